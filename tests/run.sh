@@ -1,0 +1,88 @@
+#!/usr/bin/env bash
+# Sets up, builds and tests everything: tests/run.sh
+# With arguments, which go to pytest, only the tests that they choose, and nothing else:
+#     tests/run.sh -k convolve        tests/run.sh tests/blender/test_batch.py -x
+set -uo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+export PYTHONPATH=$PWD/build/stage
+python=$PWD/build/venv/bin/python
+summary=()
+failures=0
+started=$SECONDS
+
+# step NAME COMMAND...: runs it, whatever came of the steps before, and remembers how it ended.
+step() {
+    local name=$1 begin=$SECONDS outcome=ok
+    shift
+    echo "=== $name"
+    "$@" || { outcome="FAILED ($?)"; failures=$((failures + 1)); }
+    summary+=("$(printf '%-28s %5d s  %s' "$name" $((SECONDS - begin)) "$outcome")")
+}
+
+finish() {
+    echo "=== summary"
+    printf '%s\n' "${summary[@]}"
+    echo "total $((SECONDS - started)) s, $([ $failures = 0 ] && echo "all passed" || echo "$failures FAILED")"
+    exit $((failures > 0))
+}
+
+# sanitized PRESET LIBRARY: the native smoke test in a module built with a sanitizer, whose runtime has to come first.
+sanitized() {
+    local preset=$1 runtime
+    runtime=$(c++ -print-file-name="$2")
+    tools/build.sh "$preset" || return
+    # Leaks: Python keeps much until it exits. ThreadSanitizer can't place its shadow memory everywhere: no ASLR.
+    env LD_PRELOAD="$runtime" PYTHONPATH="$PWD/build/$preset/stage" BEAMSPREAD_DLOPEN=plain PYTHONMALLOC=malloc \
+        ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 \
+        TSAN_OPTIONS=halt_on_error=1:suppressions="$PWD/tests/tsan.supp" \
+        setarch "$(uname -m)" -R "$python" tests/smoke.py
+}
+
+in_venv() { "$python" -m pytest "$@"; }
+
+in_blender() { blender -b --factory-startup --python-exit-code 1 --python tests/blender/run.py -- "$@"; }
+
+# The same tests in an official Blender, which is newer and brings libraries of its own.
+in_bpy() {
+    PYTHONPATH=$PWD/build/bpy-4.5 "$python" tests/blender/run.py -- "$@"
+}
+
+step set-up tools/setup.sh --tests
+[ $failures = 0 ] || finish
+step build tools/build.sh release
+[ $failures = 0 ] || finish
+
+if [ $# -gt 0 ]; then
+    # Paths choose the side; without any, both look for what the other arguments choose.
+    venv=() blender=() others=()
+    for argument in "$@"; do
+        case "$argument" in
+            tests/blender | tests/blender/*) blender+=("$argument") ;;
+            tests/*) venv+=("$argument") ;;
+            *) others+=("$argument") ;;
+        esac
+    done
+    # 5: nothing there was chosen, which is fine as long as the other side had something.
+    none=0
+    tolerant() {
+        local code=0
+        "$@" || code=$?
+        [ $code != 5 ] || { none=$((none + 1)); code=0; }
+        return $code
+    }
+    if [ ${#venv[@]} -gt 0 ] || [ ${#blender[@]} = 0 ]; then step "tests" tolerant in_venv "${venv[@]}" "${others[@]}"; else none=1; fi
+    if [ ${#blender[@]} -gt 0 ] || [ ${#venv[@]} = 0 ]; then step "tests in Blender" tolerant in_blender "${blender[@]}" "${others[@]}"; else none=$((none + 1)); fi
+    [ $none -lt 2 ] || step "choice of tests" false
+    finish
+fi
+
+step "format" "$python" tools/lint.py format
+step "ruff" "$python" tools/lint.py ruff
+step "clang-tidy" "$python" tools/lint.py tidy
+step "stubs" tools/stubs.sh
+step "tests" in_venv
+step "tests in Blender" in_blender
+step "tests in bpy 4.5" in_bpy
+step "address sanitizer" sanitized asan libasan.so
+step "thread sanitizer" sanitized tsan libtsan.so
+finish

@@ -1,0 +1,19 @@
+#!/usr/bin/env bash
+# Builds what changed and stages the importable package: tools/build.sh [PRESET], presets as in CMakePresets.json.
+# `release` (the default) stages into build/stage, the others into build/PRESET/stage.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+preset=${1:-release}
+
+tools/setup.sh
+
+# ninja re-runs cmake by itself when a CMake file changes, but doesn't know of the presets, the folder and the compiler.
+key=$( (pwd; c++ --version; cat CMakePresets.json) | sha256sum | cut -d' ' -f1)
+stamp=build/$preset/.configured
+if [ ! -f "build/$preset/build.ninja" ] || [ "$(cat "$stamp" 2>/dev/null)" != "$key" ]; then
+    # A cache made elsewhere or by another compiler can't be re-used.
+    rm -rf "build/$preset/CMakeCache.txt" "build/$preset/CMakeFiles"
+    cmake --preset "$preset" >&2
+    echo "$key" >"$stamp"
+fi
+exec cmake --build "build/$preset" >&2

@@ -1,0 +1,146 @@
+#!/usr/bin/env bash
+# Brings a bare Debian 12 (git, a compiler, python3) to where this repository builds, bakes and, with --tests, is tested.
+# Whatever is there already is left alone; when nothing is missing this takes a fraction of a second.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+tests=0
+for argument in "$@"; do
+    case "$argument" in
+        --tests) tests=1 ;;
+        *) echo "usage: tools/setup.sh [--tests]" >&2; exit 2 ;;
+    esac
+done
+
+packages=(g++ cmake ninja-build ccache pybind11-dev libembree-dev libtbb-dev libopenexr-dev libglm-dev libhwy-dev
+          python3 python3-dev python3-venv python3-numpy blender)
+# The X libraries are what the official bpy wheel links to; it never opens a window here.
+test_packages=(binutils libegl1 libgl1 libgomp1 libsm6 libx11-6 libxfixes3 libxi6 libxkbcommon0 libxrender1 libxxf86vm1)
+ducc_version=0.42.0
+ducc_sha256=4e11c59b53a43355b053aebb2a62ee16eebeed026575f7d216cf09d437ce52ef
+debian_python=/usr/bin/python3
+venv=build/venv
+
+say() { echo "setup: $*" >&2; }
+die() { say "$*"; exit 1; }
+
+missing_packages() {
+    command -v dpkg-query >/dev/null || { printf '%s\n' "$@"; return; }
+    # awk, not grep -v: a package that was never installed is reported on stderr and has no line at all.
+    dpkg-query -W -f '${Package} ${db:Status-Status}\n' "$@" 2>/dev/null |
+        awk -v wanted="$*" '$2 == "installed" { there[$1] = 1 }
+            END { n = split(wanted, w, " "); for (i = 1; i <= n; i++) if (!(w[i] in there)) print w[i] }'
+}
+
+install_packages() {
+    local missing as_root=()
+    mapfile -t missing < <(missing_packages "$@")
+    [ ${#missing[@]} -gt 0 ] || return 0
+    local by_hand="apt-get update && apt-get install --no-install-recommends ${missing[*]}"
+    command -v apt-get >/dev/null || die "this is not a Debian; install what corresponds to: ${missing[*]}"
+    if [ "$(id -u)" -ne 0 ]; then
+        command -v sudo >/dev/null ||
+            die "these packages are missing: ${missing[*]}
+setup: neither root nor sudo is available; run this as root, then try again:
+    $by_hand"
+        as_root=(sudo)
+        # Without a terminal nobody can type a password.
+        [ -t 0 ] || as_root=(sudo -n)
+        "${as_root[@]}" true || die "sudo was refused; these packages are missing: ${missing[*]}
+setup: run this as root, then try again:
+    $by_hand"
+    fi
+    say "installing ${missing[*]}"
+    "${as_root[@]}" apt-get -q update >&2 || say "apt-get update reported an error; going on with the lists there are"
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+        apt-get -q install -y --no-install-recommends "${missing[@]}" >&2 || die "these packages could not be installed: ${missing[*]}"
+}
+
+# make_venv REQUIREMENTS...
+# --no-deps: the files list every package, so that nothing replaces Debian's numpy.
+make_venv() {
+    if ! "$venv/bin/python" -c pass 2>/dev/null; then
+        say "making $venv"
+        rm -rf "$venv"
+        "$debian_python" -m venv --system-site-packages "$venv"
+    fi
+    say "installing Python packages into $venv"
+    local file arguments=()
+    for file in "$@"; do arguments+=(-r "$file"); done
+    "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps "${arguments[@]}" >&2
+}
+
+fetch_ducc() {
+    local folder=build/deps name="ducc0-$ducc_version" archive
+    archive=$folder/$name.tar.gz
+    [ ! -f "$folder/$name/.complete" ] || return 0
+    mkdir -p "$folder"
+    if ! echo "$ducc_sha256  $archive" | sha256sum --check --status 2>/dev/null; then
+        say "fetching the sources of $name"
+        "$venv/bin/python" -m pip download --quiet --disable-pip-version-check --no-deps --no-binary ducc0 \
+            --dest "$folder" "ducc0==$ducc_version" >&2
+        echo "$ducc_sha256  $archive" | sha256sum --check --status || die "$archive is not the file that it should be (sha256)"
+    fi
+    rm -rf "${folder:?}/$name"
+    tar -xzf "$archive" -C "$folder"
+    touch "$folder/$name/.complete"
+}
+
+# 1 GB, hence fetched once per version and kept whatever else changes.
+fetch_bpy() {
+    local folder=build/bpy-4.5
+    [ ! -f "$folder/.complete" ] || ! cmp -s "$folder/.complete" tools/requirements-bpy.txt || return 0
+    say "fetching the official Blender module into $folder (1 GB)"
+    rm -rf "$folder" "$folder.partial"
+    "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps --target "$folder.partial" \
+        -r tools/requirements-bpy.txt >&2
+    cp tools/requirements-bpy.txt "$folder.partial/.complete"
+    mv "$folder.partial" "$folder"
+}
+
+# The module is built for Debian's Python; another python3 first on PATH can import it if it is the same minor version
+# and has numpy.
+prepare_other_python() {
+    local other ours
+    other=$(python3 -c 'import importlib.util as u, sys; print("%d.%d" % sys.version_info[:2], bool(u.find_spec("numpy")))' 2>/dev/null) || return 0
+    ours=$("$debian_python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+    case "$other" in
+        "$ours True") ;;
+        "$ours False")
+            say "installing numpy for $(command -v python3)"
+            # The oldest numpy that is supported here is Debian's; 2.x needs a newer pybind11 than Debian has.
+            python3 -m pip install --quiet --disable-pip-version-check 'numpy>=1.24,<2' >&2 ||
+                say "note: $(command -v python3) has no numpy and pip could not install it: use $debian_python to import beamspread" ;;
+        *) say "note: $(command -v python3) is Python ${other% *}; the module is built for $ours: use $debian_python to import beamspread" ;;
+    esac
+}
+
+mkdir -p build/.setup
+# Two runs at a time would spoil each other's folders.
+exec 9>build/.setup/lock
+flock 9
+
+wanted=("${packages[@]}")
+inputs=(tools/setup.sh tools/requirements.txt)
+requirements=(tools/requirements.txt)
+stamp=base
+if [ "$tests" = 1 ]; then
+    wanted+=("${test_packages[@]}")
+    requirements+=(tools/requirements-tests.txt)
+    inputs+=(tools/requirements-tests.txt tools/requirements-bpy.txt)
+    stamp=tests
+fi
+install_packages "${wanted[@]}"
+
+# The folder belongs to the key because a venv can't be moved; the interpreter because an upgrade replaces it.
+key=$( (pwd; readlink -f "$debian_python"; command -v python3; cat "${inputs[@]}") | sha256sum | cut -d' ' -f1)
+if [ "$(cat build/.setup/$stamp 2>/dev/null)" = "$key" ] && [ -x "$venv/bin/python" ] &&
+    [ -f "build/deps/ducc0-$ducc_version/.complete" ] && { [ "$tests" = 0 ] || [ -f build/bpy-4.5/.complete ]; }; then
+    exit 0
+fi
+make_venv "${requirements[@]}"
+fetch_ducc
+[ "$tests" = 0 ] || fetch_bpy
+prepare_other_python
+echo "$key" >build/.setup/$stamp
+say "ready"
