@@ -1,0 +1,39 @@
+// OpenEXR images: named parts of float channels with typed attributes.
+#pragma once
+
+#include <map>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace beamspread {
+
+// Half-precision and integer numbers of foreign files arrive as float and double.
+using ExrAttribute = std::variant<std::string, double, int, std::vector<float>>;
+
+struct ExrPart {
+    std::string name;  // may be empty where the file has one part only
+    int width = 0;
+    int height = 0;
+    std::vector<std::string> channels;  // kept in this order, although the format sorts them by name
+    std::vector<float> pixels;          // height * width * channels; row 0 is the first line of the file
+    std::map<std::string, ExrAttribute> attributes;
+};
+
+// Larger images are refused in both directions: a 16384 x 16384 image of four channels just fits.
+inline constexpr int max_exr_side = 1 << 17;
+inline constexpr long long max_exr_values = 1LL << 30;
+
+// Writes the parts, ZIP-compressed, to a file beside `path` and renames it over `path` when it is whole.
+// Throws InvalidArgument if a part is inconsistent and IoError, naming the path, if it cannot be written.
+void write_exr_parts(const std::string& path, std::span<const ExrPart> parts);
+
+// Reads every part of a flat file, scan lines or tiles, half, float or unsigned channels. Throws IoError, naming the
+// path, where the file is missing, damaged, too large, deep, or has subsampled channels.
+std::vector<ExrPart> read_exr_parts(const std::string& path);
+
+// Reads the part of this name only; throws IoError if there is none.
+ExrPart read_exr_part(const std::string& path, const std::string& name);
+
+}  // namespace beamspread

@@ -1,0 +1,24 @@
+// What the reader and the writer of OpenEXR files share: attributes and the order of channels. Not for others.
+#pragma once
+
+#include <OpenEXR/ImfHeader.h>
+
+#include "image/exr.h"
+
+namespace beamspread::detail {
+
+// The attribute that keeps the order of the channels: the format itself stores them sorted by name.
+inline constexpr const char* channel_order_attribute = "channelOrder";
+
+// Attributes that describe the image itself; they are neither set from nor shown in ExrPart::attributes.
+bool is_structural_attribute(const std::string& name);
+
+void set_attributes(Imf::Header& header, const std::map<std::string, ExrAttribute>& attributes);
+std::map<std::string, ExrAttribute> get_attributes(const Imf::Header& header);
+
+void set_channels(Imf::Header& header, const std::vector<std::string>& channels);
+
+// As written by us; of foreign files R, G, B, A first within each layer, then the others by name.
+std::vector<std::string> get_channels(const Imf::Header& header);
+
+}  // namespace beamspread::detail

@@ -1,0 +1,146 @@
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfInputPart.h>
+#include <OpenEXR/ImfMultiPartInputFile.h>
+#include <OpenEXR/ImfPartType.h>
+#include <OpenEXR/ImfTileDescription.h>
+
+#include <filesystem>
+
+#include "base/error.h"
+#include "image/exr.h"
+#include "image/exr_header.h"
+
+namespace beamspread {
+
+namespace {
+
+// No deflate stream grows by more than this when it is unpacked, nor does OpenEXR's run-length code.
+constexpr long long max_inflation = 1032;
+// For the last, partly filled blocks of a tiny file.
+constexpr long long inflation_slack = 1 << 20;
+// Tiles are unpacked into a cache of one row of tiles.
+constexpr unsigned max_tile_side = 1 << 14;
+
+[[noreturn]] void fail(const std::string& reason)
+{
+    throw IoError(reason);
+}
+
+bool inflation_is_bounded(Imf::Compression compression)
+{
+    return compression == Imf::NO_COMPRESSION || compression == Imf::RLE_COMPRESSION ||
+           compression == Imf::ZIPS_COMPRESSION || compression == Imf::ZIP_COMPRESSION;
+}
+
+// Refuses, before anything of its size is allocated, a part that cannot be read or that its file cannot hold. Returns
+// how many numbers it holds.
+long long check_header(const Imf::Header& header, long long file_bytes)
+{
+    if (header.hasType() && !Imf::isImage(header.type()))
+        fail("it holds deep data, not an image");
+    const Imath::Box2i& window = header.dataWindow();
+    const long long width = 1LL + window.max.x - window.min.x;
+    const long long height = 1LL + window.max.y - window.min.y;
+    if (width < 1 || height < 1 || width > max_exr_side || height > max_exr_side)
+        fail("its size is " + std::to_string(width) + " x " + std::to_string(height));
+
+    long long pixel_bytes = 0;
+    long long channels = 0;
+    for (auto entry = header.channels().begin(); entry != header.channels().end(); ++entry) {
+        if (entry.channel().xSampling != 1 || entry.channel().ySampling != 1)
+            fail("channel '" + std::string(entry.name()) + "' is subsampled");
+        pixel_bytes += entry.channel().type == Imf::HALF ? 2 : 4;
+        ++channels;
+    }
+    if (channels == 0)
+        fail("it has no channels");
+    if (width * height > max_exr_values / channels)
+        fail("it holds more than 2^30 numbers");
+    if (inflation_is_bounded(header.compression()) &&
+        width * height * pixel_bytes > file_bytes * max_inflation + inflation_slack)
+        fail("it claims more pixels than a file of its length can hold");
+    if (header.hasTileDescription() &&
+        (header.tileDescription().xSize > max_tile_side || header.tileDescription().ySize > max_tile_side))
+        fail("its tiles are larger than " + std::to_string(max_tile_side));
+    return width * height * channels;
+}
+
+// Of a part that passed check_header.
+ExrPart read_part(Imf::MultiPartInputFile& file, int index)
+{
+    const Imf::Header& header = file.header(index);
+    const Imath::Box2i& window = header.dataWindow();
+
+    ExrPart part;
+    part.name = header.hasName() ? header.name() : "";
+    part.width = window.max.x - window.min.x + 1;
+    part.height = window.max.y - window.min.y + 1;
+    part.channels = detail::get_channels(header);
+    part.attributes = detail::get_attributes(header);
+
+    const std::size_t pixel_bytes = part.channels.size() * sizeof(float);
+    const std::size_t row_bytes = pixel_bytes * static_cast<std::size_t>(part.width);
+    part.pixels.resize(part.channels.size() * static_cast<std::size_t>(part.width) * static_cast<std::size_t>(part.height));
+    Imf::FrameBuffer buffer;
+    for (std::size_t c = 0; c < part.channels.size(); ++c)
+        buffer.insert(part.channels[c],
+                      Imf::Slice::Make(Imf::FLOAT, part.pixels.data() + c, window, pixel_bytes, row_bytes));
+    Imf::InputPart input(file, index);
+    input.setFrameBuffer(buffer);
+    input.readPixels(window.min.y, window.max.y);
+    return part;
+}
+
+// Opens the file and hands it to `read(file, file_bytes)`; whatever goes wrong becomes an IoError that names the path.
+template <class Read>
+auto with_file(const std::string& path, const Read& read)
+{
+    try {
+        std::error_code error;
+        const auto file_bytes = std::filesystem::file_size(path, error);
+        if (error)
+            fail(error.message());
+        constexpr int own_threads = 0;  // OpenEXR's thread pool is global state of the host's process
+        constexpr bool reconstruct = false;  // a truncated file is refused, not guessed at
+        Imf::MultiPartInputFile file(path.c_str(), own_threads, reconstruct);
+        return read(file, static_cast<long long>(file_bytes));
+    } catch (const std::exception& error) {
+        throw IoError("cannot read '" + path + "': " + error.what());
+    }
+}
+
+}  // namespace
+
+std::vector<ExrPart> read_exr_parts(const std::string& path)
+{
+    return with_file(path, [](Imf::MultiPartInputFile& file, long long file_bytes) {
+        long long values = 0;
+        for (int i = 0; i < file.parts(); ++i)
+            values += check_header(file.header(i), file_bytes);
+        if (values > max_exr_values)
+            fail("it holds more than 2^30 numbers");
+        std::vector<ExrPart> parts;
+        for (int i = 0; i < file.parts(); ++i)
+            parts.push_back(read_part(file, i));
+        return parts;
+    });
+}
+
+ExrPart read_exr_part(const std::string& path, const std::string& name)
+{
+    return with_file(path, [&name](Imf::MultiPartInputFile& file, long long file_bytes) {
+        std::string names;
+        for (int i = 0; i < file.parts(); ++i) {
+            const std::string part_name = file.header(i).hasName() ? file.header(i).name() : "";
+            if (part_name == name) {
+                check_header(file.header(i), file_bytes);
+                return read_part(file, i);
+            }
+            names += (i ? ", '" : "'") + part_name + "'";
+        }
+        fail("it has no part '" + name + "', only " + names);
+    });
+}
+
+}  // namespace beamspread

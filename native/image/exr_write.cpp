@@ -1,0 +1,120 @@
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfMultiPartOutputFile.h>
+#include <OpenEXR/ImfOutputPart.h>
+#include <OpenEXR/ImfPartType.h>
+
+#include <algorithm>
+#include <set>
+
+#include "base/error.h"
+#include "image/exr.h"
+#include "image/exr_header.h"
+#include "image/pending_file.h"
+
+namespace beamspread {
+
+namespace {
+
+// The format's limit for the names of channels and attributes.
+constexpr std::size_t max_name_length = 255;
+
+void check_name(const std::string& argument, const std::string& name)
+{
+    if (name.empty() || name.size() > max_name_length || name.find('\0') != std::string::npos)
+        reject(argument, "'" + name + "'", "1 to 255 characters");
+}
+
+void check_part(const ExrPart& part)
+{
+    if (part.width < 1 || part.width > max_exr_side)
+        reject("width", part.width, "1 to " + std::to_string(max_exr_side) + " texels");
+    if (part.height < 1 || part.height > max_exr_side)
+        reject("height", part.height, "1 to " + std::to_string(max_exr_side) + " texels");
+    if (part.channels.empty())
+        reject("channels", "empty", "at least one name");
+    for (const std::string& channel : part.channels)
+        check_name("channels", channel);
+    if (std::set<std::string>(part.channels.begin(), part.channels.end()).size() != part.channels.size())
+        reject("channels", "a list with equal names", "names that differ");
+
+    const std::size_t values =
+        static_cast<std::size_t>(part.width) * static_cast<std::size_t>(part.height) * part.channels.size();
+    if (values > static_cast<std::size_t>(max_exr_values))
+        reject("pixels", static_cast<double>(values), "at most 2^30 numbers");
+    if (part.pixels.size() != values)
+        reject("pixels", std::to_string(part.pixels.size()) + " numbers", std::to_string(values) + ", height * width * channels");
+
+    for (const auto& [name, value] : part.attributes) {
+        check_name("attributes", name);
+        if (detail::is_structural_attribute(name))
+            reject("attributes", "'" + name + "'", "names that OpenEXR does not use itself");
+    }
+}
+
+void check_parts(std::span<const ExrPart> parts)
+{
+    if (parts.empty())
+        reject("parts", "empty", "at least one part");
+    std::set<std::string> names;
+    for (const ExrPart& part : parts) {
+        check_part(part);
+        if (parts.size() > 1)
+            check_name("name", part.name);
+        if (!names.insert(part.name).second)
+            reject("name", "'" + part.name + "' twice", "part names that differ");
+    }
+}
+
+Imf::Header make_header(const ExrPart& part, const Imath::Box2i& display_window)
+{
+    const Imath::Box2i data_window({0, 0}, {part.width - 1, part.height - 1});
+    Imf::Header header(display_window, data_window);
+    header.compression() = Imf::ZIP_COMPRESSION;
+    header.setType(Imf::SCANLINEIMAGE);
+    if (!part.name.empty())
+        header.setName(part.name);
+    detail::set_channels(header, part.channels);
+    detail::set_attributes(header, part.attributes);
+    return header;
+}
+
+void write_pixels(Imf::OutputPart&& output, const ExrPart& part)
+{
+    const std::size_t pixel_bytes = part.channels.size() * sizeof(float);
+    const std::size_t row_bytes = pixel_bytes * static_cast<std::size_t>(part.width);
+    Imf::FrameBuffer buffer;
+    for (std::size_t c = 0; c < part.channels.size(); ++c)
+        buffer.insert(part.channels[c], Imf::Slice::Make(Imf::FLOAT, part.pixels.data() + c, output.header().dataWindow(),
+                                                         pixel_bytes, row_bytes));
+    output.setFrameBuffer(buffer);
+    output.writePixels(part.height);
+}
+
+}  // namespace
+
+void write_exr_parts(const std::string& path, std::span<const ExrPart> parts)
+{
+    check_parts(parts);
+    PendingFile file(path);
+
+    // The format wants one display window for all parts.
+    Imath::Box2i display_window({0, 0}, {0, 0});
+    for (const ExrPart& part : parts)
+        display_window.extendBy(Imath::V2i(part.width - 1, part.height - 1));
+    std::vector<Imf::Header> headers;
+    for (const ExrPart& part : parts)
+        headers.push_back(make_header(part, display_window));
+
+    constexpr int own_threads = 0;  // OpenEXR's thread pool is global state of the host's process
+    try {
+        Imf::MultiPartOutputFile output(file.path().c_str(), headers.data(), static_cast<int>(headers.size()), false,
+                                        own_threads);
+        for (std::size_t i = 0; i < parts.size(); ++i)
+            write_pixels(Imf::OutputPart(output, static_cast<int>(i)), parts[i]);
+    } catch (const std::exception& error) {
+        throw IoError("cannot write '" + path + "': " + error.what());
+    }
+    file.commit();
+}
+
+}  // namespace beamspread

@@ -1,0 +1,152 @@
+// Python names of native/image: write_exr, read_exr.
+#include "image/exr.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "base/error.h"
+#include "python/casters.h"
+
+namespace beamspread {
+
+namespace {
+
+using FloatArray = py::array_t<float, py::array::c_style>;
+
+ExrAttribute to_attribute(const std::string& name, const py::handle& value)
+{
+    if (py::isinstance<py::str>(value))
+        return py::cast<std::string>(value);
+    if (py::isinstance<py::int_>(value))
+        return py::cast<int>(value);
+    if (py::isinstance<py::float_>(value))
+        return py::cast<double>(value);
+    if (py::isinstance<py::sequence>(value))
+        return py::cast<std::vector<float>>(value);
+    reject("attributes", "'" + name + "' of type " + std::string(py::str(py::type::of(value).attr("__name__"))),
+           "str, int, float or a sequence of numbers");
+}
+
+std::map<std::string, ExrAttribute> to_attributes(const py::dict& attributes)
+{
+    std::map<std::string, ExrAttribute> result;
+    for (const auto& [key, value] : attributes) {
+        const auto name = std::string(py::str(key));
+        try {
+            result.emplace(name, to_attribute(name, value));
+        } catch (const py::cast_error&) {
+            reject("attributes", "'" + name + "': " + std::string(py::repr(value)), "an int of 32 bits or numbers");
+        }
+    }
+    return result;
+}
+
+// The arrays' rows go up, the file's lines down.
+void flip_rows(const float* from, float* to, std::size_t height, std::size_t row_values)
+{
+    for (std::size_t y = 0; y < height; ++y)
+        std::copy_n(from + y * row_values, row_values, to + (height - 1 - y) * row_values);
+}
+
+void write_exr(const std::string& path, const py::array& array, const std::vector<std::string>& channels,
+               const py::dict& attributes)
+{
+    if (!py::isinstance<FloatArray>(array) || array.ndim() != 3)
+        reject("array", std::string(py::str(array.dtype())) + " of " + std::to_string(array.ndim()) + " dimensions",
+               "contiguous float32 (H, W, C)");
+    if (array.shape(2) != static_cast<py::ssize_t>(channels.size()))
+        reject("array", std::to_string(array.shape(2)) + " channels",
+               "as many as names in channels, " + std::to_string(channels.size()));
+    if (array.shape(0) > max_exr_side || array.shape(1) > max_exr_side)
+        reject("array", static_cast<double>(std::max(array.shape(0), array.shape(1))),
+               "sides of up to " + std::to_string(max_exr_side) + " texels");
+
+    ExrPart part;
+    part.height = static_cast<int>(array.shape(0));
+    part.width = static_cast<int>(array.shape(1));
+    part.channels = channels;
+    part.attributes = to_attributes(attributes);
+    const auto* pixels = static_cast<const float*>(array.data());
+    const auto height = static_cast<std::size_t>(part.height);
+    const std::size_t row_values = static_cast<std::size_t>(part.width) * channels.size();
+
+    const py::gil_scoped_release released;
+    part.pixels.resize(height * row_values);
+    flip_rows(pixels, part.pixels.data(), height, row_values);
+    write_exr_parts(path, {&part, 1});
+}
+
+py::tuple read_exr(const std::string& path, const std::optional<std::string>& part_name)
+{
+    ExrPart part;
+    {
+        const py::gil_scoped_release released;
+        if (part_name) {
+            part = read_exr_part(path, *part_name);
+        } else {
+            std::vector<ExrPart> parts = read_exr_parts(path);
+            if (parts.size() != 1)
+                throw IoError("cannot read '" + path + "': it has " + std::to_string(parts.size()) +
+                              " parts; name one of them");
+            part = std::move(parts[0]);
+        }
+    }
+    FloatArray array({static_cast<py::ssize_t>(part.height), static_cast<py::ssize_t>(part.width),
+                      static_cast<py::ssize_t>(part.channels.size())});
+    flip_rows(part.pixels.data(), array.mutable_data(), static_cast<std::size_t>(part.height),
+              static_cast<std::size_t>(part.width) * part.channels.size());
+    return py::make_tuple(array, part.channels, part.attributes);
+}
+
+}  // namespace
+
+void bind_image(py::module_& m)
+{
+    m.def("write_exr", &write_exr, py::arg("path"), py::arg("array"), py::arg("channels"),
+          py::arg("attributes") = py::dict(), R"(Write an OpenEXR file of 32-bit float channels, ZIP-compressed.
+
+The file is written beside `path` and takes its name when it is whole.
+
+Parameters
+----------
+path : str
+    A file that exists is replaced, unless it is read-only.
+array : ndarray, float32, shape (H, W, C), C-contiguous
+    Rows from the bottom up, as Blender stores images; the file gets them from the top down.
+channels : sequence of str
+    C names, such as ["R", "G", "B"].
+attributes : dict, optional
+    Header attributes: str, int, float, or a sequence of numbers (stored as 32-bit floats).
+
+Raises
+------
+ValueError
+    An argument is of the wrong shape, dtype or range.
+OSError
+    The file cannot be written.
+)");
+    m.def("read_exr", &read_exr, py::arg("path"), py::arg("part") = py::none(), R"(Read one part of an OpenEXR file.
+
+Parameters
+----------
+path : str
+part : str, optional
+    The part's name; may be left out where the file has one part only.
+
+Returns
+-------
+array : ndarray, float32, shape (H, W, C)
+    Rows from the bottom up. Half and integer channels are converted.
+channels : list of str
+    The names of the C channels: in the order in which `write_exr` got them, or R, G, B, A first.
+attributes : dict
+    Header attributes of type str, int, float and list of float; those that describe the image itself are left out.
+
+Raises
+------
+OSError
+    The file is missing, damaged or larger than 2^30 numbers, has deep data or subsampled channels, or no such part.
+)");
+}
+
+}  // namespace beamspread

@@ -1,0 +1,173 @@
+#include "scene/coverage.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "base/threads.h"
+
+namespace beamspread {
+
+namespace {
+
+// Rows that are worked on together; also the unit of work of a thread.
+constexpr std::size_t rows_per_band = 64;
+
+// Signed area by Green's theorem: each edge adds, to every texel right of it, the height by which it crosses the
+// texel's row. Stored as differences along the row, so that an edge touches only the texels that it passes through and
+// one running sum at the end gives the covered part.
+class Band {
+public:
+    Band(std::size_t first_row, std::size_t rows, std::size_t width)
+        : m_bottom(static_cast<double>(first_row)),
+          m_rows(static_cast<double>(rows)),
+          m_width(static_cast<double>(width)),
+          m_stride(width + 1),
+          m_difference(rows * m_stride, 0.0)
+    {
+    }
+
+    // An edge in texels of the grid.
+    void add_edge(Vec2 from, Vec2 to, double sign)
+    {
+        from.y -= m_bottom;
+        to.y -= m_bottom;
+        if (from.y > to.y) {
+            std::swap(from, to);
+            sign = -sign;
+        }
+        const double begin = std::max(from.y, 0.0);
+        const double end = std::min(to.y, m_rows);
+        if (!(begin < end))
+            return;
+        const double slope = (to.x - from.x) / (to.y - from.y);
+        const auto x_at = [&](double y) { return from.x + (y - from.y) * slope; };
+        for (double y = begin; y < end;) {
+            const double row = std::floor(y);
+            const double next = std::min(row + 1.0, end);
+            add_in_row(static_cast<std::size_t>(row), x_at(y), x_at(next), sign * (next - y));
+            y = next;
+        }
+    }
+
+    void sum_row(std::size_t row, float* coverage) const
+    {
+        const double* difference = &m_difference[row * m_stride];
+        double covered = 0.0;
+        for (std::size_t x = 0; x + 1 < m_stride; ++x) {
+            covered += difference[x];
+            coverage[x] = static_cast<float>(std::clamp(covered, 0.0, 1.0));
+        }
+    }
+
+private:
+    // A piece of an edge within one row, from x0 to x1 while it rises by `height`, cut at the borders of texels.
+    void add_in_row(std::size_t row, double x0, double x1, double height)
+    {
+        if (x0 > x1)
+            std::swap(x0, x1);  // only where it passes counts, not which way it leans
+        double* difference = &m_difference[row * m_stride];
+        const double width = x1 - x0;
+        const auto share = [&](double a, double b) { return width > 0.0 ? height * ((b - a) / width) : height; };
+
+        // Left of the grid: all of the row is to its right. Right of it: nothing is.
+        if (x0 < 0.0)
+            difference[0] += share(x0, std::min(x1, 0.0));
+        const double begin = std::clamp(x0, 0.0, m_width);
+        const double end = std::clamp(x1, 0.0, m_width);
+        if (width == 0.0) {
+            if (x0 >= 0.0 && x0 < m_width)
+                add_in_texel(difference, begin, begin, height);
+            return;
+        }
+        for (double x = begin; x < end;) {
+            const double next = std::min(std::floor(x) + 1.0, end);
+            add_in_texel(difference, x, next, share(x, next));
+            x = next;
+        }
+    }
+
+    // Of the texel itself the part right of the edge is covered, of all further ones the whole.
+    static void add_in_texel(double* difference, double x0, double x1, double height)
+    {
+        const double left = std::floor(x0);
+        const double part_left = 0.5 * (x0 + x1) - left;
+        const auto texel = static_cast<std::size_t>(left);
+        difference[texel] += height * (1.0 - part_left);
+        difference[texel + 1] += height * part_left;
+    }
+
+    double m_bottom;
+    double m_rows;
+    double m_width;
+    std::size_t m_stride;
+    std::vector<double> m_difference;
+};
+
+struct Polygon {
+    std::span<const Vec2> corners;
+    double sign;  // makes its covered area positive
+    double bottom;
+    double top;
+};
+
+// Twice the signed area, positive where the corners run anticlockwise.
+double signed_area(std::span<const Vec2> corners)
+{
+    double sum = 0.0;
+    for (std::size_t i = 1; i + 1 < corners.size(); ++i) {
+        const Vec2 a = corners[i] - corners[0];
+        const Vec2 b = corners[i + 1] - corners[0];
+        sum += a.x * b.y - a.y * b.x;
+    }
+    return sum;
+}
+
+std::vector<Polygon> split(std::span<const Vec2> corners, std::span<const std::uint32_t> corner_counts)
+{
+    for (const Vec2& corner : corners) {
+        if (!std::isfinite(corner.x) || !std::isfinite(corner.y))
+            reject("corners", "not finite", "finite positions in texels");
+    }
+    std::vector<Polygon> polygons;
+    std::size_t first = 0;
+    for (const std::uint32_t count : corner_counts) {
+        if (count < 3 || count > corners.size() - first)
+            reject("corner_counts", std::to_string(count), "3 or more, their sum the number of corners");
+        const std::span<const Vec2> own = corners.subspan(first, count);
+        const auto [low, high] = std::minmax_element(own.begin(), own.end(),
+                                                     [](const Vec2& a, const Vec2& b) { return a.y < b.y; });
+        // An edge that rises has the inside on its left where corners run anticlockwise, and on its right it counts.
+        polygons.push_back({own, signed_area(own) > 0.0 ? -1.0 : 1.0, low->y, high->y});
+        first += count;
+    }
+    if (first != corners.size())
+        reject("corner_counts", "a sum of " + std::to_string(first), "the number of corners, " + std::to_string(corners.size()));
+    return polygons;
+}
+
+}  // namespace
+
+void compute_coverage(std::span<const Vec2> corners, std::span<const std::uint32_t> corner_counts, int threads,
+                      const View2D<float>& coverage)
+{
+    const std::vector<Polygon> polygons = split(corners, corner_counts);
+    const std::size_t bands = (coverage.height + rows_per_band - 1) / rows_per_band;
+    parallel_for(bands, threads, [&](std::size_t index) {
+        const std::size_t first = index * rows_per_band;
+        const std::size_t rows = std::min(rows_per_band, coverage.height - first);
+        Band band(first, rows, coverage.width);
+        for (const Polygon& polygon : polygons) {
+            if (polygon.top <= static_cast<double>(first) || polygon.bottom >= static_cast<double>(first + rows))
+                continue;
+            for (std::size_t i = 0; i < polygon.corners.size(); ++i)
+                band.add_edge(polygon.corners[i], polygon.corners[(i + 1) % polygon.corners.size()], polygon.sign);
+        }
+        for (std::size_t row = 0; row < rows; ++row)
+            band.sum_row(row, coverage.row(first + row));
+    });
+}
+
+}  // namespace beamspread

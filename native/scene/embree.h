@@ -1,0 +1,24 @@
+// Embree behind one header: handles that release themselves. Only occluders.cpp includes it.
+#pragma once
+
+#include <embree3/rtcore.h>
+
+#include <memory>
+#include <type_traits>
+
+namespace beamspread::embree {
+
+struct Release {
+    void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+    void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+    void operator()(RTCGeometry geometry) const { rtcReleaseGeometry(geometry); }
+};
+
+using Device = std::unique_ptr<std::remove_pointer_t<RTCDevice>, Release>;
+using Scene = std::unique_ptr<std::remove_pointer_t<RTCScene>, Release>;
+using Geometry = std::unique_ptr<std::remove_pointer_t<RTCGeometry>, Release>;
+
+// Throws std::runtime_error with the device's pending error, if it has one.
+void check(RTCDevice device);
+
+}  // namespace beamspread::embree

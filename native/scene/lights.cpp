@@ -1,0 +1,96 @@
+#include "scene/lights.h"
+
+#include <glm/matrix.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "base/constants.h"
+#include "base/error.h"
+#include "scene/checks.h"
+
+namespace beamspread {
+
+using detail::is_finite;
+using detail::to_text;
+
+namespace {
+
+double smoothstep(double t)
+{
+    t = std::clamp(t, 0.0, 1.0);
+    return t * t * (3.0 - 2.0 * t);
+}
+
+}  // namespace
+
+SunLight::SunLight(const Vec3& direction) : m_travel(glm::normalize(direction))
+{
+    if (!is_finite(m_travel))
+        reject("direction", to_text(direction), "a finite vector that is not 0");
+}
+
+Arrival SunLight::at(const Vec3&) const
+{
+    return {.travel = m_travel, .flux = 1.0};
+}
+
+PointLight::PointLight(const Vec3& position) : m_position(position)
+{
+    if (!is_finite(position))
+        reject("position", to_text(position), "finite coordinates in metres");
+}
+
+Arrival PointLight::at(const Vec3& point) const
+{
+    const Vec3 way = point - m_position;
+    const double distance = glm::length(way);
+    // In the lamp itself light has no direction: none arrives.
+    if (distance == 0.0)
+        return {};
+    return {.travel = way / distance, .flux = 1.0 / (4.0 * pi * distance * distance), .distance = distance};
+}
+
+SpotLight::SpotLight(const Vec3& position, const Mat3& lamp_to_world, double spot_size, double blend,
+                     SpotFalloff falloff)
+    : m_point(position),
+      m_world_to_lamp(glm::inverse(lamp_to_world)),
+      m_cos_half_size(std::cos(0.5 * spot_size)),
+      m_smooth((1.0 - m_cos_half_size) * blend),
+      m_falloff(falloff)
+{
+    if (!(spot_size > 0.0 && spot_size <= pi))
+        reject("spot_size", spot_size, "0 < spot_size <= pi, the full angle in radians");
+    if (!(blend >= 0.0 && blend <= 1.0))
+        reject("blend", blend, "0 to 1");
+    for (int i = 0; i < 3; ++i) {
+        if (!is_finite(m_world_to_lamp[i]))
+            reject("frame", "singular or not finite", "three axes that span space");
+    }
+    if (falloff == SpotFalloff::legacy) {
+        // Only the last row is used: minus the cosine to the lamp's own z axis.
+        const Vec3 z = glm::normalize(lamp_to_world[2]);
+        m_world_to_lamp = glm::transpose(Mat3(Vec3(0.0), Vec3(0.0), z));
+    }
+}
+
+Arrival SpotLight::at(const Vec3& point) const
+{
+    Arrival arrival = m_point.at(point);
+    arrival.flux *= falloff(arrival.travel);
+    return arrival;
+}
+
+double SpotLight::falloff(const Vec3& travel) const
+{
+    const Vec3 local = m_world_to_lamp * travel;
+    const double cos_theta = m_falloff == SpotFalloff::scaled ? -local.z / glm::length(local) : -local.z;
+    // Also leaves where `travel` is 0 and the cosine is not a number.
+    if (!(cos_theta > m_cos_half_size))
+        return 0.0;
+    const double border = m_smooth > 0.0 ? smoothstep((cos_theta - m_cos_half_size) / m_smooth) : 1.0;
+    return m_falloff == SpotFalloff::scaled ? border : border * cos_theta;
+}
+
+}  // namespace beamspread

@@ -1,0 +1,114 @@
+#include "scene/occluders.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "base/error.h"
+#include "scene/embree.h"
+
+namespace beamspread {
+
+namespace embree {
+
+void check(RTCDevice device)
+{
+    if (const RTCError error = rtcGetDeviceError(device); error != RTC_ERROR_NONE)
+        throw std::runtime_error("Embree failed with error " + std::to_string(static_cast<int>(error)));
+}
+
+}  // namespace embree
+
+namespace {
+
+// Embree's hits are undefined beyond this: products of coordinates overflow single precision.
+constexpr float max_coordinate = 1e18f;
+
+void check_arrays(std::span<const float> vertices, std::span<const std::uint32_t> triangles)
+{
+    if (vertices.size() % 3 != 0)
+        reject("vertices", std::to_string(vertices.size()) + " numbers", "three per vertex");
+    if (triangles.size() % 3 != 0)
+        reject("triangles", std::to_string(triangles.size()) + " indices", "three per triangle");
+    for (const float coordinate : vertices) {
+        if (!(std::abs(coordinate) < max_coordinate))
+            reject("vertices", static_cast<double>(coordinate), "finite coordinates below 1e18 m");
+    }
+    const std::size_t count = vertices.size() / 3;
+    for (const std::uint32_t index : triangles) {
+        if (index >= count)
+            reject("triangles", std::to_string(index), "indices below the number of vertices, " + std::to_string(count));
+    }
+}
+
+// Copies `values` into a new buffer of Embree's, which pads it as its vector loads need.
+template <class T>
+void set_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::span<const T> values)
+{
+    void* buffer = rtcSetNewGeometryBuffer(geometry, type, 0, format, 3 * sizeof(T), values.size() / 3);
+    if (!buffer)
+        throw std::bad_alloc();
+    std::copy(values.begin(), values.end(), static_cast<T*>(buffer));
+}
+
+}  // namespace
+
+struct Occluders::Hierarchy {
+    embree::Device device;
+    embree::Scene scene;
+};
+
+Occluders::Occluders(std::span<const float> vertices, std::span<const std::uint32_t> triangles)
+    : m_triangle_count(triangles.size() / 3)
+{
+    check_arrays(vertices, triangles);
+    for (const float coordinate : vertices)
+        m_reach = std::max(m_reach, static_cast<double>(std::abs(coordinate)));
+    if (triangles.empty())
+        return;
+
+    m_hierarchy = std::make_unique<Hierarchy>();
+    // The user's own .embree3 files must not change what is baked.
+    m_hierarchy->device.reset(rtcNewDevice("ignore_config_files=1"));
+    RTCDevice device = m_hierarchy->device.get();
+    if (!device)
+        embree::check(nullptr);
+    m_hierarchy->scene.reset(rtcNewScene(device));
+    RTCScene scene = m_hierarchy->scene.get();
+    // Robust: no light leaks through the shared edges of triangles.
+    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+    const embree::Geometry geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
+    set_buffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, vertices);
+    set_buffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, triangles);
+    rtcCommitGeometry(geometry.get());
+    rtcAttachGeometry(scene, geometry.get());
+    rtcCommitScene(scene);
+    embree::check(device);
+}
+
+Occluders::~Occluders() = default;
+
+bool Occluders::blocks(const Vec3& origin, const Vec3& direction, double distance) const
+{
+    if (!m_hierarchy)
+        return false;
+    const Vec3f from(origin);
+    const Vec3f along(direction);
+    RTCRay ray{};
+    ray.org_x = from.x;
+    ray.org_y = from.y;
+    ray.org_z = from.z;
+    ray.dir_x = along.x;
+    ray.dir_y = along.y;
+    ray.dir_z = along.z;
+    ray.tfar = static_cast<float>(distance);
+    ray.mask = ~0u;
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcOccluded1(m_hierarchy->scene.get(), &context, &ray);
+    // Embree marks a blocked ray so.
+    return ray.tfar < 0.0f;
+}
+
+}  // namespace beamspread

@@ -1,0 +1,76 @@
+#include "scene/receiver.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "base/error.h"
+#include "scene/checks.h"
+
+namespace beamspread {
+
+using detail::is_finite;
+using detail::to_text;
+
+namespace {
+
+// Axes come from object matrices in single precision; a larger error would change lengths visibly.
+constexpr double axis_tolerance = 1e-4;
+
+// The largest texture side that Blender's own images allow.
+constexpr std::size_t max_side = 1u << 16;
+
+void check_unit(const std::string& name, const Vec3& axis)
+{
+    if (!(std::abs(glm::length(axis) - 1.0) <= axis_tolerance))
+        reject(name, to_text(axis), "a unit vector");
+}
+
+void check_perpendicular(const std::string& name, const Vec3& axis, const Vec3& other)
+{
+    if (std::abs(glm::dot(axis, other)) > axis_tolerance)
+        reject(name, to_text(axis), "a vector at right angles to the other axes");
+}
+
+void check_pitch(const std::string& name, double pitch)
+{
+    if (!(pitch > 0.0) || !std::isfinite(pitch))
+        reject(name, pitch, "a finite length > 0 in metres");
+}
+
+void check_side(const std::string& name, std::size_t side)
+{
+    if (side < 1 || side > max_side)
+        reject(name, std::to_string(side), "1 to " + std::to_string(max_side) + " texels");
+}
+
+}  // namespace
+
+double ReceiverGrid::reach() const
+{
+    const double w = static_cast<double>(width);
+    const double h = static_cast<double>(height);
+    double largest = 0.0;
+    for (const Vec3& corner : {point(0, 0), point(w, 0), point(0, h), point(w, h)})
+        largest = std::max({largest, std::abs(corner.x), std::abs(corner.y), std::abs(corner.z)});
+    return largest;
+}
+
+void ReceiverGrid::check() const
+{
+    if (!is_finite(origin))
+        reject("origin", to_text(origin), "finite coordinates in metres");
+    check_unit("x_axis", x_axis);
+    check_unit("y_axis", y_axis);
+    check_unit("normal", normal);
+    check_perpendicular("y_axis", y_axis, x_axis);
+    check_perpendicular("normal", normal, x_axis);
+    check_perpendicular("normal", normal, y_axis);
+    check_pitch("pitch_x", pitch_x);
+    check_pitch("pitch_y", pitch_y);
+    check_side("width", width);
+    check_side("height", height);
+}
+
+}  // namespace beamspread

@@ -1,0 +1,38 @@
+// The plane that receives light, divided into texels.
+#pragma once
+
+#include <cstddef>
+
+#include "base/vec.h"
+
+namespace beamspread {
+
+// Texel (0, 0) is at the outer corner `origin`; x runs along a row of texels, y up the plane from row to row. The axes
+// are unit vectors at right angles; x, y, normal may be left-handed: a mirrored texture.
+struct ReceiverGrid {
+    Vec3 origin{};  // world, metres
+    Vec3 x_axis{};
+    Vec3 y_axis{};
+    Vec3 normal{};         // towards the side that is lit
+    double pitch_x = 0.0;  // metres per texel
+    double pitch_y = 0.0;
+    std::size_t width = 0;
+    std::size_t height = 0;
+
+    // World position of (x, y) in texels.
+    Vec3 point(double x, double y) const { return origin + x_axis * (x * pitch_x) + y_axis * (y * pitch_y); }
+
+    // A world direction in the plane frame.
+    Vec3 to_plane(const Vec3& direction) const
+    {
+        return {glm::dot(direction, x_axis), glm::dot(direction, y_axis), glm::dot(direction, normal)};
+    }
+
+    // The largest absolute coordinate: what the rounding of its world positions scales with.
+    double reach() const;
+
+    // Throws InvalidArgument naming the first field that is out of range.
+    void check() const;
+};
+
+}  // namespace beamspread
