@@ -1,0 +1,51 @@
+#include "base/progress.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "base/error.h"
+
+namespace beamspread {
+
+namespace {
+// Often enough for a smooth bar and a prompt Esc, rare enough that the host's interpreter costs nothing.
+constexpr std::chrono::milliseconds report_interval{50};
+}  // namespace
+
+Progress::Progress(Callback callback) : m_callback(std::move(callback)), m_owner(std::this_thread::get_id()) {}
+
+void Progress::set_total(double total)
+{
+    m_total = total;
+    m_done = 0.0;
+    report(0.0);
+}
+
+void Progress::advance(double work)
+{
+    const double done = m_done.fetch_add(work) + work;
+    if (m_cancelled)
+        throw Cancelled();
+    if (std::this_thread::get_id() != m_owner)
+        return;
+    if (std::chrono::steady_clock::now() - m_last_report >= report_interval)
+        report(std::clamp(done / m_total, 0.0, 1.0));
+}
+
+void Progress::finish()
+{
+    report(1.0);
+}
+
+void Progress::report(double fraction)
+{
+    if (!m_callback)
+        return;
+    m_last_report = std::chrono::steady_clock::now();
+    if (!m_callback(fraction))
+        m_cancelled = true;
+    if (m_cancelled)
+        throw Cancelled();
+}
+
+}  // namespace beamspread

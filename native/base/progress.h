@@ -1,0 +1,42 @@
+// Progress and cancellation of long work.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <thread>
+
+namespace beamspread {
+
+// Counts finished work from any thread and reports its fraction through a callback on the thread
+// that made the object; a callback that returns false makes every later `advance` throw Cancelled.
+class Progress {
+public:
+    using Callback = std::function<bool(double)>;
+
+    // Without a callback nothing is reported, and nothing can be cancelled.
+    explicit Progress(Callback callback = {});
+    Progress(const Progress&) = delete;
+    Progress& operator=(const Progress&) = delete;
+
+    // Starts a job of `total` units of work (> 0) and reports 0; throws Cancelled.
+    void set_total(double total);
+
+    // Adds finished work; throws Cancelled.
+    void advance(double work);
+
+    // Reports 1; throws Cancelled.
+    void finish();
+
+private:
+    void report(double fraction);
+
+    Callback m_callback;
+    std::thread::id m_owner;
+    double m_total = 1.0;
+    std::atomic<double> m_done{0.0};
+    std::atomic<bool> m_cancelled{false};
+    std::chrono::steady_clock::time_point m_last_report{};
+};
+
+}  // namespace beamspread

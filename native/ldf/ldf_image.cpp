@@ -1,0 +1,58 @@
+#include "ldf/ldf_image.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "ldf/texel_integral.h"
+
+namespace beamspread {
+
+namespace {
+
+// Adds a delta function at (u, 0), shared by the texels whose border it lies on.
+void add_delta(std::vector<double>& texels, std::size_t size, double pitch, const BallisticExit& delta)
+{
+    const double half = 0.5 * static_cast<double>(size);
+    const double column = delta.u / pitch + half;
+    const double nearest_border = std::round(column);
+    const bool on_border = std::abs(column - nearest_border) < 1e-9 * half;
+    const double left = on_border ? nearest_border - 1.0 : std::floor(column);
+    const double right = on_border ? nearest_border : left;
+    const std::size_t above = size / 2;
+    const std::size_t below = size % 2 == 0 ? above - 1 : above;
+    for (double c : {left, right}) {
+        if (c < 0.0 || c >= static_cast<double>(size))
+            continue;
+        for (std::size_t row : {below, above})
+            texels[row * size + static_cast<std::size_t>(c)] += 0.25 * delta.power;
+    }
+}
+
+}  // namespace
+
+std::vector<float> ldf_image(const LdfLibrary& library, double angle_deg, double albedo, std::size_t size, double pitch,
+                             Side side)
+{
+    if (size < 1 || size > 16384)
+        reject("size", static_cast<double>(size), "1 <= size <= 16384 texels");
+    if (!(pitch > 0.0 && std::isfinite(pitch)))
+        reject("pitch", pitch, "pitch > 0 mean free paths");
+    const RadialProfile profile = library.profile(angle_deg, albedo, side);
+    const double corner = -0.5 * static_cast<double>(size) * pitch;
+    const TexelIntegrals integrals =
+        integrate_texels(profile, {corner - profile.centre(), corner, pitch, pitch, size, size});
+    const std::size_t count = size * size;
+    std::vector<double> texels(count, 0.0);
+    for (std::size_t m = 0; m < harmonic_count; ++m)
+        for (std::size_t i = 0; i < count; ++i)
+            texels[i] += integrals.cosine[m * count + i];
+    for (const BallisticExit& delta : library.ballistic(angle_deg, side))
+        add_delta(texels, size, pitch, delta);
+    std::vector<float> image(count);
+    std::transform(texels.begin(), texels.end(), image.begin(),
+                   [area = pitch * pitch](double x) { return static_cast<float>(x / area); });
+    return image;
+}
+
+}  // namespace beamspread

@@ -1,0 +1,16 @@
+// An LDF as an image of texel means.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "ldf/library.h"
+
+namespace beamspread {
+
+// Mean exitance of each texel per unit incident power, in 1/mfp^2: size x size texels of side `pitch` mean
+// free paths, rows v upward, columns u, O at the centre of the image. Throws InvalidArgument.
+std::vector<float> ldf_image(const LdfLibrary& library, double angle_deg, double albedo, std::size_t size, double pitch,
+                             Side side);
+
+}  // namespace beamspread

@@ -1,0 +1,222 @@
+#include "ldf/library.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <utility>
+
+#include "base/constants.h"
+#include "base/error.h"
+#include "medium/fresnel.h"
+
+namespace beamspread {
+
+namespace {
+
+// Beyond the last simulated angle, if that is at least this close to grazing, its distribution is
+// used with the exact Fresnel factor.
+constexpr double grazing_deg = 88.0;
+
+// Weight of each order bin at an albedo: the mean of albedo^n over the bin, from the mean and variance of its orders.
+std::array<double, order_bin_count> order_weights(const SideResult& side, double albedo)
+{
+    std::array<double, order_bin_count> weights{};
+    if (albedo <= 0.0)
+        return weights;
+    const double log_albedo = std::log(albedo);
+    for (std::size_t b = 1; b < order_bin_count; ++b)
+        weights[b] = std::exp(log_albedo * (static_cast<double>(side.mean_order[b]) +
+                                            0.5 * log_albedo * static_cast<double>(side.order_variance[b])));
+    return weights;
+}
+
+RadialProfile contract_orders(const SideResult& side, double albedo, bool normal_incidence)
+{
+    const auto weights = order_weights(side, albedo);
+    std::vector<double> sums(radius_bin_count * harmonic_count, 0.0);
+    for (std::size_t b = 0; b < order_bin_count; ++b) {
+        if (weights[b] == 0.0)
+            continue;
+        const float* moments = side.moments.data() + b * sums.size();
+        for (std::size_t i = 0; i < sums.size(); ++i)
+            sums[i] += weights[b] * static_cast<double>(moments[i]);
+    }
+    if (normal_incidence)  // rotational symmetry: what the higher harmonics hold is noise
+        for (std::size_t i = 0; i < sums.size(); ++i)
+            if (i % harmonic_count != 0)
+                sums[i] = 0.0;
+    return RadialProfile(side.centre, sums);
+}
+
+}  // namespace
+
+void check_albedo(double albedo)
+{
+    if (!(albedo >= 0.0 && albedo < 1.0))
+        reject("albedo", albedo, "0 <= albedo < 1");
+}
+
+LdfLibrary::LdfLibrary(const Medium& medium, std::uint64_t photons, std::uint64_t seed, std::vector<AngleResult> results)
+    : m_medium(medium), m_photons(photons), m_seed(seed), m_results(std::move(results))
+{
+    validate(medium);
+    if (m_results.empty())
+        reject("angles", "empty", "at least one angle");
+    std::sort(m_results.begin(), m_results.end(),
+              [](const AngleResult& a, const AngleResult& b) { return a.angle_deg < b.angle_deg; });
+    std::vector<double> nodes;
+    for (const AngleResult& result : m_results) {
+        const double node = refracted_angle(result.angle_deg * radians_per_degree, medium.ior);
+        // Closer nodes would only amplify the simulation's noise.
+        if (!nodes.empty() && !(node - nodes.back() > 1e-3))
+            reject("angles", result.angle_deg, "distinct angles, at least 0.1 degrees apart");
+        nodes.push_back(node);
+    }
+    m_spline = AngleSpline(std::move(nodes));
+}
+
+std::vector<double> LdfLibrary::angles_deg() const
+{
+    std::vector<double> angles;
+    for (const AngleResult& result : m_results)
+        angles.push_back(result.angle_deg);
+    return angles;
+}
+
+void LdfLibrary::check_angle(double angle_deg) const
+{
+    if (!(angle_deg >= 0.0 && angle_deg < 90.0))
+        reject("angle", angle_deg, "0 <= angle < 90 degrees");
+    constexpr double rounding = 1e-4;  // degrees: single-precision directions
+    const double first = m_results.front().angle_deg;
+    const double last = m_results.back().angle_deg;
+    if (angle_deg < first - rounding || (angle_deg > last + rounding && last < grazing_deg)) {
+        std::ostringstream span;
+        span << first << " <= angle <= " << last << " degrees, what this library was simulated for";
+        reject("angle", angle_deg, span.str());
+    }
+}
+
+double LdfLibrary::inside_angle(double angle_deg) const
+{
+    const double clamped = std::clamp(angle_deg, m_results.front().angle_deg, m_results.back().angle_deg);
+    return refracted_angle(clamped * radians_per_degree, m_medium.ior);
+}
+
+double LdfLibrary::entry_transmittance(double angle_deg) const
+{
+    return 1.0 - fresnel(std::cos(angle_deg * radians_per_degree), m_medium.ior);
+}
+
+LdfLibrary::AngleWeights LdfLibrary::angle_weights(double angle_deg) const
+{
+    check_angle(angle_deg);
+    const double theta = inside_angle(angle_deg);
+    const double transmittance = entry_transmittance(angle_deg);
+    AngleWeights weights{m_spline.weights(theta, AngleSpline::Parity::even),
+                         m_spline.weights(theta, AngleSpline::Parity::odd)};
+    for (double& w : weights.even)
+        w *= transmittance;
+    for (double& w : weights.odd)
+        w *= transmittance;
+    return weights;
+}
+
+double LdfLibrary::total(double angle_deg, double albedo, Side side) const
+{
+    check_albedo(albedo);
+    const AngleWeights weights = angle_weights(angle_deg);
+    double sum = entry_transmittance(angle_deg) *
+                 ballistic_total(m_medium, refracted_angle(angle_deg * radians_per_degree, m_medium.ior), side);
+    for (std::size_t j = 0; j < m_results.size(); ++j) {
+        const SideResult& result = m_results[j].sides[static_cast<std::size_t>(side)];
+        if (result.moments.empty())
+            continue;
+        const auto by_order = order_weights(result, albedo);
+        double scattered = 0.0;
+        for (std::size_t i = 0; i < result.batch_totals.size(); ++i)
+            scattered += by_order[i % order_bin_count] * static_cast<double>(result.batch_totals[i]);
+        sum += weights.even[j] * scattered / static_cast<double>(batch_count);
+    }
+    return sum;
+}
+
+double LdfLibrary::standard_error(double angle_deg, double albedo, Side side) const
+{
+    check_albedo(albedo);
+    const AngleWeights weights = angle_weights(angle_deg);
+    double variance = 0.0;  // angles are simulated independently
+    for (std::size_t j = 0; j < m_results.size(); ++j) {
+        const SideResult& result = m_results[j].sides[static_cast<std::size_t>(side)];
+        if (result.moments.empty())
+            continue;
+        const auto by_order = order_weights(result, albedo);
+        std::array<double, batch_count> totals{};
+        for (std::size_t i = 0; i < result.batch_totals.size(); ++i)
+            totals[i / order_bin_count] += by_order[i % order_bin_count] * static_cast<double>(result.batch_totals[i]);
+        double mean = 0.0;
+        for (double t : totals)
+            mean += t / static_cast<double>(batch_count);
+        double squares = 0.0;
+        for (double t : totals)
+            squares += (t - mean) * (t - mean);
+        variance += weights.even[j] * weights.even[j] * squares / static_cast<double>(batch_count * (batch_count - 1));
+    }
+    return std::sqrt(variance);
+}
+
+double LdfLibrary::diffuse_reflectance(double albedo) const
+{
+    // 2 integral of R(theta) cos(theta) sin(theta): midpoints in sin^2, where each has the same weight.
+    constexpr int points = 64;
+    double sum = 0.0;
+    for (int i = 0; i < points; ++i)
+        sum += total(std::asin(std::sqrt((i + 0.5) / points)) / radians_per_degree, albedo, Side::reflected);
+    return sum / points;
+}
+
+std::vector<RadialProfile> LdfLibrary::node_profiles(double albedo, Side side) const
+{
+    check_albedo(albedo);
+    std::vector<RadialProfile> profiles;
+    for (const AngleResult& result : m_results) {
+        const SideResult& from = result.sides[static_cast<std::size_t>(side)];
+        profiles.push_back(from.moments.empty() ? RadialProfile()
+                                                : contract_orders(from, albedo, result.angle_deg == 0.0));
+    }
+    return profiles;
+}
+
+RadialProfile LdfLibrary::profile(double angle_deg, double albedo, Side side) const
+{
+    const AngleWeights weights = angle_weights(angle_deg);
+    const std::vector<RadialProfile> nodes = node_profiles(albedo, side);
+    RadialProfile sum;
+    for (std::size_t j = 0; j < nodes.size(); ++j)
+        sum.add(nodes[j], weights.even[j], weights.odd[j]);
+    return sum;
+}
+
+std::vector<BallisticExit> LdfLibrary::ballistic(double angle_deg, Side side) const
+{
+    check_angle(angle_deg);
+    auto exits = ballistic_exits(m_medium, refracted_angle(angle_deg * radians_per_degree, m_medium.ior), side);
+    for (BallisticExit& exit : exits)
+        exit.power *= entry_transmittance(angle_deg);
+    return exits;
+}
+
+LdfLibrary simulate_library(const Medium& medium, const std::vector<double>& angles_deg, std::uint64_t photons,
+                            std::uint64_t seed, int threads, Progress& progress)
+{
+    // Checked before the work, though the library checks again.
+    std::vector<double> sorted = angles_deg;
+    std::sort(sorted.begin(), sorted.end());
+    if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end())
+        reject("angles", *std::adjacent_find(sorted.begin(), sorted.end()), "distinct angles");
+    auto results = simulate(medium, sorted, photons, seed, threads, progress);
+    const std::uint64_t walked = (photons + batch_count - 1) / batch_count * batch_count;
+    return LdfLibrary(medium, walked, seed, std::move(results));
+}
+
+}  // namespace beamspread

@@ -1,0 +1,78 @@
+// The luminance distribution functions of one medium for every angle of incidence and every albedo.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "ldf/angle_spline.h"
+#include "ldf/radial_profile.h"
+#include "medium/medium.h"
+#include "transport/ballistic.h"
+#include "transport/simulation.h"
+
+namespace beamspread {
+
+class LdfLibrary {
+public:
+    // Results in any order, one per angle. Throws InvalidArgument.
+    LdfLibrary(const Medium& medium, std::uint64_t photons, std::uint64_t seed, std::vector<AngleResult> results);
+
+    const Medium& medium() const { return m_medium; }
+    std::uint64_t photons() const { return m_photons; }  // per angle
+    std::uint64_t seed() const { return m_seed; }
+    const std::vector<AngleResult>& results() const { return m_results; }
+    std::vector<double> angles_deg() const;
+
+    // Power that leaves one side per unit power incident, unscattered light included, specular reflection
+    // at entry excluded. Angle in degrees within the simulated ones, albedo in [0, 1).
+    double total(double angle_deg, double albedo, Side side) const;
+
+    // Standard error of `total`, from the scatter of the batches.
+    double standard_error(double angle_deg, double albedo, Side side) const;
+
+    // `total` of the reflected side under uniform diffuse light: the mean over the hemisphere, weighted by cosine.
+    double diffuse_reflectance(double albedo) const;
+
+    // The scattered part of the LDF, per unit power incident.
+    RadialProfile profile(double angle_deg, double albedo, Side side) const;
+
+    // The profiles at the simulated angles, per unit power that *entered*: `profile` is their sum with
+    // the weights that `angle_weights` gives. For solvers that meet many angles at once.
+    std::vector<RadialProfile> node_profiles(double albedo, Side side) const;
+
+    struct AngleWeights {
+        std::vector<double> even;  // per simulated angle, Fresnel transmittance at entry included
+        std::vector<double> odd;
+    };
+    AngleWeights angle_weights(double angle_deg) const;
+
+    // The unscattered light, per unit power incident.
+    std::vector<BallisticExit> ballistic(double angle_deg, Side side) const;
+
+    // Throws InvalidArgument if the library does not reach to this angle.
+    void check_angle(double angle_deg) const;
+
+private:
+    double inside_angle(double angle_deg) const;
+    double entry_transmittance(double angle_deg) const;
+
+    Medium m_medium;
+    std::uint64_t m_photons;
+    std::uint64_t m_seed;
+    std::vector<AngleResult> m_results;  // ascending angles
+    AngleSpline m_spline;                // over refracted angles
+};
+
+// 0 <= albedo < 1, or InvalidArgument.
+void check_albedo(double albedo);
+
+LdfLibrary simulate_library(const Medium& medium, const std::vector<double>& angles_deg, std::uint64_t photons,
+                            std::uint64_t seed, int threads, Progress& progress);
+
+// One multi-part OpenEXR file; see library_file.cpp for the layout. Throw IoError.
+void save_library(const LdfLibrary& library, const std::string& path);
+LdfLibrary load_library(const std::string& path);
+
+}  // namespace beamspread

@@ -1,0 +1,179 @@
+// Files of LdfLibrary: multi-part OpenEXR.
+//
+// Every part carries the attributes beamspreadLdf (format version), g, ior, thickness (mean free
+// paths, inf: half-space), photons, seed, angle (degrees) and centre (mean free paths). For the j-th
+// angle and each side there are
+//   "<side>.<j>"         columns: radius bins, lines: order bins, channels m0 .. m8: sums of weight * cos(m phi)
+//                        per unit power that entered (transport/bins.h, tally.h);
+//   "<side>.<j>.orders"  columns: order bins; line 0 and 1: mean and variance of the order; then one
+//                        line per batch: power that leaves.
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "base/error.h"
+#include "image/exr.h"
+#include "ldf/library.h"
+
+namespace beamspread {
+
+namespace {
+
+constexpr int format_version = 1;
+constexpr std::array<const char*, side_count> side_names = {"reflected", "transmitted"};
+
+std::vector<std::string> harmonic_channels()
+{
+    std::vector<std::string> names;
+    for (std::size_t m = 0; m < harmonic_count; ++m)
+        names.push_back("m" + std::to_string(m));
+    return names;
+}
+
+std::map<std::string, ExrAttribute> common_attributes(const LdfLibrary& library, double angle_deg, double centre)
+{
+    return {{"beamspreadLdf", format_version},
+            {"g", library.medium().g},
+            {"ior", library.medium().ior},
+            {"thickness", library.medium().thickness},
+            {"photons", std::to_string(library.photons())},
+            {"seed", std::to_string(library.seed())},
+            {"angle", angle_deg},
+            {"centre", centre}};
+}
+
+std::string part_name(std::size_t side, std::size_t j)
+{
+    return std::string(side_names[side]) + "." + std::to_string(j);
+}
+
+class Reader {
+public:
+    explicit Reader(const std::string& path) : m_path(path), m_parts(read_exr_parts(path)) {}
+
+    LdfLibrary library() const
+    {
+        if (m_parts.empty())
+            fail("holds no parts");
+        const ExrPart& first = m_parts.front();
+        if (attribute<int>(first, "beamspreadLdf") != format_version)
+            fail("is of another format version");
+        const Medium medium{attribute<double>(first, "g"), attribute<double>(first, "ior"),
+                            attribute<double>(first, "thickness")};
+        std::vector<AngleResult> results;
+        while (const ExrPart* part = find(part_name(0, results.size()))) {
+            AngleResult result;
+            result.angle_deg = attribute<double>(*part, "angle");
+            if (!(result.angle_deg >= 0.0 && result.angle_deg < 90.0))
+                fail("has an angle out of range");
+            for (std::size_t side = 0; side < side_count; ++side)
+                if (find(part_name(side, results.size())))
+                    result.sides[side] = side_result(part_name(side, results.size()));
+            if (result.sides[1].moments.empty() != medium.is_half_space())
+                fail("does not fit its own thickness");
+            results.push_back(std::move(result));
+        }
+        try {
+            return LdfLibrary(medium, number(first, "photons"), number(first, "seed"), std::move(results));
+        } catch (const InvalidArgument& error) {
+            fail(std::string("is inconsistent: ") + error.what());
+        }
+    }
+
+private:
+    [[noreturn]] void fail(const std::string& why) const
+    {
+        throw IoError("'" + m_path + "' is not an LDF library: it " + why);
+    }
+
+    const ExrPart* find(const std::string& name) const
+    {
+        const auto found = std::find_if(m_parts.begin(), m_parts.end(), [&](const ExrPart& p) { return p.name == name; });
+        return found == m_parts.end() ? nullptr : &*found;
+    }
+
+    template <class T>
+    T attribute(const ExrPart& part, const std::string& name) const
+    {
+        const auto found = part.attributes.find(name);
+        if (found == part.attributes.end() || !std::holds_alternative<T>(found->second))
+            fail("has no attribute '" + name + "' of the right type");
+        return std::get<T>(found->second);
+    }
+
+    std::uint64_t number(const ExrPart& part, const std::string& name) const
+    {
+        const auto text = attribute<std::string>(part, name);
+        std::uint64_t value = 0;
+        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+        if (error != std::errc() || end != text.data() + text.size())
+            fail("has an attribute '" + name + "' that is no number");
+        return value;
+    }
+
+    const ExrPart& checked(const std::string& name, std::size_t width, std::size_t height,
+                           const std::vector<std::string>& channels) const
+    {
+        const ExrPart* part = find(name);
+        if (!part)
+            fail("has no part '" + name + "'");
+        if (part->width != static_cast<int>(width) || part->height != static_cast<int>(height) ||
+            part->channels != channels)
+            fail("has a part '" + name + "' of another size");
+        if (!std::all_of(part->pixels.begin(), part->pixels.end(), [](float x) { return std::isfinite(x); }))
+            fail("has a part '" + name + "' with values that are not finite");
+        return *part;
+    }
+
+    SideResult side_result(const std::string& name) const
+    {
+        SideResult result;
+        const ExrPart& moments = checked(name, radius_bin_count, order_bin_count, harmonic_channels());
+        result.centre = attribute<double>(moments, "centre");
+        if (!std::isfinite(result.centre))
+            fail("has a centre that is not finite");
+        result.moments = moments.pixels;
+        const auto& orders = checked(name + ".orders", order_bin_count, 2 + batch_count, {"Y"}).pixels;
+        const auto line = [&](std::size_t i) {
+            return orders.begin() + static_cast<std::ptrdiff_t>(i * order_bin_count);
+        };
+        result.mean_order.assign(line(0), line(1));
+        result.order_variance.assign(line(1), line(2));
+        result.batch_totals.assign(line(2), orders.end());
+        return result;
+    }
+
+    std::string m_path;
+    std::vector<ExrPart> m_parts;
+};
+
+}  // namespace
+
+void save_library(const LdfLibrary& library, const std::string& path)
+{
+    std::vector<ExrPart> parts;
+    for (std::size_t j = 0; j < library.results().size(); ++j) {
+        const AngleResult& result = library.results()[j];
+        for (std::size_t side = 0; side < side_count; ++side) {
+            const SideResult& from = result.sides[side];
+            if (from.moments.empty())
+                continue;
+            const auto attributes = common_attributes(library, result.angle_deg, from.centre);
+            parts.push_back({part_name(side, j), static_cast<int>(radius_bin_count), static_cast<int>(order_bin_count),
+                             harmonic_channels(), from.moments, attributes});
+            std::vector<float> orders = from.mean_order;
+            orders.insert(orders.end(), from.order_variance.begin(), from.order_variance.end());
+            orders.insert(orders.end(), from.batch_totals.begin(), from.batch_totals.end());
+            parts.push_back({part_name(side, j) + ".orders", static_cast<int>(order_bin_count),
+                             static_cast<int>(2 + batch_count), {"Y"}, std::move(orders), attributes});
+        }
+    }
+    write_exr_parts(path, parts);
+}
+
+LdfLibrary load_library(const std::string& path)
+{
+    return Reader(path).library();
+}
+
+}  // namespace beamspread

@@ -1,0 +1,196 @@
+#include "ldf/radial_profile.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/constants.h"
+
+namespace beamspread {
+
+namespace {
+
+constexpr std::size_t edge_count = radius_bin_count;
+
+const std::array<double, edge_count>& edges()
+{
+    static const auto table = [] {
+        std::array<double, edge_count> r{};
+        for (std::size_t k = 0; k < edge_count; ++k)
+            r[k] = radius_bin_edge(k);
+        return r;
+    }();
+    return table;
+}
+
+// Weights of the values at up to five neighbouring edges in the derivative at each edge: that of the
+// polynomial through them.
+struct Stencil {
+    std::size_t first = 0;
+    std::array<double, 5> weight{};
+};
+
+Stencil derivative_stencil(std::size_t k)
+{
+    const auto& r = edges();
+    Stencil stencil;
+    stencil.first = std::clamp<std::size_t>(k, 2, edge_count - 3) - 2;
+    for (std::size_t i = 0; i < 5; ++i) {
+        const double ri = r[stencil.first + i];
+        double derivative = 0.0;  // of Lagrange's i-th polynomial at r[k]
+        for (std::size_t skip = 0; skip < 5; ++skip) {
+            if (skip == i)
+                continue;
+            double product = 1.0 / (ri - r[stencil.first + skip]);
+            for (std::size_t j = 0; j < 5; ++j)
+                if (j != i && j != skip)
+                    product *= (r[k] - r[stencil.first + j]) / (ri - r[stencil.first + j]);
+            derivative += product;
+        }
+        stencil.weight[i] = derivative;
+    }
+    return stencil;
+}
+
+const std::array<Stencil, edge_count>& stencils()
+{
+    static const auto table = [] {
+        std::array<Stencil, edge_count> all{};
+        for (std::size_t k = 0; k < edge_count; ++k)
+            all[k] = derivative_stencil(k);
+        return all;
+    }();
+    return table;
+}
+
+// Values and derivatives of the cubic Hermite polynomials on the bin that ends at `edge`.
+struct Cubic {
+    double v0, v1, s0, s1;
+};
+
+Cubic cubic_value(double t, double h)
+{
+    const double t2 = t * t;
+    const double t3 = t2 * t;
+    return {2.0 * t3 - 3.0 * t2 + 1.0, 3.0 * t2 - 2.0 * t3, (t3 - 2.0 * t2 + t) * h, (t3 - t2) * h};
+}
+
+Cubic cubic_derivative(double t, double h)
+{
+    const double t2 = t * t;
+    return {6.0 * (t2 - t) / h, 6.0 * (t - t2) / h, 3.0 * t2 - 4.0 * t + 1.0, 3.0 * t2 - 2.0 * t};
+}
+
+}  // namespace
+
+RadialProfile::RadialProfile() : m_remaining(edge_count, Harmonics{}), m_slope(edge_count, Harmonics{}) {}
+
+RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments) : RadialProfile()
+{
+    m_centre = centre;
+    // integral of cos^2(m phi) over a turn: 2 pi for m = 0, pi above.
+    const auto norm = [](std::size_t m) { return m == 0 ? inv_pi / 2.0 : inv_pi; };
+    // From outside in, so that what remains far out is not the difference of large sums.
+    Harmonics sum{};
+    for (std::size_t k = edge_count; k-- > 0;) {
+        m_remaining[k] = sum;
+        for (std::size_t m = 0; m < harmonic_count; ++m)
+            sum[m] += norm(m) * bin_moments[k * harmonic_count + m];
+    }
+    m_total = sum;
+
+    const auto& r = edges();
+    for (std::size_t k = 0; k < edge_count; ++k) {
+        const Stencil& stencil = stencils()[k];
+        for (std::size_t i = 0; i < 5; ++i)
+            for (std::size_t m = 0; m < harmonic_count; ++m)
+                m_slope[k][m] -= stencil.weight[i] * m_remaining[stencil.first + i][m];
+        // A monotone C_0 keeps the azimuthal mean of g positive: slopes at most three times those of the
+        // chords beside them (Fritsch, Carlson 1980).
+        const auto chord = [&](std::size_t bin) {
+            return bin == 0 ? (m_total[0] - m_remaining[0][0]) / r[0]
+                            : (m_remaining[bin - 1][0] - m_remaining[bin][0]) / (r[bin] - r[bin - 1]);
+        };
+        const double limit = 3.0 * (k + 1 < edge_count ? std::min(chord(k), chord(k + 1)) : 0.0);
+        m_slope[k][0] = std::clamp(m_slope[k][0], 0.0, std::max(0.0, limit));
+    }
+    m_slope[edge_count - 1] = {};
+    update_support();
+}
+
+void RadialProfile::add(const RadialProfile& other, double even_weight, double odd_weight)
+{
+    for (std::size_t m = 0; m < harmonic_count; ++m) {
+        const double weight = m % 2 == 0 ? even_weight : odd_weight;
+        m_total[m] += weight * other.m_total[m];
+        for (std::size_t k = 0; k < edge_count; ++k) {
+            m_remaining[k][m] += weight * other.m_remaining[k][m];
+            m_slope[k][m] += weight * other.m_slope[k][m];
+        }
+    }
+    m_centre += odd_weight * other.m_centre;
+    m_support = std::max(m_support, other.m_support);
+}
+
+void RadialProfile::update_support()
+{
+    std::size_t k = edge_count - 1;
+    while (k > 0 && m_remaining[k - 1][0] <= 0.0)
+        --k;
+    m_support = edges()[k];
+}
+
+Harmonics RadialProfile::remaining(double r) const
+{
+    Harmonics out{};
+    if (r >= m_support)
+        return out;
+    const auto& edge = edges();
+    const std::size_t k = radius_bin(static_cast<float>(r));
+    if (k == 0) {
+        // Single scattering makes g grow like 1/r toward the point of entry.
+        const double t = std::min(1.0, r / edge[0]);
+        for (std::size_t m = 0; m < harmonic_count; ++m)
+            out[m] = m_total[m] + t * (m_remaining[0][m] - m_total[m]);
+        return out;
+    }
+    const double h = edge[k] - edge[k - 1];
+    const Cubic c = cubic_value((r - edge[k - 1]) / h, h);
+    for (std::size_t m = 0; m < harmonic_count; ++m)
+        out[m] = c.v0 * m_remaining[k - 1][m] + c.v1 * m_remaining[k][m] - c.s0 * m_slope[k - 1][m] - c.s1 * m_slope[k][m];
+    return out;
+}
+
+Harmonics RadialProfile::cumulative(double r) const
+{
+    Harmonics out = remaining(r);
+    for (std::size_t m = 0; m < harmonic_count; ++m)
+        out[m] = m_total[m] - out[m];
+    return out;
+}
+
+Harmonics RadialProfile::density(double r) const
+{
+    Harmonics out{};
+    if (r >= m_support)
+        return out;
+    const auto& edge = edges();
+    const std::size_t k = radius_bin(static_cast<float>(r));
+    const double h = k == 0 ? edge[0] : edge[k] - edge[k - 1];
+    for (std::size_t m = 0; m < harmonic_count; ++m) {
+        if (k == 0) {
+            out[m] = (m_total[m] - m_remaining[0][m]) / (h * r);
+        } else {
+            const Cubic c = cubic_derivative((r - edge[k - 1]) / h, h);
+            out[m] = (c.s0 * m_slope[k - 1][m] + c.s1 * m_slope[k][m] - c.v0 * m_remaining[k - 1][m] -
+                      c.v1 * m_remaining[k][m]) / r;
+        }
+    }
+    return out;
+}
+
+double RadialProfile::total() const
+{
+    return 2.0 * pi * m_total[0];
+}
+
+}  // namespace beamspread

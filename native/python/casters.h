@@ -1,0 +1,31 @@
+// pybind11 behind one header, with what every binding file shares.
+#pragma once
+
+#include <pybind11/functional.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include "base/progress.h"
+
+namespace beamspread {
+
+namespace py = pybind11;
+
+// C-contiguous arrays of exactly this type; another type raises TypeError instead of being copied silently.
+template <class T>
+using Array = py::array_t<T, py::array::c_style>;
+
+// A callback for Progress that calls `progress(fraction)` with the GIL held and lets Ctrl-C through;
+// with None nothing is reported. `progress` must outlive it.
+Progress::Callback progress_callback(const py::object& progress);
+
+void bind_medium(py::module_& m);
+void bind_transport(py::module_& m);
+void bind_ldf(py::module_& m);
+void bind_image(py::module_& m);
+void bind_scene(py::module_& m);
+void bind_solve(py::module_& m);
+
+}  // namespace beamspread

@@ -1,0 +1,125 @@
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include "base/error.h"
+#include "ldf/ldf_image.h"
+#include "ldf/library.h"
+#include "python/casters.h"
+
+namespace beamspread {
+
+namespace {
+
+Side side_from_name(const std::string& name)
+{
+    if (name == "reflected")
+        return Side::reflected;
+    if (name == "transmitted")
+        return Side::transmitted;
+    reject("side", "'" + name + "'", "'reflected', 'transmitted'");
+}
+
+Array<float> image(const LdfLibrary& library, double angle, double albedo, std::ptrdiff_t size, double pitch,
+                   const std::string& side, double beam_diameter)
+{
+    if (beam_diameter != 0.0)
+        reject("beam_diameter", beam_diameter, "0, a pencil beam");
+    if (size < 1)
+        reject("size", static_cast<double>(size), "1 <= size <= 16384 texels");
+    const Side which = side_from_name(side);
+    std::vector<float> texels;
+    {
+        const py::gil_scoped_release release;
+        texels = ldf_image(library, angle, albedo, static_cast<std::size_t>(size), pitch, which);
+    }
+    Array<float> result({size, size});
+    std::copy(texels.begin(), texels.end(), result.mutable_data());
+    return result;
+}
+
+}  // namespace
+
+void bind_ldf(py::module_& m)
+{
+    py::class_<LdfLibrary, std::shared_ptr<LdfLibrary>> library(m, "LdfLibrary",
+                                                                R"(Luminance distribution functions of one medium.
+
+Made by `simulate`, `library` or `LdfLibrary.load`. Angles are in degrees from the surface normal,
+within the simulated ones (a library that reaches 88 degrees serves up to 90); albedos in [0, 1).
+)");
+    library
+        .def_static(
+            "load",
+            [](const std::filesystem::path& path) {
+                const py::gil_scoped_release release;
+                return std::make_shared<LdfLibrary>(load_library(path.string()));
+            },
+            py::arg("path"), "Read a library from an OpenEXR file; OSError if it is missing, damaged or something else.")
+        .def(
+            "save",
+            [](const LdfLibrary& self, const std::filesystem::path& path) {
+                const py::gil_scoped_release release;
+                save_library(self, path.string());
+            },
+            py::arg("path"), "Write a multi-part OpenEXR file; an existing file is replaced only by a complete one.")
+        .def_property_readonly("medium", &LdfLibrary::medium)
+        .def_property_readonly("angles", &LdfLibrary::angles_deg, "Simulated angles, degrees, ascending.")
+        .def_property_readonly("photons", &LdfLibrary::photons, "Photons per angle.")
+        .def_property_readonly("seed", &LdfLibrary::seed);
+    library
+        .def(
+            "reflectance",
+            [](const LdfLibrary& self, double angle, double albedo) {
+                return self.total(angle, albedo, Side::reflected);
+            },
+            py::arg("angle"), py::arg("albedo"),
+            "Diffuse reflectance: power that leaves per unit incident power, specular reflection excluded.")
+        .def(
+            "transmittance",
+            [](const LdfLibrary& self, double angle, double albedo) {
+                return self.total(angle, albedo, Side::transmitted);
+            },
+            py::arg("angle"), py::arg("albedo"),
+            "Power that leaves the far side per unit incident power, the unscattered beam included.")
+        .def(
+            "standard_error",
+            [](const LdfLibrary& self, double angle, double albedo, const std::string& side) {
+                return self.standard_error(angle, albedo, side_from_name(side));
+            },
+            py::arg("angle"), py::arg("albedo"), py::arg("side") = "reflected",
+            "Standard error of `reflectance` or `transmittance`, from the scatter of 32 independent batches.")
+        .def("diffuse_reflectance", &LdfLibrary::diffuse_reflectance, py::arg("albedo"),
+             "Reflectance under uniform diffuse light; needs a library from 0 to at least 88 degrees.");
+    library
+        .def("image", &image, py::arg("angle"), py::arg("albedo"), py::arg("size"), py::arg("pitch"),
+             py::arg("side") = "reflected", py::arg("beam_diameter") = 0.0, R"(The LDF as texel means.
+
+Parameters
+----------
+angle, albedo : float
+size : int
+    Texels along each side, 1 to 16384.
+pitch : float
+    Side of a texel, mean free paths.
+side : {"reflected", "transmitted"}
+beam_diameter : float
+    Must be 0: a pencil beam.
+
+Returns
+-------
+float32, shape (size, size)
+    1/mfp^2; rows v, columns u, O at the centre, +u (the beam's direction of travel) to the right.
+    The few texels where nine azimuthal harmonics undershoot may be slightly negative.
+
+Raises
+------
+ValueError
+    Names the argument, its value and what is allowed.
+)")
+        .def("__repr__", [](const LdfLibrary& self) {
+            return py::str("<LdfLibrary {} angles={} photons={}>").format(self.medium(), self.angles_deg(), self.photons());
+        });
+}
+
+}  // namespace beamspread

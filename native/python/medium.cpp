@@ -1,0 +1,48 @@
+#include "medium/medium.h"
+
+#include <limits>
+
+#include "python/casters.h"
+
+namespace beamspread {
+
+void bind_medium(py::module_& m)
+{
+    py::class_<Medium>(m, "Medium", R"(A homogeneous, plane-parallel, dimensionless medium.
+
+Parameters
+----------
+g : float
+    Henyey-Greenstein anisotropy, -0.99 to 0.99.
+ior : float
+    Refractive index inside over outside, 1 to 3.
+thickness : float
+    In mean free paths, > 0; ``inf`` is a half-space.
+
+Raises
+------
+ValueError
+    Names the argument, its value and what is allowed.
+)")
+        .def(py::init([](double g, double ior, double thickness) {
+                 const Medium medium{g, ior, thickness};
+                 validate(medium);
+                 return medium;
+             }),
+             py::arg("g") = 0.8, py::arg("ior") = 1.0, py::arg("thickness") = std::numeric_limits<double>::infinity())
+        .def_readonly("g", &Medium::g)
+        .def_readonly("ior", &Medium::ior)
+        .def_readonly("thickness", &Medium::thickness)
+        .def("__eq__", [](const Medium& a, const Medium& b) { return a == b; })
+        .def("__hash__", [](const Medium& a) { return py::hash(py::make_tuple(a.g, a.ior, a.thickness)); })
+        .def("__repr__",
+             [](const Medium& a) {
+                 return py::str("Medium(g={}, ior={}, thickness={})").format(a.g, a.ior, a.thickness);
+             })
+        .def(py::pickle([](const Medium& a) { return py::make_tuple(a.g, a.ior, a.thickness); },
+                        [](const py::tuple& t) {
+                            return Medium{t[0].cast<double>(), t[1].cast<double>(), t[2].cast<double>()};
+                        }));
+}
+
+}  // namespace beamspread

@@ -1,0 +1,35 @@
+// The extension module beamspread._native: exceptions and one function per folder.
+#include "base/error.h"
+#include "python/casters.h"
+
+namespace beamspread {
+
+// Errors of the engine become Python's at this one boundary.
+static void translate(std::exception_ptr pointer)
+{
+    try {
+        if (pointer)
+            std::rethrow_exception(pointer);
+    } catch (const InvalidArgument& error) {
+        PyErr_SetString(PyExc_ValueError, error.what());
+    } catch (const IoError& error) {
+        PyErr_SetString(PyExc_OSError, error.what());
+    }
+}
+
+}  // namespace beamspread
+
+PYBIND11_MODULE(_native, m)
+{
+    using namespace beamspread;
+    m.doc() = "Light transport of beamspread; import the package `beamspread` instead.";
+    m.attr("__version__") = BEAMSPREAD_VERSION;
+    py::register_exception<Cancelled>(m, "Cancelled").doc() = "A progress callback returned False.";
+    py::register_local_exception_translator(&translate);
+    bind_medium(m);
+    bind_transport(m);
+    bind_ldf(m);
+    bind_image(m);
+    bind_scene(m);
+    bind_solve(m);
+}

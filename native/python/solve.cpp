@@ -1,0 +1,107 @@
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "base/error.h"
+#include "python/casters.h"
+#include "solve/problem.h"
+
+namespace beamspread {
+
+namespace {
+
+using Solve = Luminance (*)(const Problem&, Progress&);
+
+Solve solver_from_name(const std::string& name)
+{
+    if (name == "fft")
+        return solve_fft;
+    if (name == "direct")
+        return solve_direct;
+    reject("solver", "'" + name + "'", "'fft', 'direct'");
+}
+
+std::string shape_text(const py::array& array)
+{
+    return "of shape " + py::str(array.attr("shape")).cast<std::string>();
+}
+
+Problem grid_problem(const Array<float>& irradiance, std::size_t channels)
+{
+    const py::ssize_t rank = irradiance.ndim();
+    if (rank != 2 && !(rank == 3 && irradiance.shape(0) == static_cast<py::ssize_t>(channels)))
+        reject("irradiance", shape_text(irradiance), "(H, W) or (channels, H, W)");
+    Problem problem;
+    problem.height = static_cast<std::size_t>(irradiance.shape(rank - 2));
+    problem.width = static_cast<std::size_t>(irradiance.shape(rank - 1));
+    problem.channels.resize(channels);
+    for (std::size_t c = 0; c < channels; ++c) {
+        const float* data = irradiance.data() + (rank == 3 ? c * problem.height * problem.width : 0);
+        problem.channels[c].irradiance = {data, problem.height, problem.width,
+                                          static_cast<std::ptrdiff_t>(problem.width)};
+    }
+    return problem;
+}
+
+Array<float> interleaved(const Luminance& luminance, std::size_t height, std::size_t width)
+{
+    const std::size_t channels = luminance.size();
+    Array<float> result({height, width, channels});
+    float* out = result.mutable_data();
+    for (std::size_t c = 0; c < channels; ++c)
+        for (std::size_t i = 0; i < luminance[c].size(); ++i)
+            out[i * channels + c] = luminance[c][i];
+    return result;
+}
+
+Array<float> convolve(const Array<float>& irradiance, const Array<float>& direction,
+                      const std::vector<std::shared_ptr<LdfLibrary>>& ldf, const std::vector<double>& albedo,
+                      const std::vector<double>& mean_free_path, std::array<double, 2> pitch, const std::string& solver,
+                      double tolerance, int threads, const py::object& progress)
+{
+    const Solve solve = solver_from_name(solver);
+    const std::size_t channels = albedo.size();
+    if (ldf.size() != channels || mean_free_path.size() != channels)
+        reject("ldf", "of another number of channels than albedo", "one per channel");
+    Problem problem = grid_problem(irradiance, channels);
+    problem.pitch_x = pitch[0];
+    problem.pitch_y = pitch[1];
+    problem.tolerance = tolerance;
+    problem.threads = threads;
+    const auto height = static_cast<py::ssize_t>(problem.height);
+    const auto width = static_cast<py::ssize_t>(problem.width);
+    if (direction.ndim() == 1 && direction.shape(0) == 3)
+        problem.directions.uniform = Vec3(direction.at(0), direction.at(1), direction.at(2));
+    else if (direction.ndim() == 3 && direction.shape(0) == height && direction.shape(1) == width && direction.shape(2) == 3)
+        problem.directions.field = direction.data();
+    else
+        reject("direction", shape_text(direction), "(3,) or (H, W, 3) like irradiance");
+    for (std::size_t c = 0; c < channels; ++c) {
+        problem.channels[c].library = ldf[c].get();
+        problem.channels[c].albedo = albedo[c];
+        problem.channels[c].mean_free_path = mean_free_path[c];
+    }
+
+    Progress report(progress_callback(progress));
+    Luminance luminance;
+    {
+        const py::gil_scoped_release release;
+        luminance = solve(problem, report);
+    }
+    return interleaved(luminance, problem.height, problem.width);
+}
+
+}  // namespace
+
+void bind_solve(py::module_& m)
+{
+    m.def("convolve", &convolve, py::arg("irradiance"), py::arg("direction"), py::arg("ldf"), py::arg("albedo"),
+          py::arg("mean_free_path"), py::arg("pitch"), py::arg("solver"), py::arg("tolerance"), py::arg("threads"),
+          py::arg("progress"), R"(Luminance of beams on a grid; the engine behind `beamspread.convolve`.
+
+irradiance float32 (H, W) or (C, H, W) in W/m^2, direction float32 (3,) or (H, W, 3), C libraries,
+albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr).
+)");
+}
+
+}  // namespace beamspread

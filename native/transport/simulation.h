@@ -1,0 +1,36 @@
+// Monte Carlo simulation of one medium for several angles of incidence.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/progress.h"
+#include "medium/medium.h"
+#include "transport/walk.h"
+
+namespace beamspread {
+
+// Photons are walked in this many independent batches per angle: their scatter is the statistical error.
+inline constexpr std::size_t batch_count = 32;
+
+// One side of one angle, normalized to one unit of power that entered the medium.
+struct SideResult {
+    double centre = 0.0;              // pole of (r, phi): u, mean free paths
+    std::vector<float> moments;       // [order bin][radius bin][harmonic]; empty: nothing leaves here
+    std::vector<float> mean_order;    // [order bin]
+    std::vector<float> order_variance;  // [order bin]
+    std::vector<float> batch_totals;    // [batch][order bin], power
+};
+
+struct AngleResult {
+    double angle_deg = 0.0;  // outside the medium, from the normal
+    std::array<SideResult, side_count> sides;
+};
+
+// `photons` per angle, rounded up to a multiple of batch_count. The result depends on seed and
+// photons, never on threads. Throws InvalidArgument, Cancelled.
+std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> angles_deg, std::uint64_t photons,
+                                  std::uint64_t seed, int threads, Progress& progress);
+
+}  // namespace beamspread

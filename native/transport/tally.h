@@ -1,0 +1,65 @@
+// What leaves one side of the medium, by scattering order, radius and azimuthal harmonic.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "transport/bins.h"
+
+namespace beamspread {
+
+enum class Side : std::size_t { reflected = 0, transmitted = 1 };
+inline constexpr std::size_t side_count = 2;
+
+// Sums over photons of weight * cos(m phi), with (r, phi) the place of exit around (centre, 0) and
+// phi = 0 along the beam's direction of travel. Conservative walk: albedo a scales order n by a^n.
+struct Tally {
+    double centre = 0.0;          // u of the pole of (r, phi), mean free paths
+    std::vector<double> moments;  // [order bin][radius bin][harmonic]; empty: nothing leaves this side
+    std::array<double, order_bin_count> weight{};
+    std::array<double, order_bin_count> weight_order{};   // sum of weight * order
+    std::array<double, order_bin_count> weight_order2{};  // sum of weight * order^2
+
+    void allocate() { moments.assign(order_bin_count * radius_bin_count * harmonic_count, 0.0); }
+
+    void add(double u, double v, std::uint32_t order, double w)
+    {
+        const double x = u - centre;
+        const double r2 = x * x + v * v;
+        const double r = std::sqrt(r2);
+        const double cos_phi = r > 0.0 ? x / r : 1.0;
+        const std::size_t bin = order_bin(order);
+        const std::size_t place = bin * radius_bin_count + radius_bin(static_cast<float>(r));
+        double* sums = moments.data() + place * harmonic_count;
+        // cos(m phi) by the recurrence of the Chebyshev polynomials.
+        double previous = w;
+        double current = w * cos_phi;
+        sums[0] += previous;
+        sums[1] += current;
+        for (std::size_t m = 2; m < harmonic_count; ++m) {
+            const double next = 2.0 * cos_phi * current - previous;
+            previous = current;
+            current = next;
+            sums[m] += current;
+        }
+        const double n = static_cast<double>(order);
+        weight[bin] += w;
+        weight_order[bin] += w * n;
+        weight_order2[bin] += w * n * n;
+    }
+
+    void merge(const Tally& other)
+    {
+        for (std::size_t i = 0; i < moments.size(); ++i)
+            moments[i] += other.moments[i];
+        for (std::size_t b = 0; b < order_bin_count; ++b) {
+            weight[b] += other.weight[b];
+            weight_order[b] += other.weight_order[b];
+            weight_order2[b] += other.weight_order2[b];
+        }
+    }
+};
+
+}  // namespace beamspread
