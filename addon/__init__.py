@@ -1,0 +1,65 @@
+"""Beamspread: bakes how light spreads inside translucent surfaces, depending on where it comes from.
+
+Outside Blender this package is the Python interface of the native module; inside Blender it is an add-on as well.
+"""
+
+import sys
+
+bl_info = {
+    "name": "Beamspread",
+    "description": "Bakes light inside translucent surfaces, depending on where it comes from",
+    "author": "Beamspread developers",
+    "version": (0, 1, 0),
+    "blender": (3, 4, 0),
+    "location": "Properties > Render > Beamspread; Shader Editor > Add > Beamspread",
+    "category": "Render",
+}
+
+NATIVE_PROBLEM = ""
+"""Why the native module is missing, in one sentence; empty when all is well."""
+
+try:
+    from ._load import native
+except ImportError as error:
+    # Inside Blender an add-on that vanishes with a traceback helps nobody: it registers and its panel says this.
+    if "bpy" not in sys.modules:
+        raise
+    NATIVE_PROBLEM = str(error)
+    __all__ = ["register", "unregister"]
+else:
+    from .core.color import albedo_from_color
+    from .core.convolve import convolve
+    from .core.library import library
+    from .core.material import Material, presets
+
+    Cancelled = native.Cancelled
+    LdfLibrary = native.LdfLibrary
+    Medium = native.Medium
+    simulate = native.simulate
+    __all__ = [
+        "Cancelled",
+        "LdfLibrary",
+        "Material",
+        "Medium",
+        "albedo_from_color",
+        "convolve",
+        "library",
+        "presets",
+        "register",
+        "simulate",
+        "unregister",
+    ]
+
+
+def register():
+    """Add the add-on to Blender."""
+    from . import registration
+
+    registration.register()
+
+
+def unregister():
+    """Take the add-on out of Blender."""
+    from . import registration
+
+    registration.unregister()

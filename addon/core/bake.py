@@ -1,0 +1,163 @@
+"""Bakes one receiver: beams of each light, spread by the material's LDF, summed to luminance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import BakeError
+from .margin import extend_margin
+from .material import Material, check_thickness
+from .progress import Progress, stages
+from .receiver import Receiver
+from .scene import Grid, Light, Mesh, PointLight, SpotLight, SunLight
+
+# Shares of the time that a bake takes, roughly: simulating an LDF not in the cache, beams and solving of one light.
+LIBRARY_WEIGHT, BEAMS_WEIGHT, SOLVE_WEIGHT = 3.0, 1.0, 1.0
+
+
+@dataclass(frozen=True)
+class BakeSettings:
+    """How to bake.
+
+    Attributes
+    ----------
+    solver : "fft" or "direct".
+    samples : visibility is sampled at samples x samples points per texel.
+    margin : texels added around the chart.
+    quality : of the LDF, "final" or "preview".
+    threads : 0 for all.
+    """
+
+    solver: str = "fft"
+    samples: int = 4
+    margin: int = 16
+    quality: str = "final"
+    threads: int = 0
+
+
+def bake(
+    grid: Grid,
+    lights: Sequence[Light],
+    occluders: Mesh,
+    material: Material,
+    thickness: float,
+    settings: BakeSettings,
+    progress: Progress | None = None,
+) -> np.ndarray:
+    """Luminance of a translucent plane.
+
+    Parameters
+    ----------
+    grid : where light arrives, scene units.
+    occluders : triangles that throw shadows, world.
+    material : with its mean free path in the units of the grid.
+    thickness : in the units of the grid, 0 for a half-space.
+    progress : called with 0..1, returns False to stop.
+
+    Returns
+    -------
+    float32 (grid.height, grid.width, 3), exitance / pi in W/(m^2 sr), row 0 at the bottom.
+
+    Raises
+    ------
+    MaterialError
+        A property outside its range.
+    Cancelled
+        `progress` returned False.
+    """
+    from .._load import native
+
+    material.check()
+    check_thickness(thickness)
+    media_progress, *light_progress = stages(progress, [LIBRARY_WEIGHT] + [BEAMS_WEIGHT, SOLVE_WEIGHT] * len(lights))
+    libraries = _libraries(material, thickness, settings.quality, media_progress)
+    caster = native.Occluders(occluders.vertices, occluders.triangles) if len(occluders.triangles) else None
+    luminance = np.zeros((grid.height, grid.width, 3), np.float32)
+    for light, beams_progress, solve_progress in zip(lights, light_progress[::2], light_progress[1::2]):
+        irradiance, direction = light_beams(grid, light, caster, settings, beams_progress)
+        if irradiance.any():
+            luminance += _spread(irradiance, direction, libraries, material, grid, settings, solve_progress)
+    return luminance
+
+
+def bake_texture(
+    receiver: Receiver,
+    lights: Sequence[Light],
+    occluders: Mesh,
+    material: Material,
+    thickness: float,
+    settings: BakeSettings,
+    progress: Progress | None = None,
+) -> np.ndarray:
+    """`bake` on the receiver's grid, brought to the texture and extended into the margin: (height, width, 3)."""
+    luminance = bake(receiver.grid, lights, occluders, material, thickness, settings, progress)
+    if not np.isfinite(luminance).all():
+        raise BakeError("The bake produced values that are not numbers: check the strengths of the lights.")
+    return extend_margin(receiver.to_texels(luminance), receiver.coverage > 0, settings.margin)
+
+
+def light_beams(
+    grid: Grid, light: Light, occluders, settings: BakeSettings, progress: Progress | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Irradiance (H, W, 3) in W/m^2 with colour, cosine, visibility and coverage, and the direction of travel.
+
+    The direction is a unit vector in the plane frame: (3,) for a sun, (H, W, 3) otherwise. `occluders` is a native
+    `Occluders` or None.
+    """
+    from .._load import native
+
+    numbers = (grid.origin, grid.x_axis, grid.y_axis, grid.normal, grid.pitch_x, grid.pitch_y, grid.width, grid.height)
+    caster = occluders if light.cast_shadow else None
+    options = {"samples": settings.samples, "threads": settings.threads, "progress": progress}
+    if isinstance(light, SunLight):
+        direction = grid.to_plane_frame(light.direction)
+        irradiance = native.sun_beams(*numbers, light.direction, caster, **options)
+        strength = light.irradiance
+    elif isinstance(light, SpotLight):
+        cone = light.frame, light.spot_size, light.blend
+        irradiance, direction = native.spot_beams(
+            *numbers, light.position, *cone, caster, falloff=light.falloff, **options
+        )
+        strength = light.power
+    elif isinstance(light, PointLight):
+        irradiance, direction = native.point_beams(*numbers, light.position, caster, **options)
+        strength = light.power
+    else:
+        raise TypeError(f"light is a {type(light).__name__}; it must be a SunLight, PointLight or SpotLight")
+    color = np.asarray(light.color, np.float32) * np.float32(strength)
+    return (irradiance * grid.coverage)[..., None] * color, direction
+
+
+def _libraries(material: Material, thickness: float, quality: str, progress: Progress | None) -> list:
+    """The LDF library of each channel; channels of the same medium share one."""
+    from .._load import native
+    from .library import library
+
+    depths = [thickness / length if thickness else math.inf for length in material.mean_free_path]
+    distinct = sorted(set(depths))
+    by_depth = {}
+    for depth, stage in zip(distinct, stages(progress, [1.0] * len(distinct))):
+        medium = native.Medium(g=material.anisotropy, ior=material.ior, thickness=depth)
+        by_depth[depth] = library(medium, quality=quality, progress=stage)
+    return [by_depth[depth] for depth in depths]
+
+
+def _spread(irradiance, direction, libraries, material: Material, grid: Grid, settings: BakeSettings, progress):
+    from .convolve import convolve
+
+    shared = all(library is libraries[0] for library in libraries)
+    return convolve(
+        np.ascontiguousarray(irradiance, np.float32),
+        direction,
+        libraries[0] if shared else libraries,
+        material.albedo,
+        material.mean_free_path,
+        (grid.pitch_x, grid.pitch_y),
+        solver=settings.solver,
+        threads=settings.threads,
+        progress=progress,
+    )

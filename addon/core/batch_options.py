@@ -1,0 +1,97 @@
+"""Command line of the batch: `-- [options]` after Blender's own arguments, or `batch.py scene.blend [options]`."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+SOLVERS = ("fft", "direct")
+FORMATS = ("EXR", "PNG")
+
+
+@dataclass(frozen=True)
+class BatchOptions:
+    """What a batch run is asked to do; None leaves a choice to the scene's settings."""
+
+    scene: str | None
+    objects: tuple[str, ...]
+    frames: tuple[int, int] | None
+    resolution: int | None
+    solver: str | None
+    output: str | None
+    format: str | None
+    report: str | None
+
+
+def arguments_for_script(argv: Sequence[str], inside_blender: bool) -> list[str]:
+    """The batch's own arguments: those after `--` inside Blender's program, all but the first under Python."""
+    if "--" in argv:
+        return list(argv[argv.index("--") + 1 :])
+    return [] if inside_blender else list(argv[1:])
+
+
+def parse(arguments: Sequence[str]) -> BatchOptions:
+    """Read the command line; a mistake ends the program with exit code 2 and one line that says why."""
+    parser = _parser()
+    values = parser.parse_args(list(arguments))
+    if values.resume:
+        parser.error("--resume is not supported yet: run without it to bake everything again")
+    return BatchOptions(
+        scene=values.scene,
+        objects=tuple(dict.fromkeys(name for group in values.object for name in group)),
+        frames=values.frames,
+        resolution=values.resolution,
+        solver=values.solver,
+        output=values.output,
+        format=values.format,
+        report=values.report,
+    )
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="beamspread batch",
+        description="Bake the light inside translucent surfaces of a scene into image files.",
+        epilog="Exit code 0 only if every bake asked for was written.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("scene", nargs="?", help="the .blend file, if Blender has not opened it already")
+    parser.add_argument(
+        "--object",
+        action="append",
+        nargs="+",
+        default=[],
+        metavar="NAME",
+        help="object to bake, may be repeated (default: all whose material has a Beamspread node)",
+    )
+    parser.add_argument("--frames", type=_frames, metavar="A-B", help="first and last frame (default: the current one)")
+    parser.add_argument("--resolution", type=_resolution, metavar="N", help="texels along the longer side")
+    parser.add_argument("--solver", type=str.lower, choices=SOLVERS)
+    parser.add_argument("--output", metavar="DIR", help="folder for the images (default: the scene's setting)")
+    parser.add_argument("--format", type=str.upper, choices=FORMATS)
+    parser.add_argument("--report", metavar="FILE.json", help="write what became of each bake")
+    parser.add_argument("--resume", action="store_true", help="not supported yet")
+    return parser
+
+
+def _frames(text: str) -> tuple[int, int]:
+    first, separator, last = text.strip().partition("-") if not text.startswith("-") else ("", "", "")
+    try:
+        start = int(first)
+        end = int(last) if separator else start
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a frame or a range such as 1-10") from None
+    if end < start:
+        raise argparse.ArgumentTypeError(f"{text!r} ends before it starts")
+    return start, end
+
+
+def _resolution(text: str) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
+    if not 1 <= value <= 65536:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of texels between 1 and 65536")
+    return value

@@ -1,0 +1,127 @@
+"""The render engine: Blender's own Bake fills the active image through it."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from . import bakes, extract
+from .core.errors import BakeError
+
+# Messages of the last bake: an exception in `bake` reaches nobody, and Blender reports success all the same.
+last_errors: list[str] = []
+
+
+class BeamspreadEngine(bpy.types.RenderEngine):
+    """Bakes translucent surfaces; pictures are for Cycles and EEVEE."""
+
+    bl_idname = "BEAMSPREAD"
+    bl_label = "Beamspread"
+    bl_use_preview = False
+    bl_use_eevee_viewport = True
+    bl_use_shading_nodes_custom = False
+
+    def render(self, depsgraph) -> None:
+        show_nothing(self, depsgraph)
+
+    def bake(self, depsgraph, obj, _pass_type, _pass_filter, width, height) -> None:
+        bake_active_image(self, depsgraph, obj, width, height)
+
+
+def show_nothing(engine, depsgraph) -> None:
+    """F12: an empty picture and a sentence that says what to do."""
+    scene = depsgraph.scene
+    scale = scene.render.resolution_percentage / 100
+    size = (max(1, int(scene.render.resolution_x * scale)), max(1, int(scene.render.resolution_y * scale)))
+    engine.end_result(engine.begin_result(0, 0, *size))
+    engine.report({"WARNING"}, "Beamspread bakes textures: press Bake, then render with Cycles or EEVEE")
+
+
+def bake_active_image(engine, depsgraph, obj, width: int, height: int) -> None:
+    """Fill the image that Blender bakes to; failures are reported and kept in `last_errors`."""
+    last_errors.clear()
+    result = engine.begin_result(0, 0, width, height, layer=depsgraph.view_layer.name)
+    cancelled = True
+    try:
+        _fill(engine, depsgraph, obj, result.layers[0].passes, width, height)
+        cancelled = False
+    except Exception as error:  # noqa: BLE001 - Blender would swallow it
+        message = bakes.sentence(error)
+        last_errors.append(f"{obj.name}: {message}")
+        engine.report({"ERROR"}, f"{obj.name}: {message}")
+    finally:
+        engine.end_result(result, cancel=cancelled)
+
+
+def _fill(engine, depsgraph, obj, passes, width: int, height: int) -> None:
+    primitives = _read_pass(passes, "BakePrimitive", width, height)[..., 1].view(np.int32)
+    names = _materials_in(obj, primitives)
+    if not names:
+        raise BakeError("No material of this object has a Beamspread node: add one in the Shader Editor.")
+    scene = depsgraph.scene
+    settings = bakes.core_settings(scene.beamspread)
+    light = extract.read_scene_light(depsgraph)
+    pixels = np.zeros((height, width, 4), np.float32)
+    for number, name in enumerate(names):
+        job = bakes.make_job(obj, name, light, settings, None, scene.beamspread.resolution, size=(width, height))
+        texture = job.run(lambda fraction, done=number: _step(engine, (done + fraction) / len(names)))
+        covered = job.receiver.coverage > 0
+        pixels[covered] = np.dstack([texture, np.ones((height, width), np.float32)])[covered]
+        for warning in job.warnings:
+            engine.report({"WARNING"}, warning)
+    passes["Combined"].rect.foreach_set(pixels.ravel())
+
+
+def _step(engine, fraction: float) -> bool:
+    engine.update_progress(fraction)
+    return not engine.test_break()
+
+
+def _read_pass(passes, name: str, width: int, height: int) -> np.ndarray:
+    # Flat: newer versions refuse any other shape.
+    values = np.empty(width * height * 4, np.float32)
+    passes[name].rect.foreach_get(values)
+    return values.reshape(height, width, 4)
+
+
+def _materials_in(obj, primitives: np.ndarray) -> list[str]:
+    """Beamspread materials of the triangles that this image shows (Blender bakes one image at a time)."""
+    wanted = {material.name for material in bakes.materials_of(obj)}
+    triangles = np.unique(primitives[primitives >= 0])
+    mesh = obj.to_mesh()
+    try:
+        mesh.calc_loop_triangles()
+        slots = np.empty(len(mesh.loop_triangles), np.int32)
+        mesh.loop_triangles.foreach_get("material_index", slots)
+    finally:
+        obj.to_mesh_clear()
+    used = {int(slot) for slot in np.unique(slots[triangles[triangles < len(slots)]])}
+    names = [slot.material.name for index, slot in enumerate(obj.material_slots) if index in used and slot.material]
+    return [name for name in dict.fromkeys(names) if name in wanted]
+
+
+# Panels of Blender that make sense with this engine: those of its own engines, but for render settings.
+HIDDEN_PANEL_PREFIXES = ("RENDER_PT_", "VIEWLAYER_PT_layer_passes", "WORLD_PT_viewport")
+
+
+def _compatible_panels() -> list:
+    panels = bpy.types.Panel.__subclasses__()
+    return [
+        panel
+        for panel in panels
+        if "BLENDER_RENDER" in getattr(panel, "COMPAT_ENGINES", ())
+        and not panel.__name__.startswith(HIDDEN_PANEL_PREFIXES)
+    ]
+
+
+def register() -> None:
+    bpy.utils.register_class(BeamspreadEngine)
+    for panel in _compatible_panels():
+        panel.COMPAT_ENGINES.add(BeamspreadEngine.bl_idname)
+
+
+def unregister() -> None:
+    for panel in bpy.types.Panel.__subclasses__():
+        if BeamspreadEngine.bl_idname in getattr(panel, "COMPAT_ENGINES", ()):
+            panel.COMPAT_ENGINES.remove(BeamspreadEngine.bl_idname)
+    bpy.utils.unregister_class(BeamspreadEngine)
