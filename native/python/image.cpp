@@ -11,8 +11,6 @@ namespace beamspread {
 
 namespace {
 
-using FloatArray = py::array_t<float, py::array::c_style>;
-
 ExrAttribute to_attribute(const std::string& name, const py::handle& value)
 {
     if (py::isinstance<py::str>(value))
@@ -51,7 +49,7 @@ void flip_rows(const float* from, float* to, std::size_t height, std::size_t row
 void write_exr(const std::string& path, const py::array& array, const std::vector<std::string>& channels,
                const py::dict& attributes)
 {
-    if (!py::isinstance<FloatArray>(array) || array.ndim() != 3)
+    if (!py::isinstance<Array<float>>(array) || array.ndim() != 3)
         reject("array", std::string(py::str(array.dtype())) + " of " + std::to_string(array.ndim()) + " dimensions",
                "contiguous float32 (H, W, C)");
     if (array.shape(2) != static_cast<py::ssize_t>(channels.size()))
@@ -91,7 +89,7 @@ py::tuple read_exr(const std::string& path, const std::optional<std::string>& pa
             part = std::move(parts[0]);
         }
     }
-    FloatArray array({static_cast<py::ssize_t>(part.height), static_cast<py::ssize_t>(part.width),
+    Array<float> array({static_cast<py::ssize_t>(part.height), static_cast<py::ssize_t>(part.width),
                       static_cast<py::ssize_t>(part.channels.size())});
     flip_rows(part.pixels.data(), array.mutable_data(), static_cast<std::size_t>(part.height),
               static_cast<std::size_t>(part.width) * part.channels.size());

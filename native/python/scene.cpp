@@ -11,8 +11,6 @@ namespace beamspread {
 namespace {
 
 using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
-template <class T>
-using Array = py::array_t<T, py::array::c_style>;
 
 std::string shape_text(const py::array& array)
 {
@@ -85,7 +83,7 @@ View2D<float> view(Array<float>& array, const ReceiverGrid& grid)
 void run(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, int samples, int threads,
          const py::object& callback, const BeamArrays& beams)
 {
-    Progress progress = make_progress(callback);
+    Progress progress(progress_callback(callback));
     const py::gil_scoped_release released;
     compute_beams(grid, light, occluders, {.samples = samples, .threads = threads}, beams, progress);
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <sstream>
 #include <string>
 
 #include "base/vec.h"
@@ -15,7 +16,9 @@ inline bool is_finite(const Vec3& v)
 
 inline std::string to_text(const Vec3& v)
 {
-    return "(" + std::to_string(v.x) + ", " + std::to_string(v.y) + ", " + std::to_string(v.z) + ")";
+    std::ostringstream text;
+    text << "(" << v.x << ", " << v.y << ", " << v.z << ")";
+    return text.str();
 }
 
 }  // namespace beamspread::detail

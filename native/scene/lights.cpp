@@ -1,7 +1,5 @@
 #include "scene/lights.h"
 
-#include <glm/matrix.hpp>
-
 #include <algorithm>
 #include <cmath>
 #include <string>
