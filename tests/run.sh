@@ -32,7 +32,7 @@ sanitized() {
     runtime=$(c++ -print-file-name="$2")
     tools/build.sh "$preset" || return
     # Leaks: Python keeps much until it exits. ThreadSanitizer can't place its shadow memory everywhere: no ASLR.
-    env LD_PRELOAD="$runtime" PYTHONPATH="$PWD/build/$preset/stage" BEAMSPREAD_DLOPEN=plain PYTHONMALLOC=malloc \
+    env LD_PRELOAD="$runtime" PYTHONPATH="$PWD/build/$preset/stage" BEAMSPREAD_NO_DEEPBIND=1 PYTHONMALLOC=malloc \
         ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 \
         TSAN_OPTIONS=halt_on_error=1:suppressions="$PWD/tests/tsan.supp" \
         setarch "$(uname -m)" -R "$python" tests/smoke.py

@@ -33,8 +33,8 @@ missing_packages() {
 }
 
 install_packages() {
-    local missing as_root=()
-    mapfile -t missing < <(missing_packages "$@")
+    local as_root=() missing
+    read -r -a missing <<<"$(missing_packages "$@" | xargs)"
     [ ${#missing[@]} -gt 0 ] || return 0
     local by_hand="apt-get update && apt-get install --no-install-recommends ${missing[*]}"
     command -v apt-get >/dev/null || die "this is not a Debian; install what corresponds to: ${missing[*]}"

@@ -1,0 +1,110 @@
+"""Goes once through everything that the native module does, for runs under a sanitizer: a mistake ends the process.
+
+Plain Python instead of pytest, so that nothing else is in the process; what comes out is only checked for sanity.
+"""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from beamspread import Cancelled, Medium, simulate
+from beamspread._load import native
+
+THREADS = 4
+SIZE = 24
+
+
+def cancelled_at(stop, work):
+    """Call `work(progress)` and stop it as soon as a fraction of `stop` is reported."""
+    try:
+        work(lambda fraction: fraction < stop)
+    except Cancelled:
+        return
+    raise AssertionError("progress returned False, but the work went on")
+
+
+def refused(error, work, *arguments, **keywords):
+    try:
+        work(*arguments, **keywords)
+    except error:
+        return
+    raise AssertionError(f"{work} accepted {arguments} {keywords}")
+
+
+def libraries(folder):
+    slab = simulate(Medium(g=0.5, ior=1.4, thickness=3.0), angles=[0, 30, 60], photons=2000, seed=2, threads=THREADS)
+    half_space = simulate(Medium(), angles=[0, 45], photons=500, threads=THREADS, progress=lambda fraction: True)
+    for library in (slab, half_space):
+        path = str(Path(folder) / "library.exr")
+        library.save(path)
+        again = type(library).load(path)
+        assert again.medium == library.medium
+        for side in ("reflected", "transmitted") if library is slab else ("reflected",):
+            image = again.image(20.0, 0.9, 16, 0.3, side=side)
+            assert np.isfinite(image).all()
+        assert 0 < again.reflectance(10.0, 0.9) < 1
+    cancelled_at(0.3, lambda progress: simulate(Medium(), [0], 100_000, threads=THREADS, progress=progress))
+    refused(ValueError, simulate, Medium(), [95], 100)
+    refused(OSError, type(slab).load, str(Path(folder) / "none.exr"))
+    Path(folder, "broken.exr").write_bytes(Path(folder, "library.exr").read_bytes()[:3000])
+    refused(OSError, type(slab).load, str(Path(folder) / "broken.exr"))
+    return slab
+
+
+def beams():
+    grid = {
+        "origin": (-1, -1, 0),
+        "x_axis": (1, 0, 0),
+        "y_axis": (0, 1, 0),
+        "normal": (0, 0, 1),
+        "pitch_x": 2 / SIZE,
+        "pitch_y": 2 / SIZE,
+        "width": SIZE,
+        "height": SIZE,
+    }
+    corners = np.array([[0, -1, 0.5], [0.5, -1, 0.5], [0.5, 1, 0.5], [0, 1, 0.5]], np.float32)
+    settings = {
+        "occluders": native.Occluders(corners, np.array([[0, 1, 2], [0, 2, 3]], np.uint32)),
+        "samples": 3,
+        "threads": THREADS,
+    }
+    sun = native.sun_beams(**grid, direction=(0.3, 0, -1), **settings)
+    assert sun.min() == 0 < sun.max()
+    point, point_direction = native.point_beams(**grid, position=(0.2, 0, 1), **settings)
+    spot, _ = native.spot_beams(
+        **grid, position=(0.2, 0, 1), frame=np.eye(3), spot_size=1.0, blend=0.2, progress=lambda f: True, **settings
+    )
+    assert point.max() > 0
+    assert spot.max() > 0
+    cancelled_at(0, lambda progress: native.sun_beams(**grid, direction=(0, 0, -1), progress=progress, **settings))
+    covered = native.coverage(np.array([[1.5, 1], [9, 1], [9, 8]], np.float64), np.array([3], np.uint32), SIZE, SIZE)
+    assert 0 < covered.sum() < SIZE * SIZE
+    return sun, point, point_direction
+
+
+def solvers(library, sun, point, direction):
+    from beamspread import convolve
+
+    for solver in ("fft", "direct"):
+        for irradiance, light in ((sun, (0.3, 0.0, -0.954)), (point, direction)):
+            result = convolve(
+                irradiance, light, library, (0.9, 0.5, 0.1), 0.1, 2 / SIZE, solver=solver, threads=THREADS
+            )
+            assert result.shape == (SIZE, SIZE, 3)
+            assert np.isfinite(result).all()
+    refused(ValueError, convolve, sun, (0, 0, 1), library, 0.5, 0.1, 2 / SIZE)
+
+
+def images(folder):
+    path = str(Path(folder) / "image.exr")
+    pixels = np.linspace(-1, 7, 5 * 7 * 3, dtype=np.float32).reshape(5, 7, 3)
+    native.write_exr(path, pixels, ["R", "G", "B"], {"beamspread:test": 1.5})
+    again, channels, _ = native.read_exr(path)
+    assert channels == ["R", "G", "B"]
+    assert (again == pixels).all()
+
+
+with tempfile.TemporaryDirectory() as folder:
+    images(folder)
+    solvers(libraries(folder), *beams())
+print("smoke: all fine")

@@ -1,0 +1,119 @@
+"""The native module as a guest in somebody else's process."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import beamspread
+import pytest
+from beamspread._load import native
+
+ROOT = Path(__file__).resolve().parents[2]
+STAGE = Path(beamspread.__file__).resolve().parent.parent
+WHEEL_EMBREE = ROOT / "build/bpy-4.5/bpy/lib/libembree4.so.4"
+
+# rtcGetDeviceProperty(RTC_DEVICE_PROPERTY_VERSION) is 10000 major + 100 minor + patch.
+ASK_EMBREE = """
+from beamspread._load import native
+import numpy as np
+occluders = native.Occluders(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.uint32))
+print(native.embree_version())
+"""
+
+# The control words of x87 and SSE in fenv_t (x86-64: offsets 0 and 28) without the sticky exception flags.
+FLOATING_POINT_MODE = """
+import ctypes, struct
+import numpy as np
+libm = ctypes.CDLL("libm.so.6")
+def mode():
+    environment = ctypes.create_string_buffer(32)
+    assert libm.fegetenv(environment) == 0
+    return struct.unpack_from("<H", environment, 0)[0], struct.unpack_from("<I", environment, 28)[0] & ~0x3F
+"""
+
+EVERY_KIND_OF_CALL = """
+from beamspread import Medium, convolve, simulate
+from beamspread._load import native
+library = simulate(Medium(), angles=[0, 30], photons=256)
+for solver in ("fft", "direct"):
+    convolve(np.ones((8, 8), np.float32), (0.0, 0.0, -1.0), library, 0.5, 1.0, 1.0, solver=solver)
+occluders = native.Occluders(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.uint32))
+native.sun_beams(origin=(0, 0, 0), x_axis=(1, 0, 0), y_axis=(0, 1, 0), normal=(0, 0, 1), pitch_x=1, pitch_y=1,
+                 width=4, height=4, direction=(0, 0, -1), occluders=occluders)
+"""
+
+
+def run_python(code, **environment):
+    """Stdout of a fresh interpreter that can import beamspread; its stderr has to stay empty."""
+    result = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "PYTHONPATH": str(STAGE), **environment},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert result.returncode == 0, result.stderr
+    assert result.stderr == ""
+    return result.stdout
+
+
+def native_file():
+    return Path(native.__file__)
+
+
+def test_exports_nothing_but_its_init_function():
+    symbols = subprocess.run(
+        ["nm", "--dynamic", "--defined-only", native_file()], capture_output=True, text=True, check=True
+    ).stdout
+    assert [line.split()[-1] for line in symbols.splitlines()] == ["PyInit__native"]
+
+
+def test_is_private_to_the_package():
+    loaded = run_python("import beamspread, sys; print(*sorted(n for n in sys.modules if n.endswith('_native')))")
+    assert loaded.split() == ["beamspread._native"]
+    assert native_file().parent == Path(beamspread.__file__).parent
+
+
+def test_import_needs_no_blender_and_prints_nothing():
+    assert run_python("import beamspread, sys; assert 'bpy' not in sys.modules") == ""
+
+
+def test_calls_print_nothing():
+    assert run_python("import numpy as np" + EVERY_KIND_OF_CALL) == ""
+
+
+def test_has_the_version_of_the_package():
+    assert native.__version__ == (STAGE / "beamspread/VERSION").read_text().strip()
+
+
+def test_import_restores_dlopen_flags():
+    before, after = run_python(
+        "import sys; before = sys.getdlopenflags(); import beamspread; print(before, sys.getdlopenflags())"
+    ).split()
+    assert before == after
+
+
+@pytest.mark.parametrize("call", ["import beamspread", EVERY_KIND_OF_CALL], ids=["import", "calls"])
+def test_leaves_the_floating_point_mode_alone(call):
+    before, after = run_python(f"{FLOATING_POINT_MODE}\nprint(mode())\n{call}\nprint(mode())").splitlines()
+    assert before == after
+
+
+def test_its_own_embree_is_version_3():
+    assert run_python(ASK_EMBREE).startswith("313")
+
+
+def test_embree_4_of_the_host_does_not_win_when_preloaded():
+    assert run_python(ASK_EMBREE, LD_PRELOAD=str(WHEEL_EMBREE)).startswith("313")
+
+
+def test_embree_4_of_the_host_does_not_win_when_loaded_globally():
+    load = f"import ctypes; ctypes.CDLL({str(WHEEL_EMBREE)!r}, mode=ctypes.RTLD_GLOBAL)\n"
+    assert run_python(load + ASK_EMBREE).startswith("313")
+
+
+def test_embree_4_of_the_host_would_win_without_deepbind():
+    """Shows that the two tests above can fail."""
+    code = "from beamspread._load import native; print(native.embree_version())"
+    assert run_python(code, LD_PRELOAD=str(WHEEL_EMBREE), BEAMSPREAD_NO_DEEPBIND="1").startswith("4")
