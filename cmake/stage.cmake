@@ -1,4 +1,5 @@
 # Mirrors the Python package FROM into TO beside the native module, and removes what FROM no longer has.
+cmake_minimum_required(VERSION 3.25)
 file(GLOB_RECURSE sources RELATIVE ${FROM} ${FROM}/*)
 list(FILTER sources EXCLUDE REGEX "__pycache__|\\.pyc$")
 file(GLOB_RECURSE staged RELATIVE ${TO} ${TO}/*)

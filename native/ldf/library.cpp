@@ -17,16 +17,22 @@ namespace {
 // used with the exact Fresnel factor.
 constexpr double grazing_deg = 88.0;
 
-// Weight of each order bin at an albedo: the mean of albedo^n over the bin, from the mean and variance of its orders.
+// Below this exponent a bin's weight is zero to any purpose, and the expansion in its variance no longer holds.
+constexpr double negligible_log_weight = -60.0;
+
+// Weight of each order bin at an albedo: the mean of albedo^n over the bin, to second order in the spread
+// of its orders.
 std::array<double, order_bin_count> order_weights(const SideResult& side, double albedo)
 {
     std::array<double, order_bin_count> weights{};
     if (albedo <= 0.0)
         return weights;
     const double log_albedo = std::log(albedo);
-    for (std::size_t b = 1; b < order_bin_count; ++b)
-        weights[b] = std::exp(log_albedo * (static_cast<double>(side.mean_order[b]) +
-                                            0.5 * log_albedo * static_cast<double>(side.order_variance[b])));
+    for (std::size_t b = 1; b < order_bin_count; ++b) {
+        const double log_weight = log_albedo * static_cast<double>(side.mean_order[b]);
+        if (log_weight > negligible_log_weight)
+            weights[b] = std::exp(log_weight + 0.5 * log_albedo * log_albedo * static_cast<double>(side.order_variance[b]));
+    }
     return weights;
 }
 

@@ -1,0 +1,104 @@
+"""Luminance of beams on a plane."""
+
+import numpy as np
+
+from .._load import native
+
+
+def convolve(
+    irradiance,
+    direction,
+    ldf,
+    albedo,
+    mean_free_path,
+    pitch,
+    solver="fft",
+    tolerance=1e-3,
+    threads=0,
+    progress=None,
+):
+    """Luminance that beams on a regular grid of a plane cause (Manabe et al. 2012, Eq. 2).
+
+    Parameters
+    ----------
+    irradiance : array_like, shape (H, W) or (H, W, 3)
+        W/m^2 on the surface, cosine and visibility included; rows go up the plane.
+    direction : array_like, shape (3,) or (H, W, 3)
+        Unit vectors along which light travels, in the plane's frame (x along columns, y along rows, z the outward
+        normal): z < 0. One for all beams, or one per texel.
+    ldf : LdfLibrary, or a sequence of three
+        One per channel where anisotropy or thickness in mean free paths differ.
+    albedo : float or sequence of three
+        Single-scattering albedo, 0 <= albedo < 1.
+    mean_free_path : float or sequence of three
+        Metres.
+    pitch : float or (float, float)
+        Side of a texel in metres, along x and y.
+    solver : {"fft", "direct"}
+        `direct` visits every pair of texels: exact and slow.
+    tolerance : float
+        Relative error that `fft` may make in its kernels where directions differ.
+    threads : int
+        0: all. The result does not depend on it.
+    progress : callable, optional
+        Called with the finished fraction; returning False stops.
+
+    Returns
+    -------
+    float32, shape (H, W, 3)
+        Luminance, radiance in W/(m^2 sr).
+
+    Raises
+    ------
+    ValueError
+        Names the argument, its value and what is allowed.
+    Cancelled
+        `progress` returned False.
+    """
+    beams = _float_array("irradiance", irradiance)
+    if beams.ndim == 3 and beams.shape[2] == 3:
+        beams = np.ascontiguousarray(np.moveaxis(beams, 2, 0))
+    elif beams.ndim != 2:
+        raise ValueError(f"argument 'irradiance' is of shape {beams.shape}; allowed: (H, W) or (H, W, 3)")
+    return native.convolve(
+        beams,
+        _float_array("direction", direction),
+        _libraries(ldf),
+        _rgb("albedo", albedo),
+        _rgb("mean_free_path", mean_free_path),
+        _pair("pitch", pitch),
+        solver,
+        float(tolerance),
+        int(threads),
+        progress,
+    )
+
+
+def _float_array(name, values):
+    try:
+        return np.ascontiguousarray(values, dtype=np.float32)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"argument {name!r} is {values!r}; allowed: an array of numbers") from error
+
+
+def _numbers(name, values, count):
+    """`count` floats from one number or a sequence of `count`."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape not in ((), (count,)):
+        raise ValueError(f"argument {name!r} is of shape {array.shape}; allowed: a number or {count} numbers")
+    return np.broadcast_to(array, count).tolist()
+
+
+def _rgb(name, values):
+    return _numbers(name, values, 3)
+
+
+def _pair(name, values):
+    return _numbers(name, values, 2)
+
+
+def _libraries(ldf):
+    libraries = [ldf] * 3 if isinstance(ldf, native.LdfLibrary) else list(ldf)
+    if len(libraries) != 3 or not all(isinstance(each, native.LdfLibrary) for each in libraries):
+        raise ValueError(f"argument 'ldf' is {ldf!r}; allowed: an LdfLibrary or three of them, one per channel")
+    return libraries
