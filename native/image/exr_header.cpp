@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <string_view>
 #include <type_traits>
 #include <utility>
@@ -36,6 +37,30 @@ std::pair<std::string, std::pair<std::size_t, std::string>> conventional_rank(co
     return {layer, {rank, channel}};
 }
 
+// RFC 3629: no surrogates, nothing longer than it need be.
+bool is_utf8(std::string_view text)
+{
+    constexpr std::array<std::uint32_t, 3> smallest{0x80, 0x800, 0x10000};
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        const auto lead = static_cast<unsigned char>(text[i]);
+        if (lead < 0x80)
+            continue;
+        const std::size_t following = lead >= 0xf0 ? 3 : lead >= 0xe0 ? 2 : 1;
+        if (lead < 0xc2 || lead > 0xf4 || following >= text.size() - i)
+            return false;
+        std::uint32_t code = lead & (0x3fu >> following);
+        for (std::size_t k = 0; k < following; ++k) {
+            const auto next = static_cast<unsigned char>(text[++i]);
+            if ((next & 0xc0) != 0x80)
+                return false;
+            code = code << 6 | (next & 0x3fu);
+        }
+        if (code < smallest[following - 1] || code > 0x10ffff || (code >= 0xd800 && code < 0xe000))
+            return false;
+    }
+    return true;
+}
+
 }  // namespace
 
 bool is_structural_attribute(const std::string& name)
@@ -59,12 +84,12 @@ std::map<std::string, ExrAttribute> get_attributes(const Imf::Header& header)
 {
     std::map<std::string, ExrAttribute> attributes;
     for (auto entry = header.begin(); entry != header.end(); ++entry) {
-        const std::string name = entry.name();
+        const std::string name = as_utf8(entry.name());
         if (is_structural_attribute(name))
             continue;
         const Imf::Attribute& attribute = entry.attribute();
         if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&attribute))
-            attributes.emplace(name, text->value());
+            attributes.emplace(name, as_utf8(text->value()));
         else if (const auto* number = dynamic_cast<const Imf::DoubleAttribute*>(&attribute))
             attributes.emplace(name, number->value());
         else if (const auto* single = dynamic_cast<const Imf::FloatAttribute*>(&attribute))
@@ -100,6 +125,22 @@ std::vector<std::string> get_channels(const Imf::Header& header)
         return conventional_rank(left) < conventional_rank(right);
     });
     return channels;
+}
+
+std::string as_utf8(std::string text)
+{
+    if (!is_utf8(text))
+        std::replace_if(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) >= 0x80; }, '?');
+    return text;
+}
+
+std::string reason_of(const std::exception& error, const std::string& path)
+{
+    // "Cannot read image file "PATH". Reason"
+    const std::string message = as_utf8(error.what());
+    const std::string mention = "\"" + path + "\". ";
+    const std::size_t at = message.find(mention);
+    return at == std::string::npos ? message : message.substr(at + mention.size());
 }
 
 }  // namespace beamspread::detail

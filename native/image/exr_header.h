@@ -3,6 +3,8 @@
 
 #include <OpenEXR/ImfHeader.h>
 
+#include <exception>
+
 #include "image/exr.h"
 
 namespace beamspread::detail {
@@ -18,7 +20,13 @@ std::map<std::string, ExrAttribute> get_attributes(const Imf::Header& header);
 
 void set_channels(Imf::Header& header, const std::vector<std::string>& channels);
 
-// As written by us; of foreign files R, G, B, A first within each layer, then the others by name.
+// As the file spells them. As written by us; of foreign files R, G, B, A first within each layer, then the others by name.
 std::vector<std::string> get_channels(const Imf::Header& header);
+
+// The text if it is valid UTF-8, else with "?" for its bytes outside ASCII: hosts such as Python take nothing else.
+std::string as_utf8(std::string text);
+
+// What OpenEXR says of a fault, without its own mention of the file's path.
+std::string reason_of(const std::exception& error, const std::string& path);
 
 }  // namespace beamspread::detail

@@ -5,6 +5,7 @@
 #include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfTileDescription.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "base/error.h"
@@ -49,7 +50,7 @@ long long check_header(const Imf::Header& header, long long file_bytes)
     long long channels = 0;
     for (auto entry = header.channels().begin(); entry != header.channels().end(); ++entry) {
         if (entry.channel().xSampling != 1 || entry.channel().ySampling != 1)
-            fail("channel '" + std::string(entry.name()) + "' is subsampled");
+            fail("channel '" + detail::as_utf8(entry.name()) + "' is subsampled");
         pixel_bytes += entry.channel().type == Imf::HALF ? 2 : 4;
         ++channels;
     }
@@ -66,6 +67,11 @@ long long check_header(const Imf::Header& header, long long file_bytes)
     return width * height * channels;
 }
 
+std::string part_name(const Imf::Header& header)
+{
+    return header.hasName() ? detail::as_utf8(header.name()) : "";
+}
+
 // Of a part that passed check_header.
 ExrPart read_part(Imf::MultiPartInputFile& file, int index)
 {
@@ -73,7 +79,7 @@ ExrPart read_part(Imf::MultiPartInputFile& file, int index)
     const Imath::Box2i& window = header.dataWindow();
 
     ExrPart part;
-    part.name = header.hasName() ? header.name() : "";
+    part.name = part_name(header);
     part.width = window.max.x - window.min.x + 1;
     part.height = window.max.y - window.min.y + 1;
     part.channels = detail::get_channels(header);
@@ -89,6 +95,7 @@ ExrPart read_part(Imf::MultiPartInputFile& file, int index)
     Imf::InputPart input(file, index);
     input.setFrameBuffer(buffer);
     input.readPixels(window.min.y, window.max.y);
+    std::transform(part.channels.begin(), part.channels.end(), part.channels.begin(), detail::as_utf8);
     return part;
 }
 
@@ -106,7 +113,7 @@ auto with_file(const std::string& path, const Read& read)
         Imf::MultiPartInputFile file(path.c_str(), own_threads, reconstruct);
         return read(file, static_cast<long long>(file_bytes));
     } catch (const std::exception& error) {
-        throw IoError("cannot read '" + path + "': " + error.what());
+        throw IoError("cannot read '" + path + "': " + detail::reason_of(error, path));
     }
 }
 
@@ -132,12 +139,11 @@ ExrPart read_exr_part(const std::string& path, const std::string& name)
     return with_file(path, [&name](Imf::MultiPartInputFile& file, long long file_bytes) {
         std::string names;
         for (int i = 0; i < file.parts(); ++i) {
-            const std::string part_name = file.header(i).hasName() ? file.header(i).name() : "";
-            if (part_name == name) {
+            if (part_name(file.header(i)) == name) {
                 check_header(file.header(i), file_bytes);
                 return read_part(file, i);
             }
-            names += (i ? ", '" : "'") + part_name + "'";
+            names += (i ? ", '" : "'") + part_name(file.header(i)) + "'";
         }
         fail("it has no part '" + name + "', only " + names);
     });

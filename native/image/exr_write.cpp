@@ -112,7 +112,7 @@ void write_exr_parts(const std::string& path, std::span<const ExrPart> parts)
         for (std::size_t i = 0; i < parts.size(); ++i)
             write_pixels(Imf::OutputPart(output, static_cast<int>(i)), parts[i]);
     } catch (const std::exception& error) {
-        throw IoError("cannot write '" + path + "': " + error.what());
+        throw IoError("cannot write '" + path + "': " + detail::reason_of(error, file.path()));
     }
     file.commit();
 }

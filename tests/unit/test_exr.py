@@ -1,0 +1,356 @@
+"""EXR files: what is written is checked with a reader of its own, what is read comes from a writer of its own."""
+
+import struct
+import zlib
+
+import numpy as np
+import pytest
+from beamspread._load import native
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+MAGIC = 20000630
+HALF, FLOAT = 1, 2
+DTYPES = {0: "<u4", HALF: "<f2", FLOAT: "<f4"}
+MULTI_PART = 0x1000
+
+
+def image(height=5, width=7, channels=3, seed=0):
+    return np.random.default_rng(seed).normal(size=(height, width, channels)).astype(np.float32)
+
+
+# --- a plain writer -------------------------------------------------------------------------------------------------
+
+
+def attribute(name, kind, data):
+    return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(data)) + data
+
+
+def header(width, height, channels, origin=(0, 0), sampling=1, compression=0, name=None, extra=b""):
+    """`channels`: (name, type) pairs in order of names."""
+    listing = b"".join(c.encode() + struct.pack("<xiIii", kind, 0, sampling, sampling) for c, kind in channels) + b"\0"
+    x, y = origin
+    window = struct.pack("<4i", x, y, x + width - 1, y + height - 1)
+    attributes = [
+        attribute("channels", "chlist", listing),
+        attribute("compression", "compression", bytes([compression])),
+        attribute("dataWindow", "box2i", window),
+        attribute("displayWindow", "box2i", window),
+        attribute("lineOrder", "lineOrder", b"\0"),
+        attribute("pixelAspectRatio", "float", struct.pack("<f", 1)),
+        attribute("screenWindowCenter", "v2f", struct.pack("<2f", 0, 0)),
+        attribute("screenWindowWidth", "float", struct.pack("<f", 1)),
+    ]
+    if name is not None:
+        attributes.append(attribute("name", "string", name.encode()))
+        attributes.append(attribute("type", "string", b"scanlineimage"))
+        attributes.append(attribute("chunkCount", "int", struct.pack("<i", height)))
+    return b"".join(attributes) + extra + b"\0"
+
+
+def lines(values, channels, origin=(0, 0)):
+    """Uncompressed scan lines of values (H, W, C), the first row at the top."""
+    result = []
+    for y, row in enumerate(values):
+        data = b"".join(row[:, c].astype(DTYPES[kind]).tobytes() for c, (_, kind) in enumerate(channels))
+        result.append(struct.pack("<ii", origin[1] + y, len(data)) + data)
+    return result
+
+
+def plain_exr(values, channels, **options):
+    """A file of one part as bytes."""
+    height, width = values.shape[:2]
+    start = struct.pack("<ii", MAGIC, 2) + header(width, height, channels, **options)
+    chunks = lines(values, channels, options.get("origin", (0, 0)))
+    offsets = len(start) + 8 * height + np.cumsum([0] + [len(chunk) for chunk in chunks[:-1]])
+    return start + struct.pack(f"<{height}q", *offsets) + b"".join(chunks)
+
+
+def plain_multi_part(parts):
+    """A file of several parts: name -> (values, channels)."""
+    start = struct.pack("<ii", MAGIC, 2 | MULTI_PART)
+    for name, (values, channels) in parts.items():
+        start += header(values.shape[1], values.shape[0], channels, name=name)
+    start += b"\0"
+    position = len(start) + 8 * sum(len(values) for values, _ in parts.values())
+    tables, data = b"", b""
+    for number, (values, channels) in enumerate(parts.values()):
+        for chunk in lines(values, channels):
+            tables += struct.pack("<q", position + len(data))
+            data += struct.pack("<i", number) + chunk
+    return start + tables + data
+
+
+# --- a plain reader -------------------------------------------------------------------------------------------------
+
+
+def take_string(data, at):
+    end = data.index(b"\0", at)
+    return data[at:end].decode(), end + 1
+
+
+def read_plain(data):
+    """Attributes {name: (type, bytes)} and channels {name: (H, W), top row first} of a ZIP file of floats."""
+    assert struct.unpack_from("<ii", data) == (MAGIC, 2)
+    at, attributes = 8, {}
+    while data[at]:
+        name, at = take_string(data, at)
+        kind, at = take_string(data, at)
+        (size,) = struct.unpack_from("<i", data, at)
+        attributes[name] = kind, data[at + 4 : at + 4 + size]
+        at += 4 + size
+    x0, y0, x1, y1 = struct.unpack("<4i", attributes["dataWindow"][1])
+    width, height = x1 - x0 + 1, y1 - y0 + 1
+    names, listing, position = [], attributes["channels"][1], 0
+    while listing[position]:
+        name, position = take_string(listing, position)
+        assert struct.unpack_from("<i", listing, position) == (FLOAT,)
+        names.append(name)
+        position += 16
+    assert attributes["compression"][1] == b"\3"
+    rows = np.empty((height, len(names), width), "<f4")
+    for offset in struct.unpack_from(f"<{-(-height // 16)}q", data, at + 1):
+        y, size = struct.unpack_from("<ii", data, offset)
+        count = min(16, height - y)
+        packed = data[offset + 8 : offset + 8 + size]
+        rows[y : y + count] = unzip(packed, count * len(names) * width * 4).reshape(count, len(names), width)
+    return attributes, {name: rows[:, i] for i, name in enumerate(names)}
+
+
+def unzip(packed, size):
+    """Undo deflate, the differences between bytes, and the split into two halves."""
+    if len(packed) == size:
+        return np.frombuffer(packed, "<f4")
+    steps = np.frombuffer(zlib.decompress(packed), np.uint8).astype(np.int64)
+    steps[1:] -= 128
+    values = (np.cumsum(steps) & 255).astype(np.uint8)
+    half = (size + 1) // 2
+    result = np.empty(size, np.uint8)
+    result[0::2], result[1::2] = values[:half], values[half:]
+    return result.view("<f4")
+
+
+# --- tests ----------------------------------------------------------------------------------------------------------
+
+
+def test_written_file_has_rows_top_down_and_standard_attributes(tmp_path):
+    path, pixels = tmp_path / "a.exr", image(37, 21)
+    native.write_exr(str(path), pixels, ["R", "G", "B"], {"theta": 12.5})
+    attributes, channels = read_plain(path.read_bytes())
+    for i, name in enumerate("RGB"):
+        np.testing.assert_array_equal(channels[name], pixels[::-1, :, i])
+    assert struct.unpack("<4i", attributes["displayWindow"][1]) == (0, 0, 20, 36)
+    assert attributes["theta"] == ("double", struct.pack("<d", 12.5))
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    height=st.integers(1, 40),
+    width=st.integers(1, 40),
+    names=st.lists(st.text("abcRGBA.0123", min_size=1, max_size=40), min_size=1, max_size=5, unique=True),
+    seed=st.integers(0, 9),
+)
+def test_round_trip_keeps_bits_and_the_order_of_channels(tmp_path_factory, height, width, names, seed):
+    path = str(tmp_path_factory.mktemp("exr") / "a.exr")
+    pixels = image(height, width, len(names), seed)
+    native.write_exr(path, pixels, names)
+    again, channels, attributes = native.read_exr(path)
+    assert channels == names
+    assert attributes == {}
+    assert again.dtype == np.float32
+    np.testing.assert_array_equal(again, pixels)
+
+
+def test_special_values_survive(tmp_path):
+    values = [0.18, 2.5, -0.1, 1e-30, 3e38, np.inf, -np.inf, np.nan, 0.0, -0.0]
+    pixels = np.array(values, np.float32).reshape(1, -1, 1)
+    native.write_exr(str(tmp_path / "a.exr"), pixels, ["Y"])
+    again = native.read_exr(str(tmp_path / "a.exr"))[0]
+    np.testing.assert_array_equal(again.view(np.uint32), pixels.view(np.uint32))
+
+
+def test_attributes_of_every_type(tmp_path):
+    path = str(tmp_path / "a.exr")
+    attributes = {
+        "text": "LDF of marble, µm",
+        "empty": "",
+        "long": "x" * 5000,
+        "double": 0.1,
+        "int": -7,
+        "list": [1.5, -2.0],
+        "none": [],
+        "array": np.array([0.25, 4.0]),
+    }
+    native.write_exr(path, image(), ["R", "G", "B"], attributes)
+    expected = attributes | {"array": [0.25, 4.0]}
+    assert native.read_exr(path)[2] == expected
+
+
+@pytest.mark.parametrize("origin", [(0, 0), (-3, 1000)])
+def test_reads_half_float_and_unsigned_channels(tmp_path, origin):
+    path = tmp_path / "a.exr"
+    values = np.abs(np.round(image(4, 6, 4) * 100)) + [0.5, 0.25, 0.125, 0]
+    path.write_bytes(plain_exr(values, [("A", HALF), ("B", FLOAT), ("G", HALF), ("R", 0)], origin=origin))
+    pixels, channels, _ = native.read_exr(str(path))
+    assert channels == ["R", "G", "B", "A"]
+    np.testing.assert_array_equal(pixels[::-1], values[..., ::-1])
+
+
+def test_layers_keep_together(tmp_path):
+    path = tmp_path / "a.exr"
+    names = ["A", "B", "G", "R", "Z", "far.B", "far.G", "far.R"]
+    path.write_bytes(plain_exr(image(2, 2, 8), [(name, FLOAT) for name in names]))
+    assert native.read_exr(str(path))[1] == ["R", "G", "B", "A", "Z", "far.R", "far.G", "far.B"]
+
+
+def test_reads_one_named_part(tmp_path):
+    path = tmp_path / "a.exr"
+    near, far = image(3, 4, 1, 1), image(3, 4, 2, 2)
+    path.write_bytes(plain_multi_part({"near": (near, [("Y", FLOAT)]), "far": (far, [("G", FLOAT), ("R", FLOAT)])}))
+    pixels, channels, _ = native.read_exr(str(path), "far")
+    assert channels == ["R", "G"]
+    np.testing.assert_array_equal(pixels[::-1], far[..., ::-1])
+    np.testing.assert_array_equal(native.read_exr(str(path), part="near")[0][::-1], near)
+    with pytest.raises(OSError, match=r"has 2 parts"):
+        native.read_exr(str(path))
+    with pytest.raises(OSError, match=r"no part 'middle', only 'near', 'far'"):
+        native.read_exr(str(path), "middle")
+
+
+def test_failed_write_leaves_the_old_file_and_nothing_beside_it(tmp_path):
+    path = tmp_path / "a.exr"
+    native.write_exr(str(path), image(), ["R", "G", "B"])
+    before = path.read_bytes()
+    with pytest.raises(ValueError, match="channels"):
+        native.write_exr(str(path), image(seed=1), ["R", "R", "B"])
+    path.chmod(0o444)
+    with pytest.raises(OSError, match=r"a\.exr': the file is read-only"):
+        native.write_exr(str(path), image(seed=1), ["R", "G", "B"])
+    assert path.read_bytes() == before
+    path.chmod(0o640)
+    native.write_exr(str(path), image(seed=1), ["R", "G", "B"])
+    assert path.read_bytes() != before
+    assert path.stat().st_mode & 0o777 == 0o640
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(("name", "reason"), [("none/a.exr", "there is no folder"), ("", "it is a folder")])
+def test_unwritable_places_are_named(tmp_path, name, reason):
+    path = str(tmp_path / name)
+    with pytest.raises(OSError, match=reason) as error:
+        native.write_exr(path, image(), ["R", "G", "B"])
+    assert path.rstrip("/") in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("array", "channels", "attributes", "message"),
+    [
+        (image().astype(np.float64), "RGB", {}, "array.*float64"),
+        (image()[..., 0], "RGB", {}, "array.*2 dimensions"),
+        (image()[:, ::2], "RGB", {}, "array"),
+        (image(), "RG", {}, "array.*3 channels"),
+        (image(0, 4), "RGB", {}, "height.*0"),
+        (image(4, 4, 0), "", {}, "channels.*empty"),
+        (image(), ["R", "", "B"], {}, "channels"),
+        (image(), ["R", "x" * 256, "B"], {}, "channels"),
+        (image(), "RGB", {"dataWindow": "x"}, "attributes.*dataWindow"),
+        (image(), "RGB", {"": 1}, "attributes"),
+        (image(), "RGB", {"a": None}, "attributes.*'a'.*NoneType"),
+        (image(), "RGB", {"a": 2**40}, "attributes.*'a'"),
+        (image(), "RGB", {"a": ["b"]}, "attributes.*'a'"),
+    ],
+)
+def test_bad_arguments(tmp_path, array, channels, attributes, message):
+    with pytest.raises(ValueError, match=message):
+        native.write_exr(str(tmp_path / "a.exr"), array, list(channels), attributes)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_missing_and_foreign_files(tmp_path):
+    path = tmp_path / "a.exr"
+    with pytest.raises(OSError, match=r"a\.exr.*No such file"):
+        native.read_exr(str(path))
+    for content in (b"", b"\x89PNG\r\n\x1a\n" + bytes(200), struct.pack("<ii", MAGIC, 2)):
+        path.write_bytes(content)
+        with pytest.raises(OSError, match=r"cannot read '.*a\.exr'"):
+            native.read_exr(str(path))
+    with pytest.raises(OSError, match="cannot read"):
+        native.read_exr(str(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"width": 50_000, "height": 50_000}, "more than 2\\^30|more pixels"),
+        ({"width": 30_000, "height": 30_000, "compression": 3}, "more pixels than a file of its length"),
+        ({"width": 2**31 - 1, "height": 1}, "its size|display window"),
+        ({"width": 4, "height": 4, "sampling": 2}, "subsampled"),
+        ({"width": 4, "height": 4, "channels": []}, "channel list|no channels"),
+    ],
+)
+def test_hostile_headers_are_refused_before_memory_is_taken(tmp_path, options, reason):
+    path = tmp_path / "a.exr"
+    options = {"channels": [("Y", FLOAT)]} | options
+    path.write_bytes(struct.pack("<ii", MAGIC, 2) + header(**options) + bytes(400_000))
+    with pytest.raises(OSError, match=reason):
+        native.read_exr(str(path))
+
+
+def test_every_truncation_is_refused(tmp_path):
+    path = tmp_path / "a.exr"
+    native.write_exr(str(path), image(40, 9), ["R", "G", "B"], {"a": [1.0, 2.0]})
+    content = path.read_bytes()
+    for size in range(0, len(content) - 1, 7):
+        path.write_bytes(content[:size])
+        with pytest.raises(OSError, match="cannot read"):
+            native.read_exr(str(path))
+
+
+def test_names_that_are_not_utf8(tmp_path):
+    path = tmp_path / "a.exr"
+    text = attribute("caf\u00e9", "string", "d\u00e9j\u00e0 \u20ac \U0001f600".encode()) + attribute(
+        "bad", "string", b"\xe9\xff"
+    )
+    content = plain_exr(image(2, 2, 1), [("Y?", FLOAT)], extra=text)
+    path.write_bytes(content.replace(b"Y?", b"Y\xfe", 1))
+    _, channels, attributes = native.read_exr(str(path))
+    assert channels == ["Y?"]
+    assert attributes == {"caf\u00e9": "d\u00e9j\u00e0 \u20ac \U0001f600", "bad": "??"}
+
+
+def flip_bytes(content, flips):
+    """Sets bytes after the magic number; positions wrap around within the header or within the whole."""
+    damaged = bytearray(content)
+    for position, span, value in flips:
+        damaged[4 + position % (min(len(damaged), span) - 4)] = value
+    return bytes(damaged)
+
+
+@pytest.fixture(scope="module")
+def sound_files(tmp_path_factory):
+    path = tmp_path_factory.mktemp("sound") / "a.exr"
+    native.write_exr(str(path), image(20, 9), ["R", "G", "B"], {"a": [1.0, 2.0], "b": "text"})
+    pair = {"a": (image(3, 4, 1), [("Y", FLOAT)]), "b": (image(3, 4, 1), [("Y", HALF)])}
+    return [path.read_bytes(), plain_exr(image(5, 5, 2), [("A", HALF), ("B", FLOAT)]), plain_multi_part(pair)]
+
+
+@settings(max_examples=1000, deadline=None)
+@given(
+    kind=st.integers(0, 2),
+    # Most of what can be damaged is in the first few hundred bytes.
+    flips=st.lists(
+        st.tuples(st.integers(0, 9999), st.sampled_from([400, 600, 9999]), st.integers(0, 255)), min_size=1, max_size=4
+    ),
+)
+def test_damaged_bytes_never_crash(sound_files, tmp_path_factory, kind, flips):
+    path = tmp_path_factory.getbasetemp() / "damaged.exr"
+    path.write_bytes(flip_bytes(sound_files[kind], flips))
+    part = "a" if kind == 2 else None
+    try:
+        pixels, channels, _ = native.read_exr(str(path), part)
+    except OSError as error:
+        message = str(error)
+    else:
+        message = path.name
+        assert pixels.shape[2] == len(channels)
+    assert path.name in message
