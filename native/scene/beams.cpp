@@ -1,6 +1,7 @@
 #include "scene/beams.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -88,8 +89,13 @@ private:
     {
         if (!m_occluders)
             return false;
-        // Ending short of the lamp by the same margin, a lamp that touches a surface is not shadowed by it.
-        return m_occluders->blocks(point + m_grid.normal * m_offset, -arrival.travel, arrival.distance - m_offset);
+        const Vec3 lift = m_grid.normal * m_offset;
+        if (std::isinf(arrival.distance))
+            return m_occluders->blocks(point + lift, -arrival.travel, arrival.distance);
+        const Vec3 way = -arrival.travel * arrival.distance - lift;
+        const double distance = glm::length(way);
+        // Ending short of the lamp by the same margin: one that touches a surface is not shadowed by it.
+        return m_occluders->blocks(point + lift, way / distance, distance - m_offset);
     }
 
     // In the plane frame.
