@@ -219,13 +219,18 @@ def _has_material(obj, slots: np.ndarray, material_name: str) -> np.ndarray:
 def read_surface(node) -> Surface:
     """A Beamspread node's values; lengths stay in scene units, as the geometry's."""
     material = Material(
-        albedo=tuple(node.albedo),
-        mean_free_path=tuple(node.mean_free_path),
-        anisotropy=node.anisotropy,
-        ior=node.ior,
+        albedo=tuple(map(_decimal, node.albedo)),
+        mean_free_path=tuple(map(_decimal, node.mean_free_path)),
+        anisotropy=_decimal(node.anisotropy),
+        ior=_decimal(node.ior),
     )
-    base_color = tuple(node.base_color) if node.color_mode == "BASE_COLOR" else None
-    return Surface(material, node.thickness, base_color)
+    base_color = tuple(map(_decimal, node.base_color)) if node.color_mode == "BASE_COLOR" else None
+    return Surface(material, _decimal(node.thickness), base_color)
+
+
+def _decimal(value: float) -> float:
+    """The number typed, from Blender's 32-bit float: 0.8, not 0.800000012, which would be another medium."""
+    return float(f"{value:.7g}")
 
 
 @contextmanager

@@ -31,14 +31,26 @@ def _apply_preset(node, context) -> None:
 
 
 def _show(node, _context) -> None:
-    """Bring image and IOR into the inner tree."""
-    tree = node.node_tree
-    if tree is None:
+    """Bring image and IOR into the inner tree, the node's own from here on.
+
+    A copied node shares the original's tree until then: assigning another in `copy()`, while Blender has not counted
+    the users of the new node yet, leaves the original's with too few, and Blender drops it when it saves.
+    """
+    if node.node_tree is None:
         return
+    if _is_shared(node.node_tree):
+        node.node_tree = node.node_tree.copy()
+        node.node_tree.use_fake_user = True
+    tree = node.node_tree
     tree.nodes[IMAGE].image = node.image
     tree.nodes[FRESNEL].inputs["IOR"].default_value = max(node.ior, 1.0)
     # Without a step in refraction there is no coat, whatever the renderer's Fresnel node says at grazing angles.
     tree.nodes[COAT].inputs[1].default_value = 1.0 if node.ior > 1 else 0.0
+
+
+def _is_shared(tree) -> bool:
+    """Whether more than one node shows the tree; its fake user counts as a user."""
+    return tree.users - tree.use_fake_user > 1
 
 
 def make_inner_tree() -> bpy.types.ShaderNodeTree:
@@ -154,14 +166,9 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         self.node_tree = make_inner_tree()
         _show(self, context)
 
-    def copy(self, node) -> None:
-        # `self` still shares the original's tree here; sockets come with the copy and must not be rebuilt.
-        if node.node_tree is not None:
-            self.node_tree = node.node_tree.copy()
-
     def free(self) -> None:
         # Removing the tree here crashes on undo; without its fake user it goes when the file is saved.
-        if self.node_tree is not None and self.node_tree.users <= 2:
+        if self.node_tree is not None and not _is_shared(self.node_tree):
             self.node_tree.use_fake_user = False
 
     def draw_buttons(self, _context, layout) -> None:
@@ -220,11 +227,21 @@ def _draw_add_menu(self, context) -> None:
         operator.use_transform = True
 
 
+def _is_used() -> bool:
+    """Whether any material or group of the file has the node."""
+    trees = [material.node_tree for material in bpy.data.materials if material.node_tree] + list(bpy.data.node_groups)
+    return any(node.bl_idname == BeamspreadNode.bl_idname for tree in trees for node in tree.nodes)
+
+
 def register() -> None:
-    bpy.utils.register_class(BeamspreadNode)
+    if not BeamspreadNode.is_registered:
+        bpy.utils.register_class(BeamspreadNode)
     bpy.types.NODE_MT_add.append(_draw_add_menu)
 
 
 def unregister() -> None:
     bpy.types.NODE_MT_add.remove(_draw_add_menu)
-    bpy.utils.unregister_class(BeamspreadNode)
+    # Blender frees the type but not the evaluated copies of nodes that point to it, and crashes when those go, at the
+    # latest on exit (3.4.1): a class in use stays.
+    if not _is_used():
+        bpy.utils.unregister_class(BeamspreadNode)

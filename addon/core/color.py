@@ -24,7 +24,7 @@ def albedo_from_color(color: RGB, medium, quality: str = "final", progress: Prog
     """
     from .library import library
 
-    return albedo_from_reflectance(color, library(medium, quality=quality, progress=progress).reflectance)
+    return albedo_from_reflectance(color, library(medium, quality=quality, progress=progress).diffuse_reflectance)
 
 
 def to_srgb(linear: np.ndarray) -> np.ndarray:

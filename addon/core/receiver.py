@@ -85,7 +85,8 @@ class Receiver:
         texture = np.zeros((self.height, self.width, values.shape[2]), np.float32)
         if self.texel_to_grid is None:
             column, row = self.offset
-            texture[row : row + self.grid.height, column : column + self.grid.width] = values
+            part = texture[row : row + self.grid.height, column : column + self.grid.width]
+            np.copyto(part, values, where=(self.grid.coverage > 0)[..., None])
             return texture
         rows, columns = np.nonzero(self.coverage > 0)
         x, y = self.texel_to_grid @ np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))])

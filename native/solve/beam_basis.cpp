@@ -171,18 +171,31 @@ QuadrantKernel::QuadrantKernel(const RadialProfile& profile, const Problem& prob
     m_integrals = integrate_texels(profile, {-0.5 * px, -0.5 * py, px, py, problem.width, problem.height}, problem.threads);
 }
 
-double QuadrantKernel::operator()(std::ptrdiff_t dy, std::ptrdiff_t dx, const Harmonics& cosine, const Harmonics& sine) const
+void QuadrantKernel::row(std::ptrdiff_t dy, const Harmonics& cosine, const Harmonics& sine,
+                         std::vector<double>& values) const
 {
-    const std::size_t texel = static_cast<std::size_t>(std::abs(dy)) * m_width + static_cast<std::size_t>(std::abs(dx));
-    // phi -> pi - phi for dx < 0, phi -> -phi for dy < 0.
-    const double mirror_sine = (dx < 0) != (dy < 0) ? -1.0 : 1.0;
-    double sum = 0.0;
+    values.assign(2 * m_width - 1, 0.0);
+    double* right = values.data() + (m_width - 1);
+    const std::size_t first = static_cast<std::size_t>(std::abs(dy)) * m_width;
     for (std::size_t m = 0; m < harmonic_count; ++m) {
-        const double value = cosine[m] * m_integrals.cosine[m * m_texels + texel] +
-                             mirror_sine * sine[m] * m_integrals.sine[m * m_texels + texel];
-        sum += dx < 0 && m % 2 == 1 ? -value : value;
+        // phi -> -phi for dy < 0, and phi -> pi - phi for dx < 0.
+        const double by_sine = dy < 0 ? -sine[m] : sine[m];
+        const double mirrored = m % 2 == 0 ? 1.0 : -1.0;
+        if (cosine[m] != 0.0) {
+            const double* a = m_integrals.cosine.data() + m * m_texels + first;
+            for (std::size_t x = 0; x < m_width; ++x)
+                right[x] += cosine[m] * a[x];
+            for (std::size_t x = 1; x < m_width; ++x)
+                values[m_width - 1 - x] += mirrored * cosine[m] * a[x];
+        }
+        if (by_sine != 0.0) {
+            const double* b = m_integrals.sine.data() + m * m_texels + first;
+            for (std::size_t x = 0; x < m_width; ++x)
+                right[x] += by_sine * b[x];
+            for (std::size_t x = 1; x < m_width; ++x)
+                values[m_width - 1 - x] -= mirrored * by_sine * b[x];
+        }
     }
-    return sum;
 }
 
 }  // namespace beamspread

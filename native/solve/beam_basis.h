@@ -56,8 +56,8 @@ class QuadrantKernel {
 public:
     QuadrantKernel(const RadialProfile& profile, const Problem& problem, const Channel& channel);
 
-    // Value at an offset in texels of the sum over m of cosine[m] A_m + sine[m] B_m.
-    double operator()(std::ptrdiff_t dy, std::ptrdiff_t dx, const Harmonics& cosine, const Harmonics& sine) const;
+    // The sum over m of cosine[m] A_m + sine[m] B_m for the row offset dy and dx = -(width - 1) .. width - 1.
+    void row(std::ptrdiff_t dy, const Harmonics& cosine, const Harmonics& sine, std::vector<double>& values) const;
 
 private:
     std::size_t m_width;

@@ -89,17 +89,13 @@ std::vector<float> solve_channel(const Problem& problem, const Channel& channel,
     for (const RadialProfile& profile : basis.profiles(channel))
         kernels.emplace_back(profile, problem, channel);
 
-    const auto width = static_cast<std::ptrdiff_t>(problem.width);
     const auto height = static_cast<std::ptrdiff_t>(problem.height);
-    const auto row_length = static_cast<std::size_t>(2 * width - 1);
     // rows[(dy + height - 1) * terms + k][dx + width - 1]
     std::vector<KernelRow> rows(static_cast<std::size_t>(2 * height - 1) * terms.size());
     parallel_for(rows.size(), problem.threads, [&](std::size_t i) {
         const Term& term = terms[i % terms.size()];
         const std::ptrdiff_t dy = static_cast<std::ptrdiff_t>(i / terms.size()) - (height - 1);
-        rows[i].resize(row_length);
-        for (std::ptrdiff_t dx = -(width - 1); dx < width; ++dx)
-            rows[i][static_cast<std::size_t>(dx + width - 1)] = kernels[term.node](dy, dx, term.cosine, term.sine);
+        kernels[term.node].row(dy, term.cosine, term.sine, rows[i]);
     });
 
     std::vector<std::vector<Beam>> beams(problem.height);

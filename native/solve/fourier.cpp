@@ -185,16 +185,18 @@ private:
 
     Spectrum kernel_spectrum(const QuadrantKernel& kernel, const Harmonics& cosine, const Harmonics& sine) const
     {
-        const auto width = static_cast<std::ptrdiff_t>(m_problem.width);
         const auto height = static_cast<std::ptrdiff_t>(m_problem.height);
-        const auto padded_width = static_cast<std::ptrdiff_t>(m_transform.width());
         const auto padded_height = static_cast<std::ptrdiff_t>(m_transform.height());
         std::vector<double> padded(m_transform.height() * m_transform.width(), 0.0);
         parallel_for(2 * m_problem.height - 1, m_problem.threads, [&](std::size_t i) {
             const std::ptrdiff_t dy = static_cast<std::ptrdiff_t>(i) - (height - 1);
-            double* row = padded.data() + (dy < 0 ? dy + padded_height : dy) * padded_width;
-            for (std::ptrdiff_t dx = -(width - 1); dx < width; ++dx)
-                row[dx < 0 ? dx + padded_width : dx] = kernel(dy, dx, cosine, sine);
+            std::vector<double> values;
+            kernel.row(dy, cosine, sine, values);
+            // Offset 0 goes to the first texel, negative ones wrap around to the end.
+            double* row = padded.data() + static_cast<std::size_t>(dy < 0 ? dy + padded_height : dy) * m_transform.width();
+            const auto zero = values.begin() + static_cast<std::ptrdiff_t>(m_problem.width - 1);
+            std::copy(zero, values.end(), row);
+            std::copy(values.begin(), zero, row + m_transform.width() - (m_problem.width - 1));
         });
         return m_transform.forward(padded);
     }

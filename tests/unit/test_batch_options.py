@@ -1,0 +1,65 @@
+"""Command line of the batch."""
+
+import pytest
+from beamspread.core.batch_options import arguments_for_script, parse
+
+
+def test_nothing_asked_leaves_all_to_the_scene():
+    options = parse([])
+    assert options.objects == ()
+    assert {options.scene, options.frames, options.resolution, options.solver, options.output} == {None}
+    assert {options.format, options.report} == {None}
+
+
+def test_every_option():
+    options = parse(
+        ["room.blend", "--object", "Floor", "--object", "Wall", "--frames", "2-5", "--resolution", "512"]
+        + ["--solver", "direct", "--output", "out", "--format", "png", "--report", "report.json"]
+    )
+    assert options.scene == "room.blend"
+    assert options.objects == ("Floor", "Wall")
+    assert (options.frames, options.resolution, options.solver) == ((2, 5), 512, "direct")
+    assert (options.output, options.format, options.report) == ("out", "PNG", "report.json")
+
+
+def test_objects_in_one_option_and_twice():
+    assert parse(["--object", "A", "B b", "--object", "A"]).objects == ("A", "B b")
+
+
+def test_a_single_frame():
+    assert parse(["--frames", "7"]).frames == (7, 7)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--resume"], "not supported yet"),
+        (["--frames", "5-2"], "ends before it starts"),
+        (["--frames", "a-b"], "not a frame"),
+        (["--frames", "-"], "--frames"),
+        (["--resolution", "0"], "between 1 and 65536"),
+        (["--resolution", "big"], "between 1 and 65536"),
+        (["--solver", "magic"], "invalid choice"),
+        (["--format", "JPG"], "invalid choice"),
+        (["--sovler", "fft"], "--sovler"),
+        (["--object"], "--object"),
+    ],
+)
+def test_mistakes_end_with_code_2_and_a_reason(arguments, words, capsys):
+    with pytest.raises(SystemExit) as caught:
+        parse(arguments)
+    assert caught.value.code == 2
+    assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("argv", "inside_blender", "expected"),
+    [
+        (["blender", "-b", "x.blend", "--python", "batch.py", "--", "--object", "A"], True, ["--object", "A"]),
+        (["blender", "-b", "x.blend", "--python", "batch.py"], True, []),
+        (["batch.py", "x.blend", "--object", "A"], False, ["x.blend", "--object", "A"]),
+        (["batch.py", "--", "x.blend"], False, ["x.blend"]),
+    ],
+)
+def test_own_arguments_are_found(argv, inside_blender, expected):
+    assert arguments_for_script(argv, inside_blender) == expected

@@ -1,0 +1,178 @@
+"""Receivers: any flat placement and any affine UV map give the right grid; everything else a clear sentence."""
+
+import numpy as np
+import pytest
+from beamspread.core.errors import ReceiverError
+from beamspread.core.receiver import Polygons, build_receiver, fit_uv_map, texture_size
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
+
+
+def quad(p_u, p_v, p_0=(0, 0, 0), uvs=SQUARE, flip=False):
+    """A face whose corner at `uvs` lies at p_0 + u p_u + v p_v, with its normal along p_u x p_v unless flipped."""
+    p_u, p_v = np.asarray(p_u, float), np.asarray(p_v, float)
+    uvs = np.asarray(uvs, float)
+    normal = np.cross(p_u, p_v)
+    normal /= np.linalg.norm(normal) * (-1 if flip else 1)
+    corners = np.asarray(p_0) + uvs[:, :1] * p_u + uvs[:, 1:] * p_v
+    return Polygons(corners, uvs, np.array([0, len(uvs)]), normal[None])
+
+
+def receiver_of(polygons, width, height):
+    return build_receiver(polygons, fit_uv_map(polygons), width, height)
+
+
+def texel_position(grid, column, row):
+    """World position of (column, row) in texels of the grid."""
+    step = column * grid.pitch_x * np.array(grid.x_axis) + row * grid.pitch_y * np.array(grid.y_axis)
+    return np.array(grid.origin) + step
+
+
+def check_frame(grid):
+    frame = np.array([grid.x_axis, grid.y_axis, grid.normal])
+    assert frame @ frame.T == pytest.approx(np.eye(3), abs=1e-9)
+
+
+vectors = st.tuples(*[st.floats(-1, 1)] * 3).map(np.array)
+scales = st.floats(0.01, 100)
+
+
+@settings(max_examples=60, deadline=None)
+@given(axis=vectors, other=vectors, origin=vectors, scale_u=scales, scale_v=scales, flip=st.booleans())
+def test_any_rotation_mirroring_and_scale(axis, other, origin, scale_u, scale_v, flip):
+    across = np.cross(axis, other)
+    if np.linalg.norm(across) < 1e-2:
+        return
+    p_u = scale_u * axis / np.linalg.norm(axis)
+    p_v = scale_v * across / np.linalg.norm(across)
+    polygons = quad(p_u, p_v, 10 * origin, flip=flip)
+    grid = receiver_of(polygons, 8, 5).grid
+    check_frame(grid)
+    assert (grid.width, grid.height) == (8, 5)
+    assert (grid.pitch_x, grid.pitch_y) == pytest.approx((scale_u / 8, scale_v / 5))
+    assert np.array(grid.normal) == pytest.approx(polygons.normals[0], abs=1e-6)
+    assert texel_position(grid, 8, 5) == pytest.approx(10 * origin + p_u + p_v, abs=1e-6 * max(scale_u, scale_v, 10))
+    assert grid.coverage == pytest.approx(np.ones((5, 8)))
+
+
+@pytest.mark.parametrize("turn", range(4))
+@pytest.mark.parametrize("mirror", [False, True])
+def test_turned_and_mirrored_uvs(turn, mirror):
+    """The plane stays, its UVs turn: texel corners must stay where the UV map puts them."""
+    positions = SQUARE * [4, 2]
+    uvs = np.roll(SQUARE, turn, axis=0)
+    uvs = uvs * [-1, 1] + [1, 0] if mirror else uvs
+    corners = np.column_stack([positions, np.full(4, 3.0)])
+    polygons = Polygons(corners, uvs, np.array([0, 4]), np.array([[0.0, 0, 1]]))
+    width, height = texture_size(fit_uv_map(polygons), 12)
+    assert (width, height) == ((12, 6) if turn % 2 == 0 else (6, 12))
+    grid = receiver_of(polygons, width, height).grid
+    check_frame(grid)
+    for uv, corner in zip(uvs, corners):
+        assert texel_position(grid, uv[0] * width, uv[1] * height) == pytest.approx(corner, abs=1e-9)
+
+
+def test_grid_is_the_chart_alone():
+    """A chart in a corner of an atlas: the grid is cut to it and lands back in its place."""
+    uvs = SQUARE * [0.25, 0.5] + [0.5, 0.25]
+    receiver = receiver_of(quad((8, 0, 0), (0, 8, 0), uvs=uvs), 16, 16)
+    assert (receiver.grid.width, receiver.grid.height, receiver.offset) == (4, 8, (8, 4))
+    assert np.array(receiver.grid.origin) == pytest.approx([4, 2, 0])
+    values = np.arange(32, dtype=np.float32).reshape(8, 4, 1)
+    texture = receiver.to_texels(values)
+    assert np.array_equal(texture[4:12, 8:12], values)
+    assert texture.sum() == values.sum()
+    assert (receiver.coverage > 0).sum() == 32
+
+
+def test_partial_coverage_at_the_border():
+    receiver = receiver_of(quad((1, 0, 0), (0, 1, 0), uvs=SQUARE * 0.625), 4, 4)
+    assert receiver.grid.coverage == pytest.approx(np.outer([1, 1, 0.5], [1, 1, 0.5]))
+
+
+def test_faces_that_join_to_one_plane():
+    left, right = (
+        quad((1, 0, 0), (0, 1, 0), uvs=SQUARE * [0.5, 1]),
+        quad((1, 0, 0), (0, 1, 0), uvs=SQUARE * [0.5, 1] + [0.5, 0]),
+    )
+    both = Polygons(
+        np.concatenate([left.corners, right.corners]),
+        np.concatenate([left.uvs, right.uvs]),
+        np.array([0, 4, 8]),
+        np.concatenate([left.normals, right.normals]),
+    )
+    assert receiver_of(both, 6, 6).grid.coverage == pytest.approx(np.ones((6, 6)))
+
+
+@pytest.mark.parametrize("shear", [-0.7, 0.3, 2.0])
+def test_sheared_uvs_are_resampled(shear):
+    """A field that is linear on the plane comes back linear in the texture."""
+    p_u, p_v = np.array([3.0, 0, 0]), np.array([shear, 2.0, 0])
+    receiver = receiver_of(quad(p_u, p_v, (1, 1, 0)), 30, 20)
+    grid = receiver.grid
+    check_frame(grid)
+    assert (grid.pitch_x, grid.pitch_y) == pytest.approx((0.1, 0.1))
+    assert grid.coverage.sum() * grid.pitch_x * grid.pitch_y == pytest.approx(6.0, rel=1e-4)
+    rows, columns = np.mgrid[: grid.height, : grid.width] + 0.5
+    points = (
+        np.array(grid.origin)
+        + columns[..., None] * 0.1 * np.array(grid.x_axis)
+        + rows[..., None] * 0.1 * np.array(grid.y_axis)
+    )
+    slope = np.array([2.0, -1.0, 0.5])
+    texture = receiver.to_texels((points @ slope)[..., None].astype(np.float32))[..., 0]
+    v, u = (np.mgrid[:20, :30] + 0.5) / [[[20]], [[30]]]
+    expected = (np.array([1, 1, 0]) + u[..., None] * p_u + v[..., None] * p_v) @ slope
+    inside = (slice(1, -1), slice(1, -1))
+    assert texture[inside] == pytest.approx(expected[inside], abs=1e-4)
+
+
+def test_texture_size_keeps_texels_square():
+    assert texture_size(fit_uv_map(quad((4, 0, 0), (0, 1, 0))), 1024) == (1024, 256)
+    assert texture_size(fit_uv_map(quad((1, 0, 0), (0, 1000, 0))), 100) == (1, 100)
+
+
+BENT = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.2], [0, 1, 0]], float)
+
+
+def replaced(**changes):
+    polygons = quad((1, 0, 0), (0, 1, 0))
+    values = {name: getattr(polygons, name) for name in ("corners", "uvs", "starts", "normals")}
+    return Polygons(**(values | changes))
+
+
+@pytest.mark.parametrize(
+    ("polygons", "words"),
+    [
+        (replaced(corners=BENT), "not flat"),
+        (replaced(uvs=None), "no UV map"),
+        (replaced(uvs=SQUARE * 2), "outside the image"),
+        (replaced(uvs=SQUARE - [0.5, 0]), "outside the image"),
+        (replaced(uvs=SQUARE * [1, 0]), "no area"),
+        (replaced(uvs=np.zeros((4, 2))), "no area"),
+        (replaced(uvs=SQUARE * np.nan), "not numbers"),
+        (replaced(uvs=np.array([[0, 0], [1, 0], [0.8, 1], [0.2, 1.0]])), "bends"),
+        (replaced(corners=np.zeros((4, 3))), "no area"),
+        (replaced(corners=np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3.0, 0, 0]])), "no area"),
+        (replaced(corners=np.full((4, 3), np.inf)), "infinity"),
+        (replaced(starts=np.array([0]), corners=np.zeros((0, 3)), normals=np.zeros((0, 3))), "No face"),
+        (replaced(normals=np.array([[0, 0, 1.0], [0, 0, -1.0]]), starts=np.array([0, 4, 4])), "opposite side"),
+    ],
+)
+def test_what_cannot_be_baked_says_why(polygons, words):
+    with pytest.raises(ReceiverError, match=words):
+        fit_uv_map(polygons)
+
+
+def test_a_chart_smaller_than_rounding_is_refused():
+    polygons = quad((1, 0, 0), (0, 1, 0), uvs=SQUARE * 1e-12 + 0.5)
+    with pytest.raises(ReceiverError, match="no area"):
+        fit_uv_map(polygons)
+
+
+def test_non_planar_within_rounding_is_accepted():
+    rng = np.random.default_rng(3)
+    polygons = quad((1, 0, 0), (0, 1, 0))
+    fit_uv_map(replaced(corners=polygons.corners + rng.normal(scale=1e-7, size=(4, 3))))

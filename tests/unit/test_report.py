@@ -1,0 +1,38 @@
+"""The batch's report and file names."""
+
+import json
+
+from beamspread.core.report import BakeRecord, Report, file_name
+
+KEYS = {"object", "material", "frame", "path", "width", "height", "seconds", "status", "message"}
+
+
+def test_saved_report_has_the_documented_keys(tmp_path):
+    path = tmp_path / "new" / "report.json"
+    Report([BakeRecord("Böden", "Stein", 3, "a.exr", 4, 5, 0.5, "written")]).save(str(path))
+    document = json.loads(path.read_text(encoding="utf-8"))
+    assert set(document) == {"bakes"}
+    assert set(document["bakes"][0]) == KEYS
+    assert document["bakes"][0]["object"] == "Böden"
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_all_written_needs_at_least_one_bake():
+    assert not Report().all_written()
+    assert Report([BakeRecord("A", status="written")]).all_written()
+    assert not Report([BakeRecord("A", status="written"), BakeRecord("B", status="failed")]).all_written()
+    assert not Report([BakeRecord("A", status="skipped")]).all_written()
+
+
+def test_a_record_reads_as_a_line():
+    written = BakeRecord("Floor", "Marble", 3, "f.exr", 4, 5, 0.25, "written")
+    assert str(written) == "Floor / Marble, frame 3: written f.exr (4 x 5, 0.2 s)"
+    assert str(BakeRecord("Floor", frame=1, message="No.")) == "Floor, frame 1: failed: No."
+
+
+def test_file_names_are_safe_and_distinct():
+    taken = set()
+    assert file_name("Floor", "Marble", None, ".exr", taken) == "Floor_Marble.exr"
+    assert file_name("floor", "marble", None, ".exr", taken) == "floor_marble_2.exr"
+    assert file_name("../a/b", "c:d", 12, ".png", taken) == "a_b_c_d_0012.png"
+    assert file_name("..", "Größe", None, ".exr", taken) == "unnamed_Größe.exr"
