@@ -229,6 +229,9 @@ ValueError
         .def(py::init(&make_occluders), py::arg("vertices"), py::arg("triangles"))
         .def_property_readonly("triangle_count", &Occluders::triangle_count, "int: number of triangles.");
 
+    m.def("embree_version", &embree_version,
+          "The version of Embree in use, 31305 for 3.13.5: not that of the host process.");
+
     const std::string sun_doc = std::string("Irradiance of a plane by parallel light of 1 W/m^2 at normal incidence.") + doc_grid +
                                 R"(direction : 3 floats
     Direction of travel in the world, any length but 0.)" +

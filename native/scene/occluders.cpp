@@ -111,4 +111,11 @@ bool Occluders::blocks(const Vec3& origin, const Vec3& direction, double distanc
     return ray.tfar < 0.0f;
 }
 
+int embree_version()
+{
+    const embree::Device device(rtcNewDevice("ignore_config_files=1"));
+    embree::check(device.get());
+    return static_cast<int>(rtcGetDeviceProperty(device.get(), RTC_DEVICE_PROPERTY_VERSION));
+}
+
 }  // namespace beamspread

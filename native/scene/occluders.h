@@ -36,4 +36,7 @@ private:
     double m_reach = 0.0;
 };
 
+// 10000 major + 100 minor + patch of the Embree that is called, which a host's own could have taken the place of.
+int embree_version();
+
 }  // namespace beamspread
