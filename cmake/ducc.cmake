@@ -9,4 +9,5 @@ add_library(beamspread_ducc STATIC
 target_include_directories(beamspread_ducc SYSTEM PUBLIC ${ducc_src})
 # Threads are ours (base/threads.h): a guest in another process brings no pool of its own.
 target_compile_definitions(beamspread_ducc PUBLIC DUCC0_NO_LOWLEVEL_THREADING)
-target_compile_options(beamspread_ducc PRIVATE -w -O3)
+# Its FFT takes minutes to compile with a sanitizer, and is not what that is there to check.
+target_compile_options(beamspread_ducc PRIVATE -w -O3 $<$<BOOL:${BEAMSPREAD_SANITIZE}>:-fno-sanitize=all>)
