@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+import bpy
+
 from . import extract, nodes, targets
 from .core.bake import BakeSettings
 from .core.errors import BakeError
@@ -72,6 +74,9 @@ def prepare(context, wanted: list[Target], settings: BakeSettings, resolution: i
     resolution : texels along the longer side; None keeps the size of the node's image, or the scene's setting where
         there is none.
     """
+    for target in wanted:
+        # Evaluated before the node's class was registered, it would still be of an unknown class.
+        bpy.data.materials[target.material_name].node_tree.update_tag()
     with extract.as_rendered(context.view_layer):
         depsgraph = context.evaluated_depsgraph_get()
         light = extract.read_scene_light(depsgraph)

@@ -9,6 +9,7 @@ import importlib
 import importlib.util
 import sys
 import time
+import traceback
 from pathlib import Path
 
 PACKAGE_FOLDER = Path(__file__).resolve().parent
@@ -21,7 +22,7 @@ def load_package() -> str:
     """
     import bpy
 
-    node_class = getattr(bpy.types, "BeamspreadNode", None)
+    node_class = bpy.types.Node.bl_rna_get_subclass_py("BeamspreadNode")
     if node_class is not None:
         return node_class.__module__.rpartition(".")[0]
     name = PACKAGE_FOLDER.name if PACKAGE_FOLDER.name.isidentifier() else "beamspread"
@@ -43,7 +44,7 @@ def run(arguments: list[str]) -> int:
     from .core import batch_options
 
     options = batch_options.parse(arguments)
-    registers = not hasattr(bpy.types, "BeamspreadNode")
+    registers = not hasattr(bpy.types.Scene, "beamspread")
     if registers:
         registration.register()
     try:
@@ -194,14 +195,18 @@ class _Printer:
 
 
 def main() -> int:
-    """Run as a script."""
+    """Run as a script; the exit code."""
     import bpy
 
-    package = load_package()
-    inside_blender = bool(bpy.app.binary_path)
-    options = importlib.import_module(f"{package}.core.batch_options")
-    arguments = options.arguments_for_script(sys.argv, inside_blender)
-    return importlib.import_module(f"{package}.batch").run(arguments)
+    try:
+        package = load_package()
+        inside_blender = bool(bpy.app.binary_path)
+        options = importlib.import_module(f"{package}.core.batch_options")
+        arguments = options.arguments_for_script(sys.argv, inside_blender)
+        return importlib.import_module(f"{package}.batch").run(arguments)
+    except Exception:  # noqa: BLE001 - Blender would print it and exit with 0
+        traceback.print_exc()
+        return 1
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Differences between Blender versions, bridged in this one place."""
 
 import bpy
+import numpy as np
 
 
 def add_output_socket(tree, socket_type: str, name: str) -> None:
@@ -42,3 +43,24 @@ def light_color(light) -> tuple[float, float, float]:
     if getattr(light, "use_temperature", False):
         color = tuple(a * b for a, b in zip(color, light.temperature_color))
     return color
+
+
+def read_pass(render_pass, width: int, height: int) -> np.ndarray:
+    """Float32 (height, width, channels) of a render pass, row 0 at the bottom."""
+    values = np.empty((width * height, render_pass.channels), np.float32)
+    _foreach(render_pass.rect.foreach_get, values)
+    return values.reshape(height, width, render_pass.channels)
+
+
+def write_pass(render_pass, values: np.ndarray) -> None:
+    """Fill a render pass with float32 (height, width, channels), row 0 at the bottom."""
+    values = np.ascontiguousarray(values, np.float32).reshape(-1, render_pass.channels)
+    _foreach(render_pass.rect.foreach_set, values)
+
+
+def _foreach(access, values: np.ndarray) -> None:
+    """Newer versions take a flat array alone; 3.4 counts rows, and writes past the end of a flat one of that length."""
+    try:
+        access(values.ravel())
+    except TypeError:
+        access(values)

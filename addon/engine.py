@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
+
 import bpy
 import numpy as np
 
-from . import bakes, extract
+from . import bakes, compat, extract
 from .core.errors import BakeError
 
-# Messages of the last bake: an exception in `bake` reaches nobody, and Blender reports success all the same.
-last_errors: list[str] = []
+# By object and materials: an exception in `bake` reaches nobody, and Blender reports success all the same.
+_errors: dict[tuple[str, ...], str] = {}
+_calls = itertools.count()
 
 
 class BeamspreadEngine(bpy.types.RenderEngine):
@@ -37,25 +40,32 @@ def show_nothing(engine, depsgraph) -> None:
     engine.report({"WARNING"}, "Beamspread bakes textures: press Bake, then render with Cycles or EEVEE")
 
 
+def last_errors() -> list[str]:
+    """What kept images from being filled since they were last baked with success."""
+    return list(_errors.values())
+
+
 def bake_active_image(engine, depsgraph, obj, width: int, height: int) -> None:
-    """Fill the image that Blender bakes to; failures are reported and kept in `last_errors`."""
-    last_errors.clear()
-    result = engine.begin_result(0, 0, width, height, layer=depsgraph.view_layer.name)
-    cancelled = True
+    """Fill the image that Blender bakes to; failures are reported and kept for `last_errors`."""
+    # A layer name of its own per call: results of the same layer overwrite each other.
+    result = engine.begin_result(0, 0, width, height, layer=f"Beamspread {next(_calls)}")
+    passes = result.layers[0].passes
+    key, filled = (obj.name,), False
     try:
-        _fill(engine, depsgraph, obj, result.layers[0].passes, width, height)
-        cancelled = False
+        names = _materials_in(obj, passes, width, height)
+        key += tuple(names)
+        _errors.pop(key, None)
+        compat.write_pass(passes["Combined"], _bake_materials(engine, depsgraph, obj, names, width, height))
+        filled = True
     except Exception as error:  # noqa: BLE001 - Blender would swallow it
-        message = bakes.sentence(error)
-        last_errors.append(f"{obj.name}: {message}")
-        engine.report({"ERROR"}, f"{obj.name}: {message}")
+        _errors[key] = f"{obj.name}: {bakes.sentence(error)}"
+        engine.report({"ERROR"}, _errors[key])
     finally:
-        engine.end_result(result, cancel=cancelled)
+        engine.end_result(result, cancel=not filled)
 
 
-def _fill(engine, depsgraph, obj, passes, width: int, height: int) -> None:
-    primitives = _read_pass(passes, "BakePrimitive", width, height)[..., 1].view(np.int32)
-    names = _materials_in(obj, primitives)
+def _bake_materials(engine, depsgraph, obj, names: list[str], width: int, height: int) -> np.ndarray:
+    """RGBA float32 (height, width, 4) of the object's materials, each on its own part of the image."""
     if not names:
         raise BakeError("No material of this object has a Beamspread node: add one in the Shader Editor.")
     scene = depsgraph.scene
@@ -69,7 +79,7 @@ def _fill(engine, depsgraph, obj, passes, width: int, height: int) -> None:
         pixels[covered] = np.dstack([texture, np.ones((height, width), np.float32)])[covered]
         for warning in job.warnings:
             engine.report({"WARNING"}, warning)
-    passes["Combined"].rect.foreach_set(pixels.ravel())
+    return pixels
 
 
 def _step(engine, fraction: float) -> bool:
@@ -77,16 +87,11 @@ def _step(engine, fraction: float) -> bool:
     return not engine.test_break()
 
 
-def _read_pass(passes, name: str, width: int, height: int) -> np.ndarray:
-    # Flat: newer versions refuse any other shape.
-    values = np.empty(width * height * 4, np.float32)
-    passes[name].rect.foreach_get(values)
-    return values.reshape(height, width, 4)
-
-
-def _materials_in(obj, primitives: np.ndarray) -> list[str]:
+def _materials_in(obj, passes, width: int, height: int) -> list[str]:
     """Beamspread materials of the triangles that this image shows (Blender bakes one image at a time)."""
     wanted = {material.name for material in bakes.materials_of(obj)}
+    # The second value is the triangle's number, as the bits of a float; -1 where another image is baked.
+    primitives = compat.read_pass(passes["BakePrimitive"], width, height)[..., 1].view(np.int32)
     triangles = np.unique(primitives[primitives >= 0])
     mesh = obj.to_mesh()
     try:
@@ -100,18 +105,26 @@ def _materials_in(obj, primitives: np.ndarray) -> list[str]:
     return [name for name in dict.fromkeys(names) if name in wanted]
 
 
-# Panels of Blender that make sense with this engine: those of its own engines, but for render settings.
+# Panels of Blender that make sense with this engine: those for any engine, and EEVEE's for what any engine has.
 HIDDEN_PANEL_PREFIXES = ("RENDER_PT_", "VIEWLAYER_PT_layer_passes", "WORLD_PT_viewport")
+EEVEE_PANELS = {
+    "DATA_PT_EEVEE_light",
+    "EEVEE_MATERIAL_PT_context_material",
+    "EEVEE_MATERIAL_PT_surface",
+    "EEVEE_WORLD_PT_surface",
+    "MATERIAL_PT_preview",
+}
 
 
 def _compatible_panels() -> list:
-    panels = bpy.types.Panel.__subclasses__()
-    return [
-        panel
-        for panel in panels
-        if "BLENDER_RENDER" in getattr(panel, "COMPAT_ENGINES", ())
-        and not panel.__name__.startswith(HIDDEN_PANEL_PREFIXES)
-    ]
+    return [panel for panel in bpy.types.Panel.__subclasses__() if _is_compatible(panel)]
+
+
+def _is_compatible(panel) -> bool:
+    if panel.__name__ in EEVEE_PANELS:
+        return hasattr(panel, "COMPAT_ENGINES")
+    any_engine = "BLENDER_RENDER" in getattr(panel, "COMPAT_ENGINES", ())
+    return any_engine and not panel.__name__.startswith(HIDDEN_PANEL_PREFIXES)
 
 
 def register() -> None:

@@ -104,7 +104,7 @@ class BEAMSPREAD_PT_active_image(RenderPanel, bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         _use_columns(layout)
-        draw_warnings(layout, engine.last_errors)
+        draw_warnings(layout, engine.last_errors())
         layout.operator("object.bake", text="Bake Active Image", icon="RENDER_STILL")
         layout.prop(context.scene.render.bake, "margin")
         layout.prop(context.scene.render.bake, "use_clear", text="Clear Image")

@@ -1,0 +1,12 @@
+"""Every test starts from an empty file."""
+
+import bpy
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def empty_file():
+    """Nothing but a scene, in Cycles; the add-on stays registered."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.scene.render.engine = "CYCLES"
+    bpy.context.scene.beamspread.quality = "preview"

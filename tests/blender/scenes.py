@@ -1,0 +1,125 @@
+"""Small scenes for the tests, and the exact numbers to compare with."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+REFERENCE = Path(__file__).resolve().parent.parent / "reference" / "adding_doubling.csv"
+SQUARE_UVS = ((0, 0), (1, 0), (1, 1), (0, 1))
+
+
+def add_mesh(name, vertices, faces, matrix=None, uvs=None):
+    """A mesh object; `uvs` has one pair per face corner."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(vertices, [], faces)
+    if uvs is not None:
+        layer = mesh.uv_layers.new(name="UVMap")
+        layer.data.foreach_set("uv", np.asarray(uvs, np.float32).ravel())
+    obj = bpy.data.objects.new(name, mesh)
+    obj.matrix_world = matrix or Matrix()
+    bpy.context.collection.objects.link(obj)
+    return obj
+
+
+def add_plane(name="Plane", size=(2.0, 2.0), matrix=None, uvs=SQUARE_UVS, material=None):
+    """A rectangle around the origin in xy, normal +z; `uvs` for its corners from (-x, -y) counter-clockwise."""
+    x, y = size[0] / 2, size[1] / 2
+    obj = add_mesh(name, [(-x, -y, 0), (x, -y, 0), (x, y, 0), (-x, y, 0)], [(0, 1, 2, 3)], matrix, uvs)
+    if material is not None:
+        obj.data.materials.append(material)
+    return obj
+
+
+def add_material(name="Medium", image=None, linked=False, **properties):
+    """A material with a Beamspread node."""
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    node = material.node_tree.nodes.new("BeamspreadNode")
+    for key, value in ({"albedo": (0.9, 0.8, 0.6), "mean_free_path": (0.05,) * 3} | properties).items():
+        setattr(node, key, value)
+    node.image = image
+    if linked:
+        output = material.node_tree.get_output_node("ALL")
+        material.node_tree.links.new(output.inputs["Surface"], node.outputs["BSDF"])
+    return material
+
+
+def node_of(material):
+    """Its Beamspread node."""
+    return next(node for node in material.node_tree.nodes if node.bl_idname == "BeamspreadNode")
+
+
+def sun_matrix(angle_deg, azimuth_deg=0.0):
+    """Orientation of a sun whose light arrives `angle_deg` off -z and travels towards the azimuth (0: +x)."""
+    return Matrix.Rotation(math.radians(azimuth_deg), 4, "Z") @ Matrix.Rotation(math.radians(-angle_deg), 4, "Y")
+
+
+def add_sun(angle_deg=0.0, azimuth_deg=0.0, strength=1.0, color=(1, 1, 1), matrix=None):
+    """A sun without penumbra."""
+    data = bpy.data.lights.new("Sun", "SUN")
+    data.energy, data.color, data.angle = strength, color, 0.0
+    obj = bpy.data.objects.new("Sun", data)
+    obj.matrix_world = (matrix or Matrix()) @ sun_matrix(angle_deg, azimuth_deg)
+    bpy.context.collection.objects.link(obj)
+    return obj
+
+
+def add_blocker(height, matrix=None):
+    """An upright wall in the plane x = 0.2 over y from -0.3 to 0.1, standing on the ground."""
+    vertices = [(0.2, -0.3, 0), (0.2, 0.1, 0), (0.2, 0.1, height), (0.2, -0.3, height)]
+    return add_mesh("Wall", vertices, [(0, 1, 2, 3)], matrix)
+
+
+def pixels(image):
+    """Float32 (height, width, 3), row 0 at the bottom."""
+    values = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(values)
+    return values.reshape(image.size[1], image.size[0], image.channels)[..., :3]
+
+
+def select(*objects):
+    """Select these objects alone; the first one becomes active."""
+    for obj in bpy.context.scene.objects:
+        obj.select_set(obj in objects)
+    bpy.context.view_layer.objects.active = objects[0]
+
+
+def bake(*objects):
+    """Run the operator on the objects; the node's image of each one's first material, as pixels."""
+    select(*objects)
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    return [pixels(node_of(obj.data.materials[0]).image) for obj in objects]
+
+
+def messages_of(callable_):
+    """What an operator reports as errors: Blender raises them in Python."""
+    try:
+        callable_()
+    except RuntimeError as error:
+        return str(error)
+    return ""
+
+
+def diffuse_reflectance(ior, g, albedo, angle_deg):
+    """Exact reflectance of a half-space without its specular part, from the checked-in table."""
+    with REFERENCE.open(newline="") as file:
+        for row in csv.DictReader(file):
+            key = float(row["ior"]), float(row["g"]), float(row["albedo"]), float(row["angle_deg"])
+            if row["thickness_mfp"] == "inf" and key == (ior, g, albedo, angle_deg):
+                return float(row["reflectance_total"]) - fresnel(ior, angle_deg)
+    raise LookupError((ior, g, albedo, angle_deg))
+
+
+def fresnel(ior, angle_deg):
+    """Unpolarised Fresnel reflectance from outside."""
+    cos_i = math.cos(math.radians(angle_deg))
+    cos_t = math.sqrt(1 - (1 - cos_i**2) / ior**2)
+    parallel = (ior * cos_i - cos_t) / (ior * cos_i + cos_t)
+    perpendicular = (cos_i - ior * cos_t) / (cos_i + ior * cos_t)
+    return (parallel**2 + perpendicular**2) / 2

@@ -1,0 +1,257 @@
+"""The batch as users run it: a process of its own, with exit code, files and report."""
+
+import json
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import beamspread
+import bpy
+import numpy as np
+import pytest
+from beamspread._load import native
+from mathutils import Matrix
+from scenes import add_material, add_plane, add_sun, bake, node_of, pixels
+
+BATCH = Path(beamspread.__file__).parent / "batch.py"
+KEYS = {"object", "material", "frame", "path", "width", "height", "seconds", "status", "message"}
+
+
+def save_scene(folder):
+    """Save the current scene; its path."""
+    bpy.context.scene.beamspread.resolution = 32
+    path = folder / "scene.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def run_batch(scene, *arguments, program=()):
+    """Run a batch; (exit code, bakes of its report or None, all it printed)."""
+    report = scene.parent / "report.json"
+    arguments = [*arguments, "--report", str(report)]
+    if bpy.app.binary_path:
+        start = [bpy.app.binary_path, "-b", "--factory-startup", str(scene), *program, "--python", str(BATCH), "--"]
+    else:
+        start = [sys.executable, str(BATCH), str(scene)]
+    done = subprocess.run([*start, *map(str, arguments)], capture_output=True, text=True, timeout=300)
+    bakes = json.loads(report.read_text())["bakes"] if report.exists() else None
+    return done.returncode, bakes, done.stdout + done.stderr
+
+
+def test_one_plane(tmp_path):
+    plane = add_plane(size=(2, 1), material=add_material("Stone", albedo=(0.99, 0.9, 0.5)))
+    add_sun(40, 30, strength=10)
+    scene = save_scene(tmp_path)
+    code, bakes, _ = run_batch(scene, "--output", tmp_path / "out")
+    assert code == 0
+    assert len(bakes) == 1
+    assert set(bakes[0]) == KEYS
+    expected = {"object": "Plane", "material": "Stone", "frame": 1, "width": 32, "height": 16, "status": "written"}
+    assert {key: bakes[0][key] for key in expected} == expected
+    assert Path(bakes[0]["path"]) == tmp_path / "out" / "Plane_Stone.exr"
+    stored, channels, _ = native.read_exr(bakes[0]["path"])
+    assert channels == ["R", "G", "B"]
+    assert stored == pytest.approx(bake(plane)[0], abs=1e-6)
+
+
+def test_blender_reads_the_exr_the_right_way_up(tmp_path):
+    plane = add_plane(uvs=[(0, 0), (0.5, 0), (0.5, 0.25), (0, 0.25)], material=add_material())
+    add_sun(0, strength=10)
+    bpy.context.scene.beamspread.margin = 0
+    code, bakes, _ = run_batch(save_scene(tmp_path), "--output", tmp_path)
+    assert code == 0
+    image = bpy.data.images.load(bakes[0]["path"])
+    stored, _, _ = native.read_exr(bakes[0]["path"])
+    assert pixels(image) == pytest.approx(stored, abs=1e-6)
+    height, width = stored.shape[:2]
+    assert stored[: height // 4, : width // 2].all()
+    assert not stored[height // 4 :].any()
+    assert plane is not None
+
+
+def test_frames_objects_resolution_and_solver(tmp_path):
+    add_plane("One", material=add_material("M1"))
+    add_plane("Two", matrix=Matrix.Translation((5, 0, 0)), material=add_material("M2"))
+    sun = add_sun(0)
+    for frame in (1, 3):
+        sun.data.energy = frame
+        sun.data.keyframe_insert("energy", frame=frame)
+    scene = save_scene(tmp_path)
+    code, bakes, _ = run_batch(
+        scene, "--object", "Two", "--frames", "1-3", "--resolution", 16, "--solver", "direct", "--output", tmp_path
+    )
+    assert code == 0
+    assert [(one["object"], one["frame"], one["width"]) for one in bakes] == [("Two", frame, 16) for frame in (1, 2, 3)]
+    assert len({one["path"] for one in bakes}) == 3
+    means = [native.read_exr(one["path"])[0].mean() for one in bakes]
+    assert means[2] / means[0] == pytest.approx(3, rel=1e-4)
+    assert means[0] < means[1] < means[2]
+
+
+def test_png_shows_srgb(tmp_path):
+    plane = add_plane(material=add_material(albedo=(0.9,) * 3))
+    add_sun(0, strength=2.0)
+    scene = save_scene(tmp_path)
+    code, bakes, _ = run_batch(scene, "--format", "PNG", "--output", tmp_path)
+    assert code == 0
+    assert bakes[0]["path"].endswith(".png")
+    linear = bake(plane)[0][16, 16, 0]
+    image = bpy.data.images.load(bakes[0]["path"])
+    image.colorspace_settings.is_data = True
+    assert pixels(image)[16, 16, 0] == pytest.approx(1.055 * linear ** (1 / 2.4) - 0.055, abs=0.01)
+
+
+def test_without_output_the_images_own_file_is_written(tmp_path):
+    path = tmp_path / "own.exr"
+    native.write_exr(str(path), np.zeros((8, 8, 3), np.float32), ["R", "G", "B"])
+    add_plane(material=add_material(image=bpy.data.images.load(str(path))))
+    add_sun(0)
+    code, bakes, _ = run_batch(save_scene(tmp_path))
+    assert code == 0
+    assert Path(bakes[0]["path"]) == path
+    assert native.read_exr(str(path))[0].all()
+
+
+def test_without_output_and_image_the_scenes_folder_is_used(tmp_path):
+    add_plane(material=add_material())
+    add_sun(0)
+    bpy.context.scene.beamspread.output_dir = "//mine/"
+    code, bakes, _ = run_batch(save_scene(tmp_path))
+    assert code == 0
+    assert Path(bakes[0]["path"]).parent == tmp_path / "mine"
+
+
+def test_hidden_in_the_viewport_makes_no_difference(tmp_path):
+    add_plane(material=add_material()).hide_set(True)
+    add_sun(0).hide_viewport = True
+    code, bakes, _ = run_batch(save_scene(tmp_path), "--output", tmp_path)
+    assert code == 0
+    assert native.read_exr(bakes[0]["path"])[0].any()
+
+
+def missing_image(folder):
+    image = bpy.data.images.new("Gone", 8, 8)
+    image.source, image.filepath = "FILE", str(folder / "gone.exr")
+    return image
+
+
+def read_only_image(folder):
+    path = folder / "locked.exr"
+    native.write_exr(str(path), np.zeros((8, 8, 3), np.float32), ["R", "G", "B"])
+    image = bpy.data.images.load(str(path))
+    path.chmod(stat.S_IRUSR)
+    return image
+
+
+def add_failures(folder):
+    """Planes that cannot be baked, each in its own way; {name: word of its message}."""
+    wrong = {
+        "Albedo": ({"albedo": (1, 1, 1)}, "albedo"),
+        "Negative": ({"mean_free_path": (-1, 1, 1)}, "mean free path"),
+        "Gone": ({"image": missing_image(folder)}, "gone.exr"),
+        "Locked": ({"image": read_only_image(folder)}, "read-only"),
+        "Bent": ({}, "not flat"),
+        "Unwrapped": ({}, "no UV map"),
+        "Hidden": ({}, "hidden from render"),
+    }
+    for place, (name, (properties, _)) in enumerate(wrong.items(), start=1):
+        matrix = Matrix.Translation((0, 5 * place, 0))
+        plane = add_plane(name, matrix=matrix, material=add_material(f"M {name}", **properties))
+        if name == "Bent":
+            plane.data.vertices[0].co.z = 1
+        elif name == "Unwrapped":
+            plane.data.uv_layers.remove(plane.data.uv_layers[0])
+        elif name == "Hidden":
+            plane.hide_render = True
+    return {name: word for name, (_, word) in wrong.items()}
+
+
+def test_each_failure_is_one_sentence_and_the_others_are_baked(tmp_path):
+    add_plane("Sound", material=add_material("Sound"))
+    words = add_failures(tmp_path)
+    add_plane("Sound too", matrix=Matrix.Translation((0, -5, 0)), material=add_material("Sound too"))
+    add_sun(0)
+    code, bakes, output = run_batch(save_scene(tmp_path), "--output", tmp_path / "out")
+    assert code == 1
+    by_name = {one["object"]: one for one in bakes}
+    assert set(by_name) == {"Sound", "Sound too", *words}
+    for name, word in words.items():
+        assert by_name[name]["status"] == "failed", name
+        assert word in by_name[name]["message"], name
+        assert "\n" not in by_name[name]["message"]
+        assert by_name[name]["message"] in output
+    for name in ("Sound", "Sound too"):
+        assert by_name[name]["status"] == "written"
+        assert native.read_exr(by_name[name]["path"])[0].any()
+    assert "Traceback" not in output
+    assert len(list((tmp_path / "out").iterdir())) == 2
+
+
+def test_unknown_object_and_object_without_the_node(tmp_path):
+    add_plane(material=add_material())
+    add_plane("Plain")
+    add_sun(0)
+    code, bakes, _ = run_batch(save_scene(tmp_path), "--object", "Nobody", "Plain", "Plane", "--output", tmp_path)
+    assert code == 1
+    assert [(one["object"], one["status"]) for one in bakes] == [
+        ("Nobody", "failed"),
+        ("Plain", "failed"),
+        ("Plane", "written"),
+    ]
+    assert "not in the scene" in bakes[0]["message"]
+    assert "no material with a Beamspread node" in bakes[1]["message"]
+
+
+def test_nothing_to_bake_is_no_success(tmp_path):
+    code, bakes, output = run_batch(save_scene(tmp_path))
+    assert code == 1
+    assert bakes == []
+    assert "No mesh has a material" in output
+
+
+def test_output_folder_that_cannot_be_made(tmp_path):
+    add_plane(material=add_material())
+    add_sun(0)
+    (tmp_path / "file").write_text("")
+    code, bakes, output = run_batch(save_scene(tmp_path), "--output", tmp_path / "file" / "folder")
+    assert code == 1
+    assert bakes[0]["status"] == "failed"
+    assert "cannot be made" in bakes[0]["message"]
+    assert "Traceback" not in output
+
+
+def test_resume_is_refused(tmp_path):
+    add_plane(material=add_material())
+    code, bakes, output = run_batch(save_scene(tmp_path), "--resume")
+    assert code != 0
+    assert bakes is None
+    assert "not supported yet" in output
+
+
+@pytest.mark.skipif(not bpy.app.binary_path, reason="add-ons are installed in Blender's program")
+def test_with_the_add_on_installed(tmp_path, monkeypatch):
+    """The batch uses the installed copy, wherever its own file lies."""
+    scripts = tmp_path / "scripts" / "addons"
+    scripts.mkdir(parents=True)
+    (scripts / "beamspread").symlink_to(BATCH.parent)
+    add_plane(material=add_material())
+    add_sun(0)
+    scene = save_scene(tmp_path)
+    monkeypatch.setenv("BLENDER_USER_SCRIPTS", str(tmp_path / "scripts"))
+    code, bakes, output = run_batch(scene, "--output", tmp_path, program=["--addons", "beamspread"])
+    assert code == 0, output
+    assert bakes[0]["status"] == "written"
+
+
+def test_node_is_read_from_the_file(tmp_path):
+    """The subprocess knows the node's values only from the file, saved while the class was registered."""
+    material = add_material(albedo=(0.0, 0.0, 0.5))
+    add_plane(material=material)
+    add_sun(0)
+    code, bakes, _ = run_batch(save_scene(tmp_path), "--output", tmp_path)
+    assert code == 0
+    texture = native.read_exr(bakes[0]["path"])[0]
+    assert not texture[..., :2].any()
+    assert texture[..., 2].all()
+    assert node_of(material).image is None

@@ -1,0 +1,110 @@
+"""The engine: Blender's own Bake fills the active image through RenderEngine.bake."""
+
+import bpy
+import numpy as np
+import pytest
+from beamspread import engine
+from mathutils import Matrix
+from scenes import add_material, add_mesh, add_plane, add_sun, bake, messages_of, node_of, pixels, select
+
+
+@pytest.fixture(autouse=True)
+def beamspread_engine():
+    scene = bpy.context.scene
+    scene.render.engine = "BEAMSPREAD"
+    scene.beamspread.resolution = 32
+    scene.render.bake.margin = 0
+
+
+def add_active_image(material, name="Active", size=(32, 32)):
+    image = bpy.data.images.new(name, *size, float_buffer=True)
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    material.node_tree.nodes.active = node
+    return image
+
+
+def test_same_as_the_operator():
+    plane = add_plane(material=add_material())
+    add_sun(40, 30)
+    image = add_active_image(plane.data.materials[0])
+    select(plane)
+    assert bpy.ops.object.bake(type="COMBINED") == {"FINISHED"}
+    assert engine.last_errors() == []
+    filled = pixels(image)
+    assert filled.any()
+    assert filled == pytest.approx(bake(plane)[0], abs=1e-6)
+
+
+def test_two_objects_with_an_image_each():
+    planes = [add_plane(name, material=add_material(name)) for name in "AB"]
+    planes[1].location.x = 5
+    add_sun(0)
+    images = [add_active_image(plane.data.materials[0], plane.name, (16, 24)) for plane in planes]
+    select(*planes)
+    assert bpy.ops.object.bake(type="COMBINED") == {"FINISHED"}
+    assert pixels(images[0]).any()
+    assert pixels(images[1]) == pytest.approx(pixels(images[0]), abs=1e-5)
+
+
+def test_two_materials_of_one_object_fill_their_images():
+    vertices = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)]
+    corner = add_mesh("Corner", vertices, [(0, 1, 2, 3), (0, 3, 4, 5)], uvs=[(0, 0), (1, 0), (1, 1), (0, 1)] * 2)
+    for index in range(2):
+        corner.data.materials.append(add_material(f"Side {index}", albedo=(0.9, 0.9, 0.9)))
+        corner.data.polygons[index].material_index = index
+    sun = add_sun(30, 180)
+    images = [add_active_image(material, material.name) for material in corner.data.materials]
+    select(corner)
+    assert bpy.ops.object.bake(type="COMBINED") == {"FINISHED"}
+    assert engine.last_errors() == []
+    floor, wall = (pixels(image)[16, 16, 0] for image in images)
+    assert 0 < wall < floor
+    assert sun.data.energy == 1
+
+
+def test_failure_is_reported_and_does_not_touch_the_rest():
+    plane = add_plane(material=add_material(albedo=(1.0, 0.5, 0.5)))
+    add_sun(0)
+    add_active_image(plane.data.materials[0])
+    select(plane)
+    messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
+    assert len(engine.last_errors()) == 1
+    assert "albedo's red is 1" in engine.last_errors()[0]
+    node_of(plane.data.materials[0]).albedo = (0.5, 0.5, 0.5)
+    bpy.ops.object.bake(type="COMBINED")
+    assert engine.last_errors() == []
+
+
+def test_plain_material_is_refused():
+    plane = add_plane(material=bpy.data.materials.new("Plain"))
+    plane.data.materials[0].use_nodes = True
+    add_active_image(plane.data.materials[0])
+    select(plane)
+    messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
+    assert "Beamspread node" in engine.last_errors()[-1]
+
+
+def test_viewport_hidden_caster_and_modifiers_render():
+    plane = add_plane(material=add_material())
+    roof = add_plane("Roof", size=(9, 9), matrix=Matrix.Translation((0, 0, 1)))
+    roof.hide_viewport = True
+    add_sun(0)
+    image = add_active_image(plane.data.materials[0])
+    select(plane)
+    bpy.ops.object.bake(type="COMBINED")
+    assert np.array_equal(pixels(image), np.zeros((32, 32, 3)))
+
+
+def test_f12_ends_and_says_what_to_do(capfd):
+    scene = bpy.context.scene
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    scene.render.resolution_x = scene.render.resolution_y = 16
+    bpy.ops.render.render()
+    assert "press Bake" in capfd.readouterr().out
+
+
+def test_panels_of_blender_know_the_engine():
+    assert "BEAMSPREAD" in bpy.types.MATERIAL_PT_preview.COMPAT_ENGINES

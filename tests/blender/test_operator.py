@@ -1,0 +1,283 @@
+"""The Bake operator: fills and links images, says in one sentence what it cannot bake, and bakes the others."""
+
+import stat
+
+import bpy
+import numpy as np
+import pytest
+from beamspread import operators
+from mathutils import Matrix
+from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
+
+
+@pytest.fixture(autouse=True)
+def small():
+    bpy.context.scene.beamspread.resolution = 32
+
+
+def surface_source(material):
+    return material.node_tree.get_output_node("ALL").inputs["Surface"].links[0].from_socket
+
+
+def test_first_bake_makes_links_and_packs_an_image():
+    plane = add_plane(size=(4, 2), material=add_material())
+    add_sun(30)
+    bake(plane)
+    node = node_of(plane.data.materials[0])
+    assert tuple(node.image.size) == (32, 16)
+    assert node.image.is_float
+    assert node.image.packed_file is not None
+    assert node.node_tree.nodes["Image"].image == node.image
+    assert surface_source(plane.data.materials[0]) == node.outputs["BSDF"]
+
+
+def test_image_survives_saving_with_all_its_range(tmp_path):
+    plane = add_plane(material=add_material(albedo=(0.99, 0.5, 0.0)))
+    add_sun(0, strength=50.0)
+    (before,) = bake(plane)
+    assert before.max() > 2.5
+    path = str(tmp_path / "baked.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    node = node_of(bpy.data.materials["Medium"])
+    assert pixels(node.image) == pytest.approx(before, rel=1e-3, abs=1e-3)
+    assert node.node_tree.nodes["Image"].image == node.image
+
+
+def test_baking_again_replaces_the_pixels():
+    plane = add_plane(material=add_material())
+    sun = add_sun(0)
+    (first,) = bake(plane)
+    image = node_of(plane.data.materials[0]).image
+    sun.data.energy = 2.0
+    (second,) = bake(plane)
+    assert node_of(plane.data.materials[0]).image == image
+    assert second == pytest.approx(2 * first, rel=1e-5)
+
+
+def test_an_artists_own_use_of_the_node_is_kept():
+    material = add_material()
+    tree = material.node_tree
+    principled = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeBsdfPrincipled")
+    tree.links.new(principled.inputs["Base Color"], node_of(material).outputs["Color"])
+    plane = add_plane(material=material)
+    add_sun(0)
+    bake(plane)
+    assert surface_source(material).node == principled
+
+
+def test_file_image_is_written_to_its_file(tmp_path):
+    path = tmp_path / "target.exr"
+    from beamspread._load import native
+
+    native.write_exr(str(path), np.zeros((20, 24, 3), np.float32), ["R", "G", "B"])
+    image = bpy.data.images.load(str(path))
+    plane = add_plane(material=add_material(image=image, albedo=(0.99, 0.9, 0.0)))
+    add_sun(0, strength=20.0)
+    (shown,) = bake(plane)
+    stored, channels, _ = native.read_exr(str(path))
+    assert channels == ["R", "G", "B"]
+    assert stored.shape == (20, 24, 3)
+    assert stored.max() > 1
+    assert shown == pytest.approx(stored)
+
+
+def test_byte_image_gets_encoded_values(tmp_path):
+    image = bpy.data.images.new("Bytes", 16, 16)
+    plane = add_plane(material=add_material(albedo=(0.9,) * 3))
+    add_sun(0, strength=2.0)
+    (linear,) = bake(plane)
+    node_of(plane.data.materials[0]).image = image
+    (encoded,) = bake(plane)
+    expected = 1.055 * linear[16, 16, 0] ** (1 / 2.4) - 0.055
+    assert encoded[8, 8, 0] == pytest.approx(expected, abs=0.01)
+
+
+def test_selected_objects_or_all_where_none_has_the_node():
+    first = add_plane("First", material=add_material("One"))
+    second = add_plane("Second", material=add_material("Two"))
+    bystander = add_plane("Bystander", matrix=Matrix.Translation((9, 0, 0)))
+    add_sun(0)
+    select(second)
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    assert node_of(first.data.materials[0]).image is None
+    select(bystander)
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    assert node_of(first.data.materials[0]).image is not None
+
+
+def test_hidden_in_viewport_is_baked_and_restored():
+    plane = add_plane(material=add_material())
+    wall = add_plane("Roof", matrix=Matrix.Translation((0, 0, 1)), size=(9, 9))
+    wall.hide_viewport = True
+    add_sun(0)
+    (dark,) = bake(plane)
+    assert not dark.any()
+    assert wall.hide_viewport
+    wall.hide_render = True
+    (lit,) = bake(plane)
+    assert lit.any()
+    wall.hide_render, wall.visible_shadow, wall.hide_viewport = False, False, False
+    (lit,) = bake(plane)
+    assert lit.any()
+
+
+def test_instances_and_modifiers_cast_shadows():
+    plane = add_plane(material=add_material())
+    collection = bpy.data.collections.new("Roofs")
+    roof = add_plane("Roof", size=(9, 9))
+    bpy.context.scene.collection.objects.unlink(roof)
+    collection.objects.link(roof)
+    instance = bpy.data.objects.new("Instance", None)
+    instance.instance_type, instance.instance_collection = "COLLECTION", collection
+    instance.location.z = 1
+    bpy.context.scene.collection.objects.link(instance)
+    add_sun(0)
+    (dark,) = bake(plane)
+    assert not dark.any()
+    roof.modifiers.new("Shrink", "SOLIDIFY")
+    roof.scale = (1e-3, 1e-3, 1e-3)
+    (lit,) = bake(plane)
+    assert lit.any()
+
+
+def test_two_objects_share_an_image_side_by_side():
+    image = bpy.data.images.new("Atlas", 32, 16, float_buffer=True)
+    material = add_material(image=image)
+    left = add_plane("Left", uvs=[(0, 0), (0.5, 0), (0.5, 1), (0, 1)], material=material)
+    right = add_plane("Right", uvs=[(0.5, 0), (1, 0), (1, 1), (0.5, 1)], material=material)
+    right.location.x = 5
+    add_sun(0)
+    bake(left, right)
+    assert (pixels(image)[:, :, 0] > 0).all()
+
+
+def test_two_objects_on_the_same_part_of_an_image():
+    material = add_material(image=bpy.data.images.new("Shared", 16, 16, float_buffer=True))
+    planes = [
+        add_plane("A", material=material),
+        add_plane("B", matrix=Matrix.Translation((5, 0, 0)), material=material),
+    ]
+    add_sun(0)
+    select(*planes)
+    assert "same part of the image 'Shared'" in messages_of(bpy.ops.beamspread.bake)
+
+
+def bent(plane):
+    plane.data.vertices[0].co.z = 0.5
+
+
+def without_uvs(plane):
+    plane.data.uv_layers.remove(plane.data.uv_layers[0])
+
+
+def hidden(plane):
+    plane.hide_render = True
+
+
+def in_hidden_collection(plane):
+    collection = bpy.data.collections.new("Hidden")
+    collection.hide_render = True
+    bpy.context.scene.collection.children.link(collection)
+    bpy.context.scene.collection.objects.unlink(plane)
+    collection.objects.link(plane)
+
+
+def setting(name, value):
+    def change(plane):
+        setattr(node_of(plane.data.materials[0]), name, value)
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (bent, "not flat"),
+        (without_uvs, "no UV map"),
+        (hidden, "hidden from render"),
+        (in_hidden_collection, "hidden from render"),
+        (setting("albedo", (0.5, 1.0, 0.5)), "albedo's green is 1"),
+        (setting("mean_free_path", (-0.1, 1, 1)), "mean free path's red is -0.1"),
+        (setting("anisotropy", 1.5), "anisotropy is 1.5"),
+        (setting("ior", 0.5), "IOR is 0.5"),
+        (setting("thickness", -1.0), "thickness is -1"),
+    ],
+)
+def test_what_cannot_be_baked_says_so_and_the_others_are_baked(spoil, words):
+    bad = add_plane("Bad", material=add_material("Spoilt"))
+    good = add_plane("Good", matrix=Matrix.Translation((5, 0, 0)), material=add_material("Sound"))
+    add_sun(0)
+    spoil(bad)
+    bpy.context.view_layer.update()
+    message = messages_of(lambda: bpy.ops.beamspread.bake(objects="ALL"))
+    assert "Bad / Spoilt: " in message
+    assert words in message
+    assert "Traceback" not in message
+    assert len(message.strip().splitlines()) == 1
+    assert node_of(bad.data.materials[0]).image is None
+    assert pixels(node_of(good.data.materials[0]).image).any()
+
+
+def file_image(folder):
+    path = folder / "target.png"
+    image = bpy.data.images.new("Target", 8, 8)
+    image.filepath_raw, image.file_format = str(path), "PNG"
+    image.save()
+    bpy.data.images.remove(image)
+    return path, bpy.data.images.load(str(path))
+
+
+def test_image_whose_file_is_gone(tmp_path):
+    path, image = file_image(tmp_path)
+    plane = add_plane(material=add_material(image=image))
+    add_sun(0)
+    path.unlink()
+    select(plane)
+    assert f"has lost its file {path}" in messages_of(bpy.ops.beamspread.bake)
+
+
+def test_image_whose_file_is_read_only_keeps_it(tmp_path):
+    path, image = file_image(tmp_path)
+    plane = add_plane(material=add_material(image=image))
+    add_sun(0)
+    path.chmod(stat.S_IRUSR)
+    content = path.read_bytes()
+    select(plane)
+    assert "read-only" in messages_of(bpy.ops.beamspread.bake)
+    assert path.read_bytes() == content
+    path.chmod(stat.S_IRUSR | stat.S_IWUSR)
+
+
+def test_nothing_to_bake():
+    select(add_plane())
+    assert "No mesh has a material with a Beamspread node" in messages_of(bpy.ops.beamspread.bake)
+
+
+def test_area_lights_are_named_in_a_warning(capfd):
+    plane = add_plane(material=add_material())
+    lamp = bpy.data.objects.new("Panel", bpy.data.lights.new("Panel", "AREA"))
+    bpy.context.collection.objects.link(lamp)
+    bake(plane)
+    output = capfd.readouterr().out
+    assert "'Panel' is left out" in output
+    assert "it is black" in output
+
+
+class FakeJob:
+    """Asks whether to go on until it is told not to."""
+
+    def run(self, progress):
+        while progress(0.5):
+            pass
+        raise RuntimeError("stopped")
+
+
+def test_thread_stops_when_asked():
+    thread = operators.BakeThread(FakeJob())
+    thread.start()
+    thread.cancel()
+    thread.join(timeout=10)
+    assert not thread.is_alive()
+    assert thread.cancelled
+    assert thread.texture is None
