@@ -15,6 +15,9 @@ using detail::to_text;
 
 namespace {
 
+// Hosts that keep angles in single precision round pi up.
+constexpr double max_spot_size = static_cast<double>(static_cast<float>(pi));
+
 double smoothstep(double t)
 {
     t = std::clamp(t, 0.0, 1.0);
@@ -58,7 +61,7 @@ SpotLight::SpotLight(const Vec3& position, const Mat3& lamp_to_world, double spo
       m_smooth((1.0 - m_cos_half_size) * blend),
       m_falloff(falloff)
 {
-    if (!(spot_size > 0.0 && spot_size <= pi))
+    if (!(spot_size > 0.0 && spot_size <= max_spot_size))
         reject("spot_size", spot_size, "0 < spot_size <= pi, the full angle in radians");
     if (!(blend >= 0.0 && blend <= 1.0))
         reject("blend", blend, "0 to 1");

@@ -1,0 +1,244 @@
+"""Irradiance against Cycles: a white diffuse plane baked with DIFFUSE / DIRECT shows E / pi."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+from beamspread import extract
+from beamspread._load import native
+from beamspread.core.bake import BakeSettings, light_beams
+from beamspread.core.receiver import build_receiver, fit_uv_map
+from mathutils import Euler, Matrix
+
+TEXELS = 64
+# Cycles samples each texel at random places; with this many their mean is that of the texel to 0.1 %.
+CYCLES_SAMPLES = 256
+TOLERANCE = 0.01
+
+TILTED = Matrix.Translation((0.3, -0.2, 0.5)) @ Euler((0.5, -0.4, 0.8)).to_matrix().to_4x4()
+PLANES = {
+    "plain": Matrix(),
+    "tilted": TILTED,
+    "stretched": TILTED @ Matrix.Diagonal((1.6, 0.6, 1, 1)),
+    "mirrored": TILTED @ Matrix.Diagonal((-1.3, 0.9, 1, 1)),
+    "upside_down": TILTED @ Matrix.Diagonal((1, 1, -1, 1)),
+    "inverted": TILTED @ Matrix.Diagonal((-0.7, -1, -1, 1)),
+    "flat": TILTED @ Matrix.Diagonal((1, 1.2, 0.001, 1)),
+    "far_and_small": Matrix.Translation((40, -30, 20)) @ TILTED @ Matrix.Diagonal((0.1, 0.1, 0.1, 1)),
+}
+SQUARE = np.array(scenes.SQUARE_UVS, float)
+UVS = {
+    "square": SQUARE,
+    "turned": np.roll(SQUARE, 1, axis=0),
+    "mirrored": SQUARE * [-1, 1] + [1, 0],
+    "part": SQUARE * [0.5, 0.7] + [0.2, 0.1],
+    "oblique": (SQUARE - 0.5) @ [[0.5, 0.3], [-0.3, 0.5]] + 0.5,
+}
+# Lamps stand in the frame of the plane, whose unit is half its side.
+ABOVE = {"straight": (0.0, 0.0, 0.0), "oblique": (0.35, 0.25, 0.4)}
+
+
+def add_lamp(kind, plane, euler=(0, 0, 0), place=(0.3, -0.2, 1.1), scale=(1, 1, 1), color=(1, 0.5, 0.25), **options):
+    """A lamp without extent, placed relative to the side of the plane that its normal points to."""
+    data = bpy.data.lights.new(kind, kind)
+    data.color = color
+    for name, value in options.items():
+        setattr(data, name, value)
+    if kind == "SUN":
+        data.angle = 0
+    else:
+        data.shadow_soft_size = 0
+    lamp = bpy.data.objects.new(kind, data)
+    bpy.context.collection.objects.link(lamp)
+    lamp.matrix_world = frame_of(plane) @ Matrix.LocRotScale(place, Euler(euler), scale)
+    return lamp
+
+
+def frame_of(plane):
+    """The plane's frame without scale, z along the normal of its lit side."""
+    bpy.context.view_layer.update()
+    world = plane.matrix_world
+    normal = (world.to_3x3().inverted().transposed().col[2]).normalized()
+    x_axis = world.col[0].to_3d().normalized()
+    axes = Matrix((x_axis, normal.cross(x_axis), normal)).transposed().to_4x4()
+    return Matrix.Translation(world.translation) @ axes @ Matrix.Scale(world.col[0].length, 4)
+
+
+def white_material():
+    """White, diffuse, with an image to bake into."""
+    image = bpy.data.images.new("Bake", TEXELS, TEXELS, float_buffer=True, alpha=False)
+    image.colorspace_settings.name = "Non-Color"
+    material = bpy.data.materials.new("White")
+    if bpy.app.version < (5, 0, 0):  # later ones always use nodes, and warn
+        material.use_nodes = True
+    nodes = material.node_tree.nodes
+    nodes.clear()
+    output, diffuse = nodes.new("ShaderNodeOutputMaterial"), nodes.new("ShaderNodeBsdfDiffuse")
+    diffuse.inputs["Color"].default_value = (1, 1, 1, 1)
+    diffuse.inputs["Roughness"].default_value = 0
+    material.node_tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
+    texture = nodes.new("ShaderNodeTexImage")
+    texture.image = image
+    nodes.active = texture
+    return material, image
+
+
+def add_receiver(world, uvs=scenes.SQUARE_UVS):
+    material, image = white_material()
+    return scenes.add_plane("Receiver", (2, 2), world, uvs, material), image
+
+
+def cycles_irradiance(plane, image, samples=CYCLES_SAMPLES):
+    """Pi times what Cycles bakes."""
+    scene = bpy.context.scene
+    scene.cycles.samples = samples
+    scene.cycles.use_adaptive_sampling = False
+    scene.cycles.use_denoising = False
+    scenes.select(plane)
+    bpy.ops.object.bake(type="DIFFUSE", pass_filter={"DIRECT"}, margin=0, use_clear=True)
+    return math.pi * scenes.pixels(image)
+
+
+def our_irradiance(plane):
+    """The same by the add-on, and the coverage of the texels."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    light = extract.read_scene_light(depsgraph)
+    polygons = extract.read_polygons(plane.evaluated_get(depsgraph), "White")
+    receiver = build_receiver(polygons, fit_uv_map(polygons), TEXELS, TEXELS)
+    caster = native.Occluders(light.occluders.vertices, light.occluders.triangles)
+    total = np.zeros((receiver.grid.height, receiver.grid.width, 3), np.float32)
+    for lamp in light.lights:
+        total += light_beams(receiver.grid, lamp, caster, BakeSettings(samples=8))[0]
+    return receiver.to_texels(total), receiver.coverage
+
+
+def around(values):
+    """Each texel's 3 x 3 neighbourhood, (9, H, W); the image's border is repeated."""
+    padded = np.pad(values, 1, mode="edge")
+    height, width = values.shape
+    return np.stack([padded[i : i + height, j : j + width] for i in range(3) for j in range(3)])
+
+
+def inside_one_triangle(plane):
+    """Texels that with their neighbours lie in one triangle: at its border Cycles samples only a part of a texel."""
+    plane.data.calc_loop_triangles()
+    corners = np.array([plane.data.uv_layers[0].data[i].uv for t in plane.data.loop_triangles for i in t.loops])
+    triangles = corners.astype(float).reshape(-1, 3, 2) * TEXELS
+    counts = np.array([3], np.uint32)
+    whole = np.max([native.coverage(triangle, counts, TEXELS, TEXELS) for triangle in triangles], axis=0) > 0.999
+    whole[[0, -1]], whole[:, [0, -1]] = False, False
+    return around(whole).all(axis=0)
+
+
+def near_a_border(values):
+    """Where a texel's surroundings vary by more than a fifth: at the border of a shadow or a cone."""
+    return np.ptp(around(values), axis=0) > 0.2 * values
+
+
+def assert_agree(plane, image, least_lit=0.1):
+    """Every lit texel within 1 %, the total within 0.3 %, the dark ones dark."""
+    cycles = cycles_irradiance(plane, image)
+    ours, coverage = our_irradiance(plane)
+    whole = inside_one_triangle(plane)
+    assert (coverage[whole] > 0.999).all()
+    # On the very border of a hard cone Cycles (4.2 on) may divide zero by zero.
+    undefined = np.isnan(cycles).any(axis=2)
+    assert undefined.sum() <= 4
+    whole &= ~undefined
+    strength = ours.max(axis=2)
+    lit = whole & (strength > 0.01 * strength.max()) & ~near_a_border(strength)
+    assert lit.sum() > least_lit * whole.sum()
+    np.testing.assert_allclose(cycles[lit], ours[lit], rtol=TOLERANCE)
+    # Borders too, although a texel there depends on where Cycles happened to sample it.
+    assert np.abs(cycles - ours)[whole].sum() < 0.015 * ours[whole].sum()
+    np.testing.assert_allclose(cycles[whole].sum(axis=0), ours[whole].sum(axis=0), rtol=3e-3)
+    dark = whole & (strength == 0) & ~near_a_border(strength)
+    assert cycles[dark].max(initial=0) == 0
+
+
+@pytest.mark.parametrize("world", PLANES.values(), ids=PLANES.keys())
+@pytest.mark.parametrize("kind", ["SUN", "POINT", "SPOT"])
+def test_planes(kind, world):
+    plane, image = add_receiver(world)
+    options = {"spot_size": 1.6, "spot_blend": 0.3} if kind == "SPOT" else {}
+    add_lamp(kind, plane, ABOVE["oblique"], energy=70, **options)
+    assert_agree(plane, image)
+
+
+@pytest.mark.parametrize("uvs", UVS.values(), ids=UVS.keys())
+def test_uv_layouts(uvs):
+    plane, image = add_receiver(PLANES["stretched"], uvs)
+    add_lamp("POINT", plane, energy=20)
+    assert_agree(plane, image)
+
+
+@pytest.mark.parametrize("angle", [0, 30, 60, 80, 89])
+def test_sun_angles(angle):
+    plane, image = add_receiver(Matrix())
+    add_lamp("SUN", plane, (math.radians(angle), 0, 0.3), energy=3)
+    assert_agree(plane, image)
+
+
+def test_light_from_behind_is_none():
+    plane, image = add_receiver(PLANES["mirrored"])
+    add_lamp("SUN", plane, (2.0, 0, 0))
+    add_lamp("POINT", plane, place=(0.1, 0.2, -0.5))
+    assert our_irradiance(plane)[0].max() == 0
+    assert cycles_irradiance(plane, image).max() == 0
+
+
+@pytest.mark.parametrize("blend", [0, 0.15, 1])
+@pytest.mark.parametrize("size", [50, 110, 180])
+@pytest.mark.parametrize("euler", ABOVE.values(), ids=ABOVE.keys())
+def test_spot_falloff(euler, size, blend):
+    plane, image = add_receiver(Matrix())
+    add_lamp("SPOT", plane, euler, energy=100, spot_size=math.radians(size), spot_blend=blend)
+    assert_agree(plane, image, least_lit=0.03)
+
+
+@pytest.mark.parametrize(
+    "scale",
+    [(2, 2, 2), (2, 1, 1), (1, 1, 0.6), (0.7, 1.5, 1.2), (-1.3, 0.8, 1)],
+    ids=lambda scale: "_".join(map(str, scale)),
+)
+@pytest.mark.parametrize("blend", [0.15, 1])
+def test_scaled_spot(scale, blend):
+    plane, image = add_receiver(Matrix())
+    add_lamp("SPOT", plane, ABOVE["oblique"], scale=scale, energy=100, spot_size=1.0, spot_blend=blend)
+    assert_agree(plane, image, least_lit=0.03)
+
+
+def test_spot_below_a_mirroring_parent():
+    plane, image = add_receiver(Matrix())
+    lamp = add_lamp("SPOT", plane, (math.pi - 0.35, 0.25, 0.4), energy=100, spot_size=1.2, spot_blend=0.5)
+    parent = bpy.data.objects.new("Parent", None)
+    bpy.context.collection.objects.link(parent)
+    parent.matrix_world = Matrix.Translation((0, 0, 2.2)) @ Matrix.Diagonal((1, 1, -1, 1))
+    lamp.parent = parent
+    assert_agree(plane, image)
+
+
+def test_lights_of_several_colors_add_up():
+    plane, image = add_receiver(PLANES["tilted"])
+    add_lamp("SUN", plane, (0.4, 0, 0), color=(1, 0.2, 0.1), energy=2)
+    add_lamp("POINT", plane, color=(0.1, 1, 0.3), energy=30)
+    add_lamp("SPOT", plane, color=(0.2, 0.1, 1), energy=200, spot_size=1.2, spot_blend=1)
+    # Cycles picks one of the lights for each sample: only means over many texels are free of noise.
+    blocks = TEXELS // 8, 8, TEXELS // 8, 8, 3
+    cycles = cycles_irradiance(plane, image, 4 * CYCLES_SAMPLES).reshape(blocks).mean(axis=(1, 3))
+    ours = our_irradiance(plane)[0].reshape(blocks).mean(axis=(1, 3))
+    np.testing.assert_allclose(cycles, ours, rtol=TOLERANCE)
+
+
+@pytest.mark.parametrize("kind", ["SUN", "POINT", "SPOT"])
+@pytest.mark.parametrize("world", ["plain", "mirrored"])
+def test_shadow(kind, world):
+    plane, image = add_receiver(PLANES[world])
+    wall = scenes.add_blocker(0.5)
+    wall.matrix_world = frame_of(plane)
+    options = {"spot_size": 2.0, "spot_blend": 0.2} if kind == "SPOT" else {}
+    add_lamp(kind, plane, (0.2, 0.6, 0.4), place=(0.7, -0.3, 1.1), energy=50, **options)
+    assert (our_irradiance(plane)[0].max(axis=2) == 0).sum() > 100
+    assert_agree(plane, image)
