@@ -9,5 +9,8 @@ add_library(beamspread_ducc STATIC
 target_include_directories(beamspread_ducc SYSTEM PUBLIC ${ducc_src})
 # Threads are ours (base/threads.h): a guest in another process brings no pool of its own.
 target_compile_definitions(beamspread_ducc PUBLIC DUCC0_NO_LOWLEVEL_THREADING)
-# Its FFT takes minutes to compile with a sanitizer, and is not what that is there to check.
-target_compile_options(beamspread_ducc PRIVATE -w -O3 $<$<BOOL:${BEAMSPREAD_SANITIZE}>:-fno-sanitize=all>)
+target_compile_options(beamspread_ducc PRIVATE -w -O3)
+if(BEAMSPREAD_SANITIZE)
+  # Minutes to compile otherwise, and not what a sanitizer is here to check.
+  target_compile_options(beamspread_ducc PRIVATE -fno-sanitize=all)
+endif()
