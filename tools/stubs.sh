@@ -8,6 +8,9 @@ made=build/.stubs/beamspread/_native.pyi
 
 PYTHONPATH=build/stage build/venv/bin/pybind11-stubgen --exit-code --numpy-array-remove-parameters \
     --output-dir build/.stubs beamspread._native
+# What pybind11 says of std::array is no type.
+sed -i 's/list\[float\[\([0-9]\)\]\]/typing.Sequence[float]/g' "$made"
+build/venv/bin/ruff format --quiet --isolated --line-length 120 "$made"
 if [ "${1:-}" = --update ]; then
     cp "$made" "$checked_in"
 elif ! diff -u "$checked_in" "$made"; then

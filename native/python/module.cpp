@@ -27,8 +27,9 @@ PYBIND11_MODULE(_native, m)
     py::register_exception<Cancelled>(m, "Cancelled").doc() = "A progress callback returned False.";
     py::register_local_exception_translator(&translate);
     bind_medium(m);
-    bind_transport(m);
+    // Types before the functions that name them in their signatures.
     bind_ldf(m);
+    bind_transport(m);
     bind_image(m);
     bind_scene(m);
     bind_solve(m);

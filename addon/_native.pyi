@@ -1,0 +1,477 @@
+"""
+Light transport of beamspread; import the package `beamspread` instead.
+"""
+
+from __future__ import annotations
+import numpy
+import os
+import typing
+
+__all__: list[str] = [
+    "Cancelled",
+    "LdfLibrary",
+    "Medium",
+    "Occluders",
+    "convolve",
+    "coverage",
+    "embree_version",
+    "point_beams",
+    "read_exr",
+    "simulate",
+    "spot_beams",
+    "sun_beams",
+    "write_exr",
+]
+
+class Cancelled(Exception):
+    """
+    A progress callback returned False.
+    """
+
+class Medium:
+    """
+    A homogeneous, plane-parallel, dimensionless medium.
+
+    Parameters
+    ----------
+    g : float
+        Henyey-Greenstein anisotropy, -0.99 to 0.99.
+    ior : float
+        Refractive index inside over outside, 1 to 3.
+    thickness : float
+        In mean free paths, > 0; ``inf`` is a half-space.
+
+    Raises
+    ------
+    ValueError
+        Names the argument, its value and what is allowed.
+    """
+    def __eq__(self, arg0: Medium) -> bool: ...
+    def __getstate__(self) -> tuple: ...
+    def __hash__(self) -> int: ...
+    def __init__(self, g: float = 0.8, ior: float = 1.0, thickness: float = ...) -> None: ...
+    def __repr__(self) -> str: ...
+    def __setstate__(self, arg0: tuple) -> None: ...
+    @property
+    def g(self) -> float: ...
+    @property
+    def ior(self) -> float: ...
+    @property
+    def thickness(self) -> float: ...
+
+class LdfLibrary:
+    """
+    Luminance distribution functions of one medium.
+
+    Made by `simulate`, `library` or `LdfLibrary.load`. Angles are in degrees from the surface normal,
+    within the simulated ones (a library that reaches 88 degrees serves up to 90); albedos in [0, 1).
+    """
+    @staticmethod
+    def load(path: os.PathLike) -> LdfLibrary:
+        """
+        Read a library from an OpenEXR file; OSError if it is missing, damaged or something else.
+        """
+    def __repr__(self) -> str: ...
+    def diffuse_reflectance(self, albedo: float) -> float:
+        """
+        Reflectance under uniform diffuse light; needs a library from 0 to at least 88 degrees.
+        """
+    def image(
+        self, angle: float, albedo: float, size: int, pitch: float, side: str = "reflected", beam_diameter: float = 0.0
+    ) -> numpy.ndarray:
+        """
+        The LDF as texel means.
+
+        Parameters
+        ----------
+        angle, albedo : float
+        size : int
+            Texels along each side, 1 to 16384.
+        pitch : float
+            Side of a texel, mean free paths.
+        side : {"reflected", "transmitted"}
+        beam_diameter : float
+            Must be 0: a pencil beam.
+
+        Returns
+        -------
+        float32, shape (size, size)
+            1/mfp^2; rows v, columns u, O at the centre, +u (the beam's direction of travel) to the right.
+            The few texels where nine azimuthal harmonics undershoot may be slightly negative.
+
+        Raises
+        ------
+        ValueError
+            Names the argument, its value and what is allowed.
+        """
+    def reflectance(self, angle: float, albedo: float) -> float:
+        """
+        Diffuse reflectance: power that leaves per unit incident power, specular reflection excluded.
+        """
+    def save(self, path: os.PathLike) -> None:
+        """
+        Write a multi-part OpenEXR file; an existing file is replaced only by a complete one.
+        """
+    def standard_error(self, angle: float, albedo: float, side: str = "reflected") -> float:
+        """
+        Standard error of `reflectance` or `transmittance`, from the scatter of 32 independent batches.
+        """
+    def transmittance(self, angle: float, albedo: float) -> float:
+        """
+        Power that leaves the far side per unit incident power, the unscattered beam included.
+        """
+    @property
+    def angles(self) -> list[float]:
+        """
+        Simulated angles, degrees, ascending.
+        """
+    @property
+    def medium(self) -> Medium: ...
+    @property
+    def photons(self) -> int:
+        """
+        Photons per angle.
+        """
+    @property
+    def seed(self) -> int: ...
+
+class Occluders:
+    """
+    Triangles that block light, both sides of them.
+
+    Parameters
+    ----------
+    vertices : ndarray, float32, shape (N, 3), C-contiguous
+        World positions in metres. Copied.
+    triangles : ndarray, uint32, shape (M, 3), C-contiguous
+        Vertex indices. Copied. M = 0 is allowed: nothing is blocked.
+
+    Raises
+    ------
+    ValueError
+        Wrong dtype or shape, a position that is not finite, an index that is out of range.
+    """
+    def __init__(self, vertices: numpy.ndarray, triangles: numpy.ndarray) -> None: ...
+    @property
+    def triangle_count(self) -> int:
+        """
+        int: number of triangles.
+        """
+
+def convolve(
+    irradiance: numpy.ndarray,
+    direction: numpy.ndarray,
+    ldf: list[LdfLibrary],
+    albedo: list[float],
+    mean_free_path: list[float],
+    pitch: typing.Sequence[float],
+    solver: str,
+    tolerance: float,
+    threads: int,
+    progress: typing.Any,
+) -> numpy.ndarray:
+    """
+    Luminance of beams on a grid; the engine behind `beamspread.convolve`.
+
+    irradiance float32 (H, W) or (C, H, W) in W/m^2, direction float32 (3,) or (H, W, 3), C libraries,
+    albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr).
+    """
+
+def coverage(
+    corners: numpy.ndarray, corner_counts: numpy.ndarray, width: int, height: int, threads: int = 0
+) -> numpy.ndarray:
+    """
+    The exact part of each texel of a grid that polygons cover.
+
+    Parameters
+    ----------
+    corners : ndarray, float64, shape (N, 2), C-contiguous
+        The corners of all polygons, one after the other, in texels: texel (row y, column x) spans [x, x+1] x [y, y+1].
+        Polygons may be concave, have either orientation and reach beyond the grid.
+    corner_counts : ndarray, uint32, shape (P,), C-contiguous
+        How many corners each polygon has: 3 or more; all 3 for triangles.
+    width, height : int
+        Of the grid in texels.
+    threads : int
+        0: all.
+
+    Returns
+    -------
+    coverage : ndarray, float32, shape (height, width)
+        0 to 1; where polygons overlap the sum is cut at 1.
+
+    Raises
+    ------
+    ValueError
+        An argument is out of range; the message names it.
+    """
+
+def embree_version() -> int:
+    """
+    The version of Embree in use, 31305 for 3.13.5: not that of the host process.
+    """
+
+def point_beams(
+    origin: numpy.ndarray,
+    x_axis: numpy.ndarray,
+    y_axis: numpy.ndarray,
+    normal: numpy.ndarray,
+    pitch_x: float,
+    pitch_y: float,
+    width: int,
+    height: int,
+    position: numpy.ndarray,
+    occluders: Occluders = None,
+    samples: int = 4,
+    threads: int = 0,
+    progress: typing.Any = None,
+) -> tuple:
+    """
+    Irradiance of a plane by a point lamp of 1 W, and where it comes from.
+
+    Parameters
+    ----------
+    origin : 3 floats
+        World position, in metres, of the outer corner of texel (0, 0).
+    x_axis, y_axis, normal : 3 floats each
+        Unit vectors at right angles in the world: along a row of texels, from row to row, and out of the lit side. They may
+        be left-handed (a mirrored texture).
+    pitch_x, pitch_y : float
+        Size of a texel in metres.
+    width, height : int
+        Texels, 1 to 65536.
+    position : 3 floats
+        Of the lamp in the world, metres.
+    occluders : Occluders, optional
+        What casts shadows; None: nothing does.
+    samples : int
+        samples x samples points in each texel, each with its own visibility; 1 to 64.
+    threads : int
+        0: all. The result is the same, bit for bit, for any number.
+    progress : callable, optional
+        progress(fraction) returns False to stop.
+
+    Returns
+    -------
+    irradiance : ndarray, float32, shape (height, width)
+        W/m^2 for a lamp of 1 W: cosine and visible part included. Row 0 is the lowest row of the plane.
+    direction : ndarray, float32, shape (height, width, 3)
+        Unit vectors of travel in the plane frame (x_axis, y_axis, normal), z < 0. Where no light arrives: that of the
+        unblocked light, or (0, 0, -1) if the lamp is behind the plane.
+
+    Raises
+    ------
+    ValueError
+        An argument is out of range; the message names it.
+    Cancelled
+        `progress` returned False.
+    """
+
+def read_exr(path: str, part: str | None = None) -> tuple:
+    """
+    Read one part of an OpenEXR file.
+
+    Parameters
+    ----------
+    path : str
+    part : str, optional
+        The part's name; may be left out where the file has one part only.
+
+    Returns
+    -------
+    array : ndarray, float32, shape (H, W, C)
+        Rows from the bottom up. Half and integer channels are converted.
+    channels : list of str
+        The names of the C channels: in the order in which `write_exr` got them, or R, G, B, A first.
+    attributes : dict
+        Header attributes of type str, int, float and list of float; those that describe the image itself are left out.
+
+    Raises
+    ------
+    OSError
+        The file is missing, damaged or larger than 2^30 numbers, has deep data or subsampled channels, or no such part.
+    """
+
+def simulate(
+    medium: Medium, angles: list[float], photons: int, seed: int = 1, threads: int = 0, progress: typing.Any = None
+) -> LdfLibrary:
+    """
+    Simulate the light that beams spread inside a medium, by Monte Carlo.
+
+    One simulation serves every albedo, because what leaves is tallied by scattering order.
+
+    Parameters
+    ----------
+    medium : Medium
+    angles : sequence of float
+        Angles of incidence, degrees from the surface normal, 0 <= angle < 90, distinct.
+    photons : int
+        Per angle; rounded up to a multiple of 32.
+    seed : int
+        The result depends on it, and not on the number of threads.
+    threads : int
+        0: all.
+    progress : callable, optional
+        Called with the finished fraction; returning False stops.
+
+    Returns
+    -------
+    LdfLibrary
+
+    Raises
+    ------
+    ValueError
+        Names the argument, its value and what is allowed.
+    Cancelled
+        `progress` returned False.
+    """
+
+def spot_beams(
+    origin: numpy.ndarray,
+    x_axis: numpy.ndarray,
+    y_axis: numpy.ndarray,
+    normal: numpy.ndarray,
+    pitch_x: float,
+    pitch_y: float,
+    width: int,
+    height: int,
+    position: numpy.ndarray,
+    frame: numpy.ndarray,
+    spot_size: float,
+    blend: float,
+    occluders: Occluders = None,
+    samples: int = 4,
+    threads: int = 0,
+    progress: typing.Any = None,
+    falloff: str = "scaled",
+) -> tuple:
+    """
+    Irradiance of a plane by a spot lamp of 1 W (over the whole sphere, as Blender counts it), and where it comes from.
+
+    Parameters
+    ----------
+    origin : 3 floats
+        World position, in metres, of the outer corner of texel (0, 0).
+    x_axis, y_axis, normal : 3 floats each
+        Unit vectors at right angles in the world: along a row of texels, from row to row, and out of the lit side. They may
+        be left-handed (a mirrored texture).
+    pitch_x, pitch_y : float
+        Size of a texel in metres.
+    width, height : int
+        Texels, 1 to 65536.
+    position : 3 floats
+        Of the lamp in the world, metres.
+    frame : (3, 3) floats
+        Rows: the lamp's x, y and z axes in the world with their scale (the columns of its 3 x 3 world matrix). It shines
+        along -z.
+    spot_size : float
+        Full angle of the cone in radians, 0 < spot_size <= pi.
+    blend : float
+        Soft part of the cone, 0 to 1.
+    occluders : Occluders, optional
+        What casts shadows; None: nothing does.
+    samples : int
+        samples x samples points in each texel, each with its own visibility; 1 to 64.
+    threads : int
+        0: all. The result is the same, bit for bit, for any number.
+    progress : callable, optional
+        progress(fraction) returns False to stop.
+    falloff : str
+        "scaled": as Cycles in Blender 4.2, 4.5 and 5.0, where the lamp's scale shapes the cone. "legacy": as in 3.4, where
+        it does not, and light falls off with the cosine to the axis besides.
+
+    Returns
+    -------
+    irradiance : ndarray, float32, shape (height, width)
+        W/m^2 for a lamp of 1 W: cosine and visible part included. Row 0 is the lowest row of the plane.
+    direction : ndarray, float32, shape (height, width, 3)
+        Unit vectors of travel in the plane frame (x_axis, y_axis, normal), z < 0. Where no light arrives: that of the
+        unblocked light, or (0, 0, -1) if the lamp is behind the plane.
+
+    Raises
+    ------
+    ValueError
+        An argument is out of range; the message names it.
+    Cancelled
+        `progress` returned False.
+    """
+
+def sun_beams(
+    origin: numpy.ndarray,
+    x_axis: numpy.ndarray,
+    y_axis: numpy.ndarray,
+    normal: numpy.ndarray,
+    pitch_x: float,
+    pitch_y: float,
+    width: int,
+    height: int,
+    direction: numpy.ndarray,
+    occluders: Occluders = None,
+    samples: int = 4,
+    threads: int = 0,
+    progress: typing.Any = None,
+) -> numpy.ndarray:
+    """
+    Irradiance of a plane by parallel light of 1 W/m^2 at normal incidence.
+
+    Parameters
+    ----------
+    origin : 3 floats
+        World position, in metres, of the outer corner of texel (0, 0).
+    x_axis, y_axis, normal : 3 floats each
+        Unit vectors at right angles in the world: along a row of texels, from row to row, and out of the lit side. They may
+        be left-handed (a mirrored texture).
+    pitch_x, pitch_y : float
+        Size of a texel in metres.
+    width, height : int
+        Texels, 1 to 65536.
+    direction : 3 floats
+        Direction of travel in the world, any length but 0.
+    occluders : Occluders, optional
+        What casts shadows; None: nothing does.
+    samples : int
+        samples x samples points in each texel, each with its own visibility; 1 to 64.
+    threads : int
+        0: all. The result is the same, bit for bit, for any number.
+    progress : callable, optional
+        progress(fraction) returns False to stop.
+
+    Returns
+    -------
+    irradiance : ndarray, float32, shape (height, width)
+        W/m^2: cosine times visible part of the texel; 0 everywhere if the light comes from behind. Row 0 is the lowest row.
+
+    Raises
+    ------
+    ValueError
+        An argument is out of range; the message names it.
+    Cancelled
+        `progress` returned False.
+    """
+
+def write_exr(path: str, array: numpy.ndarray, channels: list[str], attributes: dict = {}) -> None:
+    """
+    Write an OpenEXR file of 32-bit float channels, ZIP-compressed.
+
+    The file is written beside `path` and takes its name when it is whole.
+
+    Parameters
+    ----------
+    path : str
+        A file that exists is replaced, unless it is read-only.
+    array : ndarray, float32, shape (H, W, C), C-contiguous
+        Rows from the bottom up, as Blender stores images; the file gets them from the top down.
+    channels : sequence of str
+        C names, such as ["R", "G", "B"].
+    attributes : dict, optional
+        Header attributes: str, int, float, or a sequence of numbers (stored as 32-bit floats).
+
+    Raises
+    ------
+    ValueError
+        An argument is of the wrong shape, dtype or range.
+    OSError
+        The file cannot be written.
+    """
+
+__version__: str = "0.1.0"
