@@ -29,7 +29,8 @@ finish() {
 # sanitized PRESET LIBRARY: the native smoke test in a module built with a sanitizer, whose runtime has to come first.
 sanitized() {
     local preset=$1 runtime
-    runtime=$(c++ -print-file-name="$2")
+    # libstdc++ with it: exceptions pass through the runtime, which looks for their functions when the process starts.
+    runtime="$(c++ -print-file-name="$2") $(c++ -print-file-name=libstdc++.so.6)"
     tools/build.sh "$preset" || return
     # Leaks: Python keeps much until it exits. ThreadSanitizer can't place its shadow memory everywhere: no ASLR.
     env LD_PRELOAD="$runtime" PYTHONPATH="$PWD/build/$preset/stage" BEAMSPREAD_NO_DEEPBIND=1 PYTHONMALLOC=malloc \

@@ -10,7 +10,7 @@ import numpy as np
 from beamspread import Cancelled, Medium, simulate
 from beamspread._load import native
 
-THREADS = 4
+THREADS = 2
 SIZE = 24
 
 
