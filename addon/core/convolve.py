@@ -98,7 +98,8 @@ def _pair(name, values):
 
 
 def _libraries(ldf):
-    libraries = [ldf] * 3 if isinstance(ldf, native.LdfLibrary) else list(ldf)
-    if len(libraries) != 3 or not all(isinstance(each, native.LdfLibrary) for each in libraries):
+    libraries = [ldf] * 3 if isinstance(ldf, native.LdfLibrary) else ldf
+    is_sequence = isinstance(libraries, list | tuple) and len(libraries) == 3
+    if not is_sequence or not all(isinstance(each, native.LdfLibrary) for each in libraries):
         raise ValueError(f"argument 'ldf' is {ldf!r}; allowed: an LdfLibrary or three of them, one per channel")
-    return libraries
+    return list(libraries)

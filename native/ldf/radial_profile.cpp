@@ -100,10 +100,7 @@ RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments)
 
     const auto& r = edges();
     for (std::size_t k = 0; k < edge_count; ++k) {
-        const Stencil& stencil = stencils()[k];
-        for (std::size_t i = 0; i < 5; ++i)
-            for (std::size_t m = 0; m < harmonic_count; ++m)
-                m_slope[k][m] -= stencil.weight[i] * m_remaining[stencil.first + i][m];
+        m_slope[k] = slope_at(k);
         // A monotone C_0 keeps the azimuthal mean of g positive: slopes at most three times those of the
         // chords beside them (Fritsch, Carlson 1980).
         const auto chord = [&](std::size_t bin) {
@@ -115,6 +112,26 @@ RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments)
     }
     m_slope[edge_count - 1] = {};
     update_support();
+}
+
+// Far out g falls exponentially, by several times within a bin: the logarithm of what remains of m = 0 and
+// the ratios of the other harmonics to it are what a polynomial follows well.
+Harmonics RadialProfile::slope_at(std::size_t k) const
+{
+    const Stencil& stencil = stencils()[k];
+    Harmonics slope{};
+    if (m_remaining[stencil.first + 4][0] <= 0.0)
+        return slope;  // next to where the counts end
+    const double here = m_remaining[k][0];
+    for (std::size_t i = 0; i < 5; ++i) {
+        const Harmonics& there = m_remaining[stencil.first + i];
+        slope[0] -= stencil.weight[i] * here * std::log(there[0] / here);
+        for (std::size_t m = 1; m < harmonic_count; ++m)
+            slope[m] -= stencil.weight[i] * here * there[m] / there[0];
+    }
+    for (std::size_t m = 1; m < harmonic_count; ++m)
+        slope[m] += m_remaining[k][m] / here * slope[0];
+    return slope;
 }
 
 void RadialProfile::add(const RadialProfile& other, double even_weight, double odd_weight)

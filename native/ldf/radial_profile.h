@@ -42,6 +42,7 @@ public:
     double centre() const { return m_centre; }
 
 private:
+    Harmonics slope_at(std::size_t edge) const;
     void update_support();
 
     double m_centre = 0.0;

@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "medium/fresnel.h"
+#include "medium/henyey_greenstein.h"
 #include "python/casters.h"
 
 namespace beamspread {
@@ -43,6 +45,12 @@ ValueError
                         [](const py::tuple& t) {
                             return Medium{t[0].cast<double>(), t[1].cast<double>(), t[2].cast<double>()};
                         }));
+    m.def("fresnel", py::vectorize(&fresnel), py::arg("cos_theta_i"), py::arg("eta"),
+          "Reflectance of unpolarized light; eta is the index behind the boundary over the one before it.");
+    m.def("henyey_greenstein_pdf", py::vectorize(&henyey_greenstein_pdf), py::arg("cos_theta"), py::arg("g"),
+          "Density per steradian of a deflection.");
+    m.def("henyey_greenstein_sample", py::vectorize(&henyey_greenstein_sample), py::arg("g"), py::arg("u"),
+          "Cosine of a deflection, from u uniform in [0, 1).");
 }
 
 }  // namespace beamspread

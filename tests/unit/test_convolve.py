@@ -1,0 +1,213 @@
+"""The solvers: against each other, against brute force in numpy, and for what leaves the plane."""
+
+import math
+
+import beamspread
+import numpy as np
+import pytest
+from beamspread import Cancelled, Medium, convolve, simulate
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+ALBEDO = (0.6, 0.9, 0.3)
+
+
+@pytest.fixture(scope="module")
+def library():
+    return simulate(Medium(0.8), [0, 15, 30, 45, 60, 75, 88], 20_000)
+
+
+def travel(angle, azimuth):
+    """Unit direction of travel in the plane frame, degrees."""
+    theta, beta = math.radians(angle), math.radians(azimuth)
+    return (math.sin(theta) * math.cos(beta), math.sin(theta) * math.sin(beta), -math.cos(theta))
+
+
+def lamp_directions(height, width, h=0.3):
+    x, y = np.meshgrid(np.linspace(-0.5, 0.5, width), np.linspace(-0.5, 0.5, height))
+    field = np.stack([x, y, np.full_like(x, -h)], -1)
+    return (field / np.linalg.norm(field, axis=-1, keepdims=True)).astype(np.float32)
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    height=st.integers(1, 30),
+    width=st.integers(1, 30),
+    angle=st.floats(0, 89),
+    azimuth=st.floats(-180, 180),
+    mean_free_path=st.sampled_from([0.02, 0.3, 1.0, 7.0, 600.0]),
+)
+def test_fft_equals_direct(library, seed, height, width, angle, azimuth, mean_free_path):
+    """To 1e-5 of the largest value: rounding of sums of 900 single-precision products is below 1e-6 here."""
+    rng = np.random.default_rng(seed)
+    beams = rng.random((height, width, 3), np.float32) * (rng.random((height, width, 1)) < 0.7)
+    arguments = (beams, travel(angle, azimuth), library, ALBEDO, mean_free_path, 1.0)
+    direct, fft = convolve(*arguments, solver="direct"), convolve(*arguments, solver="fft")
+    assert fft == pytest.approx(direct, rel=1e-5, abs=1e-6 * direct.max())
+
+
+def test_fft_equals_direct_for_a_lamp(library):
+    rng = np.random.default_rng(2)
+    beams = rng.random((20, 31), np.float32)
+    for path in (0.05, 0.5, 5.0):
+        arguments = (beams, lamp_directions(20, 31), library, ALBEDO, path, 0.1)
+        assert convolve(*arguments, solver="fft") == pytest.approx(convolve(*arguments, solver="direct"), rel=1e-3)
+
+
+@pytest.mark.parametrize("solver", ["fft", "direct"])
+def test_a_field_of_one_direction_is_that_direction(library, solver):
+    rng = np.random.default_rng(3)
+    beams = rng.random((12, 17), np.float32)
+    direction = np.array(travel(50, 130), np.float32)
+    field = np.broadcast_to(direction, (12, 17, 3))
+    one = convolve(beams, direction, library, ALBEDO, 0.5, 1.0, solver=solver)
+    assert convolve(beams, field, library, ALBEDO, 0.5, 1.0, solver=solver) == pytest.approx(one, rel=1e-5)
+
+
+def brute_force(beams, angle, azimuth, library, albedo, mean_free_path, pitch):
+    """Each lit texel adds the library's own image, its rows turned by the azimuth, which is a multiple of 90 degrees."""
+    height, width = beams.shape
+    size = 2 * max(height, width) + 1
+    kernel = library.image(angle, albedo, size, pitch / mean_free_path) * (pitch / mean_free_path) ** 2
+    kernel = np.rot90(kernel, -azimuth // 90)  # rows go up: a turn to the left of the picture is one to the right here
+    middle = size // 2
+    sum_ = np.zeros((height, width))
+    for y, x in zip(*np.nonzero(beams)):
+        sum_ += beams[y, x] * kernel[middle - y : middle - y + height, middle - x : middle - x + width]
+    return sum_ / math.pi
+
+
+@pytest.mark.parametrize("azimuth", [0, 90, 180, 270])
+@pytest.mark.parametrize("solver", ["fft", "direct"])
+def test_kernel_is_the_image_turned_by_the_azimuth(library, solver, azimuth):
+    beams = (np.random.default_rng(4).random((9, 14)) ** 4).astype(np.float32)
+    result = convolve(beams, travel(60, azimuth), library, ALBEDO, 0.8, 0.5, solver=solver)
+    for channel, albedo in enumerate(ALBEDO):
+        expected = brute_force(beams, 60, azimuth, library, albedo, 0.8, 0.5)
+        assert result[..., channel] == pytest.approx(expected, rel=1e-4, abs=1e-6 * expected.max())
+
+
+def test_light_spreads_further_where_it_travels_to(library):
+    beams = np.zeros((41, 41), np.float32)
+    beams[20, 20] = 1
+    up = convolve(beams, travel(60, 90), library, ALBEDO, 1.0, 1.0)[..., 1]
+    assert up[21:].sum() > 1.3 * up[:20].sum()  # rows go up
+    assert up[:, 21:].sum() == pytest.approx(up[:, :20].sum(), rel=1e-4)
+
+
+@pytest.mark.parametrize("paths_per_texel", [1e-3, 0.02, 1, 50, 20 * 33])
+@pytest.mark.parametrize("solver", ["fft", "direct"])
+def test_all_power_is_found_again(library, solver, paths_per_texel):
+    """One lit texel: what the plane shows is the LDF integrated over the plane; all of R for a short mean free path."""
+    size = 33
+    beams = np.zeros((size, size), np.float32)
+    beams[16, 16] = math.pi
+    result = convolve(beams, travel(35, 20), library, ALBEDO, paths_per_texel, 1.0, solver=solver).sum((0, 1))
+    for channel, albedo in enumerate(ALBEDO):
+        window = size / paths_per_texel
+        expected = float(library.image(35, albedo, 1, window)[0, 0]) * window**2
+        # The kernel is turned by 20 degrees, the square window is not: 3 % where it cuts the distribution.
+        whole = paths_per_texel <= 0.02
+        assert result[channel] == pytest.approx(expected, rel=1e-4 if whole else 0.03)
+        if whole:
+            assert result[channel] == pytest.approx(library.reflectance(35, albedo), rel=2e-3)
+
+
+def test_uniform_light_on_a_large_plane(library):
+    result = convolve(np.full((64, 64), 2.0), travel(45, 0), library, ALBEDO, 0.02, 1.0)
+    for channel, albedo in enumerate(ALBEDO):
+        assert result[32, 32, channel] == pytest.approx(2 / math.pi * library.reflectance(45, albedo), rel=1e-4)
+
+
+def test_texels_need_not_be_square(library):
+    """Three flat texels on top of each other see what the square one in their place sees."""
+    coarse, fine = np.zeros((11, 11), np.float32), np.zeros((33, 11), np.float32)
+    coarse[5, 5] = fine[16, 5] = 1
+    expected = convolve(coarse, travel(50, 33), library, ALBEDO, 1.0, 1.0)
+    merged = convolve(fine, travel(50, 33), library, ALBEDO, 1.0, (1.0, 1 / 3)).reshape(11, 3, 11, 3).sum(1)
+    assert merged == pytest.approx(expected, rel=3e-3, abs=1e-6 * expected.max())
+
+
+def test_light_that_leaves_the_plane_does_not_come_back(library):
+    beams = np.zeros((16, 16), np.float32)
+    beams[8, 15] = 1
+    alone = convolve(beams, travel(60, 0), library, ALBEDO, 3.0, 1.0)
+    wide = convolve(np.pad(beams, ((0, 0), (0, 48))), travel(60, 0), library, ALBEDO, 3.0, 1.0)[:, :16]
+    assert alone == pytest.approx(wide, rel=1e-5)
+
+
+def test_channels_may_have_media_of_their_own(library):
+    other = simulate(Medium(0.0), [0, 30, 60], 5000)
+    beams = np.random.default_rng(6).random((8, 8)).astype(np.float32)
+    mixed = convolve(beams, travel(30, 0), [library, other, library], ALBEDO, (1.0, 2.0, 3.0), 1.0)
+    for channel, (medium, path) in enumerate([(library, 1.0), (other, 2.0), (library, 3.0)]):
+        alone = convolve(beams, travel(30, 0), medium, ALBEDO[channel], path, 1.0)
+        assert mixed[..., channel] == pytest.approx(alone[..., channel], rel=1e-5)
+
+
+@pytest.mark.parametrize("solver", ["fft", "direct"])
+def test_same_bits_for_any_number_of_threads(library, solver):
+    beams = np.random.default_rng(7).random((21, 34, 3)).astype(np.float32)
+    for direction in (travel(30, 30), lamp_directions(21, 34)):
+        runs = [convolve(beams, direction, library, ALBEDO, 1.0, 0.5, solver=solver, threads=n) for n in (1, 2, 3)]
+        assert np.array_equal(runs[0], runs[1])
+        assert np.array_equal(runs[0], runs[2])
+
+
+@pytest.mark.parametrize("solver", ["fft", "direct"])
+@pytest.mark.parametrize("stop_at", [0.0, 0.5])
+def test_cancel(library, solver, stop_at):
+    beams = np.ones((40, 40), np.float32)
+    arguments = (beams, lamp_directions(40, 40), library, ALBEDO, 1.0, 1.0, solver)
+    with pytest.raises(Cancelled):
+        convolve(*arguments, progress=lambda fraction: fraction < stop_at)
+    seen = []
+    convolve(*arguments, progress=lambda fraction: seen.append(fraction) or True)
+    assert seen[0] == 0
+    assert seen[-1] == 1
+
+
+BEAMS = np.ones((4, 5), np.float32)
+DOWN = (0.0, 0.0, -1.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"irradiance": np.ones(4)}, r"'irradiance' is of shape \(4,\)"),
+        ({"irradiance": -BEAMS}, "'irradiance' is -1"),
+        ({"irradiance": BEAMS * np.nan}, "'irradiance' is nan"),
+        ({"irradiance": np.ones((0, 4))}, "'irradiance' is empty"),
+        ({"irradiance": "bright"}, "'irradiance' is 'bright'"),
+        ({"direction": (0, 0, 1)}, "'direction' is with z = 1"),
+        ({"direction": (0, 0, -2)}, "'direction' is of length 2"),
+        ({"direction": np.zeros((5, 4, 3))}, "'direction' is of shape"),
+        ({"direction": np.zeros((4, 5, 3))}, "'direction' is of length 0"),
+        ({"ldf": None}, "'ldf' is None"),
+        ({"albedo": 1.0}, "'albedo' is 1"),
+        ({"albedo": (0.5, 0.5)}, r"'albedo' is of shape \(2,\)"),
+        ({"mean_free_path": -1}, "'mean_free_path' is -1"),
+        ({"mean_free_path": math.inf}, "'mean_free_path' is inf"),
+        ({"pitch": 0}, "'pitch' is 0"),
+        ({"solver": "magic"}, "'solver' is 'magic'"),
+        ({"tolerance": 0}, "'tolerance' is 0"),
+        ({"threads": -2}, "'threads' is -2"),
+    ],
+)
+def test_bad_arguments_are_named(library, change, message):
+    arguments = {"irradiance": BEAMS, "direction": DOWN, "ldf": library, "albedo": 0.5, "mean_free_path": 1.0, "pitch": 1.0}
+    with pytest.raises(ValueError, match=message):
+        convolve(**{**arguments, **change})
+
+
+def test_an_angle_outside_the_library(library):
+    narrow = simulate(Medium(0.8), [0, 30], 500)
+    with pytest.raises(ValueError, match="'angle' is 4"):
+        convolve(BEAMS, travel(45, 0), narrow, 0.5, 1.0, 1.0)
+    assert np.isfinite(convolve(BEAMS, travel(89.9, 0), library, 0.5, 1.0, 1.0)).all()
+
+
+def test_public_names():
+    for name in ("Medium", "simulate", "library", "LdfLibrary", "convolve", "albedo_from_color", "presets", "Cancelled"):
+        assert hasattr(beamspread, name)

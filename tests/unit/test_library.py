@@ -1,0 +1,250 @@
+"""LdfLibrary: what it promises beside the physics (that is in tests/statistical)."""
+
+import math
+
+import beamspread
+import numpy as np
+import pytest
+from beamspread import Cancelled, LdfLibrary, Medium, simulate
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+
+@pytest.fixture(scope="module")
+def small():
+    return simulate(Medium(0.8, 1.3), [0, 20, 40, 60], 2000)
+
+
+@pytest.fixture(scope="module")
+def slab():
+    return simulate(Medium(0.5, 1.0, 2.0), [0, 20, 40, 60], 2000)
+
+
+def same(a, b):
+    angles = a.angles
+    return angles == b.angles and all(
+        np.array_equal(a.image(angle, 0.9, 9, 0.7, side=side), b.image(angle, 0.9, 9, 0.7, side=side))
+        and a.reflectance(angle, 0.9) == b.reflectance(angle, 0.9)
+        for angle in angles
+        for side in ("reflected", "transmitted")
+    )
+
+
+def test_same_bits_for_any_number_of_threads():
+    runs = [simulate(Medium(0.8, 1.4, 5.0), [0, 45], 3000, seed=3, threads=threads) for threads in (1, 2, 5)]
+    assert same(runs[0], runs[1])
+    assert same(runs[0], runs[2])
+
+
+def test_the_seed_counts():
+    assert not same(*(simulate(Medium(), [30], 1000, seed=seed) for seed in (1, 2)))
+
+
+def test_an_angle_does_not_depend_on_the_others():
+    alone, together = simulate(Medium(), [30], 1000), simulate(Medium(), [0, 30, 60], 1000)
+    assert alone.reflectance(30, 0.9) == together.reflectance(30, 0.9)
+
+
+@pytest.mark.parametrize("fixture", ["small", "slab"])
+def test_files_keep_everything(fixture, request, tmp_path):
+    library = request.getfixturevalue(fixture)
+    library.save(tmp_path / "a.exr")
+    loaded = LdfLibrary.load(str(tmp_path / "a.exr"))
+    assert same(library, loaded)
+    assert loaded.medium == library.medium
+    assert (loaded.photons, loaded.seed) == (library.photons, library.seed)
+    assert loaded.standard_error(20, 0.5) == library.standard_error(20, 0.5)
+
+
+def test_a_file_is_replaced_only_by_a_whole_one(small, tmp_path):
+    path = tmp_path / "missing" / "a.exr"
+    with pytest.raises(OSError, match="missing"):
+        small.save(path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_damaged_files_are_refused(small, tmp_path):
+    path = tmp_path / "a.exr"
+    small.save(path)
+    whole = path.read_bytes()
+    rng = np.random.default_rng(1)
+    refused = 0
+    for case in range(60):
+        damaged = bytearray(whole)
+        if case % 3 == 0:
+            damaged = damaged[: rng.integers(1, len(whole))]
+        else:
+            # The header stands in the first kilobytes: half of the hits go there.
+            last = len(whole) if case % 3 == 1 else 4000
+            for place in rng.integers(0, last, 4):
+                damaged[place] ^= int(rng.integers(1, 256))
+        path.write_bytes(damaged)
+        try:
+            loaded = LdfLibrary.load(path)
+        except OSError as error:
+            assert str(path) in str(error)  # noqa: PT017 - either outcome is fine, a crash is not
+            refused += 1
+        else:
+            assert np.isfinite(loaded.image(loaded.angles[0], 0.5, 3, 1.0)).all()
+    assert refused > 20
+
+
+def test_files_that_are_no_library(tmp_path):
+    from beamspread._load import native
+
+    path = tmp_path / "picture.exr"
+    native.write_exr(str(path), np.zeros((4, 4, 3), np.float32), channels=["R", "G", "B"])
+    with pytest.raises(OSError, match="not an LDF library"):
+        LdfLibrary.load(path)
+    with pytest.raises(OSError, match="nowhere"):
+        LdfLibrary.load(tmp_path / "nowhere.exr")
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: Medium(g=1.0), "'g' is 1;"),
+        (lambda: Medium(g=math.nan), "'g' is nan"),
+        (lambda: Medium(ior=0.9), "'ior' is 0.9"),
+        (lambda: Medium(thickness=0), "'thickness' is 0"),
+        (lambda: Medium(thickness=-1), "'thickness' is -1"),
+        (lambda: simulate(Medium(), [], 100), "'angles' is empty"),
+        (lambda: simulate(Medium(), [90], 100), "'angles' is 90"),
+        (lambda: simulate(Medium(), [-1], 100), "'angles' is -1"),
+        (lambda: simulate(Medium(), [math.nan], 100), "'angles' is nan"),
+        (lambda: simulate(Medium(), [30, 30], 100), "'angles' is 30"),
+        (lambda: simulate(Medium(), [30], 0), "'photons' is 0"),
+        (lambda: simulate(Medium(), [30], -5), "'photons' is"),
+        (lambda: simulate(Medium(), [30], 100, threads=-1), "'threads' is -1"),
+    ],
+)
+def test_bad_simulations_name_the_argument(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda lib: lib.reflectance(30, 1.0), "'albedo' is 1; allowed: 0 <= albedo < 1"),
+        (lambda lib: lib.reflectance(30, -0.1), "'albedo' is -0.1"),
+        (lambda lib: lib.reflectance(30, math.nan), "'albedo' is nan"),
+        (lambda lib: lib.reflectance(61, 0.5), "'angle' is 61; allowed: 0 <= angle <= 60"),
+        (lambda lib: lib.transmittance(90, 0.5), "'angle' is 90"),
+        (lambda lib: lib.image(30, 0.5, 0, 1.0), "'size' is 0"),
+        (lambda lib: lib.image(30, 0.5, 9, 0.0), "'pitch' is 0"),
+        (lambda lib: lib.image(30, 0.5, 9, 1.0, side="up"), "'side' is 'up'"),
+        (lambda lib: lib.image(30, 0.5, 9, 1.0, beam_diameter=2.0), "'beam_diameter' is 2"),
+    ],
+)
+def test_bad_questions_name_the_argument(small, call, message):
+    with pytest.raises(ValueError, match=message):
+        call(small)
+
+
+@pytest.mark.parametrize("stop_at", [0.0, 0.3, 0.9])
+def test_cancel_and_run_again(stop_at):
+    seen = []
+
+    def progress(fraction):
+        seen.append(fraction)
+        return fraction < stop_at
+
+    with pytest.raises(Cancelled):
+        simulate(Medium(), [0, 40], 60_000, progress=progress)
+    assert seen == sorted(seen)
+    assert seen[-1] >= stop_at
+    assert simulate(Medium(), [0], 100, progress=lambda f: None).photons == 128
+
+
+def test_an_error_in_the_callback_comes_through():
+    with pytest.raises(KeyError, match="mine"):
+        simulate(Medium(), [0], 10_000, progress=lambda f: {}["mine"])
+
+
+def test_image_is_the_same_seen_at_half_the_pitch(small):
+    """To 0.3 %: where a texel's border crosses from one radius bin to the next, Gauss's rule crosses a kink."""
+    fine = small.image(35, 0.9, 60, 0.25).reshape(30, 2, 30, 2).mean(axis=(1, 3))
+    coarse = small.image(35, 0.9, 30, 0.5)
+    assert fine == pytest.approx(coarse, rel=3e-3)
+    assert fine.sum() == pytest.approx(coarse.sum(), rel=1e-6)
+
+
+def test_image_is_even_in_v_and_round_at_normal_incidence(small):
+    image = small.image(40, 0.9, 31, 0.3)
+    assert image == pytest.approx(image[::-1], rel=1e-5)
+    image = small.image(0, 0.9, 31, 0.3)
+    assert image == pytest.approx(image.T, rel=1e-4)
+    assert image == pytest.approx(image[:, ::-1], rel=1e-5)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0, 60), st.floats(0.05, 0.999), st.floats(-2.5, 3.5), st.integers(1, 40), st.sampled_from([0, 1]))
+def test_no_power_is_lost_or_doubled(angle, albedo, log_pitch, size, which):
+    """A window holds at most R and, if it is larger than the radial bins reach, exactly R."""
+    library, side = (simulated_once(), "reflected") if which == 0 else (simulated_slab_once(), "transmitted")
+    total = library.reflectance(angle, albedo) if which == 0 else library.transmittance(angle, albedo)
+    pitch = 10.0**log_pitch
+    power = float(library.image(angle, albedo, size, pitch, side=side).sum(dtype=np.float64)) * pitch**2
+    assert power <= total * (1 + 1e-5)
+    if size * pitch > 2 * 2**12 * 1.01 + 20:
+        assert power == pytest.approx(total, rel=1e-5)
+
+
+_kept = {}
+
+
+def simulated_once():
+    return _kept.setdefault("half-space", simulate(Medium(0.8), [0, 20, 40, 60], 4000))
+
+
+def simulated_slab_once():
+    return _kept.setdefault("slab", simulate(Medium(0.5, 1.4, 2.0), [0, 20, 40, 60], 4000))
+
+
+class TestCache:
+    @pytest.fixture(autouse=True)
+    def folder(self, tmp_path, monkeypatch):
+        from beamspread.core import library as module
+
+        monkeypatch.setenv("BEAMSPREAD_CACHE", str(tmp_path / "cache"))
+        monkeypatch.setattr(module, "ANGLES", (0.0, 45.0, 88.0))
+        monkeypatch.setattr(module, "PHOTONS", {"preview": 200, "final": 2000})
+        module._in_memory.cache_clear()
+        yield tmp_path / "cache"
+        module._in_memory.cache_clear()
+
+    def forget(self):
+        from beamspread.core import library as module
+
+        module._in_memory.cache_clear()
+
+    def test_simulates_once(self, folder):
+        first = beamspread.library(Medium(0.3))
+        assert beamspread.library(Medium(0.3)) is first
+        self.forget()
+        assert same(beamspread.library(Medium(0.3), progress=lambda f: pytest.fail("simulated again")), first)
+        assert len(list(folder.iterdir())) == 1
+
+    def test_damaged_and_foreign_files_are_made_again(self, folder):
+        first = beamspread.library(Medium(0.3))
+        (path,) = folder.iterdir()
+        other = simulate(Medium(0.4), [0, 45], 100)
+        for damage in (lambda: path.write_bytes(path.read_bytes()[:1000]), lambda: other.save(path)):
+            damage()
+            self.forget()
+            assert same(beamspread.library(Medium(0.3)), first)
+            assert LdfLibrary.load(path).medium == Medium(0.3)
+
+    def test_an_unwritable_folder_costs_nothing(self, folder):
+        folder.write_text("a file where the folder should be")
+        assert beamspread.library(Medium(0.3)).medium == Medium(0.3)
+
+    def test_cancel(self):
+        with pytest.raises(Cancelled):
+            beamspread.library(Medium(0.3), progress=lambda f: False)
+        assert beamspread.library(Medium(0.3)).angles == [0.0, 45.0, 88.0]
+
+    def test_unknown_quality(self):
+        with pytest.raises(ValueError, match="'quality' is 'best'"):
+            beamspread.library(Medium(0.3), quality="best")
