@@ -8,6 +8,7 @@ look up symbols in its own dependencies first.
 import importlib
 import os
 import sys
+from pathlib import Path
 
 
 def _load():
@@ -24,7 +25,7 @@ def _load():
 try:
     native = _load()
 except ImportError as error:
-    folder = os.path.dirname(os.path.abspath(__file__))
+    folder = Path(__file__).resolve().parent
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
     raise ImportError(
         f"beamspread has no working native module for Python {version} in {folder} "

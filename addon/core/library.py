@@ -1,6 +1,5 @@
 """LDF libraries of any medium: from the cache, or simulated now and cached."""
 
-import functools
 import hashlib
 import os
 import sys
@@ -61,10 +60,18 @@ def _store(result, path):
         pass
 
 
-@functools.lru_cache(maxsize=8)
-def _in_memory(path):
-    """One-element list per path that keeps a library alive for the process."""
-    return [None]
+_loaded = {}
+"""The libraries used last, by path, oldest first."""
+
+_LOADED_LIMIT = 8
+
+
+def _remember(path, result):
+    _loaded.pop(path, None)
+    _loaded[path] = result
+    while len(_loaded) > _LOADED_LIMIT:
+        del _loaded[next(iter(_loaded))]
+    return result
 
 
 def library(medium, quality="final", progress=None):
@@ -93,10 +100,8 @@ def library(medium, quality="final", progress=None):
     if quality not in PHOTONS:
         raise ValueError(f"argument 'quality' is {quality!r}; allowed: 'final', 'preview'")
     path = _cache_path(medium, quality)
-    slot = _in_memory(path)
-    if slot[0] is None:
-        slot[0] = _load_cached(path, medium)
-    if slot[0] is None:
-        slot[0] = native.simulate(medium, ANGLES, photons_for(medium, quality), progress=progress)
-        _store(slot[0], path)
-    return slot[0]
+    known = _loaded.get(path) or _load_cached(path, medium)
+    if known is None:
+        known = native.simulate(medium, ANGLES, photons_for(medium, quality), progress=progress)
+        _store(known, path)
+    return _remember(path, known)

@@ -43,7 +43,8 @@ def plain_walk(medium, angle, albedo, photons, seed):
     while len(x):
         flight = rng.exponential(size=len(x))
         with np.errstate(divide="ignore"):
-            limit = np.where(w[:, 2] < 0, -x[:, 2] / w[:, 2], (medium.thickness - x[:, 2]) / np.maximum(w[:, 2], 1e-300))
+            to_bottom = (medium.thickness - x[:, 2]) / np.maximum(w[:, 2], 1e-300)
+            limit = np.where(w[:, 2] < 0, -x[:, 2] / w[:, 2], to_bottom)
         meets = flight >= limit
         x += np.where(meets, limit, flight)[:, None] * w
         up = w[:, 2] < 0

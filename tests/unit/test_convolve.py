@@ -66,7 +66,7 @@ def test_a_field_of_one_direction_is_that_direction(library, solver):
 
 
 def brute_force(beams, angle, azimuth, library, albedo, mean_free_path, pitch):
-    """Each lit texel adds the library's own image, its rows turned by the azimuth, which is a multiple of 90 degrees."""
+    """Each lit texel adds the library's own image, turned by the azimuth, a multiple of 90 degrees."""
     height, width = beams.shape
     size = 2 * max(height, width) + 1
     kernel = library.image(angle, albedo, size, pitch / mean_free_path) * (pitch / mean_free_path) ** 2
@@ -196,9 +196,9 @@ DOWN = (0.0, 0.0, -1.0)
     ],
 )
 def test_bad_arguments_are_named(library, change, message):
-    arguments = {"irradiance": BEAMS, "direction": DOWN, "ldf": library, "albedo": 0.5, "mean_free_path": 1.0, "pitch": 1.0}
+    good = {"irradiance": BEAMS, "direction": DOWN, "ldf": library, "albedo": 0.5, "mean_free_path": 1.0, "pitch": 1.0}
     with pytest.raises(ValueError, match=message):
-        convolve(**{**arguments, **change})
+        convolve(**{**good, **change})
 
 
 def test_an_angle_outside_the_library(library):
@@ -209,5 +209,5 @@ def test_an_angle_outside_the_library(library):
 
 
 def test_public_names():
-    for name in ("Medium", "simulate", "library", "LdfLibrary", "convolve", "albedo_from_color", "presets", "Cancelled"):
-        assert hasattr(beamspread, name)
+    names = {"Medium", "simulate", "library", "LdfLibrary", "convolve", "albedo_from_color", "presets", "Cancelled"}
+    assert names <= set(dir(beamspread))

@@ -210,14 +210,14 @@ class TestCache:
         monkeypatch.setenv("BEAMSPREAD_CACHE", str(tmp_path / "cache"))
         monkeypatch.setattr(module, "ANGLES", (0.0, 45.0, 88.0))
         monkeypatch.setattr(module, "PHOTONS", {"preview": 200, "final": 2000})
-        module._in_memory.cache_clear()
+        module._loaded.clear()
         yield tmp_path / "cache"
-        module._in_memory.cache_clear()
+        module._loaded.clear()
 
     def forget(self):
         from beamspread.core import library as module
 
-        module._in_memory.cache_clear()
+        module._loaded.clear()
 
     def test_simulates_once(self, folder):
         first = beamspread.library(Medium(0.3))
