@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# Bakes every example in Blender, renders each with Cycles from what was baked, and plots the cut through the shadow
+# border of `obstacle`. Sets up and builds first what is missing. The pictures end up in build/examples.
+set -euo pipefail
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+root=$(dirname "$here")
+pictures=$root/build/examples
+logs=$pictures/logs
+
+"$root/tools/build.sh"
+package=$root/build/stage/beamspread
+mkdir -p "$logs"
+
+# step NAME COMMAND...: what it prints goes to a log, which is shown if it fails.
+step() {
+    local name=$1 log=$logs/${1// /_}.log begin=$SECONDS
+    shift
+    printf '%-24s' "$name"
+    if ! "$@" >"$log" 2>&1; then
+        echo "FAILED"
+        tail -n 40 "$log" >&2
+        echo "the whole log: $log" >&2
+        exit 1
+    fi
+    printf '%4d s\n' $((SECONDS - begin))
+}
+
+bake() { # SCENE [batch options]
+    local scene=$1
+    shift
+    step "bake $scene" blender -b --factory-startup "$here/$scene.blend" --python-exit-code 1 \
+        --python "$package/batch.py" -- --output "$pictures/baked/$scene" --report "$pictures/baked/$scene.json" "$@"
+    step "render $scene" blender -b --factory-startup "$here/$scene.blend" --python-exit-code 1 \
+        --python "$here/render_examples.py" -- "$pictures/baked/$scene.json" "$pictures"
+}
+
+bake laser_beams
+bake obstacle --frames 1-2
+bake marble_floor
+step "plot obstacle_cut" env PYTHONPATH="$root/build/stage" MPLBACKEND=Agg "$root/build/venv/bin/python" \
+    "$here/cut_plot.py" "$pictures/baked/obstacle.json" "$here/cycles_edge.csv" "$pictures/obstacle_cut.png"
+cat "$logs/plot_obstacle_cut.log"
+
+echo "The pictures are in $pictures:"
+(cd "$pictures" && ls -1 -- *.png)
