@@ -61,8 +61,9 @@ def run(arguments: list[str]) -> int:
                 return 1
         return 0 if report.all_written() else 1
     finally:
-        # A render engine left registered can keep newer versions from exiting.
+        # Classes left registered can keep newer versions from exiting, and so can nodes of a class that is gone.
         if registers:
+            bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
             registration.unregister()
 
 

@@ -3,6 +3,9 @@
 import bpy
 import numpy as np
 
+# A path property has to say that it understands "//" since Blender 4.5; earlier ones don't know the option.
+PATH_OPTIONS = {"ANIMATABLE", "PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else {"ANIMATABLE"}
+
 
 def add_output_socket(tree, socket_type: str, name: str) -> None:
     """Give a node group an output (its interface moved in Blender 4.0)."""
@@ -50,6 +53,14 @@ def read_pass(render_pass, width: int, height: int) -> np.ndarray:
     values = np.empty((width * height, render_pass.channels), np.float32)
     _foreach(render_pass.rect.foreach_get, values)
     return values.reshape(height, width, render_pass.channels)
+
+
+def baked_triangles(passes, width: int, height: int) -> np.ndarray:
+    """Int32 (height, width): the triangle that each texel shows, negative where none or another image's."""
+    primitives = read_pass(passes["BakePrimitive"], width, height)
+    # The number comes as the bits of a float: 3.4 gives seed, triangle, u, v, later versions u, v, triangle.
+    channel = 1 if primitives.shape[2] == 4 else 2
+    return np.ascontiguousarray(primitives[..., channel]).view(np.int32)
 
 
 def write_pass(render_pass, values: np.ndarray) -> None:

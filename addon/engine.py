@@ -90,9 +90,8 @@ def _step(engine, fraction: float) -> bool:
 def _materials_in(obj, passes, width: int, height: int) -> list[str]:
     """Beamspread materials of the triangles that this image shows (Blender bakes one image at a time)."""
     wanted = {material.name for material in bakes.materials_of(obj)}
-    # The second value is the triangle's number, as the bits of a float; -1 where another image is baked.
-    primitives = compat.read_pass(passes["BakePrimitive"], width, height)[..., 1].view(np.int32)
-    triangles = np.unique(primitives[primitives >= 0])
+    shown = compat.baked_triangles(passes, width, height)
+    triangles = np.unique(shown[shown >= 0])
     mesh = obj.to_mesh()
     try:
         mesh.calc_loop_triangles()

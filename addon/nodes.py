@@ -241,7 +241,7 @@ def register() -> None:
 
 def unregister() -> None:
     bpy.types.NODE_MT_add.remove(_draw_add_menu)
-    # Blender frees the type but not the evaluated copies of nodes that point to it, and crashes when those go, at the
-    # latest on exit (3.4.1): a class in use stays.
-    if not _is_used():
+    # Blender 3.4 frees the type but not the evaluated copies of nodes that point to it, and crashes when those go, at
+    # the latest on exit: there a class in use stays. In 4.5 a class that stays keeps the process from exiting.
+    if bpy.app.version >= (4, 0, 0) or not _is_used():
         bpy.utils.unregister_class(BeamspreadNode)

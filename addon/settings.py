@@ -3,6 +3,8 @@
 import bpy
 from bpy.props import EnumProperty, IntProperty, PointerProperty, StringProperty
 
+from . import compat
+
 
 class BeamspreadSettings(bpy.types.PropertyGroup):
     """How and where to bake."""
@@ -56,6 +58,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         description="Folder that a batch writes to",
         default="//beamspread/",
         subtype="DIR_PATH",
+        options=compat.PATH_OPTIONS,
     )
     format: EnumProperty(
         name="Format",

@@ -29,6 +29,7 @@ def main() -> int:
     os.chdir(ROOT)
 
     import beamspread
+    import bpy
     import pytest
 
     arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
@@ -38,7 +39,8 @@ def main() -> int:
     try:
         return int(pytest.main(["-p", "no:cacheprovider", "-o", f"pythonpath={stage}", *arguments]))
     finally:
-        # A render engine left registered can keep newer versions from exiting.
+        # Classes left registered can keep newer versions from exiting, and so can nodes of a class that is gone.
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         beamspread.unregister()
 
 

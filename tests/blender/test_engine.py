@@ -14,6 +14,7 @@ def beamspread_engine():
     scene.render.engine = "BEAMSPREAD"
     scene.beamspread.resolution = 32
     scene.render.bake.margin = 0
+    engine._errors.clear()
 
 
 def add_active_image(material, name="Active", size=(32, 32)):
