@@ -15,6 +15,9 @@ __all__: list[str] = [
     "convolve",
     "coverage",
     "embree_version",
+    "fresnel",
+    "henyey_greenstein_pdf",
+    "henyey_greenstein_sample",
     "point_beams",
     "read_exr",
     "simulate",
@@ -211,6 +214,21 @@ def embree_version() -> int:
     The version of Embree in use, 31305 for 3.13.5: not that of the host process.
     """
 
+def fresnel(cos_theta_i: numpy.ndarray, eta: numpy.ndarray) -> typing.Any:
+    """
+    Reflectance of unpolarized light; eta is the index behind the boundary over the one before it.
+    """
+
+def henyey_greenstein_pdf(cos_theta: numpy.ndarray, g: numpy.ndarray) -> typing.Any:
+    """
+    Density per steradian of a deflection.
+    """
+
+def henyey_greenstein_sample(g: numpy.ndarray, u: numpy.ndarray) -> typing.Any:
+    """
+    Cosine of a deflection, from u uniform in [0, 1).
+    """
+
 def point_beams(
     origin: numpy.ndarray,
     x_axis: numpy.ndarray,
@@ -225,6 +243,7 @@ def point_beams(
     samples: int = 4,
     threads: int = 0,
     progress: typing.Any = None,
+    clearance: float = 0.0,
 ) -> tuple:
     """
     Irradiance of a plane by a point lamp of 1 W, and where it comes from.
@@ -250,6 +269,9 @@ def point_beams(
         0: all. The result is the same, bit for bit, for any number.
     progress : callable, optional
         progress(fraction) returns False to stop.
+    clearance : float
+        How far off the plane shadow rays start, in metres, if that is more than rounding needs: as far as the receiver's own
+        faces, where they are among the occluders, depart from the plane.
 
     Returns
     -------
@@ -344,6 +366,7 @@ def spot_beams(
     threads: int = 0,
     progress: typing.Any = None,
     falloff: str = "scaled",
+    clearance: float = 0.0,
 ) -> tuple:
     """
     Irradiance of a plane by a spot lamp of 1 W (over the whole sphere, as Blender counts it), and where it comes from.
@@ -376,6 +399,9 @@ def spot_beams(
         0: all. The result is the same, bit for bit, for any number.
     progress : callable, optional
         progress(fraction) returns False to stop.
+    clearance : float
+        How far off the plane shadow rays start, in metres, if that is more than rounding needs: as far as the receiver's own
+        faces, where they are among the occluders, depart from the plane.
     falloff : str
         "scaled": as Cycles in Blender 4.2, 4.5 and 5.0, where the lamp's scale shapes the cone. "legacy": as in 3.4, where
         it does not, and light falls off with the cosine to the axis besides.
@@ -410,6 +436,7 @@ def sun_beams(
     samples: int = 4,
     threads: int = 0,
     progress: typing.Any = None,
+    clearance: float = 0.0,
 ) -> numpy.ndarray:
     """
     Irradiance of a plane by parallel light of 1 W/m^2 at normal incidence.
@@ -435,6 +462,9 @@ def sun_beams(
         0: all. The result is the same, bit for bit, for any number.
     progress : callable, optional
         progress(fraction) returns False to stop.
+    clearance : float
+        How far off the plane shadow rays start, in metres, if that is more than rounding needs: as far as the receiver's own
+        faces, where they are among the occluders, depart from the plane.
 
     Returns
     -------

@@ -20,10 +20,23 @@ namespace beamspread::detail {
 namespace {
 
 // The attributes that OpenEXR itself gives a meaning and a type.
-constexpr std::array<std::string_view, 17> structural_attributes{
-    "channels",        "chromaticities",    "chunkCount",        "compression",       "dataWindow", "displayWindow",
-    "dwaCompressionLevel", "lineOrder",     "maxSamplesPerPixel", "name",             "pixelAspectRatio",
-    "screenWindowCenter", "screenWindowWidth", "tiles",          "timeCode",          "type",       "version"};
+constexpr std::array<std::string_view, 17> structural_attributes{"channels",
+                                                                 "chromaticities",
+                                                                 "chunkCount",
+                                                                 "compression",
+                                                                 "dataWindow",
+                                                                 "displayWindow",
+                                                                 "dwaCompressionLevel",
+                                                                 "lineOrder",
+                                                                 "maxSamplesPerPixel",
+                                                                 "name",
+                                                                 "pixelAspectRatio",
+                                                                 "screenWindowCenter",
+                                                                 "screenWindowWidth",
+                                                                 "tiles",
+                                                                 "timeCode",
+                                                                 "type",
+                                                                 "version"};
 
 // (layer, rank within the layer, name): sorts "A B G R" into "R G B A" and keeps layers together.
 std::pair<std::string, std::pair<std::size_t, std::string>> conventional_rank(const std::string& channel)

@@ -87,7 +87,8 @@ ExrPart read_part(Imf::MultiPartInputFile& file, int index)
 
     const std::size_t pixel_bytes = part.channels.size() * sizeof(float);
     const std::size_t row_bytes = pixel_bytes * static_cast<std::size_t>(part.width);
-    part.pixels.resize(part.channels.size() * static_cast<std::size_t>(part.width) * static_cast<std::size_t>(part.height));
+    part.pixels.resize(part.channels.size() * static_cast<std::size_t>(part.width) *
+                       static_cast<std::size_t>(part.height));
     Imf::FrameBuffer buffer;
     for (std::size_t c = 0; c < part.channels.size(); ++c)
         buffer.insert(part.channels[c],

@@ -42,7 +42,8 @@ void check_part(const ExrPart& part)
     if (values > static_cast<std::size_t>(max_exr_values))
         reject("pixels", static_cast<double>(values), "at most 2^30 numbers");
     if (part.pixels.size() != values)
-        reject("pixels", std::to_string(part.pixels.size()) + " numbers", std::to_string(values) + ", height * width * channels");
+        reject("pixels", std::to_string(part.pixels.size()) + " numbers",
+               std::to_string(values) + ", height * width * channels");
 
     for (const auto& [name, value] : part.attributes) {
         check_name("attributes", name);
@@ -84,8 +85,8 @@ void write_pixels(Imf::OutputPart&& output, const ExrPart& part)
     const std::size_t row_bytes = pixel_bytes * static_cast<std::size_t>(part.width);
     Imf::FrameBuffer buffer;
     for (std::size_t c = 0; c < part.channels.size(); ++c)
-        buffer.insert(part.channels[c], Imf::Slice::Make(Imf::FLOAT, part.pixels.data() + c, output.header().dataWindow(),
-                                                         pixel_bytes, row_bytes));
+        buffer.insert(part.channels[c], Imf::Slice::Make(Imf::FLOAT, part.pixels.data() + c,
+                                                         output.header().dataWindow(), pixel_bytes, row_bytes));
     output.setFrameBuffer(buffer);
     output.writePixels(part.height);
 }

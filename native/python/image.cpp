@@ -90,7 +90,7 @@ py::tuple read_exr(const std::string& path, const std::optional<std::string>& pa
         }
     }
     Array<float> array({static_cast<py::ssize_t>(part.height), static_cast<py::ssize_t>(part.width),
-                      static_cast<py::ssize_t>(part.channels.size())});
+                        static_cast<py::ssize_t>(part.channels.size())});
     flip_rows(part.pixels.data(), array.mutable_data(), static_cast<std::size_t>(part.height),
               static_cast<std::size_t>(part.width) * part.channels.size());
     return py::make_tuple(array, part.channels, part.attributes);

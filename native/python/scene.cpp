@@ -80,16 +80,16 @@ View2D<float> view(Array<float>& array, const ReceiverGrid& grid)
     return {array.mutable_data(), grid.height, grid.width, static_cast<std::ptrdiff_t>(grid.width)};
 }
 
-void run(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, int samples, int threads,
+void run(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, const BeamSettings& settings,
          const py::object& callback, const BeamArrays& beams)
 {
     Progress progress(progress_callback(callback));
     const py::gil_scoped_release released;
-    compute_beams(grid, light, occluders, {.samples = samples, .threads = threads}, beams, progress);
+    compute_beams(grid, light, occluders, settings, beams, progress);
 }
 
-py::tuple beams_with_direction(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, int samples,
-                               int threads, const py::object& callback)
+py::tuple beams_with_direction(const ReceiverGrid& grid, const Light& light, const Occluders* occluders,
+                               const BeamSettings& settings, const py::object& callback)
 {
     Array<float> irradiance = make_array(grid);
     Array<float> direction(
@@ -98,38 +98,41 @@ py::tuple beams_with_direction(const ReceiverGrid& grid, const Light& light, con
     const BeamArrays beams{.irradiance = view(irradiance, grid),
                            .direction = {reinterpret_cast<Vec3f*>(direction.mutable_data()), grid.height, grid.width,
                                          static_cast<std::ptrdiff_t>(grid.width)}};
-    run(grid, light, occluders, samples, threads, callback, beams);
+    run(grid, light, occluders, settings, callback, beams);
     return py::make_tuple(irradiance, direction);
 }
 
 Array<float> sun_beams(const Numbers& origin, const Numbers& x_axis, const Numbers& y_axis, const Numbers& normal,
                        double pitch_x, double pitch_y, py::ssize_t width, py::ssize_t height, const Numbers& direction,
-                       const Occluders* occluders, int samples, int threads, const py::object& progress)
+                       const Occluders* occluders, int samples, int threads, const py::object& progress,
+                       double clearance)
 {
     const ReceiverGrid grid = to_grid(origin, x_axis, y_axis, normal, pitch_x, pitch_y, width, height);
     Array<float> irradiance = make_array(grid);
-    run(grid, SunLight(to_vec3("direction", direction)), occluders, samples, threads, progress,
+    run(grid, SunLight(to_vec3("direction", direction)), occluders, {samples, threads, clearance}, progress,
         {.irradiance = view(irradiance, grid), .direction = {}});
     return irradiance;
 }
 
 py::tuple point_beams(const Numbers& origin, const Numbers& x_axis, const Numbers& y_axis, const Numbers& normal,
                       double pitch_x, double pitch_y, py::ssize_t width, py::ssize_t height, const Numbers& position,
-                      const Occluders* occluders, int samples, int threads, const py::object& progress)
+                      const Occluders* occluders, int samples, int threads, const py::object& progress,
+                      double clearance)
 {
     const ReceiverGrid grid = to_grid(origin, x_axis, y_axis, normal, pitch_x, pitch_y, width, height);
-    return beams_with_direction(grid, PointLight(to_vec3("position", position)), occluders, samples, threads, progress);
+    return beams_with_direction(grid, PointLight(to_vec3("position", position)), occluders,
+                                {samples, threads, clearance}, progress);
 }
 
 py::tuple spot_beams(const Numbers& origin, const Numbers& x_axis, const Numbers& y_axis, const Numbers& normal,
                      double pitch_x, double pitch_y, py::ssize_t width, py::ssize_t height, const Numbers& position,
                      const Numbers& frame, double spot_size, double blend, const Occluders* occluders, int samples,
-                     int threads, const py::object& progress, const std::string& falloff)
+                     int threads, const py::object& progress, const std::string& falloff, double clearance)
 {
     const ReceiverGrid grid = to_grid(origin, x_axis, y_axis, normal, pitch_x, pitch_y, width, height);
     const SpotLight light(to_vec3("position", position), to_axes("frame", frame), spot_size, blend,
                           to_falloff(falloff));
-    return beams_with_direction(grid, light, occluders, samples, threads, progress);
+    return beams_with_direction(grid, light, occluders, {samples, threads, clearance}, progress);
 }
 
 Array<float> coverage(const py::array& corners, const py::array& corner_counts, py::ssize_t width, py::ssize_t height,
@@ -145,8 +148,8 @@ Array<float> coverage(const py::array& corners, const py::array& corner_counts, 
     const std::span<const std::uint32_t> counts(static_cast<const std::uint32_t*>(corner_counts.data()),
                                                 static_cast<std::size_t>(corner_counts.size()));
     Array<float> covered({height, width});
-    const View2D<float> texels{covered.mutable_data(), static_cast<std::size_t>(height), static_cast<std::size_t>(width),
-                               width};
+    const View2D<float> texels{covered.mutable_data(), static_cast<std::size_t>(height),
+                               static_cast<std::size_t>(width), width};
     {
         const py::gil_scoped_release released;
         compute_coverage(points, counts, threads, texels);
@@ -187,6 +190,9 @@ threads : int
     0: all. The result is the same, bit for bit, for any number.
 progress : callable, optional
     progress(fraction) returns False to stop.
+clearance : float
+    How far off the plane shadow rays start, in metres, if that is more than rounding needs: as far as the receiver's own
+    faces, where they are among the occluders, depart from the plane.
 )";
 
 constexpr const char* doc_raises = R"(
@@ -232,7 +238,8 @@ ValueError
     m.def("embree_version", &embree_version,
           "The version of Embree in use, 31305 for 3.13.5: not that of the host process.");
 
-    const std::string sun_doc = std::string("Irradiance of a plane by parallel light of 1 W/m^2 at normal incidence.") + doc_grid +
+    const std::string sun_doc = std::string("Irradiance of a plane by parallel light of 1 W/m^2 at normal incidence.") +
+                                doc_grid +
                                 R"(direction : 3 floats
     Direction of travel in the world, any length but 0.)" +
                                 doc_settings + R"(
@@ -244,19 +251,20 @@ irradiance : ndarray, float32, shape (height, width)
     m.def("sun_beams", &sun_beams, py::arg("origin"), py::arg("x_axis"), py::arg("y_axis"), py::arg("normal"),
           py::arg("pitch_x"), py::arg("pitch_y"), py::arg("width"), py::arg("height"), py::arg("direction"),
           py::arg("occluders") = py::none(), py::arg("samples") = 4, py::arg("threads") = 0,
-          py::arg("progress") = py::none(), sun_doc.c_str());
+          py::arg("progress") = py::none(), py::arg("clearance") = 0.0, sun_doc.c_str());
 
-    const std::string point_doc = std::string("Irradiance of a plane by a point lamp of 1 W, and where it comes from.") + doc_grid +
-                                  "position : 3 floats\n    Of the lamp in the world, metres." + doc_settings +
-                                  doc_lamp_returns + doc_raises;
+    const std::string point_doc =
+        std::string("Irradiance of a plane by a point lamp of 1 W, and where it comes from.") + doc_grid +
+        "position : 3 floats\n    Of the lamp in the world, metres." + doc_settings + doc_lamp_returns + doc_raises;
     m.def("point_beams", &point_beams, py::arg("origin"), py::arg("x_axis"), py::arg("y_axis"), py::arg("normal"),
           py::arg("pitch_x"), py::arg("pitch_y"), py::arg("width"), py::arg("height"), py::arg("position"),
           py::arg("occluders") = py::none(), py::arg("samples") = 4, py::arg("threads") = 0,
-          py::arg("progress") = py::none(), point_doc.c_str());
+          py::arg("progress") = py::none(), py::arg("clearance") = 0.0, point_doc.c_str());
 
     const std::string spot_doc =
-        std::string("Irradiance of a plane by a spot lamp of 1 W (over the whole sphere, as Blender counts it), and "
-                    "where it comes from.") +
+        std::string(
+            "Irradiance of a plane by a spot lamp of 1 W (over the whole sphere, as Blender counts it), and "
+            "where it comes from.") +
         doc_grid + R"(position : 3 floats
     Of the lamp in the world, metres.
 frame : (3, 3) floats
@@ -275,7 +283,7 @@ blend : float
           py::arg("pitch_x"), py::arg("pitch_y"), py::arg("width"), py::arg("height"), py::arg("position"),
           py::arg("frame"), py::arg("spot_size"), py::arg("blend"), py::arg("occluders") = py::none(),
           py::arg("samples") = 4, py::arg("threads") = 0, py::arg("progress") = py::none(),
-          py::arg("falloff") = "scaled", spot_doc.c_str());
+          py::arg("falloff") = "scaled", py::arg("clearance") = 0.0, spot_doc.c_str());
 
     m.def("coverage", &coverage, py::arg("corners"), py::arg("corner_counts"), py::arg("width"), py::arg("height"),
           py::arg("threads") = 0, R"(The exact part of each texel of a grid that polygons cover.

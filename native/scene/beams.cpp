@@ -20,10 +20,10 @@ constexpr std::size_t rows_per_block = 4;
 // of the receiver's own triangles, and is far below what can be seen: 2 micrometres in a scene of 1 metre.
 constexpr double offset_ulps = 16.0;
 
-double ray_offset(const ReceiverGrid& grid, const Occluders* occluders)
+double ray_offset(const ReceiverGrid& grid, const Occluders* occluders, double clearance)
 {
     const double reach = std::max(grid.reach(), occluders ? occluders->reach() : 0.0);
-    return offset_ulps * static_cast<double>(std::numeric_limits<float>::epsilon()) * reach;
+    return std::max(clearance, offset_ulps * static_cast<double>(std::numeric_limits<float>::epsilon()) * reach);
 }
 
 // Sub-texel points in texels, n x n: one in each cell of an n x n grid and one in each of n^2 columns and n^2 rows, so
@@ -43,12 +43,12 @@ std::vector<Vec2> sub_texel_points(int samples)
 template <class AnyLight>
 class Gatherer {
 public:
-    Gatherer(const ReceiverGrid& grid, const AnyLight& light, const Occluders* occluders, int samples)
+    Gatherer(const ReceiverGrid& grid, const AnyLight& light, const Occluders* occluders, const BeamSettings& settings)
         : m_grid(grid),
           m_light(light),
           m_occluders(occluders),
-          m_points(sub_texel_points(samples)),
-          m_offset(ray_offset(grid, occluders))
+          m_points(sub_texel_points(settings.samples)),
+          m_offset(ray_offset(grid, occluders, settings.clearance))
     {
     }
 
@@ -121,11 +121,13 @@ void compute_beams(const ReceiverGrid& grid, const Light& light, const Occluders
     grid.check();
     if (settings.samples < 1 || settings.samples > max_beam_samples)
         reject("samples", settings.samples, "1 to " + std::to_string(max_beam_samples));
+    if (!(settings.clearance >= 0.0) || std::isinf(settings.clearance))
+        reject("clearance", settings.clearance, "a finite length >= 0 in metres");
 
     progress.set_total(static_cast<double>(grid.height));
     std::visit(
         [&](const auto& any_light) {
-            const Gatherer gatherer(grid, any_light, occluders, settings.samples);
+            const Gatherer gatherer(grid, any_light, occluders, settings);
             const std::size_t blocks = (grid.height + rows_per_block - 1) / rows_per_block;
             parallel_for(blocks, settings.threads, [&](std::size_t block) {
                 const std::size_t begin = block * rows_per_block;

@@ -15,12 +15,15 @@ inline constexpr int max_beam_samples = 64;
 struct BeamSettings {
     int samples = 4;
     int threads = 0;  // 0: all
+    // How far off the plane shadow rays start, in metres, if that is more than rounding needs: as far as the receiver's
+    // own faces, where they are among the occluders, depart from the plane.
+    double clearance = 0.0;
 };
 
 // What arrives at each texel of a grid; both arrays have its size, and row 0 is the lowest row.
 struct BeamArrays {
     View2D<float> irradiance;  // W/m^2: cosine and visible part included
-    View2D<Vec3f> direction;   // may have no data: not wanted
+    View2D<Vec3f> direction;  // may have no data: not wanted
 };
 
 // Light from behind the plane is 0. Directions are unit vectors of travel in the plane frame with z < 0, the mean over

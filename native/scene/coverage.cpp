@@ -137,14 +137,15 @@ std::vector<Polygon> split(std::span<const Vec2> corners, std::span<const std::u
         if (count < 3 || count > corners.size() - first)
             reject("corner_counts", std::to_string(count), "3 or more, their sum the number of corners");
         const std::span<const Vec2> own = corners.subspan(first, count);
-        const auto [low, high] = std::minmax_element(own.begin(), own.end(),
-                                                     [](const Vec2& a, const Vec2& b) { return a.y < b.y; });
+        const auto [low, high] =
+            std::minmax_element(own.begin(), own.end(), [](const Vec2& a, const Vec2& b) { return a.y < b.y; });
         // An edge that rises has the inside on its left where corners run anticlockwise, and on its right it counts.
         polygons.push_back({own, signed_area(own) > 0.0 ? -1.0 : 1.0, low->y, high->y});
         first += count;
     }
     if (first != corners.size())
-        reject("corner_counts", "a sum of " + std::to_string(first), "the number of corners, " + std::to_string(corners.size()));
+        reject("corner_counts", "a sum of " + std::to_string(first),
+               "the number of corners, " + std::to_string(corners.size()));
     return polygons;
 }
 

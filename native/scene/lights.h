@@ -17,8 +17,8 @@ namespace beamspread {
 
 // Light at one point of the scene.
 struct Arrival {
-    Vec3 travel{};        // unit vector along which it travels
-    double flux = 0.0;    // on a square metre that faces it, W/m^2
+    Vec3 travel{};  // unit vector along which it travels
+    double flux = 0.0;  // on a square metre that faces it, W/m^2
     double distance = std::numeric_limits<double>::infinity();  // to the lamp, metres
 };
 

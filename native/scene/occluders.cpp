@@ -38,7 +38,8 @@ void check_arrays(std::span<const float> vertices, std::span<const std::uint32_t
     const std::size_t count = vertices.size() / 3;
     for (const std::uint32_t index : triangles) {
         if (index >= count)
-            reject("triangles", std::to_string(index), "indices below the number of vertices, " + std::to_string(count));
+            reject("triangles", std::to_string(index),
+                   "indices below the number of vertices, " + std::to_string(count));
     }
 }
 

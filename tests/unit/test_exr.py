@@ -1,12 +1,13 @@
 """EXR files: what is written is checked with a reader of its own, what is read comes from a writer of its own."""
 
+import resource
 import struct
 import zlib
 
 import numpy as np
 import pytest
 from beamspread._load import native
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 MAGIC = 20000630
@@ -234,6 +235,21 @@ def test_failed_write_leaves_the_old_file_and_nothing_beside_it(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_a_disk_that_is_full_leaves_the_old_file_and_nothing_beside_it(tmp_path):
+    path = tmp_path / "a.exr"
+    native.write_exr(str(path), image(), ["R", "G", "B"])
+    before = path.read_bytes()
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))
+    try:
+        with pytest.raises(OSError, match=r"cannot write '.*a\.exr': "):
+            native.write_exr(str(path), image(90, 90), ["R", "G", "B"])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
 @pytest.mark.parametrize(("name", "reason"), [("none/a.exr", "there is no folder"), ("", "it is a folder")])
 def test_unwritable_places_are_named(tmp_path, name, reason):
     path = str(tmp_path / name)
@@ -306,16 +322,32 @@ def test_every_truncation_is_refused(tmp_path):
             native.read_exr(str(path))
 
 
+def utf8_or_marks(data):
+    try:
+        return data.decode()
+    except UnicodeDecodeError:
+        return "".join(chr(byte) if byte < 0x80 else "?" for byte in data)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.one_of(st.binary(max_size=12), st.text(max_size=9).map(lambda t: t.encode("utf-8", "surrogatepass"))))
+@example(b"\xed\xa0\x80")  # a surrogate
+@example(b"\xf4\x90\x80\x80")  # beyond the last code point
+@example(b"\xe0\x80\xaf")  # longer than it need be
+@example(b"a\xe2\x82")  # cut off
+def test_text_that_is_not_utf8_gets_question_marks(tmp_path_factory, data):
+    path = tmp_path_factory.getbasetemp() / "text.exr"
+    extra = attribute("note", "string", data)
+    path.write_bytes(plain_exr(image(2, 2, 1), [("Y", FLOAT)], extra=extra))
+    assert native.read_exr(str(path))[2] == {"note": utf8_or_marks(data)}
+
+
 def test_names_that_are_not_utf8(tmp_path):
     path = tmp_path / "a.exr"
-    text = attribute("caf\u00e9", "string", "d\u00e9j\u00e0 \u20ac \U0001f600".encode()) + attribute(
-        "bad", "string", b"\xe9\xff"
-    )
-    content = plain_exr(image(2, 2, 1), [("Y?", FLOAT)], extra=text)
-    path.write_bytes(content.replace(b"Y?", b"Y\xfe", 1))
-    _, channels, attributes = native.read_exr(str(path))
-    assert channels == ["Y?"]
-    assert attributes == {"caf\u00e9": "d\u00e9j\u00e0 \u20ac \U0001f600", "bad": "??"}
+    extra = attribute("N?", "int", struct.pack("<i", 3))
+    content = plain_exr(image(2, 2, 1), [("Y?", FLOAT)], extra=extra)
+    path.write_bytes(content.replace(b"Y?", b"Y\xfe", 1).replace(b"N?", b"N\xfe", 1))
+    assert native.read_exr(str(path))[1:] == (["Y?"], {"N?": 3})
 
 
 def flip_bytes(content, flips):

@@ -236,6 +236,20 @@ def test_a_plane_does_not_shadow_itself(seed, size, distance, angle, margin):
     assert flux.min() > 0
 
 
+def test_clearance_keeps_an_uneven_plane_from_shadowing_itself():
+    x, y = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9))
+    z = 1e-4 * np.random.default_rng(1).uniform(-1, 1, x.shape)
+    corner = (np.arange(8)[:, None] * 9 + np.arange(8)).ravel()
+    faces = [(corner, corner + 1, corner + 10), (corner, corner + 10, corner + 9)]
+    occluders = native.Occluders(
+        np.stack([x, y, z], -1).reshape(-1, 3).astype(np.float32),
+        np.concatenate([np.stack(face, 1) for face in faces]).astype(np.uint32),
+    )
+    arguments = make_grid(30, 30, (1.9, 1.9)) | {"direction": (1, 0, -1), "occluders": occluders}
+    assert (native.sun_beams(**arguments) == 0).any()
+    np.testing.assert_allclose(native.sun_beams(**arguments, clearance=1.1e-4), math.sqrt(0.5), rtol=1e-6)
+
+
 def box(low, high):
     """Vertices and triangles of an axis-aligned box."""
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
@@ -352,6 +366,8 @@ def test_errors_in_the_callback_reach_the_caller():
         ({"samples": 0}, "samples.*0.*1 to 64"),
         ({"samples": 65}, "samples.*65"),
         ({"threads": -1}, "threads.*-1"),
+        ({"clearance": -1.0}, "clearance.*-1.*>= 0"),
+        ({"clearance": math.inf}, "clearance"),
         ({"position": (0, math.inf, 1)}, "position"),
         ({"frame": np.zeros((3, 3))}, "frame.*singular"),
         ({"frame": np.eye(2)}, r"frame.*3 x 3"),
