@@ -181,16 +181,22 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
 def draw_properties(node, layout) -> None:
     """The node's properties, in the node editor and in panels."""
     layout.prop(node, "preset")
-    layout.prop(node, "color_mode", expand=True)
+    layout.row().prop(node, "color_mode", expand=True)
     if node.color_mode == "BASE_COLOR":
         layout.prop(node, "base_color")
     else:
-        layout.column().prop(node, "albedo")
-    layout.column().prop(node, "mean_free_path")
+        _draw_channels(layout, node, "albedo", "Albedo")
+    _draw_channels(layout, node, "mean_free_path", "Free Path")
     layout.prop(node, "anisotropy")
     layout.prop(node, "ior")
     layout.prop(node, "thickness")
     layout.template_ID(node, "image", new="image.new", open="image.open")
+
+
+def _draw_channels(layout, node, name: str, label: str) -> None:
+    column = layout.column(align=True)
+    for index, channel in enumerate(("Red", "Green", "Blue")):
+        column.prop(node, name, index=index, text=channel if index else f"{label} {channel}")
 
 
 def find_node(material):

@@ -146,7 +146,7 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         done = (self._next - 1 + self._thread.fraction) / len(self._queue)
         status.update(self._thread.fraction, done)
         context.window_manager.progress_update(int(100 * done))
-        context.workspace.status_text_set(status.text())
+        context.workspace.status_text_set(": ".join(status.lines()))
         status.redraw(context)
 
     def _take_result(self) -> None:

@@ -32,9 +32,9 @@ def stop() -> None:
     _running.update(subject="", own=0.0, all=0.0)
 
 
-def text() -> str:
-    """One line about the running bake."""
-    return f"Baking {_running['subject']}: {_running['own']:.0%}, all: {_running['all']:.0%}   (Esc: cancel)"
+def lines() -> tuple[str, str]:
+    """What is running, and how far it is."""
+    return f"Baking {_running['subject']}", f"{_running['own']:.0%}, all {_running['all']:.0%} (Esc cancels)"
 
 
 def redraw(context) -> None:

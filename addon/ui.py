@@ -7,6 +7,9 @@ import bpy
 from . import bakes, compat, engine, extract, nodes, status, targets
 from .core.errors import BakeError
 
+# Objects whose warnings a panel shows; it is drawn often.
+MOST_OBJECTS = 8
+
 
 def warnings_for(context, obj) -> list[str]:
     """What would keep the object from being baked, as far as it is known without baking."""
@@ -28,8 +31,14 @@ def warnings_for(context, obj) -> list[str]:
     return messages
 
 
-def draw_warnings(layout, messages: list[str], width: int = 44) -> None:
-    """Sentences, wrapped, with an icon."""
+# Of a panel beside its text, and of a letter on average, at a user-interface scale of 1.
+BORDER_PIXELS, LETTER_PIXELS = 65, 6.8
+
+
+def draw_warnings(layout, context, messages: list[str]) -> None:
+    """Sentences, wrapped to the panel's width, with an icon."""
+    pixels = context.region.width / context.preferences.system.ui_scale
+    width = max(20, int((pixels - BORDER_PIXELS) / LETTER_PIXELS))
     for message in messages:
         column = layout.column(align=True)
         for number, line in enumerate(_wrap(message, width)):
@@ -46,17 +55,20 @@ def _wrap(text: str, width: int) -> list[str]:
 
 
 def draw_bake(layout, context) -> None:
-    """Problems of the active object, then the Bake buttons or the progress."""
+    """Problems of the selected objects, then the Bake buttons or the progress."""
     problem = status.native_problem()
     if problem:
-        draw_warnings(layout, [problem])
+        draw_warnings(layout, context, [problem])
         return
     if status.is_running():
-        layout.label(text=status.text(), icon="RENDER_STILL")
+        column = layout.column(align=True)
+        for line, icon in zip(status.lines(), ("RENDER_STILL", "BLANK1")):
+            column.label(text=line, icon=icon)
         return
-    obj = context.object
-    if obj is not None and bakes.materials_of(obj):
-        draw_warnings(layout, warnings_for(context, obj))
+    # `context.object` is empty in the render properties.
+    chosen = [obj for obj in context.view_layer.objects.selected if bakes.materials_of(obj)]
+    for obj in chosen[:MOST_OBJECTS]:
+        draw_warnings(layout, context, [f"{obj.name}: {message}" for message in warnings_for(context, obj)])
     row = layout.row(align=True)
     row.scale_y = 1.4
     row.operator("beamspread.bake", text="Bake", icon="RENDER_STILL").objects = "SELECTED"
@@ -104,7 +116,7 @@ class BEAMSPREAD_PT_active_image(RenderPanel, bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         _use_columns(layout)
-        draw_warnings(layout, engine.last_errors())
+        draw_warnings(layout, context, engine.last_errors())
         layout.operator("object.bake", text="Bake Active Image", icon="RENDER_STILL")
         layout.prop(context.scene.render.bake, "margin")
         layout.prop(context.scene.render.bake, "use_clear", text="Clear Image")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .bake import LIBRARY_WEIGHT, BakeSettings, bake_texture
+from .bake import LIBRARY_WEIGHT, LIGHT_WEIGHT, BakeSettings, bake_texture
 from .color import albedo_from_color
 from .material import RGB, Material, check_thickness
 from .progress import Progress, stages
@@ -67,7 +67,7 @@ class BakeJob:
     def run(self, progress: Progress | None = None) -> np.ndarray:
         """Bake: float32 (height, width, 3) luminance, margin included, row 0 at the bottom."""
         needs_albedo = 0.0 if self.surface.base_color is None else LIBRARY_WEIGHT
-        resolving, baking = stages(progress, [needs_albedo, LIBRARY_WEIGHT + 2 * len(self.lights)])
+        resolving, baking = stages(progress, [needs_albedo, LIBRARY_WEIGHT + LIGHT_WEIGHT * len(self.lights)])
         material = self.surface.resolve(self.settings.quality, resolving)
         return bake_texture(
             self.receiver, self.lights, self.occluders, material, self.surface.thickness, self.settings, baking
