@@ -34,18 +34,17 @@ void detail::parallel_ordered(std::size_t count, int threads,
     std::size_t next = 0;
     arena.execute([&] {
         // Twice as many results in flight as threads: enough to hide uneven work items.
-        tbb::parallel_pipeline(static_cast<std::size_t>(2 * concurrency),
-                               tbb::make_filter<void, std::size_t>(tbb::filter_mode::serial_in_order,
-                                                                   [&](tbb::flow_control& flow) {
-                                                                       if (next == count)
-                                                                           flow.stop();
-                                                                       return next == count ? next : next++;
-                                                                   }) &
-                                   tbb::make_filter<std::size_t, Item>(
-                                       tbb::filter_mode::parallel, [&](std::size_t i) { return Item(i, make(i)); }) &
-                                   tbb::make_filter<Item, void>(tbb::filter_mode::serial_in_order, [&](Item item) {
-                                       use(item.first, std::move(item.second));
-                                   }));
+        tbb::parallel_pipeline(
+            static_cast<std::size_t>(2 * concurrency),
+            tbb::make_filter<void, std::size_t>(tbb::filter_mode::serial_in_order, [&](tbb::flow_control& flow) {
+                if (next == count)
+                    flow.stop();
+                return next == count ? next : next++;
+            }) & tbb::make_filter<std::size_t, Item>(tbb::filter_mode::parallel, [&](std::size_t i) {
+                return Item(i, make(i));
+            }) & tbb::make_filter<Item, void>(tbb::filter_mode::serial_in_order, [&](Item item) {
+                use(item.first, std::move(item.second));
+            }));
     });
 }
 

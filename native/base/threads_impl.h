@@ -16,9 +16,10 @@ void parallel_ordered(std::size_t count, int threads, const std::function<Result
                       const std::function<void(std::size_t, Result)>& use)
 {
     detail::parallel_ordered(
-        count, threads,
-        [&make](std::size_t i) -> std::shared_ptr<void> { return std::make_shared<Result>(make(i)); },
-        [&use](std::size_t i, std::shared_ptr<void> result) { use(i, std::move(*static_cast<Result*>(result.get()))); });
+        count, threads, [&make](std::size_t i) -> std::shared_ptr<void> { return std::make_shared<Result>(make(i)); },
+        [&use](std::size_t i, std::shared_ptr<void> result) {
+            use(i, std::move(*static_cast<Result*>(result.get())));
+        });
 }
 
 }  // namespace beamspread

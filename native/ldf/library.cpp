@@ -31,7 +31,8 @@ std::array<double, order_bin_count> order_weights(const SideResult& side, double
     for (std::size_t b = 1; b < order_bin_count; ++b) {
         const double log_weight = log_albedo * static_cast<double>(side.mean_order[b]);
         if (log_weight > negligible_log_weight)
-            weights[b] = std::exp(log_weight + 0.5 * log_albedo * log_albedo * static_cast<double>(side.order_variance[b]));
+            weights[b] =
+                std::exp(log_weight + 0.5 * log_albedo * log_albedo * static_cast<double>(side.order_variance[b]));
     }
     return weights;
 }
@@ -62,7 +63,8 @@ void check_albedo(double albedo)
         reject("albedo", albedo, "0 <= albedo < 1");
 }
 
-LdfLibrary::LdfLibrary(const Medium& medium, std::uint64_t photons, std::uint64_t seed, std::vector<AngleResult> results)
+LdfLibrary::LdfLibrary(const Medium& medium, std::uint64_t photons, std::uint64_t seed,
+                       std::vector<AngleResult> results)
     : m_medium(medium), m_photons(photons), m_seed(seed), m_results(std::move(results))
 {
     validate(medium);

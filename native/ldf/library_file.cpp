@@ -88,7 +88,8 @@ private:
 
     const ExrPart* find(const std::string& name) const
     {
-        const auto found = std::find_if(m_parts.begin(), m_parts.end(), [&](const ExrPart& p) { return p.name == name; });
+        const auto found =
+            std::find_if(m_parts.begin(), m_parts.end(), [&](const ExrPart& p) { return p.name == name; });
         return found == m_parts.end() ? nullptr : &*found;
     }
 
@@ -164,8 +165,12 @@ void save_library(const LdfLibrary& library, const std::string& path)
             std::vector<float> orders = from.mean_order;
             orders.insert(orders.end(), from.order_variance.begin(), from.order_variance.end());
             orders.insert(orders.end(), from.batch_totals.begin(), from.batch_totals.end());
-            parts.push_back({part_name(side, j) + ".orders", static_cast<int>(order_bin_count),
-                             static_cast<int>(2 + batch_count), {"Y"}, std::move(orders), attributes});
+            parts.push_back({part_name(side, j) + ".orders",
+                             static_cast<int>(order_bin_count),
+                             static_cast<int>(2 + batch_count),
+                             {"Y"},
+                             std::move(orders),
+                             attributes});
         }
     }
     write_exr_parts(path, parts);

@@ -173,7 +173,8 @@ Harmonics RadialProfile::remaining(double r) const
     const double h = edge[k] - edge[k - 1];
     const Cubic c = cubic_value((r - edge[k - 1]) / h, h);
     for (std::size_t m = 0; m < harmonic_count; ++m)
-        out[m] = c.v0 * m_remaining[k - 1][m] + c.v1 * m_remaining[k][m] - c.s0 * m_slope[k - 1][m] - c.s1 * m_slope[k][m];
+        out[m] =
+            c.v0 * m_remaining[k - 1][m] + c.v1 * m_remaining[k][m] - c.s0 * m_slope[k - 1][m] - c.s1 * m_slope[k][m];
     return out;
 }
 
@@ -199,7 +200,8 @@ Harmonics RadialProfile::density(double r) const
         } else {
             const Cubic c = cubic_derivative((r - edge[k - 1]) / h, h);
             out[m] = (c.s0 * m_slope[k - 1][m] + c.s1 * m_slope[k][m] - c.v0 * m_remaining[k - 1][m] -
-                      c.v1 * m_remaining[k][m]) / r;
+                      c.v1 * m_remaining[k][m]) /
+                     r;
         }
     }
     return out;

@@ -55,7 +55,8 @@ within the simulated ones (a library that reaches 88 degrees serves up to 90); a
                 const py::gil_scoped_release release;
                 return std::make_shared<LdfLibrary>(load_library(path.string()));
             },
-            py::arg("path"), "Read a library from an OpenEXR file; OSError if it is missing, damaged or something else.")
+            py::arg("path"),
+            "Read a library from an OpenEXR file; OSError if it is missing, damaged or something else.")
         .def(
             "save",
             [](const LdfLibrary& self, const std::filesystem::path& path) {
@@ -118,7 +119,8 @@ ValueError
     Names the argument, its value and what is allowed.
 )")
         .def("__repr__", [](const LdfLibrary& self) {
-            return py::str("<LdfLibrary {} angles={} photons={}>").format(self.medium(), self.angles_deg(), self.photons());
+            return py::str("<LdfLibrary {} angles={} photons={}>")
+                .format(self.medium(), self.angles_deg(), self.photons());
         });
 }
 

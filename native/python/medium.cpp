@@ -41,10 +41,9 @@ ValueError
              [](const Medium& a) {
                  return py::str("Medium(g={}, ior={}, thickness={})").format(a.g, a.ior, a.thickness);
              })
-        .def(py::pickle([](const Medium& a) { return py::make_tuple(a.g, a.ior, a.thickness); },
-                        [](const py::tuple& t) {
-                            return Medium{t[0].cast<double>(), t[1].cast<double>(), t[2].cast<double>()};
-                        }));
+        .def(py::pickle(
+            [](const Medium& a) { return py::make_tuple(a.g, a.ior, a.thickness); },
+            [](const py::tuple& t) { return Medium{t[0].cast<double>(), t[1].cast<double>(), t[2].cast<double>()}; }));
     m.def("fresnel", py::vectorize(&fresnel), py::arg("cos_theta_i"), py::arg("eta"),
           "Reflectance of unpolarized light; eta is the index behind the boundary over the one before it.");
     m.def("henyey_greenstein_pdf", py::vectorize(&henyey_greenstein_pdf), py::arg("cos_theta"), py::arg("g"),

@@ -72,7 +72,8 @@ Array<float> convolve(const Array<float>& irradiance, const Array<float>& direct
     const auto width = static_cast<py::ssize_t>(problem.width);
     if (direction.ndim() == 1 && direction.shape(0) == 3)
         problem.directions.uniform = Vec3(direction.at(0), direction.at(1), direction.at(2));
-    else if (direction.ndim() == 3 && direction.shape(0) == height && direction.shape(1) == width && direction.shape(2) == 3)
+    else if (direction.ndim() == 3 && direction.shape(0) == height && direction.shape(1) == width &&
+             direction.shape(2) == 3)
         problem.directions.field = direction.data();
     else
         reject("direction", shape_text(direction), "(3,) or (H, W, 3) like irradiance");

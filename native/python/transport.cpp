@@ -11,8 +11,8 @@ void bind_transport(py::module_& m)
            int threads, const py::object& progress) {
             Progress report(progress_callback(progress));
             const py::gil_scoped_release release;
-            return std::make_shared<LdfLibrary>(
-                simulate_library(medium, angles, photons < 0 ? 0 : static_cast<std::uint64_t>(photons), seed, threads, report));
+            return std::make_shared<LdfLibrary>(simulate_library(
+                medium, angles, photons < 0 ? 0 : static_cast<std::uint64_t>(photons), seed, threads, report));
         },
         py::arg("medium"), py::arg("angles"), py::arg("photons"), py::arg("seed") = 1, py::arg("threads") = 0,
         py::arg("progress") = py::none(), R"(Simulate the light that beams spread inside a medium, by Monte Carlo.

@@ -168,7 +168,8 @@ QuadrantKernel::QuadrantKernel(const RadialProfile& profile, const Problem& prob
 {
     const double px = problem.pitch_x / channel.mean_free_path;
     const double py = problem.pitch_y / channel.mean_free_path;
-    m_integrals = integrate_texels(profile, {-0.5 * px, -0.5 * py, px, py, problem.width, problem.height}, problem.threads);
+    m_integrals =
+        integrate_texels(profile, {-0.5 * px, -0.5 * py, px, py, problem.width, problem.height}, problem.threads);
 }
 
 void QuadrantKernel::row(std::ptrdiff_t dy, const Harmonics& cosine, const Harmonics& sine,

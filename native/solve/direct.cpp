@@ -13,7 +13,7 @@ namespace {
 // sum[i] += factor * values[i]; compiled for several instruction sets, the best chosen at run time. Without
 // contraction to fused multiply-add the results are the same for all.
 __attribute__((target_clones("default", "avx2", "avx512f"))) void add_scaled(double* sum, const double* values,
-                                                                              double factor, std::size_t count)
+                                                                             double factor, std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i)
         sum[i] += factor * values[i];
@@ -82,8 +82,8 @@ struct Beam {
 
 std::vector<float> solve_channel(const Problem& problem, const Channel& channel, Progress& progress)
 {
-    const BeamBasis basis = problem.directions.field ? BeamBasis::library_nodes(problem, *channel.library)
-                                                     : BeamBasis::uniform(problem);
+    const BeamBasis basis =
+        problem.directions.field ? BeamBasis::library_nodes(problem, *channel.library) : BeamBasis::uniform(problem);
     const std::vector<Term> terms = basis_terms(problem, basis);
     std::vector<QuadrantKernel> kernels;
     for (const RadialProfile& profile : basis.profiles(channel))

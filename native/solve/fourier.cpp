@@ -135,8 +135,8 @@ private:
     BeamWeights beam_weights(const Channel& beams, const BeamBasis& basis) const
     {
         const std::size_t texels = m_problem.width * m_problem.height;
-        BeamWeights result{std::vector<float>(basis.node_count() * texels), std::vector<float>(basis.node_count() * texels),
-                           std::vector<float>(texels)};
+        BeamWeights result{std::vector<float>(basis.node_count() * texels),
+                           std::vector<float>(basis.node_count() * texels), std::vector<float>(texels)};
         parallel_for(m_problem.height, m_problem.threads, [&](std::size_t y) {
             for (std::size_t x = 0; x < m_problem.width; ++x) {
                 if (beams.irradiance(y, x) == 0.0f)
@@ -193,7 +193,8 @@ private:
             std::vector<double> values;
             kernel.row(dy, cosine, sine, values);
             // Offset 0 goes to the first texel, negative ones wrap around to the end.
-            double* row = padded.data() + static_cast<std::size_t>(dy < 0 ? dy + padded_height : dy) * m_transform.width();
+            double* row =
+                padded.data() + static_cast<std::size_t>(dy < 0 ? dy + padded_height : dy) * m_transform.width();
             const auto zero = values.begin() + static_cast<std::ptrdiff_t>(m_problem.width - 1);
             std::copy(zero, values.end(), row);
             std::copy(values.begin(), zero, row + m_transform.width() - (m_problem.width - 1));

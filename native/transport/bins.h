@@ -45,7 +45,8 @@ inline std::size_t radius_bin(float radius)
 inline double radius_bin_edge(std::size_t bin)
 {
     const std::size_t octave = bin / 4;
-    const double base = static_cast<double>(std::uint64_t{1} << octave) / static_cast<double>(1 << -min_radius_exponent);
+    const double base =
+        static_cast<double>(std::uint64_t{1} << octave) / static_cast<double>(1 << -min_radius_exponent);
     return base * (1.0 + 0.25 * static_cast<double>(bin % 4));
 }
 
