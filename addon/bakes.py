@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -40,6 +41,9 @@ def sentence(error: Exception) -> str:
         return "The bake was cancelled."
     if isinstance(error, MemoryError):
         return "There is not enough memory: lower the resolution."
+    if not isinstance(error, (ValueError, OSError)):
+        # Nothing that an artist does should lead here: keep what a bug report needs.
+        logging.getLogger(__name__).error("unexpected error", exc_info=error)
     return str(error) or type(error).__name__
 
 
@@ -79,7 +83,10 @@ def prepare(context, wanted: list[Target], settings: BakeSettings, resolution: i
         bpy.data.materials[target.material_name].node_tree.update_tag()
     with extract.as_rendered(context.view_layer):
         depsgraph = context.evaluated_depsgraph_get()
-        light = extract.read_scene_light(depsgraph)
+        try:
+            light = extract.read_scene_light(depsgraph)
+        except Exception as error:  # noqa: BLE001 - each bake asked for needs an answer
+            return [Prepared(target, None, sentence(error)) for target in wanted]
         visible = extract.render_visible_names(context.view_layer)
         return [_prepare_one(context.scene, depsgraph, light, visible, one, settings, resolution) for one in wanted]
 
@@ -89,8 +96,8 @@ def _prepare_one(scene, depsgraph, light, visible, target: Target, settings, res
         check_visible(target.object_name, visible)
         obj = scene.objects[target.object_name].evaluated_get(depsgraph)
         job = make_job(obj, target.material_name, light, settings, resolution, scene.beamspread.resolution)
-    except BakeError as error:
-        return Prepared(target, None, str(error))
+    except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
+        return Prepared(target, None, sentence(error))
     return Prepared(target, job)
 
 

@@ -138,6 +138,8 @@ def _bake_one(prepared, options, record, taken: set[str]) -> None:
         record.path = _write(options, record, texture, taken)
         record.status = WRITTEN
         record.message = " ".join(prepared.job.warnings)
+        if record.path.lower().endswith(".png") and texture.max() > 1:
+            record.message = f"{record.message} Values above 1 were clipped: EXR keeps them.".strip()
     except KeyboardInterrupt:
         record.status, record.message = CANCELLED, "The bake was cancelled."
     except Exception as error:  # noqa: BLE001 - the others are still to be baked

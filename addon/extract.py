@@ -256,10 +256,11 @@ def as_rendered(view_layer):
         for child in layer_collection.children:
             visit(child)
 
-    hidden = [obj for obj in view_layer.objects if obj.hide_get(view_layer=view_layer)]
+    objects = list(view_layer.objects)
+    hidden = [obj for obj in objects if obj.hide_get(view_layer=view_layer)]
     try:
         visit(view_layer.layer_collection)
-        for obj in view_layer.objects:
+        for obj in objects:
             if obj.library is not None or obj.hide_render:
                 continue
             set_value(obj, "hide_viewport", False)

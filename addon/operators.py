@@ -58,7 +58,13 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return context.scene is not None and context.mode == "OBJECT" and not status.is_running()
+        if status.is_running():
+            cls.poll_message_set("A bake is running: Esc stops it")
+            return False
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Go to Object Mode first")
+            return False
+        return True
 
     def execute(self, context):
         if not self._prepare(context):

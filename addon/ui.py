@@ -11,11 +11,11 @@ from .core.errors import BakeError
 MOST_OBJECTS = 8
 
 
-def warnings_for(context, obj) -> list[str]:
+def warnings_for(obj, visible: set[str]) -> list[str]:
     """What would keep the object from being baked, as far as it is known without baking."""
     messages = []
     try:
-        bakes.check_visible(obj.name, extract.render_visible_names(context.view_layer))
+        bakes.check_visible(obj.name, visible)
     except BakeError as error:
         messages.append(str(error))
     if obj.type == "MESH" and not obj.data.uv_layers:
@@ -67,8 +67,9 @@ def draw_bake(layout, context) -> None:
         return
     # `context.object` is empty in the render properties.
     chosen = [obj for obj in context.view_layer.objects.selected if bakes.materials_of(obj)]
+    visible = extract.render_visible_names(context.view_layer) if chosen else set()
     for obj in chosen[:MOST_OBJECTS]:
-        draw_warnings(layout, context, [f"{obj.name}: {message}" for message in warnings_for(context, obj)])
+        draw_warnings(layout, context, [f"{obj.name}: {message}" for message in warnings_for(obj, visible)])
     row = layout.row(align=True)
     row.scale_y = 1.4
     row.operator("beamspread.bake", text="Bake", icon="RENDER_STILL").objects = "SELECTED"

@@ -122,6 +122,23 @@ def test_hidden_in_viewport_is_baked_and_restored():
     assert lit.any()
 
 
+def test_collection_hidden_in_viewport_casts_shadows():
+    plane = add_plane(material=add_material())
+    roof = add_plane("Roof", matrix=Matrix.Translation((0, 0, 1)), size=(9, 9))
+    collection = bpy.data.collections.new("Roofs")
+    bpy.context.scene.collection.children.link(collection)
+    collection.objects.link(roof)
+    bpy.context.scene.collection.objects.unlink(roof)
+    collection.hide_viewport = True
+    add_sun(0)
+    (dark,) = bake(plane)
+    assert not dark.any()
+    assert collection.hide_viewport
+    bpy.context.view_layer.layer_collection.children["Roofs"].exclude = True
+    (lit,) = bake(plane)
+    assert lit.any()
+
+
 def test_instances_and_modifiers_cast_shadows():
     plane = add_plane(material=add_material())
     collection = bpy.data.collections.new("Roofs")

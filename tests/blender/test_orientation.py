@@ -83,6 +83,25 @@ def test_mirrored_object_mirrors_its_texture(upright, scale):
     )
 
 
+@pytest.mark.parametrize(
+    "matrix",
+    [
+        Matrix.Translation((1000, -2000, 500)),
+        Matrix.Diagonal((1e-3, 1e-3, 1e-3, 1)),
+        Matrix.Diagonal((1e3, 1e3, 1e3, 1)) @ Matrix.Rotation(0.7, 4, Vector((1, 2, 3))),
+    ],
+)
+def test_a_plane_never_shadows_itself(matrix):
+    """Far from the origin, tiny and huge: an evenly lit plane stays even but for the loss at its border."""
+    bpy.context.scene.beamspread.resolution = 64
+    size = matrix.to_scale().x
+    plane = add_plane(matrix=matrix, material=add_material(mean_free_path=(1e-4 * size,) * 3, anisotropy=0.0))
+    add_sun(70, matrix=matrix.to_quaternion().to_matrix().to_4x4())
+    (texture,) = bake(plane)
+    red = texture[8:-8, 8:-8, 0]
+    assert red.min() == pytest.approx(red.max(), rel=1e-3)
+
+
 def test_non_uniform_scale(upright):
     texture = scene_texture(size=(1, 1), object_matrix=Matrix.Diagonal((SIZE[0], SIZE[1], 7, 1)))
     assert texture == pytest.approx(upright, abs=TOLERANCE * upright.max())
