@@ -10,8 +10,10 @@ from .._load import native
 ANGLES = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 58.0, 65.0, 71.0, 76.0, 80.0, 84.0, 88.0)
 """Simulated angles of incidence, degrees; denser toward grazing, where distributions change fastest."""
 
-PHOTONS = {"preview": 20_000, "final": 300_000}
-"""Photons per angle for media whose light turns around within some ten scatterings."""
+PHOTONS = {"preview": 32_000, "final": 800_000}
+"""Photons per angle for a medium with g .8 and ior 1; see `photons_for`."""
+
+_MAX_PHOTONS = 1_000_000
 
 _FILE_VERSION = 1
 """Raised when the simulation changes, so that older cached files are made again."""
@@ -31,8 +33,12 @@ def cache_folder():
 
 
 def photons_for(medium, quality):
-    """Photons per angle: fewer where g is so high that each takes very many scatterings."""
-    return int(PHOTONS[quality] * min(1.0, (1.0 - medium.g) / 0.15))
+    """Photons per angle that take about the same time in every medium.
+
+    The number of scatterings before light leaves grows like 1 / (1 - g), and internal reflection keeps it in longer.
+    """
+    effort = (1.0 - medium.g) / 0.2 / medium.ior**2
+    return int(min(PHOTONS[quality] * effort, _MAX_PHOTONS))
 
 
 def _cache_path(medium, quality):
@@ -81,7 +87,7 @@ def library(medium, quality="final", progress=None):
     ----------
     medium : Medium
     quality : {"final", "preview"}
-        Relative standard error of the totals: about 0.3 % and 1 %.
+        Relative standard error of the totals up to 60 degrees: at most 0.4 % and 2 % for g up to .8.
     progress : callable, optional
         Called with the finished fraction while a simulation runs; returning False stops.
 

@@ -6,7 +6,9 @@ namespace beamspread {
 
 void reject(const std::string& argument, const std::string& value, const std::string& allowed)
 {
-    throw InvalidArgument("argument '" + argument + "' is " + value + "; allowed: " + allowed);
+    std::ostringstream text;
+    text << "argument '" << argument << "' is " << value << "; allowed: " << allowed;
+    throw InvalidArgument(text.str());
 }
 
 void reject(const std::string& argument, double value, const std::string& allowed)

@@ -14,6 +14,7 @@ namespace {
 // Exits less likely than this are tallied at random with this weight: unbiased, and the many deep
 // flights that have next to no chance to leave cost one comparison.
 constexpr double rare_exit = 0.02;
+constexpr double rare_exit_distance = 3.912023005428146;  // exp of its negative is rare_exit
 
 // A walk that outlives 2^k first_roulette scatterings goes on with probability 1/sqrt(2) at each k. In a half-space
 // the chance to be still inside falls like order^-1/2, so that each octave of orders then costs the same and
@@ -82,9 +83,15 @@ public:
         std::uint32_t next_roulette = first_roulette(m_medium);
         while (true) {
             const double to_boundary = distance_to_boundary(m_w);
-            if (m_order > 0)
-                tally_exit(m_w, to_boundary, m_exit_weight);
             const double flight = -std::log(m_random.uniform_positive());
+            // Far from the boundary the flight itself decides whether its exit is tallied: it comes this
+            // close with the probability exp(-to_boundary) / rare_exit.
+            if (m_order > 0) {
+                if (to_boundary < rare_exit_distance)
+                    tally_exit(m_w, to_boundary, m_exit_weight * std::exp(-to_boundary));
+                else if (flight >= to_boundary - rare_exit_distance)
+                    tally_exit(m_w, to_boundary, m_exit_weight * rare_exit);
+            }
             if (flight >= to_boundary) {
                 // The part that leaves is tallied; the rest turns back.
                 if (m_random.uniform() >= fresnel(std::abs(m_w.z), 1.0 / m_medium.ior))
@@ -121,19 +128,13 @@ private:
         return depth / std::max(std::abs(w.z), 1e-300);
     }
 
-    // Expected exit along w, instead of waiting for a flight that gets there.
-    void tally_exit(const Vec3& w, double to_boundary, double estimator_weight)
+    // Adds an exit along w that happens with the given probability, instead of waiting for it.
+    void tally_exit(const Vec3& w, double to_boundary, double probability)
     {
-        double expected = estimator_weight * std::exp(-to_boundary);
-        if (expected < rare_exit) {
-            if (m_random.uniform() * rare_exit >= expected)
-                return;
-            expected = rare_exit;
-        }
         const double reflectance = fresnel(std::abs(w.z), 1.0 / m_medium.ior);
         if (reflectance < 1.0)
             m_tallies[w.z < 0.0 ? 0 : 1].add(m_x.x + to_boundary * w.x, m_x.y + to_boundary * w.y, m_order,
-                                             m_weight * expected * (1.0 - reflectance));
+                                             m_weight * probability * (1.0 - reflectance));
     }
 
     // Density per steradian of the connections below: proportional to the cosine, inside the cone that
@@ -161,7 +162,14 @@ private:
         const double cos_theta = std::sqrt(1.0 - m_cone * m_random.uniform());
         const Vec3 w = around_z(side * cos_theta, m_random);
         const double phase = henyey_greenstein_pdf(glm::dot(before, w), m_medium.g);
-        tally_exit(w, distance_to_boundary(w), phase / (phase + connection_pdf(w)));
+        const double to_boundary = distance_to_boundary(w);
+        double probability = phase / (phase + connection_pdf(w)) * std::exp(-to_boundary);
+        if (probability < rare_exit) {
+            if (m_random.uniform() * rare_exit >= probability)
+                return;
+            probability = rare_exit;
+        }
+        tally_exit(w, to_boundary, probability);
     }
 
     const Medium& m_medium;
