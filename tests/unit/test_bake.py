@@ -1,0 +1,121 @@
+"""The bake of plain data: lights add up, colours and thickness act per channel, progress and cancel work."""
+
+import math
+from dataclasses import replace
+
+import beamspread
+import numpy as np
+import pytest
+from beamspread.core.bake import BakeSettings, bake
+from beamspread.core.errors import MaterialError
+from beamspread.core.job import BakeJob, Surface
+from beamspread.core.material import Material
+from beamspread.core.receiver import Receiver
+from beamspread.core.scene import Grid, Mesh, PointLight, SpotLight, SunLight
+
+SETTINGS = BakeSettings(quality="preview", samples=2, margin=0)
+MATERIAL = Material(albedo=(0.9, 0.9, 0.9), mean_free_path=(0.01, 0.01, 0.01), anisotropy=0.0)
+SUN = SunLight("Sun", (0.0, 0.0, -1.0), 2.0, (1.0, 1.0, 1.0))
+
+
+def grid(size=24, side=1.0):
+    """A square in the xy plane, centred on the origin."""
+    return Grid(
+        origin=(-side / 2, -side / 2, 0.0),
+        x_axis=(1.0, 0.0, 0.0),
+        y_axis=(0.0, 1.0, 0.0),
+        normal=(0.0, 0.0, 1.0),
+        pitch_x=side / size,
+        pitch_y=side / size,
+        width=size,
+        height=size,
+        coverage=np.ones((size, size), np.float32),
+    )
+
+
+def reflectance(angle, albedo=0.9, thickness=math.inf):
+    medium = beamspread.Medium(g=0.0, ior=1.0, thickness=thickness)
+    return beamspread.library(medium, quality="preview").reflectance(angle, albedo)
+
+
+def test_interior_under_a_sun():
+    luminance = bake(grid(), [SUN], Mesh.empty(), MATERIAL, 0.0, SETTINGS)
+    assert luminance.shape == (24, 24, 3)
+    assert luminance.dtype == np.float32
+    assert luminance[12, 12] == pytest.approx(reflectance(0) * 2 / math.pi, rel=2e-3)
+
+
+def test_lights_add_up_and_colours_stay_apart():
+    red = replace(SUN, color=(1.0, 0.0, 0.0))
+    blue = replace(SUN, color=(0.0, 0.0, 1.0), direction=(math.sin(0.5), 0.0, -math.cos(0.5)))
+    both = bake(grid(), [red, blue], Mesh.empty(), MATERIAL, 0.0, SETTINGS)
+    apart = sum(bake(grid(), [light], Mesh.empty(), MATERIAL, 0.0, SETTINGS) for light in (red, blue))
+    assert both == pytest.approx(apart)
+    assert not both[..., 1].any()
+    assert both[12, 12, 0] > both[12, 12, 2] > 0
+
+
+def test_no_light():
+    assert not bake(grid(), [], Mesh.empty(), MATERIAL, 0.0, SETTINGS).any()
+
+
+@pytest.mark.parametrize("kind", ["point", "spot"])
+def test_lamp_above_the_centre(kind):
+    """P / (4 pi r^2) below the lamp; a cone wider than the plane changes nothing there."""
+    place = ("Lamp", (0.0, 0.0, 2.0), 100.0, (1.0, 1.0, 1.0), True)
+    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    lamp = PointLight(*place) if kind == "point" else SpotLight(*place, axes, math.radians(120), 0.0)
+    luminance = bake(grid(), [lamp], Mesh.empty(), MATERIAL, 0.0, SETTINGS)
+    irradiance = 100 / (4 * math.pi * 2**2)
+    assert luminance[12, 12] == pytest.approx(reflectance(0) * irradiance / math.pi, rel=0.01)
+    assert luminance[12, 4] == pytest.approx(luminance[12, 19], rel=0.01)
+
+
+def test_occluder_and_lamps_without_shadow():
+    roof = Mesh(np.array([[-9, -9, 1], [9, -9, 1], [0, 18, 1]], np.float32), np.array([[0, 1, 2]], np.uint32))
+    assert not bake(grid(), [SUN], roof, MATERIAL, 0.0, SETTINGS).any()
+    free = bake(grid(), [replace(SUN, cast_shadow=False)], roof, MATERIAL, 0.0, SETTINGS)
+    assert free == pytest.approx(bake(grid(), [SUN], Mesh.empty(), MATERIAL, 0.0, SETTINGS))
+
+
+def test_thickness_counts_in_mean_free_paths_of_each_channel():
+    material = replace(MATERIAL, mean_free_path=(0.01, 0.02, 0.04))
+    luminance = bake(grid(), [SUN], Mesh.empty(), material, 0.04, SETTINGS)
+    expected = [reflectance(0, thickness=depth) * 2 / math.pi for depth in (4, 2, 1)]
+    assert luminance[12, 12] == pytest.approx(expected, rel=0.01)
+
+
+def test_properties_are_checked_before_anything_runs():
+    with pytest.raises(MaterialError, match="albedo"):
+        bake(grid(), [SUN], Mesh.empty(), replace(MATERIAL, albedo=(1.0, 0.5, 0.5)), 0.0, SETTINGS)
+    with pytest.raises(MaterialError, match="thickness"):
+        bake(grid(), [SUN], Mesh.empty(), MATERIAL, -1.0, SETTINGS)
+
+
+def test_progress_rises_to_one_and_can_stop_at_any_time():
+    seen = []
+    sun = bake(grid(), [SUN, SUN], Mesh.empty(), MATERIAL, 0.0, SETTINGS, lambda done: seen.append(done) or True)
+    assert (np.diff(seen) > -1e-9).all()
+    assert 0 <= seen[0] <= seen[-1] <= 1
+    for moment in (0.0, 0.6, 0.95):
+        with pytest.raises(beamspread.Cancelled):
+            bake(grid(), [SUN, SUN], Mesh.empty(), MATERIAL, 0.0, SETTINGS, lambda done, m=moment: done < m)
+    assert np.array_equal(bake(grid(), [SUN, SUN], Mesh.empty(), MATERIAL, 0.0, SETTINGS), sun)
+
+
+def test_job_works_out_the_albedo_of_a_base_colour():
+    surface = Surface(replace(MATERIAL, albedo=(2.0, 2.0, 2.0)), base_color=(0.5, 0.3, 0.1))
+    albedo = surface.resolve("preview").albedo
+    library = beamspread.library(beamspread.Medium(g=0.0, ior=1.0), quality="preview")
+    assert [library.diffuse_reflectance(value) for value in albedo] == pytest.approx([0.5, 0.3, 0.1], abs=1e-6)
+    receiver = Receiver(grid(), 24, 24, grid().coverage)
+    texture = BakeJob(receiver, [SUN], Mesh.empty(), surface, SETTINGS).run()
+    expected = [reflectance(0, value) * 2 / math.pi for value in albedo]
+    assert texture[12, 12] == pytest.approx(expected, rel=5e-3)
+
+
+def test_albedo_from_color_is_public():
+    medium = beamspread.Medium(g=0.0, ior=1.0)
+    assert 0 < beamspread.albedo_from_color((0.2, 0.3, 0.4), medium, quality="preview")[0] < 1
+    with pytest.raises(ValueError, match="base colour"):
+        beamspread.albedo_from_color((0.2, 1.3, 0.4), medium, quality="preview")
