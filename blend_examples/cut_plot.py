@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import matplotlib.pyplot as plt
 import numpy as np
-
 from beamspread import _native
 
 # The scene, as make_scenes.py builds it; lengths in mean free paths.
@@ -50,8 +49,10 @@ def read_cycles(path):
     result = {}
     for name in ("toward", "away"):
         chosen = [row for row in rows if row["direction"] == name]
-        u, value, error = ([[float(row[key]) for key in keys] for row in chosen]
-                           for keys in (("u_mfp",), ("r", "g", "b"), ("r_se", "g_se", "b_se")))
+        u, value, error = (
+            [[float(row[key]) for key in keys] for row in chosen]
+            for keys in (("u_mfp",), ("r", "g", "b"), ("r_se", "g_se", "b_se"))
+        )
         result[name] = Profile(np.array(u)[:, 0], np.array(value), np.array(error))
     return result
 
@@ -69,7 +70,7 @@ def read_cut(path):
 
 def leak_depth(profile, fraction, channel=GREEN):
     """Depth of shadow at which luminance falls to a fraction of what it is far out in the light."""
-    lit = profile.value[(profile.u > -22) & (profile.u < -16), channel].mean()
+    lit = profile.value[(profile.u > -17.5) & (profile.u < -13), channel].mean()
     beyond = np.flatnonzero((profile.value[:, channel] < fraction * lit) & (profile.u > 0))
     if len(beyond) == 0:
         return math.nan
@@ -90,11 +91,25 @@ def draw_cut(axis, baked, cycles, sign, title):
             u = (border + sign * truth.u)[near]
             value, error = truth.value[near, channel], truth.error[near, channel]
             axis.fill_between(u, value - 2 * error, value + 2 * error, color="k", alpha=0.25, lw=0)
-            axis.plot(u, value, color="k", lw=0.8, ls="--", label="Cycles (2 standard errors)" if channel == 2 and name == "toward" else None)
+            axis.plot(
+                u,
+                value,
+                color="k",
+                lw=0.8,
+                ls="--",
+                label="Cycles (2 standard errors)" if channel == 2 and name == "toward" else None,
+            )
     axis.plot([0, 0], [0, 0.02], color="k", lw=3, solid_capstyle="butt")
-    axis.annotate("", (sign * -18, 0.085), (sign * -36, 0.085), arrowprops={"arrowstyle": "->", "color": "darkorange", "lw": 2})
-    axis.set(title=title, xlim=(-50, 50), ylim=(0, 0.095), xlabel="u (mean free paths); the obstacle stands at 0",
-             ylabel="luminance / irradiance (1/sr)")
+    axis.annotate(
+        "", (sign * -18, 0.085), (sign * -36, 0.085), arrowprops={"arrowstyle": "->", "color": "darkorange", "lw": 2}
+    )
+    axis.set(
+        title=title,
+        xlim=(-50, 50),
+        ylim=(0, 0.095),
+        xlabel="u (mean free paths); the obstacle stands at 0",
+        ylabel="luminance / irradiance (1/sr)",
+    )
 
 
 def draw_leak(axis, sides, channel):
@@ -105,23 +120,30 @@ def draw_leak(axis, sides, channel):
         value, error = truth.value[:, channel], truth.error[:, channel]
         low = np.maximum(value - 2 * error, 1e-7)
         axis.fill_between(truth.u, low, value + 2 * error, color="k", alpha=0.25, lw=0)
-        axis.plot(truth.u, value, color="k", lw=0.8, ls="--", label="Cycles (2 standard errors)" if style == "-" else None)
+        axis.plot(
+            truth.u, value, color="k", lw=0.8, ls="--", label="Cycles (2 standard errors)" if style == "-" else None
+        )
     axis.axvline(0, color="0.6", lw=0.8)
-    axis.set(xlim=(-8, 14), xlabel="depth into the shadow (mean free paths)", ylabel="luminance / irradiance (1/sr)",
-             title=CHANNELS[channel][0])
+    axis.set(
+        xlim=(-8, 14),
+        xlabel="depth into the shadow (mean free paths)",
+        ylabel="luminance / irradiance (1/sr)",
+        title=CHANNELS[channel][0],
+    )
     axis.set_ylim(max(sides[0][2].value[:, channel].max() * 2e-3, 1e-6), sides[0][2].value[:, channel].max() * 1.6)
     axis.grid(which="both", alpha=0.2)
     axis.legend(fontsize=8, loc="lower left")
 
 
 def report(sides):
-    lines = []
+    print("depth of shadow, in mean free paths, where luminance falls to a part of the lit level: baked (Cycles)")
     for channel, (name, _) in enumerate(CHANNELS):
-        for fraction in (0.05, 0.01):
-            for label, _, baked, truth in sides:
-                lines.append(f"{name}: {label}, falls to {fraction:.0%} of the lit level {leak_depth(baked, fraction, channel):.2f} "
-                             f"mean free paths into the shadow (Cycles {leak_depth(truth, fraction, channel):.2f})")
-    print("\n".join(lines))
+        for label, _, baked, truth in sides:
+            depths = (
+                f"{part:.0%} {leak_depth(baked, part, channel):.2f} ({leak_depth(truth, part, channel):.2f})"
+                for part in (0.05, 0.01)
+            )
+            print(f"{name}, {label}: {', '.join(depths)}")
 
 
 def main():
@@ -141,8 +163,11 @@ def main():
     draw_leak(axes[1, 0], sides, GREEN)
     draw_leak(axes[1, 1], sides, 0)
     depths = [leak_depth(side[2], 0.05) for side in sides]
-    figure.suptitle(f"Obstacle, cut along the light. Albedo 0.9 falls to 5 % of the lit level {depths[0]:.1f} mean free paths into the\n"
-                    f"shadow where light travels towards it, {depths[1]:.1f} where it travels away.", fontsize=11)
+    figure.suptitle(
+        f"Obstacle, cut along the light. Albedo 0.9 falls to 5 % of the lit level {depths[0]:.1f} mean free paths\n"
+        f"into the shadow where light travels towards it, {depths[1]:.1f} where it travels away.",
+        fontsize=11,
+    )
     figure.savefig(picture, dpi=100)
     report(sides)
 

@@ -1,6 +1,6 @@
 """Shadow border on a scattering half-space, path traced by Cycles: the independent truth for the `obstacle` example.
 
-    blender -b --factory-startup -t 2 --python blend_examples/cycles_slab.py -- blend_examples/cycles_edge.csv [--seconds 3600]
+    blender -b --factory-startup --python blend_examples/cycles_slab.py -- blend_examples/cycles_edge.csv --seconds 3600
 
 The medium is the paper's (Henyey-Greenstein g = 0.8, single-scattering albedo R G B = 0.6 0.9 0.3, index-matched), as a
 box so wide and thick that its ends cannot be seen (see SLAB). A sun at 55 degrees shines along +u. A black sheet
@@ -9,10 +9,10 @@ hangs one mean free path above the surface and shades one half of it with a shar
     direction "toward": lit where u < 0, so the light travels towards the shadow (the foot of the obstacle);
     direction "away":   lit where u > 0, so it travels away from the shadow (the far end of the obstacle's shadow).
 
-Exitance is measured by a "ghost": a white diffuse sheet just above the surface, facing it, that only glossy rays can see.
-Nothing in the scene is glossy, so it blocks nothing, and its baked diffuse pass is exitance / pi. The picture does
+Exitance is measured by a "ghost": a white diffuse sheet just above the surface, facing it, that only glossy rays can
+see. Nothing in the scene is glossy, so it blocks nothing, and its baked diffuse pass is exitance / pi. The picture does
 not change along the border, so texels along v are averaged. Runs with different seeds give the standard errors;
-`--resume FILE.npz` keeps the sums between calls.
+`--resume FILE.npz` keeps them between calls.
 """
 
 import argparse
@@ -33,8 +33,8 @@ IRRADIANCE = math.cos(math.radians(ANGLE_DEG))  # of a sun of strength 1 W/m^2
 # In mean free paths (1 m here). Light of albedo 0.9 falls by e in about 3.4 mean free paths, so 25 down and up again,
 # or 200 sideways, is nothing.
 SLAB_WIDTH, SLAB_DEPTH = 400.0, 25.0
-HALF_RANGE = 24.0  # the profile runs from -HALF_RANGE to +HALF_RANGE
-BINS, ROWS = 192, 8
+HALF_RANGE = 18.0  # the profile runs from -HALF_RANGE to +HALF_RANGE
+BINS, ROWS = 144, 8
 SHEET_HEIGHT = 1.0
 GHOST_HEIGHT = 1e-4
 
@@ -78,6 +78,7 @@ def diffuse_nodes(colour):
         bsdf = nodes.new("ShaderNodeBsdfDiffuse")
         bsdf.inputs["Color"].default_value = (colour, colour, colour, 1.0)
         links.new(bsdf.outputs[0], output.inputs["Surface"])
+
     return build
 
 
@@ -107,9 +108,11 @@ def add_sheet():
 
 
 def add_ghost():
+    # One triangle holds the whole texture: Cycles mirrors samples of a texel that leave the triangle of its centre,
+    # which in texels that a quad's diagonal crosses moves them far along u.
     half_v = HALF_RANGE * ROWS / BINS
-    corners = [(-HALF_RANGE, -half_v, 0), (-HALF_RANGE, half_v, 0), (HALF_RANGE, half_v, 0), (HALF_RANGE, -half_v, 0)]
-    ghost = mesh_object("Ghost", corners, [(0, 1, 2, 3)], [(0, 0), (0, 1), (1, 1), (1, 0)])  # normal down
+    corners = [(-HALF_RANGE, -half_v, 0), (-HALF_RANGE, 3 * half_v, 0), (3 * HALF_RANGE, -half_v, 0)]  # normal down
+    ghost = mesh_object("Ghost", corners, [(0, 1, 2)], [(0, 0), (0, 2), (2, 0)])
     ghost.location.z = GHOST_HEIGHT
     ghost.visible_camera = ghost.visible_diffuse = ghost.visible_transmission = False
     ghost.visible_volume_scatter = ghost.visible_shadow = False
@@ -137,8 +140,14 @@ def set_up_cycles(samples):
     cycles.use_denoising = False
     cycles.use_adaptive_sampling = False
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
-    for name in ("max_bounces", "diffuse_bounces", "glossy_bounces", "transmission_bounces", "volume_bounces",
-                 "transparent_max_bounces"):
+    for name in (
+        "max_bounces",
+        "diffuse_bounces",
+        "glossy_bounces",
+        "transmission_bounces",
+        "volume_bounces",
+        "transparent_max_bounces",
+    ):
         setattr(cycles, name, 1024)
 
 
@@ -163,7 +172,7 @@ def write_csv(path, runs, samples, command):
         "# toward: lit where u < 0; away: lit where u > 0. u in mean free paths, bins of "
         f"{2 * HALF_RANGE / BINS} around u_mfp.",
         "# r g b: luminance over irradiance at lit places, L / E in 1/sr; *_se: standard error of the mean.",
-        f"# Samples per bin: {total}; in {({k: len(v) for k, v in runs.items()})} runs.",
+        f"# Samples per bin: {total}; in { ({k: len(v) for k, v in runs.items()}) } runs.",
         "direction,u_mfp,r,g,b,r_se,g_se,b_se",
     ]
     for name, profiles in runs.items():
@@ -180,7 +189,7 @@ def write_csv(path, runs, samples, command):
 
 
 def main():
-    arguments = sys.argv[sys.argv.index("--") + 1:]
+    arguments = sys.argv[sys.argv.index("--") + 1 :]
     parser = argparse.ArgumentParser(prog="cycles_slab.py")
     parser.add_argument("csv")
     parser.add_argument("--seconds", type=float, default=3600.0, help="stop after this time")

@@ -36,8 +36,12 @@ def laser_beams():
     distance, cone_deg, watts = 0.4, 1.0, 400.0
     parts.spot_lamp("White", (0, 0, 0), Vector((0, 0, -1)), distance, cone_deg, watts, (1, 1, 1))
     around = [
-        ("Red", (1, 0, 0)), ("Magenta", (1, 0, 1)), ("Blue", (0, 0, 1)),
-        ("Cyan", (0, 1, 1)), ("Green", (0, 1, 0)), ("Yellow", (1, 1, 0)),
+        ("Red", (1, 0, 0)),
+        ("Magenta", (1, 0, 1)),
+        ("Blue", (0, 0, 1)),
+        ("Cyan", (0, 1, 1)),
+        ("Green", (0, 1, 0)),
+        ("Yellow", (1, 1, 0)),
     ]
     for index, (name, color) in enumerate(around):
         azimuth_deg, angle_deg = 60.0 * index, (45.0, 55.0)[index % 2]

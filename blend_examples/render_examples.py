@@ -26,7 +26,7 @@ def show(bake):
 
 
 def main():
-    report, folder = sys.argv[sys.argv.index("--") + 1:]
+    report, folder = sys.argv[sys.argv.index("--") + 1 :]
     beamspread.register()
     try:
         bakes = json.loads(Path(report).read_text(encoding="utf-8"))["bakes"]

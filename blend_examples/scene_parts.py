@@ -98,7 +98,12 @@ def glowing_material(name, color, glow, strength):
 def plane(name, width, depth, material, center=(0.0, 0.0)):
     """A horizontal rectangle whose UV map runs over the whole texture, u along x and v along y."""
     (x, y), half_x, half_y = center, width / 2, depth / 2
-    corners = [(x - half_x, y - half_y, 0), (x + half_x, y - half_y, 0), (x + half_x, y + half_y, 0), (x - half_x, y + half_y, 0)]
+    corners = [
+        (x - half_x, y - half_y, 0),
+        (x + half_x, y - half_y, 0),
+        (x + half_x, y + half_y, 0),
+        (x - half_x, y + half_y, 0),
+    ]
     obj = mesh_object(name, corners, [(0, 1, 2, 3)], material)
     layer = obj.data.uv_layers.new(name="UVMap")
     for loop, uv in zip(layer.data, [(0, 0), (1, 0), (1, 1), (0, 1)]):
@@ -144,7 +149,8 @@ def lathe(name, profile, material, location, scale=1.0):
 
 
 def rounded(points, steps=6):
-    """Points of a Catmull-Rom curve through `points`; a point given twice stays a corner."""
+    """(radius, height) along a Catmull-Rom curve through `points`, "radius,height ..."; one given twice is a corner."""
+    points = [tuple(float(number) for number in point.split(",")) for point in points.split()]
     result = [points[0]]
     for index in range(len(points) - 1):
         p1, p2 = points[index], points[index + 1]
@@ -154,9 +160,12 @@ def rounded(points, steps=6):
         p3 = points[index + 2] if index + 2 < len(points) and points[index + 2] != p2 else p2
         for step in range(1, steps + 1):
             t = step / steps
-            result.append(tuple(
-                0.5 * (2 * b + (c - a) * t + (2 * a - 5 * b + 4 * c - d) * t**2 + (3 * b - 3 * c + d - a) * t**3)
-                for a, b, c, d in zip(p0, p1, p2, p3)))
+            result.append(
+                tuple(
+                    0.5 * (2 * b + (c - a) * t + (2 * a - 5 * b + 4 * c - d) * t**2 + (3 * b - 3 * c + d - a) * t**3)
+                    for a, b, c, d in zip(p0, p1, p2, p3)
+                )
+            )
     return [(max(radius, 0.0), height) for radius, height in result]
 
 
@@ -210,13 +219,15 @@ def camera(location, target, lens=50.0, roll_deg=0.0):
     obj.location = location
     aim(obj, Vector(target) - Vector(location))
     if roll_deg:
-        obj.rotation_euler = (obj.rotation_euler.to_matrix() @ Matrix.Rotation(math.radians(roll_deg), 3, "Z")).to_euler()
+        obj.rotation_euler = (
+            obj.rotation_euler.to_matrix() @ Matrix.Rotation(math.radians(roll_deg), 3, "Z")
+        ).to_euler()
     bpy.context.scene.camera = obj
     return obj
 
 
 def scale_scene(factor):
-    """Make everything smaller or larger around the origin, lamps of position with the power that keeps them as bright."""
+    """Make everything smaller or larger around the origin, and keep what point and spot lamps light as bright."""
     bpy.context.view_layer.update()
     for obj in bpy.context.scene.objects:
         obj.location *= factor
