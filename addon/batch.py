@@ -201,6 +201,8 @@ def main() -> int:
     """Run as a script; the exit code."""
     import bpy
 
+    # `python batch.py` makes this folder the first place to look for any module, such as one named "settings".
+    sys.path[:] = [place for place in sys.path if Path(place or ".").resolve() != PACKAGE_FOLDER]
     try:
         package = load_package()
         inside_blender = bool(bpy.app.binary_path)

@@ -32,7 +32,7 @@ def warnings_for(obj, visible: set[str]) -> list[str]:
 
 
 # Of a panel beside its text, and of a letter on average, at a user-interface scale of 1.
-BORDER_PIXELS, LETTER_PIXELS = 65, 6.8
+BORDER_PIXELS, LETTER_PIXELS = 60, 6.4
 
 
 def draw_warnings(layout, context, messages: list[str]) -> None:
