@@ -151,7 +151,7 @@ def assert_agree(plane, image, least_lit=0.1):
     lit = whole & (strength > 0.01 * strength.max()) & ~near_a_border(strength)
     assert lit.sum() > least_lit * whole.sum()
     np.testing.assert_allclose(cycles[lit], ours[lit], rtol=TOLERANCE)
-    # Borders too, although a texel there depends on where Cycles happened to sample it.
+    # Borders too, although Cycles weighs a texel there by its pixel filter and we by area.
     assert np.abs(cycles - ours)[whole].sum() < 0.015 * ours[whole].sum()
     np.testing.assert_allclose(cycles[whole].sum(axis=0), ours[whole].sum(axis=0), rtol=3e-3)
     dark = whole & (strength == 0) & ~near_a_border(strength)
