@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 MAGIC = 20000630
 HALF, FLOAT = 1, 2
 DTYPES = {0: "<u4", HALF: "<f2", FLOAT: "<f4"}
-MULTI_PART = 0x1000
+TILED, DEEP, MULTI_PART = 0x200, 0x800, 0x1000
 
 
 def image(height=5, width=7, channels=3, seed=0):
@@ -309,6 +309,35 @@ def test_hostile_headers_are_refused_before_memory_is_taken(tmp_path, options, r
     options = {"channels": [("Y", FLOAT)]} | options
     path.write_bytes(struct.pack("<ii", MAGIC, 2) + header(**options) + bytes(400_000))
     with pytest.raises(OSError, match=reason):
+        native.read_exr(str(path))
+
+
+def test_reads_tiles(tmp_path):
+    path = tmp_path / "a.exr"
+    values = image(3, 5, 1)
+    tiles = attribute("tiles", "tiledesc", struct.pack("<IIB", 4, 4, 0))
+    start = struct.pack("<ii", MAGIC, 2 | TILED) + header(5, 3, [("Y", FLOAT)], extra=tiles)
+    chunks = [
+        struct.pack("<5i", x, 0, 0, 0, part.nbytes) + part.tobytes()
+        for x, part in enumerate((values[:, :4], values[:, 4:]))
+    ]
+    offsets = len(start) + 16, len(start) + 16 + len(chunks[0])
+    path.write_bytes(start + struct.pack("<2q", *offsets) + b"".join(chunks))
+    np.testing.assert_array_equal(native.read_exr(str(path))[0][::-1], values)
+
+    huge = start.replace(struct.pack("<II", 4, 4), struct.pack("<II", 1 << 20, 1 << 20))
+    path.write_bytes(huge + struct.pack("<q", len(huge) + 8) + b"".join(chunks))
+    with pytest.raises(OSError, match="tiles are larger"):
+        native.read_exr(str(path))
+
+
+def test_deep_data_is_refused(tmp_path):
+    path = tmp_path / "a.exr"
+    kind = attribute("type", "string", b"deepscanline") + attribute("name", "string", b"deep")
+    kind += attribute("version", "int", b"\1\0\0\0") + attribute("chunkCount", "int", b"\2\0\0\0")
+    content = struct.pack("<ii", MAGIC, 2 | DEEP) + header(2, 2, [("Y", FLOAT)], extra=kind)
+    path.write_bytes(content + struct.pack("<2q", len(content) + 16, len(content) + 16) + bytes(100))
+    with pytest.raises(OSError, match="deep data"):
         native.read_exr(str(path))
 
 
