@@ -32,7 +32,7 @@ def light_casts_shadow(light) -> bool:
 
 def spot_falloff() -> str:
     """How Cycles shapes a spot's cone (see native/scene/lights.h)."""
-    return "scaled" if bpy.app.version >= (4, 0, 0) else "legacy"
+    return "scaled" if bpy.app.version >= (3, 5, 0) else "legacy"
 
 
 def light_strength(light) -> float:

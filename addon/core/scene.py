@@ -81,7 +81,7 @@ class SpotLight:
     frame : rows are the lamp's x, y and z axes (light travels along -z), object scale included.
     spot_size : full cone angle, radians.
     blend : soft part of the cone, 0..1.
-    falloff : "scaled", or "legacy" for Cycles before Blender 4.0, where the lamp's scale does not shape the cone.
+    falloff : "scaled", or "legacy" for Cycles before Blender 3.5, where the lamp's scale does not shape the cone.
     """
 
     name: str
