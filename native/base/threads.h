@@ -6,15 +6,17 @@
 
 namespace beamspread {
 
-// Calls body(0) .. body(count - 1) on up to `threads` threads (0: all), the calling one among them.
-// An exception in a body stops the loop and is rethrown here.
-void parallel_for(std::size_t count, int threads, const std::function<void(std::size_t)>& body);
+// Calls body() on this thread; parallel loops inside it use up to `threads` threads (0: all), this one among
+// them. Once around a whole job: setting the threads up costs more than a short loop.
+void with_threads(int threads, const std::function<void()>& body);
 
-// Calls make(i) on up to `threads` threads and use(i, result) one at a time in the order of i, so
-// that sums come out the same, bit for bit, for any number of threads. At most a few results exist
-// at once.
+// Calls body(0) .. body(count - 1). An exception in a body stops the loop and is rethrown here.
+void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body);
+
+// Calls make(i) in parallel and use(i, result) one at a time in the order of i, so that sums come out
+// the same, bit for bit, for any number of threads. At most a few results exist at once.
 template <class Result>
-void parallel_ordered(std::size_t count, int threads, const std::function<Result(std::size_t)>& make,
+void parallel_ordered(std::size_t count, const std::function<Result(std::size_t)>& make,
                       const std::function<void(std::size_t, Result)>& use);
 
 }  // namespace beamspread

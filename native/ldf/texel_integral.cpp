@@ -104,7 +104,7 @@ BorderIntegral vertical(const RadialProfile& profile, Radial radial, double x, d
 
 }  // namespace
 
-TexelIntegrals integrate_texels(const RadialProfile& profile, const TexelGrid& grid, int threads)
+TexelIntegrals integrate_texels(const RadialProfile& profile, const TexelGrid& grid)
 {
     const std::size_t texels = grid.width * grid.height;
     TexelIntegrals out(texels);
@@ -124,7 +124,7 @@ TexelIntegrals integrate_texels(const RadialProfile& profile, const TexelGrid& g
 
     constexpr std::size_t rows_per_block = 16;
     const std::size_t blocks = (grid.height + rows_per_block - 1) / rows_per_block;
-    parallel_for(blocks, threads, [&](std::size_t block) {
+    parallel_for(blocks, [&](std::size_t block) {
         const std::size_t first = block * rows_per_block;
         const std::size_t last = std::min(grid.height, first + rows_per_block);
         const auto horizontal_borders = [&](std::size_t i) {

@@ -129,13 +129,14 @@ void compute_beams(const ReceiverGrid& grid, const Light& light, const Occluders
         [&](const auto& any_light) {
             const Gatherer gatherer(grid, any_light, occluders, settings);
             const std::size_t blocks = (grid.height + rows_per_block - 1) / rows_per_block;
-            parallel_for(blocks, settings.threads, [&](std::size_t block) {
+            const auto gather_block = [&](std::size_t block) {
                 const std::size_t begin = block * rows_per_block;
                 const std::size_t end = std::min(begin + rows_per_block, grid.height);
                 for (std::size_t y = begin; y < end; ++y)
                     gatherer.gather_row(y, beams);
                 progress.advance(static_cast<double>(end - begin));
-            });
+            };
+            with_threads(settings.threads, [&] { parallel_for(blocks, gather_block); });
         },
         light);
     progress.finish();

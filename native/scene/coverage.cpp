@@ -156,7 +156,7 @@ void compute_coverage(std::span<const Vec2> corners, std::span<const std::uint32
 {
     const std::vector<Polygon> polygons = split(corners, corner_counts);
     const std::size_t bands = (coverage.height + rows_per_band - 1) / rows_per_band;
-    parallel_for(bands, threads, [&](std::size_t index) {
+    const auto fill_band = [&](std::size_t index) {
         const std::size_t first = index * rows_per_band;
         const std::size_t rows = std::min(rows_per_band, coverage.height - first);
         Band band(first, rows, coverage.width);
@@ -168,7 +168,8 @@ void compute_coverage(std::span<const Vec2> corners, std::span<const std::uint32
         }
         for (std::size_t row = 0; row < rows; ++row)
             band.sum_row(row, coverage.row(first + row));
-    });
+    };
+    with_threads(threads, [&] { parallel_for(bands, fill_band); });
 }
 
 }  // namespace beamspread

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "base/constants.h"
@@ -52,21 +53,30 @@ std::vector<double> lagrange_weights(const std::vector<double>& nodes, double x)
     return weights;
 }
 
-// L1 distance of two profiles over radius bins and harmonics, relative to the first one's power.
+// Upper bounds of the L1 norm of each harmonic, relative to the profile's power: the radial integral of |c_m|
+// over bins, times that of |cos(m phi)|.
+Harmonics relative_norms(const RadialProfile& profile, double power)
+{
+    Harmonics norms{};
+    Harmonics previous{};
+    for (std::size_t k = 0; k < radius_bin_count; ++k) {
+        const Harmonics cumulative = profile.cumulative(radius_bin_edge(k));
+        for (std::size_t m = 0; m < harmonic_count; ++m)
+            norms[m] += (m == 0 ? 2.0 * pi : 4.0) * std::abs(cumulative[m] - previous[m]);
+        previous = cumulative;
+    }
+    for (double& norm : norms)
+        norm = power > 0.0 ? norm / power : 0.0;
+    return norms;
+}
+
+// L1 distance of two profiles, relative to the first one's power.
 double distance(const RadialProfile& a, const RadialProfile& b)
 {
-    double sum = 0.0;
-    Harmonics previous_a{};
-    Harmonics previous_b{};
-    for (std::size_t k = 0; k < radius_bin_count; ++k) {
-        const Harmonics ca = a.cumulative(radius_bin_edge(k));
-        const Harmonics cb = b.cumulative(radius_bin_edge(k));
-        for (std::size_t m = 0; m < harmonic_count; ++m)
-            sum += (m == 0 ? 2.0 * pi : 4.0) * std::abs((ca[m] - previous_a[m]) - (cb[m] - previous_b[m]));
-        previous_a = ca;
-        previous_b = cb;
-    }
-    return a.total() > 0.0 ? sum / a.total() : 0.0;
+    RadialProfile difference = a;
+    difference.add(b, -1.0, -1.0);
+    const Harmonics norms = relative_norms(difference, a.total());
+    return std::accumulate(norms.begin(), norms.end(), 0.0);
 }
 
 RadialProfile combine(const std::vector<RadialProfile>& nodes, const std::vector<double>& weights)
@@ -95,6 +105,27 @@ Vec3 direction_at(const Problem& problem, std::size_t y, std::size_t x)
         return problem.directions.uniform;
     const float* d = problem.directions.field + 3 * (y * problem.width + x);
     return Vec3(d[0], d[1], d[2]);
+}
+
+std::vector<std::size_t> needed_harmonics(const std::vector<RadialProfile>& profiles, double tolerance)
+{
+    Harmonics strongest{};
+    for (const RadialProfile& profile : profiles) {
+        const Harmonics norms = relative_norms(profile, profile.total());
+        for (std::size_t m = 0; m < harmonic_count; ++m)
+            strongest[m] = std::max(strongest[m], norms[m]);
+    }
+    std::vector<std::size_t> weakest_first(harmonic_count);
+    std::iota(weakest_first.begin(), weakest_first.end(), std::size_t{0});
+    std::sort(weakest_first.begin(), weakest_first.end(),
+              [&](std::size_t a, std::size_t b) { return strongest[a] < strongest[b]; });
+    double left_out = 0.0;
+    std::size_t count = 0;
+    while (count < harmonic_count && left_out + strongest[weakest_first[count]] < tolerance)
+        left_out += strongest[weakest_first[count++]];
+    std::vector<std::size_t> needed(weakest_first.begin() + static_cast<std::ptrdiff_t>(count), weakest_first.end());
+    std::sort(needed.begin(), needed.end());
+    return needed;
 }
 
 BeamBasis BeamBasis::uniform(const Problem& problem)
@@ -168,8 +199,7 @@ QuadrantKernel::QuadrantKernel(const RadialProfile& profile, const Problem& prob
 {
     const double px = problem.pitch_x / channel.mean_free_path;
     const double py = problem.pitch_y / channel.mean_free_path;
-    m_integrals =
-        integrate_texels(profile, {-0.5 * px, -0.5 * py, px, py, problem.width, problem.height}, problem.threads);
+    m_integrals = integrate_texels(profile, {-0.5 * px, -0.5 * py, px, py, problem.width, problem.height});
 }
 
 void QuadrantKernel::row(std::ptrdiff_t dy, const Harmonics& cosine, const Harmonics& sine,

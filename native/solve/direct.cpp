@@ -92,14 +92,14 @@ std::vector<float> solve_channel(const Problem& problem, const Channel& channel,
     const auto height = static_cast<std::ptrdiff_t>(problem.height);
     // rows[(dy + height - 1) * terms + k][dx + width - 1]
     std::vector<KernelRow> rows(static_cast<std::size_t>(2 * height - 1) * terms.size());
-    parallel_for(rows.size(), problem.threads, [&](std::size_t i) {
+    parallel_for(rows.size(), [&](std::size_t i) {
         const Term& term = terms[i % terms.size()];
         const std::ptrdiff_t dy = static_cast<std::ptrdiff_t>(i / terms.size()) - (height - 1);
         kernels[term.node].row(dy, term.cosine, term.sine, rows[i]);
     });
 
     std::vector<std::vector<Beam>> beams(problem.height);
-    parallel_for(problem.height, problem.threads, [&](std::size_t y) {
+    parallel_for(problem.height, [&](std::size_t y) {
         for (std::size_t x = 0; x < problem.width; ++x) {
             const auto irradiance = static_cast<double>(channel.irradiance(y, x));
             if (irradiance == 0.0)
@@ -112,7 +112,7 @@ std::vector<float> solve_channel(const Problem& problem, const Channel& channel,
     });
 
     std::vector<float> luminance(problem.width * problem.height);
-    parallel_for(problem.height, problem.threads, [&](std::size_t target) {
+    parallel_for(problem.height, [&](std::size_t target) {
         std::vector<double> sum(problem.width, 0.0);
         for (std::size_t source = 0; source < problem.height; ++source) {
             const std::size_t offset = (target + problem.height - 1 - source) * terms.size();
@@ -136,8 +136,10 @@ Luminance solve_direct(const Problem& problem, Progress& progress)
     validate(problem);
     progress.set_total(static_cast<double>(problem.height * problem.channels.size()));
     Luminance luminance;
-    for (const Channel& channel : problem.channels)
-        luminance.push_back(solve_channel(problem, channel, progress));
+    with_threads(problem.threads, [&] {
+        for (const Channel& channel : problem.channels)
+            luminance.push_back(solve_channel(problem, channel, progress));
+    });
     progress.finish();
     return luminance;
 }

@@ -17,17 +17,16 @@ std::size_t item_count(std::size_t lines)
 }
 }  // namespace
 
-RealTransform::RealTransform(std::size_t min_height, std::size_t min_width, int threads)
+RealTransform::RealTransform(std::size_t min_height, std::size_t min_width)
     : m_height(ducc0::good_size_complex(min_height)),
       m_width(ducc0::good_size_real(min_width)),
-      m_half_width(m_width / 2 + 1),
-      m_threads(threads)
+      m_half_width(m_width / 2 + 1)
 {
 }
 
 void RealTransform::transform_columns(Spectrum& spectrum, bool forward) const
 {
-    parallel_for(item_count(m_half_width), m_threads, [&](std::size_t item) {
+    parallel_for(item_count(m_half_width), [&](std::size_t item) {
         const std::size_t first = item * lines_per_item;
         const std::size_t count = std::min(lines_per_item, m_half_width - first);
         const ducc0::vfmav<std::complex<double>> columns(spectrum.data() + first, {m_height, count},
@@ -39,7 +38,7 @@ void RealTransform::transform_columns(Spectrum& spectrum, bool forward) const
 Spectrum RealTransform::forward(const std::vector<double>& values) const
 {
     Spectrum spectrum(m_height * m_half_width);
-    parallel_for(item_count(m_height), m_threads, [&](std::size_t item) {
+    parallel_for(item_count(m_height), [&](std::size_t item) {
         const std::size_t first = item * lines_per_item;
         const std::size_t count = std::min(lines_per_item, m_height - first);
         const double* begin = values.data() + first * m_width;
@@ -59,7 +58,7 @@ std::vector<double> RealTransform::inverse(Spectrum& spectrum) const
     transform_columns(spectrum, false);
     std::vector<double> values(m_height * m_width);
     const double scale = 1.0 / (static_cast<double>(m_height) * static_cast<double>(m_width));
-    parallel_for(item_count(m_height), m_threads, [&](std::size_t item) {
+    parallel_for(item_count(m_height), [&](std::size_t item) {
         const std::size_t first = item * lines_per_item;
         const std::size_t count = std::min(lines_per_item, m_height - first);
         const ducc0::cfmav<std::complex<double>> rows(spectrum.data() + first * m_half_width, {count, m_half_width});

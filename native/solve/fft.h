@@ -14,7 +14,7 @@ using Spectrum = std::vector<std::complex<double>>;
 class RealTransform {
 public:
     // The smallest fast size of at least the given one.
-    RealTransform(std::size_t min_height, std::size_t min_width, int threads);
+    RealTransform(std::size_t min_height, std::size_t min_width);
 
     std::size_t height() const { return m_height; }
     std::size_t width() const { return m_width; }
@@ -30,7 +30,6 @@ private:
     std::size_t m_height;
     std::size_t m_width;
     std::size_t m_half_width;
-    int m_threads;
 };
 
 }  // namespace beamspread

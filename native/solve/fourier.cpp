@@ -32,7 +32,7 @@ public:
         : m_problem(problem),
           m_progress(progress),
           // Twice the size, less one: light that leaves on one side does not come back on the other.
-          m_transform(2 * problem.height - 1, 2 * problem.width - 1, problem.threads),
+          m_transform(2 * problem.height - 1, 2 * problem.width - 1),
           m_sums(problem.channels.size(), Spectrum())
     {
     }
@@ -83,10 +83,13 @@ private:
     {
         const BeamBasis basis = group_basis(group);
         std::vector<std::vector<QuadrantKernel>> kernels(group.size());
+        std::vector<RadialProfile> all_profiles;
         for (std::size_t g = 0; g < group.size(); ++g) {
             const Channel& channel = m_problem.channels[group[g]];
-            for (const RadialProfile& profile : basis.profiles(channel))
+            for (const RadialProfile& profile : basis.profiles(channel)) {
                 kernels[g].emplace_back(profile, m_problem, channel);
+                all_profiles.push_back(profile);
+            }
             m_sums[group[g]].assign(m_transform.height() * (m_transform.width() / 2 + 1), {});
         }
         const Channel& beams = m_problem.channels[group.front()];
@@ -107,9 +110,10 @@ private:
         }
 
         const BeamWeights weights = beam_weights(beams, basis);
-        const double share = 1.0 / static_cast<double>(basis.node_count() * (2 * harmonic_count - 1));
+        const std::vector<std::size_t> harmonics = needed_harmonics(all_profiles, m_problem.tolerance);
+        const double share = 1.0 / static_cast<double>(basis.node_count() * 2 * harmonics.size());
         for (std::size_t node = 0; node < basis.node_count(); ++node) {
-            for (std::size_t m = 0; m < harmonic_count; ++m) {
+            for (const std::size_t m : harmonics) {
                 for (Phase phase : {Phase::cosine, Phase::sine}) {
                     if (m == 0 && phase == Phase::sine)
                         continue;
@@ -137,7 +141,7 @@ private:
         const std::size_t texels = m_problem.width * m_problem.height;
         BeamWeights result{std::vector<float>(basis.node_count() * texels),
                            std::vector<float>(basis.node_count() * texels), std::vector<float>(texels)};
-        parallel_for(m_problem.height, m_problem.threads, [&](std::size_t y) {
+        parallel_for(m_problem.height, [&](std::size_t y) {
             for (std::size_t x = 0; x < m_problem.width; ++x) {
                 if (beams.irradiance(y, x) == 0.0f)
                     continue;
@@ -169,7 +173,7 @@ private:
         const std::vector<float>& by_node = term.m % 2 == 0 ? weights.even : weights.odd;
         const auto m = static_cast<double>(term.m);
         std::vector<double> padded = pad_irradiance(beams);
-        parallel_for(m_problem.height, m_problem.threads, [&](std::size_t y) {
+        parallel_for(m_problem.height, [&](std::size_t y) {
             for (std::size_t x = 0; x < m_problem.width; ++x) {
                 double& value = padded[y * m_transform.width() + x];
                 if (value == 0.0)
@@ -188,7 +192,7 @@ private:
         const auto height = static_cast<std::ptrdiff_t>(m_problem.height);
         const auto padded_height = static_cast<std::ptrdiff_t>(m_transform.height());
         std::vector<double> padded(m_transform.height() * m_transform.width(), 0.0);
-        parallel_for(2 * m_problem.height - 1, m_problem.threads, [&](std::size_t i) {
+        parallel_for(2 * m_problem.height - 1, [&](std::size_t i) {
             const std::ptrdiff_t dy = static_cast<std::ptrdiff_t>(i) - (height - 1);
             std::vector<double> values;
             kernel.row(dy, cosine, sine, values);
@@ -205,7 +209,7 @@ private:
     void accumulate(Spectrum& sum, const Spectrum& light, const Spectrum& kernel) const
     {
         const std::size_t columns = sum.size() / m_transform.height();
-        parallel_for(m_transform.height(), m_problem.threads, [&](std::size_t row) {
+        parallel_for(m_transform.height(), [&](std::size_t row) {
             for (std::size_t i = row * columns; i < (row + 1) * columns; ++i) {
                 // The textbook product: std::complex's own handles infinities at ten times the cost.
                 const auto a = light[i];
@@ -236,7 +240,9 @@ private:
 Luminance solve_fft(const Problem& problem, Progress& progress)
 {
     validate(problem);
-    return Solver(problem, progress).solve();
+    Luminance luminance;
+    with_threads(problem.threads, [&] { luminance = Solver(problem, progress).solve(); });
+    return luminance;
 }
 
 }  // namespace beamspread

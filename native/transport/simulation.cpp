@@ -123,7 +123,8 @@ std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> 
         if (batch + 1 == batch_count)
             results.push_back(normalized(angles_deg[item / batch_count], sums, total_photons));
     };
-    parallel_ordered<SideTallies>(angles_deg.size() * batch_count, threads, walk_batch, merge_batch);
+    with_threads(threads,
+                 [&] { parallel_ordered<SideTallies>(angles_deg.size() * batch_count, walk_batch, merge_batch); });
     progress.finish();
     return results;
 }
