@@ -270,8 +270,8 @@ def point_beams(
     progress : callable, optional
         progress(fraction) returns False to stop.
     clearance : float
-        How far off the plane shadow rays start, in metres, if that is more than rounding needs: as far as the receiver's own
-        faces, where they are among the occluders, depart from the plane.
+        How far off the plane shadow rays start, in metres, besides what rounding needs: as far as the receiver's own faces,
+        where they are among the occluders, depart from the plane.
 
     Returns
     -------
@@ -400,8 +400,8 @@ def spot_beams(
     progress : callable, optional
         progress(fraction) returns False to stop.
     clearance : float
-        How far off the plane shadow rays start, in metres, if that is more than rounding needs: as far as the receiver's own
-        faces, where they are among the occluders, depart from the plane.
+        How far off the plane shadow rays start, in metres, besides what rounding needs: as far as the receiver's own faces,
+        where they are among the occluders, depart from the plane.
     falloff : str
         "scaled": as Cycles in Blender 4.2, 4.5 and 5.0, where the lamp's scale shapes the cone. "legacy": as in 3.4, where
         it does not, and light falls off with the cosine to the axis besides.
@@ -463,8 +463,8 @@ def sun_beams(
     progress : callable, optional
         progress(fraction) returns False to stop.
     clearance : float
-        How far off the plane shadow rays start, in metres, if that is more than rounding needs: as far as the receiver's own
-        faces, where they are among the occluders, depart from the plane.
+        How far off the plane shadow rays start, in metres, besides what rounding needs: as far as the receiver's own faces,
+        where they are among the occluders, depart from the plane.
 
     Returns
     -------

@@ -79,9 +79,10 @@ def bake(
     caster = native.Occluders(occluders.vertices, occluders.triangles) if len(occluders.triangles) else None
     luminance = np.zeros((grid.height, grid.width, 3), np.float32)
     for light, beams_progress, solve_progress in zip(lights, light_progress[::2], light_progress[1::2]):
-        irradiance, direction = light_beams(grid, light, caster, settings, beams_progress)
-        if irradiance.any():
-            luminance += _spread(irradiance, direction, libraries, material, grid, settings, solve_progress)
+        beams, direction, strength = unit_beams(grid, light, caster, settings, beams_progress)
+        if beams.any() and any(strength):
+            # The light's colour comes last, so that the channels share the work on its beams.
+            luminance += strength * _spread(beams, direction, libraries, material, grid, settings, solve_progress)
     return luminance
 
 
@@ -109,11 +110,24 @@ def light_beams(
     The direction is a unit vector in the plane frame: (3,) for a sun, (H, W, 3) otherwise. `occluders` is a native
     `Occluders` or None.
     """
+    beams, direction, strength = unit_beams(grid, light, occluders, settings, progress)
+    return beams[..., None] * strength, direction
+
+
+def unit_beams(
+    grid: Grid, light: Light, occluders, settings: BakeSettings, progress: Progress | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Irradiance (H, W) of the light at strength 1, direction as `light_beams` says, and strength times colour (3,)."""
     from .._load import native
 
     numbers = (grid.origin, grid.x_axis, grid.y_axis, grid.normal, grid.pitch_x, grid.pitch_y, grid.width, grid.height)
     caster = occluders if light.cast_shadow else None
-    options = {"samples": settings.samples, "threads": settings.threads, "progress": progress}
+    options = {
+        "samples": settings.samples,
+        "threads": settings.threads,
+        "progress": progress,
+        "clearance": grid.clearance,
+    }
     if isinstance(light, SunLight):
         direction = grid.to_plane_frame(light.direction)
         irradiance = native.sun_beams(*numbers, light.direction, caster, **options)
@@ -129,8 +143,7 @@ def light_beams(
         strength = light.power
     else:
         raise TypeError(f"light is a {type(light).__name__}; it must be a SunLight, PointLight or SpotLight")
-    color = np.asarray(light.color, np.float32) * np.float32(strength)
-    return (irradiance * grid.coverage)[..., None] * color, direction
+    return irradiance * grid.coverage, direction, np.asarray(light.color, np.float32) * np.float32(strength)
 
 
 def _libraries(material: Material, thickness: float, quality: str, progress: Progress | None) -> list:

@@ -46,12 +46,13 @@ class Polygons:
 
 @dataclass(frozen=True)
 class UvMap:
-    """P(u, v) = p_0 + u p_u + v p_v on the plane with the outward unit `normal`."""
+    """P(u, v) = p_0 + u p_u + v p_v on the plane with the outward unit `normal`; corners depart by `deviation`."""
 
     p_0: np.ndarray
     p_u: np.ndarray
     p_v: np.ndarray
     normal: np.ndarray
+    deviation: float
 
     def is_orthogonal(self) -> bool:
         """Whether texels are rectangles."""
@@ -165,7 +166,8 @@ def _fit_affine(corners: np.ndarray, uvs: np.ndarray, normal: np.ndarray, size: 
     p_u, p_v = slopes - np.outer(slopes @ normal, normal)
     if np.linalg.norm(np.cross(p_u, p_v)) < 1e-9 * np.linalg.norm(p_u) * np.linalg.norm(p_v):
         raise ReceiverError("The UV map has no area: unwrap the mesh again.")
-    return UvMap(centre - uv_centre @ slopes, p_u, p_v, normal)
+    deviation = float(np.abs((corners - centre) @ normal).max())
+    return UvMap(centre - uv_centre @ slopes, p_u, p_v, normal, deviation)
 
 
 def texture_size(uv_map: UvMap, resolution: int) -> tuple[int, int]:
@@ -203,7 +205,7 @@ def _texel_receiver(uv_map: UvMap, texels: np.ndarray, coverage: np.ndarray, axe
     last = np.clip(np.ceil(texels.max(axis=0) - EDGE_TOLERANCE), first + 1, [width, height]).astype(int)
     origin = uv_map.p_0 + first[0] / width * uv_map.p_u + first[1] / height * uv_map.p_v
     part = np.ascontiguousarray(coverage[first[1] : last[1], first[0] : last[0]])
-    grid = _grid(origin, axes, uv_map.normal, pitch, part)
+    grid = _grid(origin, axes, uv_map, pitch, part)
     return Receiver(grid, width, height, coverage, offset=(int(first[0]), int(first[1])))
 
 
@@ -218,13 +220,13 @@ def _sheared_receiver(polygons: Polygons, uv_map: UvMap, coverage: np.ndarray, a
     origin_in_plane = first * pitch
     centre = polygons.corners.mean(axis=0)
     origin = origin_in_plane @ frame + (centre @ uv_map.normal) * uv_map.normal
-    grid = _grid(origin, axes, uv_map.normal, pitch, grid_coverage)
+    grid = _grid(origin, axes, uv_map, pitch, grid_coverage)
     columns = [(frame @ uv_map.p_u) / pitch / width, (frame @ uv_map.p_v) / pitch / height]
     texel_to_grid = np.column_stack([*columns, frame @ uv_map.p_0 / pitch - first])
     return Receiver(grid, width, height, coverage, texel_to_grid=texel_to_grid)
 
 
-def _grid(origin: np.ndarray, axes, normal: np.ndarray, pitch: np.ndarray, coverage: np.ndarray) -> Grid:
+def _grid(origin: np.ndarray, axes, uv_map: UvMap, pitch: np.ndarray, coverage: np.ndarray) -> Grid:
     def vector(values):
         return tuple(float(value) for value in values)
 
@@ -233,12 +235,13 @@ def _grid(origin: np.ndarray, axes, normal: np.ndarray, pitch: np.ndarray, cover
         origin=vector(origin),
         x_axis=vector(axes[0]),
         y_axis=vector(axes[1]),
-        normal=vector(normal),
+        normal=vector(uv_map.normal),
         pitch_x=float(pitch[0]),
         pitch_y=float(pitch[1]),
         width=width,
         height=height,
         coverage=coverage,
+        clearance=uv_map.deviation,
     )
 
 

@@ -26,6 +26,7 @@ class Grid:
     pitch_x, pitch_y : texel size along the axes, scene units.
     width, height : number of texels.
     coverage : float32 (height, width), part of each texel inside the mesh, 0..1.
+    clearance : how far the mesh departs from the plane at most, scene units: shadow rays start above that.
     """
 
     origin: Vector
@@ -37,6 +38,7 @@ class Grid:
     width: int
     height: int
     coverage: np.ndarray
+    clearance: float = 0.0
 
     def to_plane_frame(self, direction: Vector) -> np.ndarray:
         """Turn a world direction into the plane frame (x along columns, y up the rows, z outward)."""

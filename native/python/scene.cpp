@@ -191,8 +191,8 @@ threads : int
 progress : callable, optional
     progress(fraction) returns False to stop.
 clearance : float
-    How far off the plane shadow rays start, in metres, if that is more than rounding needs: as far as the receiver's own
-    faces, where they are among the occluders, depart from the plane.
+    How far off the plane shadow rays start, in metres, besides what rounding needs: as far as the receiver's own faces,
+    where they are among the occluders, depart from the plane.
 )";
 
 constexpr const char* doc_raises = R"(

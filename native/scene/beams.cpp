@@ -23,7 +23,7 @@ constexpr double offset_ulps = 16.0;
 double ray_offset(const ReceiverGrid& grid, const Occluders* occluders, double clearance)
 {
     const double reach = std::max(grid.reach(), occluders ? occluders->reach() : 0.0);
-    return std::max(clearance, offset_ulps * static_cast<double>(std::numeric_limits<float>::epsilon()) * reach);
+    return clearance + offset_ulps * static_cast<double>(std::numeric_limits<float>::epsilon()) * reach;
 }
 
 // Sub-texel points in texels, n x n: one in each cell of an n x n grid and one in each of n^2 columns and n^2 rows, so

@@ -6,11 +6,12 @@ from dataclasses import replace
 import beamspread
 import numpy as np
 import pytest
-from beamspread.core.bake import BakeSettings, bake
+from beamspread._load import native
+from beamspread.core.bake import BakeSettings, bake, light_beams
 from beamspread.core.errors import MaterialError
 from beamspread.core.job import BakeJob, Surface
 from beamspread.core.material import Material
-from beamspread.core.receiver import Receiver
+from beamspread.core.receiver import Polygons, Receiver, build_receiver, fit_uv_map
 from beamspread.core.scene import Grid, Mesh, PointLight, SpotLight, SunLight
 
 SETTINGS = BakeSettings(quality="preview", samples=2, margin=0)
@@ -53,6 +54,20 @@ def test_lights_add_up_and_colours_stay_apart():
     assert both == pytest.approx(apart)
     assert not both[..., 1].any()
     assert both[12, 12, 0] > both[12, 12, 2] > 0
+
+
+def test_an_uneven_receiver_does_not_shadow_itself():
+    """Corners off the plane, but still taken for flat; a low sun, and the mesh itself among the occluders."""
+    bump = 3e-5
+    corners = np.array([(-0.5, -0.5, bump), (0.5, -0.5, -bump), (0.5, 0.5, bump), (-0.5, 0.5, -bump)])
+    uvs = corners[:, :2] + 0.5
+    polygons = Polygons(corners, uvs, np.array([0, 4]), np.array([(0.0, 0.0, 1.0)]))
+    receiver = build_receiver(polygons, fit_uv_map(polygons), 32, 32)
+    mesh = Mesh(corners.astype(np.float32), np.array([(0, 1, 2), (0, 2, 3)], np.uint32))
+    low_sun = replace(SUN, direction=(math.sin(1.5), 0.0, -math.cos(1.5)))
+    occluders = native.Occluders(mesh.vertices, mesh.triangles)
+    irradiance, _ = light_beams(receiver.grid, low_sun, occluders, SETTINGS)
+    assert irradiance == pytest.approx(np.full((32, 32, 3), 2 * math.cos(1.5)), rel=1e-3)
 
 
 def test_no_light():
