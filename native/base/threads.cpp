@@ -1,5 +1,7 @@
 #include "base/threads.h"
 
+#include <algorithm>
+
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_pipeline.h>
@@ -13,7 +15,9 @@ void with_threads(int threads, const std::function<void()>& body)
 {
     if (threads < 0)
         reject("threads", threads, "0 (all) or more");
-    tbb::task_arena arena(threads == 0 ? tbb::info::default_concurrency() : threads);
+    // More threads than cores gain nothing, and TBB would warn of them on the host's stderr.
+    const int cores = tbb::info::default_concurrency();
+    tbb::task_arena arena(threads == 0 ? cores : std::min(threads, cores));
     arena.execute(body);
 }
 

@@ -15,8 +15,8 @@ inline constexpr int max_beam_samples = 64;
 struct BeamSettings {
     int samples = 4;
     int threads = 0;  // 0: all
-    // How far off the plane shadow rays start, in metres, if that is more than rounding needs: as far as the receiver's
-    // own faces, where they are among the occluders, depart from the plane.
+    // How far off the plane shadow rays start, in metres, besides what rounding needs: as far as the receiver's own
+    // faces, where they are among the occluders, depart from the plane.
     double clearance = 0.0;
 };
 
