@@ -26,7 +26,7 @@ std::vector<std::string> harmonic_channels()
 {
     std::vector<std::string> names;
     for (std::size_t m = 0; m < harmonic_count; ++m)
-        names.push_back("m" + std::to_string(m));
+        names.push_back({'m', static_cast<char>('0' + m)});
     return names;
 }
 

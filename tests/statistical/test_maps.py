@@ -69,6 +69,25 @@ def test_map_distance_is_the_noise_of_the_count(medium, angle, albedo, pitch, si
     assert np.abs(image - counted).sum() / counted.sum() < noise + 0.02
 
 
+def test_a_small_tilt_shifts_in_proportion():
+    """Between 0 and the first simulated angle the mean of u is an odd function of the angle: half at half the tilt.
+
+    5 % for the noise of the mean at 10 degrees and for the cubic term of a sine.
+    """
+    pitch, size = 0.5, 81
+    u = (np.arange(size) - size // 2) * pitch
+    library = simulate(Medium(0.8), [0, 10, 20, 30], 400_000)
+
+    def shift(angle):
+        image = library.image(angle, 0.9, size, pitch)
+        return (image * u).sum() / image.sum()
+
+    assert shift(0) == pytest.approx(0, abs=1e-4)
+    assert shift(10) > 0.3
+    assert shift(5) / shift(10) == pytest.approx(0.5, rel=0.05)
+    assert shift(2.5) / shift(10) == pytest.approx(0.25, rel=0.05)
+
+
 def at(image, pitch, u, v):
     """Values of a map between texels, bilinear in the logarithm."""
     column, row = u / pitch + image.shape[1] // 2, v / pitch + image.shape[0] // 2
