@@ -328,7 +328,7 @@ def simulate(
     angles : sequence of float
         Angles of incidence, degrees from the surface normal, 0 <= angle < 90, distinct.
     photons : int
-        Per angle; rounded up to a multiple of 32.
+        Per angle, at least 1.
     seed : int
         The result depends on it, and not on the number of threads.
     threads : int

@@ -223,8 +223,7 @@ LdfLibrary simulate_library(const Medium& medium, const std::vector<double>& ang
     if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end())
         reject("angles", *std::adjacent_find(sorted.begin(), sorted.end()), "distinct angles");
     auto results = simulate(medium, sorted, photons, seed, threads, progress);
-    const std::uint64_t walked = (photons + batch_count - 1) / batch_count * batch_count;
-    return LdfLibrary(medium, walked, seed, std::move(results));
+    return LdfLibrary(medium, photons, seed, std::move(results));
 }
 
 }  // namespace beamspread

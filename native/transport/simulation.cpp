@@ -86,17 +86,19 @@ std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> 
     if (photons < 1)
         reject("photons", static_cast<double>(photons), "photons >= 1");
 
-    const std::uint64_t per_batch = (photons + batch_count - 1) / batch_count;
-    const auto total_photons = static_cast<double>(per_batch * batch_count);
+    const auto total_photons = static_cast<double>(photons);
     progress.set_total(total_photons * static_cast<double>(angles_deg.size()));
 
     const auto walk_batch = [&](std::size_t item) {
         const std::size_t angle = item / batch_count;
         const double theta = refracted_angle(angles_deg[angle] * radians_per_degree, medium.ior);
         SideTallies tallies = empty_tallies(medium, theta);
-        Random random(seed, std::bit_cast<std::uint64_t>(angles_deg[angle]), item % batch_count);
-        for (std::uint64_t done = 0; done < per_batch;) {
-            const std::uint64_t block = std::min(photons_per_progress, per_batch - done);
+        const std::size_t batch = item % batch_count;
+        Random random(seed, std::bit_cast<std::uint64_t>(angles_deg[angle]), batch);
+        // The first batches take one more each where the photons do not divide evenly.
+        const std::uint64_t batch_photons = photons / batch_count + (batch < photons % batch_count ? 1 : 0);
+        for (std::uint64_t done = 0; done < batch_photons;) {
+            const std::uint64_t block = std::min(photons_per_progress, batch_photons - done);
             for (std::uint64_t i = 0; i < block; ++i)
                 walk_photon(medium, theta, random, tallies);
             done += block;

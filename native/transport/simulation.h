@@ -28,8 +28,7 @@ struct AngleResult {
     std::array<SideResult, side_count> sides;
 };
 
-// `photons` per angle, rounded up to a multiple of batch_count. The result depends on seed and
-// photons, never on threads. Throws InvalidArgument, Cancelled.
+// `photons` per angle. The result depends on seed and photons, never on threads. Throws InvalidArgument, Cancelled.
 std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> angles_deg, std::uint64_t photons,
                                   std::uint64_t seed, int threads, Progress& progress);
 
