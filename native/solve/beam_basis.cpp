@@ -107,13 +107,15 @@ Vec3 direction_at(const Problem& problem, std::size_t y, std::size_t x)
     return Vec3(d[0], d[1], d[2]);
 }
 
-std::vector<std::size_t> needed_harmonics(const std::vector<RadialProfile>& profiles, double tolerance)
+std::vector<std::size_t> needed_harmonics(const std::vector<std::vector<RadialProfile>>& profiles, double tolerance)
 {
     Harmonics strongest{};
-    for (const RadialProfile& profile : profiles) {
-        const Harmonics norms = relative_norms(profile, profile.total());
-        for (std::size_t m = 0; m < harmonic_count; ++m)
-            strongest[m] = std::max(strongest[m], norms[m]);
+    for (const std::vector<RadialProfile>& channel : profiles) {
+        for (const RadialProfile& profile : channel) {
+            const Harmonics norms = relative_norms(profile, profile.total());
+            for (std::size_t m = 0; m < harmonic_count; ++m)
+                strongest[m] = std::max(strongest[m], norms[m]);
+        }
     }
     std::vector<std::size_t> weakest_first(harmonic_count);
     std::iota(weakest_first.begin(), weakest_first.end(), std::size_t{0});

@@ -45,7 +45,7 @@ private:
 
 // Harmonics that a kernel cannot do without: leaving out the others changes it by less than the tolerance,
 // relative L1, in a node or channel's profile where they are strongest.
-std::vector<std::size_t> needed_harmonics(const std::vector<RadialProfile>& profiles, double tolerance);
+std::vector<std::size_t> needed_harmonics(const std::vector<std::vector<RadialProfile>>& profiles, double tolerance);
 
 // Angle of incidence in degrees and azimuth in radians of a unit vector of travel.
 double incidence_deg(const Vec3& direction);

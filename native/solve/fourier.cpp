@@ -82,39 +82,48 @@ private:
     void solve_group(const std::vector<std::size_t>& group)
     {
         const BeamBasis basis = group_basis(group);
-        std::vector<std::vector<QuadrantKernel>> kernels(group.size());
-        std::vector<RadialProfile> all_profiles;
+        std::vector<std::vector<RadialProfile>> profiles;  // [channel of the group][node]
+        for (const std::size_t c : group) {
+            profiles.push_back(basis.profiles(m_problem.channels[c]));
+            m_sums[c].assign(m_transform.height() * (m_transform.width() / 2 + 1), {});
+        }
+        if (m_problem.directions.field)
+            solve_field(group, basis, profiles);
+        else
+            solve_uniform(group, profiles);
+    }
+
+    void solve_uniform(const std::vector<std::size_t>& group, const std::vector<std::vector<RadialProfile>>& profiles)
+    {
+        const double beta = azimuth(m_problem.directions.uniform);
+        Harmonics cosine{};
+        Harmonics sine{};
+        for (std::size_t m = 0; m < harmonic_count; ++m) {
+            cosine[m] = std::cos(static_cast<double>(m) * beta);
+            sine[m] = std::sin(static_cast<double>(m) * beta);
+        }
+        const Spectrum light = m_transform.forward(pad_irradiance(m_problem.channels[group.front()]));
         for (std::size_t g = 0; g < group.size(); ++g) {
-            const Channel& channel = m_problem.channels[group[g]];
-            for (const RadialProfile& profile : basis.profiles(channel)) {
-                kernels[g].emplace_back(profile, m_problem, channel);
-                all_profiles.push_back(profile);
-            }
-            m_sums[group[g]].assign(m_transform.height() * (m_transform.width() / 2 + 1), {});
+            const QuadrantKernel kernel(profiles[g][0], m_problem, m_problem.channels[group[g]]);
+            accumulate(m_sums[group[g]], light, kernel_spectrum(kernel, cosine, sine));
+            m_progress.advance(1.0 / static_cast<double>(group.size()));
         }
+    }
+
+    void solve_field(const std::vector<std::size_t>& group, const BeamBasis& basis,
+                     const std::vector<std::vector<RadialProfile>>& profiles)
+    {
         const Channel& beams = m_problem.channels[group.front()];
-
-        if (!m_problem.directions.field) {
-            const double beta = azimuth(m_problem.directions.uniform);
-            Harmonics cosine{};
-            Harmonics sine{};
-            for (std::size_t m = 0; m < harmonic_count; ++m) {
-                cosine[m] = std::cos(static_cast<double>(m) * beta);
-                sine[m] = std::sin(static_cast<double>(m) * beta);
-            }
-            const Spectrum light = m_transform.forward(pad_irradiance(beams));
-            for (std::size_t g = 0; g < group.size(); ++g)
-                accumulate(m_sums[group[g]], light, kernel_spectrum(kernels[g][0], cosine, sine));
-            m_progress.advance(1.0);
-            return;
-        }
-
         const BeamWeights weights = beam_weights(beams, basis);
-        const std::vector<std::size_t> harmonics = needed_harmonics(all_profiles, m_problem.tolerance);
+        const std::vector<std::size_t> harmonics = needed_harmonics(profiles, m_problem.tolerance);
         const double share = 1.0 / static_cast<double>(basis.node_count() * 2 * harmonics.size());
         for (std::size_t node = 0; node < basis.node_count(); ++node) {
+            // One node at a time: the kernels of all of them would take gigabytes.
+            std::vector<QuadrantKernel> kernels;
+            for (std::size_t g = 0; g < group.size(); ++g)
+                kernels.emplace_back(profiles[g][node], m_problem, m_problem.channels[group[g]]);
             for (const std::size_t m : harmonics) {
-                for (Phase phase : {Phase::cosine, Phase::sine}) {
+                for (const Phase phase : {Phase::cosine, Phase::sine}) {
                     if (m == 0 && phase == Phase::sine)
                         continue;
                     const Spectrum light = m_transform.forward(pad_term(beams, weights, {node, m, phase}));
@@ -122,7 +131,7 @@ private:
                     Harmonics sine{};
                     (phase == Phase::cosine ? cosine : sine)[m] = 1.0;
                     for (std::size_t g = 0; g < group.size(); ++g)
-                        accumulate(m_sums[group[g]], light, kernel_spectrum(kernels[g][node], cosine, sine));
+                        accumulate(m_sums[group[g]], light, kernel_spectrum(kernels[g], cosine, sine));
                     m_progress.advance(share);
                 }
             }
