@@ -62,7 +62,7 @@ const std::array<Stencil, edge_count>& stencils()
     return table;
 }
 
-// Values and derivatives of the cubic Hermite polynomials on the bin that ends at `edge`.
+// The cubic Hermite polynomials at t in [0, 1] of a bin of width h: factors of values and slopes at its edges.
 struct Cubic {
     double v0, v1, s0, s1;
 };
@@ -72,12 +72,6 @@ Cubic cubic_value(double t, double h)
     const double t2 = t * t;
     const double t3 = t2 * t;
     return {2.0 * t3 - 3.0 * t2 + 1.0, 3.0 * t2 - 2.0 * t3, (t3 - 2.0 * t2 + t) * h, (t3 - t2) * h};
-}
-
-Cubic cubic_derivative(double t, double h)
-{
-    const double t2 = t * t;
-    return {6.0 * (t2 - t) / h, 6.0 * (t - t2) / h, 3.0 * t2 - 4.0 * t + 1.0, 3.0 * t2 - 2.0 * t};
 }
 
 }  // namespace
@@ -183,27 +177,6 @@ Harmonics RadialProfile::cumulative(double r) const
     Harmonics out = remaining(r);
     for (std::size_t m = 0; m < harmonic_count; ++m)
         out[m] = m_total[m] - out[m];
-    return out;
-}
-
-Harmonics RadialProfile::density(double r) const
-{
-    Harmonics out{};
-    if (r >= m_support)
-        return out;
-    const auto& edge = edges();
-    const std::size_t k = radius_bin(static_cast<float>(r));
-    const double h = k == 0 ? edge[0] : edge[k] - edge[k - 1];
-    for (std::size_t m = 0; m < harmonic_count; ++m) {
-        if (k == 0) {
-            out[m] = (m_total[m] - m_remaining[0][m]) / (h * r);
-        } else {
-            const Cubic c = cubic_derivative((r - edge[k - 1]) / h, h);
-            out[m] = (c.s0 * m_slope[k - 1][m] + c.s1 * m_slope[k][m] - c.v0 * m_remaining[k - 1][m] -
-                      c.v1 * m_remaining[k][m]) /
-                     r;
-        }
-    }
     return out;
 }
 

@@ -30,9 +30,6 @@ public:
     // C_m(infinity) - C_m(r), which stays accurate where next to nothing is left outside r.
     Harmonics remaining(double r) const;
 
-    // c_m(r) = C_m'(r) / r.
-    Harmonics density(double r) const;
-
     // Total power: 2 pi C_0(infinity).
     double total() const;
 

@@ -142,7 +142,7 @@ BeamBasis BeamBasis::uniform(const Problem& problem)
     return basis;
 }
 
-BeamBasis BeamBasis::library_nodes(const Problem&, const LdfLibrary& library)
+BeamBasis BeamBasis::library_nodes(const LdfLibrary& library)
 {
     BeamBasis basis;
     basis.m_node_count = library.results().size();
@@ -157,7 +157,7 @@ BeamBasis BeamBasis::present_angles(const Problem& problem, const Channel& chann
 {
     const AngleRange range = range_of_lit_beams(problem);
     if (range.first > range.last)  // nothing is lit
-        return library_nodes(problem, *channel.library);
+        return library_nodes(*channel.library);
     const std::vector<RadialProfile> library_profiles = channel.library->node_profiles(channel.albedo, Side::reflected);
     const auto profile_at = [&](double angle) {
         const auto weights = channel.library->angle_weights(angle);
@@ -193,7 +193,7 @@ BeamBasis BeamBasis::present_angles(const Problem& problem, const Channel& chann
         };
         return basis;
     }
-    return library_nodes(problem, *channel.library);
+    return library_nodes(*channel.library);
 }
 
 QuadrantKernel::QuadrantKernel(const RadialProfile& profile, const Problem& problem, const Channel& channel)

@@ -22,7 +22,7 @@ public:
     static BeamBasis uniform(const Problem& problem);
 
     // The library's own simulated angles: exact.
-    static BeamBasis library_nodes(const Problem& problem, const LdfLibrary& library);
+    static BeamBasis library_nodes(const LdfLibrary& library);
 
     // As few Chebyshev nodes over the angles present as keep the kernel of `channel` within the problem's tolerance.
     static BeamBasis present_angles(const Problem& problem, const Channel& channel);

@@ -83,7 +83,7 @@ struct Beam {
 std::vector<float> solve_channel(const Problem& problem, const Channel& channel, Progress& progress)
 {
     const BeamBasis basis =
-        problem.directions.field ? BeamBasis::library_nodes(problem, *channel.library) : BeamBasis::uniform(problem);
+        problem.directions.field ? BeamBasis::library_nodes(*channel.library) : BeamBasis::uniform(problem);
     const std::vector<Term> terms = basis_terms(problem, basis);
     std::vector<QuadrantKernel> kernels;
     for (const RadialProfile& profile : basis.profiles(channel))
