@@ -208,6 +208,15 @@ def test_an_angle_outside_the_library(library):
     assert np.isfinite(convolve(BEAMS, travel(89.9, 0), library, 0.5, 1.0, 1.0)).all()
 
 
+def test_transforms_of_many_sizes_at_once(library):
+    """Transforms of different sizes follow each other on several threads: what they share must be locked."""
+    sizes = np.random.default_rng(8).integers(40, 160, (60, 2))
+    for height, width in sizes:
+        result = convolve(np.ones((height, width), np.float32), DOWN, library, 0.5, 0.01, 1.0)
+        assert np.isfinite(result).all()
+        assert np.ptp(result[2:-2, 2:-2]) < 1e-4 * result.max()
+
+
 def test_public_names():
     names = {"Medium", "simulate", "library", "LdfLibrary", "convolve", "albedo_from_color", "presets", "Cancelled"}
     assert names <= set(dir(beamspread))
