@@ -107,6 +107,20 @@ class LdfLibrary:
         ValueError
             Names the argument, its value and what is allowed.
         """
+    def image_standard_error(
+        self, angle: float, albedo: float, size: int, pitch: float, side: str = "reflected"
+    ) -> numpy.ndarray:
+        """
+        Statistical standard error of every texel of `image`.
+
+        From the scatter between eight groups of the simulation's photons, hence with a relative error of about a quarter of its
+        own (less between simulated angles, where several simulations add up). Parameters, units and errors as for `image`.
+
+        Returns
+        -------
+        float32, shape (size, size)
+            1/mfp^2; 0 where no photon came near.
+        """
     def reflectance(self, angle: float, albedo: float) -> float:
         """
         Diffuse reflectance: power that leaves per unit incident power, specular reflection excluded.

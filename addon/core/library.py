@@ -15,7 +15,7 @@ PHOTONS = {"preview": 32_000, "final": 800_000}
 
 _MAX_PHOTONS = 1_000_000
 
-_FILE_VERSION = 1
+_FILE_VERSION = 2
 """Raised when the simulation changes, so that older cached files are made again."""
 
 

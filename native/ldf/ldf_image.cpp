@@ -29,16 +29,17 @@ void add_delta(std::vector<double>& texels, std::size_t size, double pitch, cons
     }
 }
 
-}  // namespace
-
-std::vector<float> ldf_image(const LdfLibrary& library, double angle_deg, double albedo, std::size_t size, double pitch,
-                             Side side)
+void check_grid(std::size_t size, double pitch)
 {
     if (size < 1 || size > 16384)
         reject("size", static_cast<double>(size), "1 <= size <= 16384 texels");
     if (!(pitch > 0.0 && std::isfinite(pitch)))
         reject("pitch", pitch, "pitch > 0 mean free paths");
-    const RadialProfile profile = library.profile(angle_deg, albedo, side);
+}
+
+// Power of the scattered light in each texel.
+std::vector<double> texel_power(const RadialProfile& profile, std::size_t size, double pitch)
+{
     const double corner = -0.5 * static_cast<double>(size) * pitch;
     const TexelIntegrals integrals =
         integrate_texels(profile, {corner - profile.centre(), corner, pitch, pitch, size, size});
@@ -47,12 +48,44 @@ std::vector<float> ldf_image(const LdfLibrary& library, double angle_deg, double
     for (std::size_t m = 0; m < harmonic_count; ++m)
         for (std::size_t i = 0; i < count; ++i)
             texels[i] += integrals.cosine[m * count + i];
+    return texels;
+}
+
+}  // namespace
+
+std::vector<float> ldf_image(const LdfLibrary& library, double angle_deg, double albedo, std::size_t size, double pitch,
+                             Side side)
+{
+    check_grid(size, pitch);
+    std::vector<double> texels = texel_power(library.profile(angle_deg, albedo, side), size, pitch);
     for (const BallisticExit& delta : library.ballistic(angle_deg, side))
         add_delta(texels, size, pitch, delta);
-    std::vector<float> image(count);
+    std::vector<float> image(texels.size());
     std::transform(texels.begin(), texels.end(), image.begin(),
                    [area = pitch * pitch](double x) { return static_cast<float>(x / area); });
     return image;
+}
+
+std::vector<float> ldf_image_standard_error(const LdfLibrary& library, double angle_deg, double albedo,
+                                            std::size_t size, double pitch, Side side)
+{
+    check_grid(size, pitch);
+    // Mean and sum of squared differences from it, one group after the other (Welford 1962).
+    std::vector<double> mean(size * size, 0.0);
+    std::vector<double> squares(size * size, 0.0);
+    for (std::size_t group = 0; group < group_count; ++group) {
+        const auto texels = texel_power(library.group_profile(angle_deg, albedo, side, group), size, pitch);
+        for (std::size_t i = 0; i < texels.size(); ++i) {
+            const double difference = texels[i] - mean[i];
+            mean[i] += difference / static_cast<double>(group + 1);
+            squares[i] += difference * (texels[i] - mean[i]);
+        }
+    }
+    std::vector<float> errors(squares.size());
+    const double scale = 1.0 / static_cast<double>(group_count * (group_count - 1));
+    std::transform(squares.begin(), squares.end(), errors.begin(),
+                   [&](double x) { return static_cast<float>(std::sqrt(x * scale) / (pitch * pitch)); });
+    return errors;
 }
 
 }  // namespace beamspread

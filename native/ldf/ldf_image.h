@@ -13,4 +13,9 @@ namespace beamspread {
 std::vector<float> ldf_image(const LdfLibrary& library, double angle_deg, double albedo, std::size_t size, double pitch,
                              Side side);
 
+// Standard error of each texel of that image, from the scatter between groups of batches; its own relative error is a
+// quarter. Throws InvalidArgument.
+std::vector<float> ldf_image_standard_error(const LdfLibrary& library, double angle_deg, double albedo,
+                                            std::size_t size, double pitch, Side side);
+
 }  // namespace beamspread

@@ -37,10 +37,11 @@ std::array<double, order_bin_count> order_weights(const SideResult& side, double
     return weights;
 }
 
-RadialProfile contract_orders(const SideResult& side, double albedo, bool normal_incidence)
+// Sums over the orders, [radius bin][harmonic].
+std::vector<double> contract_orders(const SideResult& side, double albedo)
 {
     const auto weights = order_weights(side, albedo);
-    std::vector<double> sums(radius_bin_count * harmonic_count, 0.0);
+    std::vector<double> sums(ring_value_count, 0.0);
     for (std::size_t b = 0; b < order_bin_count; ++b) {
         if (weights[b] == 0.0)
             continue;
@@ -48,11 +49,16 @@ RadialProfile contract_orders(const SideResult& side, double albedo, bool normal
         for (std::size_t i = 0; i < sums.size(); ++i)
             sums[i] += weights[b] * static_cast<double>(moments[i]);
     }
-    if (normal_incidence)  // rotational symmetry: what the higher harmonics hold is noise
+    return sums;
+}
+
+RadialProfile profile_of(const AngleResult& angle, Side side, std::vector<double> sums)
+{
+    if (angle.angle_deg == 0.0)  // rotational symmetry: what the higher harmonics hold is noise
         for (std::size_t i = 0; i < sums.size(); ++i)
             if (i % harmonic_count != 0)
                 sums[i] = 0.0;
-    return RadialProfile(side.centre, sums);
+    return RadialProfile(angle.sides[static_cast<std::size_t>(side)].centre, sums);
 }
 
 }  // namespace
@@ -190,19 +196,45 @@ std::vector<RadialProfile> LdfLibrary::node_profiles(double albedo, Side side) c
     for (const AngleResult& result : m_results) {
         const SideResult& from = result.sides[static_cast<std::size_t>(side)];
         profiles.push_back(from.moments.empty() ? RadialProfile()
-                                                : contract_orders(from, albedo, result.angle_deg == 0.0));
+                                                : profile_of(result, side, contract_orders(from, albedo)));
     }
     return profiles;
 }
 
-RadialProfile LdfLibrary::profile(double angle_deg, double albedo, Side side) const
+RadialProfile LdfLibrary::interpolated(double angle_deg, const std::vector<RadialProfile>& nodes) const
 {
     const AngleWeights weights = angle_weights(angle_deg);
-    const std::vector<RadialProfile> nodes = node_profiles(albedo, side);
     RadialProfile sum;
     for (std::size_t j = 0; j < nodes.size(); ++j)
         sum.add(nodes[j], weights.even[j], weights.odd[j]);
     return sum;
+}
+
+RadialProfile LdfLibrary::profile(double angle_deg, double albedo, Side side) const
+{
+    return interpolated(angle_deg, node_profiles(albedo, side));
+}
+
+RadialProfile LdfLibrary::group_profile(double angle_deg, double albedo, Side side, std::size_t group) const
+{
+    check_albedo(albedo);
+    std::vector<RadialProfile> nodes;
+    for (const AngleResult& result : m_results) {
+        const SideResult& from = result.sides[static_cast<std::size_t>(side)];
+        if (from.moments.empty()) {
+            nodes.emplace_back();
+            continue;
+        }
+        const std::vector<double> deviations = deviations_at(from.deviations, group, albedo);
+        std::vector<double> sums = contract_orders(from, albedo);
+        for (std::size_t ring = 0; ring < radius_bin_count; ++ring) {
+            const double power = sums[ring * harmonic_count];
+            for (std::size_t i = ring * harmonic_count; i < (ring + 1) * harmonic_count; ++i)
+                sums[i] += power * deviations[i];
+        }
+        nodes.push_back(profile_of(result, side, std::move(sums)));
+    }
+    return interpolated(angle_deg, nodes);
 }
 
 std::vector<BallisticExit> LdfLibrary::ballistic(double angle_deg, Side side) const

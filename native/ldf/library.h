@@ -38,6 +38,9 @@ public:
     // The scattered part of the LDF, per unit power incident.
     RadialProfile profile(double angle_deg, double albedo, Side side) const;
 
+    // The same from a group of batches alone, a simulation of its own; group < group_count.
+    RadialProfile group_profile(double angle_deg, double albedo, Side side, std::size_t group) const;
+
     // The profiles at the simulated angles, per unit power that *entered*: `profile` is their sum with
     // the weights that `angle_weights` gives. For solvers that meet many angles at once.
     std::vector<RadialProfile> node_profiles(double albedo, Side side) const;
@@ -56,6 +59,7 @@ public:
 
 private:
     double inside_angle(double angle_deg) const;
+    RadialProfile interpolated(double angle_deg, const std::vector<RadialProfile>& nodes) const;
     double entry_transmittance(double angle_deg) const;
 
     Medium m_medium;

@@ -6,7 +6,9 @@
 //   "<side>.<j>"         columns: radius bins, lines: order bins, channels m0 .. m8: sums of weight * cos(m phi)
 //                        per unit power that entered (transport/bins.h, tally.h);
 //   "<side>.<j>.orders"  columns: order bins; line 0 and 1: mean and variance of the order; then one
-//                        line per batch: power that leaves.
+//                        line per batch: power that leaves;
+//   "<side>.<j>.scatter" columns: radius bins, lines: albedos within groups of batches, channels m0 .. m8: deviations
+//                        of the groups (transport/map_scatter.h).
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -19,7 +21,8 @@ namespace beamspread {
 
 namespace {
 
-constexpr int format_version = 1;
+constexpr int format_version = 2;
+constexpr std::size_t scatter_lines = group_count * scatter_albedos.size();
 constexpr std::array<const char*, side_count> side_names = {"reflected", "transmitted"};
 
 std::vector<std::string> harmonic_channels()
@@ -141,6 +144,7 @@ private:
         result.mean_order.assign(line(0), line(1));
         result.order_variance.assign(line(1), line(2));
         result.batch_totals.assign(line(2), orders.end());
+        result.deviations = checked(name + ".scatter", radius_bin_count, scatter_lines, harmonic_channels()).pixels;
         return result;
     }
 
@@ -171,6 +175,8 @@ void save_library(const LdfLibrary& library, const std::string& path)
                              {"Y"},
                              std::move(orders),
                              attributes});
+            parts.push_back({part_name(side, j) + ".scatter", static_cast<int>(radius_bin_count),
+                             static_cast<int>(scatter_lines), harmonic_channels(), from.deviations, attributes});
         }
     }
     write_exr_parts(path, parts);

@@ -40,6 +40,7 @@ SideTallies empty_tallies(const Medium& medium, double theta_inside)
 struct AngleSums {
     SideTallies total;
     std::array<std::vector<double>, side_count> batch_totals;
+    std::array<MapScatter, side_count> scatter;
 };
 
 AngleResult normalized(double angle_deg, const AngleSums& sums, double photons)
@@ -68,6 +69,7 @@ AngleResult normalized(double angle_deg, const AngleSums& sums, double photons)
         const double per_photon = static_cast<double>(batch_count) / photons;
         for (double x : sums.batch_totals[side])
             out.batch_totals.push_back(static_cast<float>(x * per_photon));
+        out.deviations = sums.scatter[side].relative_deviations();
     }
     return result;
 }
@@ -116,6 +118,7 @@ std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> 
         for (std::size_t side = 0; side < side_count; ++side) {
             const auto& weight = tallies[side].weight;
             sums.batch_totals[side].insert(sums.batch_totals[side].end(), weight.begin(), weight.end());
+            sums.scatter[side].add(batch % group_count, tallies[side]);
         }
         if (batch == 0)
             sums.total = std::move(tallies);

@@ -7,6 +7,7 @@
 
 #include "base/progress.h"
 #include "medium/medium.h"
+#include "transport/map_scatter.h"
 #include "transport/walk.h"
 
 namespace beamspread {
@@ -21,6 +22,7 @@ struct SideResult {
     std::vector<float> mean_order;    // [order bin]
     std::vector<float> order_variance;  // [order bin]
     std::vector<float> batch_totals;    // [batch][order bin], power
+    std::vector<float> deviations;      // of groups of batches, see transport/map_scatter.h
 };
 
 struct AngleResult {

@@ -88,6 +88,29 @@ def test_a_small_tilt_shifts_in_proportion():
     assert shift(2.5) / shift(10) == pytest.approx(0.25, rel=0.05)
 
 
+@pytest.mark.parametrize(
+    ("medium", "albedo", "pitch", "side"),
+    [
+        (Medium(0.8, 1.4), 0.98, 1.0, "reflected"),
+        (Medium(0.5, 1.2, 3.0), 0.8, 0.3, "transmitted"),
+        (Medium(0.5, 1.2, 3.0), 0.998, 0.05, "reflected"),
+    ],
+    ids=str,
+)
+def test_map_of_the_standard_error_is_the_scatter_between_seeds(medium, albedo, pitch, side):
+    """20 seeds, at an angle and albedos between those that are kept.
+
+    The scatter of 20 maps has a relative error of 16 %, the mean of 20 predictions 6 %. Over the map the median of
+    their ratio is within 15 % of 1 (texels scatter together), and next to no texel is off by a factor of 2.
+    """
+    runs = [simulate(medium, [0, 30, 60], 6000, seed=seed) for seed in range(20)]
+    scatter = np.std([run.image(45, albedo, SIZE, pitch, side=side) for run in runs], axis=0, ddof=1)
+    errors = [run.image_standard_error(45, albedo, SIZE, pitch, side=side) for run in runs]
+    ratio = scatter / np.sqrt(np.mean(np.square(errors), axis=0))
+    assert 0.85 < np.median(ratio) < 1.15
+    assert (np.abs(np.log2(ratio)) > 1).mean() < 0.02
+
+
 def at(image, pitch, u, v):
     """Values of a map between texels, bilinear in the logarithm."""
     column, row = u / pitch + image.shape[1] // 2, v / pitch + image.shape[0] // 2

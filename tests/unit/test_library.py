@@ -24,6 +24,9 @@ def same(a, b):
     angles = a.angles
     return angles == b.angles and all(
         np.array_equal(a.image(angle, 0.9, 9, 0.7, side=side), b.image(angle, 0.9, 9, 0.7, side=side))
+        and np.array_equal(
+            a.image_standard_error(angle, 0.9, 9, 0.7, side=side), b.image_standard_error(angle, 0.9, 9, 0.7, side=side)
+        )
         and a.reflectance(angle, 0.9) == b.reflectance(angle, 0.9)
         for angle in angles
         for side in ("reflected", "transmitted")
