@@ -34,11 +34,13 @@ else:
 
     Cancelled = native.Cancelled
     LdfLibrary = native.LdfLibrary
+    LdfSample = native.LdfSample
     Medium = native.Medium
     simulate = native.simulate
     __all__ = [
         "Cancelled",
         "LdfLibrary",
+        "LdfSample",
         "Material",
         "Medium",
         "albedo_from_color",

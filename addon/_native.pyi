@@ -10,6 +10,7 @@ import typing
 __all__: list[str] = [
     "Cancelled",
     "LdfLibrary",
+    "LdfSample",
     "Medium",
     "Occluders",
     "convolve",
@@ -108,7 +109,7 @@ class LdfLibrary:
             Names the argument, its value and what is allowed.
         """
     def image_standard_error(
-        self, angle: float, albedo: float, size: int, pitch: float, side: str = "reflected"
+        self, angle: float, albedo: float, size: int, pitch: float, side: str = "reflected", beam_diameter: float = 0.0
     ) -> numpy.ndarray:
         """
         Statistical standard error of every texel of `image`.
@@ -151,6 +152,94 @@ class LdfLibrary:
         """
     @property
     def seed(self) -> int: ...
+
+class LdfSample:
+    """
+    One LDF as an image.
+
+    Parameters
+    ----------
+    image : array_like, float32, shape (N, M)
+        Mean exitance of each texel per unit incident power, 1/mfp^2 (the paper's luminance, times pi); rows v upward,
+        columns u; O, where the beam's axis enters, at the centre; the beam travels toward +u, to the right.
+        Undershoots of up to 10 % of the brightest texel are taken for noise, other negative values are refused.
+    pitch : float
+        Side of a texel, mean free paths.
+    angle : float
+        Of incidence, degrees from the surface normal, [0, 90).
+    albedo : float
+        [0, 1).
+    beam_diameter : float
+        Of the evenly lit disk on the surface, mean free paths; 0: a pencil beam.
+    g : float, optional
+        Anisotropy of the medium.
+
+    Raises
+    ------
+    ValueError
+        Names the argument, its value and what is allowed.
+    """
+    @staticmethod
+    def from_library(
+        library: LdfLibrary,
+        angle: float,
+        albedo: float,
+        size: int,
+        pitch: float,
+        beam_diameter: float = 0.0,
+        side: str = "reflected",
+    ) -> LdfSample:
+        """
+        The sample whose image is `library.image(angle, albedo, size, pitch, side, beam_diameter)`.
+        """
+    @staticmethod
+    def load(path: os.PathLike) -> LdfSample:
+        """
+        Read a sample from an OpenEXR file, ours or another program's.
+
+        The file has one part with the channel Y (or one channel alone) and the attributes, numbers of type float, double or int,
+        ``pitch`` (mean free paths), ``angle`` (degrees), ``albedo``, and where known ``beamDiameter`` (mean free paths) and ``g``.
+        Its first line is that of the largest v.
+
+        Raises
+        ------
+        OSError
+            The file is missing or damaged; or it lacks, or has a wrong, attribute, channel or value, which the message names.
+        """
+    def __init__(
+        self,
+        image: typing.Any,
+        pitch: float,
+        angle: float,
+        albedo: float,
+        beam_diameter: float = 0.0,
+        g: float | None = None,
+    ) -> None: ...
+    def __repr__(self) -> str: ...
+    def save(self, path: os.PathLike) -> None:
+        """
+        Write an OpenEXR file that `load` reads; an existing file is replaced only by a complete one.
+        """
+    @property
+    def albedo(self) -> float: ...
+    @property
+    def angle(self) -> float: ...
+    @property
+    def beam_diameter(self) -> float: ...
+    @property
+    def g(self) -> float | None: ...
+    @property
+    def image(self) -> numpy.ndarray:
+        """
+        float32, shape (N, M), read-only.
+        """
+    @property
+    def pitch(self) -> float: ...
+    @property
+    def power(self) -> float:
+        """
+        Power that leaves within the image, per unit incident power.
+        """
 
 class Occluders:
     """

@@ -29,8 +29,10 @@ void add_delta(std::vector<double>& texels, std::size_t size, double pitch, cons
     }
 }
 
-void check_grid(std::size_t size, double pitch)
+void check_grid(std::size_t size, double pitch, double beam_diameter)
 {
+    if (beam_diameter != 0.0)
+        reject("beam_diameter", beam_diameter, "0, a pencil beam");
     if (size < 1 || size > 16384)
         reject("size", static_cast<double>(size), "1 <= size <= 16384 texels");
     if (!(pitch > 0.0 && std::isfinite(pitch)))
@@ -54,9 +56,9 @@ std::vector<double> texel_power(const RadialProfile& profile, std::size_t size, 
 }  // namespace
 
 std::vector<float> ldf_image(const LdfLibrary& library, double angle_deg, double albedo, std::size_t size, double pitch,
-                             Side side)
+                             Side side, double beam_diameter)
 {
-    check_grid(size, pitch);
+    check_grid(size, pitch, beam_diameter);
     std::vector<double> texels = texel_power(library.profile(angle_deg, albedo, side), size, pitch);
     for (const BallisticExit& delta : library.ballistic(angle_deg, side))
         add_delta(texels, size, pitch, delta);
@@ -67,9 +69,9 @@ std::vector<float> ldf_image(const LdfLibrary& library, double angle_deg, double
 }
 
 std::vector<float> ldf_image_standard_error(const LdfLibrary& library, double angle_deg, double albedo,
-                                            std::size_t size, double pitch, Side side)
+                                            std::size_t size, double pitch, Side side, double beam_diameter)
 {
-    check_grid(size, pitch);
+    check_grid(size, pitch, beam_diameter);
     // Mean and sum of squared differences from it, one group after the other (Welford 1962).
     std::vector<double> mean(size * size, 0.0);
     std::vector<double> squares(size * size, 0.0);

@@ -8,6 +8,7 @@
 #include <pybind11/stl/filesystem.h>
 
 #include "base/progress.h"
+#include "transport/tally.h"
 
 namespace beamspread {
 
@@ -21,9 +22,16 @@ using Array = py::array_t<T, py::array::c_style>;
 // with None nothing is reported. `progress` must outlive it.
 Progress::Callback progress_callback(const py::object& progress);
 
+// "reflected" or "transmitted"; throws InvalidArgument.
+Side side_from_name(const std::string& name);
+
+// Texels along a side of an LDF's image; throws InvalidArgument for a negative number.
+std::size_t image_side(std::ptrdiff_t size);
+
 void bind_medium(py::module_& m);
 void bind_transport(py::module_& m);
 void bind_ldf(py::module_& m);
+void bind_ldf_sample(py::module_& m);
 void bind_image(py::module_& m);
 void bind_scene(py::module_& m);
 void bind_solve(py::module_& m);

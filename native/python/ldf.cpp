@@ -2,7 +2,6 @@
 #include <filesystem>
 #include <memory>
 
-#include "base/error.h"
 #include "ldf/ldf_image.h"
 #include "ldf/library.h"
 #include "python/casters.h"
@@ -11,29 +10,16 @@ namespace beamspread {
 
 namespace {
 
-Side side_from_name(const std::string& name)
-{
-    if (name == "reflected")
-        return Side::reflected;
-    if (name == "transmitted")
-        return Side::transmitted;
-    reject("side", "'" + name + "'", "'reflected', 'transmitted'");
-}
-
-using ImageFunction = std::vector<float> (*)(const LdfLibrary&, double, double, std::size_t, double, Side);
+using ImageFunction = std::vector<float> (*)(const LdfLibrary&, double, double, std::size_t, double, Side, double);
 
 Array<float> image(ImageFunction make, const LdfLibrary& library, double angle, double albedo, std::ptrdiff_t size,
                    double pitch, const std::string& side, double beam_diameter)
 {
-    if (beam_diameter != 0.0)
-        reject("beam_diameter", beam_diameter, "0, a pencil beam");
-    if (size < 1)
-        reject("size", static_cast<double>(size), "1 <= size <= 16384 texels");
     const Side which = side_from_name(side);
     std::vector<float> texels;
     {
         const py::gil_scoped_release release;
-        texels = make(library, angle, albedo, static_cast<std::size_t>(size), pitch, which);
+        texels = make(library, angle, albedo, image_side(size), pitch, which, beam_diameter);
     }
     Array<float> result({size, size});
     std::copy(texels.begin(), texels.end(), result.mutable_data());
@@ -129,11 +115,11 @@ ValueError
         .def(
             "image_standard_error",
             [](const LdfLibrary& self, double angle, double albedo, std::ptrdiff_t size, double pitch,
-               const std::string& side) {
-                return image(ldf_image_standard_error, self, angle, albedo, size, pitch, side, 0.0);
+               const std::string& side, double beam_diameter) {
+                return image(ldf_image_standard_error, self, angle, albedo, size, pitch, side, beam_diameter);
             },
             py::arg("angle"), py::arg("albedo"), py::arg("size"), py::arg("pitch"), py::arg("side") = "reflected",
-            R"(Statistical standard error of every texel of `image`.
+            py::arg("beam_diameter") = 0.0, R"(Statistical standard error of every texel of `image`.
 
 From the scatter between eight groups of the simulation's photons, hence with a relative error of about a quarter of its
 own (less between simulated angles, where several simulations add up). Parameters, units and errors as for `image`.

@@ -1,0 +1,42 @@
+// One LDF as an image: from a library, from our files or another simulator's.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace beamspread {
+
+inline constexpr std::size_t max_sample_side = 16384;
+
+// Lengths in mean free paths. The beam travels toward +u; O, where its axis enters, is the centre of the image.
+struct LdfSample {
+    std::size_t width = 0;
+    std::size_t height = 0;
+    std::vector<float> image;  // mean exitance of each texel per unit incident power, 1/mfp^2; rows v upward, columns u
+    double pitch = 1.0;  // side of a texel
+    double angle_deg = 0.0;  // of incidence
+    double albedo = 0.0;
+    double beam_diameter = 0.0;  // of the disk that the beam lights on the surface; 0: a pencil beam
+    std::optional<double> g;  // anisotropy of the medium, where known
+
+    float at(std::size_t y, std::size_t x) const { return image[y * width + x]; }
+
+    // Coordinates of a texel's centre.
+    double u(std::size_t x) const { return (static_cast<double>(x) + 0.5 - 0.5 * static_cast<double>(width)) * pitch; }
+    double v(std::size_t y) const { return (static_cast<double>(y) + 0.5 - 0.5 * static_cast<double>(height)) * pitch; }
+
+    // Power that leaves within the image, per unit power incident.
+    double power() const;
+};
+
+// Throws InvalidArgument. Exitance is finite and not negative, but for undershoots of up to 10 % of the brightest texel: few
+// harmonics (ldf_image.h) and denoised simulations have them.
+void validate(const LdfSample& sample);
+
+// One-part OpenEXR file; see sample_file.cpp for the layout. Throw IoError.
+void save_sample(const LdfSample& sample, const std::string& path);
+LdfSample load_sample(const std::string& path);
+
+}  // namespace beamspread

@@ -1,0 +1,139 @@
+// Python names of LdfSample.
+#include "ldf/sample.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include "base/error.h"
+#include "ldf/ldf_image.h"
+#include "python/casters.h"
+
+namespace beamspread {
+
+namespace {
+
+// Any real array: samples come from files and other programs, and are small.
+LdfSample sample_of(const py::object& image, double pitch, double angle, double albedo, double beam_diameter,
+                    std::optional<double> g)
+{
+    const auto array = py::array::ensure(image);
+    if (!array)
+        reject("image", "no array", "real numbers, (N, M)");
+    const char kind = array.dtype().kind();
+    if (array.ndim() != 2 || (kind != 'f' && kind != 'i' && kind != 'u' && kind != 'b'))
+        reject("image", std::string(py::str(array.dtype())) + " of " + std::to_string(array.ndim()) + " dimensions",
+               "real numbers, (N, M)");
+    const auto pixels = py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(array);
+    LdfSample sample;
+    sample.height = static_cast<std::size_t>(pixels.shape(0));
+    sample.width = static_cast<std::size_t>(pixels.shape(1));
+    sample.image.assign(pixels.data(), pixels.data() + pixels.size());
+    sample.pitch = pitch;
+    sample.angle_deg = angle;
+    sample.albedo = albedo;
+    sample.beam_diameter = beam_diameter;
+    sample.g = g;
+    validate(sample);
+    return sample;
+}
+
+LdfSample from_library(const LdfLibrary& library, double angle, double albedo, std::ptrdiff_t size, double pitch,
+                       double beam_diameter, const std::string& side)
+{
+    LdfSample sample;
+    const Side which = side_from_name(side);
+    const py::gil_scoped_release release;
+    sample.image = ldf_image(library, angle, albedo, image_side(size), pitch, which, beam_diameter);
+    sample.height = static_cast<std::size_t>(size);
+    sample.width = static_cast<std::size_t>(size);
+    sample.pitch = pitch;
+    sample.angle_deg = angle;
+    sample.albedo = albedo;
+    sample.beam_diameter = beam_diameter;
+    sample.g = library.medium().g;
+    return sample;
+}
+
+// A view that nobody can write through: what `validate` saw holds for the sample's life.
+Array<float> image_of(const py::object& self)
+{
+    const auto& sample = self.cast<const LdfSample&>();
+    Array<float> view({sample.height, sample.width}, sample.image.data(), self);
+    view.attr("setflags")(py::arg("write") = false);
+    return view;
+}
+
+}  // namespace
+
+void bind_ldf_sample(py::module_& m)
+{
+    py::class_<LdfSample, std::shared_ptr<LdfSample>> sample(m, "LdfSample", R"(One LDF as an image.
+
+Parameters
+----------
+image : array_like, float32, shape (N, M)
+    Mean exitance of each texel per unit incident power, 1/mfp^2 (the paper's luminance, times pi); rows v upward,
+    columns u; O, where the beam's axis enters, at the centre; the beam travels toward +u, to the right.
+    Undershoots of up to 10 % of the brightest texel are taken for noise, other negative values are refused.
+pitch : float
+    Side of a texel, mean free paths.
+angle : float
+    Of incidence, degrees from the surface normal, [0, 90).
+albedo : float
+    [0, 1).
+beam_diameter : float
+    Of the evenly lit disk on the surface, mean free paths; 0: a pencil beam.
+g : float, optional
+    Anisotropy of the medium.
+
+Raises
+------
+ValueError
+    Names the argument, its value and what is allowed.
+)");
+    sample.def(py::init(&sample_of), py::arg("image"), py::arg("pitch"), py::arg("angle"), py::arg("albedo"),
+               py::arg("beam_diameter") = 0.0, py::arg("g") = py::none());
+    sample.def_static("from_library", &from_library, py::arg("library"), py::arg("angle"), py::arg("albedo"),
+                      py::arg("size"), py::arg("pitch"), py::arg("beam_diameter") = 0.0, py::arg("side") = "reflected",
+                      "The sample whose image is `library.image(angle, albedo, size, pitch, side, beam_diameter)`.");
+    sample.def_static(
+        "load",
+        [](const std::filesystem::path& path) {
+            const py::gil_scoped_release release;
+            return load_sample(path.string());
+        },
+        py::arg("path"), R"(Read a sample from an OpenEXR file, ours or another program's.
+
+The file has one part with the channel Y (or one channel alone) and the attributes, numbers of type float, double or int,
+``pitch`` (mean free paths), ``angle`` (degrees), ``albedo``, and where known ``beamDiameter`` (mean free paths) and ``g``.
+Its first line is that of the largest v.
+
+Raises
+------
+OSError
+    The file is missing or damaged; or it lacks, or has a wrong, attribute, channel or value, which the message names.
+)");
+    sample.def(
+        "save",
+        [](const LdfSample& self, const std::filesystem::path& path) {
+            const py::gil_scoped_release release;
+            save_sample(self, path.string());
+        },
+        py::arg("path"),
+        "Write an OpenEXR file that `load` reads; an existing file is replaced only by a complete one.");
+    sample.def_property_readonly("image", &image_of, "float32, shape (N, M), read-only.")
+        .def_readonly("pitch", &LdfSample::pitch)
+        .def_readonly("angle", &LdfSample::angle_deg)
+        .def_readonly("albedo", &LdfSample::albedo)
+        .def_readonly("beam_diameter", &LdfSample::beam_diameter)
+        .def_readonly("g", &LdfSample::g)
+        .def_property_readonly("power", &LdfSample::power,
+                               "Power that leaves within the image, per unit incident power.")
+        .def("__repr__", [](const LdfSample& self) {
+            return py::str("<LdfSample {}x{} pitch={} angle={} albedo={} beam_diameter={} g={}>")
+                .format(self.height, self.width, self.pitch, self.angle_deg, self.albedo, self.beam_diameter, self.g);
+        });
+}
+
+}  // namespace beamspread
