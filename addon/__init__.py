@@ -30,7 +30,8 @@ else:
     from .core.color import albedo_from_color
     from .core.convolve import convolve
     from .core.library import library
-    from .core.material import Material, presets
+    from .core.material import Material
+    from .core.presets import presets
 
     Cancelled = native.Cancelled
     LdfLibrary = native.LdfLibrary

@@ -4,23 +4,26 @@ import bpy
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty
 
 from . import compat
-from .core.material import presets
+from .core.presets import presets
 
 CUSTOM_PRESET = "CUSTOM"
 IMAGE, FRESNEL, COAT = "Image", "Fresnel", "Coat"
 
 
 def _preset_items() -> list[tuple]:
-    items = [(CUSTOM_PRESET, "Custom", "Values set by hand", 0)]
-    for number, (name, material) in enumerate(sorted(presets().items()), start=1):
-        items.append((name, name.replace("_", " ").title(), material.source, number))
-    return items
+    # A saved file keeps the number: it counts the rows of the table, to whose end new materials go.
+    items = [
+        (name, name.replace("_", " ").title(), material.source, number)
+        for number, (name, material) in enumerate(presets().items(), start=1)
+    ]
+    return [(CUSTOM_PRESET, "Custom", "Values set by hand", 0), *sorted(items)]
 
 
 def _apply_preset(node, context) -> None:
     if node.preset == CUSTOM_PRESET:
         return
-    material = presets()[node.preset]
+    # The node has one anisotropy for all channels.
+    material = presets()[node.preset].with_one_anisotropy()
     # Lengths are stored in scene units, which `scale_length` metres make one of.
     metres_per_unit = context.scene.unit_settings.scale_length if context and context.scene else 1.0
     node.color_mode = "ALBEDO"
@@ -109,7 +112,13 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         default="ALBEDO",
     )
     base_color: FloatVectorProperty(
-        name="Base Color", subtype="COLOR", size=3, default=(0.6, 0.6, 0.6), soft_min=0.0, soft_max=1.0
+        name="Base Color",
+        description="Seen under even light; where the medium can't be as bright, it becomes as bright as it can be",
+        subtype="COLOR",
+        size=3,
+        default=(0.6, 0.6, 0.6),
+        soft_min=0.0,
+        soft_max=1.0,
     )
     albedo: FloatVectorProperty(
         name="Albedo",

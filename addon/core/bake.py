@@ -152,12 +152,13 @@ def _libraries(material: Material, thickness: float, quality: str, progress: Pro
     from .library import library
 
     depths = [thickness / length if thickness else math.inf for length in material.mean_free_path]
-    distinct = sorted(set(depths))
-    by_depth = {}
-    for depth, stage in zip(distinct, stages(progress, [1.0] * len(distinct))):
-        medium = native.Medium(g=material.anisotropy, ior=material.ior, thickness=depth)
-        by_depth[depth] = library(medium, quality=quality, progress=stage)
-    return [by_depth[depth] for depth in depths]
+    channels = list(zip(material.channel_anisotropy, depths))
+    distinct = sorted(set(channels))
+    by_channel = {}
+    for (g, depth), stage in zip(distinct, stages(progress, [1.0] * len(distinct))):
+        medium = native.Medium(g=g, ior=material.ior, thickness=depth)
+        by_channel[g, depth] = library(medium, quality=quality, progress=stage)
+    return [by_channel[channel] for channel in channels]
 
 
 def _spread(irradiance, direction, libraries, material: Material, grid: Grid, settings: BakeSettings, progress):

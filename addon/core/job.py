@@ -10,7 +10,7 @@ import numpy as np
 
 from .bake import LIBRARY_WEIGHT, LIGHT_WEIGHT, BakeSettings, bake_texture
 from .color import albedo_from_color
-from .material import RGB, Material, check_thickness
+from .material import RGB, Material, check_base_color, check_thickness
 from .progress import Progress, stages
 from .receiver import Receiver
 from .scene import Light, Mesh
@@ -36,6 +36,8 @@ class Surface:
         material = self.material if self.base_color is None else replace(self.material, albedo=(0.0, 0.0, 0.0))
         material.check()
         check_thickness(self.thickness)
+        if self.base_color is not None:
+            check_base_color(self.base_color)
 
     def resolve(self, quality: str, progress: Progress | None = None) -> Material:
         """The material, its albedo worked out from the base colour if there is one."""
@@ -44,12 +46,12 @@ class Surface:
             return self.material
         from .._load import native
 
+        channels = zip(self.base_color, self.material.mean_free_path, self.material.channel_anisotropy)
         albedo = []
-        lengths = self.material.mean_free_path
-        for channel, (length, stage) in enumerate(zip(lengths, stages(progress, [1.0] * len(lengths)))):
+        for (color, length, g), stage in zip(channels, stages(progress, [1.0] * len(self.base_color))):
             depth = self.thickness / length if self.thickness else math.inf
-            medium = native.Medium(g=self.material.anisotropy, ior=self.material.ior, thickness=depth)
-            albedo.append(albedo_from_color(self.base_color, medium, quality, stage)[channel])
+            medium = native.Medium(g=g, ior=self.material.ior, thickness=depth)
+            albedo.append(albedo_from_color(color, medium, quality, stage)[0])
         return replace(self.material, albedo=tuple(albedo))
 
 

@@ -33,6 +33,20 @@ def test_preset_fills_in_lengths_in_scene_units(scale_length):
     assert (node.anisotropy, node.ior) == pytest.approx((marble.anisotropy, marble.ior))
 
 
+def test_preset_with_an_anisotropy_per_channel_becomes_the_similar_one():
+    """The node has one anisotropy: a mean free path in it is that of the material with sigma_s (1 - g) kept."""
+    node = node_of(add_material())
+    node.preset = "regular_milk"
+    similar = presets()["regular_milk"].with_one_anisotropy()
+    assert list(node.mean_free_path) == pytest.approx(similar.mean_free_path)
+    assert node.anisotropy == pytest.approx(0.715)
+
+
+def test_presets_keep_their_numbers_in_saved_files():
+    items = {item.identifier: item.value for item in node_of(add_material()).bl_rna.properties["preset"].enum_items}
+    assert (items["CUSTOM"], items["apple"], items["whole_milk"], items["regular_milk"]) == (0, 1, 12, 15)
+
+
 def test_values_out_of_range_can_be_set_by_scripts():
     """The bake has to complain about them, not Blender to change them silently."""
     node = node_of(add_material(albedo=(1, 1, 1), mean_free_path=(-1, 0, 1), anisotropy=2.0, ior=0.5, thickness=-1.0))

@@ -129,8 +129,22 @@ def test_job_works_out_the_albedo_of_a_base_colour():
     assert texture[12, 12] == pytest.approx(expected, rel=5e-3)
 
 
+def test_a_bake_uses_the_anisotropy_of_each_channel():
+    material = replace(MATERIAL, anisotropy=0.5, anisotropy_rgb=(0.0, 0.7, 0.0))
+    luminance = bake(grid(), [SUN], Mesh.empty(), material, 0.0, SETTINGS)
+    forward = beamspread.library(beamspread.Medium(g=0.7, ior=1.0), quality="preview").reflectance(0, 0.9)
+    expected = [value * 2 / math.pi for value in (reflectance(0), forward, reflectance(0))]
+    assert luminance[12, 12] == pytest.approx(expected, rel=0.01)
+
+
+def test_base_color_is_met_with_an_anisotropy_per_channel():
+    material = replace(MATERIAL, anisotropy_rgb=(0.0, 0.7, 0.0))
+    albedo = Surface(material, base_color=(0.3, 0.3, 0.3)).resolve("preview").albedo
+    assert albedo[0] == albedo[2] < albedo[1]
+    library = beamspread.library(beamspread.Medium(g=0.7, ior=1.0), quality="preview")
+    assert library.diffuse_reflectance(albedo[1]) == pytest.approx(0.3, abs=1e-9)
+
+
 def test_albedo_from_color_is_public():
     medium = beamspread.Medium(g=0.0, ior=1.0)
     assert 0 < beamspread.albedo_from_color((0.2, 0.3, 0.4), medium, quality="preview")[0] < 1
-    with pytest.raises(ValueError, match="base colour"):
-        beamspread.albedo_from_color((0.2, 1.3, 0.4), medium, quality="preview")
