@@ -9,8 +9,8 @@ import numpy as np
 from .material import RGB
 from .progress import Progress
 
-HIGHEST_ALBEDO = 0.9999
-"""What a colour too bright for its medium becomes: the highest albedo that simulations are tested for."""
+HIGHEST_ALBEDO = 0.99999
+"""What a colour too bright for its medium becomes: simulations follow light for enough scatterings up to here."""
 
 
 def albedo_from_color(color, medium, quality: str = "final", progress: Progress | None = None) -> RGB:
@@ -18,7 +18,7 @@ def albedo_from_color(color, medium, quality: str = "final", progress: Progress 
 
     It grows with the colour, from 0 for black. No medium reflects everything: some light is reflected before it
     enters, some leaves a slab on the other side. A colour brighter than the medium can be becomes `HIGHEST_ALBEDO`
-    (0.9999), its brightest.
+    (0.99999), its brightest.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def albedo_from_color(color, medium, quality: str = "final", progress: Progress 
 
     Returns
     -------
-    Three floats in [0, 0.9999].
+    Three floats in [0, 0.99999].
 
     Raises
     ------
