@@ -95,7 +95,7 @@ class LdfLibrary:
             Side of a texel, mean free paths.
         side : {"reflected", "transmitted"}
         beam_diameter : float
-            Must be 0: a pencil beam.
+            Of the disk around O that the beam evenly lights on the surface, mean free paths; 0: a pencil beam.
 
         Returns
         -------

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/constants.h"
 #include "base/error.h"
+#include "ldf/disk_profile.h"
 #include "ldf/texel_integral.h"
 
 namespace beamspread {
@@ -31,20 +33,45 @@ void add_delta(std::vector<double>& texels, std::size_t size, double pitch, cons
 
 void check_grid(std::size_t size, double pitch, double beam_diameter)
 {
-    if (beam_diameter != 0.0)
-        reject("beam_diameter", beam_diameter, "0, a pencil beam");
     if (size < 1 || size > 16384)
         reject("size", static_cast<double>(size), "1 <= size <= 16384 texels");
     if (!(pitch > 0.0 && std::isfinite(pitch)))
         reject("pitch", pitch, "pitch > 0 mean free paths");
+    if (!(beam_diameter >= 0.0 && std::isfinite(beam_diameter)))
+        reject("beam_diameter", beam_diameter, "beam_diameter >= 0 mean free paths");
+}
+
+// Adds what a disk of light around (u, 0) leaves in each texel.
+void add_disk(std::vector<double>& texels, std::size_t size, double pitch, const BallisticExit& centre, double radius)
+{
+    const double corner = -0.5 * static_cast<double>(size) * pitch;
+    const double density = centre.power / (pi * radius * radius);
+    for (std::size_t row = 0; row < size; ++row) {
+        const double y = corner + static_cast<double>(row) * pitch;
+        if (y > radius || y + pitch < -radius)
+            continue;
+        for (std::size_t column = 0; column < size; ++column) {
+            const double x = corner + static_cast<double>(column) * pitch - centre.u;
+            if (x <= radius && x + pitch >= -radius)
+                texels[row * size + column] += density * disk_overlap(radius, x, x + pitch, y, y + pitch);
+        }
+    }
+}
+
+// A disk so much smaller than a texel is a point: what it spreads over a texel's border is lost in rounding.
+bool is_point(double beam_diameter, double pitch)
+{
+    return beam_diameter < 1e-5 * pitch;
 }
 
 // Power of the scattered light in each texel.
-std::vector<double> texel_power(const RadialProfile& profile, std::size_t size, double pitch)
+std::vector<double> texel_power(const RadialProfile& profile, std::size_t size, double pitch, double beam_diameter)
 {
     const double corner = -0.5 * static_cast<double>(size) * pitch;
-    const TexelIntegrals integrals =
-        integrate_texels(profile, {corner - profile.centre(), corner, pitch, pitch, size, size});
+    const TexelGrid grid{corner - profile.centre(), corner, pitch, pitch, size, size};
+    const TexelIntegrals integrals = is_point(beam_diameter, pitch)
+                                         ? integrate_texels(profile, grid)
+                                         : integrate_texels(DiskProfile(profile, 0.5 * beam_diameter), grid);
     const std::size_t count = size * size;
     std::vector<double> texels(count, 0.0);
     for (std::size_t m = 0; m < harmonic_count; ++m)
@@ -59,9 +86,13 @@ std::vector<float> ldf_image(const LdfLibrary& library, double angle_deg, double
                              Side side, double beam_diameter)
 {
     check_grid(size, pitch, beam_diameter);
-    std::vector<double> texels = texel_power(library.profile(angle_deg, albedo, side), size, pitch);
-    for (const BallisticExit& delta : library.ballistic(angle_deg, side))
-        add_delta(texels, size, pitch, delta);
+    std::vector<double> texels = texel_power(library.profile(angle_deg, albedo, side), size, pitch, beam_diameter);
+    for (const BallisticExit& exit : library.ballistic(angle_deg, side)) {
+        if (is_point(beam_diameter, pitch))
+            add_delta(texels, size, pitch, exit);
+        else
+            add_disk(texels, size, pitch, exit, 0.5 * beam_diameter);
+    }
     std::vector<float> image(texels.size());
     std::transform(texels.begin(), texels.end(), image.begin(),
                    [area = pitch * pitch](double x) { return static_cast<float>(x / area); });
@@ -76,7 +107,8 @@ std::vector<float> ldf_image_standard_error(const LdfLibrary& library, double an
     std::vector<double> mean(size * size, 0.0);
     std::vector<double> squares(size * size, 0.0);
     for (std::size_t group = 0; group < group_count; ++group) {
-        const auto texels = texel_power(library.group_profile(angle_deg, albedo, side, group), size, pitch);
+        const auto texels =
+            texel_power(library.group_profile(angle_deg, albedo, side, group), size, pitch, beam_diameter);
         for (std::size_t i = 0; i < texels.size(); ++i) {
             const double difference = texels[i] - mean[i];
             mean[i] += difference / static_cast<double>(group + 1);

@@ -49,8 +49,8 @@ enum class Radial { remaining, cumulative };
 // Integral over a straight border of F_m(r) (cos, sin)(m phi) d phi. The border runs from s0 to s1
 // along a unit vector at `distance` (>= 0) to the pole's left or right; place(s) gives (x, y).
 template <class Place>
-BorderIntegral integrate_border(const RadialProfile& profile, Radial radial, double distance, double s0, double s1,
-                                double turn, const Place& place)
+BorderIntegral integrate_piece(const RadialFunction& profile, Radial radial, double distance, double s0, double s1,
+                               double turn, const Place& place)
 {
     BorderIntegral sum;
     if (distance == 0.0)
@@ -88,15 +88,33 @@ BorderIntegral integrate_border(const RadialProfile& profile, Radial radial, dou
     return sum;
 }
 
+// The same, cut where the border crosses the radius at which the profile may change abruptly.
+template <class Place>
+BorderIntegral integrate_border(const RadialFunction& profile, Radial radial, double distance, double s0, double s1,
+                                double turn, const Place& place)
+{
+    if (!(distance < profile.edge()))
+        return integrate_piece(profile, radial, distance, s0, s1, turn, place);
+    const double chord = std::sqrt(profile.edge() * profile.edge() - distance * distance);
+    BorderIntegral sum;
+    double from = s0;
+    for (const double to : {std::clamp(-chord, s0, s1), std::clamp(chord, s0, s1), s1}) {
+        if (to > from)
+            sum.add(integrate_piece(profile, radial, distance, from, to, turn, place), 1.0);
+        from = to;
+    }
+    return sum;
+}
+
 // Along +x at height y, from x0 to x1.
-BorderIntegral horizontal(const RadialProfile& profile, Radial radial, double y, double x0, double x1)
+BorderIntegral horizontal(const RadialFunction& profile, Radial radial, double y, double x0, double x1)
 {
     return integrate_border(profile, radial, std::abs(y), x0, x1, y > 0.0 ? -1.0 : 1.0,
                             [y](double s) { return std::pair(s, y); });
 }
 
 // Along +y at x, from y0 to y1.
-BorderIntegral vertical(const RadialProfile& profile, Radial radial, double x, double y0, double y1)
+BorderIntegral vertical(const RadialFunction& profile, Radial radial, double x, double y0, double y1)
 {
     return integrate_border(profile, radial, std::abs(x), y0, y1, x > 0.0 ? 1.0 : -1.0,
                             [x](double s) { return std::pair(x, s); });
@@ -104,7 +122,7 @@ BorderIntegral vertical(const RadialProfile& profile, Radial radial, double x, d
 
 }  // namespace
 
-TexelIntegrals integrate_texels(const RadialProfile& profile, const TexelGrid& grid)
+TexelIntegrals integrate_texels(const RadialFunction& profile, const TexelGrid& grid)
 {
     const std::size_t texels = grid.width * grid.height;
     TexelIntegrals out(texels);

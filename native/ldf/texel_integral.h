@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "ldf/radial_profile.h"
+#include "ldf/radial_function.h"
 
 namespace beamspread {
 
@@ -31,6 +31,6 @@ struct TexelIntegrals {
 // By Green's theorem the integral over a texel is that of C_m(r) cos(m phi) d phi around its border.
 // Every border is shared by two texels, so the sum over texels telescopes: no energy is lost or
 // doubled for any ratio of mean free path and pitch.
-TexelIntegrals integrate_texels(const RadialProfile& profile, const TexelGrid& grid);
+TexelIntegrals integrate_texels(const RadialFunction& profile, const TexelGrid& grid);
 
 }  // namespace beamspread

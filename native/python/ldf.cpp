@@ -99,7 +99,7 @@ pitch : float
     Side of a texel, mean free paths.
 side : {"reflected", "transmitted"}
 beam_diameter : float
-    Must be 0: a pencil beam.
+    Of the disk around O that the beam evenly lights on the surface, mean free paths; 0: a pencil beam.
 
 Returns
 -------

@@ -137,7 +137,7 @@ def test_bad_simulations_name_the_argument(call, message):
         (lambda lib: lib.image(30, 0.5, 0, 1.0), "'size' is 0"),
         (lambda lib: lib.image(30, 0.5, 9, 0.0), "'pitch' is 0"),
         (lambda lib: lib.image(30, 0.5, 9, 1.0, side="up"), "'side' is 'up'"),
-        (lambda lib: lib.image(30, 0.5, 9, 1.0, beam_diameter=2.0), "'beam_diameter' is 2"),
+        (lambda lib: lib.image(30, 0.5, 9, 1.0, beam_diameter=-2.0), "'beam_diameter' is -2"),
     ],
 )
 def test_bad_questions_name_the_argument(small, call, message):
