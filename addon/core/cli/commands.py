@@ -1,0 +1,132 @@
+"""The commands: each takes its options, prints its result, and raises what goes wrong."""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+
+from ..._load import native
+from ..color import albedo_from_color
+from ..library import ANGLES, library, photons_for
+from ..presets import presets
+from .bar import ProgressBar
+from .options import MOST_MAPS
+from .totals import describe, specular, text_table, totals_table
+
+PICTURES = (".png", ".pdf", ".svg")
+
+
+class CommandError(Exception):
+    """Something that keeps a command from its result, in one sentence."""
+
+
+def ldf(options) -> None:
+    """Print the totals of an LDF and draw its maps."""
+    if len(options.albedo) > MOST_MAPS:
+        raise ValueError(f"--albedo has {len(options.albedo)} values; allowed: 1 to {MOST_MAPS}")
+    if options.library and (options.g, options.ior, options.thickness) != (None, None, None):
+        raise ValueError("--library has a medium of its own: leave out --g, --ior and --thickness")
+    saved = native.LdfLibrary.load(options.library) if options.library else None
+    medium = saved.medium if saved else _medium(options)
+    if options.side == "transmitted" and math.isinf(medium.thickness):
+        raise ValueError("--side is transmitted; a half-space has no far side: give --thickness")
+    if options.output:
+        # Before the simulation: who waited for it should get the picture.
+        _check_target(options.output, PICTURES)
+        picture = _picture_module()
+    source = saved or _simulated(medium, options.quality)
+    rows = totals_table(source, options.angle, options.albedo)
+    lost = f"{100 * specular(medium, options.angle):.1f} % is reflected before it enters"
+    photons = f"{source.photons} photons per angle"
+    print(f"{describe(medium)}; beam at {options.angle:g} degrees, of which {lost}; {photons}")
+    print(text_table(rows), flush=True)
+    if options.output:
+        pitch = options.pitch or picture.default_pitch(medium, options.size)
+        maps = picture.read_maps(source, options.angle, options.albedo, options.size, pitch, options.side)
+        picture.save(picture.draw(maps, rows, [lost, photons]), options.output)
+
+
+def simulate(options) -> None:
+    """Simulate a medium and save its library."""
+    medium = _medium(options)
+    _check_target(options.output, (".exr",))
+    angles = options.angles or list(ANGLES)
+    photons = options.photons or photons_for(medium, options.quality)
+    start = time.monotonic()
+    with ProgressBar("simulating") as progress:
+        result = native.simulate(medium, angles, photons, seed=options.seed, threads=options.threads, progress=progress)
+    seconds = time.monotonic() - start
+    result.save(options.output)
+    size = Path(options.output).stat().st_size / 1e6
+    print(f"{options.output}: {describe(medium)}; {size:.1f} MB")
+    print(f"{len(result.angles)} angles, {result.photons} photons each, seed {result.seed}, {seconds:.1f} s")
+    print(f"light from {result.angles[0]:g} degrees:")
+    print(text_table(totals_table(result, result.angles[0], [0.9, 0.99, 0.999])))
+
+
+def list_presets(_options) -> None:
+    """Print the measured materials."""
+    materials = presets()
+    sources = list(dict.fromkeys(material.source for material in materials.values()))
+    rows = [("material", "albedo r g b", "mean free path r g b / mm", "anisotropy r g b", "ior", "source")]
+    for name, material in sorted(materials.items()):
+        columns = (
+            [f"{value:.5f}" for value in material.albedo],
+            [f"{1e3 * length:8.4g}" for length in material.mean_free_path],
+            [f"{value:.3f}" for value in material.channel_anisotropy],
+        )
+        number = f"[{sources.index(material.source) + 1}]"
+        rows.append((name, *map(" ".join, columns), f"{material.ior:g}", number))
+    print(text_table(rows))
+    for number, source in enumerate(sources, start=1):
+        print(f"[{number}] {source}")
+
+
+def albedo(options) -> None:
+    """Print the albedo that gives a colour."""
+    if len(options.color) not in (1, 3):
+        raise ValueError(f"--color has {len(options.color)} values; allowed: one, or red green blue")
+    medium = _medium(options)
+    source = _simulated(medium, options.quality)
+    color = options.color if len(options.color) == 3 else options.color * 3
+    values = albedo_from_color(color, medium, quality=options.quality)
+    rows = [("channel", "color", "albedo", "reflects")]
+    for channel, wanted, value in zip(("red", "green", "blue"), color, values):
+        rows.append((channel, f"{wanted:g}", f"{value:.6f}", f"{source.diffuse_reflectance(value):.4f}"))
+    print(f"{describe(medium)}, under uniform diffuse light")
+    print(text_table(rows))
+
+
+COMMANDS = {"ldf": ldf, "library": simulate, "presets": list_presets, "albedo": albedo}
+
+
+def _medium(options):
+    given = {name: getattr(options, name) for name in ("g", "ior", "thickness")}
+    return native.Medium(**{name: value for name, value in given.items() if value is not None})
+
+
+def _simulated(medium, quality: str):
+    with ProgressBar("simulating") as progress:
+        return library(medium, quality=quality, progress=progress)
+
+
+def _check_target(path: str, endings: tuple[str, ...]) -> None:
+    target = Path(path)
+    if target.suffix.lower() not in endings:
+        raise ValueError(f"--output is {path}; allowed: a name that ends in {', '.join(endings)}")
+    if not target.parent.is_dir():
+        raise CommandError(f"the folder {target.parent} for {target.name} does not exist")
+    if target.is_dir():
+        raise CommandError(f"{path} is a folder; name a file")
+
+
+def _picture_module():
+    try:
+        from . import picture
+    except ImportError as error:
+        raise CommandError(
+            "drawing needs matplotlib, which this Python does not have "
+            f"(apt install python3-matplotlib, or pip install matplotlib): {error}"
+        ) from error
+    return picture

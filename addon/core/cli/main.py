@@ -1,0 +1,39 @@
+"""Runs one command and turns whatever happens into an exit code and at most one sentence."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+from ..._load import native
+from .commands import COMMANDS, CommandError
+from .options import PROGRAM, make_parser
+
+DONE, FAILED, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Exit code: 0 done, 1 failed, 2 wrong use, 130 cancelled with Ctrl-C."""
+    options = make_parser().parse_args(arguments)
+    try:
+        COMMANDS[options.command](options)
+        sys.stdout.flush()
+    except (KeyboardInterrupt, native.Cancelled):
+        return _complain(options, "cancelled", INTERRUPTED)
+    except BrokenPipeError:
+        # Whoever reads has had enough, as `head` does; Python would complain once more when it closes the stream.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+    except (CommandError, OSError) as error:
+        return _complain(options, str(error), FAILED)
+    except MemoryError:
+        return _complain(options, "there is not enough memory", FAILED)
+    except ValueError as error:
+        return _complain(options, str(error), WRONG_USE)
+    return DONE
+
+
+def _complain(options, sentence: str, code: int) -> int:
+    print(f"{PROGRAM} {options.command}: {sentence}", file=sys.stderr)
+    return code
