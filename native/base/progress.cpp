@@ -25,7 +25,7 @@ void Progress::advance(double work)
 {
     const double done = m_done.fetch_add(work) + work;
     if (m_cancelled)
-        throw Cancelled();
+        stop();
     if (std::this_thread::get_id() != m_owner)
         return;
     if (std::chrono::steady_clock::now() - m_last_report >= report_interval)
@@ -42,10 +42,23 @@ void Progress::report(double fraction)
     if (!m_callback)
         return;
     m_last_report = std::chrono::steady_clock::now();
-    if (!m_callback(fraction))
+    try {
+        if (!m_callback(fraction))
+            m_cancelled = true;
+    } catch (...) {
+        // The other threads stop as well, and with the same exception: whichever is first gets through.
+        m_error = std::current_exception();
         m_cancelled = true;
+    }
     if (m_cancelled)
-        throw Cancelled();
+        stop();
+}
+
+void Progress::stop() const
+{
+    if (m_error)
+        std::rethrow_exception(m_error);
+    throw Cancelled();
 }
 
 }  // namespace beamspread

@@ -3,13 +3,15 @@
 
 #include <atomic>
 #include <chrono>
+#include <exception>
 #include <functional>
 #include <thread>
 
 namespace beamspread {
 
 // Counts finished work from any thread and reports its fraction through a callback on the thread
-// that made the object; a callback that returns false makes every later `advance` throw Cancelled.
+// that made the object; a callback that returns false makes every later `advance` throw Cancelled, and
+// one that throws makes it throw the same.
 class Progress {
 public:
     using Callback = std::function<bool(double)>;
@@ -30,11 +32,13 @@ public:
 
 private:
     void report(double fraction);
+    [[noreturn]] void stop() const;
 
     Callback m_callback;
     std::thread::id m_owner;
     double m_total = 1.0;
     std::atomic<double> m_done{0.0};
+    std::exception_ptr m_error;  // of the callback; set before m_cancelled
     std::atomic<bool> m_cancelled{false};
     std::chrono::steady_clock::time_point m_last_report{};
 };

@@ -1,6 +1,7 @@
 """LdfLibrary: what it promises beside the physics (that is in tests/statistical)."""
 
 import math
+import time
 
 import beamspread
 import numpy as np
@@ -163,6 +164,14 @@ def test_cancel_and_run_again(stop_at):
 def test_an_error_in_the_callback_comes_through():
     with pytest.raises(KeyError, match="mine"):
         simulate(Medium(), [0], 10_000, progress=lambda f: {}["mine"])
+
+
+def test_an_error_in_the_callback_stops_every_thread():
+    """What each thread has in hand would take it half a minute."""
+    begin = time.monotonic()
+    with pytest.raises(KeyError, match="mine"):
+        simulate(Medium(), [0], 10**8, threads=4, progress=lambda f: f == 0 or {}["mine"])
+    assert time.monotonic() - begin < 10
 
 
 def test_image_is_the_same_seen_at_half_the_pitch(small):
