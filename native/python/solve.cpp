@@ -18,7 +18,9 @@ Solve solver_from_name(const std::string& name)
         return solve_fft;
     if (name == "direct")
         return solve_direct;
-    reject("solver", "'" + name + "'", "'fft', 'direct'");
+    if (name == "adaptive")
+        return solve_adaptive;
+    reject("solver", "'" + name + "'", "'fft', 'direct', 'adaptive'");
 }
 
 std::string shape_text(const py::array& array)

@@ -5,19 +5,11 @@
 #include "base/constants.h"
 #include "base/threads.h"
 #include "solve/beam_basis.h"
+#include "solve/row_sum.h"
 
 namespace beamspread {
 
 namespace {
-
-// sum[i] += factor * values[i]; compiled for several instruction sets, the best chosen at run time. Without
-// contraction to fused multiply-add the results are the same for all.
-__attribute__((target_clones("default", "avx2", "avx512f"))) void add_scaled(double* sum, const double* values,
-                                                                             double factor, std::size_t count)
-{
-    for (std::size_t i = 0; i < count; ++i)
-        sum[i] += factor * values[i];
-}
 
 // Values of one basis kernel for one row offset, dx = -(width - 1) .. width - 1.
 using KernelRow = std::vector<double>;

@@ -45,6 +45,9 @@ void validate(const Problem& problem);
 // Every texel is one beam, every pair of texels is visited: the truth for the other solvers.
 Luminance solve_direct(const Problem& problem, Progress& progress);
 
+// Evenly lit squares as one beam each, and small beams seen from afar on coarser grids.
+Luminance solve_adaptive(const Problem& problem, Progress& progress);
+
 // The same sums by Fourier transforms, padded so that light that leaves the plane does not come back.
 Luminance solve_fft(const Problem& problem, Progress& progress);
 
