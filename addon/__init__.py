@@ -28,7 +28,7 @@ except ImportError as error:
     __all__ = ["register", "unregister"]
 else:
     from .core.color import albedo_from_color
-    from .core.convolve import convolve
+    from .core.convolve import adaptive_beams, convolve
     from .core.library import library
     from .core.material import Material
     from .core.presets import presets
@@ -44,6 +44,7 @@ else:
         "LdfSample",
         "Material",
         "Medium",
+        "adaptive_beams",
         "albedo_from_color",
         "convolve",
         "library",

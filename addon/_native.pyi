@@ -13,6 +13,7 @@ __all__: list[str] = [
     "LdfSample",
     "Medium",
     "Occluders",
+    "adaptive_beams",
     "convolve",
     "coverage",
     "embree_version",
@@ -263,6 +264,16 @@ class Occluders:
         """
         int: number of triangles.
         """
+
+def adaptive_beams(
+    irradiance: numpy.ndarray, direction: numpy.ndarray, tolerance: float
+) -> tuple[numpy.ndarray, numpy.ndarray]:
+    """
+    Squares that the adaptive solver lights by one beam each; the engine behind `beamspread.adaptive_beams`.
+
+    irradiance float32 (H, W), direction float32 (3,) or (H, W, 3); returns int64 (N, 3) of row, column and size, and
+    float64 (N,) mean irradiance.
+    """
 
 def convolve(
     irradiance: numpy.ndarray,

@@ -24,6 +24,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         items=[
             ("fft", "FFT", "Fast convolution", 0),
             ("direct", "Direct", "Adds up every beam at every texel: slow, the reference for the others", 1),
+            ("adaptive", "Adaptive", "Lights evenly lit squares by one beam each, as Manabe et al. 2012", 2),
         ],
         default="fft",
     )

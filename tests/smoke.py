@@ -85,7 +85,7 @@ def beams():
 def solvers(library, sun, point, direction):
     from beamspread import convolve
 
-    for solver in ("fft", "direct"):
+    for solver in ("fft", "direct", "adaptive"):
         for irradiance, light in ((sun, (0.3, 0.0, -0.954)), (point, direction)):
             result = convolve(
                 irradiance, light, library, (0.9, 0.5, 0.1), 0.1, 2 / SIZE, solver=solver, threads=THREADS

@@ -26,7 +26,7 @@ class BakeSettings:
 
     Attributes
     ----------
-    solver : "fft" or "direct".
+    solver : "fft", "direct" or "adaptive".
     samples : visibility is sampled at samples x samples points per texel.
     margin : texels added around the chart.
     quality : of the LDF, "final" or "preview".

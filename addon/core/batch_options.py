@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-SOLVERS = ("fft", "direct")
+SOLVERS = ("fft", "direct", "adaptive")
 FORMATS = ("EXR", "PNG")
 
 

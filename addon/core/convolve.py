@@ -34,10 +34,13 @@ def convolve(
         Metres.
     pitch : float or (float, float)
         Side of a texel in metres, along x and y.
-    solver : {"fft", "direct"}
-        `direct` visits every pair of texels: exact and slow.
+    solver : {"fft", "direct", "adaptive"}
+        `direct` visits every pair of texels: exact and slow. `adaptive` lights evenly lit squares by one beam each
+        (section 3.3 of the paper) and looks at small beams more coarsely from farther away.
     tolerance : float
-        Relative error that `fft` may make in its kernels where directions differ.
+        Relative error that `fft` may make in its kernels where directions differ. `adaptive`: the sum over all texels
+        of the absolute error stays below `tolerance` times the sum of the luminance, and the error of each texel
+        below `tolerance` times the brightest one.
     threads : int
         0: all. The result does not depend on it.
     progress : callable, optional
@@ -72,6 +75,44 @@ def convolve(
         int(threads),
         progress,
     )
+
+
+BEAM = np.dtype([("row", np.int64), ("column", np.int64), ("size", np.int64), ("power", np.float64)])
+
+
+def adaptive_beams(irradiance, direction, pitch=1.0, tolerance=1e-3):
+    """Beams by which ``convolve(..., solver="adaptive")`` lights a plane (Manabe et al. 2012, section 3.3, Fig. 5).
+
+    A beam is a square of 2^k texels, the largest that is wholly and evenly lit: its irradiance and its direction
+    vary by less than a share of the tolerance. The paper searches a mask of lit and dark texels; light that varies
+    within a square splits it.
+
+    Parameters
+    ----------
+    irradiance : array_like, shape (H, W)
+        W/m^2; one channel.
+    direction, pitch, tolerance
+        As for `convolve`.
+
+    Returns
+    -------
+    structured array, shape (N,)
+        `row` and `column` of each square's first texel, its `size` in texels, and its `power` in W.
+
+    Raises
+    ------
+    ValueError
+        Names the argument, its value and what is allowed.
+    """
+    light = _float_array("irradiance", irradiance)
+    if light.ndim != 2:
+        raise ValueError(f"argument 'irradiance' is of shape {light.shape}; allowed: (H, W)")
+    pitch_x, pitch_y = _pair("pitch", pitch)
+    squares, mean = native.adaptive_beams(light, _float_array("direction", direction), float(tolerance))
+    beams = np.empty(len(squares), BEAM)
+    beams["row"], beams["column"], beams["size"] = squares.T
+    beams["power"] = mean * beams["size"] ** 2 * pitch_x * pitch_y
+    return beams
 
 
 def _float_array(name, values):

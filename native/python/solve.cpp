@@ -1,9 +1,12 @@
 #include <array>
+#include <cstdint>
 #include <memory>
+#include <tuple>
 #include <vector>
 
 #include "base/error.h"
 #include "python/casters.h"
+#include "solve/mask_pyramid.h"
 #include "solve/problem.h"
 
 namespace beamspread {
@@ -56,6 +59,19 @@ Array<float> interleaved(const Luminance& luminance, std::size_t height, std::si
     return result;
 }
 
+void set_directions(Problem& problem, const Array<float>& direction)
+{
+    const auto height = static_cast<py::ssize_t>(problem.height);
+    const auto width = static_cast<py::ssize_t>(problem.width);
+    if (direction.ndim() == 1 && direction.shape(0) == 3)
+        problem.directions.uniform = Vec3(direction.at(0), direction.at(1), direction.at(2));
+    else if (direction.ndim() == 3 && direction.shape(0) == height && direction.shape(1) == width &&
+             direction.shape(2) == 3)
+        problem.directions.field = direction.data();
+    else
+        reject("direction", shape_text(direction), "(3,) or (H, W, 3) like irradiance");
+}
+
 Array<float> convolve(const Array<float>& irradiance, const Array<float>& direction,
                       const std::vector<std::shared_ptr<LdfLibrary>>& ldf, const std::vector<double>& albedo,
                       const std::vector<double>& mean_free_path, std::array<double, 2> pitch, const std::string& solver,
@@ -70,15 +86,7 @@ Array<float> convolve(const Array<float>& irradiance, const Array<float>& direct
     problem.pitch_y = pitch[1];
     problem.tolerance = tolerance;
     problem.threads = threads;
-    const auto height = static_cast<py::ssize_t>(problem.height);
-    const auto width = static_cast<py::ssize_t>(problem.width);
-    if (direction.ndim() == 1 && direction.shape(0) == 3)
-        problem.directions.uniform = Vec3(direction.at(0), direction.at(1), direction.at(2));
-    else if (direction.ndim() == 3 && direction.shape(0) == height && direction.shape(1) == width &&
-             direction.shape(2) == 3)
-        problem.directions.field = direction.data();
-    else
-        reject("direction", shape_text(direction), "(3,) or (H, W, 3) like irradiance");
+    set_directions(problem, direction);
     for (std::size_t c = 0; c < channels; ++c) {
         problem.channels[c].library = ldf[c].get();
         problem.channels[c].albedo = albedo[c];
@@ -94,6 +102,33 @@ Array<float> convolve(const Array<float>& irradiance, const Array<float>& direct
     return interleaved(luminance, problem.height, problem.width);
 }
 
+using Squares = std::tuple<Array<std::int64_t>, Array<double>>;
+
+Squares adaptive_beams(const Array<float>& irradiance, const Array<float>& direction, double tolerance)
+{
+    Problem problem = grid_problem(irradiance, 1);
+    problem.tolerance = tolerance;
+    set_directions(problem, direction);
+    std::vector<Square> squares;
+    {
+        const py::gil_scoped_release release;
+        validate(problem);
+        squares = even_squares(problem, problem.channels[0].irradiance);
+    }
+    const auto count = static_cast<py::ssize_t>(squares.size());
+    Array<std::int64_t> places({count, py::ssize_t{3}});
+    Array<double> light(count);
+    std::int64_t* place = places.mutable_data();
+    double* mean = light.mutable_data();
+    for (const Square& square : squares) {
+        *place++ = static_cast<std::int64_t>(square.y);
+        *place++ = static_cast<std::int64_t>(square.x);
+        *place++ = static_cast<std::int64_t>(square.size);
+        *mean++ = square.irradiance;
+    }
+    return {places, light};
+}
+
 }  // namespace
 
 void bind_solve(py::module_& m)
@@ -104,6 +139,12 @@ void bind_solve(py::module_& m)
 
 irradiance float32 (H, W) or (C, H, W) in W/m^2, direction float32 (3,) or (H, W, 3), C libraries,
 albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr).
+)");
+    m.def("adaptive_beams", &adaptive_beams, py::arg("irradiance"), py::arg("direction"), py::arg("tolerance"),
+          R"(Squares that the adaptive solver lights by one beam each; the engine behind `beamspread.adaptive_beams`.
+
+irradiance float32 (H, W), direction float32 (3,) or (H, W, 3); returns int64 (N, 3) of row, column and size, and
+float64 (N,) mean irradiance.
 )");
 }
 

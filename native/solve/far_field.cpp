@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "base/constants.h"
 #include "base/threads.h"
@@ -290,6 +291,21 @@ std::size_t count_lit(const Grid& light)
         std::count_if(light.values.begin(), light.values.end(), [](double value) { return value != 0.0; }));
 }
 
+// Shares of all light in rows and columns of each parity.
+std::vector<double> shares_of_light(const Grid& light, std::size_t odd_rows, std::size_t odd_columns)
+{
+    std::vector<double> shares(odd_rows * odd_columns, 0.0);
+    for (std::size_t y = 0; y < light.height; ++y)
+        for (std::size_t x = 0; x < light.width; ++x)
+            shares[(y % odd_rows) * odd_columns + x % odd_columns] += std::abs(light.row(y)[x]);
+    const double all = std::accumulate(shares.begin(), shares.end(), 0.0);
+    for (double& share : shares)
+        share /= all;
+    return shares;
+}
+
+}  // namespace
+
 double absolute_sum(const Grid& grid)
 {
     double sum = 0.0;
@@ -297,8 +313,6 @@ double absolute_sum(const Grid& grid)
         sum += std::abs(value);
     return sum;
 }
-
-}  // namespace
 
 double cost_of_disk(std::ptrdiff_t radius, std::size_t height, std::size_t width)
 {
@@ -350,8 +364,9 @@ void FarField::add(const KernelTable& kernel, Grid light, double allowed_error)
         const std::ptrdiff_t kernel_radius = kernel_sums.radius(allowed);
         const double kernel_cost = lit * cost_of_disk(kernel_radius, height, width);
         const auto add_kernel = [&] {
-            add_disks(light, kernel_radius, [&](std::size_t, std::size_t) -> const KernelTable& { return *current; },
-                      level.sum);
+            add_disks(
+                light, kernel_radius, [&](std::size_t, std::size_t) -> const KernelTable& { return *current; },
+                level.sum);
         };
 
         // Finding the remainder costs about this much per value of the kernel.
@@ -366,16 +381,19 @@ void FarField::add(const KernelTable& kernel, Grid light, double allowed_error)
         const Remainder remainder(*current, next, width, level.split_y, level.split_x);
         const std::size_t odd_rows = level.split_y ? 2 : 1;
         const std::size_t odd_columns = level.split_x ? 2 : 1;
+        const std::vector<double> shares = shares_of_light(light, odd_rows, odd_columns);
         DistanceSums remainder_sums(height, width);
         remainder_sums.add_rows([&](std::ptrdiff_t dy, double* values) {
             const std::ptrdiff_t reach = remainder_sums.reach_x();
             const auto length = static_cast<std::size_t>(2 * reach + 1);
             std::vector<double> row(length);
             std::fill_n(values, length, 0.0);
-            for (std::size_t parity = 0; parity < odd_rows * odd_columns; ++parity) {
+            for (std::size_t parity = 0; parity < shares.size(); ++parity) {
+                if (shares[parity] == 0.0)
+                    continue;
                 remainder.row(parity / odd_columns == 1, parity % odd_columns == 1, dy, reach, row.data());
                 for (std::size_t k = 0; k < length; ++k)
-                    values[k] = std::max(values[k], std::abs(row[k]));
+                    values[k] += shares[parity] * std::abs(row[k]);
             }
         });
         const std::ptrdiff_t radius = remainder_sums.radius(allowed);

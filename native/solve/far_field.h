@@ -23,6 +23,8 @@ struct Grid {
     const double* row(std::size_t y) const { return values.data() + y * width; }
 };
 
+double absolute_sum(const Grid& grid);
+
 // Sums over all pairs of texels, kernel(target - source) * light(source). Each level has every other point of the
 // one below, and cubic interpolation between them. Far from the source a kernel is smooth, and interpolated at both
 // ends from the coarser grid it is as good; near the source the remainder is added pair by pair:

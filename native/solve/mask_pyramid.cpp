@@ -60,8 +60,7 @@ void MaskPyramid::search(std::size_t level, std::size_t y, std::size_t x, double
     const double allowed = tolerance * static_cast<double>(cell.least);
     const bool even_light = cell.least > 0.0f && static_cast<double>(cell.greatest) - mean <= allowed &&
                             mean - static_cast<double>(cell.least) <= allowed;
-    const bool even_direction =
-        glm::length(cell.greatest_direction - cell.least_direction) <= tolerance / 20.0;
+    const bool even_direction = glm::length(cell.greatest_direction - cell.least_direction) <= tolerance / 20.0;
     if (level == 0 || (even_light && even_direction)) {
         found.push_back({y * size, x * size, size, mean});
         return;

@@ -51,7 +51,7 @@ private:
     std::vector<Level> m_levels;  // 0: texels
 };
 
-// The beams of the adaptive solver at the problem's tolerance, half of which they use up.
+// The beams of the adaptive solver, which may use up a share of the problem's tolerance.
 std::vector<Square> even_squares(const Problem& problem, const View2D<const float>& irradiance);
 
 }  // namespace beamspread

@@ -96,8 +96,8 @@ private:
                 const std::ptrdiff_t block = block_of(dx);
                 const Stencil& weights = m_thirds[static_cast<std::size_t>(dx - factor * block + 1)];
                 const double* b = from + block - stencil_radius;
-                to[dx] = weights[0] * b[0] + weights[1] * b[1] + weights[2] * b[2] + weights[3] * b[3] +
-                         weights[4] * b[4];
+                to[dx] =
+                    weights[0] * b[0] + weights[1] * b[1] + weights[2] * b[2] + weights[3] * b[3] + weights[4] * b[4];
             }
         });
         parallel_for(static_cast<std::size_t>(2 * table.reach_y() + 1), [&](std::size_t i) {

@@ -36,7 +36,7 @@ EVERY_KIND_OF_CALL = """
 from beamspread import Medium, convolve, simulate
 from beamspread._load import native
 library = simulate(Medium(), angles=[0, 30], photons=256)
-for solver in ("fft", "direct"):
+for solver in ("fft", "direct", "adaptive"):
     convolve(np.ones((8, 8), np.float32), (0.0, 0.0, -1.0), library, 0.5, 1.0, 1.0, solver=solver)
 occluders = native.Occluders(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.uint32))
 native.sun_beams(origin=(0, 0, 0), x_axis=(1, 0, 0), y_axis=(0, 1, 0), normal=(0, 0, 1), pitch_x=1, pitch_y=1,
