@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/progress.h"
@@ -73,7 +74,7 @@ private:
 void check_albedo(double albedo);
 
 LdfLibrary simulate_library(const Medium& medium, const std::vector<double>& angles_deg, std::uint64_t photons,
-                            std::uint64_t seed, int threads, Progress& progress);
+                            std::uint64_t seed, int threads, std::string_view kernel, Progress& progress);
 
 // One multi-part OpenEXR file; see library_file.cpp for the layout. Throw IoError.
 void save_library(const LdfLibrary& library, const std::string& path);

@@ -4,6 +4,8 @@
 #include <bit>
 #include <cmath>
 #include <functional>
+#include <sstream>
+#include <string>
 #include <utility>
 
 #include "base/constants.h"
@@ -15,7 +17,7 @@ namespace beamspread {
 
 namespace {
 
-constexpr std::uint64_t photons_per_progress = 512;
+constexpr std::uint64_t enough_photons_per_job = 200'000;
 
 // Light forgets the beam's direction after a transport mean free path, so that is where the far side's
 // distribution is centred, or where the beam leaves a thinner slab.
@@ -74,10 +76,57 @@ AngleResult normalized(double angle_deg, const AngleSums& sums, double photons)
     return result;
 }
 
+void merge_batch(std::size_t index, SideTallies batch, AngleSums& sums)
+{
+    for (std::size_t side = 0; side < side_count; ++side) {
+        const auto& weight = batch[side].weight;
+        sums.batch_totals[side].insert(sums.batch_totals[side].end(), weight.begin(), weight.end());
+        sums.scatter[side].add(index % group_count, batch[side]);
+    }
+    if (sums.total[0].moments.empty())
+        sums.total = std::move(batch);
+    else
+        for (std::size_t side = 0; side < side_count; ++side)
+            sums.total[side].merge(batch[side]);
+}
+
+// The first batches take one more each where the photons do not divide evenly.
+std::vector<std::uint64_t> batch_sizes(std::uint64_t photons)
+{
+    std::vector<std::uint64_t> sizes(batch_count, photons / batch_count);
+    for (std::size_t b = 0; b < photons % batch_count; ++b)
+        ++sizes[b];
+    return sizes;
+}
+
+// Batches that one thread walks together: the last walks of a job leave most lanes of a packet idle, so that a job should not be short.
+std::size_t batches_per_job(std::uint64_t photons)
+{
+    std::size_t batches = batch_count;
+    while (batches > 1 && photons / batch_count * batches > enough_photons_per_job)
+        batches /= 2;
+    return batches;
+}
+
+WalkKernel find_kernel(std::string_view name)
+{
+    const std::vector<WalkKernel> kernels = walk_kernels();
+    if (name.empty())
+        return kernels.front();
+    std::ostringstream allowed;
+    allowed << "empty (the fastest)";
+    for (const WalkKernel& kernel : kernels) {
+        if (kernel.name == name)
+            return kernel;
+        allowed << ", '" << kernel.name << "'";
+    }
+    reject("kernel", "'" + std::string(name) + "'", allowed.str());
+}
+
 }  // namespace
 
 std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> angles_deg, std::uint64_t photons,
-                                  std::uint64_t seed, int threads, Progress& progress)
+                                  std::uint64_t seed, int threads, std::string_view kernel_name, Progress& progress)
 {
     validate(medium);
     if (angles_deg.empty())
@@ -91,45 +140,35 @@ std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> 
     const auto total_photons = static_cast<double>(photons);
     progress.set_total(total_photons * static_cast<double>(angles_deg.size()));
 
-    const auto walk_batch = [&](std::size_t item) {
-        const std::size_t angle = item / batch_count;
-        const double theta = refracted_angle(angles_deg[angle] * radians_per_degree, medium.ior);
-        SideTallies tallies = empty_tallies(medium, theta);
-        const std::size_t batch = item % batch_count;
-        Random random(seed, std::bit_cast<std::uint64_t>(angles_deg[angle]), batch);
-        // The first batches take one more each where the photons do not divide evenly.
-        const std::uint64_t batch_photons = photons / batch_count + (batch < photons % batch_count ? 1 : 0);
-        for (std::uint64_t done = 0; done < batch_photons;) {
-            const std::uint64_t block = std::min(photons_per_progress, batch_photons - done);
-            for (std::uint64_t i = 0; i < block; ++i)
-                walk_photon(medium, theta, random, tallies);
-            done += block;
-            progress.advance(static_cast<double>(block));
-        }
+    const WalkKernel kernel = find_kernel(kernel_name);
+    const std::vector<std::uint64_t> batches = batch_sizes(photons);
+    const std::size_t per_job = batches_per_job(photons);
+    const std::size_t jobs_per_angle = batch_count / per_job;
+
+    const auto walk_job = [&](std::size_t item) {
+        const double angle = angles_deg[item / jobs_per_angle];
+        const double theta = refracted_angle(angle * radians_per_degree, medium.ior);
+        const std::size_t first = item % jobs_per_angle * per_job;
+        std::vector<SideTallies> tallies(per_job, empty_tallies(medium, theta));
+        kernel.walk({medium, theta, seed, std::bit_cast<std::uint64_t>(angle), first,
+                     std::span(batches).subspan(first, per_job), tallies, progress});
         return tallies;
     };
 
     std::vector<AngleResult> results;
     AngleSums sums;
-    const auto merge_batch = [&](std::size_t item, SideTallies tallies) {
-        const std::size_t batch = item % batch_count;
-        if (batch == 0)
+    const auto merge_job = [&](std::size_t item, std::vector<SideTallies> tallies) {
+        const std::size_t job = item % jobs_per_angle;
+        if (job == 0)
             sums = AngleSums{};
-        for (std::size_t side = 0; side < side_count; ++side) {
-            const auto& weight = tallies[side].weight;
-            sums.batch_totals[side].insert(sums.batch_totals[side].end(), weight.begin(), weight.end());
-            sums.scatter[side].add(batch % group_count, tallies[side]);
-        }
-        if (batch == 0)
-            sums.total = std::move(tallies);
-        else
-            for (std::size_t side = 0; side < side_count; ++side)
-                sums.total[side].merge(tallies[side]);
-        if (batch + 1 == batch_count)
-            results.push_back(normalized(angles_deg[item / batch_count], sums, total_photons));
+        for (std::size_t b = 0; b < per_job; ++b)
+            merge_batch(job * per_job + b, std::move(tallies[b]), sums);
+        if (job + 1 == jobs_per_angle)
+            results.push_back(normalized(angles_deg[item / jobs_per_angle], sums, total_photons));
     };
-    with_threads(threads,
-                 [&] { parallel_ordered<SideTallies>(angles_deg.size() * batch_count, walk_batch, merge_batch); });
+    with_threads(threads, [&] {
+        parallel_ordered<std::vector<SideTallies>>(angles_deg.size() * jobs_per_angle, walk_job, merge_job);
+    });
     progress.finish();
     return results;
 }

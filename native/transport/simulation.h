@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "base/progress.h"
@@ -30,8 +31,9 @@ struct AngleResult {
     std::array<SideResult, side_count> sides;
 };
 
-// `photons` per angle. The result depends on seed and photons, never on threads. Throws InvalidArgument, Cancelled.
+// `photons` per angle. The result depends on seed, photons and kernel (a name of walk_kernels(), or empty: the fastest), never on
+// threads. Throws InvalidArgument, Cancelled.
 std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> angles_deg, std::uint64_t photons,
-                                  std::uint64_t seed, int threads, Progress& progress);
+                                  std::uint64_t seed, int threads, std::string_view kernel_name, Progress& progress);
 
 }  // namespace beamspread

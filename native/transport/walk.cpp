@@ -6,34 +6,11 @@
 #include "base/vec.h"
 #include "medium/fresnel.h"
 #include "medium/henyey_greenstein.h"
+#include "transport/walk_plan.h"
 
 namespace beamspread {
 
 namespace {
-
-// Exits less likely than this are tallied at random with this weight: unbiased, and the many deep
-// flights that have next to no chance to leave cost one comparison.
-constexpr double rare_exit = 0.02;
-constexpr double rare_exit_distance = 3.912023005428146;  // exp of its negative is rare_exit
-
-// A walk that outlives 2^k first_roulette scatterings goes on with probability 1/sqrt(2) at each k. In a half-space
-// the chance to be still inside falls like order^-1/2, so that each octave of orders then costs the same and
-// adds the same variance.
-constexpr double roulette_survival = 0.70710678118654752;
-
-// In scatterings that change the direction as much as one isotropic one. Internal reflection keeps light
-// inside for longer. Measured best of 2 to 32 over albedos .2 to .9999, flat around it.
-std::uint32_t first_roulette(const Medium& medium)
-{
-    return static_cast<std::uint32_t>(4.0 * medium.ior * medium.ior / (1.0 - std::max(0.0, medium.g)));
-}
-
-// Up to this order exits are also sampled by connections: beyond it light has forgotten its direction,
-// and the walk itself finds its way out.
-std::uint32_t last_connected_order(double g)
-{
-    return static_cast<std::uint32_t>(4.0 / (1.0 - std::max(0.0, g)));
-}
 
 Vec3 scatter(const Vec3& w, double g, Random& random)
 {
@@ -72,15 +49,14 @@ public:
         : m_medium(medium),
           m_random(random),
           m_tallies(tallies),
-          m_last_connected_order(last_connected_order(medium.g)),
-          m_cone(1.0 / (medium.ior * medium.ior)),
+          m_plan(medium),
           m_w(std::sin(theta_inside), 0.0, std::cos(theta_inside))
     {
     }
 
     void run()
     {
-        std::uint32_t next_roulette = first_roulette(m_medium);
+        std::uint32_t next_roulette = m_plan.first_roulette;
         while (true) {
             const double to_boundary = distance_to_boundary(m_w);
             const double flight = -std::log(m_random.uniform_positive());
@@ -108,12 +84,13 @@ public:
             if (++m_order >= max_order)
                 return;
             m_exit_weight = 1.0;
-            if (m_order <= m_last_connected_order)
+            if (m_order <= m_plan.last_connected_order)
                 tally_connections(before);
             if (m_order >= next_roulette) {
-                if (m_random.uniform() >= roulette_survival)
+                const double survival = m_order <= last_common_order ? roulette_survival : late_roulette_survival;
+                if (m_random.uniform() >= survival)
                     return;
-                m_weight /= roulette_survival;
+                m_weight /= survival;
                 next_roulette *= 2;
             }
         }
@@ -141,7 +118,7 @@ private:
     // internal reflection lets out.
     double connection_pdf(const Vec3& w) const
     {
-        return w.z * w.z > 1.0 - m_cone ? std::abs(w.z) * inv_pi / m_cone : 0.0;
+        return w.z * w.z > 1.0 - m_plan.exit_cone ? std::abs(w.z) * inv_pi / m_plan.exit_cone : 0.0;
     }
 
     // A forward-peaked phase function seldom sends light of low orders back to the surface. For these an
@@ -159,7 +136,7 @@ private:
 
     void connect(const Vec3& before, double side)
     {
-        const double cos_theta = std::sqrt(1.0 - m_cone * m_random.uniform());
+        const double cos_theta = std::sqrt(1.0 - m_plan.exit_cone * m_random.uniform());
         const Vec3 w = around_z(side * cos_theta, m_random);
         const double phase = henyey_greenstein_pdf(glm::dot(before, w), m_medium.g);
         const double to_boundary = distance_to_boundary(w);
@@ -175,8 +152,7 @@ private:
     const Medium& m_medium;
     Random& m_random;
     SideTallies& m_tallies;
-    std::uint32_t m_last_connected_order;
-    double m_cone;  // squared sine of the half angle of the cone that can leave
+    WalkPlan m_plan;
     Vec3 m_x{0.0};  // mean free paths; z points into the medium
     Vec3 m_w;
     double m_weight = 1.0;

@@ -1,0 +1,370 @@
+// The photon walk of walk.cpp for many photons at a time: every lane of a vector is a photon, and a lane whose
+// photon has ended takes the next one. What only some lanes need (exits, connections) is queued until vectors are full.
+// The oldest instruction set runs the scalar walk.
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "transport/walk_packets.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include "hwy/contrib/math/math-inl.h"
+#include "medium/fresnel.h"
+#include "transport/packet_math-inl.h"
+#include "transport/packet_tally-inl.h"
+#include "transport/walk_plan.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace beamspread {
+namespace HWY_NAMESPACE {
+
+constexpr std::size_t packet_count = 2;
+
+template <class T>
+using Lanes = std::array<T, lane_count>;
+
+struct Packet {
+    HWY_ALIGN Lanes<float> x{};  // mean free paths; z points into the medium
+    HWY_ALIGN Lanes<float> y{};
+    HWY_ALIGN Lanes<float> z{};
+    HWY_ALIGN Lanes<float> wx{};
+    HWY_ALIGN Lanes<float> wy{};
+    HWY_ALIGN Lanes<float> wz{};
+    HWY_ALIGN Lanes<float> weight{};
+    HWY_ALIGN Lanes<float> exit_weight{};  // of the exit along the walk, among the ways to sample it
+    HWY_ALIGN Lanes<std::uint32_t> order{};
+    HWY_ALIGN Lanes<std::uint32_t> next_roulette{};
+    HWY_ALIGN Lanes<std::uint32_t> batch{};  // shifted into place
+    HWY_ALIGN Lanes<std::uint32_t> active{};  // all bits, or none: nobody is left to walk
+    RandomState random{};
+    std::size_t active_count = 0;
+};
+
+class PacketWalk {
+public:
+    explicit PacketWalk(const WalkJob& job)
+        : m_job(job),
+          m_plan(job.medium),
+          m_half_space(job.medium.is_half_space()),
+          m_thickness(broadcast(job.medium.thickness)),
+          m_sin_theta(static_cast<float>(std::sin(job.theta_inside))),
+          m_cos_theta(static_cast<float>(std::cos(job.theta_inside))),
+          m_tally(job.tallies)
+    {
+    }
+
+    void run()
+    {
+        Random random(m_job.seed, m_job.stream, m_job.first_batch);
+        for (Packet& packet : m_packets) {
+            PacketRandom::seed(random, packet.random);
+            for (std::size_t lane = 0; lane < lane_count; ++lane)
+                start_photon(packet, lane);
+        }
+        PacketRandom::seed(random, m_connection_random);
+        bool alive = true;
+        while (alive) {
+            alive = false;
+            for (Packet& packet : m_packets) {
+                if (packet.active_count == 0)
+                    continue;
+                step(packet);
+                alive = true;
+            }
+        }
+        connect_all();
+        m_tally.finish();
+        m_job.progress.advance(static_cast<double>(m_started % photons_per_progress));
+    }
+
+private:
+    // The next photon of the job, if there is one, into a lane.
+    void start_photon(Packet& packet, std::size_t lane)
+    {
+        while (m_batch < m_job.photons.size() && m_started_in_batch == m_job.photons[m_batch]) {
+            ++m_batch;
+            m_started_in_batch = 0;
+        }
+        const bool was_active = packet.active[lane] != 0;
+        if (m_batch == m_job.photons.size()) {
+            packet.active[lane] = 0;
+            packet.active_count -= was_active ? 1 : 0;
+            return;
+        }
+        ++m_started_in_batch;
+        if (++m_started % photons_per_progress == 0)
+            m_job.progress.advance(static_cast<double>(photons_per_progress));
+        packet.x[lane] = packet.y[lane] = packet.z[lane] = 0.0f;
+        packet.wx[lane] = m_sin_theta;
+        packet.wy[lane] = 0.0f;
+        packet.wz[lane] = m_cos_theta;
+        packet.weight[lane] = packet.exit_weight[lane] = 1.0f;
+        packet.order[lane] = 0;
+        packet.next_roulette[lane] = m_plan.first_roulette;
+        packet.batch[lane] = static_cast<std::uint32_t>(m_batch << batch_shift);
+        packet.active[lane] = ~0u;
+        packet.active_count += was_active ? 0 : 1;
+    }
+
+    HWY_INLINE Floats distance_to_boundary(Floats z, Floats wz) const
+    {
+        const FloatMask up = hn::Lt(wz, hn::Zero(floats));
+        const Floats depth = hn::IfThenElse(up, z, hn::Sub(m_thickness, z));
+        // |wz| from below: a flight along the surface has a finite end that it never reaches.
+        return hn::Div(depth, hn::Max(hn::Abs(wz), broadcast(1e-30)));
+    }
+
+    // One flight, and the scattering or reflection at its end.
+    HWY_INLINE void step(Packet& packet)
+    {
+        PacketRandom random(packet.random);
+        const double g = m_job.medium.g;
+        const FloatMask active = float_mask(hn::Ne(hn::Load(words, packet.active.data()), hn::Zero(words)));
+        Vectors x{hn::Load(floats, packet.x.data()), hn::Load(floats, packet.y.data()),
+                  hn::Load(floats, packet.z.data())};
+        const Vectors w{hn::Load(floats, packet.wx.data()), hn::Load(floats, packet.wy.data()),
+                        hn::Load(floats, packet.wz.data())};
+        Floats weight = hn::Load(floats, packet.weight.data());
+        Words order = hn::Load(words, packet.order.data());
+        const Words batch = hn::Load(words, packet.batch.data());
+
+        const Floats to_boundary = distance_to_boundary(x.z, w.z);
+        const Floats flight = hn::Neg(hn::Log(floats, random.uniform()));
+        const FloatMask hits = hn::Ge(flight, to_boundary);
+        const Floats reflectance = internal_reflectance(m_job.medium.ior, hn::Abs(w.z));
+        tally_expected_exits(packet, active, x, w, to_boundary, flight, reflectance);
+
+        // The part that leaves is tallied; the rest turns back.
+        const FloatMask turns_back = hn::And(hits, hn::Lt(random.uniform(), reflectance));
+        FloatMask ends = hn::AndNot(turns_back, hits);
+        const FloatMask scatters = hn::Not(hits);
+        const Floats path = hn::Min(flight, to_boundary);
+        x = {hn::MulAdd(path, w.x, x.x), hn::MulAdd(path, w.y, x.y), hn::MulAdd(path, w.z, x.z)};
+        const FloatMask up = hn::Lt(w.z, hn::Zero(floats));
+        x.z = hn::IfThenElse(hits, hn::IfThenElse(up, hn::Zero(floats), m_thickness), x.z);
+
+        const Deflection deflection = sample_henyey_greenstein(g, random.uniform());
+        const Vectors scattered = turn(w, deflection.cos_theta, deflection.sin_theta, random_azimuth(random));
+        order = hn::IfThenElse(hn::RebindMask(words, scatters), hn::Add(order, hn::Set(words, 1u)), order);
+
+        Floats exit_weight = broadcast(1.0);
+        const FloatMask connected =
+            hn::AndNot(greater(order, hn::Set(words, m_plan.last_connected_order)), hn::And(scatters, active));
+        if (!hn::AllFalse(floats, connected)) {
+            const Floats balanced = hn::Div(deflection.pdf, hn::Add(deflection.pdf, connection_pdf(scattered.z)));
+            const FloatMask rivalled =
+                m_half_space ? hn::And(connected, hn::Lt(scattered.z, hn::Zero(floats))) : connected;
+            exit_weight = hn::IfThenElse(rivalled, balanced, exit_weight);
+            m_requests.push(connected, x, w, weight, hn::Or(order, batch));
+            if (m_requests.count > Requests::capacity)
+                connect_all();
+        }
+
+        ends = hn::Or(ends, greater(order, hn::Set(words, max_order - 1)));
+        const Words next_roulette = hn::Load(words, packet.next_roulette.data());
+        const FloatMask at_risk = hn::AndNot(greater(next_roulette, order), scatters);
+        if (!hn::AllFalse(floats, at_risk)) {
+            const FloatMask late = greater(order, hn::Set(words, last_common_order));
+            const Floats survival =
+                hn::IfThenElse(late, broadcast(late_roulette_survival), broadcast(roulette_survival));
+            ends = hn::Or(ends, hn::And(at_risk, hn::Ge(random.uniform(), survival)));
+            weight = hn::IfThenElse(at_risk, hn::Div(weight, survival), weight);
+            hn::Store(
+                hn::IfThenElse(hn::RebindMask(words, at_risk), hn::Add(next_roulette, next_roulette), next_roulette),
+                words, packet.next_roulette.data());
+        }
+
+        hn::Store(x.x, floats, packet.x.data());
+        hn::Store(x.y, floats, packet.y.data());
+        hn::Store(x.z, floats, packet.z.data());
+        hn::Store(hn::IfThenElse(scatters, scattered.x, w.x), floats, packet.wx.data());
+        hn::Store(hn::IfThenElse(scatters, scattered.y, w.y), floats, packet.wy.data());
+        hn::Store(hn::IfThenElse(scatters, scattered.z, hn::Neg(w.z)), floats, packet.wz.data());
+        hn::Store(weight, floats, packet.weight.data());
+        hn::Store(exit_weight, floats, packet.exit_weight.data());
+        hn::Store(order, words, packet.order.data());
+        random.store();
+
+        ends = hn::And(ends, active);
+        if (!hn::AllFalse(floats, ends)) {
+            std::array<std::uint8_t, 8> bytes{};
+            hn::StoreMaskBits(floats, ends, bytes.data());
+            for (auto bits = std::bit_cast<std::uint64_t>(bytes); bits != 0; bits &= bits - 1)
+                start_photon(packet, static_cast<std::size_t>(std::countr_zero(bits)));
+        }
+    }
+
+    // The exits along the flights that begin here, instead of waiting for one. Far from the boundary the flight itself decides whether
+    // its exit is tallied: it comes this close with the probability exp(-to_boundary) / rare_exit.
+    HWY_INLINE void tally_expected_exits(const Packet& packet, FloatMask active, const Vectors& x, const Vectors& w,
+                                         Floats to_boundary, Floats flight, Floats reflectance)
+    {
+        const Words order = hn::Load(words, packet.order.data());
+        const Floats rare_distance = broadcast(rare_exit_distance);
+        const FloatMask near = hn::Lt(to_boundary, rare_distance);
+        const FloatMask lucky = hn::Ge(flight, hn::Sub(to_boundary, rare_distance));
+        FloatMask tallied = hn::And(active, hn::Or(near, lucky));
+        tallied = hn::And(tallied, float_mask(hn::Ne(order, hn::Zero(words))));
+        tallied = hn::And(tallied, hn::Lt(reflectance, broadcast(1.0)));
+        if (hn::AllFalse(floats, tallied))
+            return;
+        const Floats escape = hn::Exp(floats, hn::Neg(hn::Min(to_boundary, rare_distance)));
+        const Floats weight =
+            hn::Mul(hn::Load(floats, packet.weight.data()), hn::Load(floats, packet.exit_weight.data()));
+        add_exits(tallied, x, w, to_boundary, hn::Mul(weight, escape), reflectance,
+                  hn::Or(order, hn::Load(words, packet.batch.data())));
+    }
+
+    HWY_INLINE void add_exits(FloatMask mask, const Vectors& x, const Vectors& w, Floats to_boundary, Floats weight,
+                              Floats reflectance, Words what)
+    {
+        const FloatMask up = hn::Lt(w.z, hn::Zero(floats));
+        const Words side = hn::IfThenElse(hn::RebindMask(words, up), hn::Zero(words), hn::Set(words, 1u << side_shift));
+        m_tally.add(mask, hn::MulAdd(to_boundary, w.x, x.x), hn::MulAdd(to_boundary, w.y, x.y),
+                    hn::Mul(weight, hn::Sub(broadcast(1.0), reflectance)), hn::Or(what, side));
+    }
+
+    // Density per steradian of the connections below: proportional to the cosine, inside the cone that
+    // internal reflection lets out.
+    HWY_INLINE Floats connection_pdf(Floats wz) const
+    {
+        const FloatMask inside = hn::Gt(hn::Mul(wz, wz), broadcast(1.0 - m_plan.exit_cone));
+        return hn::IfThenElseZero(inside, hn::Mul(hn::Abs(wz), broadcast(inv_pi / m_plan.exit_cone)));
+    }
+
+    // Scatterings from which an exit is to be sampled by a direction that leaves: see Walk::tally_connections.
+    struct Requests {
+        static constexpr std::size_t capacity = 128;
+        template <class T>
+        using Queue = std::array<T, capacity + 2 * lane_count>;
+
+        HWY_INLINE void push(FloatMask mask, const Vectors& from, const Vectors& before, Floats w, Words order_batch)
+        {
+            hn::CompressStore(from.x, mask, floats, x.data() + count);
+            hn::CompressStore(from.y, mask, floats, y.data() + count);
+            hn::CompressStore(from.z, mask, floats, z.data() + count);
+            hn::CompressStore(before.x, mask, floats, wx.data() + count);
+            hn::CompressStore(before.y, mask, floats, wy.data() + count);
+            hn::CompressStore(before.z, mask, floats, wz.data() + count);
+            hn::CompressStore(w, mask, floats, weight.data() + count);
+            count += hn::CompressStore(order_batch, hn::RebindMask(words, mask), words, what.data() + count);
+        }
+
+        std::size_t count = 0;
+        Queue<float> x{};
+        Queue<float> y{};
+        Queue<float> z{};
+        Queue<float> wx{};
+        Queue<float> wy{};
+        Queue<float> wz{};
+        Queue<float> weight{};
+        Queue<std::uint32_t> what{};
+    };
+
+    HWY_NOINLINE void connect_all()
+    {
+        PacketRandom random(m_connection_random);
+        for (std::size_t i = 0; i < m_requests.count; i += lane_count) {
+            const FloatMask valid = hn::FirstN(floats, m_requests.count - i);
+            connect(valid, i, -1.0, random);
+            if (!m_half_space)
+                connect(valid, i, 1.0, random);
+        }
+        random.store();
+        m_requests.count = 0;
+    }
+
+    HWY_INLINE void connect(FloatMask valid, std::size_t i, double side, PacketRandom& random)
+    {
+        const Vectors x{hn::LoadU(floats, m_requests.x.data() + i), hn::LoadU(floats, m_requests.y.data() + i),
+                        hn::LoadU(floats, m_requests.z.data() + i)};
+        const Vectors before{hn::LoadU(floats, m_requests.wx.data() + i), hn::LoadU(floats, m_requests.wy.data() + i),
+                             hn::LoadU(floats, m_requests.wz.data() + i)};
+        const Floats sin2 = hn::Mul(broadcast(m_plan.exit_cone), random.uniform());
+        const Floats cos_theta = hn::Sqrt(hn::Sub(broadcast(1.0), sin2));
+        const Floats sin_theta = hn::Sqrt(sin2);
+        const SinCos azimuth = random_azimuth(random);
+        const Vectors w{hn::Mul(sin_theta, azimuth.cosine), hn::Mul(sin_theta, azimuth.sine),
+                        hn::Mul(broadcast(side), cos_theta)};
+        const Floats phase = henyey_greenstein_density(m_job.medium.g, dot(before, w));
+        const Floats to_boundary = distance_to_boundary(x.z, w.z);
+        const Floats balanced = hn::Div(phase, hn::Add(phase, connection_pdf(w.z)));
+        const Floats probability = hn::Mul(balanced, hn::Exp(floats, hn::Neg(to_boundary)));
+        const Floats rare = broadcast(rare_exit);
+        const FloatMask tallied = hn::And(valid, hn::Lt(hn::Mul(random.uniform(), rare), probability));
+        const Floats weight = hn::Mul(hn::LoadU(floats, m_requests.weight.data() + i), hn::Max(probability, rare));
+        add_exits(tallied, x, w, to_boundary, weight, internal_reflectance(m_job.medium.ior, cos_theta),
+                  hn::LoadU(words, m_requests.what.data() + i));
+    }
+
+    const WalkJob& m_job;
+    WalkPlan m_plan;
+    bool m_half_space;
+    Floats m_thickness;
+    float m_sin_theta;
+    float m_cos_theta;
+    PacketTally m_tally;
+    std::array<Packet, packet_count> m_packets{};
+    Requests m_requests;
+    RandomState m_connection_random{};
+    std::size_t m_batch = 0;
+    std::uint64_t m_started_in_batch = 0;
+    std::uint64_t m_started = 0;
+};
+
+void walk_packets(const WalkJob& job)
+{
+    PacketWalk(job).run();
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace beamspread
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace beamspread {
+
+namespace {
+
+void walk_scalar(const WalkJob& job)
+{
+    for (std::size_t b = 0; b < job.photons.size(); ++b) {
+        Random random(job.seed, job.stream, job.first_batch + b);
+        for (std::uint64_t done = 0; done < job.photons[b];) {
+            const std::uint64_t block = std::min(photons_per_progress, job.photons[b] - done);
+            for (std::uint64_t i = 0; i < block; ++i)
+                walk_photon(job.medium, job.theta_inside, random, job.tallies[b]);
+            done += block;
+            job.progress.advance(static_cast<double>(block));
+        }
+    }
+}
+
+}  // namespace
+
+std::vector<WalkKernel> walk_kernels()
+{
+    std::vector<WalkKernel> kernels;
+    [[maybe_unused]] const std::int64_t supported = hwy::SupportedTargets();
+#if HWY_TARGETS & HWY_AVX3
+    if (supported & HWY_AVX3)
+        kernels.push_back({"avx512", N_AVX3::walk_packets});
+#endif
+#if HWY_TARGETS & HWY_AVX2
+    if (supported & HWY_AVX2)
+        kernels.push_back({"avx2", N_AVX2::walk_packets});
+#endif
+#if HWY_TARGETS & HWY_SSE4
+    if (supported & HWY_SSE4)
+        kernels.push_back({"sse4", N_SSE4::walk_packets});
+#endif
+    kernels.push_back({"scalar", walk_scalar});
+    return kernels;
+}
+
+}  // namespace beamspread
+#endif
