@@ -62,16 +62,21 @@ public:
             const double flight = -std::log(m_random.uniform_positive());
             // Far from the boundary the flight itself decides whether its exit is tallied: it comes this
             // close with the probability exp(-to_boundary) / rare_exit.
-            if (m_order > 0) {
+            const bool expected = m_order <= m_plan.last_expected_order;
+            if (expected && m_order > 0) {
                 if (to_boundary < rare_exit_distance)
                     tally_exit(m_w, to_boundary, m_exit_weight * std::exp(-to_boundary));
                 else if (flight >= to_boundary - rare_exit_distance)
                     tally_exit(m_w, to_boundary, m_exit_weight * rare_exit);
             }
             if (flight >= to_boundary) {
-                // The part that leaves is tallied; the rest turns back.
-                if (m_random.uniform() >= fresnel(std::abs(m_w.z), 1.0 / m_medium.ior))
+                const double reflectance = fresnel(std::abs(m_w.z), 1.0 / m_medium.ior);
+                if (m_random.uniform() >= reflectance) {
+                    // Fresnel's transmittance is in the decision, and not in the tally.
+                    if (!expected)
+                        tally(m_w, to_boundary, 1.0);
                     return;
+                }
                 m_x += to_boundary * m_w;
                 m_x.z = m_w.z < 0.0 ? 0.0 : m_medium.thickness;
                 m_w.z = -m_w.z;
@@ -84,7 +89,7 @@ public:
             if (++m_order >= max_order)
                 return;
             m_exit_weight = 1.0;
-            if (m_order <= m_plan.last_connected_order)
+            if (m_order <= m_plan.last_expected_order)
                 tally_connections(before);
             if (m_order >= next_roulette) {
                 const double survival = m_order <= last_common_order ? roulette_survival : late_roulette_survival;
@@ -110,8 +115,13 @@ private:
     {
         const double reflectance = fresnel(std::abs(w.z), 1.0 / m_medium.ior);
         if (reflectance < 1.0)
-            m_tallies[w.z < 0.0 ? 0 : 1].add(m_x.x + to_boundary * w.x, m_x.y + to_boundary * w.y, m_order,
-                                             m_weight * probability * (1.0 - reflectance));
+            tally(w, to_boundary, probability * (1.0 - reflectance));
+    }
+
+    void tally(const Vec3& w, double to_boundary, double probability)
+    {
+        m_tallies[w.z < 0.0 ? 0 : 1].add(m_x.x + to_boundary * w.x, m_x.y + to_boundary * w.y, m_order,
+                                         m_weight * probability);
     }
 
     // Density per steradian of the connections below: proportional to the cosine, inside the cone that
@@ -121,8 +131,7 @@ private:
         return w.z * w.z > 1.0 - m_plan.exit_cone ? std::abs(w.z) * inv_pi / m_plan.exit_cone : 0.0;
     }
 
-    // A forward-peaked phase function seldom sends light of low orders back to the surface. For these an
-    // exit is sampled in two ways, by the phase function (the walk itself) and by a direction chosen among those that
+    // An exit of low order is sampled in two ways, by the phase function (the walk itself) and by a direction chosen among those that
     // leave, weighted by the balance heuristic (Veach, Guibas 1995).
     void tally_connections(const Vec3& before)
     {

@@ -136,11 +136,10 @@ private:
         const Floats flight = hn::Neg(hn::Log(floats, random.uniform()));
         const FloatMask hits = hn::Ge(flight, to_boundary);
         const Floats reflectance = internal_reflectance(m_job.medium.ior, hn::Abs(w.z));
-        tally_expected_exits(packet, active, x, w, to_boundary, flight, reflectance);
-
         // The part that leaves is tallied; the rest turns back.
         const FloatMask turns_back = hn::And(hits, hn::Lt(random.uniform(), reflectance));
         FloatMask ends = hn::AndNot(turns_back, hits);
+        tally_exits(packet, active, x, w, to_boundary, flight, reflectance, ends);
         const FloatMask scatters = hn::Not(hits);
         const Floats path = hn::Min(flight, to_boundary);
         x = {hn::MulAdd(path, w.x, x.x), hn::MulAdd(path, w.y, x.y), hn::MulAdd(path, w.z, x.z)};
@@ -153,7 +152,7 @@ private:
 
         Floats exit_weight = broadcast(1.0);
         const FloatMask connected =
-            hn::AndNot(greater(order, hn::Set(words, m_plan.last_connected_order)), hn::And(scatters, active));
+            hn::AndNot(greater(order, hn::Set(words, m_plan.last_expected_order)), hn::And(scatters, active));
         if (!hn::AllFalse(floats, connected)) {
             const Floats balanced = hn::Div(deflection.pdf, hn::Add(deflection.pdf, connection_pdf(scattered.z)));
             const FloatMask rivalled =
@@ -198,34 +197,37 @@ private:
         }
     }
 
-    // The exits along the flights that begin here, instead of waiting for one. Far from the boundary the flight itself decides whether
-    // its exit is tallied: it comes this close with the probability exp(-to_boundary) / rare_exit.
-    HWY_INLINE void tally_expected_exits(const Packet& packet, FloatMask active, const Vectors& x, const Vectors& w,
-                                         Floats to_boundary, Floats flight, Floats reflectance)
+    // Low orders: the exits along the flights that begin here, instead of waiting for one. Far from the boundary the
+    // flight itself decides whether its exit is tallied: it comes this close with the probability exp(-to_boundary) / rare_exit.
+    // High orders: the exits that happen.
+    HWY_INLINE void tally_exits(const Packet& packet, FloatMask active, const Vectors& x, const Vectors& w,
+                                Floats to_boundary, Floats flight, Floats reflectance, FloatMask leaves)
     {
         const Words order = hn::Load(words, packet.order.data());
         const Floats rare_distance = broadcast(rare_exit_distance);
-        const FloatMask near = hn::Lt(to_boundary, rare_distance);
-        const FloatMask lucky = hn::Ge(flight, hn::Sub(to_boundary, rare_distance));
-        FloatMask tallied = hn::And(active, hn::Or(near, lucky));
-        tallied = hn::And(tallied, float_mask(hn::Ne(order, hn::Zero(words))));
-        tallied = hn::And(tallied, hn::Lt(reflectance, broadcast(1.0)));
+        const FloatMask late = greater(order, hn::Set(words, m_plan.last_expected_order));
+        const FloatMask close =
+            hn::Or(hn::Lt(to_boundary, rare_distance), hn::Ge(flight, hn::Sub(to_boundary, rare_distance)));
+        const FloatMask scattered = greater(order, hn::Zero(words));
+        const FloatMask may_leave = hn::And(hn::And(close, scattered), hn::Lt(reflectance, broadcast(1.0)));
+        const FloatMask tallied = hn::And(active, hn::Or(hn::And(late, leaves), hn::AndNot(late, may_leave)));
         if (hn::AllFalse(floats, tallied))
             return;
-        const Floats escape = hn::Exp(floats, hn::Neg(hn::Min(to_boundary, rare_distance)));
-        const Floats weight =
-            hn::Mul(hn::Load(floats, packet.weight.data()), hn::Load(floats, packet.exit_weight.data()));
-        add_exits(tallied, x, w, to_boundary, hn::Mul(weight, escape), reflectance,
+        const Floats escape = hn::Mul(hn::Exp(floats, hn::Neg(hn::Min(to_boundary, rare_distance))),
+                                      hn::Load(floats, packet.exit_weight.data()));
+        const Floats probability =
+            hn::IfThenElse(late, broadcast(1.0), hn::Mul(escape, hn::Sub(broadcast(1.0), reflectance)));
+        add_exits(tallied, x, w, to_boundary, hn::Mul(hn::Load(floats, packet.weight.data()), probability),
                   hn::Or(order, hn::Load(words, packet.batch.data())));
     }
 
     HWY_INLINE void add_exits(FloatMask mask, const Vectors& x, const Vectors& w, Floats to_boundary, Floats weight,
-                              Floats reflectance, Words what)
+                              Words what)
     {
         const FloatMask up = hn::Lt(w.z, hn::Zero(floats));
         const Words side = hn::IfThenElse(hn::RebindMask(words, up), hn::Zero(words), hn::Set(words, 1u << side_shift));
-        m_tally.add(mask, hn::MulAdd(to_boundary, w.x, x.x), hn::MulAdd(to_boundary, w.y, x.y),
-                    hn::Mul(weight, hn::Sub(broadcast(1.0), reflectance)), hn::Or(what, side));
+        m_tally.add(mask, hn::MulAdd(to_boundary, w.x, x.x), hn::MulAdd(to_boundary, w.y, x.y), weight,
+                    hn::Or(what, side));
     }
 
     // Density per steradian of the connections below: proportional to the cosine, inside the cone that
@@ -297,7 +299,8 @@ private:
         const Floats rare = broadcast(rare_exit);
         const FloatMask tallied = hn::And(valid, hn::Lt(hn::Mul(random.uniform(), rare), probability));
         const Floats weight = hn::Mul(hn::LoadU(floats, m_requests.weight.data() + i), hn::Max(probability, rare));
-        add_exits(tallied, x, w, to_boundary, weight, internal_reflectance(m_job.medium.ior, cos_theta),
+        const Floats transmittance = hn::Sub(broadcast(1.0), internal_reflectance(m_job.medium.ior, cos_theta));
+        add_exits(tallied, x, w, to_boundary, hn::Mul(weight, transmittance),
                   hn::LoadU(words, m_requests.what.data() + i));
     }
 

@@ -10,24 +10,26 @@
 namespace beamspread {
 
 struct WalkPlan {
-    explicit WalkPlan(const Medium& medium)
-        : last_connected_order(static_cast<std::uint32_t>(4.0 / (1.0 - std::max(0.0, medium.g)))),
-          first_roulette(static_cast<std::uint32_t>(4.0 * medium.ior * medium.ior / (1.0 - std::max(0.0, medium.g)))),
-          exit_cone(1.0 / (medium.ior * medium.ior))
+    explicit WalkPlan(const Medium& medium) : exit_cone(1.0 / (medium.ior * medium.ior))
     {
+        // Scatterings that change the direction as much as one isotropic one.
+        const double transport = 1.0 / (1.0 - std::max(0.0, medium.g));
+        last_expected_order = static_cast<std::uint32_t>(2.0 * transport);
+        first_roulette = static_cast<std::uint32_t>(8.0 * medium.ior * medium.ior * transport);
     }
-
-    // Up to this order exits are also sampled by connections: beyond it light has forgotten its direction,
-    // and the walk itself finds its way out.
-    std::uint32_t last_connected_order;
-
-    // A walk that outlives 2^k first_roulette scatterings goes on with the probability `survival` at each k. In
-    // scatterings that change the direction as much as one isotropic one; internal reflection keeps light inside for
-    // longer. Measured best of 2 to 32 over albedos .2 to .9999, flat around it.
-    std::uint32_t first_roulette;
 
     // Squared sine of the half angle of the cone that can leave.
     double exit_cone;
+
+    // Up to this order exits are tallied at their expected value at every flight, and sampled by connections too: a
+    // forward-peaked phase function seldom sends such light back to the surface. Beyond it light has forgotten its
+    // direction and finds its way out; then the exits that happen are tallied, because the sum of the expected ones along a
+    // walk varies more than the one that ends it.
+    std::uint32_t last_expected_order;
+
+    // A walk that outlives 2^k first_roulette scatterings goes on with a certain probability at each k. Internal
+    // reflection keeps light inside for longer.
+    std::uint32_t first_roulette;
 };
 
 // In a half-space the chance to be still inside falls like order^-1/2. Giving up as many again makes each octave
