@@ -38,6 +38,7 @@ else:
     LdfSample = native.LdfSample
     Medium = native.Medium
     simulate = native.simulate
+    walk_kernels = native.walk_kernels
     __all__ = [
         "Cancelled",
         "LdfLibrary",
@@ -52,6 +53,7 @@ else:
         "register",
         "simulate",
         "unregister",
+        "walk_kernels",
     ]
 
 

@@ -25,6 +25,7 @@ __all__: list[str] = [
     "simulate",
     "spot_beams",
     "sun_beams",
+    "walk_kernels",
     "write_exr",
 ]
 
@@ -429,7 +430,13 @@ def read_exr(path: str, part: str | None = None) -> tuple:
     """
 
 def simulate(
-    medium: Medium, angles: list[float], photons: int, seed: int = 1, threads: int = 0, progress: typing.Any = None
+    medium: Medium,
+    angles: list[float],
+    photons: int,
+    seed: int = 1,
+    threads: int = 0,
+    progress: typing.Any = None,
+    kernel: str = "",
 ) -> LdfLibrary:
     """
     Simulate the light that beams spread inside a medium, by Monte Carlo.
@@ -449,6 +456,8 @@ def simulate(
         0: all.
     progress : callable, optional
         Called with the finished fraction; returning False stops.
+    kernel : str
+        One of `walk_kernels()`; empty: the fastest. They agree up to the simulation's noise.
 
     Returns
     -------
@@ -591,6 +600,14 @@ def sun_beams(
         An argument is out of range; the message names it.
     Cancelled
         `progress` returned False.
+    """
+
+def walk_kernels() -> list[str]:
+    """
+    Names of the implementations of the photon walk that this processor can run, fastest first.
+
+    The last, `scalar`, walks one photon at a time in double precision and is the truth for the others, which
+    walk as many as a vector has lanes, in single precision.
     """
 
 def write_exr(path: str, array: numpy.ndarray, channels: list[str], attributes: dict = {}) -> None:

@@ -118,7 +118,7 @@ Result ours(const Medium& medium, std::uint64_t seed, std::uint64_t photons, con
 struct Merit {
     Result mean;
     Result relative_error;  // of one photon
-    Result merit;           // 1 / (variance x time), relative variance, seconds
+    Result merit;  // 1 / (variance x time), relative variance, seconds
     double photons_per_ms = 0.0;
 };
 
@@ -143,7 +143,7 @@ Merit measure(std::uint64_t photons, const std::function<Result(std::uint64_t)>&
     const double seconds = times[seeds / 2];
     Merit merit;
     merit.photons_per_ms = static_cast<double>(photons) / seconds / 1e3;
-    const auto of = [&](double Result::*part) {
+    const auto of = [&](double Result::* part) {
         double mean = 0.0, squares = 0.0;
         for (const Result& result : results)
             mean += result.*part / seeds;
@@ -161,8 +161,8 @@ Merit measure(std::uint64_t photons, const std::function<Result(std::uint64_t)>&
 
 void print(const char* name, const Merit& merit, const Merit& base)
 {
-    std::printf("  %-8s %8.0f   %.5f  %5.2f  %6.1f x    %.5f  %5.2f  %6.1f x\n", name, merit.photons_per_ms, merit.mean.total,
-                merit.relative_error.total, merit.merit.total / base.merit.total, merit.mean.ring,
+    std::printf("  %-8s %8.0f   %.5f  %5.2f  %6.1f x    %.5f  %5.2f  %6.1f x\n", name, merit.photons_per_ms,
+                merit.mean.total, merit.relative_error.total, merit.merit.total / base.merit.total, merit.mean.ring,
                 merit.relative_error.ring, merit.merit.ring / base.merit.ring);
 }
 
@@ -177,15 +177,21 @@ double wall_seconds(const std::function<void()>& body)
 
 int main()
 {
-    std::printf("albedo %g, %g degrees; error: relative, of one photon; FOM: 1 / (variance x CPU time) over the plain walk's\n", albedo, angle_deg);
-    for (const Medium& medium : {Medium{0.8, 1.0}, Medium{0.8, 1.4}, Medium{0.0, 1.0}, Medium{0.95, 1.3}, Medium{0.8, 1.0, 10.0}}) {
-        std::printf("g %g, ior %g, thickness %g\n  walk     photon/ms   total  error     FOM      ring   error     FOM\n", medium.g, medium.ior, medium.thickness);
+    std::printf(
+        "albedo %g, %g degrees; error: relative, of one photon; FOM: 1 / (variance x CPU time) over the plain walk's\n",
+        albedo, angle_deg);
+    for (const Medium& medium :
+         {Medium{0.8, 1.0}, Medium{0.8, 1.4}, Medium{0.0, 1.0}, Medium{0.95, 1.3}, Medium{0.8, 1.0, 10.0}}) {
+        std::printf(
+            "g %g, ior %g, thickness %g\n  walk     photon/ms   total  error     FOM      ring   error     FOM\n",
+            medium.g, medium.ior, medium.thickness);
         const Merit base = measure(4000, [&](std::uint64_t seed) { return plain(medium, seed, 4000); });
         print("plain", base, base);
         for (const WalkKernel& kernel : walk_kernels()) {
             const std::uint64_t photons = kernel.name == "scalar" ? 4000 : 32000;
             const std::string name(kernel.name);
-            print(name.c_str(), measure(photons, [&](std::uint64_t seed) { return ours(medium, seed, photons, name, 1); }), base);
+            print(name.c_str(),
+                  measure(photons, [&](std::uint64_t seed) { return ours(medium, seed, photons, name, 1); }), base);
         }
     }
     const Medium medium{0.8, 1.4};
