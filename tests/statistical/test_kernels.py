@@ -17,8 +17,15 @@ PHOTONS = {"scalar": 3_000}
 """Per seed; the others are faster."""
 
 
+def harmonics(image):
+    """Sums of the image times cos(m phi), m = 1 .. 8, phi around the centre."""
+    x = np.arange(len(image)) - (len(image) - 1) / 2
+    phi = np.arctan2(x[:, None], x[None, :])
+    return [float((image * np.cos(m * phi)).sum()) for m in range(1, 9)]
+
+
 def quantities(library):
-    """Totals, and the image's even and odd parts at three scales, for low and high orders."""
+    """Totals, and what the image holds near O and in its harmonics, for low and high orders."""
     medium = library.medium
     sides = ["reflected"] if np.isinf(medium.thickness) else ["reflected", "transmitted"]
     values = []
@@ -28,8 +35,8 @@ def quantities(library):
             values.append(library.transmittance(ANGLE, albedo))
         for side in sides:
             for scale in (0.1, 1.0):
-                image = library.image(ANGLE, albedo, 4, scale / (1 - max(0.0, medium.g)), side=side)
-                values += [image.sum(), image[:, 2:].sum() - image[:, :2].sum(), image[1:3].sum(), image[1:3, 1:3].sum()]
+                image = library.image(ANGLE, albedo, 12, 0.3 * scale / (1 - max(0.0, medium.g)), side=side)
+                values += [image.sum(), image[4:8, 4:8].sum(), *harmonics(image)]
     return np.array(values, dtype=float)
 
 
@@ -54,6 +61,23 @@ def test_kernel_agrees_with_the_scalar_walk(medium, kernel):
 
 
 @pytest.mark.parametrize("kernel", walk_kernels())
+def test_light_prefers_no_azimuth(kernel):
+    """Next to normal incidence no harmonic but m = 0 is left: t-test over 24 simulations, 99.9 % for all together.
+
+    What a grid of square texels makes of m = 0 is taken from normal incidence itself, where a library keeps m = 0 only.
+    """
+    photons = PHOTONS.get(kernel, 40_000)
+
+    def found(angle, seed):
+        image = simulate(Medium(0.0), [angle], photons, seed=seed, kernel=kernel).image(angle, 0.3, 24, 0.25)
+        return np.array(harmonics(image)[1:]) / image.sum()
+
+    difference = [found(0.1, seed) - found(0.0, seed) for seed in range(24)]
+    p = stats.ttest_1samp(difference, 0.0).pvalue
+    assert p.min() > 1 - CONFIDENCE ** (1 / p.size), f"m = {p.argmin() + 2}"
+
+
+@pytest.mark.parametrize("kernel", walk_kernels())
 def test_kernels_walk_every_photon(kernel):
     """At an albedo near 1 nothing is absorbed in a slab: what is reflected and transmitted adds up to what enters."""
     medium = Medium(0.0, 1.0, 1.0)
@@ -66,5 +90,5 @@ def test_kernels_walk_every_photon(kernel):
 
 
 def test_unknown_kernel_is_refused():
-    with pytest.raises(ValueError, match="'kernel'.*'mmx'.*'scalar'"):
+    with pytest.raises(ValueError, match=r"'kernel'.*'mmx'.*'scalar'"):
         simulate(Medium(), [0], 10, kernel="mmx")
