@@ -37,6 +37,7 @@ else:
     LdfLibrary = native.LdfLibrary
     LdfSample = native.LdfSample
     Medium = native.Medium
+    exact_totals = native.exact_totals
     simulate = native.simulate
     walk_kernels = native.walk_kernels
     __all__ = [
@@ -48,6 +49,7 @@ else:
         "adaptive_beams",
         "albedo_from_color",
         "convolve",
+        "exact_totals",
         "library",
         "presets",
         "register",

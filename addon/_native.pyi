@@ -17,6 +17,7 @@ __all__: list[str] = [
     "convolve",
     "coverage",
     "embree_version",
+    "exact_totals",
     "fresnel",
     "henyey_greenstein_pdf",
     "henyey_greenstein_sample",
@@ -78,6 +79,24 @@ class LdfLibrary:
         Read a library from an OpenEXR file; OSError if it is missing, damaged or something else.
         """
     def __repr__(self) -> str: ...
+    def calibrated(self, threads: int = 0) -> LdfLibrary:
+        """
+        A copy whose totals are those of `exact_totals`.
+
+        The light of each scattering order, with the distribution it was simulated with, is scaled: by as little as makes the
+        totals right at 16 albedos from .01 to .99999, least squares weighted by statistical variance. Albedos in between, and the
+        totals of every map, follow. `standard_error` then includes what `exact_totals` and the interpolation between angles
+        leave; `image_standard_error` stays that of the simulation, an upper bound.
+
+        Parameters
+        ----------
+        threads : int
+            0: all. The result does not depend on it.
+
+        Returns
+        -------
+        LdfLibrary
+        """
     def diffuse_reflectance(self, albedo: float) -> float:
         """
         Reflectance under uniform diffuse light; needs a library from 0 to at least 88 degrees.
@@ -134,7 +153,10 @@ class LdfLibrary:
         """
     def standard_error(self, angle: float, albedo: float, side: str = "reflected") -> float:
         """
-        Standard error of `reflectance` or `transmittance`, from the scatter of 32 independent batches.
+        Standard error of `reflectance` or `transmittance`.
+
+        From the scatter of 32 independent batches; it does not know what interpolation between far angles misses. That of a
+        calibrated library does: the error halfway between simulated angles is known from `exact_totals`.
         """
     def transmittance(self, angle: float, albedo: float) -> float:
         """
@@ -144,6 +166,11 @@ class LdfLibrary:
     def angles(self) -> list[float]:
         """
         Simulated angles, degrees, ascending.
+        """
+    @property
+    def is_calibrated(self) -> bool:
+        """
+        Whether `calibrated` made it.
         """
     @property
     def medium(self) -> Medium: ...
@@ -327,6 +354,35 @@ def coverage(
 def embree_version() -> int:
     """
     The version of Embree in use, 31305 for 3.13.5: not that of the host process.
+    """
+
+def exact_totals(medium: Medium, angles: list[float], albedos: list[float], threads: int = 0) -> tuple:
+    """
+    Reflectance and transmittance of a medium without noise, by discrete ordinates and doubling of layers.
+
+    The plane-parallel problem alone, as van de Hulst 1980 and Prahl, van Gemert, Welch 1993 (Appl. Opt. 32, 559) solve it:
+    it knows nothing of where light leaves, and so checks simulations and calibrates libraries. Twice as many
+    directions change the results by less than 1e-4 of each for -.95 <= g <= .95 and angles up to 88 degrees.
+
+    Parameters
+    ----------
+    medium : Medium
+    angles : sequence of float
+        Angles of incidence, degrees from the surface normal, 0 <= angle < 90.
+    albedos : sequence of float
+        Single-scattering albedos, 0 <= albedo < 1.
+    threads : int
+        0: all. The result does not depend on it.
+
+    Returns
+    -------
+    reflectance, transmittance : float64, shape (angles, albedos)
+        Power per unit incident power: what `LdfLibrary.reflectance` and `LdfLibrary.transmittance` estimate.
+
+    Raises
+    ------
+    ValueError
+        Names the argument, its value and what is allowed.
     """
 
 def fresnel(cos_theta_i: numpy.ndarray, eta: numpy.ndarray) -> typing.Any:

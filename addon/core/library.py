@@ -7,16 +7,31 @@ from pathlib import Path
 
 from .._load import native
 
-ANGLES = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 58.0, 65.0, 71.0, 76.0, 80.0, 84.0, 88.0)
-"""Simulated angles of incidence, degrees; denser toward grazing, where distributions change fastest."""
-
 PHOTONS = {"preview": 32_000, "final": 800_000}
 """Photons per angle for a medium with g .8 and ior 1; see `photons_for`."""
 
 _MAX_PHOTONS = 1_000_000
 
-_FILE_VERSION = 2
+_FILE_VERSION = 3
 """Raised when the simulation changes, so that older cached files are made again."""
+
+SHIPPED_FOLDER = Path(__file__).resolve().parents[1] / "library"
+"""Libraries that came with the package, made by ``tools/make_library.py``."""
+
+
+def angles_for(medium):
+    """Angles of incidence to simulate, degrees.
+
+    Refraction lets the light inside change slowly with the angle outside; without it, the more a phase function peaks
+    forward, the more suddenly light leaves again near grazing. With these angles interpolation moves no total from 0 to
+    85 degrees by more than .15 % (.7 % from 75 degrees on), whatever the albedo, for g -.5 to .95 and
+    thicknesses from .5, up to 1e-6 of the incident power.
+    """
+    if medium.ior >= 1.2:
+        return (0.0, 12.0, 24.0, 36.0, 47.0, 57.0, 66.0, 73.0, 79.0, 84.0, 88.0)
+    if medium.g <= 0.85:
+        return (0.0, 11.0, 22.0, 33.0, 43.0, 52.0, 60.0, 67.0, 73.0, 78.0, 82.0, 85.5, 88.5)
+    return (0.0, 9.0, 18.0, 27.0, 36.0, 44.5, 52.0, 58.5, 64.5, 70.0, 74.5, 78.5, 82.0, 85.0, 87.0, 89.0)
 
 
 def cache_folder():
@@ -41,20 +56,41 @@ def photons_for(medium, quality):
     return int(min(PHOTONS[quality] * effort, _MAX_PHOTONS))
 
 
+def make(medium, quality, progress=None):
+    """Simulate the library of a medium and make its totals exact."""
+    return native.simulate(medium, angles_for(medium), photons_for(medium, quality), progress=progress).calibrated()
+
+
+def file_name(medium, quality):
+    """Name of the file that holds the library of a medium."""
+    return f"g{medium.g:g}_ior{medium.ior:g}_thickness{medium.thickness:g}_{quality}.exr"
+
+
 def _cache_path(medium, quality):
-    key = repr((_FILE_VERSION, medium.g, medium.ior, medium.thickness, ANGLES, photons_for(medium, quality)))
+    key = repr(
+        (_FILE_VERSION, medium.g, medium.ior, medium.thickness, angles_for(medium), photons_for(medium, quality))
+    )
     digest = hashlib.sha256(key.encode()).hexdigest()[:16]
-    name = f"g{medium.g:g}_ior{medium.ior:g}_thickness{medium.thickness:g}_{quality}_{digest}.exr"
-    return cache_folder() / name
+    name = Path(file_name(medium, quality))
+    return cache_folder() / f"{name.stem}_{digest}.exr"
 
 
-def _load_cached(path, medium):
-    """The cached library, or None where there is none, or where the file is damaged or another medium's."""
+def _load(path, medium):
+    """The library in a file; None where there is no such file, or where it is damaged or another medium's."""
     try:
-        cached = native.LdfLibrary.load(path)
+        found = native.LdfLibrary.load(path)
     except OSError:
         return None
-    return cached if cached.medium == medium else None
+    whole = found.is_calibrated and tuple(found.angles) == angles_for(medium)
+    return found if whole and found.medium == medium else None
+
+
+def _load_shipped(medium, quality):
+    """A shipped library of at least this quality, or None."""
+    for name in (quality, "final"):
+        if found := _load(SHIPPED_FOLDER / file_name(medium, name), medium):
+            return found
+    return None
 
 
 def _store(result, path):
@@ -87,14 +123,15 @@ def library(medium, quality="final", progress=None):
     ----------
     medium : Medium
     quality : {"final", "preview"}
-        Relative standard error of the totals up to 60 degrees: at most 0.4 % and 2 % for g up to .8.
+        Totals are exact either way, as `LdfLibrary.calibrated` has it; what differs is the noise of the maps, see
+        `LdfLibrary.image_standard_error`.
     progress : callable, optional
         Called with the finished fraction while a simulation runs; returning False stops.
 
     Returns
     -------
     LdfLibrary
-        From the cache folder if it is there, else simulated now and cached.
+        One that came with the package, else from the cache folder, else simulated now and cached.
 
     Raises
     ------
@@ -106,8 +143,8 @@ def library(medium, quality="final", progress=None):
     if quality not in PHOTONS:
         raise ValueError(f"argument 'quality' is {quality!r}; allowed: 'final', 'preview'")
     path = _cache_path(medium, quality)
-    known = _loaded.get(path) or _load_cached(path, medium)
+    known = _loaded.get(path) or _load_shipped(medium, quality) or _load(path, medium)
     if known is None:
-        known = native.simulate(medium, ANGLES, photons_for(medium, quality), progress=progress)
+        known = make(medium, quality, progress)
         _store(known, path)
     return _remember(path, known)

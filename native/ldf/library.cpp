@@ -8,6 +8,7 @@
 #include "base/constants.h"
 #include "base/error.h"
 #include "medium/fresnel.h"
+#include "transport/adding_doubling.h"
 
 namespace beamspread {
 
@@ -19,23 +20,6 @@ constexpr double grazing_deg = 88.0;
 
 // Below this exponent a bin's weight is zero to any purpose, and the expansion in its variance no longer holds.
 constexpr double negligible_log_weight = -60.0;
-
-// Weight of each order bin at an albedo: the mean of albedo^n over the bin, to second order in the spread
-// of its orders.
-std::array<double, order_bin_count> order_weights(const SideResult& side, double albedo)
-{
-    std::array<double, order_bin_count> weights{};
-    if (albedo <= 0.0)
-        return weights;
-    const double log_albedo = std::log(albedo);
-    for (std::size_t b = 1; b < order_bin_count; ++b) {
-        const double log_weight = log_albedo * static_cast<double>(side.mean_order[b]);
-        if (log_weight > negligible_log_weight)
-            weights[b] =
-                std::exp(log_weight + 0.5 * log_albedo * log_albedo * static_cast<double>(side.order_variance[b]));
-    }
-    return weights;
-}
 
 // Sums over the orders, [radius bin][harmonic].
 std::vector<double> contract_orders(const SideResult& side, double albedo)
@@ -63,6 +47,21 @@ RadialProfile profile_of(const AngleResult& angle, Side side, std::vector<double
 
 }  // namespace
 
+std::array<double, order_bin_count> order_weights(const SideResult& side, double albedo)
+{
+    std::array<double, order_bin_count> weights{};
+    if (albedo <= 0.0)
+        return weights;
+    const double log_albedo = std::log(albedo);
+    for (std::size_t b = 1; b < order_bin_count; ++b) {
+        const double log_weight = log_albedo * static_cast<double>(side.mean_order[b]);
+        if (log_weight > negligible_log_weight)
+            weights[b] =
+                std::exp(log_weight + 0.5 * log_albedo * log_albedo * static_cast<double>(side.order_variance[b]));
+    }
+    return weights;
+}
+
 void check_albedo(double albedo)
 {
     if (!(albedo >= 0.0 && albedo < 1.0))
@@ -70,17 +69,25 @@ void check_albedo(double albedo)
 }
 
 LdfLibrary::LdfLibrary(const Medium& medium, std::uint64_t photons, std::uint64_t seed,
-                       std::vector<AngleResult> results)
-    : m_medium(medium), m_photons(photons), m_seed(seed), m_results(std::move(results))
+                       std::vector<AngleResult> results, std::vector<SideResiduals> residuals)
+    : m_medium(medium),
+      m_photons(photons),
+      m_seed(seed),
+      m_results(std::move(results)),
+      m_residuals(std::move(residuals))
 {
     validate(medium);
     if (m_results.empty())
         reject("angles", "empty", "at least one angle");
     std::sort(m_results.begin(), m_results.end(),
               [](const AngleResult& a, const AngleResult& b) { return a.angle_deg < b.angle_deg; });
+    if (is_calibrated() && m_residuals.size() != m_results.size())
+        reject("residuals", static_cast<double>(m_residuals.size()), "as many as angles");
+    // Outside the medium both the refracted angle and the Fresnel factor of light that comes back from a slab's other
+    // boundary are smooth functions of the angle; inside, the latter turns up infinitely fast toward grazing.
     std::vector<double> nodes;
     for (const AngleResult& result : m_results) {
-        const double node = refracted_angle(result.angle_deg * radians_per_degree, medium.ior);
+        const double node = result.angle_deg * radians_per_degree;
         // Closer nodes would only amplify the simulation's noise.
         if (!nodes.empty() && !(node - nodes.back() > 1e-3))
             reject("angles", result.angle_deg, "distinct angles, at least 0.1 degrees apart");
@@ -111,10 +118,9 @@ void LdfLibrary::check_angle(double angle_deg) const
     }
 }
 
-double LdfLibrary::inside_angle(double angle_deg) const
+double LdfLibrary::clamped_angle(double angle_deg) const
 {
-    const double clamped = std::clamp(angle_deg, m_results.front().angle_deg, m_results.back().angle_deg);
-    return refracted_angle(clamped * radians_per_degree, m_medium.ior);
+    return std::clamp(angle_deg, m_results.front().angle_deg, m_results.back().angle_deg);
 }
 
 double LdfLibrary::entry_transmittance(double angle_deg) const
@@ -125,7 +131,7 @@ double LdfLibrary::entry_transmittance(double angle_deg) const
 LdfLibrary::AngleWeights LdfLibrary::angle_weights(double angle_deg) const
 {
     check_angle(angle_deg);
-    const double theta = inside_angle(angle_deg);
+    const double theta = clamped_angle(angle_deg) * radians_per_degree;
     const double transmittance = entry_transmittance(angle_deg);
     AngleWeights weights{m_spline.weights(theta, AngleSpline::Parity::even),
                          m_spline.weights(theta, AngleSpline::Parity::odd)};
@@ -176,7 +182,29 @@ double LdfLibrary::standard_error(double angle_deg, double albedo, Side side) co
             squares += (t - mean) * (t - mean);
         variance += weights.even[j] * weights.even[j] * squares / static_cast<double>(batch_count * (batch_count - 1));
     }
+    if (is_calibrated()) {
+        const double relative = std::hypot(exact_totals_error(m_medium), residual(angle_deg, albedo, side));
+        variance += std::pow(relative * total(angle_deg, albedo, side), 2);
+    }
     return std::sqrt(variance);
+}
+
+// The largest of those at the compared angles and albedos around.
+double LdfLibrary::residual(double angle_deg, double albedo, Side side) const
+{
+    const double angle = clamped_angle(angle_deg);
+    const auto s = static_cast<std::size_t>(side);
+    const auto above = std::upper_bound(compared_albedos.begin(), compared_albedos.end() - 1, albedo);
+    const auto k = static_cast<std::size_t>(above - compared_albedos.begin());
+    const auto at = [k](const auto& values) { return std::max(values[k == 0 ? 0 : k - 1], values[k]); };
+    std::size_t j = 0;
+    while (j + 1 < m_results.size() && angle >= m_results[j + 1].angle_deg)
+        ++j;
+    const Residuals& from = m_residuals[j][s];
+    if (angle == m_results[j].angle_deg || j + 1 == m_results.size())
+        return static_cast<double>(at(from.here));
+    const bool is_near = 2.0 * angle < m_results[j].angle_deg + m_results[j + 1].angle_deg;
+    return static_cast<double>(std::max(at(from.halfway), at(is_near ? from.here : m_residuals[j + 1][s].here)));
 }
 
 double LdfLibrary::diffuse_reflectance(double albedo) const

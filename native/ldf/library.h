@@ -15,22 +15,45 @@
 
 namespace beamspread {
 
+// Albedos at which the totals of calibrated libraries are compared with exact ones. Calibration makes them equal at every
+// other one of these, from the first to the last: their weights of the orders span those of all albedos.
+inline constexpr std::array<double, 31> compared_albedos = {
+    0.01,  0.05,   0.1,    0.2,    0.3,    0.4,     0.5,     0.6,     0.7,    0.75,  0.8,
+    0.86,  0.9,    0.93,   0.95,   0.97,   0.98,    0.986,   0.99,    0.995,  0.997, 0.9983,
+    0.999, 0.9995, 0.9997, 0.9998, 0.9999, 0.99995, 0.99997, 0.99998, 0.99999};
+
+// Weight of each order bin at an albedo: the mean of albedo^n over the bin, to second order in the spread
+// of its orders.
+std::array<double, order_bin_count> order_weights(const SideResult& side, double albedo);
+
+// Relative errors of the totals of a calibrated library, at a simulated angle and halfway to the next.
+struct Residuals {
+    std::array<float, compared_albedos.size()> here{};
+    std::array<float, compared_albedos.size()> halfway{};
+};
+using SideResiduals = std::array<Residuals, side_count>;
+
 class LdfLibrary {
 public:
-    // Results in any order, one per angle. Throws InvalidArgument.
-    LdfLibrary(const Medium& medium, std::uint64_t photons, std::uint64_t seed, std::vector<AngleResult> results);
+    // Results in any order, one per angle; of a calibrated library also, by ascending angles, what is left of its errors.
+    // Throws InvalidArgument.
+    LdfLibrary(const Medium& medium, std::uint64_t photons, std::uint64_t seed, std::vector<AngleResult> results,
+               std::vector<SideResiduals> residuals = {});
 
     const Medium& medium() const { return m_medium; }
     std::uint64_t photons() const { return m_photons; }  // per angle
     std::uint64_t seed() const { return m_seed; }
     const std::vector<AngleResult>& results() const { return m_results; }
     std::vector<double> angles_deg() const;
+    bool is_calibrated() const { return !m_residuals.empty(); }  // see ldf/calibration.h
+    const std::vector<SideResiduals>& residuals() const { return m_residuals; }
 
     // Power that leaves one side per unit power incident, unscattered light included, specular reflection
     // at entry excluded. Angle in degrees within the simulated ones, albedo in [0, 1).
     double total(double angle_deg, double albedo, Side side) const;
 
-    // Standard error of `total`, from the scatter of the batches.
+    // Standard error of `total`, from the scatter of the batches. For a calibrated library, whose statistical error is next
+    // to nothing, also the error of the exact totals, and what calibration and interpolation between angles left.
     double standard_error(double angle_deg, double albedo, Side side) const;
 
     // `total` of the reflected side under uniform diffuse light: the mean over the hemisphere, weighted by cosine.
@@ -59,7 +82,8 @@ public:
     void check_angle(double angle_deg) const;
 
 private:
-    double inside_angle(double angle_deg) const;
+    double clamped_angle(double angle_deg) const;
+    double residual(double angle_deg, double albedo, Side side) const;
     RadialProfile interpolated(double angle_deg, const std::vector<RadialProfile>& nodes) const;
     double entry_transmittance(double angle_deg) const;
 
@@ -67,7 +91,8 @@ private:
     std::uint64_t m_photons;
     std::uint64_t m_seed;
     std::vector<AngleResult> m_results;  // ascending angles
-    AngleSpline m_spline;                // over refracted angles
+    std::vector<SideResiduals> m_residuals;
+    AngleSpline m_spline;  // over the angles outside, see the constructor
 };
 
 // 0 <= albedo < 1, or InvalidArgument.

@@ -1,15 +1,17 @@
 // Files of LdfLibrary: multi-part OpenEXR.
 //
 // Every part carries the attributes beamspreadLdf (format version), g, ior, thickness (mean free
-// paths, inf: half-space), photons, seed, angle (degrees) and centre (mean free paths). For the j-th
-// angle and each side there are
+// paths, inf: half-space), photons, seed, angle (degrees), centre (mean free paths) and a checksum of itself. For the
+// j-th angle and each side there are
 //   "<side>.<j>"         columns: radius bins, lines: order bins, channels m0 .. m8: sums of weight * cos(m phi)
 //                        per unit power that entered (transport/bins.h, tally.h);
+//                        of a calibrated library also the attributes residuals and residualsHalfway (ldf/library.h);
 //   "<side>.<j>.orders"  columns: order bins; line 0 and 1: mean and variance of the order; then one
 //                        line per batch: power that leaves;
 //   "<side>.<j>.scatter" columns: radius bins, lines: albedos within groups of batches, channels m0 .. m8: deviations
 //                        of the groups (transport/map_scatter.h).
 #include <algorithm>
+#include <bit>
 #include <charconv>
 #include <cmath>
 
@@ -21,7 +23,7 @@ namespace beamspread {
 
 namespace {
 
-constexpr int format_version = 2;
+constexpr int format_version = 3;
 constexpr std::size_t scatter_lines = group_count * scatter_albedos.size();
 constexpr std::array<const char*, side_count> side_names = {"reflected", "transmitted"};
 
@@ -50,6 +52,44 @@ std::string part_name(std::size_t side, std::size_t j)
     return std::string(side_names[side]) + "." + std::to_string(j);
 }
 
+// FNV-1a over whole numbers instead of bytes: notices any damage to a part, be it to a single attribute.
+class Checksum {
+public:
+    void add(std::uint64_t word) { m_hash = (m_hash ^ word) * 0x100000001b3ULL; }
+    void add(int value) { add(static_cast<std::uint64_t>(value)); }
+    void add(double value) { add(std::bit_cast<std::uint64_t>(value)); }
+    void add(const std::string& text)
+    {
+        for (char c : text)
+            add(static_cast<std::uint64_t>(c));
+        add(text.size());
+    }
+    void add(const std::vector<float>& values)
+    {
+        for (float x : values)
+            add(std::uint64_t{std::bit_cast<std::uint32_t>(x)});
+        add(values.size());
+    }
+    std::string text() const { return std::to_string(m_hash); }
+
+private:
+    std::uint64_t m_hash = 0xcbf29ce484222325ULL;
+};
+
+std::string checksum(const ExrPart& part)
+{
+    Checksum sum;
+    sum.add(part.name);
+    for (const auto& [name, value] : part.attributes) {
+        if (name == "checksum")
+            continue;
+        sum.add(name);
+        std::visit([&sum](const auto& x) { sum.add(x); }, value);
+    }
+    sum.add(part.pixels);
+    return sum.text();
+}
+
 class Reader {
 public:
     explicit Reader(const std::string& path) : m_path(path), m_parts(read_exr_parts(path)) {}
@@ -64,6 +104,8 @@ public:
         const Medium medium{attribute<double>(first, "g"), attribute<double>(first, "ior"),
                             attribute<double>(first, "thickness")};
         std::vector<AngleResult> results;
+        std::vector<SideResiduals> residuals;
+        const bool is_calibrated = first.attributes.contains("residuals");
         while (const ExrPart* part = find(part_name(0, results.size()))) {
             AngleResult result;
             result.angle_deg = attribute<double>(*part, "angle");
@@ -72,12 +114,15 @@ public:
             for (std::size_t side = 0; side < side_count; ++side)
                 if (find(part_name(side, results.size())))
                     result.sides[side] = side_result(part_name(side, results.size()));
+            if (is_calibrated)
+                residuals.push_back(side_residuals(results.size()));
             if (result.sides[1].moments.empty() != medium.is_half_space())
                 fail("does not fit its own thickness");
             results.push_back(std::move(result));
         }
         try {
-            return LdfLibrary(medium, number(first, "photons"), number(first, "seed"), std::move(results));
+            return LdfLibrary(medium, number(first, "photons"), number(first, "seed"), std::move(results),
+                              std::move(residuals));
         } catch (const InvalidArgument& error) {
             fail(std::string("is inconsistent: ") + error.what());
         }
@@ -126,7 +171,30 @@ private:
             fail("has a part '" + name + "' of another size");
         if (!std::all_of(part->pixels.begin(), part->pixels.end(), [](float x) { return std::isfinite(x); }))
             fail("has a part '" + name + "' with values that are not finite");
+        if (attribute<std::string>(*part, "checksum") != checksum(*part))
+            fail("has a damaged part '" + name + "'");
         return *part;
+    }
+
+    void read_residuals(const ExrPart& part, const std::string& name,
+                        std::array<float, compared_albedos.size()>& to) const
+    {
+        const auto values = attribute<std::vector<float>>(part, name);
+        if (values.size() != to.size() ||
+            !std::all_of(values.begin(), values.end(), [](float x) { return x >= 0.0F && std::isfinite(x); }))
+            fail("has an attribute '" + name + "' that is no list of errors");
+        std::copy(values.begin(), values.end(), to.begin());
+    }
+
+    SideResiduals side_residuals(std::size_t j) const
+    {
+        SideResiduals residuals{};
+        for (std::size_t side = 0; side < side_count; ++side)
+            if (const ExrPart* part = find(part_name(side, j))) {
+                read_residuals(*part, "residuals", residuals[side].here);
+                read_residuals(*part, "residualsHalfway", residuals[side].halfway);
+            }
+        return residuals;
     }
 
     SideResult side_result(const std::string& name) const
@@ -164,8 +232,14 @@ void save_library(const LdfLibrary& library, const std::string& path)
             if (from.moments.empty())
                 continue;
             const auto attributes = common_attributes(library, result.angle_deg, from.centre);
+            auto moments_attributes = attributes;
+            if (library.is_calibrated()) {
+                const Residuals& left = library.residuals()[j][side];
+                moments_attributes["residuals"] = std::vector<float>(left.here.begin(), left.here.end());
+                moments_attributes["residualsHalfway"] = std::vector<float>(left.halfway.begin(), left.halfway.end());
+            }
             parts.push_back({part_name(side, j), static_cast<int>(radius_bin_count), static_cast<int>(order_bin_count),
-                             harmonic_channels(), from.moments, attributes});
+                             harmonic_channels(), from.moments, moments_attributes});
             std::vector<float> orders = from.mean_order;
             orders.insert(orders.end(), from.order_variance.begin(), from.order_variance.end());
             orders.insert(orders.end(), from.batch_totals.begin(), from.batch_totals.end());
@@ -179,6 +253,8 @@ void save_library(const LdfLibrary& library, const std::string& path)
                              static_cast<int>(scatter_lines), harmonic_channels(), from.deviations, attributes});
         }
     }
+    for (ExrPart& part : parts)
+        part.attributes["checksum"] = checksum(part);
     write_exr_parts(path, parts);
 }
 

@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "ldf/calibration.h"
 #include "ldf/ldf_image.h"
 #include "ldf/library.h"
 #include "python/casters.h"
@@ -55,7 +56,8 @@ within the simulated ones (a library that reaches 88 degrees serves up to 90); a
         .def_property_readonly("medium", &LdfLibrary::medium)
         .def_property_readonly("angles", &LdfLibrary::angles_deg, "Simulated angles, degrees, ascending.")
         .def_property_readonly("photons", &LdfLibrary::photons, "Photons per angle.")
-        .def_property_readonly("seed", &LdfLibrary::seed);
+        .def_property_readonly("seed", &LdfLibrary::seed)
+        .def_property_readonly("is_calibrated", &LdfLibrary::is_calibrated, "Whether `calibrated` made it.");
     library
         .def(
             "reflectance",
@@ -77,7 +79,34 @@ within the simulated ones (a library that reaches 88 degrees serves up to 90); a
                 return self.standard_error(angle, albedo, side_from_name(side));
             },
             py::arg("angle"), py::arg("albedo"), py::arg("side") = "reflected",
-            "Standard error of `reflectance` or `transmittance`, from the scatter of 32 independent batches.")
+            R"(Standard error of `reflectance` or `transmittance`.
+
+From the scatter of 32 independent batches; it does not know what interpolation between far angles misses. That of a
+calibrated library does: the error halfway between simulated angles is known from `exact_totals`.
+)")
+        .def(
+            "calibrated",
+            [](const LdfLibrary& self, int threads) {
+                const py::gil_scoped_release release;
+                return std::make_shared<LdfLibrary>(calibrated(self, threads));
+            },
+            py::arg("threads") = 0,
+            R"(A copy whose totals are those of `exact_totals`.
+
+The light of each scattering order, with the distribution it was simulated with, is scaled: by as little as makes the
+totals right at 16 albedos from .01 to .99999, least squares weighted by statistical variance. Albedos in between, and the
+totals of every map, follow. `standard_error` then includes what `exact_totals` and the interpolation between angles
+leave; `image_standard_error` stays that of the simulation, an upper bound.
+
+Parameters
+----------
+threads : int
+    0: all. The result does not depend on it.
+
+Returns
+-------
+LdfLibrary
+)")
         .def("diffuse_reflectance", &LdfLibrary::diffuse_reflectance, py::arg("albedo"),
              "Reflectance under uniform diffuse light; needs a library from 0 to at least 88 degrees.");
     library

@@ -1,7 +1,30 @@
+#include <algorithm>
+
 #include "ldf/library.h"
 #include "python/casters.h"
+#include "transport/adding_doubling.h"
 
 namespace beamspread {
+
+namespace {
+
+py::tuple exact(const Medium& medium, const std::vector<double>& angles, const std::vector<double>& albedos,
+                int threads)
+{
+    ExactTotals totals;
+    {
+        const py::gil_scoped_release release;
+        totals = exact_totals(medium, angles, albedos, threads);
+    }
+    const auto table = [&](const std::vector<double>& values) {
+        Array<double> array({angles.size(), albedos.size()});
+        std::copy(values.begin(), values.end(), array.mutable_data());
+        return array;
+    };
+    return py::make_tuple(table(totals.reflectance), table(totals.transmittance));
+}
+
+}  // namespace
 
 void bind_transport(py::module_& m)
 {
@@ -59,6 +82,33 @@ Cancelled
 
 The last, `scalar`, walks one photon at a time in double precision and is the truth for the others, which
 walk as many as a vector has lanes, in single precision.
+)");
+    m.def("exact_totals", &exact, py::arg("medium"), py::arg("angles"), py::arg("albedos"), py::arg("threads") = 0,
+          R"(Reflectance and transmittance of a medium without noise, by discrete ordinates and doubling of layers.
+
+The plane-parallel problem alone, as van de Hulst 1980 and Prahl, van Gemert, Welch 1993 (Appl. Opt. 32, 559) solve it:
+it knows nothing of where light leaves, and so checks simulations and calibrates libraries. Twice as many
+directions change the results by less than 1e-4 of each for -.95 <= g <= .95 and angles up to 88 degrees.
+
+Parameters
+----------
+medium : Medium
+angles : sequence of float
+    Angles of incidence, degrees from the surface normal, 0 <= angle < 90.
+albedos : sequence of float
+    Single-scattering albedos, 0 <= albedo < 1.
+threads : int
+    0: all. The result does not depend on it.
+
+Returns
+-------
+reflectance, transmittance : float64, shape (angles, albedos)
+    Power per unit incident power: what `LdfLibrary.reflectance` and `LdfLibrary.transmittance` estimate.
+
+Raises
+------
+ValueError
+    Names the argument, its value and what is allowed.
 )");
 }
 

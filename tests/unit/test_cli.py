@@ -42,13 +42,14 @@ def slab_file(tmp_path_factory):
     return path
 
 
-def test_library_saves_what_simulate_gives(run, tmp_path):
+def test_library_saves_the_calibrated_simulation(run, tmp_path):
     code, out, err = run(
         "library", "--g", "-.3", "--ior", "1.3", "--thickness", "5", *SMALL, "--seed", "7", "-o", "a.exr"
     )
     assert (code, err) == (0, "")
     assert "a.exr: g -0.3, ior 1.3, slab of 5 mean free paths" in out
-    loaded, expected = LdfLibrary.load(tmp_path / "a.exr"), simulate(Medium(-0.3, 1.3, 5.0), [0, 30, 60], 400, seed=7)
+    loaded = LdfLibrary.load(tmp_path / "a.exr")
+    expected = simulate(Medium(-0.3, 1.3, 5.0), [0, 30, 60], 400, seed=7).calibrated()
     assert (loaded.medium, loaded.angles, loaded.photons, loaded.seed) == (expected.medium, [0, 30, 60], 400, 7)
     assert loaded.reflectance(30, 0.9) == expected.reflectance(30, 0.9)
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.exr"]

@@ -220,7 +220,8 @@ class TestCache:
         from beamspread.core import library as module
 
         monkeypatch.setenv("BEAMSPREAD_CACHE", str(tmp_path / "cache"))
-        monkeypatch.setattr(module, "ANGLES", (0.0, 45.0, 88.0))
+        monkeypatch.setattr(module, "SHIPPED_FOLDER", tmp_path / "shipped")
+        monkeypatch.setattr(module, "angles_for", lambda medium: (0.0, 45.0, 88.0))
         monkeypatch.setattr(module, "PHOTONS", {"preview": 200, "final": 2000})
         module._loaded.clear()
         yield tmp_path / "cache"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..._load import native
 from ..color import albedo_from_color
-from ..library import ANGLES, library, photons_for
+from ..library import angles_for, library, photons_for
 from ..presets import presets
 from .bar import ProgressBar
 from .options import MOST_MAPS
@@ -51,11 +51,12 @@ def simulate(options) -> None:
     """Simulate a medium and save its library."""
     medium = _medium(options)
     _check_target(options.output, (".exr",))
-    angles = options.angles or list(ANGLES)
+    angles = options.angles or angles_for(medium)
     photons = options.photons or photons_for(medium, options.quality)
     start = time.monotonic()
     with ProgressBar("simulating") as progress:
-        result = native.simulate(medium, angles, photons, seed=options.seed, threads=options.threads, progress=progress)
+        plain = native.simulate(medium, angles, photons, seed=options.seed, threads=options.threads, progress=progress)
+        result = plain.calibrated(options.threads)
     seconds = time.monotonic() - start
     result.save(options.output)
     size = Path(options.output).stat().st_size / 1e6
