@@ -9,7 +9,7 @@
 #include "solve/beam_basis.h"
 #include "solve/far_field.h"
 #include "solve/mask_pyramid.h"
-#include "solve/row_sum.h"
+#include "solve/near_field.h"
 #include "solve/texel_kernel.h"
 
 namespace beamspread {
@@ -17,7 +17,7 @@ namespace beamspread {
 namespace {
 
 // Share of the tolerance that each kind of approximation may use up: light that is not quite even within a square,
-// directions between the nodes and harmonics left out, kernels farther than near_texels, and distance.
+// kernels farther than near_texels, distance, and directions between the nodes with harmonics left out.
 constexpr double tolerance_share = 0.25;
 
 // Texels around the pole within which texel_kernel must be exact for its table to be off by at most `tolerance`,
@@ -100,7 +100,7 @@ public:
     SummedKernel(const KernelTable& kernel, std::size_t grid_height, std::size_t grid_width)
         : m_height(static_cast<std::ptrdiff_t>(grid_height)),
           m_width(static_cast<std::ptrdiff_t>(grid_width)),
-          m_sums(m_height, m_width)
+          m_sums(m_height, m_width + near_block)
     {
         for (std::ptrdiff_t dy = 1 - m_height; dy < m_height; ++dy) {
             double row_sum = 0.0;
@@ -111,8 +111,8 @@ public:
         }
     }
 
-    // dx = -width .. width - 1.
-    const double* row(std::ptrdiff_t dy) const { return m_sums.row(dy); }
+    // Offsets -height .. height - 1, -width .. width - 1.
+    const KernelTable& table() const { return m_sums; }
 
     // Power that the lights leave on the plane.
     double power(const Grid& light) const
@@ -138,48 +138,31 @@ private:
 // right of a corner. Where squares of the same light meet, their steps cancel.
 class SquareBeams {
 public:
-    SquareBeams(const Grid& light, const std::vector<Square>& squares) : m_rows(light.height + 1)
+    SquareBeams(const Grid& light, const std::vector<Square>& squares) : m_steps(light.height + 1, light.width + 1)
     {
-        Grid steps(light.height + 1, light.width + 1);
         for (const Square& square : squares) {
             const double mean = mean_light(light, square);
-            steps.row(square.y)[square.x] += mean;
-            steps.row(square.y)[square.x + square.size] -= mean;
-            steps.row(square.y + square.size)[square.x] -= mean;
-            steps.row(square.y + square.size)[square.x + square.size] += mean;
+            m_steps.row(square.y)[square.x] += mean;
+            m_steps.row(square.y)[square.x + square.size] -= mean;
+            m_steps.row(square.y + square.size)[square.x] -= mean;
+            m_steps.row(square.y + square.size)[square.x + square.size] += mean;
         }
-        for (std::size_t y = 0; y < steps.height; ++y)
-            for (std::size_t x = 0; x < steps.width; ++x)
-                if (steps.row(y)[x] != 0.0)
-                    m_rows[y].push_back({x, steps.row(y)[x]});
     }
 
     std::size_t count_steps() const
     {
-        std::size_t count = 0;
-        for (const std::vector<Step>& row : m_rows)
-            count += row.size();
-        return count;
+        const std::vector<double>& steps = m_steps.values;
+        return steps.size() - static_cast<std::size_t>(std::count(steps.begin(), steps.end(), 0.0));
     }
 
     // The luminance of a step is the sum of the kernel over the offsets below and to the left.
     void add_to(Grid& sum, const SummedKernel& summed) const
     {
-        parallel_for(sum.height, [&](std::size_t target) {
-            for (std::size_t y = 0; y < m_rows.size(); ++y) {
-                const double* row = summed.row(static_cast<std::ptrdiff_t>(target) - static_cast<std::ptrdiff_t>(y));
-                for (const Step& step : m_rows[y])
-                    add_scaled(sum.row(target), row - step.x, step.light, sum.width);
-            }
-        });
+        const KernelTable* table = &summed.table();
+        add_near(sum, m_steps, {static_cast<std::ptrdiff_t>(sum.height + sum.width), {table, table, table, table}});
     }
 
 private:
-    struct Step {
-        std::size_t x;
-        double light;
-    };
-
     static double mean_light(const Grid& light, const Square& square)
     {
         // Around the first texel, so that even light has exactly its own value as mean.
@@ -191,7 +174,7 @@ private:
         return first + sum / static_cast<double>(square.size * square.size);
     }
 
-    std::vector<std::vector<Step>> m_rows;
+    Grid m_steps;
 };
 
 std::vector<Square> at_least(const std::vector<Square>& squares, std::size_t size)
@@ -207,7 +190,7 @@ std::vector<Square> wide_beams(const std::vector<Square>& squares, const Grid& l
 {
     // Typical radius within which a texel's beam is added texel by texel.
     constexpr std::ptrdiff_t typical_radius = 12;
-    const double texel_cost = cost_of_disk(typical_radius, light.height, light.width);
+    const double texel_cost = near_cost(typical_radius, light.height, light.width);
     const auto texels = static_cast<double>(light.values.size());
     std::vector<Square> best;
     double best_saving = 0.0;
@@ -266,7 +249,9 @@ private:
         const RadialProfile profile = BeamBasis::uniform(m_problem).profiles(m_channel)[0];
         const KernelTable kernel = table(profile, term);
         const SummedKernel summed(kernel, m_problem.height, m_problem.width);
-        add_term(sum, term.light, kernel, summed, tolerance_share * m_problem.tolerance * summed.power(term.light));
+        // One direction is exact: its share goes to distance.
+        const double allowed = 2.0 * tolerance_share * m_problem.tolerance * summed.power(term.light);
+        add_term(sum, term.light, kernel, summed, allowed);
         m_progress.advance(1.0);
     }
 

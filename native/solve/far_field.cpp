@@ -5,7 +5,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "base/constants.h"
 #include "base/threads.h"
 #include "solve/row_sum.h"
 
@@ -249,40 +248,16 @@ private:
     std::vector<double> m_sums;
 };
 
-// Half the width of a disk's row.
-std::ptrdiff_t chord(std::ptrdiff_t radius, std::ptrdiff_t dy)
+// The part of a kernel that add_near needs.
+template <class Row>
+KernelTable near_part(const Row& row, std::ptrdiff_t radius, std::size_t height, std::size_t width)
 {
-    return static_cast<std::ptrdiff_t>(std::sqrt(static_cast<double>(radius * radius - dy * dy)));
-}
-
-// Adds the light of every point to the points within the radius; `table` gives the kernel of a source at a
-// row and column.
-template <class Table>
-void add_disks(const Grid& light, std::ptrdiff_t radius, const Table& table, Grid& sum)
-{
-    std::vector<std::vector<std::size_t>> lit(light.height);
-    for (std::size_t y = 0; y < light.height; ++y)
-        for (std::size_t x = 0; x < light.width; ++x)
-            if (light.row(y)[x] != 0.0)
-                lit[y].push_back(x);
-    const auto height = static_cast<std::ptrdiff_t>(light.height);
-    const auto width = static_cast<std::ptrdiff_t>(light.width);
-    parallel_for(light.height, [&](std::size_t target) {
-        const auto y = static_cast<std::ptrdiff_t>(target);
-        double* to = sum.row(target);
-        for (std::ptrdiff_t from = std::max<std::ptrdiff_t>(0, y - radius); from <= std::min(height - 1, y + radius);
-             ++from) {
-            const auto source = static_cast<std::size_t>(from);
-            const std::ptrdiff_t reach = std::min(width - 1, chord(radius, y - from));
-            for (const std::size_t column : lit[source]) {
-                const auto x = static_cast<std::ptrdiff_t>(column);
-                const std::ptrdiff_t first = std::max<std::ptrdiff_t>(0, x - reach);
-                const std::ptrdiff_t last = std::min(width - 1, x + reach);
-                add_scaled(to + first, table(source, column).row(y - from) + (first - x), light.row(source)[column],
-                           static_cast<std::size_t>(last - first + 1));
-            }
-        }
-    });
+    const std::ptrdiff_t reach_y = std::min(radius, static_cast<std::ptrdiff_t>(height) - 1);
+    const std::ptrdiff_t reach_x = std::min(radius, static_cast<std::ptrdiff_t>(width) - 1);
+    KernelTable table(reach_y, reach_x + near_block);
+    for (std::ptrdiff_t dy = -reach_y; dy <= reach_y; ++dy)
+        row(dy, reach_x, table.row(dy) - reach_x);
+    return table;
 }
 
 std::size_t count_lit(const Grid& light)
@@ -312,14 +287,6 @@ double absolute_sum(const Grid& grid)
     for (const double value : grid.values)
         sum += std::abs(value);
     return sum;
-}
-
-double cost_of_disk(std::ptrdiff_t radius, std::size_t height, std::size_t width)
-{
-    constexpr double row_overhead = 16.0;
-    const auto r = static_cast<double>(radius);
-    const double rows = std::min(2.0 * r + 1.0, static_cast<double>(height));
-    return rows * row_overhead + std::min(pi * r * r + 1.0, static_cast<double>(height * width));
 }
 
 FarField::FarField(std::size_t height, std::size_t width) : m_reach_y(reach_for(height)), m_reach_x(reach_for(width))
@@ -353,8 +320,9 @@ void FarField::add(const KernelTable& kernel, Grid light, double allowed_error)
             return;
         const std::size_t height = light.height;
         const std::size_t width = light.width;
-        const double allowed =
-            allowed_error / (static_cast<double>(m_levels.size()) * level.cell * absolute_sum(light));
+        // Half of what is left to each level: the finest ones cost most.
+        allowed_error *= 0.5;
+        const double allowed = allowed_error / (level.cell * absolute_sum(light));
 
         DistanceSums kernel_sums(height, width);
         kernel_sums.add_rows([&](std::ptrdiff_t dy, double* values) {
@@ -362,11 +330,13 @@ void FarField::add(const KernelTable& kernel, Grid light, double allowed_error)
                 *values++ = std::abs(current->row(dy)[dx]);
         });
         const std::ptrdiff_t kernel_radius = kernel_sums.radius(allowed);
-        const double kernel_cost = lit * cost_of_disk(kernel_radius, height, width);
+        const double kernel_cost = lit * near_cost(kernel_radius, height, width);
         const auto add_kernel = [&] {
-            add_disks(
-                light, kernel_radius, [&](std::size_t, std::size_t) -> const KernelTable& { return *current; },
-                level.sum);
+            const KernelTable table =
+                near_part([&](std::ptrdiff_t dy, std::ptrdiff_t reach,
+                              double* values) { std::copy_n(current->row(dy) - reach, 2 * reach + 1, values); },
+                          kernel_radius, height, width);
+            add_near(level.sum, light, {kernel_radius, {&table, &table, &table, &table}});
         };
 
         // Finding the remainder costs about this much per value of the kernel.
@@ -397,26 +367,23 @@ void FarField::add(const KernelTable& kernel, Grid light, double allowed_error)
             }
         });
         const std::ptrdiff_t radius = remainder_sums.radius(allowed);
-        // The coarser levels together cost about a third as much.
-        if (4.0 / 3.0 * lit * cost_of_disk(radius, height, width) > kernel_cost) {
+        // The coarser levels together: each light becomes up to four, and a third as many as there are texels.
+        const double coarse_lit = std::min(4.0 * lit, static_cast<double>(height * width) / 3.0);
+        if ((lit + coarse_lit) * near_cost(radius, height, width) > kernel_cost) {
             add_kernel();
             return;
         }
         std::vector<KernelTable> tables;
-        const std::ptrdiff_t reach_y = std::min(radius, static_cast<std::ptrdiff_t>(height) - 1);
-        const std::ptrdiff_t reach_x = std::min(radius, static_cast<std::ptrdiff_t>(width) - 1);
-        for (std::size_t parity = 0; parity < odd_rows * odd_columns; ++parity) {
-            tables.emplace_back(reach_y, reach_x);
-            for (std::ptrdiff_t dy = -reach_y; dy <= reach_y; ++dy)
-                remainder.row(parity / odd_columns == 1, parity % odd_columns == 1, dy, reach_x,
-                              tables.back().row(dy) - reach_x);
-        }
-        add_disks(
-            light, radius,
-            [&](std::size_t y, std::size_t x) -> const KernelTable& {
-                return tables[(y % odd_rows) * odd_columns + x % odd_columns];
-            },
-            level.sum);
+        for (std::size_t parity = 0; parity < odd_rows * odd_columns; ++parity)
+            tables.push_back(near_part(
+                [&](std::ptrdiff_t dy, std::ptrdiff_t reach, double* values) {
+                    remainder.row(parity / odd_columns == 1, parity % odd_columns == 1, dy, reach, values);
+                },
+                radius, height, width));
+        NearKernels kernels{radius, {}};
+        for (std::size_t parity = 0; parity < kernels.tables.size(); ++parity)
+            kernels.tables[parity] = &tables[(parity / 2 % odd_rows) * odd_columns + parity % odd_columns];
+        add_near(level.sum, light, kernels);
 
         if (level.split_x)
             light = gather_columns(light);

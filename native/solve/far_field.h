@@ -4,24 +4,10 @@
 #include <cstddef>
 #include <vector>
 
+#include "solve/near_field.h"
 #include "solve/texel_kernel.h"
 
 namespace beamspread {
-
-// Values on a grid, row by row.
-struct Grid {
-    std::size_t height = 0;
-    std::size_t width = 0;
-    std::vector<double> values;
-
-    Grid() = default;
-    Grid(std::size_t grid_height, std::size_t grid_width)
-        : height(grid_height), width(grid_width), values(grid_height * grid_width)
-    {
-    }
-    double* row(std::size_t y) { return values.data() + y * width; }
-    const double* row(std::size_t y) const { return values.data() + y * width; }
-};
 
 double absolute_sum(const Grid& grid);
 
@@ -57,8 +43,5 @@ private:
     std::ptrdiff_t m_reach_y = 0;
     std::ptrdiff_t m_reach_x = 0;
 };
-
-// Multiplications and additions that adding one beam within a radius costs on a grid.
-double cost_of_disk(std::ptrdiff_t radius, std::size_t height, std::size_t width);
 
 }  // namespace beamspread

@@ -1,6 +1,6 @@
 """Adaptive against direct: beams, seconds, ratio and error, on the paper's Fig. 9 scene and on masks that are hard.
 
-    PYTHONPATH=build/stage build/venv/bin/python tests/bench/adaptive.py [--size N] [--path TEXELS] [--tolerance T]
+PYTHONPATH=build/stage build/venv/bin/python tests/bench/adaptive.py [--size N] [--path TEXELS] [--tolerance T]
 """
 
 import argparse
