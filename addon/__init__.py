@@ -33,14 +33,17 @@ else:
     from .core.material import Material
     from .core.presets import presets
 
+    AngularSpace = native.AngularSpace
     Cancelled = native.Cancelled
     LdfLibrary = native.LdfLibrary
     LdfSample = native.LdfSample
     Medium = native.Medium
     exact_totals = native.exact_totals
+    interpolate = native.interpolate
     simulate = native.simulate
     walk_kernels = native.walk_kernels
     __all__ = [
+        "AngularSpace",
         "Cancelled",
         "LdfLibrary",
         "LdfSample",
@@ -50,6 +53,7 @@ else:
         "albedo_from_color",
         "convolve",
         "exact_totals",
+        "interpolate",
         "library",
         "presets",
         "register",

@@ -8,6 +8,7 @@ import os
 import typing
 
 __all__: list[str] = [
+    "AngularSpace",
     "Cancelled",
     "LdfLibrary",
     "LdfSample",
@@ -21,6 +22,7 @@ __all__: list[str] = [
     "fresnel",
     "henyey_greenstein_pdf",
     "henyey_greenstein_sample",
+    "interpolate",
     "point_beams",
     "read_exr",
     "simulate",
@@ -256,6 +258,15 @@ class LdfSample:
     @property
     def beam_diameter(self) -> float: ...
     @property
+    def brightest(self) -> tuple:
+        """
+        H, the brightest point, (u, v) in mean free paths.
+
+        On v = 0, as an LDF is even in v. The image is smoothed as little as brings its noise, the part odd in v, below 1 % of the
+        peak; H is the vertex of a paraboloid fitted to what is within 5 % of the peak. A peak next to O that the texels don't resolve, such as
+        a pencil beam's, is at O.
+        """
+    @property
     def g(self) -> float | None: ...
     @property
     def image(self) -> numpy.ndarray:
@@ -269,6 +280,47 @@ class LdfSample:
         """
         Power that leaves within the image, per unit incident power.
         """
+
+class AngularSpace:
+    """
+    The angular space of Manabe et al. 2012 (Sec. 3.2, Fig. 3).
+
+    Places P of the plane as seen from the reference point Q at `height` above the brightest point H: psi in [0, pi/2)
+    is the angle at Q between the normal and the direction to P, phi in [0, 2 pi) the azimuth of P around H from the
+    beam's direction of travel, +u: ``P = H + height tan(psi) (cos phi, sin phi)``. The paper's text takes for phi the angle at P between
+    the directions to O and H, which is 0 everywhere at normal incidence; its Fig. 4 shows the azimuth. The maps therefore depend on H
+    and the height alone.
+
+    Parameters
+    ----------
+    origin : (float, float)
+        O, where the beam enters, (u, v) in any unit of length.
+    brightest : (float, float)
+        H, in the same unit.
+    height : float
+        Of Q, in the same unit; > 0.
+
+    Raises
+    ------
+    ValueError
+        Names the argument, its value and what is allowed.
+    """
+    def __init__(self, origin: typing.Sequence[float], brightest: typing.Sequence[float], height: float) -> None: ...
+    def __repr__(self) -> str: ...
+    def to_angular(self, u: typing.Any, v: typing.Any) -> tuple:
+        """
+        (phi, psi) of places (u, v), elementwise for arrays; phi is 0 at H.
+        """
+    def to_planar(self, phi: typing.Any, psi: typing.Any) -> tuple:
+        """
+        (u, v) of directions, elementwise for arrays; any phi, psi in [0, pi/2).
+        """
+    @property
+    def brightest(self) -> tuple: ...
+    @property
+    def height(self) -> float: ...
+    @property
+    def origin(self) -> tuple: ...
 
 class Occluders:
     """
@@ -398,6 +450,45 @@ def henyey_greenstein_pdf(cos_theta: numpy.ndarray, g: numpy.ndarray) -> typing.
 def henyey_greenstein_sample(g: numpy.ndarray, u: numpy.ndarray) -> typing.Any:
     """
     Cosine of a deflection, from u uniform in [0, 1).
+    """
+
+def interpolate(
+    samples: list[LdfSample],
+    angle: float,
+    albedo: float,
+    g: float | None = None,
+    method: str = "angular",
+    height: float | None = None,
+) -> LdfSample:
+    """
+    The LDF at an angle and albedo between samples.
+
+    Parameters
+    ----------
+    samples : sequence of LdfSample
+        On a regular grid of angles and albedos, and of g where that differs, in any order; alike in texels and beam. Only the
+        cell of the grid around what is asked for counts.
+    angle, albedo : float
+        Within the samples' span.
+    g : float, optional
+        Anisotropy; needed where the samples span more than one.
+    method : {"angular", "adaptive", "planar"}
+        ``angular`` is the paper's (Eq. 3, 4): exitance is blended with linear weights at the same place of angular space, H and Q
+        are blended with the same weights. ``planar`` blends at the same (u, v). ``adaptive`` blends logarithms, with weights that
+        follow how LDFs change with angle and albedo: nearer to the truth, by far where albedos differ.
+    height : float, optional
+        Of Q above H for ``angular``, mean free paths; default: two thirds of the images' width, the paper's 100 units over a window of
+        150. The result doesn't depend on it but for rounding: with the same height for all samples it cancels out.
+
+    Returns
+    -------
+    LdfSample
+        Where a sample is asked for, its own image.
+
+    Raises
+    ------
+    ValueError
+        Names the argument, its value and what is allowed: outside of the samples, their span.
     """
 
 def point_beams(
