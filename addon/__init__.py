@@ -28,7 +28,7 @@ except ImportError as error:
     __all__ = ["register", "unregister"]
 else:
     from .core.color import albedo_from_color
-    from .core.convolve import adaptive_beams, convolve
+    from .core.convolve import adaptive_beams, convolve, convolve_lights
     from .core.library import library
     from .core.material import Material
     from .core.presets import presets
@@ -52,6 +52,7 @@ else:
         "adaptive_beams",
         "albedo_from_color",
         "convolve",
+        "convolve_lights",
         "exact_totals",
         "interpolate",
         "library",

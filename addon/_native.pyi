@@ -356,8 +356,7 @@ def adaptive_beams(
     """
 
 def convolve(
-    irradiance: numpy.ndarray,
-    direction: numpy.ndarray,
+    lights: list[tuple[numpy.ndarray, numpy.ndarray]],
     ldf: list[LdfLibrary],
     albedo: list[float],
     mean_free_path: list[float],
@@ -370,7 +369,7 @@ def convolve(
     """
     Luminance of beams on a grid; the engine behind `beamspread.convolve`.
 
-    irradiance float32 (H, W) or (C, H, W) in W/m^2, direction float32 (3,) or (H, W, 3), C libraries,
+    Lights are pairs of irradiance, float32 (H, W) or (H, W, C) in W/m^2, and direction, float32 (3,) or (H, W, 3); C libraries,
     albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr).
     """
 

@@ -1,18 +1,44 @@
-# DUCC's FFT (BSD-3 part of its PyPI source package), compiled into one static library.
+# DUCC's FFT (BSD-3 part of its PyPI source package), compiled for several instruction sets into one static library.
 if(NOT EXISTS ${DUCC_SOURCE_DIR}/src/ducc0/fft/fft.h)
   message(FATAL_ERROR "DUCC's sources are not at ${DUCC_SOURCE_DIR}: run tools/setup.sh, or set DUCC_SOURCE_DIR")
 endif()
 set(ducc_src ${DUCC_SOURCE_DIR}/src)
-add_library(beamspread_ducc STATIC
-            ${ducc_src}/ducc0/fft/fft_inst1.cc ${ducc_src}/ducc0/fft/fft_inst2.cc ${ducc_src}/ducc0/infra/mav.cc
-            ${ducc_src}/ducc0/infra/string_utils.cc ${ducc_src}/ducc0/infra/threading.cc)
-target_include_directories(beamspread_ducc SYSTEM PUBLIC ${ducc_src})
-# Threads are ours (base/threads.h): a guest in another process brings no pool of its own. DUCC's own switch for that,
-# DUCC0_NO_LOWLEVEL_THREADING, would also take the locks off the plans that our threads share.
-target_compile_definitions(beamspread_ducc PUBLIC DUCC0_CUSTOM_LOWLEVEL_THREADING)
-target_include_directories(beamspread_ducc SYSTEM PUBLIC ${CMAKE_SOURCE_DIR}/cmake/ducc)
-target_compile_options(beamspread_ducc PRIVATE -w -O3)
-if(BEAMSPREAD_SANITIZE)
-  # Minutes to compile otherwise, and not what a sanitizer is here to check.
-  target_compile_options(beamspread_ducc PRIVATE -fno-sanitize=all)
+
+# What templates and inline functions become for a newer processor must not be what the linker keeps for the rest of
+# the program: each target is linked into one object file, where the groups that linkers merge by name are dissolved
+# (--force-group-allocation) and every symbol but the one that it is found by is local.
+set(ducc_objects)
+function(ducc_target name)
+  add_library(ducc_${name} OBJECT ${CMAKE_SOURCE_DIR}/native/solve/targets/fft.cpp ${ducc_src}/ducc0/infra/mav.cc
+              ${ducc_src}/ducc0/infra/string_utils.cc ${ducc_src}/ducc0/infra/threading.cc)
+  target_include_directories(ducc_${name} PRIVATE ${CMAKE_SOURCE_DIR}/native)
+  # Threads are ours (base/threads.h): a guest in another process brings no pool of its own. DUCC's own switch for
+  # that, DUCC0_NO_LOWLEVEL_THREADING, would also take the locks off the plans that our threads share.
+  target_include_directories(ducc_${name} SYSTEM PRIVATE ${ducc_src} ${CMAKE_SOURCE_DIR}/cmake/ducc)
+  target_compile_definitions(ducc_${name} PRIVATE DUCC0_CUSTOM_LOWLEVEL_THREADING
+                             BEAMSPREAD_FFT_TARGET=beamspread_fft_${name})
+  target_compile_options(ducc_${name} PRIVATE -w -O3 -fno-gnu-unique ${ARGN})
+  if(BEAMSPREAD_SANITIZE)
+    # Minutes to compile otherwise, and not what a sanitizer is here to check.
+    target_compile_options(ducc_${name} PRIVATE -fno-sanitize=all)
+  endif()
+  set(object ${CMAKE_BINARY_DIR}/ducc_${name}.o)
+  add_custom_command(OUTPUT ${object}
+                     COMMAND ${CMAKE_LINKER} -r --force-group-allocation -o ${object} $<TARGET_OBJECTS:ducc_${name}>
+                     COMMAND ${CMAKE_OBJCOPY} --keep-global-symbol=beamspread_fft_${name} ${object}
+                     DEPENDS ducc_${name} $<TARGET_OBJECTS:ducc_${name}>
+                     COMMAND_EXPAND_LISTS VERBATIM)
+  set(ducc_objects ${ducc_objects} ${object} PARENT_SCOPE)
+endfunction()
+
+ducc_target(baseline)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  ducc_target(avx2 -march=x86-64-v3)
+  ducc_target(avx512 -march=x86-64-v4)
+endif()
+list(LENGTH ducc_objects ducc_target_count)
+add_library(beamspread_ducc STATIC ${ducc_objects})
+set_target_properties(beamspread_ducc PROPERTIES LINKER_LANGUAGE CXX)
+if(ducc_target_count GREATER 1)
+  target_compile_definitions(beamspread_ducc INTERFACE BEAMSPREAD_FFT_TARGETS)
 endif()

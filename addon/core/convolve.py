@@ -3,6 +3,7 @@
 import numpy as np
 
 from .._load import native
+from .progress import stages
 
 
 def convolve(
@@ -38,9 +39,11 @@ def convolve(
         `direct` visits every pair of texels: exact and slow. `adaptive` lights evenly lit squares by one beam each
         (section 3.3 of the paper) and looks at small beams more coarsely from farther away.
     tolerance : float
-        Relative error that `fft` may make in its kernels where directions differ. `adaptive`: the sum over all texels
-        of the absolute error stays below `tolerance` times the sum of the luminance, and the error of each texel
-        below `tolerance` times the brightest one.
+        `fft`: relative L1 error of the kernels of beams whose directions differ, root mean square over the light and
+        over the lit texels; that of the luminance is several times smaller. Where there is one direction `fft` is off
+        by about 1e-5 of the brightest texel whatever the tolerance. `adaptive`: the sum over all texels of the
+        absolute error stays below `tolerance` times the sum of the luminance, and the error of each texel below
+        `tolerance` times the brightest one.
     threads : int
         0: all. The result does not depend on it.
     progress : callable, optional
@@ -58,23 +61,50 @@ def convolve(
     Cancelled
         `progress` returned False.
     """
-    beams = _float_array("irradiance", irradiance)
-    if beams.ndim == 3 and beams.shape[2] == 3:
-        beams = np.ascontiguousarray(np.moveaxis(beams, 2, 0))
-    elif beams.ndim != 2:
-        raise ValueError(f"argument 'irradiance' is of shape {beams.shape}; allowed: (H, W) or (H, W, 3)")
-    return native.convolve(
-        beams,
-        _float_array("direction", direction),
-        _libraries(ldf),
-        _rgb("albedo", albedo),
-        _rgb("mean_free_path", mean_free_path),
-        _pair("pitch", pitch),
-        solver,
-        float(tolerance),
-        int(threads),
-        progress,
-    )
+    light = irradiance, direction
+    return convolve_lights([light], ldf, albedo, mean_free_path, pitch, solver, tolerance, threads, progress)
+
+
+def convolve_lights(
+    lights,
+    ldf,
+    albedo,
+    mean_free_path,
+    pitch,
+    solver="fft",
+    tolerance=1e-3,
+    threads=0,
+    progress=None,
+):
+    """Luminance of several lights together.
+
+    The sum of what `convolve` gives for each; but `fft` spreads all lights of changing direction at once, so that
+    two lamps cost little more than one.
+
+    Parameters
+    ----------
+    lights : sequence of (irradiance, direction)
+        Each as for `convolve`, which describes the other parameters, too.
+
+    Returns
+    -------
+    float32, shape (H, W, 3)
+        Luminance, radiance in W/(m^2 sr).
+    """
+    arrays = [(_irradiance(irradiance), _float_array("direction", direction)) for irradiance, direction in lights]
+    rest = _libraries(ldf), _rgb("albedo", albedo), _rgb("mean_free_path", mean_free_path), _pair("pitch", pitch)
+    numbers = float(tolerance), int(threads)
+    if solver == "fft" or len(arrays) < 2:
+        return native.convolve(arrays, *rest, solver, *numbers, progress)
+    parts = stages(progress, [1.0] * len(arrays))
+    return sum(native.convolve([light], *rest, solver, *numbers, part) for light, part in zip(arrays, parts))
+
+
+def _irradiance(values):
+    array = _float_array("irradiance", values)
+    if array.ndim == 2 or (array.ndim == 3 and array.shape[2] == 3):
+        return array
+    raise ValueError(f"argument 'irradiance' is of shape {array.shape}; allowed: (H, W) or (H, W, 3)")
 
 
 BEAM = np.dtype([("row", np.int64), ("column", np.int64), ("size", np.int64), ("power", np.float64)])

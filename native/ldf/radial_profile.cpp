@@ -62,7 +62,8 @@ const std::array<Stencil, edge_count>& stencils()
     return table;
 }
 
-// The cubic Hermite polynomials at t in [0, 1] of a bin of width h: factors of values and slopes at its edges.
+// The cubic Hermite polynomials, or their derivatives, at t in [0, 1] of a bin of width h: factors of values and
+// slopes at its edges.
 struct Cubic {
     double v0, v1, s0, s1;
 };
@@ -72,6 +73,12 @@ Cubic cubic_value(double t, double h)
     const double t2 = t * t;
     const double t3 = t2 * t;
     return {2.0 * t3 - 3.0 * t2 + 1.0, 3.0 * t2 - 2.0 * t3, (t3 - 2.0 * t2 + t) * h, (t3 - t2) * h};
+}
+
+Cubic cubic_derivative(double t, double h)
+{
+    const double t2 = t * t;
+    return {6.0 * (t2 - t) / h, 6.0 * (t - t2) / h, 3.0 * t2 - 4.0 * t + 1.0, 3.0 * t2 - 2.0 * t};
 }
 
 }  // namespace
@@ -130,15 +137,22 @@ Harmonics RadialProfile::slope_at(std::size_t k) const
 
 void RadialProfile::add(const RadialProfile& other, double even_weight, double odd_weight)
 {
+    Harmonics weights{};
+    for (std::size_t m = 0; m < harmonic_count; ++m)
+        weights[m] = m % 2 == 0 ? even_weight : odd_weight;
+    add(other, weights);
+    m_centre += odd_weight * other.m_centre;
+}
+
+void RadialProfile::add(const RadialProfile& other, const Harmonics& weights)
+{
     for (std::size_t m = 0; m < harmonic_count; ++m) {
-        const double weight = m % 2 == 0 ? even_weight : odd_weight;
-        m_total[m] += weight * other.m_total[m];
+        m_total[m] += weights[m] * other.m_total[m];
         for (std::size_t k = 0; k < edge_count; ++k) {
-            m_remaining[k][m] += weight * other.m_remaining[k][m];
-            m_slope[k][m] += weight * other.m_slope[k][m];
+            m_remaining[k][m] += weights[m] * other.m_remaining[k][m];
+            m_slope[k][m] += weights[m] * other.m_slope[k][m];
         }
     }
-    m_centre += odd_weight * other.m_centre;
     m_support = std::max(m_support, other.m_support);
 }
 
@@ -169,6 +183,27 @@ Harmonics RadialProfile::remaining(double r) const
     for (std::size_t m = 0; m < harmonic_count; ++m)
         out[m] =
             c.v0 * m_remaining[k - 1][m] + c.v1 * m_remaining[k][m] - c.s0 * m_slope[k - 1][m] - c.s1 * m_slope[k][m];
+    return out;
+}
+
+Harmonics RadialProfile::density(double r) const
+{
+    Harmonics out{};
+    if (r >= m_support)
+        return out;
+    const auto& edge = edges();
+    const std::size_t k = radius_bin(static_cast<float>(r));
+    if (k == 0) {
+        for (std::size_t m = 0; m < harmonic_count; ++m)
+            out[m] = (m_total[m] - m_remaining[0][m]) / (edge[0] * r);
+        return out;
+    }
+    const double h = edge[k] - edge[k - 1];
+    const Cubic c = cubic_derivative((r - edge[k - 1]) / h, h);
+    for (std::size_t m = 0; m < harmonic_count; ++m)
+        out[m] = (c.s0 * m_slope[k - 1][m] + c.s1 * m_slope[k][m] - c.v0 * m_remaining[k - 1][m] -
+                  c.v1 * m_remaining[k][m]) /
+                 r;
     return out;
 }
 

@@ -21,8 +21,14 @@ public:
     // Adds `weight` times another profile, harmonics of even and odd m apart.
     void add(const RadialProfile& other, double even_weight, double odd_weight);
 
+    // The same with a weight for each harmonic.
+    void add(const RadialProfile& other, const Harmonics& weights);
+
     Harmonics cumulative(double r) const override;
     Harmonics remaining(double r) const override;
+
+    // c_m(r) itself, r > 0.
+    Harmonics density(double r) const;
 
     // Total power: 2 pi C_0(infinity).
     double total() const;

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <memory>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -13,19 +14,6 @@ namespace beamspread {
 
 namespace {
 
-using Solve = Luminance (*)(const Problem&, Progress&);
-
-Solve solver_from_name(const std::string& name)
-{
-    if (name == "fft")
-        return solve_fft;
-    if (name == "direct")
-        return solve_direct;
-    if (name == "adaptive")
-        return solve_adaptive;
-    reject("solver", "'" + name + "'", "'fft', 'direct', 'adaptive'");
-}
-
 std::string shape_text(const py::array& array)
 {
     return "of shape " + py::str(array.attr("shape")).cast<std::string>();
@@ -34,17 +22,17 @@ std::string shape_text(const py::array& array)
 Problem grid_problem(const Array<float>& irradiance, std::size_t channels)
 {
     const py::ssize_t rank = irradiance.ndim();
-    if (rank != 2 && !(rank == 3 && irradiance.shape(0) == static_cast<py::ssize_t>(channels)))
-        reject("irradiance", shape_text(irradiance), "(H, W) or (channels, H, W)");
+    if (rank != 2 && !(rank == 3 && irradiance.shape(2) == static_cast<py::ssize_t>(channels)))
+        reject("irradiance", shape_text(irradiance), "(H, W) or (H, W, channels)");
     Problem problem;
-    problem.height = static_cast<std::size_t>(irradiance.shape(rank - 2));
-    problem.width = static_cast<std::size_t>(irradiance.shape(rank - 1));
+    problem.height = static_cast<std::size_t>(irradiance.shape(0));
+    problem.width = static_cast<std::size_t>(irradiance.shape(1));
     problem.channels.resize(channels);
-    for (std::size_t c = 0; c < channels; ++c) {
-        const float* data = irradiance.data() + (rank == 3 ? c * problem.height * problem.width : 0);
-        problem.channels[c].irradiance = {data, problem.height, problem.width,
-                                          static_cast<std::ptrdiff_t>(problem.width)};
-    }
+    const std::size_t stride = rank == 3 ? channels : 1;
+    for (std::size_t c = 0; c < channels; ++c)
+        problem.channels[c].irradiance = {irradiance.data() + (rank == 3 ? c : 0), problem.height, problem.width,
+                                          static_cast<std::ptrdiff_t>(stride * problem.width),
+                                          static_cast<std::ptrdiff_t>(stride)};
     return problem;
 }
 
@@ -72,34 +60,53 @@ void set_directions(Problem& problem, const Array<float>& direction)
         reject("direction", shape_text(direction), "(3,) or (H, W, 3) like irradiance");
 }
 
-Array<float> convolve(const Array<float>& irradiance, const Array<float>& direction,
-                      const std::vector<std::shared_ptr<LdfLibrary>>& ldf, const std::vector<double>& albedo,
-                      const std::vector<double>& mean_free_path, std::array<double, 2> pitch, const std::string& solver,
-                      double tolerance, int threads, const py::object& progress)
+using Light = std::pair<Array<float>, Array<float>>;  // irradiance and direction
+
+Array<float> convolve(const std::vector<Light>& lights, const std::vector<std::shared_ptr<LdfLibrary>>& ldf,
+                      const std::vector<double>& albedo, const std::vector<double>& mean_free_path,
+                      std::array<double, 2> pitch, const std::string& solver, double tolerance, int threads,
+                      const py::object& progress)
 {
-    const Solve solve = solver_from_name(solver);
     const std::size_t channels = albedo.size();
     if (ldf.size() != channels || mean_free_path.size() != channels)
         reject("ldf", "of another number of channels than albedo", "one per channel");
-    Problem problem = grid_problem(irradiance, channels);
-    problem.pitch_x = pitch[0];
-    problem.pitch_y = pitch[1];
-    problem.tolerance = tolerance;
-    problem.threads = threads;
-    set_directions(problem, direction);
-    for (std::size_t c = 0; c < channels; ++c) {
-        problem.channels[c].library = ldf[c].get();
-        problem.channels[c].albedo = albedo[c];
-        problem.channels[c].mean_free_path = mean_free_path[c];
+    if (lights.empty())
+        reject("lights", "empty", "at least one light");
+    std::vector<Problem> problems;
+    for (const auto& [irradiance, direction] : lights) {
+        Problem& problem = problems.emplace_back(grid_problem(irradiance, channels));
+        if (problem.height != problems.front().height || problem.width != problems.front().width)
+            reject("irradiance", shape_text(irradiance), "the same shape for all lights");
+        set_directions(problem, direction);
+        problem.pitch_x = pitch[0];
+        problem.pitch_y = pitch[1];
+        problem.tolerance = tolerance;
+        problem.threads = threads;
+        for (std::size_t c = 0; c < channels; ++c) {
+            problem.channels[c].library = ldf[c].get();
+            problem.channels[c].albedo = albedo[c];
+            problem.channels[c].mean_free_path = mean_free_path[c];
+        }
     }
-
+    const Problem& first = problems.front();
     Progress report(progress_callback(progress));
-    Luminance luminance;
+    if (solver == "fft") {
+        Array<float> luminance({first.height, first.width, channels});
+        float* data = luminance.mutable_data();
+        const py::gil_scoped_release release;
+        solve_fft(problems, report, data);
+        return luminance;
+    }
+    if (solver != "direct" && solver != "adaptive")
+        reject("solver", "'" + solver + "'", "'fft', 'direct', 'adaptive'");
+    if (problems.size() > 1)
+        reject("lights", static_cast<double>(problems.size()), "one, except for the solver 'fft'");
+    Luminance planes;
     {
         const py::gil_scoped_release release;
-        luminance = solve(problem, report);
+        planes = solver == "direct" ? solve_direct(first, report) : solve_adaptive(first, report);
     }
-    return interleaved(luminance, problem.height, problem.width);
+    return interleaved(planes, first.height, first.width);
 }
 
 using Squares = std::tuple<Array<std::int64_t>, Array<double>>;
@@ -133,11 +140,11 @@ Squares adaptive_beams(const Array<float>& irradiance, const Array<float>& direc
 
 void bind_solve(py::module_& m)
 {
-    m.def("convolve", &convolve, py::arg("irradiance"), py::arg("direction"), py::arg("ldf"), py::arg("albedo"),
-          py::arg("mean_free_path"), py::arg("pitch"), py::arg("solver"), py::arg("tolerance"), py::arg("threads"),
-          py::arg("progress"), R"(Luminance of beams on a grid; the engine behind `beamspread.convolve`.
+    m.def("convolve", &convolve, py::arg("lights"), py::arg("ldf"), py::arg("albedo"), py::arg("mean_free_path"),
+          py::arg("pitch"), py::arg("solver"), py::arg("tolerance"), py::arg("threads"), py::arg("progress"),
+          R"(Luminance of beams on a grid; the engine behind `beamspread.convolve`.
 
-irradiance float32 (H, W) or (C, H, W) in W/m^2, direction float32 (3,) or (H, W, 3), C libraries,
+Lights are pairs of irradiance, float32 (H, W) or (H, W, C) in W/m^2, and direction, float32 (3,) or (H, W, 3); C libraries,
 albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr).
 )");
     m.def("adaptive_beams", &adaptive_beams, py::arg("irradiance"), py::arg("direction"), py::arg("tolerance"),

@@ -44,7 +44,8 @@ Term uniform_term(const Problem& problem, const Channel& channel)
         term.kernel.sine[m] = std::sin(static_cast<double>(m) * beta);
     }
     for (std::size_t y = 0; y < problem.height; ++y)
-        std::copy_n(channel.irradiance.row(y), problem.width, term.light.row(y));
+        for (std::size_t x = 0; x < problem.width; ++x)
+            term.light.row(y)[x] = static_cast<double>(channel.irradiance(y, x));
     return term;
 }
 

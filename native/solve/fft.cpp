@@ -1,71 +1,59 @@
 #include "solve/fft.h"
 
-#include <algorithm>
-
-#include "base/threads.h"
-#include "ducc0/fft/fft.h"
+#include "solve/targets/fft.h"
 
 namespace beamspread {
 
 namespace {
-// Rows or columns of one work item: some hundred kilobytes, so that an item stays in the cache.
-constexpr std::size_t lines_per_item = 32;
 
-std::size_t item_count(std::size_t lines)
+struct Choice {
+    const FftTarget* target;
+    const char* name;
+};
+
+const Choice& choice()
 {
-    return (lines + lines_per_item - 1) / lines_per_item;
+    static const Choice best = []() -> Choice {
+#ifdef BEAMSPREAD_FFT_TARGETS
+        __builtin_cpu_init();
+        // What the compiler's levels x86-64-v4 and -v3 stand for.
+        if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+            __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
+            __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2"))
+            return {beamspread_fft_avx512(), "avx512"};
+        if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2"))
+            return {beamspread_fft_avx2(), "avx2"};
+#endif
+        return {beamspread_fft_baseline(), "baseline"};
+    }();
+    return best;
 }
+
 }  // namespace
 
-RealTransform::RealTransform(std::size_t min_height, std::size_t min_width)
-    : m_height(ducc0::good_size_complex(min_height)),
-      m_width(ducc0::good_size_real(min_width)),
-      m_half_width(m_width / 2 + 1)
+std::size_t fast_even_size(std::size_t min_size)
 {
+    return 2 * choice().target->good_size((min_size + 1) / 2);
 }
 
-void RealTransform::transform_columns(Spectrum& spectrum, bool forward) const
+void real_to_half(const float* real, Complex* half, std::size_t count, std::size_t size)
 {
-    parallel_for(item_count(m_half_width), [&](std::size_t item) {
-        const std::size_t first = item * lines_per_item;
-        const std::size_t count = std::min(lines_per_item, m_half_width - first);
-        const ducc0::vfmav<std::complex<double>> columns(spectrum.data() + first, {m_height, count},
-                                                         {static_cast<std::ptrdiff_t>(m_half_width), 1});
-        ducc0::c2c(columns, columns, {0}, forward, 1.0, 1);
-    });
+    choice().target->real_to_half(real, half, count, size);
 }
 
-Spectrum RealTransform::forward(const std::vector<double>& values) const
+void half_to_real(const Complex* half, float* real, std::size_t count, std::size_t size)
 {
-    Spectrum spectrum(m_height * m_half_width);
-    parallel_for(item_count(m_height), [&](std::size_t item) {
-        const std::size_t first = item * lines_per_item;
-        const std::size_t count = std::min(lines_per_item, m_height - first);
-        const double* begin = values.data() + first * m_width;
-        // The padding, half of the rows or more, transforms to zeros.
-        if (std::all_of(begin, begin + count * m_width, [](double x) { return x == 0.0; }))
-            return;
-        const ducc0::cfmav<double> rows(begin, {count, m_width});
-        const ducc0::vfmav<std::complex<double>> out(spectrum.data() + first * m_half_width, {count, m_half_width});
-        ducc0::r2c(rows, out, 1, true, 1.0, 1);
-    });
-    transform_columns(spectrum, true);
-    return spectrum;
+    choice().target->half_to_real(half, real, count, size);
 }
 
-std::vector<double> RealTransform::inverse(Spectrum& spectrum) const
+void complex_in_place(Complex* lines, std::size_t count, std::size_t size, bool forward)
 {
-    transform_columns(spectrum, false);
-    std::vector<double> values(m_height * m_width);
-    const double scale = 1.0 / (static_cast<double>(m_height) * static_cast<double>(m_width));
-    parallel_for(item_count(m_height), [&](std::size_t item) {
-        const std::size_t first = item * lines_per_item;
-        const std::size_t count = std::min(lines_per_item, m_height - first);
-        const ducc0::cfmav<std::complex<double>> rows(spectrum.data() + first * m_half_width, {count, m_half_width});
-        const ducc0::vfmav<double> out(values.data() + first * m_width, {count, m_width});
-        ducc0::c2r(rows, out, 1, false, scale, 1);
-    });
-    return values;
+    choice().target->complex_in_place(lines, count, size, forward);
+}
+
+const char* fft_instruction_set()
+{
+    return choice().name;
 }
 
 }  // namespace beamspread

@@ -1,35 +1,24 @@
-// Two-dimensional real Fourier transforms: DUCC behind one header.
+// Fourier transforms of many lines in single precision: DUCC behind one header, compiled for several instruction
+// sets, the best of which is chosen at run time.
 #pragma once
 
 #include <complex>
 #include <cstddef>
-#include <vector>
 
 namespace beamspread {
 
-using Spectrum = std::vector<std::complex<double>>;
+using Complex = std::complex<float>;
 
-// Transforms of one padded size; the real arrays are (height, width) row by row, the spectra
-// (height, width / 2 + 1).
-class RealTransform {
-public:
-    // The smallest fast size of at least the given one.
-    RealTransform(std::size_t min_height, std::size_t min_width);
+// The smallest even size of at least `min_size` whose transforms are fast.
+std::size_t fast_even_size(std::size_t min_size);
 
-    std::size_t height() const { return m_height; }
-    std::size_t width() const { return m_width; }
+// Lines are contiguous and follow each other; `real` lines have `size` values, `half` lines size / 2 + 1. All
+// transforms are sums without a factor; forward ones have the sign e^-i. One thread does the work.
+void real_to_half(const float* real, Complex* half, std::size_t count, std::size_t size);
+void half_to_real(const Complex* half, float* real, std::size_t count, std::size_t size);
+void complex_in_place(Complex* lines, std::size_t count, std::size_t size, bool forward);
 
-    Spectrum forward(const std::vector<double>& values) const;
-
-    // Inverse of `forward`, the factor 1 / (height width) included. Overwrites the spectrum.
-    std::vector<double> inverse(Spectrum& spectrum) const;
-
-private:
-    void transform_columns(Spectrum& spectrum, bool forward) const;
-
-    std::size_t m_height;
-    std::size_t m_width;
-    std::size_t m_half_width;
-};
+// What the transforms were compiled for: "avx512", "avx2" or "baseline".
+const char* fft_instruction_set();
 
 }  // namespace beamspread

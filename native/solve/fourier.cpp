@@ -1,257 +1,287 @@
 // The fft solver: the direct solver's sums as products of spectra.
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "base/constants.h"
 #include "base/threads.h"
-#include "solve/beam_basis.h"
-#include "solve/fft.h"
+#include "solve/light_terms.h"
+#include "solve/loops.h"
 
 namespace beamspread {
 
 namespace {
 
-enum class Phase { cosine, sine };
+// Rows of one work item: their pieces of columns fill cache lines.
+constexpr std::size_t rows_per_item = 16;
+constexpr std::size_t columns_per_item = 8;
 
-// Weights of the beams in one term of the basis: [E w_j(theta) cos or sin(m beta)].
-struct BeamTerm {
-    std::size_t node;
-    std::size_t m;
-    Phase phase;
+// Bytes that the spectra of light terms, and those of the media's luminance, may take at once.
+constexpr std::size_t spectra_budget = std::size_t{1} << 30;
+
+// Borders of the kernels' windows, texels: errors of some 1e-6 of the brightest texel, and of some 1e-5 where a basis
+// makes larger ones and sums its many kernels.
+constexpr double fixed_deviation = 3.0;
+constexpr double changing_deviation = 1.5;
+
+// Channels whose light is the same but for a factor.
+struct Group {
+    std::vector<LightField> lights;
+    std::vector<KernelMedium> media;
+    struct Member {
+        std::size_t channel;
+        std::size_t medium;
+        double factor;
+    };
+    std::vector<Member> members;
 };
 
-// What the beams of a channel have in common with those of another one: then their spectra serve both.
-bool same_beams(const Channel& a, const Channel& b)
-{
-    return a.irradiance.data == b.irradiance.data && a.library == b.library;
-}
-
-class Solver {
+// A spectrum along the rows, column by column: [column][row], not cleared.
+class ColumnSpectrum {
 public:
-    Solver(const Problem& problem, Progress& progress)
-        : m_problem(problem),
+    ColumnSpectrum(std::size_t columns, std::size_t rows)
+        : m_rows(rows), m_data(std::make_unique_for_overwrite<Complex[]>(columns * rows))
+    {
+    }
+    Complex* column(std::size_t i) { return m_data.get() + i * m_rows; }
+
+private:
+    std::size_t m_rows;
+    std::unique_ptr<Complex[]> m_data;
+};
+
+class GroupSolver {
+public:
+    GroupSolver(const Group& group, const Problem& plane, Progress& progress, float* luminance)
+        : m_group(group),
           m_progress(progress),
-          // Twice the size, less one: light that leaves on one side does not come back on the other.
-          m_transform(2 * problem.height - 1, 2 * problem.width - 1),
-          m_sums(problem.channels.size(), Spectrum())
+          m_luminance(luminance),
+          m_channels(plane.channels.size()),
+          m_terms(light_terms(group.lights, group.media, std::max(plane.pitch_x, plane.pitch_y), plane.tolerance)),
+          m_spectra(plane.width, plane.height, plane.pitch_x, plane.pitch_y, m_terms.profiles,
+                    m_terms.changing.empty() ? fixed_deviation : changing_deviation),
+          m_plane(m_spectra.plane()),
+          m_columns(m_plane.padded_width / 2 + 1)
     {
     }
 
-    Luminance solve()
+    void solve()
     {
-        const std::size_t count = m_problem.channels.size();
-        std::vector<bool> done(count, false);
-        std::vector<std::vector<std::size_t>> groups;
-        for (std::size_t c = 0; c < count; ++c) {
-            if (done[c])
-                continue;
-            groups.emplace_back();
-            for (std::size_t d = c; d < count; ++d) {
-                if (!done[d] && same_beams(m_problem.channels[c], m_problem.channels[d])) {
-                    groups.back().push_back(d);
-                    done[d] = true;
-                }
+        const std::size_t bytes = m_columns * m_plane.height * sizeof(Complex);
+        const std::size_t at_once = std::max<std::size_t>(spectra_budget / bytes, 1);
+        const std::size_t media = m_group.media.size();
+        const std::size_t terms = m_terms.terms.size();
+        const std::size_t rounds = ((media + at_once - 1) / at_once) * ((terms + at_once - 1) / at_once);
+        // Rows and columns of every round, and the rows of the results.
+        m_unit = 1.0 / (static_cast<double>(rounds) + 1.0);
+        for (std::size_t first = 0; first < media; first += at_once) {
+            const std::size_t last = std::min(media, first + at_once);
+            std::vector<ColumnSpectrum> results;
+            for (std::size_t k = first; k < last; ++k)
+                results.emplace_back(m_columns, m_plane.height);
+            std::vector<ColumnSpectrum> light;
+            for (std::size_t t = 0; t < std::min(terms, at_once); ++t)
+                light.emplace_back(m_columns, m_plane.height);
+            for (std::size_t t = 0; t < terms; t += at_once) {
+                const std::size_t count = std::min(at_once, terms - t);
+                transform_light(t, count, light);
+                convolve_columns(t, count, light, first, results);
             }
+            light.clear();
+            for (std::size_t k = first; k < last; ++k)
+                store(k, results[k - first], static_cast<double>(media));
         }
-        m_progress.set_total(static_cast<double>(groups.size()));
-        for (const auto& group : groups)
-            solve_group(group);
-
-        Luminance luminance;
-        for (Spectrum& sum : m_sums)
-            luminance.push_back(crop(m_transform.inverse(sum)));
-        m_progress.finish();
-        return luminance;
     }
 
 private:
-    // Nodes that keep the kernels of every channel of a group within the tolerance.
-    BeamBasis group_basis(const std::vector<std::size_t>& group) const
+    void transform_light(std::size_t first, std::size_t count, std::vector<ColumnSpectrum>& light)
     {
-        if (!m_problem.directions.field)
-            return BeamBasis::uniform(m_problem);
-        BeamBasis basis = BeamBasis::present_angles(m_problem, m_problem.channels[group.front()]);
-        for (std::size_t c : group) {
-            BeamBasis other = BeamBasis::present_angles(m_problem, m_problem.channels[c]);
-            if (other.node_count() > basis.node_count())
-                basis = std::move(other);
-        }
-        return basis;
-    }
-
-    void solve_group(const std::vector<std::size_t>& group)
-    {
-        const BeamBasis basis = group_basis(group);
-        std::vector<std::vector<RadialProfile>> profiles;  // [channel of the group][node]
-        for (const std::size_t c : group) {
-            profiles.push_back(basis.profiles(m_problem.channels[c]));
-            m_sums[c].assign(m_transform.height() * (m_transform.width() / 2 + 1), {});
-        }
-        if (m_problem.directions.field)
-            solve_field(group, basis, profiles);
-        else
-            solve_uniform(group, profiles);
-    }
-
-    void solve_uniform(const std::vector<std::size_t>& group, const std::vector<std::vector<RadialProfile>>& profiles)
-    {
-        const double beta = azimuth(m_problem.directions.uniform);
-        Harmonics cosine{};
-        Harmonics sine{};
-        for (std::size_t m = 0; m < harmonic_count; ++m) {
-            cosine[m] = std::cos(static_cast<double>(m) * beta);
-            sine[m] = std::sin(static_cast<double>(m) * beta);
-        }
-        const Spectrum light = m_transform.forward(pad_irradiance(m_problem.channels[group.front()]));
-        for (std::size_t g = 0; g < group.size(); ++g) {
-            const QuadrantKernel kernel(profiles[g][0], m_problem, m_problem.channels[group[g]]);
-            accumulate(m_sums[group[g]], light, kernel_spectrum(kernel, cosine, sine));
-            m_progress.advance(1.0 / static_cast<double>(group.size()));
-        }
-    }
-
-    void solve_field(const std::vector<std::size_t>& group, const BeamBasis& basis,
-                     const std::vector<std::vector<RadialProfile>>& profiles)
-    {
-        const Channel& beams = m_problem.channels[group.front()];
-        const BeamWeights weights = beam_weights(beams, basis);
-        const std::vector<std::size_t> harmonics = needed_harmonics(profiles, m_problem.tolerance);
-        const double share = 1.0 / static_cast<double>(basis.node_count() * 2 * harmonics.size());
-        for (std::size_t node = 0; node < basis.node_count(); ++node) {
-            // One node at a time: the kernels of all of them would take gigabytes.
-            std::vector<QuadrantKernel> kernels;
-            for (std::size_t g = 0; g < group.size(); ++g)
-                kernels.emplace_back(profiles[g][node], m_problem, m_problem.channels[group[g]]);
-            for (const std::size_t m : harmonics) {
-                for (const Phase phase : {Phase::cosine, Phase::sine}) {
-                    if (m == 0 && phase == Phase::sine)
-                        continue;
-                    const Spectrum light = m_transform.forward(pad_term(beams, weights, {node, m, phase}));
-                    Harmonics cosine{};
-                    Harmonics sine{};
-                    (phase == Phase::cosine ? cosine : sine)[m] = 1.0;
-                    for (std::size_t g = 0; g < group.size(); ++g)
-                        accumulate(m_sums[group[g]], light, kernel_spectrum(kernels[g], cosine, sine));
-                    m_progress.advance(share);
+        const std::size_t stride = m_plane.padded_width;
+        const std::size_t items = (m_plane.height + rows_per_item - 1) / rows_per_item;
+        parallel_for(items, [&](std::size_t item) {
+            const std::size_t y0 = item * rows_per_item;
+            const std::size_t rows = std::min(rows_per_item, m_plane.height - y0);
+            std::vector<float> values(rows * count * stride, 0.0f);  // [row][term][x]
+            std::vector<Complex> half(rows * m_columns);
+            for (std::size_t y = 0; y < rows; ++y)
+                term_rows(m_terms, first, count, y0 + y, values.data() + y * count * stride, stride);
+            std::vector<float> lines(rows * stride);
+            for (std::size_t t = 0; t < count; ++t) {
+                for (std::size_t y = 0; y < rows; ++y)
+                    std::copy_n(values.data() + (y * count + t) * stride, stride, lines.data() + y * stride);
+                real_to_half(lines.data(), half.data(), rows, stride);
+                for (std::size_t x = 0; x < m_columns; ++x) {
+                    Complex* column = light[t].column(x) + y0;
+                    for (std::size_t y = 0; y < rows; ++y)
+                        column[y] = half[y * m_columns + x];
                 }
             }
+            m_progress.advance(0.4 * m_unit / static_cast<double>(items));
+        });
+    }
+
+    void convolve_columns(std::size_t first_term, std::size_t count, std::vector<ColumnSpectrum>& light,
+                          std::size_t first_medium, std::vector<ColumnSpectrum>& results)
+    {
+        const std::size_t height = m_plane.padded_height;
+        const std::size_t items = (m_columns + columns_per_item - 1) / columns_per_item;
+        parallel_for(items, [&](std::size_t item) {
+            std::vector<Complex> lines(count * height);
+            std::vector<Complex> sums(2 * results.size() * height);  // [medium][even, odd m][frequency]
+            std::vector<float> kernel(height);
+            KernelSpectra::Column column;
+            const std::size_t last = std::min(m_columns, (item + 1) * columns_per_item);
+            for (std::size_t x = item * columns_per_item; x < last; ++x) {
+                for (std::size_t t = 0; t < count; ++t) {
+                    Complex* line = lines.data() + t * height;
+                    std::copy_n(light[t].column(x), m_plane.height, line);
+                    std::fill(line + m_plane.height, line + height, Complex());
+                }
+                complex_in_place(lines.data(), count, height, true);
+                std::fill(sums.begin(), sums.end(), Complex());
+                m_spectra.start(x, column);
+                for (std::size_t t = 0; t < count; ++t)
+                    for (std::size_t k = 0; k < results.size(); ++k)
+                        add_kernels(m_terms.terms[first_term + t].kernels[first_medium + k], column, kernel,
+                                    lines.data() + t * height, sums.data() + 2 * k * height);
+                for (std::size_t k = 0; k < results.size(); ++k) {
+                    Complex* even = sums.data() + 2 * k * height;
+                    const Complex* odd = even + height;
+                    for (std::size_t f = 0; f < height; ++f)  // -i times the odd ones
+                        even[f] += Complex(odd[f].imag(), -odd[f].real());
+                    complex_in_place(even, 1, height, false);
+                    Complex* result = results[k].column(x);
+                    for (std::size_t y = 0; y < m_plane.height; ++y)
+                        result[y] = (first_term > 0 ? result[y] : Complex()) + even[y];
+                }
+            }
+            m_progress.advance(0.6 * m_unit / static_cast<double>(items));
+        });
+    }
+
+    // Adds the product of a light's spectrum and its kernel's; `sums`: those of even m, then those of odd m.
+    void add_kernels(const std::vector<KernelTerm>& terms, const KernelSpectra::Column& column,
+                     std::vector<float>& kernel, const Complex* light, Complex* sums) const
+    {
+        for (std::size_t first = 0; first < terms.size();) {
+            const std::size_t parity = terms[first].m % 2;
+            std::size_t last = first + 1;
+            while (last < terms.size() && terms[last].phase == terms[first].phase && terms[last].m % 2 == parity)
+                ++last;
+            m_spectra.spectrum(column, terms.data() + first, last - first, kernel.data());
+            add_product(sums + parity * kernel.size(), kernel.data(), light, kernel.size());
+            first = last;
         }
     }
 
-    // For every texel: weights of the nodes for even and odd harmonics, and the azimuth of its beam.
-    struct BeamWeights {
-        std::vector<float> even;  // [node][texel]
-        std::vector<float> odd;
-        std::vector<float> beta;  // [texel]
-    };
-
-    BeamWeights beam_weights(const Channel& beams, const BeamBasis& basis) const
+    void store(std::size_t medium, ColumnSpectrum& result, double media)
     {
-        const std::size_t texels = m_problem.width * m_problem.height;
-        BeamWeights result{std::vector<float>(basis.node_count() * texels),
-                           std::vector<float>(basis.node_count() * texels), std::vector<float>(texels)};
-        parallel_for(m_problem.height, [&](std::size_t y) {
-            for (std::size_t x = 0; x < m_problem.width; ++x) {
-                if (beams.irradiance(y, x) == 0.0f)
+        const std::size_t stride = m_plane.padded_width;
+        const std::size_t items = (m_plane.height + rows_per_item - 1) / rows_per_item;
+        const double factor =
+            inv_pi / (static_cast<double>(m_plane.padded_width) * static_cast<double>(m_plane.padded_height));
+        parallel_for(items, [&](std::size_t item) {
+            const std::size_t y0 = item * rows_per_item;
+            const std::size_t rows = std::min(rows_per_item, m_plane.height - y0);
+            std::vector<Complex> half(rows * m_columns);
+            std::vector<float> lines(rows * stride);
+            for (std::size_t x = 0; x < m_columns; ++x) {
+                const Complex* column = result.column(x) + y0;
+                for (std::size_t y = 0; y < rows; ++y)
+                    half[y * m_columns + x] = column[y];
+            }
+            half_to_real(half.data(), lines.data(), rows, stride);
+            for (const Group::Member& member : m_group.members) {
+                if (member.medium != medium)
                     continue;
-                const std::size_t texel = y * m_problem.width + x;
-                const Vec3 direction = direction_at(m_problem, y, x);
-                const BeamBasis::Weights weights = basis.weights(direction);
-                for (std::size_t j = 0; j < basis.node_count(); ++j) {
-                    result.even[j * texels + texel] = static_cast<float>(weights.even[j]);
-                    result.odd[j * texels + texel] = static_cast<float>(weights.odd[j]);
-                }
-                result.beta[texel] = static_cast<float>(azimuth(direction));
+                const auto scaled = static_cast<float>(factor * member.factor);
+                for (std::size_t y = 0; y < rows; ++y)
+                    for (std::size_t x = 0; x < m_plane.width; ++x)
+                        m_luminance[((y0 + y) * m_plane.width + x) * m_channels + member.channel] =
+                            scaled * lines[y * stride + x];
             }
-        });
-        return result;
-    }
-
-    std::vector<double> pad_irradiance(const Channel& beams) const
-    {
-        std::vector<double> padded(m_transform.height() * m_transform.width(), 0.0);
-        for (std::size_t y = 0; y < m_problem.height; ++y)
-            for (std::size_t x = 0; x < m_problem.width; ++x)
-                padded[y * m_transform.width() + x] = static_cast<double>(beams.irradiance(y, x));
-        return padded;
-    }
-
-    std::vector<double> pad_term(const Channel& beams, const BeamWeights& weights, const BeamTerm& term) const
-    {
-        const std::size_t texels = m_problem.width * m_problem.height;
-        const std::vector<float>& by_node = term.m % 2 == 0 ? weights.even : weights.odd;
-        const auto m = static_cast<double>(term.m);
-        std::vector<double> padded = pad_irradiance(beams);
-        parallel_for(m_problem.height, [&](std::size_t y) {
-            for (std::size_t x = 0; x < m_problem.width; ++x) {
-                double& value = padded[y * m_transform.width() + x];
-                if (value == 0.0)
-                    continue;
-                const std::size_t texel = y * m_problem.width + x;
-                const double phase = m * static_cast<double>(weights.beta[texel]);
-                value *= static_cast<double>(by_node[term.node * texels + texel]) *
-                         (term.phase == Phase::cosine ? std::cos(phase) : std::sin(phase));
-            }
-        });
-        return padded;
-    }
-
-    Spectrum kernel_spectrum(const QuadrantKernel& kernel, const Harmonics& cosine, const Harmonics& sine) const
-    {
-        const auto height = static_cast<std::ptrdiff_t>(m_problem.height);
-        const auto padded_height = static_cast<std::ptrdiff_t>(m_transform.height());
-        std::vector<double> padded(m_transform.height() * m_transform.width(), 0.0);
-        parallel_for(2 * m_problem.height - 1, [&](std::size_t i) {
-            const std::ptrdiff_t dy = static_cast<std::ptrdiff_t>(i) - (height - 1);
-            std::vector<double> values;
-            kernel.row(dy, cosine, sine, values);
-            // Offset 0 goes to the first texel, negative ones wrap around to the end.
-            double* row =
-                padded.data() + static_cast<std::size_t>(dy < 0 ? dy + padded_height : dy) * m_transform.width();
-            const auto zero = values.begin() + static_cast<std::ptrdiff_t>(m_problem.width - 1);
-            std::copy(zero, values.end(), row);
-            std::copy(values.begin(), zero, row + m_transform.width() - (m_problem.width - 1));
-        });
-        return m_transform.forward(padded);
-    }
-
-    void accumulate(Spectrum& sum, const Spectrum& light, const Spectrum& kernel) const
-    {
-        const std::size_t columns = sum.size() / m_transform.height();
-        parallel_for(m_transform.height(), [&](std::size_t row) {
-            for (std::size_t i = row * columns; i < (row + 1) * columns; ++i) {
-                // The textbook product: std::complex's own handles infinities at ten times the cost.
-                const auto a = light[i];
-                const auto b = kernel[i];
-                sum[i] += std::complex<double>(a.real() * b.real() - a.imag() * b.imag(),
-                                               a.real() * b.imag() + a.imag() * b.real());
-            }
+            m_progress.advance(m_unit / (media * static_cast<double>(items)));
         });
     }
 
-    std::vector<float> crop(const std::vector<double>& padded) const
-    {
-        std::vector<float> values(m_problem.width * m_problem.height);
-        for (std::size_t y = 0; y < m_problem.height; ++y)
-            for (std::size_t x = 0; x < m_problem.width; ++x)
-                values[y * m_problem.width + x] = static_cast<float>(inv_pi * padded[y * m_transform.width() + x]);
-        return values;
-    }
-
-    const Problem& m_problem;
+    const Group& m_group;
     Progress& m_progress;
-    RealTransform m_transform;
-    std::vector<Spectrum> m_sums;
+    float* m_luminance;
+    std::size_t m_channels;
+    LightTerms m_terms;
+    KernelSpectra m_spectra;
+    const PaddedPlane& m_plane;
+    std::size_t m_columns;
+    double m_unit = 1.0;
 };
+
+// The factor between the light of two channels, if that is all they differ by; else 0.
+double common_factor(const std::vector<Problem>& lights, std::size_t channel, std::size_t reference)
+{
+    double factor = 0.0;
+    for (const Problem& light : lights) {
+        const View2D<const float>& a = light.channels[channel].irradiance;
+        const View2D<const float>& b = light.channels[reference].irradiance;
+        if (a.data == b.data && (factor == 0.0 || factor == 1.0)) {
+            factor = 1.0;
+            continue;
+        }
+        for (std::size_t y = 0; y < a.height; ++y) {
+            for (std::size_t x = 0; x < a.width; ++x) {
+                const auto value = static_cast<double>(a(y, x));
+                const auto other = static_cast<double>(b(y, x));
+                if (factor == 0.0 && other > 0.0)
+                    factor = value / other;
+                // Products of single-precision numbers are off by less.
+                if (std::abs(value - factor * other) > 3e-7 * value)
+                    return 0.0;
+            }
+        }
+    }
+    return factor;
+}
+
+std::vector<Group> group_channels(const std::vector<Problem>& lights)
+{
+    std::vector<Group> groups;
+    for (std::size_t c = 0; c < lights.front().channels.size(); ++c) {
+        const Channel& channel = lights.front().channels[c];
+        double factor = 0.0;
+        Group* found = nullptr;
+        for (Group& group : groups) {
+            factor = common_factor(lights, c, group.members.front().channel);
+            found = factor > 0.0 ? &group : nullptr;
+            if (found != nullptr)
+                break;
+        }
+        if (found == nullptr) {
+            factor = 1.0;
+            found = &groups.emplace_back();
+            for (const Problem& light : lights)
+                found->lights.push_back({light.channels[c].irradiance, light.directions});
+        }
+        const KernelMedium medium{channel.library, channel.albedo, channel.mean_free_path};
+        const auto known = std::find(found->media.begin(), found->media.end(), medium);
+        found->members.push_back({c, static_cast<std::size_t>(known - found->media.begin()), factor});
+        if (known == found->media.end())
+            found->media.push_back(medium);
+    }
+    return groups;
+}
 
 }  // namespace
 
-Luminance solve_fft(const Problem& problem, Progress& progress)
+void solve_fft(const std::vector<Problem>& lights, Progress& progress, float* luminance)
 {
-    validate(problem);
-    Luminance luminance;
-    with_threads(problem.threads, [&] { luminance = Solver(problem, progress).solve(); });
-    return luminance;
+    for (const Problem& light : lights)
+        validate(light);
+    with_threads(lights.front().threads, [&] {
+        const std::vector<Group> groups = group_channels(lights);
+        progress.set_total(static_cast<double>(groups.size()));
+        for (const Group& group : groups)
+            GroupSolver(group, lights.front(), progress, luminance).solve();
+    });
+    progress.finish();
 }
 
 }  // namespace beamspread

@@ -48,7 +48,8 @@ Luminance solve_direct(const Problem& problem, Progress& progress);
 // Evenly lit squares as one beam each, and small beams seen from afar on coarser grids.
 Luminance solve_adaptive(const Problem& problem, Progress& progress);
 
-// The same sums by Fourier transforms, padded so that light that leaves the plane does not come back.
-Luminance solve_fft(const Problem& problem, Progress& progress);
+// The same sums by Fourier transforms, padded so that light that leaves the plane does not come back; the sum of
+// several lights, which differ in irradiance and directions only. Writes (height, width, channels).
+void solve_fft(const std::vector<Problem>& lights, Progress& progress, float* luminance);
 
 }  // namespace beamspread

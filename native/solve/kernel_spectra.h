@@ -1,0 +1,91 @@
+// Fourier transforms of kernels, without transforming kernels.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "ldf/radial_profile.h"
+
+namespace beamspread {
+
+enum class Phase { cosine, sine };
+
+// Part of a kernel: `weight` times the harmonic m of a profile.
+struct KernelTerm {
+    std::size_t profile;
+    std::size_t m;
+    Phase phase;
+    double weight;
+};
+
+struct ScaledProfile {
+    RadialProfile profile;
+    double mean_free_path = 1.0;  // metres
+    double reach = 0.0;           // metres: what the profile holds farther out is left out
+};
+
+// Radius in metres outside which the profile holds no more than this fraction of its power.
+double reach(const RadialProfile& profile, double mean_free_path, double fraction);
+
+// The texels of a plane, and the size that it is padded to.
+struct PaddedPlane {
+    std::size_t width = 0;
+    std::size_t height = 0;
+    double pitch_x = 1.0;  // metres
+    double pitch_y = 1.0;
+    std::size_t padded_width = 0;  // even
+    std::size_t padded_height = 0;
+};
+
+// The spectra of texel integrals of c_m(r) cos(m phi) and c_m(r) sin(m phi), on the frequencies of a padded plane.
+//
+// A kernel is cut in two by a smooth window a few texels wide. What is outside has no detail finer than texels: its
+// spectrum is i^-m cos(m psi) H_m(k), a table of one Hankel transform in |k|, times the sinc of the texel. What is
+// inside are few texels, integrated exactly (ldf/texel_integral.h) and transformed by a sum.
+class KernelSpectra {
+public:
+    // Chooses the padding: the least where nothing that the kernels hold within reach comes back on the other side.
+    // `window_deviation`: width of the window's border, texels. The wider, the less detail beyond what texels resolve is
+    // left outside, and the longer the sums.
+    KernelSpectra(std::size_t width, std::size_t height, double pitch_x, double pitch_y,
+                  std::vector<ScaledProfile> profiles, double window_deviation);
+
+    const PaddedPlane& plane() const { return m_plane; }
+
+    // What one column of frequencies needs for all kernels; use it again for the next one.
+    struct Column {
+        std::vector<float> trig;      // [2 m + phase][frequency]: cos, sin (m psi) times the sinc of the texel
+        std::vector<float> hankel;    // [profile * harmonics + m][frequency]
+        std::vector<double> near_cosine;  // [column of the window]: 1, then 2 cos
+        std::vector<double> near_sine;
+    };
+
+    // For kx = 2 pi frequency / padded_width.
+    void start(std::size_t frequency, Column& column) const;
+
+    // The sum of terms that share their phase and whether m is even, for all padded_height frequencies ky; for odd m
+    // divided by -i, hence real.
+    void spectrum(const Column& column, const KernelTerm* terms, std::size_t count, float* values) const;
+
+private:
+    void choose_window(std::size_t width, std::size_t height);
+    void tabulate_hankel();
+    void integrate_near();
+
+    PaddedPlane m_plane;
+    std::vector<ScaledProfile> m_profiles;
+    double m_texel = 1.0;       // metres: the unit of length here
+    double m_deviation = 1.0;
+    double m_cut = 0.0;         // where the kernels end, texels
+    double m_taper = 0.0;       // over which they fall to zero beyond that
+    bool m_far = true;          // whether there is anything outside the window
+    std::size_t m_near_x = 0;   // half-width of the window
+    std::size_t m_near_y = 0;
+    double m_k_step = 1.0;
+    std::size_t m_table_rows = 0;
+    std::vector<float> m_table;          // [k][profile * harmonics + m], first row for -m_k_step
+    std::vector<float> m_near;           // [profile][m][phase][y][x], quadrant
+    std::vector<float> m_near_trig;      // [cos, sin][y][frequency]
+};
+
+}  // namespace beamspread

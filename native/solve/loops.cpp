@@ -1,0 +1,44 @@
+#include "solve/loops.h"
+
+#define BEAMSPREAD_CLONES __attribute__((target_clones("default", "avx2", "avx512f")))
+
+namespace beamspread {
+
+BEAMSPREAD_CLONES void add_scaled(float* sum, const float* values, float factor, std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i)
+        sum[i] += factor * values[i];
+}
+
+BEAMSPREAD_CLONES void scale(float* product, const float* values, float factor, std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i)
+        product[i] = factor * values[i];
+}
+
+BEAMSPREAD_CLONES void add_scaled_product(float* sum, const float* a, const float* b, float factor, std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i)
+        sum[i] += factor * (a[i] * b[i]);
+}
+
+BEAMSPREAD_CLONES void add_product(Complex* sum, const float* factor, const Complex* values, std::size_t count)
+{
+    // std::complex is two floats by definition ([complex.numbers]).
+    auto* s = reinterpret_cast<float*>(sum);
+    const auto* v = reinterpret_cast<const float*>(values);
+    for (std::size_t i = 0; i < count; ++i) {
+        s[2 * i] += factor[i] * v[2 * i];
+        s[2 * i + 1] += factor[i] * v[2 * i + 1];
+    }
+}
+
+BEAMSPREAD_CLONES void interpolate(float* result, const float* table, std::size_t stride, const float* weight,
+                                   std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i)
+        result[i] = weight[0] * table[i] + weight[1] * table[stride + i] + weight[2] * table[2 * stride + i] +
+                    weight[3] * table[3 * stride + i];
+}
+
+}  // namespace beamspread

@@ -1,0 +1,26 @@
+// Inner loops of the fft solver, compiled for several instruction sets, the best chosen at run time. Without
+// contraction to fused multiply-add the results are the same for all.
+#pragma once
+
+#include <cstddef>
+
+#include "solve/fft.h"
+
+namespace beamspread {
+
+// sum[i] += factor * values[i]
+void add_scaled(float* sum, const float* values, float factor, std::size_t count);
+
+// product[i] = factor * values[i]
+void scale(float* product, const float* values, float factor, std::size_t count);
+
+// sum[i] += factor * a[i] * b[i]
+void add_scaled_product(float* sum, const float* a, const float* b, float factor, std::size_t count);
+
+// sum[i] += factor[i] * values[i]
+void add_product(Complex* sum, const float* factor, const Complex* values, std::size_t count);
+
+// result[f] = sum over k of weight[k] * table[k * stride + f], k = 0 .. 3
+void interpolate(float* result, const float* table, std::size_t stride, const float* weight, std::size_t count);
+
+}  // namespace beamspread

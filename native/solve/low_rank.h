@@ -1,0 +1,57 @@
+// A few light terms in place of a beam per texel, for light whose direction changes from texel to texel.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "base/view.h"
+#include "solve/kernel_spectra.h"
+#include "solve/problem.h"
+
+namespace beamspread {
+
+// Light of one source on the plane.
+struct LightField {
+    View2D<const float> irradiance;
+    Directions directions;
+};
+
+// What decides a kernel, besides the direction.
+struct KernelMedium {
+    const LdfLibrary* library = nullptr;
+    double albedo = 0.0;
+    double mean_free_path = 1.0;
+
+    bool operator==(const KernelMedium&) const = default;
+};
+
+// Place of an angle of incidence in tables: tan(theta / 2), which needs no trigonometry and is smooth everywhere.
+inline double half_tangent(double x, double y, double z)
+{
+    const double across = std::sqrt(x * x + y * y);
+    return across / (std::sqrt(across * across + z * z) - z);
+}
+
+// The harmonic m of a kernel as sum over i of u_i(theta) e_i(r): u_i are tables over half_tangent, e_i is the harmonic
+// m of a profile per medium.
+struct LowRankBasis {
+    struct AngleFunction {
+        std::size_t m;
+        std::size_t rank;
+        std::vector<float> values;
+    };
+    double first = 0.0;  // half_tangent of the first and last entries of the tables
+    double last = 0.0;
+    std::vector<AngleFunction> functions;              // ascending m, then rank
+    std::vector<std::vector<ScaledProfile>> profiles;  // [medium][rank]
+};
+
+// The least costly basis whose kernels are off by at most `tolerance`: root mean square, over the light and the lit
+// texels, of the relative L1 error of the kernels (bounded by its chi-square distance). The media share the functions of
+// the angle. `texel` is the side of a texel in metres: detail inside the one where a beam enters does not count.
+// Empty where nothing is lit.
+LowRankBasis low_rank_basis(const std::vector<LightField>& lights, const std::vector<KernelMedium>& media, double texel,
+                            double tolerance);
+
+}  // namespace beamspread

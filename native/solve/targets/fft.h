@@ -1,0 +1,23 @@
+// The transforms of solve/fft.h as compiled for one instruction set.
+#pragma once
+
+#include <complex>
+#include <cstddef>
+
+namespace beamspread {
+
+struct FftTarget {
+    void (*real_to_half)(const float*, std::complex<float>*, std::size_t count, std::size_t size);
+    void (*half_to_real)(const std::complex<float>*, float*, std::size_t count, std::size_t size);
+    void (*complex_in_place)(std::complex<float>*, std::size_t count, std::size_t size, bool forward);
+    std::size_t (*good_size)(std::size_t);
+};
+
+}  // namespace beamspread
+
+// One per instruction set: each is its own object file, of which only this symbol can be seen (cmake/ducc.cmake).
+extern "C" {
+const beamspread::FftTarget* beamspread_fft_baseline();
+const beamspread::FftTarget* beamspread_fft_avx2();
+const beamspread::FftTarget* beamspread_fft_avx512();
+}
