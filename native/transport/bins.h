@@ -9,8 +9,9 @@
 
 namespace beamspread {
 
-// Number of azimuthal harmonics kept, cos(m phi) for m = 0 .. 8.
-inline constexpr std::size_t harmonic_count = 9;
+// Number of azimuthal harmonics kept, cos(m phi) for m = 0 .. 16. Half as many leave 5 % of the power of a beam at 85
+// degrees in the wrong places (g .8, ior 1), these .8 %.
+inline constexpr std::size_t harmonic_count = 17;
 
 // Orders 0 .. 15 exactly, then four bins per octave up to 2^20: enough for albedos of 0.99999.
 inline constexpr std::uint32_t exact_orders = 16;

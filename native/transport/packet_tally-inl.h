@@ -22,6 +22,16 @@ constexpr int side_shift = 20;
 constexpr int batch_shift = 21;
 static_assert(max_order <= 1u << side_shift);
 
+// [m][k]: of cos(phi)^k in cos(m phi).
+constexpr auto chebyshev_coefficients = [] {
+    std::array<std::array<double, harmonic_count>, harmonic_count> c{};
+    c[0][0] = c[1][1] = 1.0;
+    for (std::size_t m = 2; m < harmonic_count; ++m)
+        for (std::size_t k = 0; k <= m; ++k)
+            c[m][k] = (k > 0 ? 2.0 * c[m - 1][k - 1] : 0.0) - c[m - 2][k];
+    return c;
+}();
+
 // Collects exits, and adds them to the tallies when there are enough to fill vectors. Until `finish` the moments
 // hold powers of cos(phi) in the place of cos(m phi), which take no recurrence.
 class PacketTally {
@@ -56,20 +66,14 @@ private:
     // From sums of c^m, c = cos(phi), to sums of cos(m phi), which is the m-th Chebyshev polynomial of c.
     static void powers_to_harmonics(double* sums)
     {
-        const double c2 = sums[2];
-        const double c3 = sums[3];
-        const double c4 = sums[4];
-        const double c5 = sums[5];
-        const double c6 = sums[6];
-        sums[8] = 128.0 * sums[8] - 256.0 * c6 + 160.0 * c4 - 32.0 * c2 + sums[0];
-        sums[7] = 64.0 * sums[7] - 112.0 * c5 + 56.0 * c3 - 7.0 * sums[1];
-        sums[6] = 32.0 * c6 - 48.0 * c4 + 18.0 * c2 - sums[0];
-        sums[5] = 16.0 * c5 - 20.0 * c3 + 5.0 * sums[1];
-        sums[4] = 8.0 * c4 - 8.0 * c2 + sums[0];
-        sums[3] = 4.0 * c3 - 3.0 * sums[1];
-        sums[2] = 2.0 * c2 - sums[0];
+        std::array<double, harmonic_count> powers;
+        std::copy_n(sums, harmonic_count, powers.begin());
+        for (std::size_t m = 0; m < harmonic_count; ++m) {
+            sums[m] = 0.0;
+            for (std::size_t k = m % 2; k <= m; k += 2)
+                sums[m] += chebyshev_coefficients[m][k] * powers[k];
+        }
     }
-    static_assert(harmonic_count == 9);
 
     HWY_NOINLINE void flush()
     {
@@ -150,11 +154,13 @@ private:
                 hn::RebindMask(doubles, hn::TestBit(exponent, hn::Set(hn::RebindToUnsigned<decltype(doubles)>(), 4u))),
                 hn::Mul(powers, hn::Set(doubles, c4)), powers);
         const auto next = hn::Set(doubles, step == 8 ? c4 * c4 : step == 4 ? c4 : step == 2 ? c2 : c1);
-        for (std::size_t m = 0; m < 8; m += step) {
+        constexpr std::size_t last = harmonic_count - 1;
+        static_assert(last % step == 0);
+        for (std::size_t m = 0; m < last; m += step) {
             hn::StoreU(hn::Add(hn::LoadU(doubles, sums + m), powers), doubles, sums + m);
             powers = hn::Mul(powers, next);
         }
-        sums[8] += static_cast<double>(weight) * c4 * c4;
+        sums[last] += hn::GetLane(powers);
     }
 
     std::span<SideTallies> m_batches;
