@@ -20,11 +20,11 @@ namespace {
 // kernels farther than near_texels, distance, and directions between the nodes with harmonics left out.
 constexpr double tolerance_share = 0.25;
 
-// Texels around the pole within which texel_kernel must be exact for its table to be off by at most `tolerance`,
+// Texels around the pole within which TexelKernels must be exact for its tables to be off by at most `tolerance`,
 // relative L1. Measured over mean free paths from 0.3 to 500 texels: 1.6e-3 at 32, falling with the third power.
 std::ptrdiff_t near_texels(double tolerance)
 {
-    return static_cast<std::ptrdiff_t>(std::ceil(std::min(1e6, 32.0 * std::cbrt(1.6e-3 / tolerance))));
+    return static_cast<std::ptrdiff_t>(std::ceil(std::clamp(32.0 * std::cbrt(1.6e-3 / tolerance), 8.0, 1e6)));
 }
 
 // Every beam's kernel is a sum over terms: a factor that depends on the beam, times a kernel that does not.
@@ -248,7 +248,7 @@ private:
     {
         const Term term = uniform_term(m_problem, m_channel);
         const RadialProfile profile = BeamBasis::uniform(m_problem).profiles(m_channel)[0];
-        const KernelTable kernel = table(profile, term);
+        const KernelTable kernel = kernels(profile).table(term.kernel);
         const SummedKernel summed(kernel, m_problem.height, m_problem.width);
         // One direction is exact: its share goes to distance.
         const double allowed = 2.0 * tolerance_share * m_problem.tolerance * summed.power(term.light);
@@ -266,9 +266,12 @@ private:
         const BeamField beams(m_problem, m_channel, basis);
 
         double power = 0.0;
+        std::vector<TexelKernels> node_kernels;
         for (std::size_t node = 0; node < basis.node_count(); ++node) {
+            node_kernels.push_back(kernels(profiles[node]));
             const Term term = beams.term(node, 0, false);
-            power += SummedKernel(table(profiles[node], term), m_problem.height, m_problem.width).power(term.light);
+            const KernelTable kernel = node_kernels[node].table(term.kernel);
+            power += SummedKernel(kernel, m_problem.height, m_problem.width).power(term.light);
         }
         const double terms = static_cast<double>(basis.node_count() * 2 * harmonics.size());
         const double allowed = tolerance_share * m_problem.tolerance * power / terms;
@@ -277,7 +280,7 @@ private:
                 for (const bool sine : {false, true}) {
                     if (m > 0 || !sine) {
                         const Term term = beams.term(node, m, sine);
-                        const KernelTable kernel = table(profiles[node], term);
+                        const KernelTable kernel = node_kernels[node].table(term.kernel);
                         add_term(sum, term.light, kernel, SummedKernel(kernel, m_problem.height, m_problem.width),
                                  allowed);
                     }
@@ -285,9 +288,9 @@ private:
                 }
     }
 
-    KernelTable table(const RadialProfile& profile, const Term& term) const
+    TexelKernels kernels(const RadialProfile& profile) const
     {
-        return texel_kernel(profile, term.kernel, m_problem.pitch_x / m_channel.mean_free_path,
+        return TexelKernels(profile, m_problem.pitch_x / m_channel.mean_free_path,
                             m_problem.pitch_y / m_channel.mean_free_path, m_far.reach_y(), m_far.reach_x(),
                             near_texels(tolerance_share * m_problem.tolerance));
     }

@@ -13,7 +13,7 @@ MaskPyramid::MaskPyramid(const Problem& problem, const View2D<const float>& irra
     for (std::size_t y = 0; y < m_height; ++y)
         for (std::size_t x = 0; x < m_width; ++x) {
             const float value = irradiance(y, x);
-            const Vec3 direction = direction_at(problem, y, x);
+            const Vec3f direction(direction_at(problem, y, x));
             texels.cells[y * m_width + x] = {value, value, static_cast<double>(value), direction, direction};
         }
     m_levels.push_back(std::move(texels));
@@ -60,7 +60,8 @@ void MaskPyramid::search(std::size_t level, std::size_t y, std::size_t x, double
     const double allowed = tolerance * static_cast<double>(cell.least);
     const bool even_light = cell.least > 0.0f && static_cast<double>(cell.greatest) - mean <= allowed &&
                             mean - static_cast<double>(cell.least) <= allowed;
-    const bool even_direction = glm::length(cell.greatest_direction - cell.least_direction) <= tolerance / 20.0;
+    const bool even_direction =
+        static_cast<double>(glm::length(cell.greatest_direction - cell.least_direction)) <= tolerance / 20.0;
     if (level == 0 || (even_light && even_direction)) {
         found.push_back({y * size, x * size, size, mean});
         return;

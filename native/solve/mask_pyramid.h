@@ -34,8 +34,8 @@ private:
         float least = 0.0f;
         float greatest = 0.0f;
         double sum = 0.0;
-        Vec3 least_direction{0.0};
-        Vec3 greatest_direction{0.0};
+        Vec3f least_direction{0.0f};
+        Vec3f greatest_direction{0.0f};
     };
     struct Level {
         std::size_t height = 0;

@@ -2,10 +2,10 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
 #include <vector>
 
 #include "ldf/radial_profile.h"
+#include "ldf/texel_integral.h"
 
 namespace beamspread {
 
@@ -37,10 +37,30 @@ struct HarmonicSum {
     Harmonics sine{};
 };
 
-// The kernel's power in each texel, sides in mean free paths. Exact within `near` texels of the pole; farther out
-// exact in blocks of 3, 9, 27 ... texels, each exact within `near` blocks, whose power is handed to their texels by
-// polynomials: no power is lost, and values are off by less than the profile's own noise.
-KernelTable texel_kernel(const RadialProfile& profile, const HarmonicSum& harmonics, double pitch_x, double pitch_y,
-                         std::ptrdiff_t reach_y, std::ptrdiff_t reach_x, std::ptrdiff_t near);
+// Tables of one profile's kernels: the power in each texel, sides in mean free paths. Exact within `near` texels of the
+// pole; farther out exact in blocks of 3, 9, 27 ... texels, each exact within `near` blocks, whose power is handed to
+// their texels by polynomials: no power is lost, and values are off by less than the profile's own noise.
+class TexelKernels {
+public:
+    TexelKernels(const RadialProfile& profile, double pitch_x, double pitch_y, std::ptrdiff_t reach_y,
+                 std::ptrdiff_t reach_x, std::ptrdiff_t near);
+
+    KernelTable table(const HarmonicSum& harmonics) const;
+
+private:
+    // Blocks of 3^n texels, and their integrals near the pole.
+    struct Level {
+        std::ptrdiff_t reach_y = 0;
+        std::ptrdiff_t reach_x = 0;
+        std::size_t height = 0;  // of the quadrant that is integrated
+        std::size_t width = 0;
+        TexelIntegrals integrals;
+    };
+
+    static void integrate(const Level& level, const HarmonicSum& harmonics, KernelTable& table);
+    static void refine(const KernelTable& coarse, KernelTable& table);
+
+    std::vector<Level> m_levels;  // finest first
+};
 
 }  // namespace beamspread
