@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <optional>
 
 #include "base/constants.h"
 #include "base/threads.h"
-#include "solve/beam_basis.h"
 #include "solve/far_field.h"
+#include "solve/light_terms.h"
 #include "solve/mask_pyramid.h"
 #include "solve/near_field.h"
 #include "solve/texel_kernel.h"
@@ -17,7 +18,7 @@ namespace beamspread {
 namespace {
 
 // Share of the tolerance that each kind of approximation may use up: light that is not quite even within a square,
-// kernels farther than near_texels, distance, and directions between the nodes with harmonics left out.
+// kernels farther than near_texels, distance, and terms left out where directions differ.
 constexpr double tolerance_share = 0.25;
 
 // Texels around the pole within which TexelKernels must be exact for its tables to be off by at most `tolerance`,
@@ -26,74 +27,6 @@ std::ptrdiff_t near_texels(double tolerance)
 {
     return static_cast<std::ptrdiff_t>(std::ceil(std::clamp(32.0 * std::cbrt(1.6e-3 / tolerance), 8.0, 1e6)));
 }
-
-// Every beam's kernel is a sum over terms: a factor that depends on the beam, times a kernel that does not.
-struct Term {
-    std::size_t node = 0;
-    HarmonicSum kernel;
-    Grid light;  // irradiance times factor
-};
-
-// One beam direction: one term, whose factor is one.
-Term uniform_term(const Problem& problem, const Channel& channel)
-{
-    Term term{0, {}, Grid(problem.height, problem.width)};
-    const double beta = azimuth(problem.directions.uniform);
-    for (std::size_t m = 0; m < harmonic_count; ++m) {
-        term.kernel.cosine[m] = std::cos(static_cast<double>(m) * beta);
-        term.kernel.sine[m] = std::sin(static_cast<double>(m) * beta);
-    }
-    for (std::size_t y = 0; y < problem.height; ++y)
-        for (std::size_t x = 0; x < problem.width; ++x)
-            term.light.row(y)[x] = static_cast<double>(channel.irradiance(y, x));
-    return term;
-}
-
-// Beams of many directions: weights of the nodes and azimuth at every lit texel.
-class BeamField {
-public:
-    BeamField(const Problem& problem, const Channel& channel, const BeamBasis& basis)
-        : m_light(problem.height, problem.width),
-          m_beta(problem.height * problem.width),
-          m_even(basis.node_count(), std::vector<double>(problem.height * problem.width)),
-          m_odd(m_even)
-    {
-        parallel_for(problem.height, [&](std::size_t y) {
-            for (std::size_t x = 0; x < problem.width; ++x) {
-                const auto irradiance = static_cast<double>(channel.irradiance(y, x));
-                if (irradiance == 0.0)
-                    continue;
-                const std::size_t texel = y * problem.width + x;
-                const Vec3 direction = direction_at(problem, y, x);
-                const BeamBasis::Weights weights = basis.weights(direction);
-                m_light.values[texel] = irradiance;
-                m_beta[texel] = azimuth(direction);
-                for (std::size_t j = 0; j < basis.node_count(); ++j) {
-                    m_even[j][texel] = weights.even[j];
-                    m_odd[j][texel] = weights.odd[j];
-                }
-            }
-        });
-    }
-
-    Term term(std::size_t node, std::size_t m, bool sine) const
-    {
-        Term term{node, {}, m_light};
-        (sine ? term.kernel.sine : term.kernel.cosine)[m] = 1.0;
-        const std::vector<double>& weights = m % 2 == 0 ? m_even[node] : m_odd[node];
-        for (std::size_t i = 0; i < weights.size(); ++i) {
-            const double phase = static_cast<double>(m) * m_beta[i];
-            term.light.values[i] *= weights[i] * (sine ? std::sin(phase) : std::cos(phase));
-        }
-        return term;
-    }
-
-private:
-    Grid m_light;
-    std::vector<double> m_beta;
-    std::vector<std::vector<double>> m_even;  // [node][texel]
-    std::vector<std::vector<double>> m_odd;
-};
 
 // Sums of a kernel over all offsets below and to the left of a texel's upper right corner.
 class SummedKernel {
@@ -213,6 +146,20 @@ std::vector<Square> wide_beams(const std::vector<Square>& squares, const Grid& l
     return best;
 }
 
+HarmonicSum harmonic_sum(const std::vector<KernelTerm>& terms)
+{
+    HarmonicSum sum;
+    for (const KernelTerm& term : terms)
+        (term.phase == Phase::cosine ? sum.cosine : sum.sine)[term.m] += term.weight;
+    return sum;
+}
+
+// Whether the kernel has a harmonic 0; the others have no power, all around taken together.
+bool has_power(const LightTerm& term)
+{
+    return std::any_of(term.kernels[0].begin(), term.kernels[0].end(), [](const KernelTerm& k) { return k.m == 0; });
+}
+
 class ChannelSolver {
 public:
     ChannelSolver(const Problem& problem, const Channel& channel, const std::vector<Square>& squares,
@@ -232,10 +179,7 @@ public:
             return std::vector<float>(m_problem.height * m_problem.width);
         }
         Grid sum(m_problem.height, m_problem.width);
-        if (m_problem.directions.field)
-            add_field(sum);
-        else
-            add_uniform(sum);
+        add_terms(sum);
         const Grid far = m_far.sum();
         std::vector<float> luminance(sum.values.size());
         for (std::size_t i = 0; i < luminance.size(); ++i)
@@ -244,70 +188,71 @@ public:
     }
 
 private:
-    void add_uniform(Grid& sum)
+    // Each beam's kernel is a sum over terms, of a factor that depends on the beam times a kernel that does not.
+    void add_terms(Grid& sum)
     {
-        const Term term = uniform_term(m_problem, m_channel);
-        const RadialProfile profile = BeamBasis::uniform(m_problem).profiles(m_channel)[0];
-        const KernelTable kernel = kernels(profile).table(term.kernel);
-        const SummedKernel summed(kernel, m_problem.height, m_problem.width);
-        // One direction is exact: its share goes to distance.
-        const double allowed = 2.0 * tolerance_share * m_problem.tolerance * summed.power(term.light);
-        add_term(sum, term.light, kernel, summed, allowed);
-        m_progress.advance(1.0);
-    }
-
-    void add_field(Grid& sum)
-    {
-        Problem basis_problem = m_problem;
-        basis_problem.tolerance = 0.5 * tolerance_share * m_problem.tolerance;  // angles and harmonics half each
-        const BeamBasis basis = BeamBasis::present_angles(basis_problem, m_channel);
-        const std::vector<RadialProfile> profiles = basis.profiles(m_channel);
-        const std::vector<std::size_t> harmonics = needed_harmonics({profiles}, basis_problem.tolerance);
-        const BeamField beams(m_problem, m_channel, basis);
+        // Half a share for directions: what is left out is a root mean square, and a single texel may be farther off.
+        const LightTerms terms =
+            light_terms({{m_channel.irradiance, m_problem.directions}},
+                        {{m_channel.library, m_channel.albedo, m_channel.mean_free_path}},
+                        std::max(m_problem.pitch_x, m_problem.pitch_y), 0.5 * tolerance_share * m_problem.tolerance);
+        std::vector<TexelKernels> kernels;
+        for (const ScaledProfile& profile : terms.profiles)
+            kernels.emplace_back(profile.profile, m_problem.pitch_x / m_channel.mean_free_path,
+                                 m_problem.pitch_y / m_channel.mean_free_path, m_far.reach_y(), m_far.reach_x(),
+                                 near_texels(tolerance_share * m_problem.tolerance));
+        KernelTable kernel;
+        std::optional<std::size_t> tabulated;  // the term whose kernel that is
+        const auto tabulate = [&](std::size_t t) {
+            const std::vector<KernelTerm>& parts = terms.terms[t].kernels[0];
+            if (tabulated != t)
+                kernel = kernels[parts.front().profile].table(harmonic_sum(parts));
+            tabulated = t;
+        };
 
         double power = 0.0;
-        std::vector<TexelKernels> node_kernels;
-        for (std::size_t node = 0; node < basis.node_count(); ++node) {
-            node_kernels.push_back(kernels(profiles[node]));
-            const Term term = beams.term(node, 0, false);
-            const KernelTable kernel = node_kernels[node].table(term.kernel);
-            power += SummedKernel(kernel, m_problem.height, m_problem.width).power(term.light);
+        for (std::size_t t = 0; t < terms.terms.size(); ++t)
+            if (has_power(terms.terms[t])) {
+                tabulate(t);
+                power += SummedKernel(kernel, m_problem.height, m_problem.width).power(light(terms, t));
+            }
+        const auto count = static_cast<double>(terms.terms.size());
+        // One direction leaves nothing out: its share goes to distance. The errors of many terms have nothing to do
+        // with each other, so that their squares add up.
+        const double allowed = (m_problem.directions.field ? 1.0 : 2.0) * tolerance_share * m_problem.tolerance *
+                               std::max(power, 0.0) / std::sqrt(count);
+        for (std::size_t t = 0; t < terms.terms.size(); ++t) {
+            tabulate(t);
+            add_term(sum, light(terms, t), kernel, allowed);
+            m_progress.advance(1.0 / count);
         }
-        const double terms = static_cast<double>(basis.node_count() * 2 * harmonics.size());
-        const double allowed = tolerance_share * m_problem.tolerance * power / terms;
-        for (std::size_t node = 0; node < basis.node_count(); ++node)
-            for (const std::size_t m : harmonics)
-                for (const bool sine : {false, true}) {
-                    if (m > 0 || !sine) {
-                        const Term term = beams.term(node, m, sine);
-                        const KernelTable kernel = node_kernels[node].table(term.kernel);
-                        add_term(sum, term.light, kernel, SummedKernel(kernel, m_problem.height, m_problem.width),
-                                 allowed);
-                    }
-                    m_progress.advance(1.0 / terms);
-                }
     }
 
-    TexelKernels kernels(const RadialProfile& profile) const
+    // Light of one term on the plane.
+    Grid light(const LightTerms& terms, std::size_t index) const
     {
-        return TexelKernels(profile, m_problem.pitch_x / m_channel.mean_free_path,
-                            m_problem.pitch_y / m_channel.mean_free_path, m_far.reach_y(), m_far.reach_x(),
-                            near_texels(tolerance_share * m_problem.tolerance));
+        Grid grid(m_problem.height, m_problem.width);
+        parallel_for(grid.height, [&](std::size_t y) {
+            std::vector<float> row(grid.width);
+            term_rows(terms, index, 1, y, row.data(), grid.width);
+            std::copy(row.begin(), row.end(), grid.row(y));
+        });
+        return grid;
     }
 
-    void add_term(Grid& sum, Grid light, const KernelTable& kernel, const SummedKernel& summed, double allowed_error)
+    void add_term(Grid& sum, Grid light, const KernelTable& kernel, double allowed_error)
     {
         const double light_before = absolute_sum(light);
         const std::vector<Square> wide = wide_beams(m_squares, light);
         if (!wide.empty()) {
-            SquareBeams(light, wide).add_to(sum, summed);
+            SquareBeams(light, wide).add_to(sum, SummedKernel(kernel, light.height, light.width));
             for (const Square& square : wide)
                 for (std::size_t y = square.y; y < square.y + square.size; ++y)
                     std::fill_n(light.row(y) + square.x, square.size, 0.0);
         }
         // In proportion to the light: an error saved on wide beams is not spent on the texels between them.
         const double share = light_before > 0.0 ? absolute_sum(light) / light_before : 0.0;
-        m_far.add(kernel, std::move(light), std::max(share * allowed_error, 0.0));
+        m_far.add(kernel, std::move(light), share * allowed_error);
     }
 
     const Problem& m_problem;

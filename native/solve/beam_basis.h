@@ -24,9 +24,6 @@ public:
     // The library's own simulated angles: exact.
     static BeamBasis library_nodes(const LdfLibrary& library);
 
-    // As few Chebyshev nodes over the angles present as keep the kernel of `channel` within the problem's tolerance.
-    static BeamBasis present_angles(const Problem& problem, const Channel& channel);
-
     std::size_t node_count() const { return m_node_count; }
 
     // Radial profiles of the nodes for a channel.
@@ -42,10 +39,6 @@ private:
     std::function<std::vector<RadialProfile>(const Channel&)> m_profiles;
     std::function<Weights(const Vec3&)> m_weights;
 };
-
-// Harmonics that a kernel cannot do without: leaving out the others changes it by less than the tolerance,
-// relative L1, in a node or channel's profile where they are strongest.
-std::vector<std::size_t> needed_harmonics(const std::vector<std::vector<RadialProfile>>& profiles, double tolerance);
 
 // Angle of incidence in degrees and azimuth in radians of a unit vector of travel.
 double incidence_deg(const Vec3& direction);
