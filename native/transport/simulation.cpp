@@ -19,11 +19,14 @@ namespace {
 
 constexpr std::uint64_t enough_photons_per_job = 200'000;
 
-// Light forgets the beam's direction after a transport mean free path, so that is where the far side's
-// distribution is centred, or where the beam leaves a thinner slab.
+// The far side's distribution peaks where the beam leaves, if light has not forgotten its direction by then, and with it the
+// few scatterings that light of low albedos has; deeper down it is broad, and its centre stays behind.
 double far_side_centre(const Medium& medium, double theta_inside)
 {
-    const double path = std::min(1.0 / (1.0 - medium.g), medium.thickness / std::cos(theta_inside));
+    const double memory = 2.0 / (1.0 - medium.g);
+    const double through = medium.thickness / std::cos(theta_inside);
+    // A smooth minimum, as the spline over angles wants it.
+    const double path = std::pow(std::pow(memory, -4.0) + std::pow(through, -4.0), -0.25);
     return std::sin(theta_inside) * path;
 }
 
