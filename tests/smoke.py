@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from beamspread import Cancelled, Medium, simulate
+from beamspread import Cancelled, Medium, exact_totals, simulate
 from beamspread._load import native
 
 THREADS = 2
@@ -48,7 +48,30 @@ def libraries(folder):
     refused(OSError, type(slab).load, str(Path(folder) / "none.exr"))
     Path(folder, "broken.exr").write_bytes(Path(folder, "library.exr").read_bytes()[:3000])
     refused(OSError, type(slab).load, str(Path(folder) / "broken.exr"))
+    calibrated = slab.calibrated(threads=THREADS)
+    assert abs(calibrated.reflectance(30, 0.9) - exact_totals(slab.medium, [30], [0.9])[0][0, 0]) < 1e-3
+    assert np.isfinite(calibrated.image_standard_error(20.0, 0.9, 8, 0.3)).all()
+    calibrated.save(str(Path(folder) / "calibrated.exr"))
+    for name in ("library.exr", "calibrated.exr"):
+        fuzz(Path(folder, name).read_bytes(), str(Path(folder) / "fuzzed.exr"), type(slab))
     return slab
+
+
+def fuzz(whole, path, library):
+    """Load files with bytes changed or cut off, most in the headers: each is refused or fit for use."""
+    rng = np.random.default_rng(1)
+    for case in range(150):
+        damaged = bytearray(whole)
+        if case % 5 == 0:
+            damaged = damaged[: rng.integers(1, len(whole))]
+        for place in rng.integers(0, min(len(damaged), 6000 if case % 2 else len(whole)), 1 + case % 4):
+            damaged[place] = int(rng.integers(256))
+        Path(path).write_bytes(damaged)
+        try:
+            loaded = library.load(path)
+        except OSError:
+            continue
+        assert np.isfinite(loaded.image(loaded.angles[0], 0.9, 4, 1.0)).all()
 
 
 def beams():

@@ -56,9 +56,10 @@ def photons_for(medium, quality):
     return int(min(PHOTONS[quality] * effort, _MAX_PHOTONS))
 
 
-def make(medium, quality, progress=None):
+def make(medium, quality, progress=None, kernel=""):
     """Simulate the library of a medium and make its totals exact."""
-    return native.simulate(medium, angles_for(medium), photons_for(medium, quality), progress=progress).calibrated()
+    photons = photons_for(medium, quality)
+    return native.simulate(medium, angles_for(medium), photons, progress=progress, kernel=kernel).calibrated()
 
 
 def file_name(medium, quality):

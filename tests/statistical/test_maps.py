@@ -4,20 +4,18 @@ import functools
 
 import numpy as np
 import pytest
-from beamspread import Medium, simulate
+from beamspread import Medium, convolve, exact_totals, simulate
+from beamspread.core.library import angles_for
 
 from .plain_walk import plain_walk
 
-ANGLES = [0, 10, 20, 30, 40, 50, 58, 65]
 PHOTONS = 100_000
-
-
 SIZE = 15
 
 
 @functools.cache
 def library_of(medium):
-    return simulate(medium, ANGLES, PHOTONS, seed=7)
+    return simulate(medium, angles_for(medium), PHOTONS, seed=7).calibrated()
 
 
 @functools.cache
@@ -37,9 +35,11 @@ CASES = [
     (Medium(0.8), 45, 0.9, 2.5, "reflected"),
     (Medium(0.8), 30, 0.6, 1.0, "reflected"),
     (Medium(0.0), 55, 0.99, 0.5, "reflected"),
-    (Medium(0.8, 1.4), 45, 0.9, 2.5, "reflected"),
+    (Medium(0.8, 1.4), 52, 0.9, 2.5, "reflected"),
+    (Medium(0.8, 1.4), 62, 0.99, 12.0, "reflected"),
+    (Medium(0.0), 62, 0.9, 0.05, "reflected"),
     (Medium(0.5, 1.4, 4.0), 35, 0.9, 0.75, "reflected"),
-    (Medium(0.5, 1.4, 4.0), 35, 0.9, 0.75, "transmitted"),
+    (Medium(0.5, 1.4, 4.0), 42, 0.6, 0.75, "transmitted"),
     (Medium(0.8, 1.0, 1.0), 25, 0.6, 0.25, "transmitted"),
 ]
 
@@ -127,7 +127,7 @@ def test_far_field_is_shifted_along_the_beam(radius):
     """By sin(theta) / (mu_s' + .35 mu_a), seen from 3 to 4 transport mean free paths (Wang, Jacques 1995).
 
     The centre is the point around which a circle of that radius has no first harmonic. The formula was measured within
-    1 % at this albedo with an independent simulator; 5 % here, for the noise of this far field.
+    1 % at this albedo with an independent simulator; 2 % here, of which the noise of this far field is .5 %.
     """
     albedo, pitch = 0.9, 1.0
     image = far_field(albedo, pitch)
@@ -137,9 +137,21 @@ def test_far_field_is_shifted_along_the_beam(radius):
     assert first[0] > 0 > first[-1]
     shift = np.interp(0, first[::-1], shifts[::-1])
     expected = np.sin(np.radians(45)) / (albedo * (1 - 0.8) + 0.35 * (1 - albedo))
-    assert shift == pytest.approx(expected, rel=0.05)
+    assert shift == pytest.approx(expected, rel=0.02)
 
 
 @functools.cache
 def far_field(albedo, pitch):
-    return simulate(Medium(0.8), [45], 400_000).image(45, albedo, 101, pitch)
+    return simulate(Medium(0.8), [45], 4_000_000).image(45, albedo, 101, pitch)
+
+
+@pytest.mark.parametrize("medium", [Medium(0.8, 1.4), Medium(0.0, 1.0, 2.0)], ids=str)
+def test_a_bake_keeps_energy(medium):
+    """What a large plane gives off is the exact reflectance times the power it receives, to .1 %."""
+    irradiance = np.zeros((96, 96), np.float32)
+    irradiance[40:56, 44:52] = np.random.default_rng(1).random((16, 8)) + 0.5
+    angle = np.radians(52)
+    albedo = (0.5, 0.97, 0.9995)
+    luminance = convolve(irradiance, (np.sin(angle), 0, -np.cos(angle)), library_of(medium), albedo, 1e-3, 0.1)
+    reflected = np.pi * luminance.sum((0, 1), dtype=np.float64) / irradiance.sum(dtype=np.float64)
+    assert reflected == pytest.approx(exact_totals(medium, [52], albedo)[0][0], rel=1e-3)

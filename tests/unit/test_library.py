@@ -1,7 +1,11 @@
 """LdfLibrary: what it promises beside the physics (that is in tests/statistical)."""
 
 import math
+import os
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import beamspread
 import numpy as np
@@ -9,6 +13,8 @@ import pytest
 from beamspread import Cancelled, LdfLibrary, Medium, simulate
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+MAKE_LIBRARY = Path(__file__).parents[2] / "tools" / "make_library.py"
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +79,7 @@ def test_damaged_files_are_refused(small, tmp_path):
     whole = path.read_bytes()
     rng = np.random.default_rng(1)
     refused = 0
-    for case in range(60):
+    for case in range(300):
         damaged = bytearray(whole)
         if case % 3 == 0:
             damaged = damaged[: rng.integers(1, len(whole))]
@@ -89,8 +95,8 @@ def test_damaged_files_are_refused(small, tmp_path):
             assert str(path) in str(error)  # noqa: PT017 - either outcome is fine, a crash is not
             refused += 1
         else:
-            assert np.isfinite(loaded.image(loaded.angles[0], 0.5, 3, 1.0)).all()
-    assert refused > 20
+            assert same(loaded, small)  # what was hit does not matter to us: OpenEXR's own attributes
+    assert refused > 200
 
 
 def test_files_that_are_no_library(tmp_path):
@@ -214,6 +220,22 @@ def simulated_slab_once():
     return _kept.setdefault("slab", simulate(Medium(0.5, 1.4, 2.0), [0, 20, 40, 60], 4000))
 
 
+def test_shipped_files_are_made_again_bit_by_bit(tmp_path):
+    """The command that makes them, for a small one, by the kernel that every processor has."""
+    from beamspread.core import library as module
+
+    medium = Medium(0.9, 1.5, 0.5)
+    choice = ["--medium", "0.9", "1.5", "0.5", "--quality", "preview", "--kernel", "scalar"]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    files = []
+    for name in ("one", "two"):
+        command = [sys.executable, MAKE_LIBRARY, *choice, "--output", tmp_path / name]
+        subprocess.run(command, check=True, env=environment, capture_output=True)
+        files.append(tmp_path / name / module.file_name(medium, "preview"))
+    assert files[0].read_bytes() == files[1].read_bytes()
+    assert same(LdfLibrary.load(files[0]), module.make(medium, "preview", kernel="scalar"))
+
+
 class TestCache:
     @pytest.fixture(autouse=True)
     def folder(self, tmp_path, monkeypatch):
@@ -248,6 +270,60 @@ class TestCache:
             self.forget()
             assert same(beamspread.library(Medium(0.3)), first)
             assert LdfLibrary.load(path).medium == Medium(0.3)
+
+    def test_any_damage_is_repaired(self, folder):
+        first = beamspread.library(Medium(0.3))
+        (path,) = folder.iterdir()
+        whole = path.read_bytes()
+        rng = np.random.default_rng(2)
+        for case in range(12):
+            damaged = bytearray(whole)
+            damaged[rng.integers(0, len(whole) if case % 2 else 4000)] ^= 1 << int(rng.integers(8))
+            path.write_bytes(damaged)
+            self.forget()
+            assert same(beamspread.library(Medium(0.3)), first)
+
+    def test_files_made_otherwise_are_made_again(self, folder):
+        beamspread.library(Medium(0.3))
+        (path,) = folder.iterdir()
+        for other in (simulate(Medium(0.3), [0, 45, 88], 300), simulate(Medium(0.3), [0, 40, 88], 300).calibrated()):
+            other.save(path)
+            self.forget()
+            made = beamspread.library(Medium(0.3))
+            assert made.is_calibrated
+            assert made.angles == [0.0, 45.0, 88.0]
+
+    def test_a_folder_in_place_of_the_file_costs_nothing(self, folder):
+        first = beamspread.library(Medium(0.3))
+        (path,) = folder.iterdir()
+        path.unlink()
+        path.mkdir()
+        self.forget()
+        assert same(beamspread.library(Medium(0.3)), first)
+        assert path.is_dir()
+
+    def test_nothing_is_left_beside_the_files(self, folder):
+        beamspread.library(Medium(0.3))
+        beamspread.library(Medium(0.4), quality="preview")
+        assert sorted(path.suffix for path in folder.iterdir()) == [".exr", ".exr"]
+
+    def test_shipped_libraries_come_first(self, folder, tmp_path):
+        from beamspread.core import library as module
+
+        medium = Medium(0.3, 1.1, 2.0)
+        shipped = module.make(medium, "final")
+        (tmp_path / "shipped").mkdir()
+        path = tmp_path / "shipped" / module.file_name(medium, "final")
+        shipped.save(path)
+        for quality in ("final", "preview"):
+            self.forget()
+            found = beamspread.library(medium, quality=quality, progress=lambda f: pytest.fail("simulated"))
+            assert same(found, shipped)
+        assert not folder.exists()
+        path.write_bytes(path.read_bytes()[:-100])
+        self.forget()
+        assert same(beamspread.library(medium), shipped)
+        assert len(list(folder.iterdir())) == 1
 
     def test_an_unwritable_folder_costs_nothing(self, folder):
         folder.write_text("a file where the folder should be")

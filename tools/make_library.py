@@ -1,0 +1,52 @@
+"""Make the LDF libraries that come with the add-on: addon/library/*.exr, where `beamspread.library` looks first.
+
+    PYTHONPATH=build/stage build/venv/bin/python tools/make_library.py
+
+Every medium of the grid below, in final quality. `--medium G IOR THICKNESS` (as often as wanted) makes others instead,
+`--quality` and `--output` say how and where. Which random numbers a photon gets depends on the width of the processor's
+vectors; `--kernel scalar` gives the same files anywhere.
+"""
+
+import argparse
+import itertools
+import math
+import sys
+import time
+from pathlib import Path
+
+from beamspread import Medium
+from beamspread.core.library import PHOTONS, file_name, make
+
+GRID = [Medium(g, ior, math.inf) for g, ior in itertools.product((0.0, 0.8, 0.9), (1.0, 1.3, 1.4, 1.5))]
+"""Half-spaces of the materials that are asked for most: presets of unknown g (0), and what forward scattering does."""
+
+MAX_BYTES = 40e6
+"""What all files together may take of the package."""
+
+
+def main():
+    """Make the files that the command line asks for."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--medium", nargs=3, type=float, action="append", metavar=("G", "IOR", "THICKNESS"))
+    parser.add_argument("--quality", choices=sorted(PHOTONS), default="final")
+    parser.add_argument("--kernel", default="", help="of the photon walk, see beamspread._native.walk_kernels()")
+    parser.add_argument("--output", type=Path, default=Path(__file__).parents[1] / "addon" / "library")
+    options = parser.parse_args()
+    media = [Medium(*numbers) for numbers in options.medium or ()] or GRID
+    options.output.mkdir(exist_ok=True)
+    total = 0
+    for medium in media:
+        start = time.monotonic()
+        library = make(medium, options.quality, kernel=options.kernel)
+        path = options.output / file_name(medium, options.quality)
+        library.save(path)
+        seconds, size = time.monotonic() - start, path.stat().st_size
+        total += size
+        print(f"{path.name}: {library.photons} photons, {size / 1e6:.2f} MB, {seconds:.1f} s", flush=True)
+    print(f"{len(media)} files, {total / 1e6:.1f} MB")
+    if total > MAX_BYTES:
+        sys.exit(f"more than the {MAX_BYTES / 1e6:g} MB that the package may take")
+
+
+if __name__ == "__main__":
+    main()
