@@ -24,7 +24,7 @@ def angles_for(medium):
 
     Refraction lets the light inside change slowly with the angle outside; without it, the more a phase function peaks
     forward, the more suddenly light leaves again near grazing. With these angles interpolation moves no total from 0 to
-    85 degrees by more than .15 % (.7 % from 75 degrees on), whatever the albedo, for g -.5 to .95 and
+    85 degrees by more than .15 % (.8 % from 75 degrees on), whatever the albedo, for g -.5 to .95 and
     thicknesses from .5, up to 1e-6 of the incident power.
     """
     if medium.ior >= 1.2:
