@@ -12,8 +12,10 @@ __all__: list[str] = [
     "Cancelled",
     "LdfLibrary",
     "LdfSample",
+    "LdfSource",
     "Medium",
     "Occluders",
+    "SampleSource",
     "adaptive_beams",
     "convolve",
     "coverage",
@@ -68,7 +70,12 @@ class Medium:
     @property
     def thickness(self) -> float: ...
 
-class LdfLibrary:
+class LdfSource:
+    """
+    What `convolve` takes LDFs from.
+    """
+
+class LdfLibrary(LdfSource):
     """
     Luminance distribution functions of one medium.
 
@@ -322,6 +329,12 @@ class AngularSpace:
     @property
     def origin(self) -> tuple: ...
 
+class SampleSource(LdfSource):
+    """
+    LdfSamples of one medium as `convolve` takes them, interpolated by a method of `interpolate`.
+    """
+    def __init__(self, samples: list[LdfSample], method: str = "angular") -> None: ...
+
 class Occluders:
     """
     Triangles that block light, both sides of them.
@@ -357,7 +370,7 @@ def adaptive_beams(
 
 def convolve(
     lights: list[tuple[numpy.ndarray, numpy.ndarray]],
-    ldf: list[LdfLibrary],
+    ldf: list[LdfSource],
     albedo: list[float],
     mean_free_path: list[float],
     pitch: typing.Sequence[float],

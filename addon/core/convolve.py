@@ -17,6 +17,7 @@ def convolve(
     tolerance=1e-3,
     threads=0,
     progress=None,
+    interpolation="angular",
 ):
     """Luminance that beams on a regular grid of a plane cause (Manabe et al. 2012, Eq. 2).
 
@@ -27,8 +28,11 @@ def convolve(
     direction : array_like, shape (3,) or (H, W, 3)
         Unit vectors along which light travels, in the plane's frame (x along columns, y along rows, z the outward
         normal): z < 0. One for all beams, or one per texel.
-    ldf : LdfLibrary, or a sequence of three
-        One per channel where anisotropy or thickness in mean free paths differ.
+    ldf : LdfLibrary, or LdfSamples, or a sequence of three of either
+        One per channel where anisotropy or thickness in mean free paths differ. Samples (one, or a sequence as for
+        `interpolate`) stand for the LDFs between them, and each texel for a beam of their diameter; angles and albedos
+        outside of them are errors. Their images enter as rings around O with azimuthal harmonics: power is
+        kept, detail finer than a fifth of the distance from O is not.
     albedo : float or sequence of three
         Single-scattering albedo, 0 <= albedo < 1.
     mean_free_path : float or sequence of three
@@ -48,6 +52,8 @@ def convolve(
         0: all. The result does not depend on it.
     progress : callable, optional
         Called with the finished fraction; returning False stops.
+    interpolation : {"angular", "adaptive", "planar"}
+        Method of `interpolate` between samples.
 
     Returns
     -------
@@ -62,7 +68,9 @@ def convolve(
         `progress` returned False.
     """
     light = irradiance, direction
-    return convolve_lights([light], ldf, albedo, mean_free_path, pitch, solver, tolerance, threads, progress)
+    return convolve_lights(
+        [light], ldf, albedo, mean_free_path, pitch, solver, tolerance, threads, progress, interpolation
+    )
 
 
 def convolve_lights(
@@ -75,6 +83,7 @@ def convolve_lights(
     tolerance=1e-3,
     threads=0,
     progress=None,
+    interpolation="angular",
 ):
     """Luminance of several lights together.
 
@@ -92,7 +101,8 @@ def convolve_lights(
         Luminance, radiance in W/(m^2 sr).
     """
     arrays = [(_irradiance(irradiance), _float_array("direction", direction)) for irradiance, direction in lights]
-    rest = _libraries(ldf), _rgb("albedo", albedo), _rgb("mean_free_path", mean_free_path), _pair("pitch", pitch)
+    sources = _sources(ldf, interpolation)
+    rest = sources, _rgb("albedo", albedo), _rgb("mean_free_path", mean_free_path), _pair("pitch", pitch)
     numbers = float(tolerance), int(threads)
     if solver == "fft" or len(arrays) < 2:
         return native.convolve(arrays, *rest, solver, *numbers, progress)
@@ -168,9 +178,26 @@ def _pair(name, values):
     return _numbers(name, values, 2)
 
 
-def _libraries(ldf):
-    libraries = [ldf] * 3 if isinstance(ldf, native.LdfLibrary) else ldf
-    is_sequence = isinstance(libraries, list | tuple) and len(libraries) == 3
-    if not is_sequence or not all(isinstance(each, native.LdfLibrary) for each in libraries):
-        raise ValueError(f"argument 'ldf' is {ldf!r}; allowed: an LdfLibrary or three of them, one per channel")
-    return list(libraries)
+def _sources(ldf, interpolation):
+    """Native sources of LDFs, one per channel."""
+    one = _source(ldf, interpolation)
+    if one is not None:
+        return [one] * 3
+    each = [_source(entry, interpolation) for entry in ldf] if isinstance(ldf, list | tuple) else []
+    if len(each) != 3 or None in each:
+        raise ValueError(
+            f"argument 'ldf' is {ldf!r}; allowed: an LdfLibrary, LdfSamples, or three of either, one per channel"
+        )
+    return each
+
+
+def _source(ldf, interpolation):
+    """A library as it is, or samples as a source; None for anything else."""
+    if isinstance(ldf, native.LdfSource):
+        return ldf
+    samples = [ldf] if isinstance(ldf, native.LdfSample) else ldf
+    if not isinstance(samples, list | tuple) or not samples:
+        return None
+    if not all(isinstance(sample, native.LdfSample) for sample in samples):
+        return None
+    return native.SampleSource(list(samples), interpolation)

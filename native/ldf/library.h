@@ -8,7 +8,7 @@
 
 #include "base/progress.h"
 #include "ldf/angle_spline.h"
-#include "ldf/radial_profile.h"
+#include "ldf/ldf_source.h"
 #include "medium/medium.h"
 #include "transport/ballistic.h"
 #include "transport/simulation.h"
@@ -33,7 +33,7 @@ struct Residuals {
 };
 using SideResiduals = std::array<Residuals, side_count>;
 
-class LdfLibrary {
+class LdfLibrary final : public LdfSource {
 public:
     // Results in any order, one per angle; of a calibrated library also, by ascending angles, what is left of its errors.
     // Throws InvalidArgument.
@@ -60,26 +60,21 @@ public:
     double diffuse_reflectance(double albedo) const;
 
     // The scattered part of the LDF, per unit power incident.
-    RadialProfile profile(double angle_deg, double albedo, Side side) const;
+    RadialProfile profile(double angle_deg, double albedo, Side side) const override;
 
     // The same from a group of batches alone, a simulation of its own; group < group_count.
     RadialProfile group_profile(double angle_deg, double albedo, Side side, std::size_t group) const;
 
-    // The profiles at the simulated angles, per unit power that *entered*: `profile` is their sum with
-    // the weights that `angle_weights` gives. For solvers that meet many angles at once.
-    std::vector<RadialProfile> node_profiles(double albedo, Side side) const;
-
-    struct AngleWeights {
-        std::vector<double> even;  // per simulated angle, Fresnel transmittance at entry included
-        std::vector<double> odd;
-    };
-    AngleWeights angle_weights(double angle_deg) const;
+    // At the simulated angles, per unit power that *entered*; the weights include the Fresnel transmittance at entry.
+    std::size_t node_count() const override { return m_results.size(); }
+    std::vector<RadialProfile> node_profiles(double albedo, Side side) const override;
+    AngleWeights angle_weights(double angle_deg) const override;
 
     // The unscattered light, per unit power incident.
     std::vector<BallisticExit> ballistic(double angle_deg, Side side) const;
 
     // Throws InvalidArgument if the library does not reach to this angle.
-    void check_angle(double angle_deg) const;
+    void check_angle(double angle_deg) const override;
 
 private:
     double clamped_angle(double angle_deg) const;

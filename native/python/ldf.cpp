@@ -31,8 +31,10 @@ Array<float> image(ImageFunction make, const LdfLibrary& library, double angle, 
 
 void bind_ldf(py::module_& m)
 {
-    py::class_<LdfLibrary, std::shared_ptr<LdfLibrary>> library(m, "LdfLibrary",
-                                                                R"(Luminance distribution functions of one medium.
+    py::class_<LdfSource, std::shared_ptr<LdfSource>>(m, "LdfSource", "What `convolve` takes LDFs from.");
+    py::class_<LdfLibrary, LdfSource, std::shared_ptr<LdfLibrary>> library(
+        m, "LdfLibrary",
+        R"(Luminance distribution functions of one medium.
 
 Made by `simulate`, `library` or `LdfLibrary.load`. Angles are in degrees from the surface normal,
 within the simulated ones (a library that reaches 88 degrees serves up to 90); albedos in [0, 1).

@@ -1,10 +1,11 @@
-// Python names of angular space and interpolation: AngularSpace, interpolate.
+// Python names of angular space and interpolation: AngularSpace, interpolate, SampleSource.
 #include "ldf/interpolate.h"
 
 #include <memory>
 
 #include "base/error.h"
 #include "ldf/angular_space.h"
+#include "ldf/sample_source.h"
 #include "python/casters.h"
 
 namespace beamspread {
@@ -73,6 +74,18 @@ LdfSample interpolate_samples(const std::vector<std::shared_ptr<LdfSample>>& sam
     const Interpolation which = method_from_name(method);
     const py::gil_scoped_release release;
     return interpolate(pointers, angle, albedo, g, which, height);
+}
+
+std::shared_ptr<SampleSource> sample_source(const std::vector<std::shared_ptr<LdfSample>>& samples,
+                                            const std::string& method)
+{
+    std::vector<LdfSample> copies;
+    for (const auto& sample : samples) {
+        if (!sample)
+            reject("ldf", "with None", "LdfSamples");
+        copies.push_back(*sample);
+    }
+    return std::make_shared<SampleSource>(std::move(copies), method_from_name(method));
 }
 
 py::tuple pair(const Vec2& place)
@@ -154,6 +167,11 @@ Raises
 ValueError
     Names the argument, its value and what is allowed: outside of the samples, their span.
 )");
+
+    py::class_<SampleSource, LdfSource, std::shared_ptr<SampleSource>>(
+        m, "SampleSource",
+        "LdfSamples of one medium as `convolve` takes them, interpolated by a method of `interpolate`.")
+        .def(py::init(&sample_source), py::arg("samples"), py::arg("method") = "angular");
 }
 
 }  // namespace beamspread

@@ -62,7 +62,7 @@ void set_directions(Problem& problem, const Array<float>& direction)
 
 using Light = std::pair<Array<float>, Array<float>>;  // irradiance and direction
 
-Array<float> convolve(const std::vector<Light>& lights, const std::vector<std::shared_ptr<LdfLibrary>>& ldf,
+Array<float> convolve(const std::vector<Light>& lights, const std::vector<std::shared_ptr<LdfSource>>& ldf,
                       const std::vector<double>& albedo, const std::vector<double>& mean_free_path,
                       std::array<double, 2> pitch, const std::string& solver, double tolerance, int threads,
                       const py::object& progress)

@@ -36,10 +36,10 @@ BeamBasis BeamBasis::uniform(const Problem& problem)
     return basis;
 }
 
-BeamBasis BeamBasis::library_nodes(const LdfLibrary& library)
+BeamBasis BeamBasis::library_nodes(const LdfSource& library)
 {
     BeamBasis basis;
-    basis.m_node_count = library.results().size();
+    basis.m_node_count = library.node_count();
     basis.m_profiles = [](const Channel& channel) {
         return channel.library->node_profiles(channel.albedo, Side::reflected);
     };

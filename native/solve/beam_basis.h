@@ -16,13 +16,13 @@ namespace beamspread {
 class BeamBasis {
 public:
     // Weights of the nodes for one angle of incidence; even and odd harmonics may differ.
-    using Weights = LdfLibrary::AngleWeights;
+    using Weights = LdfSource::AngleWeights;
 
     // One direction for the whole grid: one node.
     static BeamBasis uniform(const Problem& problem);
 
-    // The library's own simulated angles: exact.
-    static BeamBasis library_nodes(const LdfLibrary& library);
+    // The library's own nodes: exact.
+    static BeamBasis library_nodes(const LdfSource& library);
 
     std::size_t node_count() const { return m_node_count; }
 

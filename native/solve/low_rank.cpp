@@ -118,11 +118,11 @@ struct NodeWeights {
     Matrix odd;
 
     NodeWeights() = default;
-    NodeWeights(const LdfLibrary& library, const std::vector<double>& half_tangents)
-        : even(index(half_tangents.size()), index(library.results().size())), odd(even)
+    NodeWeights(const LdfSource& library, const std::vector<double>& half_tangents)
+        : even(index(half_tangents.size()), index(library.node_count())), odd(even)
     {
         parallel_for(half_tangents.size(), [&](std::size_t a) {
-            const LdfLibrary::AngleWeights weights = library.angle_weights(angle_deg(half_tangents[a]));
+            const LdfSource::AngleWeights weights = library.angle_weights(angle_deg(half_tangents[a]));
             for (std::size_t j = 0; j < weights.even.size(); ++j) {
                 even(index(a), index(j)) = weights.even[j];
                 odd(index(a), index(j)) = weights.odd[j];
@@ -267,7 +267,7 @@ LowRankBasis low_rank_basis(const std::vector<LightField>& lights, const std::ve
                             reach(described[k].mean, media[k].mean_free_path, std::min(1e-6, 1e-3 * tolerance))};
         basis.profiles.emplace_back(ranks, empty);
     }
-    std::map<const LdfLibrary*, NodeWeights> tables;
+    std::map<const LdfSource*, NodeWeights> tables;
     for (const KernelMedium& medium : media)
         if (!tables.contains(medium.library))
             tables[medium.library] =

@@ -19,7 +19,7 @@ struct LightField {
 
 // What decides a kernel, besides the direction.
 struct KernelMedium {
-    const LdfLibrary* library = nullptr;
+    const LdfSource* library = nullptr;
     double albedo = 0.0;
     double mean_free_path = 1.0;
 

@@ -8,13 +8,13 @@
 #include "base/progress.h"
 #include "base/vec.h"
 #include "base/view.h"
-#include "ldf/library.h"
+#include "ldf/ldf_source.h"
 
 namespace beamspread {
 
 struct Channel {
     View2D<const float> irradiance;        // W/m^2
-    const LdfLibrary* library = nullptr;
+    const LdfSource* library = nullptr;
     double albedo = 0.0;
     double mean_free_path = 1.0;           // metres
 };

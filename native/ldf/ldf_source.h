@@ -1,0 +1,41 @@
+// What solvers ask of the LDFs of one medium, wherever they come from.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "ldf/radial_profile.h"
+#include "transport/tally.h"
+
+namespace beamspread {
+
+class LdfSource {
+public:
+    virtual ~LdfSource() = default;
+
+    // The scattered part of the LDF, per unit power incident. Throws InvalidArgument.
+    virtual RadialProfile profile(double angle_deg, double albedo, Side side) const = 0;
+
+    // Angles at which profiles are known; `profile` is the sum of `node_profiles` with the weights that `angle_weights`
+    // gives. For solvers that meet many angles at once.
+    virtual std::size_t node_count() const = 0;
+    virtual std::vector<RadialProfile> node_profiles(double albedo, Side side) const = 0;
+
+    struct AngleWeights {
+        std::vector<double> even;  // per node, for the harmonics of even m
+        std::vector<double> odd;
+    };
+    virtual AngleWeights angle_weights(double angle_deg) const = 0;
+
+    // Throws InvalidArgument for an angle that the source does not reach to.
+    virtual void check_angle(double angle_deg) const = 0;
+
+protected:
+    LdfSource() = default;
+    LdfSource(const LdfSource&) = default;
+    LdfSource(LdfSource&&) = default;
+    LdfSource& operator=(const LdfSource&) = default;
+    LdfSource& operator=(LdfSource&&) = default;
+};
+
+}  // namespace beamspread
