@@ -1,8 +1,10 @@
 #include "scene/beams.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "base/error.h"
@@ -71,31 +73,49 @@ private:
     Texel gather_texel(double x, double y) const
     {
         Texel sum{};
-        for (const Vec2& sub : m_points) {
-            const Vec3 point = m_grid.point(x + sub.x, y + sub.y);
-            const Arrival arrival = m_light.at(point);
-            const double cos_theta = -glm::dot(arrival.travel, m_grid.normal);
-            if (!(cos_theta > 0.0) || arrival.flux == 0.0 || is_blocked(point, arrival))
-                continue;
-            const double irradiance = arrival.flux * cos_theta;
-            sum.irradiance += irradiance;
-            sum.flow += irradiance * arrival.travel;
-        }
+        for (std::size_t first = 0; first < m_points.size(); first += Occluders::packet_size)
+            gather_points(x, y, std::span(m_points).subspan(first), sum);
         sum.irradiance /= static_cast<double>(m_points.size());
         return sum;
     }
 
-    bool is_blocked(const Vec3& point, const Arrival& arrival) const
+    // Adds the light of as many of the points as make a packet of rays.
+    void gather_points(double x, double y, std::span<const Vec2> points, Texel& sum) const
     {
-        if (!m_occluders)
-            return false;
+        std::array<Vec3, Occluders::packet_size> travel;
+        std::array<double, Occluders::packet_size> irradiance;
+        std::array<ShadowRay, Occluders::packet_size> rays;
+        std::size_t count = 0;
+        for (const Vec2& sub : points.first(std::min(points.size(), Occluders::packet_size))) {
+            const Vec3 point = m_grid.point(x + sub.x, y + sub.y);
+            const Arrival arrival = m_light.at(point);
+            const double cos_theta = -glm::dot(arrival.travel, m_grid.normal);
+            if (!(cos_theta > 0.0) || arrival.flux == 0.0)
+                continue;
+            travel[count] = arrival.travel;
+            irradiance[count] = arrival.flux * cos_theta;
+            if (m_occluders)
+                rays[count] = shadow_ray(point, arrival);
+            ++count;
+        }
+        const std::uint32_t blocked = m_occluders ? m_occluders->blocked(std::span(rays).first(count)) : 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            if (blocked >> i & 1u)
+                continue;
+            sum.irradiance += irradiance[i];
+            sum.flow += irradiance[i] * travel[i];
+        }
+    }
+
+    ShadowRay shadow_ray(const Vec3& point, const Arrival& arrival) const
+    {
         const Vec3 lift = m_grid.normal * m_offset;
         if (std::isinf(arrival.distance))
-            return m_occluders->blocks(point + lift, -arrival.travel, arrival.distance);
+            return {.origin = point + lift, .direction = -arrival.travel, .distance = arrival.distance};
         const Vec3 way = -arrival.travel * arrival.distance - lift;
         const double distance = glm::length(way);
         // Ending short of the lamp by the same margin: one that touches a surface is not shadowed by it.
-        return m_occluders->blocks(point + lift, way / distance, distance - m_offset);
+        return {.origin = point + lift, .direction = way / distance, .distance = distance - m_offset};
     }
 
     // In the plane frame.

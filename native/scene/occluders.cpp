@@ -1,6 +1,7 @@
 #include "scene/occluders.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -90,26 +91,34 @@ Occluders::Occluders(std::span<const float> vertices, std::span<const std::uint3
 
 Occluders::~Occluders() = default;
 
-bool Occluders::blocks(const Vec3& origin, const Vec3& direction, double distance) const
+std::uint32_t Occluders::blocked(std::span<const ShadowRay> rays) const
 {
-    if (!m_hierarchy)
-        return false;
-    const Vec3f from(origin);
-    const Vec3f along(direction);
-    RTCRay ray{};
-    ray.org_x = from.x;
-    ray.org_y = from.y;
-    ray.org_z = from.z;
-    ray.dir_x = along.x;
-    ray.dir_y = along.y;
-    ray.dir_z = along.z;
-    ray.tfar = static_cast<float>(distance);
-    ray.mask = ~0u;
+    if (!m_hierarchy || rays.empty())
+        return 0;
+    alignas(64) std::array<int, packet_size> valid{};  // -1: a ray
+    RTCRay16 packet{};
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        const Vec3f from(rays[i].origin);
+        const Vec3f along(rays[i].direction);
+        valid[i] = -1;
+        packet.org_x[i] = from.x;
+        packet.org_y[i] = from.y;
+        packet.org_z[i] = from.z;
+        packet.dir_x[i] = along.x;
+        packet.dir_y[i] = along.y;
+        packet.dir_z[i] = along.z;
+        packet.tfar[i] = static_cast<float>(rays[i].distance);
+        packet.mask[i] = ~0u;
+    }
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    rtcOccluded1(m_hierarchy->scene.get(), &context, &ray);
-    // Embree marks a blocked ray so.
-    return ray.tfar < 0.0f;
+    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    rtcOccluded16(valid.data(), m_hierarchy->scene.get(), &context, &packet);
+    std::uint32_t bits = 0;
+    // Embree marks a blocked ray by a negative length.
+    for (std::size_t i = 0; i < rays.size(); ++i)
+        bits |= static_cast<std::uint32_t>(packet.tfar[i] < 0.0f) << i;
+    return bits;
 }
 
 int embree_version()

@@ -9,6 +9,14 @@
 
 namespace beamspread {
 
+// Towards a light: what lies in (0, distance) from `origin` along the unit vector `direction` shades `origin`. The distance
+// may be infinite.
+struct ShadowRay {
+    Vec3 origin{};
+    Vec3 direction{};
+    double distance = 0.0;
+};
+
 // An immutable set of triangles with a bounding volume hierarchy; both sides of a triangle block. Its queries may run on
 // any number of threads at once.
 class Occluders {
@@ -20,9 +28,11 @@ public:
     Occluders(const Occluders&) = delete;
     Occluders& operator=(const Occluders&) = delete;
 
-    // Whether a triangle lies in (0, distance) on the ray from `origin` along the unit vector `direction`. The distance
-    // may be infinite.
-    bool blocks(const Vec3& origin, const Vec3& direction, double distance) const;
+    // Rays that are traced together: neighbours take the same way through the hierarchy, and share it.
+    static constexpr std::size_t packet_size = 16;
+
+    // Bit i: whether a triangle blocks the i-th of at most `packet_size` rays.
+    std::uint32_t blocked(std::span<const ShadowRay> rays) const;
 
     std::size_t triangle_count() const { return m_triangle_count; }
 
