@@ -5,10 +5,12 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "base/error.h"
 #include "base/threads.h"
+#include "scene/open_tiles.h"
 
 namespace beamspread {
 
@@ -22,10 +24,11 @@ constexpr std::size_t rows_per_block = 4;
 // of the receiver's own triangles, and is far below what can be seen: 2 micrometres in a scene of 1 metre.
 constexpr double offset_ulps = 16.0;
 
-double ray_offset(const ReceiverGrid& grid, const Occluders* occluders, double clearance)
+RayStart ray_start(const ReceiverGrid& grid, const Occluders* occluders, double clearance)
 {
     const double reach = std::max(grid.reach(), occluders ? occluders->reach() : 0.0);
-    return clearance + offset_ulps * static_cast<double>(std::numeric_limits<float>::epsilon()) * reach;
+    return {.rounding = offset_ulps * static_cast<double>(std::numeric_limits<float>::epsilon()) * reach,
+            .clearance = clearance};
 }
 
 // Sub-texel points in texels, n x n: one in each cell of an n x n grid and one in each of n^2 columns and n^2 rows, so
@@ -50,14 +53,16 @@ public:
           m_light(light),
           m_occluders(occluders),
           m_points(sub_texel_points(settings.samples)),
-          m_offset(ray_offset(grid, occluders, settings.clearance))
+          m_start(ray_start(grid, occluders, settings.clearance)),
+          m_open(grid, light.source(), occluders, m_start),
+          m_open_texel(gather_texel(0.0, 0.0, nullptr))
     {
     }
 
     void gather_row(std::size_t y, const BeamArrays& beams) const
     {
         for (std::size_t x = 0; x < m_grid.width; ++x) {
-            const auto [irradiance, flow] = gather_texel(static_cast<double>(x), static_cast<double>(y));
+            const auto [irradiance, flow] = texel(x, y);
             beams.irradiance(y, x) = static_cast<float>(irradiance);
             if (beams.direction.data)
                 beams.direction(y, x) = Vec3f(mean_direction(flow, static_cast<double>(x), static_cast<double>(y)));
@@ -70,17 +75,26 @@ private:
         Vec3 flow;          // sum over the points of irradiance times direction of travel
     };
 
-    Texel gather_texel(double x, double y) const
+    Texel texel(std::size_t x, std::size_t y) const
+    {
+        const bool is_open = m_open.is_open(x, y);
+        // A sun is the same everywhere.
+        if (std::is_same_v<AnyLight, SunLight> && is_open)
+            return m_open_texel;
+        return gather_texel(static_cast<double>(x), static_cast<double>(y), is_open ? nullptr : m_occluders);
+    }
+
+    Texel gather_texel(double x, double y, const Occluders* occluders) const
     {
         Texel sum{};
         for (std::size_t first = 0; first < m_points.size(); first += Occluders::packet_size)
-            gather_points(x, y, std::span(m_points).subspan(first), sum);
+            gather_points(x, y, std::span(m_points).subspan(first), occluders, sum);
         sum.irradiance /= static_cast<double>(m_points.size());
         return sum;
     }
 
     // Adds the light of as many of the points as make a packet of rays.
-    void gather_points(double x, double y, std::span<const Vec2> points, Texel& sum) const
+    void gather_points(double x, double y, std::span<const Vec2> points, const Occluders* occluders, Texel& sum) const
     {
         std::array<Vec3, Occluders::packet_size> travel;
         std::array<double, Occluders::packet_size> irradiance;
@@ -94,11 +108,11 @@ private:
                 continue;
             travel[count] = arrival.travel;
             irradiance[count] = arrival.flux * cos_theta;
-            if (m_occluders)
+            if (occluders)
                 rays[count] = shadow_ray(point, arrival);
             ++count;
         }
-        const std::uint32_t blocked = m_occluders ? m_occluders->blocked(std::span(rays).first(count)) : 0;
+        const std::uint32_t blocked = occluders ? occluders->blocked(std::span(rays).first(count)) : 0;
         for (std::size_t i = 0; i < count; ++i) {
             if (blocked >> i & 1u)
                 continue;
@@ -109,13 +123,13 @@ private:
 
     ShadowRay shadow_ray(const Vec3& point, const Arrival& arrival) const
     {
-        const Vec3 lift = m_grid.normal * m_offset;
+        const Vec3 lift = m_grid.normal * m_start.height();
         if (std::isinf(arrival.distance))
             return {.origin = point + lift, .direction = -arrival.travel, .distance = arrival.distance};
         const Vec3 way = -arrival.travel * arrival.distance - lift;
         const double distance = glm::length(way);
         // Ending short of the lamp by the same margin: one that touches a surface is not shadowed by it.
-        return {.origin = point + lift, .direction = way / distance, .distance = distance - m_offset};
+        return {.origin = point + lift, .direction = way / distance, .distance = distance - m_start.height()};
     }
 
     // In the plane frame.
@@ -130,7 +144,9 @@ private:
     const AnyLight& m_light;
     const Occluders* m_occluders;
     std::vector<Vec2> m_points;
-    double m_offset;
+    RayStart m_start;
+    OpenTiles m_open;
+    Texel m_open_texel;  // texel (0, 0) with nothing in the way
 };
 
 }  // namespace

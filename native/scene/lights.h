@@ -22,11 +22,18 @@ struct Arrival {
     double distance = std::numeric_limits<double>::infinity();  // to the lamp, metres
 };
 
+// Where all light of a lamp comes from.
+struct LightSource {
+    Vec3 position{};  // of the lamp; of a light infinitely far away the unit vector towards it
+    bool is_far = false;
+};
+
 class SunLight {
 public:
     // `direction` of travel, any length but 0; throws InvalidArgument.
     explicit SunLight(const Vec3& direction);
     Arrival at(const Vec3& point) const;
+    LightSource source() const { return {.position = -m_travel, .is_far = true}; }
 
 private:
     Vec3 m_travel;
@@ -37,6 +44,7 @@ public:
     // Throws InvalidArgument.
     explicit PointLight(const Vec3& position);
     Arrival at(const Vec3& point) const;
+    LightSource source() const { return {.position = m_position}; }
 
 private:
     Vec3 m_position;
@@ -58,6 +66,7 @@ public:
     // `spot_size` is the full angle of the cone in (0, pi], `blend` in [0, 1]. Throws InvalidArgument.
     SpotLight(const Vec3& position, const Mat3& lamp_to_world, double spot_size, double blend, SpotFalloff falloff);
     Arrival at(const Vec3& point) const;
+    LightSource source() const { return m_point.source(); }
 
 private:
     double falloff(const Vec3& travel) const;

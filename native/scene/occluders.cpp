@@ -1,7 +1,6 @@
 #include "scene/occluders.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -44,14 +43,15 @@ void check_arrays(std::span<const float> vertices, std::span<const std::uint32_t
     }
 }
 
-// Copies `values` into a new buffer of Embree's, which pads it as its vector loads need.
+// Copies `values` into a new buffer of Embree's, which pads it as its vector loads need; it lives as long as the geometry.
 template <class T>
-void set_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::span<const T> values)
+const T* set_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::span<const T> values)
 {
     void* buffer = rtcSetNewGeometryBuffer(geometry, type, 0, format, 3 * sizeof(T), values.size() / 3);
     if (!buffer)
         throw std::bad_alloc();
     std::copy(values.begin(), values.end(), static_cast<T*>(buffer));
+    return static_cast<const T*>(buffer);
 }
 
 }  // namespace
@@ -59,6 +59,8 @@ void set_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std:
 struct Occluders::Hierarchy {
     embree::Device device;
     embree::Scene scene;
+    const float* vertices = nullptr;  // in buffers of the scene
+    const std::uint32_t* triangles = nullptr;
 };
 
 Occluders::Occluders(std::span<const float> vertices, std::span<const std::uint32_t> triangles)
@@ -81,8 +83,8 @@ Occluders::Occluders(std::span<const float> vertices, std::span<const std::uint3
     // Robust: no light leaks through the shared edges of triangles.
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
     const embree::Geometry geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
-    set_buffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, vertices);
-    set_buffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, triangles);
+    m_hierarchy->vertices = set_buffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, vertices);
+    m_hierarchy->triangles = set_buffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, triangles);
     rtcCommitGeometry(geometry.get());
     rtcAttachGeometry(scene, geometry.get());
     rtcCommitScene(scene);
@@ -90,6 +92,15 @@ Occluders::Occluders(std::span<const float> vertices, std::span<const std::uint3
 }
 
 Occluders::~Occluders() = default;
+
+std::array<Vec3, 3> Occluders::triangle(std::size_t index) const
+{
+    const auto corner = [this, index](std::size_t i) {
+        const float* vertex = m_hierarchy->vertices + std::size_t{3} * m_hierarchy->triangles[3 * index + i];
+        return Vec3(vertex[0], vertex[1], vertex[2]);
+    };
+    return {corner(0), corner(1), corner(2)};
+}
 
 std::uint32_t Occluders::blocked(std::span<const ShadowRay> rays) const
 {

@@ -1,6 +1,7 @@
 // Triangles that block light.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -35,6 +36,9 @@ public:
     std::uint32_t blocked(std::span<const ShadowRay> rays) const;
 
     std::size_t triangle_count() const { return m_triangle_count; }
+
+    // Its corners.
+    std::array<Vec3, 3> triangle(std::size_t index) const;
 
     // The largest absolute coordinate of a vertex: what the rounding of hits scales with.
     double reach() const { return m_reach; }

@@ -139,6 +139,44 @@ def test_point_equals_brute_force(seed, samples, count, mirrored):
     assert (direction[..., 2] < 0).all()
 
 
+def corner_around(grid, height):
+    """A triangle whose shadow passes by the grid while the rectangle around it takes it in: rays are traced."""
+    corners = np.array([(-400, 300, height), (300, -400, height), (-400, -400, height)], float)
+    return grid["origin"] + corners @ np.array([grid["x_axis"], grid["y_axis"], grid["normal"]])
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    count=st.integers(1, 40),
+    size=st.sampled_from([0.01, 0.1, 1.0]),
+    slant=st.sampled_from([0.0, 1.0, 30.0]),
+    lamp_height=st.sampled_from([None, 0.1, 1.0, 5.0]),
+    clearance=st.sampled_from([0.0, 0.05]),
+)
+def test_texels_out_of_reach_of_shadows_need_no_rays(seed, count, size, slant, lamp_height, clearance):
+    axes, centre, rng = rotation(seed), np.array([30.0, -20.0, 10.0]), np.random.default_rng(seed)
+    grid = make_grid(width=150, height=110, axes=axes, centre=centre) | {"samples": 1, "clearance": clearance}
+    # Also through the plane, behind it, and beyond the lamp.
+    middle = rng.uniform([-1.5, -1.2, -0.3], [1.5, 1.2, 1.5], (count, 1, 3))
+    local = middle + rng.normal(0, size, (count, 3, 3))
+    # Behind the plane, far away: where rays start depends on the largest coordinate, which is to be the same for both.
+    far = np.array([(0, 0, -1000), (1, 0, -1000), (0, 1, -1000)])
+    vertices = np.concatenate([local.reshape(-1, 3), far]) @ axes + centre
+
+    def light(vertices):
+        triangles = np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)
+        occluders = native.Occluders(vertices.astype(np.float32), triangles)
+        if lamp_height is None:
+            return native.sun_beams(**grid, direction=np.array([slant, 0.3, -1.0]) @ axes, occluders=occluders)
+        position = np.array([0.1 * slant, 0.2, lamp_height]) @ axes + centre
+        return native.point_beams(**grid, position=position, occluders=occluders)[0]
+
+    skipped = light(vertices)
+    traced = light(np.concatenate([vertices, corner_around(grid, 0.5 * (lamp_height or 1.0))]))
+    np.testing.assert_array_equal(skipped, traced)
+
+
 def spot_falloff(travel, frame, size, blend, falloff):
     """As Cycles of Blender 3.4 ("legacy") and 4.2 to 5.0 ("scaled")."""
     frame = np.asarray(frame, float)
