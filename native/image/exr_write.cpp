@@ -2,6 +2,7 @@
 #include <OpenEXR/ImfMultiPartOutputFile.h>
 #include <OpenEXR/ImfOutputPart.h>
 #include <OpenEXR/ImfPartType.h>
+#include <OpenEXR/ImfThreading.h>
 
 #include <algorithm>
 #include <set>
@@ -17,6 +18,9 @@ namespace {
 
 // The format's limit for the names of channels and attributes.
 constexpr std::size_t max_name_length = 255;
+
+// Three quarters of the time of OpenEXR's own choice, 4, for files that are 4 % larger, measured on a baked floor.
+constexpr int fast_zip_level = 2;
 
 void check_name(const std::string& argument, const std::string& name)
 {
@@ -71,6 +75,7 @@ Imf::Header make_header(const ExrPart& part, const Imath::Box2i& display_window)
     const Imath::Box2i data_window({0, 0}, {part.width - 1, part.height - 1});
     Imf::Header header(display_window, data_window);
     header.compression() = Imf::ZIP_COMPRESSION;
+    header.zipCompressionLevel() = fast_zip_level;
     header.setType(Imf::SCANLINEIMAGE);
     if (!part.name.empty())
         header.setName(part.name);
@@ -106,10 +111,11 @@ void write_exr_parts(const std::string& path, std::span<const ExrPart> parts)
     for (const ExrPart& part : parts)
         headers.push_back(make_header(part, display_window));
 
-    constexpr int own_threads = 0;  // OpenEXR's thread pool is global state of the host's process
+    // OpenEXR's thread pool is global state of the host's process: used as the host has set it up, and left so.
+    const int host_threads = Imf::globalThreadCount();
     try {
         Imf::MultiPartOutputFile output(file.path().c_str(), headers.data(), static_cast<int>(headers.size()), false,
-                                        own_threads);
+                                        host_threads);
         for (std::size_t i = 0; i < parts.size(); ++i)
             write_pixels(Imf::OutputPart(output, static_cast<int>(i)), parts[i]);
     } catch (const std::exception& error) {
