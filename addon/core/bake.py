@@ -77,13 +77,15 @@ def bake(
     media_progress, *light_progress = stages(progress, [LIBRARY_WEIGHT] + [BEAMS_WEIGHT, SOLVE_WEIGHT] * len(lights))
     libraries = _libraries(material, thickness, settings.quality, media_progress)
     caster = native.Occluders(occluders.vertices, occluders.triangles) if len(occluders.triangles) else None
-    luminance = np.zeros((grid.height, grid.width, 3), np.float32)
+    luminance = None
     for light, beams_progress, solve_progress in zip(lights, light_progress[::2], light_progress[1::2]):
         beams, direction, strength = unit_beams(grid, light, caster, settings, beams_progress)
         if beams.any() and any(strength):
             # The light's colour comes last, so that the channels share the work on its beams.
-            luminance += strength * _spread(beams, direction, libraries, material, grid, settings, solve_progress)
-    return luminance
+            spread = _spread(beams, direction, libraries, material, grid, settings, solve_progress)
+            spread *= strength
+            luminance = spread if luminance is None else np.add(luminance, spread, out=luminance)
+    return np.zeros((grid.height, grid.width, 3), np.float32) if luminance is None else luminance
 
 
 def bake_texture(

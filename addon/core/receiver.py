@@ -82,12 +82,18 @@ class Receiver:
     texel_to_grid: np.ndarray | None = None
 
     def to_texels(self, values: np.ndarray) -> np.ndarray:
-        """Bring grid values (grid height, grid width, C) to the texture (height, width, C), 0 outside the chart."""
+        """Bring grid values (grid height, grid width, C) to the texture (height, width, C), 0 outside the chart.
+
+        Where the grid is the texture and the chart covers all of it, these are the values themselves, not a copy.
+        """
+        covered = self.grid.coverage > 0
+        if self.texel_to_grid is None and covered.shape == (self.height, self.width) and covered.all():
+            return values
         texture = np.zeros((self.height, self.width, values.shape[2]), np.float32)
         if self.texel_to_grid is None:
             column, row = self.offset
             part = texture[row : row + self.grid.height, column : column + self.grid.width]
-            np.copyto(part, values, where=(self.grid.coverage > 0)[..., None])
+            np.copyto(part, values, where=covered[..., None])
             return texture
         rows, columns = np.nonzero(self.coverage > 0)
         x, y = self.texel_to_grid @ np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))])

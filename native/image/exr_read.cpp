@@ -3,6 +3,7 @@
 #include <OpenEXR/ImfInputPart.h>
 #include <OpenEXR/ImfMultiPartInputFile.h>
 #include <OpenEXR/ImfPartType.h>
+#include <OpenEXR/ImfThreading.h>
 #include <OpenEXR/ImfTileDescription.h>
 
 #include <algorithm>
@@ -109,9 +110,10 @@ auto with_file(const std::string& path, const Read& read)
         const auto file_bytes = std::filesystem::file_size(path, error);
         if (error)
             fail(error.message());
-        constexpr int own_threads = 0;  // OpenEXR's thread pool is global state of the host's process
+        // OpenEXR's thread pool is global state of the host's process: used as the host has set it up, and left so.
+        const int host_threads = Imf::globalThreadCount();
         constexpr bool reconstruct = false;  // a truncated file is refused, not guessed at
-        Imf::MultiPartInputFile file(path.c_str(), own_threads, reconstruct);
+        Imf::MultiPartInputFile file(path.c_str(), host_threads, reconstruct);
         return read(file, static_cast<long long>(file_bytes));
     } catch (const std::exception& error) {
         throw IoError("cannot read '" + path + "': " + detail::reason_of(error, path));

@@ -1,0 +1,81 @@
+"""A whole bake in Blender against the least that the same Blender can do: start, load the file, save such an image.
+
+    PYTHONPATH=build/stage build/venv/bin/python tests/bench/whole_bake.py [--resolution N] [--runs N]
+
+A floor under a sun, with a monkey that throws a shadow. The library of the medium is in the cache: the first bake of a
+medium simulates it. Wall seconds are worth something on an idle machine only; CPU seconds are those of all threads.
+"""
+
+import argparse
+import os
+import resource
+import shutil
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+STAGE = ROOT / "build" / "stage"
+INSIDE = ROOT / "tests" / "bench" / "in_blender" / "whole_bake.py"
+BPY_MODULE = ROOT / "build" / "bpy-4.5" / "bin" / "python"
+
+
+def command(program, scene, script, *arguments):
+    """Run a script on a scene, in Blender or in a Python with the bpy module."""
+    scene = [str(scene)] if scene else []
+    if Path(program).name.startswith("python"):
+        # batch.py takes its options as they come, without a "--" in front.
+        dashes = [] if script.name == "batch.py" else ["--"]
+        return [program, str(script), *scene, *dashes, *arguments]
+    return [program, "-b", "--factory-startup", *scene, "--python-exit-code", "1", "--python", str(script), "--", *arguments]
+
+
+def run(arguments):
+    """Wall and CPU seconds of a process, and what it printed."""
+    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    done = subprocess.run(arguments, env=os.environ | {"PYTHONPATH": str(STAGE)}, capture_output=True, text=True)
+    wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+    if done.returncode != 0:
+        raise RuntimeError(f"{' '.join(arguments)} failed:\n{done.stdout}{done.stderr}")
+    return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done.stdout
+
+
+def best(results):
+    """The least wall and CPU seconds."""
+    return min(result[0] for result in results), min(result[1] for result in results)
+
+
+def measure(program, folder, resolution, runs):
+    size = str(resolution)
+    run(command(program, None, INSIDE, "make", folder, size))
+    version = run([program, "--version"])[2].splitlines()[0] if "python" not in program else "bpy module 4.5"
+    for scene in sorted(Path(folder).glob("*.blend")):
+        bake = command(program, scene, STAGE / "beamspread" / "batch.py", "--output", folder)
+        save = command(program, scene, INSIDE, "save", str(Path(folder) / "saved.exr"), size)
+        run(bake)  # fills the cache and warms the disk's
+        pairs = [(run(save), run(bake)) for _ in range(runs)]
+        saved, baked = best([pair[0] for pair in pairs]), best([pair[1] for pair in pairs])
+        print(f"{version}, {scene.stem}, {size} x {size}:  wall s  CPU s")
+        print(f"  start, load, save      {saved[0]:8.2f}  {saved[1]:.2f}")
+        print(f"  start, load, bake      {baked[0]:8.2f}  {baked[1]:.2f}")
+        print(f"  ratio                  {baked[0] / saved[0]:8.2f}  {baked[1] / saved[1]:.2f}")
+        for line in run(command(program, scene, INSIDE, "phases", folder))[2].splitlines():
+            if line.startswith("phase "):
+                name, _, numbers = line.removeprefix("phase ").partition(": ")
+                wall, cpu = numbers.split()
+                print(f"    {name:22} {wall:>7}  {cpu}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--resolution", type=int, default=1024)
+    parser.add_argument("--runs", type=int, default=3)
+    options = parser.parse_args()
+    programs = [shutil.which("blender"), str(BPY_MODULE) if BPY_MODULE.exists() else None]
+    for program in filter(None, programs):
+        with tempfile.TemporaryDirectory() as folder:
+            measure(program, folder, options.resolution, options.runs)
+
+
+main()
