@@ -769,9 +769,11 @@ def walk_kernels() -> list[str]:
     walk as many as a vector has lanes, in single precision.
     """
 
-def write_exr(path: str, array: numpy.ndarray, channels: list[str], attributes: dict = {}) -> None:
+def write_exr(
+    path: str, array: numpy.ndarray, channels: list[str], attributes: dict = {}, compression: str = "zip"
+) -> None:
     """
-    Write an OpenEXR file of 32-bit float channels, ZIP-compressed.
+    Write an OpenEXR file of 32-bit float channels.
 
     The file is written beside `path` and takes its name when it is whole.
 
@@ -785,6 +787,8 @@ def write_exr(path: str, array: numpy.ndarray, channels: list[str], attributes: 
         C names, such as ["R", "G", "B"].
     attributes : dict, optional
         Header attributes: str, int, float, or a sequence of numbers (stored as 32-bit floats).
+    compression : {"zip", "none"}
+        Both without loss.
 
     Raises
     ------

@@ -109,11 +109,11 @@ def write_file(path: Path, texture: np.ndarray, file_format: str) -> None:
 
 
 def write_exr(path: Path, texture: np.ndarray) -> None:
-    """Linear 32-bit float RGB."""
+    """Linear 32-bit float RGB, not packed, as Blender saves float images by itself."""
     from ._load import native
 
     try:
-        native.write_exr(str(path), np.ascontiguousarray(texture, np.float32), ["R", "G", "B"])
+        native.write_exr(str(path), np.ascontiguousarray(texture, np.float32), ["R", "G", "B"], compression="none")
     except OSError as error:
         raise ImageError(f"The file {path} cannot be written: {error}") from error
 

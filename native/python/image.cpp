@@ -39,6 +39,15 @@ std::map<std::string, ExrAttribute> to_attributes(const py::dict& attributes)
     return result;
 }
 
+ExrCompression to_compression(const std::string& name)
+{
+    if (name == "zip")
+        return ExrCompression::zip;
+    if (name == "none")
+        return ExrCompression::none;
+    reject("compression", "'" + name + "'", "'zip' or 'none'");
+}
+
 // The arrays' rows go up, the file's lines down.
 void flip_rows(const float* from, float* to, std::size_t height, std::size_t row_values)
 {
@@ -47,8 +56,9 @@ void flip_rows(const float* from, float* to, std::size_t height, std::size_t row
 }
 
 void write_exr(const std::string& path, const py::array& array, const std::vector<std::string>& channels,
-               const py::dict& attributes)
+               const py::dict& attributes, const std::string& compression)
 {
+    const ExrCompression packing = to_compression(compression);
     if (!py::isinstance<Array<float>>(array) || array.ndim() != 3)
         reject("array", std::string(py::str(array.dtype())) + " of " + std::to_string(array.ndim()) + " dimensions",
                "contiguous float32 (H, W, C)");
@@ -71,7 +81,7 @@ void write_exr(const std::string& path, const py::array& array, const std::vecto
     const py::gil_scoped_release released;
     part.pixels.resize(height * row_values);
     flip_rows(pixels, part.pixels.data(), height, row_values);
-    write_exr_parts(path, {&part, 1});
+    write_exr_parts(path, {&part, 1}, packing);
 }
 
 py::tuple read_exr(const std::string& path, const std::optional<std::string>& part_name)
@@ -101,7 +111,8 @@ py::tuple read_exr(const std::string& path, const std::optional<std::string>& pa
 void bind_image(py::module_& m)
 {
     m.def("write_exr", &write_exr, py::arg("path"), py::arg("array"), py::arg("channels"),
-          py::arg("attributes") = py::dict(), R"(Write an OpenEXR file of 32-bit float channels, ZIP-compressed.
+          py::arg("attributes") = py::dict(), py::arg("compression") = "zip",
+          R"(Write an OpenEXR file of 32-bit float channels.
 
 The file is written beside `path` and takes its name when it is whole.
 
@@ -115,6 +126,8 @@ channels : sequence of str
     C names, such as ["R", "G", "B"].
 attributes : dict, optional
     Header attributes: str, int, float, or a sequence of numbers (stored as 32-bit floats).
+compression : {"zip", "none"}
+    Both without loss.
 
 Raises
 ------

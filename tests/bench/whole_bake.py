@@ -11,6 +11,7 @@ import os
 import resource
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -18,13 +19,13 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 STAGE = ROOT / "build" / "stage"
 INSIDE = ROOT / "tests" / "bench" / "in_blender" / "whole_bake.py"
-BPY_MODULE = ROOT / "build" / "bpy-4.5" / "bin" / "python"
+BPY_MODULE = ROOT / "build" / "bpy-4.5"
 
 
 def command(program, scene, script, *arguments):
     """Run a script on a scene, in Blender or in a Python with the bpy module."""
     scene = [str(scene)] if scene else []
-    if Path(program).name.startswith("python"):
+    if program == sys.executable:
         # batch.py takes its options as they come, without a "--" in front.
         dashes = [] if script.name == "batch.py" else ["--"]
         return [program, str(script), *scene, *dashes, *arguments]
@@ -34,7 +35,11 @@ def command(program, scene, script, *arguments):
 def run(arguments):
     """Wall and CPU seconds of a process, and what it printed."""
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    done = subprocess.run(arguments, env=os.environ | {"PYTHONPATH": str(STAGE)}, capture_output=True, text=True)
+    path = [STAGE, BPY_MODULE] if arguments[0] == sys.executable else [STAGE]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, path))}
+    # Python keeps what it has compiled, as it does for those who don't forbid it.
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    done = subprocess.run(arguments, env=environment, capture_output=True, text=True)
     wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
     if done.returncode != 0:
         raise RuntimeError(f"{' '.join(arguments)} failed:\n{done.stdout}{done.stderr}")
@@ -49,7 +54,7 @@ def best(results):
 def measure(program, folder, resolution, runs):
     size = str(resolution)
     run(command(program, None, INSIDE, "make", folder, size))
-    version = run([program, "--version"])[2].splitlines()[0] if "python" not in program else "bpy module 4.5"
+    version = "bpy module 4.5" if program == sys.executable else run([program, "--version"])[2].splitlines()[0]
     for scene in sorted(Path(folder).glob("*.blend")):
         bake = command(program, scene, STAGE / "beamspread" / "batch.py", "--output", folder)
         save = command(program, scene, INSIDE, "save", str(Path(folder) / "saved.exr"), size)
@@ -72,7 +77,7 @@ def main():
     parser.add_argument("--resolution", type=int, default=1024)
     parser.add_argument("--runs", type=int, default=3)
     options = parser.parse_args()
-    programs = [shutil.which("blender"), str(BPY_MODULE) if BPY_MODULE.exists() else None]
+    programs = [shutil.which("blender"), sys.executable if BPY_MODULE.exists() else None]
     for program in filter(None, programs):
         with tempfile.TemporaryDirectory() as folder:
             measure(program, folder, options.resolution, options.runs)

@@ -91,7 +91,7 @@ def take_string(data, at):
 
 
 def read_plain(data):
-    """Attributes {name: (type, bytes)} and channels {name: (H, W), top row first} of a ZIP file of floats."""
+    """Attributes {name: (type, bytes)} and channels {name: (H, W), top row first} of a file of floats, unpacked or ZIP."""
     assert struct.unpack_from("<ii", data) == (MAGIC, 2)
     at, attributes = 8, {}
     while data[at]:
@@ -108,11 +108,11 @@ def read_plain(data):
         assert struct.unpack_from("<i", listing, position) == (FLOAT,)
         names.append(name)
         position += 16
-    assert attributes["compression"][1] == b"\3"
+    lines_per_block = {b"\0": 1, b"\3": 16}[attributes["compression"][1]]
     rows = np.empty((height, len(names), width), "<f4")
-    for offset in struct.unpack_from(f"<{-(-height // 16)}q", data, at + 1):
+    for offset in struct.unpack_from(f"<{-(-height // lines_per_block)}q", data, at + 1):
         y, size = struct.unpack_from("<ii", data, offset)
-        count = min(16, height - y)
+        count = min(lines_per_block, height - y)
         packed = data[offset + 8 : offset + 8 + size]
         rows[y : y + count] = unzip(packed, count * len(names) * width * 4).reshape(count, len(names), width)
     return attributes, {name: rows[:, i] for i, name in enumerate(names)}
@@ -134,10 +134,12 @@ def unzip(packed, size):
 # --- tests ----------------------------------------------------------------------------------------------------------
 
 
-def test_written_file_has_rows_top_down_and_standard_attributes(tmp_path):
+@pytest.mark.parametrize(("compression", "code"), [("zip", b"\3"), ("none", b"\0")])
+def test_written_file_has_rows_top_down_and_standard_attributes(tmp_path, compression, code):
     path, pixels = tmp_path / "a.exr", image(37, 21)
-    native.write_exr(str(path), pixels, ["R", "G", "B"], {"theta": 12.5})
+    native.write_exr(str(path), pixels, ["R", "G", "B"], {"theta": 12.5}, compression=compression)
     attributes, channels = read_plain(path.read_bytes())
+    assert attributes["compression"] == ("compression", code)
     for i, name in enumerate("RGB"):
         np.testing.assert_array_equal(channels[name], pixels[::-1, :, i])
     assert struct.unpack("<4i", attributes["displayWindow"][1]) == (0, 0, 20, 36)
@@ -160,6 +162,11 @@ def test_round_trip_keeps_bits_and_the_order_of_channels(tmp_path_factory, heigh
     assert attributes == {}
     assert again.dtype == np.float32
     np.testing.assert_array_equal(again, pixels)
+
+
+def test_unknown_compression_is_named(tmp_path):
+    with pytest.raises(ValueError, match="compression.*'piz'.*'zip' or 'none'"):
+        native.write_exr(str(tmp_path / "a.exr"), image(2, 2), ["R", "G", "B"], compression="piz")
 
 
 def test_special_values_survive(tmp_path):
