@@ -29,7 +29,18 @@ def command(program, scene, script, *arguments):
         # batch.py takes its options as they come, without a "--" in front.
         dashes = [] if script.name == "batch.py" else ["--"]
         return [program, str(script), *scene, *dashes, *arguments]
-    return [program, "-b", "--factory-startup", *scene, "--python-exit-code", "1", "--python", str(script), "--", *arguments]
+    return [
+        program,
+        "-b",
+        "--factory-startup",
+        *scene,
+        "--python-exit-code",
+        "1",
+        "--python",
+        str(script),
+        "--",
+        *arguments,
+    ]
 
 
 def run(arguments):

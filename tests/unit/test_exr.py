@@ -91,7 +91,7 @@ def take_string(data, at):
 
 
 def read_plain(data):
-    """Attributes {name: (type, bytes)} and channels {name: (H, W), top row first} of a file of floats, unpacked or ZIP."""
+    """Attributes {name: (type, bytes)} and channels {name: (H, W), top row first} of a float file, unpacked or ZIP."""
     assert struct.unpack_from("<ii", data) == (MAGIC, 2)
     at, attributes = 8, {}
     while data[at]:
@@ -165,7 +165,7 @@ def test_round_trip_keeps_bits_and_the_order_of_channels(tmp_path_factory, heigh
 
 
 def test_unknown_compression_is_named(tmp_path):
-    with pytest.raises(ValueError, match="compression.*'piz'.*'zip' or 'none'"):
+    with pytest.raises(ValueError, match=r"compression.*'piz'.*'zip' or 'none'"):
         native.write_exr(str(tmp_path / "a.exr"), image(2, 2), ["R", "G", "B"], compression="piz")
 
 

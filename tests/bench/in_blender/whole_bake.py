@@ -78,8 +78,10 @@ def phases(folder):
     time_calls("image file", targets, "write_file")
     time_calls("unregister", registration, "unregister")
     batch.run(["--output", folder, "--report", str(Path(folder) / "report.json")])
-    rest = [now - begin - sum(row[i] for row in rows) for i, now, begin in
-            ((1, time.perf_counter(), start[0]), (2, time.process_time(), start[1]))]
+    rest = [
+        now - begin - sum(row[i] for row in rows)
+        for i, now, begin in ((1, time.perf_counter(), start[0]), (2, time.process_time(), start[1]))
+    ]
     for name, wall, cpu in [*rows, ("the rest", *rest)]:
         print(f"phase {name}: {wall:.3f} {cpu:.3f}")
 
