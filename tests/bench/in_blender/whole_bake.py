@@ -64,11 +64,11 @@ def phases(folder):
 
     def import_all():
         from beamspread import bakes, batch, registration, targets
-        from beamspread.core import bake, job
+        from beamspread.core import bake
 
-        return bakes, batch, registration, targets, bake, job
+        return bakes, batch, registration, targets, bake
 
-    bakes, batch, registration, targets, bake, job = timed("import", import_all)()
+    bakes, batch, registration, targets, bake = timed("import", import_all)()
     time_calls("register", registration, "register")
     time_calls("extract", bakes, "prepare")
     time_calls("library from the cache", bake, "_libraries")
