@@ -41,6 +41,10 @@ CASES = [
     (Medium(0.5, 1.4, 4.0), 35, 0.9, 0.75, "reflected"),
     (Medium(0.5, 1.4, 4.0), 42, 0.6, 0.75, "transmitted"),
     (Medium(0.8, 1.0, 1.0), 25, 0.6, 0.25, "transmitted"),
+    (Medium(0.8), 85, 0.9, 4.0, "reflected"),
+    (Medium(0.95), 80.5, 0.95, 16.0, "reflected"),
+    (Medium(0.8, 1.4), 70, 0.98, 4.0, "reflected"),
+    (Medium(-0.5, 1.6, 0.5), 62, 0.9, 0.8, "reflected"),
 ]
 
 
