@@ -67,6 +67,8 @@ def core_settings(settings, solver: str | None = None) -> BakeSettings:
         samples=settings.samples,
         margin=settings.margin,
         quality=settings.quality,
+        distributions=settings.distributions.lower(),
+        sample_folder=bpy.path.abspath(settings.sample_folder),
     )
 
 

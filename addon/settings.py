@@ -37,6 +37,30 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         ],
         default="final",
     )
+    distributions: EnumProperty(
+        name="Distributions",
+        description="Where the luminance distribution functions come from",
+        items=[
+            ("LIBRARY", "Library", "Simulated for each material: every angle and albedo", 0),
+            ("ANGULAR", "Samples, Angular", "Your own samples, interpolated as Manabe et al. 2012", 1),
+            (
+                "ADAPTIVE",
+                "Samples, Adaptive",
+                "Your own samples, their logarithms interpolated: more exact",
+                2,
+            ),
+            ("PLANAR", "Samples, Planar", "Your own samples, blended in place: for comparison", 3),
+        ],
+        default="LIBRARY",
+    )
+    sample_folder: StringProperty(
+        name="LDF Samples",
+        description="Folder of EXR files, one LDF sample each. They replace anisotropy, index of refraction and "
+        "thickness of all materials; albedos and angles of light must lie between theirs",
+        default="",
+        subtype="DIR_PATH",
+        options=compat.PATH_OPTIONS,
+    )
     samples: IntProperty(
         name="Samples",
         description="Light and shadow are sampled at this number squared of points in every texel",

@@ -99,8 +99,10 @@ class BEAMSPREAD_PT_render(RenderPanel, bpy.types.Panel):
         _use_columns(layout)
         draw_bake(layout, context)
         column = layout.column()
-        for name in ("resolution", "margin", "samples", "quality", "solver"):
-            column.prop(context.scene.beamspread, name)
+        settings = context.scene.beamspread
+        for name in ("resolution", "margin", "samples", "solver", "distributions"):
+            column.prop(settings, name)
+        column.prop(settings, "quality" if settings.distributions == "LIBRARY" else "sample_folder")
 
 
 class BEAMSPREAD_PT_active_image(RenderPanel, bpy.types.Panel):

@@ -13,6 +13,7 @@ from .margin import extend_margin
 from .material import Material, check_thickness
 from .progress import Progress, stages
 from .receiver import Receiver
+from .samples import load_source
 from .scene import Grid, Light, Mesh, PointLight, SpotLight, SunLight
 
 # Shares of the time that a bake takes, roughly: simulating an LDF not in the cache, beams and solving of one light.
@@ -30,6 +31,9 @@ class BakeSettings:
     samples : visibility is sampled at samples x samples points per texel.
     margin : texels added around the chart.
     quality : of the LDF, "final" or "preview".
+    distributions : "library", simulated from the material, or the method by which the samples in `sample_folder` are
+        interpolated: "angular", "adaptive" or "planar". Samples stand for anisotropy, index of refraction and
+        thickness of every material.
     threads : 0 for all.
     """
 
@@ -37,6 +41,8 @@ class BakeSettings:
     samples: int = 4
     margin: int = 16
     quality: str = "final"
+    distributions: str = "library"
+    sample_folder: str = ""
     threads: int = 0
 
 
@@ -67,6 +73,8 @@ def bake(
     ------
     MaterialError
         A property outside its range.
+    BakeError
+        Samples that are missing, damaged, or don't reach the albedos and angles of the scene.
     Cancelled
         `progress` returned False.
     """
@@ -75,7 +83,10 @@ def bake(
     material.check()
     check_thickness(thickness)
     media_progress, *light_progress = stages(progress, [LIBRARY_WEIGHT] + [BEAMS_WEIGHT, SOLVE_WEIGHT] * len(lights))
-    libraries = _libraries(material, thickness, settings.quality, media_progress)
+    if settings.distributions == "library":
+        libraries = _libraries(material, thickness, settings.quality, media_progress)
+    else:
+        libraries = [load_source(settings.sample_folder, settings.distributions)] * 3
     caster = native.Occluders(occluders.vertices, occluders.triangles) if len(occluders.triangles) else None
     luminance = None
     for light, beams_progress, solve_progress in zip(lights, light_progress[::2], light_progress[1::2]):
@@ -167,14 +178,19 @@ def _spread(irradiance, direction, libraries, material: Material, grid: Grid, se
     from .convolve import convolve
 
     shared = all(library is libraries[0] for library in libraries)
-    return convolve(
-        np.ascontiguousarray(irradiance, np.float32),
-        direction,
-        libraries[0] if shared else libraries,
-        material.albedo,
-        material.mean_free_path,
-        (grid.pitch_x, grid.pitch_y),
-        solver=settings.solver,
-        threads=settings.threads,
-        progress=progress,
-    )
+    try:
+        return convolve(
+            np.ascontiguousarray(irradiance, np.float32),
+            direction,
+            libraries[0] if shared else libraries,
+            material.albedo,
+            material.mean_free_path,
+            (grid.pitch_x, grid.pitch_y),
+            solver=settings.solver,
+            threads=settings.threads,
+            progress=progress,
+        )
+    except ValueError as error:
+        if settings.distributions == "library":
+            raise
+        raise BakeError(f"The LDF samples in '{settings.sample_folder}' don't reach this far: {error}.") from error

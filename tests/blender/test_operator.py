@@ -2,6 +2,7 @@
 
 import stat
 
+import beamspread
 import bpy
 import numpy as np
 import pytest
@@ -279,6 +280,24 @@ def test_area_lights_are_named_in_a_warning(capfd):
     output = capfd.readouterr().out
     assert "'Panel' is left out" in output
     assert "it is black" in output
+
+
+def test_samples_of_a_folder(tmp_path):
+    """Exitance far from the border is the power of the sample, whatever the material's anisotropy."""
+    image = np.zeros((21, 21))
+    image[8:13, 8:13] = 0.02
+    for angle in (0, 60):
+        beamspread.LdfSample(image, 0.5, angle, 0.9).save(tmp_path / f"{angle}.exr")
+    plane = add_plane(size=(2, 2), material=add_material(albedo=(0.9, 0.9, 0.9)))
+    add_sun(30, strength=2.0)
+    settings = bpy.context.scene.beamspread
+    settings.distributions, settings.sample_folder = "ANGULAR", str(tmp_path)
+    (luminance,) = bake(plane)
+    expected = image.sum() * 0.25 * 2 * np.cos(np.radians(30)) / np.pi
+    assert luminance[16, 16] == pytest.approx(expected, rel=1e-3)
+    settings.sample_folder = str(tmp_path / "missing")
+    select(plane)
+    assert "There is no folder of LDF samples" in messages_of(bpy.ops.beamspread.bake)
 
 
 class FakeJob:

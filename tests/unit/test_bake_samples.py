@@ -1,0 +1,61 @@
+"""Bakes from a folder of samples."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from beamspread import LdfSample, Medium, simulate
+from beamspread.core.bake import BakeSettings, bake
+from beamspread.core.errors import BakeError
+from beamspread.core.samples import load_folder
+from beamspread.core.scene import Mesh
+from tests.unit.test_bake import MATERIAL, SUN, grid
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("samples")
+    library = simulate(Medium(0.0), [0, 30, 60], 20_000)
+    for angle in (0, 30, 60):
+        for albedo in (0.8, 0.9):
+            LdfSample.from_library(library, angle, albedo, 81, 0.5).save(path / f"{angle}_{albedo}.exr")
+    return path
+
+
+def settings(folder, method="angular"):
+    return BakeSettings(samples=2, margin=0, distributions=method, sample_folder=str(folder))
+
+
+@pytest.mark.parametrize("method", ["angular", "adaptive", "planar"])
+def test_interior_under_a_sun(folder, method):
+    """Far from the border exitance is the power of the sample."""
+    sample = LdfSample.load(folder / "30_0.9.exr")
+    sun = replace(SUN, direction=(math.sin(math.radians(30)), 0.0, -math.cos(math.radians(30))))
+    luminance = bake(grid(), [sun], Mesh.empty(), MATERIAL, 0.0, settings(folder, method))
+    irradiance = 2 * math.cos(math.radians(30))
+    assert luminance[12, 12] == pytest.approx(sample.power * irradiance / math.pi, rel=1e-3)
+
+
+def test_what_the_artist_is_told(folder, tmp_path):
+    def baked(where, sun=SUN, material=MATERIAL):
+        return bake(grid(), [sun], Mesh.empty(), material, 0.0, settings(where))
+
+    with pytest.raises(BakeError, match="no folder of LDF samples at ''"):
+        baked("")
+    with pytest.raises(BakeError, match="no folder of LDF samples"):
+        baked(tmp_path / "missing")
+    with pytest.raises(BakeError, match="holds no EXR file"):
+        baked(tmp_path)
+    low = replace(SUN, direction=(math.sin(1.3), 0.0, -math.cos(1.3)))
+    with pytest.raises(BakeError, match=r"don't reach this far: .*0 <= angle <= 60"):
+        baked(folder, sun=low)
+    with pytest.raises(BakeError, match=r"don't reach this far: .*0.8 <= albedo <= 0.9"):
+        baked(folder, material=replace(MATERIAL, albedo=(0.9, 0.9, 0.95)))
+    LdfSample(np.ones((3, 3)), 0.5, 0, 0.5).save(tmp_path / "a.exr")
+    LdfSample(np.ones((4, 4)), 0.5, 0, 0.6).save(tmp_path / "b.exr")
+    with pytest.raises(BakeError, match=r"can't be interpolated: .*3 x 3 and of 4 x 4"):
+        baked(tmp_path)
+    (tmp_path / "b.exr").write_text("no image")
+    with pytest.raises(BakeError, match=r"b\.exr"):
+        load_folder(str(tmp_path))
