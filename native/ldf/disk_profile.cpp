@@ -84,8 +84,9 @@ std::vector<double> breakpoints(double radius, double support)
     };
     constexpr double ratio = 1.2;
     const double finest = std::max(1e-6 * radius, std::min(1e-3 * radius, 1e-3));
-    for (double offset = finest; offset < support; offset *= ratio)
-        add_offset(offset);
+    const int steps = static_cast<int>(std::ceil(std::log(std::max(1.0, support / finest)) / std::log(ratio)));
+    for (int i = 0; i < steps; ++i)
+        add_offset(finest * std::pow(ratio, i));
     for (std::size_t k = 0; k < radius_bin_count && radius_bin_edge(k) < support; ++k) {
         add_offset(radius_bin_edge(k));
         if (radius_bin_edge(k) > 2.0 * radius)

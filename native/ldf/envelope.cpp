@@ -139,7 +139,8 @@ Envelope envelope(const LdfSample& sample)
 
     const std::vector<double> means = ring_means(sample, variance);
     const double coarsest = static_cast<double>(std::min(sample.width, sample.height)) / 8.0;
-    for (double sigma = 1.0; sigma <= coarsest && !open.empty(); sigma *= 2.0) {
+    double sigma = 1.0;
+    while (sigma <= coarsest && !open.empty()) {
         const std::vector<double> blurred = blur(image, sample.width, sample.height, sigma);
         const std::vector<double> blurred_means = blur(means, sample.width, sample.height, sigma);
         noise = blur(variance, sample.width, sample.height, std::max(noise_sigma, sigma));
@@ -152,6 +153,7 @@ Envelope envelope(const LdfSample& sample)
             }
             return clear;
         });
+        sigma *= 2.0;
     }
     for (const std::size_t i : open)
         result.value[i] = means[i];

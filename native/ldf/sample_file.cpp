@@ -57,9 +57,9 @@ public:
         result.width = static_cast<std::size_t>(m_part.width);
         result.height = static_cast<std::size_t>(m_part.height);
         result.image = flipped(channel(), result.width);
-        result.pitch = *number("pitch");
-        result.angle_deg = *number("angle");
-        result.albedo = *number("albedo");
+        result.pitch = needed("pitch");
+        result.angle_deg = needed("angle");
+        result.albedo = needed("albedo");
         result.beam_diameter = number("beamDiameter").value_or(0.0);
         result.g = number("g");
         try {
@@ -93,6 +93,9 @@ private:
             return *integer;
         fail(m_path, "has an attribute '" + name + "' that is no number");
     }
+
+    // Of an attribute that `check_attributes` saw.
+    double needed(const std::string& name) const { return number(name).value_or(0.0); }
 
     std::vector<float> channel() const
     {

@@ -74,8 +74,8 @@ std::vector<double> node_angles(const std::vector<LdfSample>& samples)
     std::vector<double> angles{sampled.front()};
     for (const double angle : sampled) {
         const double from = angles.back();
-        const double steps = std::ceil((angle - from - rounding_deg) / largest_step_deg);
-        for (double i = 1.0; i <= steps; i += 1.0)
+        const int steps = static_cast<int>(std::ceil((angle - from - rounding_deg) / largest_step_deg));
+        for (int i = 1; i <= steps; ++i)
             angles.push_back(from + (angle - from) * i / steps);
     }
     return angles;
