@@ -19,7 +19,7 @@ TOOLS = ROOT / "build/venv/bin"
 NATIVE = ROOT / "native"
 COMPILE_COMMANDS = ROOT / "build/release/compile_commands.json"
 STAMPS = ROOT / "build/.tidy"
-PYTHON_FOLDERS = ["addon", "tests", "tools", "blend_examples"]
+PYTHON_FOLDERS = ["addon", "tests", "tools", "blend_examples", "docs"]
 PROJECT_INCLUDE = re.compile(rb'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
 
 

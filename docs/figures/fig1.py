@@ -14,6 +14,8 @@ BEAM = 0.5  # mm
 TEXEL = 0.025  # mm
 SIZE = 161
 LEVELS = (0.5, 0.2, 0.1)
+# More than a library has per angle: contours are sensitive to noise.
+PHOTONS = 20_000_000
 
 
 def ellipse(image, level):
@@ -25,7 +27,7 @@ def ellipse(image, level):
 
 
 def make():
-    library = bs.library(PLATE)
+    library = bs.simulate(PLATE, [ANGLE], PHOTONS)
     image = paper.laser_image(library, ANGLE, ALBEDO, SIZE, TEXEL / MEAN_FREE_PATH, BEAM / TEXEL)
     sample = bs.LdfSample(image, TEXEL, ANGLE, ALBEDO, BEAM)  # pitch in mm: only for its brightest point
     shift = sample.brightest[0]
@@ -46,7 +48,7 @@ def make():
         ax.set_xlabel("u (mm)")
         ax.set_ylabel("v (mm)")
     lines = ax.contour(where, where, image / image.max(), levels=sorted(LEVELS), colors="white", linewidths=0.8)
-    ax.clabel(lines, fmt=lambda level: f"{100 * level:g} %", fontsize=8)
+    ax.clabel(lines, [level for level in LEVELS if level < 0.5], fmt=lambda level: f"{100 * level:g} %", fontsize=8)
     bar = made.colorbar(drawn, ax=ax, label="exitance / peak", ticks=[-3, -2, -1, 0])
     bar.ax.set_yticklabels(["≤ 0.001", "0.01", "0.1", "1"])
     style.save(made, "fig1")

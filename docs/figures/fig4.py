@@ -20,7 +20,9 @@ def draw_angles():
     o, h, p, q = (-1.0, 0.0), (-0.3, 0.0), (1.5, 0.0), (-0.3, 1.8)
     side.axhspan(-0.5, 0, color="#ffe3b8")
     side.plot([-2.2, 2.4], [0, 0], color="black", linewidth=1)
-    side.annotate("", o, (-2.1, 1.1), arrowprops={"arrowstyle": "-|>", "color": "tab:red", "linewidth": 1.8, "shrinkB": 0})
+    side.annotate(
+        "", o, (-2.1, 1.1), arrowprops={"arrowstyle": "-|>", "color": "tab:red", "linewidth": 1.8, "shrinkB": 0}
+    )
     side.text(-2.15, 1.2, "beam", color="tab:red")
     side.plot([h[0], q[0], p[0]], [h[1], q[1], p[1]], color="tab:blue", linewidth=1.2)
     side.add_patch(Arc(q, 0.9, 0.9, theta1=270, theta2=315, color="tab:blue"))
@@ -73,7 +75,9 @@ def make():
     half = SIZE / 2
     plane.imshow(np.log10(np.maximum(sample.image / peak, 1e-9)), extent=(-half, half, -half, half), **options)
     window = paper.WINDOW / 2
-    plane.plot([-window, window, window, -window, -window], [-window, -window, window, window, -window], "w--", linewidth=0.9)
+    plane.plot(
+        [-window, window, window, -window, -window], [-window, -window, window, window, -window], "w--", linewidth=0.9
+    )
     where = np.arange(SIZE) + 0.5 - half
     levels = [1e-2, 3e-2, 1e-1, 0.3, 0.7]
     plane.contour(where, where, sample.image / peak, levels=levels, colors="white", linewidths=0.7)

@@ -86,9 +86,13 @@ def make():
             arrow = {"arrowstyle": "-|>", "color": "0.75", "linewidth": 1}
             tail, head = (np.array([np.cos(beta), np.sin(beta)]) * r for r in (38, 58))
             axes[1, 1].annotate("", (x + head[0], y + head[1]), (x + tail[0], y + tail[1]), arrowprops=arrow)
-            axes[1, 1].text(x + 1.28 * head[0], y + 1.28 * head[1], f"{angle:g}°", color="0.75", ha="center", va="center")
+            axes[1, 1].text(
+                x + 1.28 * head[0], y + 1.28 * head[1], f"{angle:g}°", color="0.75", ha="center", va="center"
+            )
     style.scale_bar(axes[0, 0], 100, "100 units")
     style.save(made, "fig7")
-    border = [f"{100 * picture[SIZE // 2 + 74, SIZE // 2].max() / picture.max():.1f} %" for picture in (published, exact)]
+    border = [
+        f"{100 * picture[SIZE // 2 + 74, SIZE // 2].max() / picture.max():.1f} %" for picture in (published, exact)
+    ]
     row = ["Fig. 7 (b): white beam at the window's border, of the peak", "visible", *border]
     return {}, [row]

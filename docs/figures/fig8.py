@@ -112,7 +112,9 @@ def compare(library, mask, azimuth=0.0):
     ]
     found["paper"] = pairs
     found["exact"] = [
-        timed(lambda solver=solver: exactly(library, mask, azimuth, paper.ALBEDO_RGB, solver=solver, tolerance=TOLERANCE))
+        timed(
+            lambda solver=solver: exactly(library, mask, azimuth, paper.ALBEDO_RGB, solver=solver, tolerance=TOLERANCE)
+        )
         for solver in ("direct", "adaptive", "fft")
     ]
     return found, squares
@@ -140,7 +142,10 @@ def make():
     mask = lit(0.0)
     found, squares = compare(library, mask)
     made, axes = style.figure(11.2, 7.2, 2, 3)
-    for ax, title in ((axes[0, 0], f"{len(squares)} squares instead of {int(mask.sum())}"), (axes[1, 0], "their border")):
+    for ax, title in (
+        (axes[0, 0], f"{len(squares)} squares instead of {int(mask.sum())}"),
+        (axes[1, 0], "their border"),
+    ):
         draw_squares(ax, squares)
         ax.set_title(title)
     axes[1, 0].set(xlim=(70, 115), ylim=(15, 60))
@@ -167,7 +172,15 @@ def make():
                      f"{100 * total:.2g} %, {100 * worst:.2g} %"])  # fmt: skip
         brief.append(f"{counts[0]} in {rows[-1][3]}, {counts[1]} in {rows[-1][4]}: {ratio} times")
     published = ["paper", 45600, 4107, "387.607 s", "55.875 s", "6.9", "almost the same"]
-    head = ["", "equal beams", "adaptive beams", "time, equal", "time, adaptive", "ratio", "difference: sum, worst texel"]
+    head = [
+        "",
+        "equal beams",
+        "adaptive beams",
+        "time, equal",
+        "time, adaptive",
+        "ratio",
+        "difference: sum, worst texel",
+    ]
     summary = [
         [f"Fig. 8 (a): green {DEPTH:g} units inside the shadow, light travelling in and out", "", *leaks],
         ["Fig. 9: equal and adaptive beams", "45600 in 387.607 s, 4107 in 55.875 s: 6.9 times", *brief],
