@@ -1,7 +1,7 @@
 """The setting of the paper's figures, and its method as published.
 
-Lengths are in units of the paper, 1 unit = 1 texel. It doesn't say how many of them are a mean free path. We take one, but for
-Fig. 7: a simulation that knows nothing but its medium counts in mean free paths. `fig6` shows what depends on it.
+Lengths are in units of the paper, 1 unit = 1 texel. It doesn't say how many of them are a mean free path. We take one
+(not in Fig. 7): a simulation that knows nothing but its medium counts in mean free paths. `fig6` tells what depends on it.
 """
 
 import functools
@@ -38,7 +38,7 @@ def laser_sample(library, angle, albedo, size=WINDOW, unit=UNIT, diameter=LASER_
 
 
 def square_sample(library, angle, albedo, side):
-    """LdfSample of a beam that fills `side` x `side` texels; the window reaches as far beyond each of them as for one."""
+    """LdfSample of a beam that fills `side` x `side` texels; the window reaches as far beyond them as beyond one."""
     size = WINDOW + side
     pencil = library.image(angle, albedo, (size + side) // 2 * 2 + 1, UNIT).astype(float)
     # A square of even side has its centre between texels: half a texel right of and above that of the filter.
