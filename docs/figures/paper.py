@@ -1,7 +1,7 @@
 """The setting of the paper's figures, and its method as published.
 
 Lengths are in units of the paper, 1 unit = 1 texel. It doesn't say how many of them are a mean free path. We take one
-(not in Fig. 7): a simulation that knows nothing but its medium counts in mean free paths. `fig6` tells what depends on it.
+(not in Fig. 7): a simulation that knows nothing but its medium counts in mean free paths. See `fig6` for others.
 """
 
 import functools
