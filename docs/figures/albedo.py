@@ -43,5 +43,6 @@ def make():
 
     i = int(np.argmin(np.abs(albedos - ALBEDO)))
     values = [f"{powers[name][i]:.4f}" for name in looks]
+    head = ["", "exact", "its method", "`adaptive`"]
     row = ["Reflectance at 0°, albedo 0.6 from .2 and .999", "", values[1], f"{values[0]}; `adaptive`: {values[2]}"]
-    return {"albedo": style.table(["exact", "its method", "`adaptive`"], [values])}, [row]
+    return {"albedo": style.table(head, [["reflectance", *values]])}, [row]
