@@ -151,15 +151,20 @@ def set_up_cycles(samples):
         setattr(cycles, name, 1024)
 
 
-def bake_profile(image, seed):
-    """L / E, averaged along the border: float64 (BINS, 3)."""
+def bake_texels(image, seed):
+    """L / E: float64 (ROWS, BINS, 3), a texel in ten thousand nan."""
     bpy.context.scene.cycles.seed = seed
     bpy.ops.object.bake(type="DIFFUSE", pass_filter={"DIRECT", "INDIRECT"}, use_clear=True)
     pixels = np.empty(BINS * ROWS * 4, np.float32)
     image.pixels.foreach_get(pixels)
     rows = pixels.reshape(ROWS, BINS, 4)[:, :, :3].astype(np.float64)
-    rows[~np.isfinite(rows)] = np.nan  # a texel in ten thousand
-    return np.nanmean(rows, axis=0) / IRRADIANCE
+    rows[~np.isfinite(rows)] = np.nan
+    return rows / IRRADIANCE
+
+
+def bake_profile(image, seed):
+    """L / E, averaged along the border: float64 (BINS, 3)."""
+    return np.nanmean(bake_texels(image, seed), axis=0)
 
 
 def write_csv(path, runs, samples, command):
@@ -188,6 +193,16 @@ def write_csv(path, runs, samples, command):
     os.replace(part, path)
 
 
+def build_scene(samples):
+    """The whole scene; the sheet and the image of the ghost."""
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    set_up_cycles(samples)
+    add_slab()
+    add_sun()
+    return add_sheet(), add_ghost()
+
+
 def main():
     arguments = sys.argv[sys.argv.index("--") + 1 :]
     parser = argparse.ArgumentParser(prog="cycles_slab.py")
@@ -197,14 +212,7 @@ def main():
     parser.add_argument("--resume", metavar="FILE.npz", help="runs so far; read if it is there, written after each")
     options = parser.parse_args(arguments)
 
-    for obj in list(bpy.data.objects):
-        bpy.data.objects.remove(obj)
-    set_up_cycles(options.samples)
-    add_slab()
-    add_sun()
-    sheet = add_sheet()
-    image = add_ghost()
-
+    sheet, image = build_scene(options.samples)
     runs = {"toward": [], "away": []}
     if options.resume and os.path.exists(options.resume):
         with np.load(options.resume) as stored:
@@ -222,4 +230,5 @@ def main():
         write_csv(options.csv, runs, options.samples, command)
 
 
-main()
+if __name__ == "__main__":
+    main()
