@@ -132,7 +132,7 @@ def shown(error):
 
 
 def draw(path, solvers, simulated, cycles, goal_seconds):
-    figure, axes = plt.subplots(figsize=(7, 4.5), dpi=120)
+    figure, axes = plt.subplots(figsize=(10, 4.5), dpi=100, layout="constrained")
     for name, seconds, error in solvers:
         axes.plot(seconds, error, "o", label=name.replace("`", ""))
     axes.plot(*zip(*simulated), "kx", label="fft after simulating 1e3, 1e4, 1e5 photons per angle")
@@ -143,8 +143,7 @@ def draw(path, solvers, simulated, cycles, goal_seconds):
     axes.axhline(resolution(), color="gray", lw=0.8)
     axes.text(seconds[0], resolution() * 1.05, "the reference shows no smaller ones", fontsize=8)
     axes.grid(which="both", alpha=0.3)
-    axes.legend(fontsize=8)
-    figure.tight_layout()
+    figure.legend(loc="outside right upper", fontsize=8)
     figure.savefig(path)
 
 
@@ -164,10 +163,10 @@ def main():
     rows.append(("`fft`", fft_seconds, edge_error(fft)))
     rows.append(("`adaptive`, tolerance 1e-3", adaptive_seconds, edge_error(adaptive)))
     for name in ("fftconvolve", "oaconvolve"):
-        image, seconds = timed(lambda convolve=getattr(scipy.signal, name): with_scipy(convolve, kernel), 2)
+        image, seconds = timed(lambda name=name: with_scipy(getattr(scipy.signal, name), kernel), 2)
         rows.append((f"SciPy `{name}`, kernels given", seconds, edge_error(image)))
     # The whole border is within the smaller texture, the light from beyond it is not: the error is that of fft.
-    rows.append(("`direct`, extrapolated", direct_seconds, edge_error(fft)))
+    rows.append(("`direct`, extrapolated from 256 x 256", direct_seconds, edge_error(fft)))
 
     simulated = []
     for photons in PHOTONS:
@@ -182,7 +181,7 @@ def main():
     for name, spent, deviation in rows:
         print(f"| {name} | {human(spent)} | {shown(deviation)} | {spent / fft_seconds:.2g} |")
     for count, spent, deviation in cycles:
-        print(f"| Cycles, {count} samples | {human(spent)} | {deviation:.1%} | {spent / fft_seconds:.2g} |")
+        print(f"| Cycles, {count} samples, scaled from 1152 texels | {human(spent)} | {deviation:.1%} | {spent / fft_seconds:.2g} |")
     print(f"| Cycles, extrapolated | {human(goal_seconds)} | {GOAL:.0%} | {goal_seconds / fft_seconds:.2g} |")
     print(f"\nCycles' error goes with the samples to the power {exponent:.2f}.")
     for (spent, deviation), photons in zip(simulated, PHOTONS):
