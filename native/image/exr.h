@@ -19,6 +19,7 @@ struct ExrPart {
     std::vector<std::string> channels;  // kept in this order, although the format sorts them by name
     std::vector<float> pixels;          // height * width * channels; row 0 is the first line of the file
     std::map<std::string, ExrAttribute> attributes;
+    bool half = false;  // write the numbers in half precision, rounded
 };
 
 // Larger images are refused in both directions: a 16384 x 16384 image of four channels just fits.

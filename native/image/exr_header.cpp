@@ -115,10 +115,10 @@ std::map<std::string, ExrAttribute> get_attributes(const Imf::Header& header)
     return attributes;
 }
 
-void set_channels(Imf::Header& header, const std::vector<std::string>& channels)
+void set_channels(Imf::Header& header, const std::vector<std::string>& channels, Imf::PixelType type)
 {
     for (const std::string& channel : channels)
-        header.channels().insert(channel, Imf::Channel(Imf::FLOAT));
+        header.channels().insert(channel, Imf::Channel(type));
     header.insert(channel_order_attribute, Imf::StringVectorAttribute(channels));
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfPixelType.h>
 
 #include <exception>
 
@@ -18,7 +19,7 @@ bool is_structural_attribute(const std::string& name);
 void set_attributes(Imf::Header& header, const std::map<std::string, ExrAttribute>& attributes);
 std::map<std::string, ExrAttribute> get_attributes(const Imf::Header& header);
 
-void set_channels(Imf::Header& header, const std::vector<std::string>& channels);
+void set_channels(Imf::Header& header, const std::vector<std::string>& channels, Imf::PixelType type);
 
 // As the file spells them. As written by us; of foreign files R, G, B, A first within each layer, then the others by name.
 std::vector<std::string> get_channels(const Imf::Header& header);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <set>
+#include <utility>
 
 #include "base/error.h"
 #include "image/exr.h"
@@ -74,21 +75,30 @@ Imf::Header make_header(const ExrPart& part, const Imath::Box2i& display_window,
     header.setType(Imf::SCANLINEIMAGE);
     if (!part.name.empty())
         header.setName(part.name);
-    detail::set_channels(header, part.channels);
+    detail::set_channels(header, part.channels, part.half ? Imf::HALF : Imf::FLOAT);
     detail::set_attributes(header, part.attributes);
     return header;
 }
 
-void write_pixels(Imf::OutputPart&& output, const ExrPart& part)
+template <class T>
+void write_pixels(Imf::OutputPart&& output, const ExrPart& part, Imf::PixelType type, const std::vector<T>& pixels)
 {
-    const std::size_t pixel_bytes = part.channels.size() * sizeof(float);
+    const std::size_t pixel_bytes = part.channels.size() * sizeof(T);
     const std::size_t row_bytes = pixel_bytes * static_cast<std::size_t>(part.width);
     Imf::FrameBuffer buffer;
     for (std::size_t c = 0; c < part.channels.size(); ++c)
-        buffer.insert(part.channels[c], Imf::Slice::Make(Imf::FLOAT, part.pixels.data() + c,
-                                                         output.header().dataWindow(), pixel_bytes, row_bytes));
+        buffer.insert(part.channels[c],
+                      Imf::Slice::Make(type, pixels.data() + c, output.header().dataWindow(), pixel_bytes, row_bytes));
     output.setFrameBuffer(buffer);
     output.writePixels(part.height);
+}
+
+void write_part(Imf::OutputPart&& output, const ExrPart& part)
+{
+    if (part.half)
+        write_pixels(std::move(output), part, Imf::HALF, std::vector<half>(part.pixels.begin(), part.pixels.end()));
+    else
+        write_pixels(std::move(output), part, Imf::FLOAT, part.pixels);
 }
 
 }  // namespace
@@ -111,7 +121,7 @@ void write_exr_parts(const std::string& path, std::span<const ExrPart> parts, Ex
         Imf::MultiPartOutputFile output(file.path().c_str(), headers.data(), static_cast<int>(headers.size()), false,
                                         own_threads);
         for (std::size_t i = 0; i < parts.size(); ++i)
-            write_pixels(Imf::OutputPart(output, static_cast<int>(i)), parts[i]);
+            write_part(Imf::OutputPart(output, static_cast<int>(i)), parts[i]);
     } catch (const std::exception& error) {
         throw IoError("cannot write '" + path + "': " + detail::reason_of(error, file.path()));
     }

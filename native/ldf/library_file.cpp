@@ -3,13 +3,13 @@
 // Every part carries the attributes beamspreadLdf (format version), g, ior, thickness (mean free
 // paths, inf: half-space), photons, seed, angle (degrees), centre (mean free paths) and a checksum of itself. For the
 // j-th angle and each side there are
-//   "<side>.<j>"         columns: radius bins, lines: order bins, channels m0 .. m8: sums of weight * cos(m phi)
-//                        per unit power that entered (transport/bins.h, tally.h);
+//   "<side>.<j>"         columns: radius bins, lines: order bins, channels m0 .. m16: sums of weight * cos(m phi)
+//                        per unit power that entered (transport/bins.h, tally.h), up to the last bins that are not empty;
 //                        of a calibrated library also the attributes residuals and residualsHalfway (ldf/library.h);
 //   "<side>.<j>.orders"  columns: order bins; line 0 and 1: mean and variance of the order; then one
 //                        line per batch: power that leaves;
-//   "<side>.<j>.scatter" columns: radius bins, lines: albedos within groups of batches, channels m0 .. m8: deviations
-//                        of the groups (transport/map_scatter.h).
+//   "<side>.<j>.scatter" columns: radius bins, lines: albedos within groups of batches, channels m0 .. m16:
+//                        deviations of the groups (transport/map_scatter.h).
 #include <algorithm>
 #include <bit>
 #include <charconv>
@@ -23,7 +23,7 @@ namespace beamspread {
 
 namespace {
 
-constexpr int format_version = 3;
+constexpr int format_version = 4;
 constexpr std::size_t scatter_lines = group_count * scatter_albedos.size();
 constexpr std::array<const char*, side_count> side_names = {"reflected", "transmitted"};
 
@@ -31,9 +31,38 @@ std::vector<std::string> harmonic_channels()
 {
     std::vector<std::string> names;
     for (std::size_t m = 0; m < harmonic_count; ++m)
-        names.push_back({'m', static_cast<char>('0' + m)});
+        names.push_back(std::string("m").append(std::to_string(m)));
     return names;
 }
+
+// Lines of radius bins, cut after `columns` of them or filled up with zeros.
+std::vector<float> with_columns(const std::vector<float>& values, std::size_t from_columns, std::size_t columns)
+{
+    const std::size_t lines = values.size() / (from_columns * harmonic_count);
+    const std::size_t kept = std::min(from_columns, columns) * harmonic_count;
+    std::vector<float> result(lines * columns * harmonic_count, 0.0F);
+    for (std::size_t i = 0; i < lines; ++i)
+        std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * from_columns * harmonic_count), kept,
+                    result.begin() + static_cast<std::ptrdiff_t>(i * columns * harmonic_count));
+    return result;
+}
+
+// Bins that something was counted in, up to the last one; at least one of each.
+struct UsedBins {
+    explicit UsedBins(const std::vector<float>& moments)
+    {
+        for (std::size_t i = 0; i < moments.size(); i += harmonic_count) {
+            if (moments[i] == 0.0F)
+                continue;
+            const std::size_t bin = i / harmonic_count;
+            orders = std::max(orders, bin / radius_bin_count + 1);
+            radii = std::max(radii, bin % radius_bin_count + 1);
+        }
+    }
+
+    std::size_t orders = 1;
+    std::size_t radii = 1;
+};
 
 std::map<std::string, ExrAttribute> common_attributes(const LdfLibrary& library, double angle_deg, double centre)
 {
@@ -160,20 +189,28 @@ private:
         return value;
     }
 
-    const ExrPart& checked(const std::string& name, std::size_t width, std::size_t height,
-                           const std::vector<std::string>& channels) const
+    const ExrPart& checked(const std::string& name, std::size_t height, const std::vector<std::string>& channels) const
     {
         const ExrPart* part = find(name);
         if (!part)
             fail("has no part '" + name + "'");
-        if (part->width != static_cast<int>(width) || part->height != static_cast<int>(height) ||
-            part->channels != channels)
+        if (part->height > static_cast<int>(height) || part->channels != channels)
             fail("has a part '" + name + "' of another size");
         if (!std::all_of(part->pixels.begin(), part->pixels.end(), [](float x) { return std::isfinite(x); }))
             fail("has a part '" + name + "' with values that are not finite");
         if (attribute<std::string>(*part, "checksum") != checksum(*part))
             fail("has a damaged part '" + name + "'");
         return *part;
+    }
+
+    // [line][radius bin][harmonic] of a part of at most this many lines, the missing bins empty.
+    std::vector<float> rings(const ExrPart& part, std::size_t lines) const
+    {
+        if (part.width > static_cast<int>(radius_bin_count))
+            fail("has a part '" + part.name + "' of another size");
+        auto values = with_columns(part.pixels, static_cast<std::size_t>(part.width), radius_bin_count);
+        values.resize(lines * radius_bin_count * harmonic_count, 0.0F);
+        return values;
     }
 
     void read_residuals(const ExrPart& part, const std::string& name,
@@ -200,19 +237,21 @@ private:
     SideResult side_result(const std::string& name) const
     {
         SideResult result;
-        const ExrPart& moments = checked(name, radius_bin_count, order_bin_count, harmonic_channels());
+        const ExrPart& moments = checked(name, order_bin_count, harmonic_channels());
         result.centre = attribute<double>(moments, "centre");
         if (!std::isfinite(result.centre))
             fail("has a centre that is not finite");
-        result.moments = moments.pixels;
-        const auto& orders = checked(name + ".orders", order_bin_count, 2 + batch_count, {"Y"}).pixels;
+        result.moments = rings(moments, order_bin_count);
+        const ExrPart& orders = checked(name + ".orders", 2 + batch_count, {"Y"});
+        if (orders.width != static_cast<int>(order_bin_count) || orders.height != static_cast<int>(2 + batch_count))
+            fail("has a part '" + orders.name + "' of another size");
         const auto line = [&](std::size_t i) {
-            return orders.begin() + static_cast<std::ptrdiff_t>(i * order_bin_count);
+            return orders.pixels.begin() + static_cast<std::ptrdiff_t>(i * order_bin_count);
         };
         result.mean_order.assign(line(0), line(1));
         result.order_variance.assign(line(1), line(2));
-        result.batch_totals.assign(line(2), orders.end());
-        result.deviations = checked(name + ".scatter", radius_bin_count, scatter_lines, harmonic_channels()).pixels;
+        result.batch_totals.assign(line(2), orders.pixels.end());
+        result.deviations = rings(checked(name + ".scatter", scatter_lines, harmonic_channels()), scatter_lines);
         return result;
     }
 
@@ -238,8 +277,11 @@ void save_library(const LdfLibrary& library, const std::string& path)
                 moments_attributes["residuals"] = std::vector<float>(left.here.begin(), left.here.end());
                 moments_attributes["residualsHalfway"] = std::vector<float>(left.halfway.begin(), left.halfway.end());
             }
-            parts.push_back({part_name(side, j), static_cast<int>(radius_bin_count), static_cast<int>(order_bin_count),
-                             harmonic_channels(), from.moments, moments_attributes});
+            const UsedBins used(from.moments);
+            std::vector<float> moments = with_columns(from.moments, radius_bin_count, used.radii);
+            moments.resize(used.orders * used.radii * harmonic_count);
+            parts.push_back({part_name(side, j), static_cast<int>(used.radii), static_cast<int>(used.orders),
+                             harmonic_channels(), std::move(moments), moments_attributes});
             std::vector<float> orders = from.mean_order;
             orders.insert(orders.end(), from.order_variance.begin(), from.order_variance.end());
             orders.insert(orders.end(), from.batch_totals.begin(), from.batch_totals.end());
@@ -249,8 +291,9 @@ void save_library(const LdfLibrary& library, const std::string& path)
                              {"Y"},
                              std::move(orders),
                              attributes});
-            parts.push_back({part_name(side, j) + ".scatter", static_cast<int>(radius_bin_count),
-                             static_cast<int>(scatter_lines), harmonic_channels(), from.deviations, attributes});
+            parts.push_back({part_name(side, j) + ".scatter", static_cast<int>(used.radii),
+                             static_cast<int>(scatter_lines), harmonic_channels(),
+                             with_columns(from.deviations, radius_bin_count, used.radii), attributes, true});
         }
     }
     for (ExrPart& part : parts)

@@ -9,8 +9,11 @@ namespace {
 
 constexpr std::size_t group_values = scatter_albedos.size() * ring_value_count;
 
+// To what half precision holds exactly.
 float rounded_to_five_bits(double x)
 {
+    if (std::abs(x) < 0x1p-14)
+        return 0.0F;
     int exponent = 0;
     const double mantissa = std::frexp(x, &exponent);
     return static_cast<float>(std::ldexp(std::round(mantissa * 32.0) / 32.0, exponent));
