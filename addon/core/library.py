@@ -27,6 +27,9 @@ def angles_for(medium):
     85 degrees by more than .15 % (.8 % from 75 degrees on), whatever the albedo, for g -.5 to .95 and
     thicknesses from .5, up to 1e-6 of the incident power.
     """
+    if medium.ior > 1.0 and medium.thickness < 2.0:
+        # What comes back from the far side surrounds the beam's mirror image, which moves with the angle.
+        return (*map(float, range(0, 73, 6)), 76.0, 80.0, 84.0, 88.0)
     if medium.ior >= 1.2:
         return (0.0, 12.0, 24.0, 36.0, 47.0, 57.0, 66.0, 73.0, 79.0, 84.0, 88.0)
     if medium.g <= 0.85:

@@ -235,8 +235,13 @@ RadialProfile LdfLibrary::interpolated(double angle_deg, const std::vector<Radia
 {
     const AngleWeights weights = angle_weights(angle_deg);
     RadialProfile sum;
-    for (std::size_t j = 0; j < nodes.size(); ++j)
+    double centre = 0.0;
+    for (std::size_t j = 0; j < nodes.size(); ++j) {
         sum.add(nodes[j], weights.even[j], weights.odd[j]);
+        centre += weights.odd[j] * nodes[j].centre();
+    }
+    // The weights hold the transmittance at entry, which changes power and no place.
+    sum.set_centre(centre / entry_transmittance(angle_deg));
     return sum;
 }
 

@@ -141,7 +141,6 @@ void RadialProfile::add(const RadialProfile& other, double even_weight, double o
     for (std::size_t m = 0; m < harmonic_count; ++m)
         weights[m] = m % 2 == 0 ? even_weight : odd_weight;
     add(other, weights);
-    m_centre += odd_weight * other.m_centre;
 }
 
 void RadialProfile::add(const RadialProfile& other, const Harmonics& weights)

@@ -18,7 +18,7 @@ public:
     // From sums of weight * cos(m phi) per radius bin, [radius bin][harmonic].
     RadialProfile(double centre, std::span<const double> bin_moments);
 
-    // Adds `weight` times another profile, harmonics of even and odd m apart.
+    // Adds `weight` times another profile, harmonics of even and odd m apart. The centre stays.
     void add(const RadialProfile& other, double even_weight, double odd_weight);
 
     // The same with a weight for each harmonic.
@@ -36,6 +36,7 @@ public:
     double support() const override { return m_support; }
 
     double centre() const { return m_centre; }
+    void set_centre(double centre) { m_centre = centre; }
 
 private:
     Harmonics slope_at(std::size_t edge) const;

@@ -45,6 +45,7 @@ CASES = [
     (Medium(0.95), 80.5, 0.95, 16.0, "reflected"),
     (Medium(0.8, 1.4), 70, 0.98, 4.0, "reflected"),
     (Medium(-0.5, 1.6, 0.5), 62, 0.9, 0.8, "reflected"),
+    (Medium(0.8, 1.4, 0.5), 75, 0.9, 0.5, "transmitted"),
 ]
 
 
