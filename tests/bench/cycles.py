@@ -181,9 +181,8 @@ def main():
     for name, spent, deviation in rows:
         print(f"| {name} | {human(spent)} | {shown(deviation)} | {spent / fft_seconds:.2g} |")
     for count, spent, deviation in cycles:
-        print(
-            f"| Cycles, {count} samples, scaled from 1152 texels | {human(spent)} | {deviation:.1%} | {spent / fft_seconds:.2g} |"
-        )
+        name = f"Cycles, {count} samples, scaled from 1152 texels"
+        print(f"| {name} | {human(spent)} | {deviation:.1%} | {spent / fft_seconds:.2g} |")
     print(f"| Cycles, extrapolated | {human(goal_seconds)} | {GOAL:.0%} | {goal_seconds / fft_seconds:.2g} |")
     print(f"\nCycles' error goes with the samples to the power {exponent:.2f}.")
     for (spent, deviation), photons in zip(simulated, PHOTONS):
