@@ -21,12 +21,15 @@ __all__: list[str] = [
     "coverage",
     "embree_version",
     "exact_totals",
+    "fast_size",
+    "fft_instruction_set",
     "fresnel",
     "henyey_greenstein_pdf",
     "henyey_greenstein_sample",
     "interpolate",
     "point_beams",
     "read_exr",
+    "real_transform",
     "simulate",
     "spot_beams",
     "sun_beams",
@@ -378,12 +381,14 @@ def convolve(
     tolerance: float,
     threads: int,
     progress: typing.Any,
+    memory: int = 1073741824,
 ) -> numpy.ndarray:
     """
     Luminance of beams on a grid; the engine behind `beamspread.convolve`.
 
     Lights are pairs of irradiance, float32 (H, W) or (H, W, C) in W/m^2, and direction, float32 (3,) or (H, W, 3); C libraries,
-    albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr).
+    albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr). `memory`: bytes that the spectra of the solver 'fft' may take; where the whole plane
+    needs more it is solved in tiles.
     """
 
 def coverage(
@@ -447,6 +452,16 @@ def exact_totals(medium: Medium, angles: list[float], albedos: list[float], thre
     ------
     ValueError
         Names the argument, its value and what is allowed.
+    """
+
+def fast_size(min_size: int) -> int:
+    """
+    The smallest even size of fast transforms.
+    """
+
+def fft_instruction_set() -> str:
+    """
+    What the transforms of the solver use: 'avx512', 'avx2' or 'baseline'.
     """
 
 def fresnel(cos_theta_i: numpy.ndarray, eta: numpy.ndarray) -> typing.Any:
@@ -586,6 +601,13 @@ def read_exr(path: str, part: str | None = None) -> tuple:
     ------
     OSError
         The file is missing, damaged or larger than 2^30 numbers, has deep data or subsampled channels, or no such part.
+    """
+
+def real_transform(values: numpy.ndarray, threads: int = 0) -> numpy.ndarray:
+    """
+    Fourier transform of real values, float32 (H, W) with W even; complex64 (H, W / 2 + 1).
+
+    One of these is what tests/bench/fft.py counts the solver's time in.
     """
 
 def simulate(

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "python/casters.h"
+#include "solve/fft.h"
 #include "solve/mask_pyramid.h"
 #include "solve/problem.h"
 
@@ -65,7 +66,7 @@ using Light = std::pair<Array<float>, Array<float>>;  // irradiance and directio
 Array<float> convolve(const std::vector<Light>& lights, const std::vector<std::shared_ptr<LdfSource>>& ldf,
                       const std::vector<double>& albedo, const std::vector<double>& mean_free_path,
                       std::array<double, 2> pitch, const std::string& solver, double tolerance, int threads,
-                      const py::object& progress)
+                      const py::object& progress, std::size_t memory)
 {
     const std::size_t channels = albedo.size();
     if (ldf.size() != channels || mean_free_path.size() != channels)
@@ -82,6 +83,7 @@ Array<float> convolve(const std::vector<Light>& lights, const std::vector<std::s
         problem.pitch_y = pitch[1];
         problem.tolerance = tolerance;
         problem.threads = threads;
+        problem.memory = memory;
         for (std::size_t c = 0; c < channels; ++c) {
             problem.channels[c].library = ldf[c].get();
             problem.channels[c].albedo = albedo[c];
@@ -136,16 +138,40 @@ Squares adaptive_beams(const Array<float>& irradiance, const Array<float>& direc
     return {places, light};
 }
 
+Array<Complex> real_transform(const Array<float>& values, int threads)
+{
+    if (values.ndim() != 2 || values.shape(1) % 2 != 0)
+        reject("values", shape_text(values), "(H, W) with W even");
+    const auto height = static_cast<std::size_t>(values.shape(0));
+    const auto width = static_cast<std::size_t>(values.shape(1));
+    Array<Complex> spectrum({height, width / 2 + 1});
+    Complex* out = spectrum.mutable_data();
+    const float* in = values.data();
+    const py::gil_scoped_release release;
+    real_to_half_2d(in, out, height, width, threads);
+    return spectrum;
+}
+
 }  // namespace
 
 void bind_solve(py::module_& m)
 {
+    m.def("real_transform", &real_transform, py::arg("values"), py::arg("threads") = 0,
+          R"(Fourier transform of real values, float32 (H, W) with W even; complex64 (H, W / 2 + 1).
+
+One of these is what tests/bench/fft.py counts the solver's time in.
+)");
+    m.def("fft_instruction_set", &fft_instruction_set,
+          "What the transforms of the solver use: 'avx512', 'avx2' or 'baseline'.");
+    m.def("fast_size", &fast_even_size, py::arg("min_size"), "The smallest even size of fast transforms.");
     m.def("convolve", &convolve, py::arg("lights"), py::arg("ldf"), py::arg("albedo"), py::arg("mean_free_path"),
           py::arg("pitch"), py::arg("solver"), py::arg("tolerance"), py::arg("threads"), py::arg("progress"),
+          py::arg("memory") = Problem().memory,
           R"(Luminance of beams on a grid; the engine behind `beamspread.convolve`.
 
 Lights are pairs of irradiance, float32 (H, W) or (H, W, C) in W/m^2, and direction, float32 (3,) or (H, W, 3); C libraries,
-albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr).
+albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr). `memory`: bytes that the spectra of the solver 'fft' may take; where the whole plane
+needs more it is solved in tiles.
 )");
     m.def("adaptive_beams", &adaptive_beams, py::arg("irradiance"), py::arg("direction"), py::arg("tolerance"),
           R"(Squares that the adaptive solver lights by one beam each; the engine behind `beamspread.adaptive_beams`.

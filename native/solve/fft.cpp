@@ -1,5 +1,9 @@
 #include "solve/fft.h"
 
+#include <algorithm>
+#include <vector>
+
+#include "base/threads.h"
 #include "solve/targets/fft.h"
 
 namespace beamspread {
@@ -49,6 +53,25 @@ void half_to_real(const Complex* half, float* real, std::size_t count, std::size
 void complex_in_place(Complex* lines, std::size_t count, std::size_t size, bool forward)
 {
     choice().target->complex_in_place(lines, count, size, forward);
+}
+
+void real_to_half_2d(const float* real, Complex* half, std::size_t height, std::size_t width, int threads)
+{
+    const std::size_t columns = width / 2 + 1;
+    // Some hundred kilobytes, so that an item stays in the cache.
+    constexpr std::size_t lines = 16;
+    with_threads(threads, [&] {
+        parallel_for((height + lines - 1) / lines, [&](std::size_t item) {
+            const std::size_t first = item * lines;
+            const std::size_t count = std::min(lines, height - first);
+            real_to_half(real + first * width, half + first * columns, count, width);
+        });
+        parallel_for((columns + lines - 1) / lines, [&](std::size_t item) {
+            const std::size_t first = item * lines;
+            const std::size_t count = std::min(lines, columns - first);
+            choice().target->complex_columns(half + first, count, height, columns);
+        });
+    });
 }
 
 const char* fft_instruction_set()

@@ -18,6 +18,10 @@ void real_to_half(const float* real, Complex* half, std::size_t count, std::size
 void half_to_real(const Complex* half, float* real, std::size_t count, std::size_t size);
 void complex_in_place(Complex* lines, std::size_t count, std::size_t size, bool forward);
 
+// Two-dimensional transform of (height, width) real values, width even: (height, width / 2 + 1) frequencies. What the
+// cost of the solver is counted in.
+void real_to_half_2d(const float* real, Complex* half, std::size_t height, std::size_t width, int threads);
+
 // What the transforms were compiled for: "avx512", "avx2" or "baseline".
 const char* fft_instruction_set();
 

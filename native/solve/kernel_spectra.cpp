@@ -82,20 +82,22 @@ double reach(const RadialProfile& profile, double mean_free_path, double fractio
 }
 
 KernelSpectra::KernelSpectra(std::size_t width, std::size_t height, double pitch_x, double pitch_y,
-                             std::vector<ScaledProfile> profiles, double window_deviation)
-    : m_plane{width, height, pitch_x, pitch_y, 0, 0},
+                             std::vector<ScaledProfile> profiles, double window_deviation, std::size_t budget)
+    : m_plane{width, height, pitch_x, pitch_y},
       m_profiles(std::move(profiles)),
       m_texel(std::max(pitch_x, pitch_y)),
       m_deviation(window_deviation)
 {
-    choose_window(width, height);
+    choose_window();
+    choose_tiles(budget);
     if (m_far)
         tabulate_hankel();
     integrate_near();
 }
 
-void KernelSpectra::choose_window(std::size_t width, std::size_t height)
+void KernelSpectra::choose_window()
 {
+    const auto [width, height] = std::pair(m_plane.width, m_plane.height);
     for (const ScaledProfile& each : m_profiles)
         m_cut = std::max(m_cut, each.reach / m_texel);
     const double px = m_plane.pitch_x / m_texel;
@@ -114,12 +116,36 @@ void KernelSpectra::choose_window(std::size_t width, std::size_t height)
     };
     m_near_x = texels(near_end, px, width);
     m_near_y = texels(near_end, py, height);
-    const auto padded = [&](std::size_t size, double pitch, std::size_t near) {
+    const auto halo = [&](double pitch, std::size_t near) {
         const double end = m_far ? std::ceil((m_cut + m_taper) / pitch) + 1.0 : 0.0;
-        return fast_even_size(size + std::max(near, static_cast<std::size_t>(end)));
+        return std::max(near, static_cast<std::size_t>(end));
     };
-    m_plane.padded_width = padded(width, px, m_near_x);
-    m_plane.padded_height = padded(height, py, m_near_y);
+    m_plane.halo_x = halo(px, m_near_x);
+    m_plane.halo_y = halo(py, m_near_y);
+}
+
+void KernelSpectra::choose_tiles(std::size_t budget)
+{
+    const auto with_tiles = [&](std::size_t count) {
+        PaddedPlane plane = m_plane;
+        // What wraps around falls into the halo, and on the whole plane beyond its end.
+        const auto pad = [&](std::size_t size, std::size_t halo, std::size_t& tile) {
+            tile = (size + count - 1) / count;
+            return fast_even_size(tile + (count > 1 ? 2 : 1) * halo);
+        };
+        plane.padded_width = pad(plane.width, plane.halo_x, plane.tile_width);
+        plane.padded_height = pad(plane.height, plane.halo_y, plane.tile_height);
+        return plane;
+    };
+    constexpr std::size_t most_tiles = 16;  // along a side
+    for (std::size_t count = 1; count <= most_tiles; ++count) {
+        const PaddedPlane plane = with_tiles(count);
+        if (plane.rows() * plane.columns() * sizeof(Complex) <= budget) {
+            m_plane = plane;
+            return;
+        }
+    }
+    m_plane = with_tiles(1);
 }
 
 // By the projection-slice theorem the two-dimensional transform of c_m(r) cos(m phi) along kx is the one-dimensional
@@ -297,7 +323,8 @@ void KernelSpectra::start(std::size_t frequency, Column& column) const
     const double sinc_x = sinc(x_turn);
     const bool x_nyquist = 2 * frequency == m_plane.padded_width;
 
-    std::vector<float> values(functions);
+    column.values.resize(functions);
+    float* values = column.values.data();
     for (std::size_t f = 0; f < frequencies; ++f) {
         const double y_turn = pi * static_cast<double>(f) / static_cast<double>(m_plane.padded_height);
         const double ky = 2.0 * y_turn * m_texel / m_plane.pitch_y;
@@ -323,7 +350,7 @@ void KernelSpectra::start(std::size_t frequency, Column& column) const
         const float* table = m_table.data() + row * functions;
         const std::array<float, 4> weights = {static_cast<float>(w[0]), static_cast<float>(w[1]),
                                               static_cast<float>(w[2]), static_cast<float>(w[3])};
-        interpolate(values.data(), table, functions, weights.data(), functions);
+        interpolate(values, table, functions, weights.data(), functions);
         for (std::size_t i = 0; i < functions; ++i)
             column.hankel[i * frequencies + f] = values[i];
     }

@@ -1,6 +1,7 @@
 // Fourier transforms of kernels, without transforming kernels.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
@@ -27,14 +28,22 @@ struct ScaledProfile {
 // Radius in metres outside which the profile holds no more than this fraction of its power.
 double reach(const RadialProfile& profile, double mean_free_path, double fraction);
 
-// The texels of a plane, and the size that it is padded to.
+// The texels of a plane, the tiles that it is solved in, and the size that each is padded to.
 struct PaddedPlane {
     std::size_t width = 0;
     std::size_t height = 0;
     double pitch_x = 1.0;  // metres
     double pitch_y = 1.0;
+    std::size_t halo_x = 0;  // texels that light may spread along x: no kernel holds anything beyond
+    std::size_t halo_y = 0;
+    std::size_t tile_width = 0;
+    std::size_t tile_height = 0;
     std::size_t padded_width = 0;  // even
     std::size_t padded_height = 0;
+
+    // Of the half-transformed rows of a tile's light.
+    std::size_t columns() const { return padded_width / 2 + 1; }
+    std::size_t rows() const { return std::min(height, tile_height + 2 * halo_y); }
 };
 
 // The spectra of texel integrals of c_m(r) cos(m phi) and c_m(r) sin(m phi), on the frequencies of a padded plane.
@@ -44,11 +53,12 @@ struct PaddedPlane {
 // inside are few texels, integrated exactly (ldf/texel_integral.h) and transformed by a sum.
 class KernelSpectra {
 public:
-    // Chooses the padding: the least where nothing that the kernels hold within reach comes back on the other side.
+    // Chooses the padding: the least where nothing that the kernels hold within reach comes back on the other side;
+    // and as few tiles as keep rows() x columns() frequencies within `budget` bytes, if any do.
     // `window_deviation`: width of the window's border, texels. The wider, the less detail beyond what texels resolve is
     // left outside, and the longer the sums.
     KernelSpectra(std::size_t width, std::size_t height, double pitch_x, double pitch_y,
-                  std::vector<ScaledProfile> profiles, double window_deviation);
+                  std::vector<ScaledProfile> profiles, double window_deviation, std::size_t budget);
 
     const PaddedPlane& plane() const { return m_plane; }
 
@@ -58,6 +68,7 @@ public:
         std::vector<float> hankel;    // [profile * harmonics + m][frequency]
         std::vector<double> near_cosine;  // [column of the window]: 1, then 2 cos
         std::vector<double> near_sine;
+        std::vector<float> values;  // of one frequency
     };
 
     // For kx = 2 pi frequency / padded_width.
@@ -68,7 +79,8 @@ public:
     void spectrum(const Column& column, const KernelTerm* terms, std::size_t count, float* values) const;
 
 private:
-    void choose_window(std::size_t width, std::size_t height);
+    void choose_window();
+    void choose_tiles(std::size_t budget);
     void tabulate_hankel();
     void integrate_near();
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "solve/beam_basis.h"
+#include "solve/loops.h"
 
 namespace beamspread {
 
@@ -38,7 +39,7 @@ LightTerms light_terms(const std::vector<LightField>& lights, const std::vector<
         for (const KernelMedium& medium : media) {
             ScaledProfile profile{medium.library->profile(incidence_deg(direction), medium.albedo, Side::reflected),
                                   medium.mean_free_path, 0.0};
-            profile.reach = reach(profile.profile, medium.mean_free_path, std::min(1e-6, 1e-3 * tolerance));
+            profile.reach = reach(profile.profile, medium.mean_free_path, 1e-3 * std::min(tolerance, 1e-3));
             term.kernels.push_back(fixed_kernel(result.profiles.size(), azimuth(direction)));
             result.profiles.push_back(std::move(profile));
         }
@@ -66,76 +67,58 @@ LightTerms light_terms(const std::vector<LightField>& lights, const std::vector<
     return result;
 }
 
-void term_rows(const LightTerms& terms, std::size_t first, std::size_t count, std::size_t y, float* values,
-               std::size_t stride)
+void TermRow::start(const LightTerms& terms, const RowSpan& span)
 {
-    const std::size_t last = first + count;
-    bool any_changing = false;
-    for (std::size_t t = first; t < last; ++t) {
-        const LightTerm& term = terms.terms[t];
-        float* out = values + (t - first) * stride;
-        if (!term.fixed) {
-            any_changing = true;
-            continue;
-        }
-        const View2D<const float>& irradiance = terms.fixed[*term.fixed].irradiance;
-        for (std::size_t x = 0; x < irradiance.width; ++x)
-            out[x] = irradiance(y, x);
-    }
-    if (!any_changing)
-        return;
-
+    m_span = span;
+    m_lights.resize(terms.basis.functions.empty() ? 0 : terms.changing.size());
     const LowRankBasis& basis = terms.basis;
-    const std::size_t width = terms.changing.front().irradiance.width;
-    const std::size_t steps = basis.functions.front().values.size() - 1;
-    const double span = basis.last - basis.first;
-    const double per_step = span > 0.0 ? static_cast<double>(steps) / span : 0.0;
-    std::vector<std::size_t> step(width);
-    std::vector<float> part(width);
-    std::vector<float> cos_beta(width);
-    std::vector<float> sin_beta(width);
-    std::vector<float> cosine(width);  // cos(m beta), sin(m beta) times irradiance
-    std::vector<float> sine(width);
-    for (std::size_t l = 0; l < terms.changing.size(); ++l) {
+    for (std::size_t l = 0; l < m_lights.size(); ++l) {
+        Light& row = m_lights[l];
         const LightField& light = terms.changing[l];
-        const bool add = l > 0;
-        for (std::size_t x = 0; x < width; ++x) {
-            cosine[x] = light.irradiance(y, x);
-            sine[x] = 0.0f;
-            const float* d = light.directions.field + 3 * (y * width + x);
-            const bool lit = cosine[x] != 0.0f;
-            const double dx = lit ? static_cast<double>(d[0]) : 0.0;
-            const double dy = lit ? static_cast<double>(d[1]) : 0.0;
-            const double dz = lit ? static_cast<double>(d[2]) : -1.0;
-            const double across = std::sqrt(dx * dx + dy * dy);
-            cos_beta[x] = across > 0.0 ? static_cast<float>(dx / across) : 1.0f;
-            sin_beta[x] = across > 0.0 ? static_cast<float>(dy / across) : 0.0f;
+        row.m = 0;
+        for (auto* values : {&row.part, &row.cos_beta, &row.sin_beta, &row.cosine, &row.sine})
+            values->resize(span.width);
+        row.step.resize(span.width);
+        const std::size_t steps = basis.functions.front().values.size() - 1;
+        const double per_step =
+            basis.last > basis.first ? static_cast<double>(steps) / (basis.last - basis.first) : 0.0;
+        const float* d = light.directions.field + 3 * (span.y * light.irradiance.width + span.x);
+        for (std::size_t i = 0; i < span.width; ++i, d += 3) {
+            row.cosine[i] = light.irradiance(span.y, span.x + i);
+            row.sine[i] = 0.0f;
+            const bool lit = row.cosine[i] != 0.0f;  // where it is dark the direction may be anything
+            const double x = lit ? static_cast<double>(d[0]) : 0.0;
+            const double y = lit ? static_cast<double>(d[1]) : 0.0;
+            const double z = lit ? static_cast<double>(d[2]) : -1.0;
+            const double across = std::sqrt(x * x + y * y);
+            const double per_across = across > 0.0 ? 1.0 / across : 0.0;
+            row.cos_beta[i] = across > 0.0 ? static_cast<float>(x * per_across) : 1.0f;
+            row.sin_beta[i] = static_cast<float>(y * per_across);
             const double place =
-                std::clamp((half_tangent(dx, dy, dz) - basis.first) * per_step, 0.0, static_cast<double>(steps));
-            step[x] = std::min(static_cast<std::size_t>(place), steps - 1);
-            part[x] = static_cast<float>(place - static_cast<double>(step[x]));
+                std::clamp((half_tangent(x, y, z) - basis.first) * per_step, 0.0, static_cast<double>(steps));
+            row.step[i] = std::min(static_cast<std::uint32_t>(place), static_cast<std::uint32_t>(steps - 1));
+            row.part[i] = static_cast<float>(place - static_cast<double>(row.step[i]));
         }
-        std::size_t m = 0;
-        for (std::size_t t = first; t < last; ++t) {
-            const LightTerm& term = terms.terms[t];
-            if (term.fixed)
-                continue;
-            const LowRankBasis::AngleFunction& function = basis.functions[term.function];
-            for (; m < function.m; ++m) {
-                for (std::size_t x = 0; x < width; ++x) {
-                    const float next = cosine[x] * cos_beta[x] - sine[x] * sin_beta[x];
-                    sine[x] = sine[x] * cos_beta[x] + cosine[x] * sin_beta[x];
-                    cosine[x] = next;
-                }
-            }
-            const float* table = function.values.data();
-            const std::vector<float>& by_azimuth = term.phase == Phase::cosine ? cosine : sine;
-            float* out = values + (t - first) * stride;
-            for (std::size_t x = 0; x < width; ++x) {
-                const float u = table[step[x]] + part[x] * (table[step[x] + 1] - table[step[x]]);
-                out[x] = (add ? out[x] : 0.0f) + u * by_azimuth[x];
-            }
-        }
+    }
+}
+
+void TermRow::evaluate(const LightTerms& terms, std::size_t t, float* values)
+{
+    const LightTerm& term = terms.terms[t];
+    if (term.fixed) {
+        const View2D<const float>& irradiance = terms.fixed[*term.fixed].irradiance;
+        for (std::size_t i = 0; i < m_span.width; ++i)
+            values[i] = irradiance(m_span.y, m_span.x + i);
+        return;
+    }
+    const LowRankBasis::AngleFunction& function = terms.basis.functions[term.function];
+    std::fill_n(values, m_span.width, 0.0f);
+    for (Light& light : m_lights) {
+        for (; light.m < function.m; ++light.m)
+            turn(light.cosine.data(), light.sine.data(), light.cos_beta.data(), light.sin_beta.data(), m_span.width);
+        const std::vector<float>& by_azimuth = term.phase == Phase::cosine ? light.cosine : light.sine;
+        add_from_table(values, function.values.data(), light.step.data(), light.part.data(), by_azimuth.data(),
+                       m_span.width);
     }
 }
 

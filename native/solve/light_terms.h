@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -31,8 +32,33 @@ struct LightTerms {
 LightTerms light_terms(const std::vector<LightField>& lights, const std::vector<KernelMedium>& media, double texel,
                        double tolerance);
 
-// Values of `count` terms from `first` on for the texels of row y, [term][x] with rows `stride` apart.
-void term_rows(const LightTerms& terms, std::size_t first, std::size_t count, std::size_t y, float* values,
-               std::size_t stride);
+// Part of a row of texels.
+struct RowSpan {
+    std::size_t y;
+    std::size_t x;
+    std::size_t width;
+};
+
+// The light of one row, from term to term in their order: what all terms of changing direction share is found once.
+class TermRow {
+public:
+    void start(const LightTerms& terms, const RowSpan& span);
+
+    // Values of term t; t may not go down.
+    void evaluate(const LightTerms& terms, std::size_t t, float* values);
+
+private:
+    struct Light {
+        std::vector<std::uint32_t> step;  // in the tables of the basis
+        std::vector<float> part;
+        std::vector<float> cos_beta;
+        std::vector<float> sin_beta;
+        std::vector<float> cosine;  // cos(m beta), sin(m beta) times irradiance
+        std::vector<float> sine;
+        std::size_t m = 0;
+    };
+    RowSpan m_span{};
+    std::vector<Light> m_lights;  // of changing direction
+};
 
 }  // namespace beamspread

@@ -4,19 +4,20 @@
 
 namespace beamspread {
 
-BEAMSPREAD_CLONES void add_scaled(float* sum, const float* values, float factor, std::size_t count)
+BEAMSPREAD_CLONES void add_scaled(float* __restrict sum, const float* values, float factor, std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i)
         sum[i] += factor * values[i];
 }
 
-BEAMSPREAD_CLONES void scale(float* product, const float* values, float factor, std::size_t count)
+BEAMSPREAD_CLONES void scale(float* __restrict product, const float* values, float factor, std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i)
         product[i] = factor * values[i];
 }
 
-BEAMSPREAD_CLONES void add_scaled_product(float* sum, const float* a, const float* b, float factor, std::size_t count)
+BEAMSPREAD_CLONES void add_scaled_product(float* __restrict sum, const float* a, const float* b, float factor,
+                                          std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i)
         sum[i] += factor * (a[i] * b[i]);
@@ -33,12 +34,31 @@ BEAMSPREAD_CLONES void add_product(Complex* sum, const float* factor, const Comp
     }
 }
 
-BEAMSPREAD_CLONES void interpolate(float* result, const float* table, std::size_t stride, const float* weight,
-                                   std::size_t count)
+BEAMSPREAD_CLONES void interpolate(float* __restrict result, const float* table, std::size_t stride,
+                                   const float* weight, std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i)
         result[i] = weight[0] * table[i] + weight[1] * table[stride + i] + weight[2] * table[2 * stride + i] +
                     weight[3] * table[3 * stride + i];
+}
+
+BEAMSPREAD_CLONES void turn(float* __restrict cosine, float* __restrict sine, const float* cos_beta,
+                            const float* sin_beta, std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i) {
+        const float next = cosine[i] * cos_beta[i] - sine[i] * sin_beta[i];
+        sine[i] = sine[i] * cos_beta[i] + cosine[i] * sin_beta[i];
+        cosine[i] = next;
+    }
+}
+
+BEAMSPREAD_CLONES void add_from_table(float* __restrict sum, const float* table, const std::uint32_t* step,
+                                      const float* part, const float* factor, std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i) {
+        const float first = table[step[i]];
+        sum[i] += factor[i] * (first + part[i] * (table[step[i] + 1] - first));
+    }
 }
 
 }  // namespace beamspread

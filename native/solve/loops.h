@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "solve/fft.h"
 
@@ -22,5 +23,12 @@ void add_product(Complex* sum, const float* factor, const Complex* values, std::
 
 // result[f] = sum over k of weight[k] * table[k * stride + f], k = 0 .. 3
 void interpolate(float* result, const float* table, std::size_t stride, const float* weight, std::size_t count);
+
+// (cosine, sine)[i] turned by the angle of (cos_beta, sin_beta)[i]
+void turn(float* cosine, float* sine, const float* cos_beta, const float* sin_beta, std::size_t count);
+
+// sum[i] += factor[i] times the table interpolated between step[i] and step[i] + 1
+void add_from_table(float* sum, const float* table, const std::uint32_t* step, const float* part, const float* factor,
+                    std::size_t count);
 
 }  // namespace beamspread

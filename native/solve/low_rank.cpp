@@ -18,10 +18,14 @@ namespace {
 constexpr std::size_t angle_bins = 64;
 constexpr std::size_t table_steps = 1024;
 
+// Errors of m = 0 count so many times: under even light they add up, while those of the other harmonics cancel.
+constexpr double power_weight = 3.0;
+
 struct PresentAngles {
     double first = 1.0;  // half_tangent
     double last = 0.0;
-    std::array<double, angle_bins> share{};  // of light and of lit texels, in even bins between them; sum 1
+    std::array<double, angle_bins> share{};  // in even bins between them, sum 1: mean of those
+                                             // of light, of lit texels and of angles
 };
 
 double angle_deg(double half_tangent)
@@ -99,8 +103,11 @@ PresentAngles present_angles(const std::vector<LightField>& lights)
         light += total.light[i];
         texels += total.texels[i];
     }
+    const auto occupied = std::count_if(total.texels.begin(), total.texels.end(), [](double x) { return x > 0.0; });
     for (std::size_t i = 0; i < angle_bins; ++i)
-        present.share[i] = 0.5 * (total.light[i] / light + total.texels[i] / texels);
+        if (total.texels[i] > 0.0)
+            present.share[i] =
+                (total.light[i] / light + total.texels[i] / texels + 1.0 / static_cast<double>(occupied)) / 3.0;
     return present;
 }
 
@@ -191,7 +198,7 @@ AngularMedium describe(const KernelMedium& of, const PresentAngles& present, con
                 continue;
             for (std::size_t m = 0; m < harmonic_count; ++m) {
                 // The mean of cos^2 (m phi) over a turn.
-                const double mean_square = m == 0 ? 1.0 : 0.5;
+                const double mean_square = m == 0 ? power_weight * power_weight : 0.5;
                 medium.features[m](index(j), k) =
                     std::sqrt(mean_square / (mean_bins(0, k) * power)) * bins(index(m), k);
             }
@@ -236,7 +243,7 @@ LowRankBasis low_rank_basis(const std::vector<LightField>& lights, const std::ve
         Matrix gram = Matrix::Zero(index(angle_bins), index(angle_bins));
         for (const AngularMedium& medium : described) {
             const Matrix rows = root_share.asDiagonal() * medium.weights.of(m) * medium.features[m];
-            gram += rows * rows.transpose();
+            gram += rows * rows.transpose() / static_cast<double>(described.size());
         }
         const Eigen::SelfAdjointEigenSolver<Matrix> solver(gram);
         for (std::size_t rank = 0; rank < angle_bins; ++rank) {
@@ -264,7 +271,7 @@ LowRankBasis low_rank_basis(const std::vector<LightField>& lights, const std::ve
         ranks = std::max(ranks, c.rank + 1);
     for (std::size_t k = 0; k < media.size(); ++k) {
         ScaledProfile empty{RadialProfile(), media[k].mean_free_path,
-                            reach(described[k].mean, media[k].mean_free_path, std::min(1e-6, 1e-3 * tolerance))};
+                            reach(described[k].mean, media[k].mean_free_path, 1e-3 * tolerance)};
         basis.profiles.emplace_back(ranks, empty);
     }
     std::map<const LdfSource*, NodeWeights> tables;
@@ -273,7 +280,9 @@ LowRankBasis low_rank_basis(const std::vector<LightField>& lights, const std::ve
             tables[medium.library] =
                 NodeWeights(*medium.library, evenly(present.first, present.last, table_steps + 1, 0.0));
     for (const Candidate& c : candidates) {
-        const Vector by_angle = root_share.cwiseProduct(c.direction) / std::sqrt(c.gain);
+        // The mean over the media, once for each of the two factors of the decomposition.
+        const Vector by_angle =
+            root_share.cwiseProduct(c.direction) / std::sqrt(c.gain * static_cast<double>(media.size()));
         Vector values = Vector::Zero(index(table_steps + 1));
         for (std::size_t k = 0; k < media.size(); ++k) {
             const Vector by_node = described[k].weights.of(c.m).transpose() * by_angle;

@@ -47,10 +47,10 @@ struct LowRankBasis {
     std::vector<std::vector<ScaledProfile>> profiles;  // [medium][rank]
 };
 
-// The least costly basis whose kernels are off by at most `tolerance`: root mean square, over the light and the lit
-// texels, of the relative L1 error of the kernels (bounded by its chi-square distance). The media share the functions of
-// the angle. `texel` is the side of a texel in metres: detail inside the one where a beam enters does not count.
-// Empty where nothing is lit.
+// The least costly basis whose kernels are off by at most `tolerance`: relative L1 error (bounded by the chi-square
+// distance to the mean kernel), root mean square over the media, the light, the lit texels and the angles present. The
+// media share the functions of the angle. `texel` is the side of a texel in metres: detail inside the one where a beam
+// enters does not count. Empty where nothing is lit.
 LowRankBasis low_rank_basis(const std::vector<LightField>& lights, const std::vector<KernelMedium>& media, double texel,
                             double tolerance);
 

@@ -34,6 +34,7 @@ struct Problem {
     std::vector<Channel> channels;
     double tolerance = 1e-3;  // relative error of the kernels that an approximating solver may make
     int threads = 0;
+    std::size_t memory = std::size_t{1} << 30;  // bytes that spectra may take at once; beyond, in tiles
 };
 
 // Luminance in W/(m^2 sr), one plane (height, width) per channel.

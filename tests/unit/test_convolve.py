@@ -5,7 +5,7 @@ import math
 import beamspread
 import numpy as np
 import pytest
-from beamspread import Cancelled, Medium, convolve, simulate
+from beamspread import Cancelled, Medium, _native, convolve, simulate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -58,6 +58,18 @@ def test_fft_equals_direct_where_spectra_are_tabulated(library, angle, mean_free
     direct, fft = convolve(*arguments, solver="direct"), convolve(*arguments, solver="fft")
     worst = (np.abs(fft - direct) / direct.max((0, 1))).max()
     assert worst < 7e-5
+
+
+@pytest.mark.parametrize("memory", [250_000, 100_000])
+def test_tiles_are_seamless(library, memory):
+    """What tiles leave out lies beyond the reach of the kernels: a millionth of their power."""
+    beams = np.random.default_rng(11).random((150, 230), np.float32)
+    rest = ([library] * 3, ALBEDO, [0.1, 0.2, 0.5], (1.0, 1.0), "fft", 1e-3, 0, None)
+    for direction in (np.array(travel(40, 70), np.float32), lamp_directions(150, 230)):
+        whole = _native.convolve([(beams, direction)], *rest)
+        tiled = _native.convolve([(beams, direction)], *rest, memory=memory)
+        assert not np.array_equal(tiled, whole)
+        assert tiled == pytest.approx(whole, rel=1e-5, abs=1e-5 * whole.max((0, 1)).min())
 
 
 def test_several_lights_add_up(library):

@@ -28,12 +28,18 @@ void complex_in_place(Complex* lines, std::size_t count, std::size_t size, bool 
     ducc0::c2c(data, data, {1}, forward, 1.0f, 1);
 }
 
+void complex_columns(Complex* columns, std::size_t count, std::size_t size, std::size_t stride)
+{
+    const ducc0::vfmav<Complex> data(columns, {size, count}, {static_cast<std::ptrdiff_t>(stride), 1});
+    ducc0::c2c(data, data, {0}, true, 1.0f, 1);
+}
+
 std::size_t good_size(std::size_t size)
 {
     return ducc0::good_size_real(size);
 }
 
-constexpr beamspread::FftTarget target{real_to_half, half_to_real, complex_in_place, good_size};
+constexpr beamspread::FftTarget target{real_to_half, half_to_real, complex_in_place, complex_columns, good_size};
 
 }  // namespace
 

@@ -10,6 +10,8 @@ struct FftTarget {
     void (*real_to_half)(const float*, std::complex<float>*, std::size_t count, std::size_t size);
     void (*half_to_real)(const std::complex<float>*, float*, std::size_t count, std::size_t size);
     void (*complex_in_place)(std::complex<float>*, std::size_t count, std::size_t size, bool forward);
+    // Forward, of `count` columns that lie side by side in rows `stride` apart.
+    void (*complex_columns)(std::complex<float>*, std::size_t count, std::size_t size, std::size_t stride);
     std::size_t (*good_size)(std::size_t);
 };
 
