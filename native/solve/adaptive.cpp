@@ -234,7 +234,9 @@ private:
         Grid grid(m_problem.height, m_problem.width);
         parallel_for(grid.height, [&](std::size_t y) {
             std::vector<float> row(grid.width);
-            term_rows(terms, index, 1, y, row.data(), grid.width);
+            TermRow texels;
+            texels.start(terms, {y, 0, grid.width});
+            texels.evaluate(terms, index, row.data());
             std::copy(row.begin(), row.end(), grid.row(y));
         });
         return grid;
