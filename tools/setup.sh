@@ -13,7 +13,7 @@ for argument in "$@"; do
 done
 
 packages=(g++ cmake ninja-build ccache pybind11-dev libembree-dev libtbb-dev libopenexr-dev libglm-dev libeigen3-dev libhwy-dev
-          python3 python3-dev python3-venv python3-numpy blender)
+          python3 python3-dev python3-venv python3-numpy python3-matplotlib blender)
 # The X libraries are what the official bpy wheel links to; it never opens a window here.
 test_packages=(binutils libegl1 libgl1 libgomp1 libsm6 libx11-6 libxfixes3 libxi6 libxkbcommon0 libxrender1 libxxf86vm1)
 ducc_version=0.42.0
@@ -99,18 +99,19 @@ fetch_bpy() {
 }
 
 # The module is built for Debian's Python; another python3 first on PATH can import it if it is the same minor version
-# and has numpy.
+# and has numpy, and draw with it if it has matplotlib.
 prepare_other_python() {
     local other ours
-    other=$(python3 -c 'import importlib.util as u, sys; print("%d.%d" % sys.version_info[:2], bool(u.find_spec("numpy")))' 2>/dev/null) || return 0
+    other=$(python3 -c 'import importlib.util as u, sys
+print("%d.%d" % sys.version_info[:2], all(u.find_spec(name) for name in ("numpy", "matplotlib")))' 2>/dev/null) || return 0
     ours=$("$debian_python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
     case "$other" in
         "$ours True") ;;
         "$ours False")
-            say "installing numpy for $(command -v python3)"
+            say "installing numpy and matplotlib for $(command -v python3)"
             # The oldest numpy that is supported here is Debian's; 2.x needs a newer pybind11 than Debian has.
-            python3 -m pip install --quiet --disable-pip-version-check 'numpy>=1.24,<2' >&2 ||
-                say "note: $(command -v python3) has no numpy and pip could not install it: use $debian_python to import beamspread" ;;
+            python3 -m pip install --quiet --disable-pip-version-check 'numpy>=1.24,<2' 'matplotlib>=3.6' >&2 ||
+                say "note: $(command -v python3) has no numpy or matplotlib and pip could not install them: use $debian_python to import beamspread" ;;
         *) say "note: $(command -v python3) is Python ${other% *}; the module is built for $ours: use $debian_python to import beamspread" ;;
     esac
 }

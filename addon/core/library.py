@@ -56,7 +56,7 @@ def photons_for(medium, quality):
     The number of scatterings before light leaves grows like 1 / (1 - g), and internal reflection keeps it in longer.
     """
     effort = (1.0 - medium.g) / 0.2 / medium.ior**2
-    return int(min(PHOTONS[quality] * effort, _MAX_PHOTONS))
+    return round(min(PHOTONS[quality] * effort, _MAX_PHOTONS))
 
 
 def make(medium, quality, progress=None, kernel=""):
