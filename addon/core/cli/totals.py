@@ -33,7 +33,7 @@ def totals_table(library, angle_deg: float, albedos: Sequence[float]) -> list[tu
 
 def _value(total, library, angle_deg: float, albedo: float, side: str) -> tuple[str, str]:
     error = library.standard_error(angle_deg, albedo, side=side)
-    return f"{total(angle_deg, albedo):.5f}", f"{error:.5f}"
+    return f"{total(angle_deg, albedo):.5f}", f"{error:.1g}"
 
 
 def text_table(rows: Sequence[tuple[str, ...]]) -> str:
