@@ -13,7 +13,7 @@ for argument in "$@"; do
 done
 
 packages=(g++ cmake ninja-build ccache pybind11-dev libembree-dev libtbb-dev libopenexr-dev libglm-dev libeigen3-dev libhwy-dev
-          python3 python3-dev python3-venv python3-numpy python3-matplotlib blender)
+          python3 python3-dev python3-venv python3-numpy blender)
 # The X libraries are what the official bpy wheel links to; it never opens a window here.
 test_packages=(binutils libegl1 libgl1 libgomp1 libsm6 libx11-6 libxfixes3 libxi6 libxkbcommon0 libxrender1 libxxf86vm1)
 ducc_version=0.42.0
