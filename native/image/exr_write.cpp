@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <set>
-#include <utility>
 
 #include "base/error.h"
 #include "image/exr.h"
@@ -81,7 +80,7 @@ Imf::Header make_header(const ExrPart& part, const Imath::Box2i& display_window,
 }
 
 template <class T>
-void write_pixels(Imf::OutputPart&& output, const ExrPart& part, Imf::PixelType type, const std::vector<T>& pixels)
+void write_pixels(Imf::OutputPart output, const ExrPart& part, Imf::PixelType type, const std::vector<T>& pixels)
 {
     const std::size_t pixel_bytes = part.channels.size() * sizeof(T);
     const std::size_t row_bytes = pixel_bytes * static_cast<std::size_t>(part.width);
@@ -93,12 +92,12 @@ void write_pixels(Imf::OutputPart&& output, const ExrPart& part, Imf::PixelType 
     output.writePixels(part.height);
 }
 
-void write_part(Imf::OutputPart&& output, const ExrPart& part)
+void write_part(Imf::OutputPart output, const ExrPart& part)
 {
     if (part.half)
-        write_pixels(std::move(output), part, Imf::HALF, std::vector<half>(part.pixels.begin(), part.pixels.end()));
+        write_pixels(output, part, Imf::HALF, std::vector<half>(part.pixels.begin(), part.pixels.end()));
     else
-        write_pixels(std::move(output), part, Imf::FLOAT, part.pixels);
+        write_pixels(output, part, Imf::FLOAT, part.pixels);
 }
 
 }  // namespace

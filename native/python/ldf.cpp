@@ -31,7 +31,7 @@ Array<float> image(ImageFunction make, const LdfLibrary& library, double angle, 
 
 void bind_ldf(py::module_& m)
 {
-    py::class_<LdfSource, std::shared_ptr<LdfSource>>(m, "LdfSource", "What `convolve` takes LDFs from.");
+    const py::class_<LdfSource, std::shared_ptr<LdfSource>> source(m, "LdfSource", "What `convolve` takes LDFs from.");
     py::class_<LdfLibrary, LdfSource, std::shared_ptr<LdfLibrary>> library(
         m, "LdfLibrary",
         R"(Luminance distribution functions of one medium.

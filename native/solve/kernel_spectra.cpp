@@ -154,11 +154,17 @@ void KernelSpectra::tabulate_hankel()
 {
     const double end = m_cut + m_taper;
     std::vector<double> positions;
-    for (double x = 0.0; x < even_until; x += even_step)
-        positions.push_back(x);
+    double position = 0.0;
+    while (position < even_until) {
+        positions.push_back(position);
+        position += even_step;
+    }
     const std::size_t even_count = positions.size();
-    for (double x = even_until; x < std::max(end, 1.1 * even_until) * growth * growth; x *= growth)
-        positions.push_back(x);
+    position = even_until;
+    while (position < std::max(end, 1.1 * even_until) * growth * growth) {
+        positions.push_back(position);
+        position *= growth;
+    }
     const std::size_t position_count = positions.size();
 
     const std::size_t samples = static_cast<std::size_t>(std::ceil(end / sample_step)) + 1;
@@ -176,8 +182,9 @@ void KernelSpectra::tabulate_hankel()
         const double to_paths = m_texel / m_profiles[p].mean_free_path;
         // Panels of the integrals: steps of a texel in the window, then bins of the profile, halved.
         std::vector<double> breaks;
-        for (double r = 0.0; r < std::min(end, 2.0 * window_end * m_deviation); r += 1.0)
-            breaks.push_back(r);
+        const auto steps = static_cast<std::size_t>(std::ceil(std::min(end, 2.0 * window_end * m_deviation)));
+        for (std::size_t step = 0; step < steps; ++step)
+            breaks.push_back(static_cast<double>(step));
         for (std::size_t k = 0; k < radius_bin_count; ++k) {
             const double r = radius_bin_edge(k) / to_paths;
             const double next = k + 1 < radius_bin_count ? radius_bin_edge(k + 1) / to_paths : r;
@@ -262,8 +269,9 @@ void KernelSpectra::integrate_near()
         const TexelIntegrals exact = integrate_texels(
             profile, {-0.5 * px * to_paths, -0.5 * py * to_paths, px * to_paths, py * to_paths, width, m_near_y + 1});
         parallel_for(texels, [&](std::size_t texel) {
+            const std::size_t row = texel / width;
             const double x0 = (static_cast<double>(texel % width) - 0.5) * px;
-            const double y0 = (static_cast<double>(texel / width) - 0.5) * py;
+            const double y0 = (static_cast<double>(row) - 0.5) * py;
             Harmonics cosine{};
             Harmonics sine{};
             for (std::size_t i = 0; m_far && i < gauss_node.size() * gauss_node.size(); ++i) {

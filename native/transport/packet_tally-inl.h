@@ -131,34 +131,35 @@ private:
         tally.weight_order2[bin] += w * n * n;
     }
 
+    using DoubleTag = hn::CappedTag<double, 8>;
+    using Doubles = hn::Vec<DoubleTag>;
+
+    // The values of the lanes whose number has this bit, times a factor; the others as they are.
+    static HWY_INLINE Doubles times_where(std::uint64_t bit, Doubles values, double factor)
+    {
+        const DoubleTag doubles;
+        const hn::RebindToUnsigned<DoubleTag> numbers;
+        const auto lane = hn::BitCast(numbers, hn::Iota(hn::RebindToSigned<DoubleTag>(), 0));
+        const auto chosen = hn::RebindMask(doubles, hn::TestBit(lane, hn::Set(numbers, bit)));
+        return hn::IfThenElse(chosen, hn::Mul(values, hn::Set(doubles, factor)), values);
+    }
+
     // sums[m] += weight * c^m
     static HWY_INLINE void add_powers(double* sums, float c, float weight)
     {
-        const hn::CappedTag<double, 8> doubles;
+        const DoubleTag doubles;
         constexpr std::size_t step = HWY_MIN(HWY_LANES(double), 8);
-        const double c1 = c;
-        const double c2 = c1 * c1;
-        const double c4 = c2 * c2;
-        const auto exponent = hn::BitCast(hn::RebindToUnsigned<decltype(doubles)>(),
-                                          hn::Iota(hn::RebindToSigned<decltype(doubles)>(), 0));
-        auto powers = hn::Set(doubles, static_cast<double>(weight));
-        powers = hn::IfThenElse(
-            hn::RebindMask(doubles, hn::TestBit(exponent, hn::Set(hn::RebindToUnsigned<decltype(doubles)>(), 1u))),
-            hn::Mul(powers, hn::Set(doubles, c1)), powers);
-        if constexpr (step > 2)
-            powers = hn::IfThenElse(
-                hn::RebindMask(doubles, hn::TestBit(exponent, hn::Set(hn::RebindToUnsigned<decltype(doubles)>(), 2u))),
-                hn::Mul(powers, hn::Set(doubles, c2)), powers);
-        if constexpr (step > 4)
-            powers = hn::IfThenElse(
-                hn::RebindMask(doubles, hn::TestBit(exponent, hn::Set(hn::RebindToUnsigned<decltype(doubles)>(), 4u))),
-                hn::Mul(powers, hn::Set(doubles, c4)), powers);
-        const auto next = hn::Set(doubles, step == 8 ? c4 * c4 : step == 4 ? c4 : step == 2 ? c2 : c1);
         constexpr std::size_t last = harmonic_count - 1;
         static_assert(last % step == 0);
+        auto powers = hn::Set(doubles, static_cast<double>(weight));
+        double power = c;  // c^bit
+        for (std::uint64_t bit = 1; bit < step; bit *= 2) {
+            powers = times_where(bit, powers, power);
+            power *= power;
+        }
         for (std::size_t m = 0; m < last; m += step) {
             hn::StoreU(hn::Add(hn::LoadU(doubles, sums + m), powers), doubles, sums + m);
-            powers = hn::Mul(powers, next);
+            powers = hn::Mul(powers, hn::Set(doubles, power));
         }
         sums[last] += hn::GetLane(powers);
     }
