@@ -6,7 +6,7 @@ set(ducc_src ${DUCC_SOURCE_DIR}/src)
 
 # What templates and inline functions become for a newer processor must not be what the linker keeps for the rest of
 # the program: each target is linked into one object file, where the groups that linkers merge by name are dissolved
-# (--force-group-allocation) and every symbol but the one that it is found by is local.
+# (--force-group-allocation) and every symbol but the one that it is found by is local, which unique ones could not be.
 set(ducc_objects)
 function(ducc_target name)
   add_library(ducc_${name} OBJECT ${CMAKE_SOURCE_DIR}/native/solve/targets/fft.cpp ${ducc_src}/ducc0/infra/mav.cc

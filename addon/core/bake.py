@@ -20,6 +20,12 @@ from .scene import Grid, Light, Mesh, PointLight, SpotLight, SunLight
 LIBRARY_WEIGHT, BEAMS_WEIGHT, SOLVE_WEIGHT = 2.0, 1.0, 3.0
 LIGHT_WEIGHT = BEAMS_WEIGHT + SOLVE_WEIGHT
 
+# Of the solvers: luminance within about a tenth of it, less than the noise of the libraries.
+TOLERANCE = 1e-2
+
+# Lights solved together; each keeps its irradiance and directions in memory until then.
+MOST_LIGHTS_AT_ONCE = 4
+
 
 @dataclass(frozen=True)
 class BakeSettings:
@@ -89,13 +95,25 @@ def bake(
         libraries = [load_source(settings.sample_folder, settings.distributions)] * 3
     caster = native.Occluders(occluders.vertices, occluders.triangles) if len(occluders.triangles) else None
     luminance = None
-    for light, beams_progress, solve_progress in zip(lights, light_progress[::2], light_progress[1::2]):
+    # Lights of one colour, which comes last, so that the channels share the work on their beams.
+    waiting, waiting_color = [], None
+    for number, (light, beams_progress, solve_progress) in enumerate(
+        zip(lights, light_progress[::2], light_progress[1::2]), 1
+    ):
         beams, direction, strength = unit_beams(grid, light, caster, settings, beams_progress)
         if beams.any() and any(strength):
-            # The light's colour comes last, so that the channels share the work on its beams.
-            spread = _spread(beams, direction, libraries, material, grid, settings, solve_progress)
-            spread *= strength
+            waiting.append((beams * strength.max(), direction))
+            waiting_color = strength / strength.max()
+        next_color = np.asarray(lights[number].color, np.float32) if number < len(lights) else None
+        if waiting and (
+            next_color is None
+            or len(waiting) == MOST_LIGHTS_AT_ONCE
+            or not np.allclose(next_color, waiting_color * next_color.max(), rtol=1e-5)
+        ):
+            spread = _spread(waiting, libraries, material, grid, settings, solve_progress)
+            spread *= waiting_color
             luminance = spread if luminance is None else np.add(luminance, spread, out=luminance)
+            waiting = []
     return np.zeros((grid.height, grid.width, 3), np.float32) if luminance is None else luminance
 
 
@@ -174,19 +192,19 @@ def _libraries(material: Material, thickness: float, quality: str, progress: Pro
     return [by_channel[channel] for channel in channels]
 
 
-def _spread(irradiance, direction, libraries, material: Material, grid: Grid, settings: BakeSettings, progress):
-    from .convolve import convolve
+def _spread(lights, libraries, material: Material, grid: Grid, settings: BakeSettings, progress):
+    from .convolve import convolve_lights
 
     shared = all(library is libraries[0] for library in libraries)
     try:
-        return convolve(
-            np.ascontiguousarray(irradiance, np.float32),
-            direction,
+        return convolve_lights(
+            lights,
             libraries[0] if shared else libraries,
             material.albedo,
             material.mean_free_path,
             (grid.pitch_x, grid.pitch_y),
             solver=settings.solver,
+            tolerance=TOLERANCE,
             threads=settings.threads,
             progress=progress,
         )

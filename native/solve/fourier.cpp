@@ -52,7 +52,8 @@ public:
           m_channels(plane.channels.size()),
           m_terms(light_terms(group.lights, group.media, std::max(plane.pitch_x, plane.pitch_y), plane.tolerance)),
           m_spectra(plane.width, plane.height, plane.pitch_x, plane.pitch_y, m_terms.profiles,
-                    m_terms.changing.empty() ? fixed_deviation : changing_deviation, plane.memory / 2),
+                    m_terms.changing.empty() ? fixed_deviation : changing_deviation, plane.memory / 2,
+                    std::min(m_terms.terms.size(), terms_per_batch / 2)),
           m_plane(m_spectra.plane()),
           m_budget(plane.memory / 2)
     {

@@ -19,6 +19,9 @@ namespace {
 constexpr double window_radius = 4.75;
 constexpr double window_end = 9.25;
 
+// Place in the table of harmonics that a profile lacks.
+constexpr std::size_t no_column = static_cast<std::size_t>(-1);
+
 // Planes up to this size are all window.
 constexpr std::size_t small_plane = 32;
 
@@ -82,14 +85,15 @@ double reach(const RadialProfile& profile, double mean_free_path, double fractio
 }
 
 KernelSpectra::KernelSpectra(std::size_t width, std::size_t height, double pitch_x, double pitch_y,
-                             std::vector<ScaledProfile> profiles, double window_deviation, std::size_t budget)
+                             std::vector<ScaledProfile> profiles, double window_deviation, std::size_t budget,
+                             std::size_t terms)
     : m_plane{width, height, pitch_x, pitch_y},
       m_profiles(std::move(profiles)),
       m_texel(std::max(pitch_x, pitch_y)),
       m_deviation(window_deviation)
 {
     choose_window();
-    choose_tiles(budget);
+    choose_tiles(budget, terms);
     if (m_far)
         tabulate_hankel();
     integrate_near();
@@ -124,7 +128,7 @@ void KernelSpectra::choose_window()
     m_plane.halo_y = halo(py, m_near_y);
 }
 
-void KernelSpectra::choose_tiles(std::size_t budget)
+void KernelSpectra::choose_tiles(std::size_t budget, std::size_t terms)
 {
     const auto with_tiles = [&](std::size_t count) {
         PaddedPlane plane = m_plane;
@@ -137,15 +141,22 @@ void KernelSpectra::choose_tiles(std::size_t budget)
         plane.padded_height = pad(plane.height, plane.halo_y, plane.tile_height);
         return plane;
     };
-    constexpr std::size_t most_tiles = 16;  // along a side
-    for (std::size_t count = 1; count <= most_tiles; ++count) {
-        const PaddedPlane plane = with_tiles(count);
-        if (plane.rows() * plane.columns() * sizeof(Complex) <= budget) {
-            m_plane = plane;
-            return;
+    constexpr std::size_t most_tiles = 16;    // along a side
+    constexpr double most_overlap = 1.25;  // that is worth having several light terms in memory at once
+    const PaddedPlane whole = with_tiles(1);
+    const double area = static_cast<double>(whole.padded_width * whole.padded_height);
+    for (const std::size_t allowed : {budget / std::max<std::size_t>(terms, 1), budget}) {
+        for (std::size_t count = 1; count <= most_tiles; ++count) {
+            const PaddedPlane plane = with_tiles(count);
+            const double overlap = static_cast<double>(count * count * plane.padded_width * plane.padded_height) / area;
+            if (plane.rows() * plane.columns() * sizeof(Complex) <= allowed &&
+                (allowed == budget || overlap <= most_overlap)) {
+                m_plane = plane;
+                return;
+            }
         }
     }
-    m_plane = with_tiles(1);
+    m_plane = whole;
 }
 
 // By the projection-slice theorem the two-dimensional transform of c_m(r) cos(m phi) along kx is the one-dimensional
@@ -154,17 +165,11 @@ void KernelSpectra::tabulate_hankel()
 {
     const double end = m_cut + m_taper;
     std::vector<double> positions;
-    double position = 0.0;
-    while (position < even_until) {
-        positions.push_back(position);
-        position += even_step;
-    }
+    for (int i = 0; i * even_step < even_until; ++i)
+        positions.push_back(i * even_step);
     const std::size_t even_count = positions.size();
-    position = even_until;
-    while (position < std::max(end, 1.1 * even_until) * growth * growth) {
-        positions.push_back(position);
-        position *= growth;
-    }
+    for (int i = 0; positions.back() < std::max(end, 1.1 * even_until) * growth; ++i)
+        positions.push_back(even_until * std::pow(growth, i));
     const std::size_t position_count = positions.size();
 
     const std::size_t samples = static_cast<std::size_t>(std::ceil(end / sample_step)) + 1;
@@ -172,7 +177,16 @@ void KernelSpectra::tabulate_hankel()
     // would leave the cache, and such kernels hold little power at their ends.
     const std::size_t length = fast_even_size((samples <= 2048 ? 32 : 16) * samples);
     m_k_step = 2.0 * pi / (static_cast<double>(length) * sample_step);
-    const std::size_t columns = m_profiles.size() * harmonic_count;
+    for (std::size_t p = 0; p < m_profiles.size(); ++p) {
+        for (std::size_t m = 0; m < harmonic_count; ++m) {
+            const RadialProfile& profile = m_profiles[p].profile;
+            bool empty = true;
+            for (std::size_t k = 0; k < radius_bin_count; ++k)
+                empty = empty && profile.remaining(radius_bin_edge(k))[m] == 0.0;
+            m_column.push_back(empty ? no_column : m_table_columns++);
+        }
+    }
+    const std::size_t columns = m_table_columns;
     const std::size_t last = static_cast<std::size_t>(0.95 * 2.0 * pi / m_k_step);
     m_table_rows = last + 4;
     m_table.assign(m_table_rows * columns, 0.0f);
@@ -182,9 +196,8 @@ void KernelSpectra::tabulate_hankel()
         const double to_paths = m_texel / m_profiles[p].mean_free_path;
         // Panels of the integrals: steps of a texel in the window, then bins of the profile, halved.
         std::vector<double> breaks;
-        const auto steps = static_cast<std::size_t>(std::ceil(std::min(end, 2.0 * window_end * m_deviation)));
-        for (std::size_t step = 0; step < steps; ++step)
-            breaks.push_back(static_cast<double>(step));
+        for (int r = 0; r < std::min(end, 2.0 * window_end * m_deviation); ++r)
+            breaks.push_back(r);
         for (std::size_t k = 0; k < radius_bin_count; ++k) {
             const double r = radius_bin_edge(k) / to_paths;
             const double next = k + 1 < radius_bin_count ? radius_bin_edge(k + 1) / to_paths : r;
@@ -241,13 +254,15 @@ void KernelSpectra::tabulate_hankel()
             return value;
         };
         parallel_for(harmonic_count, [&](std::size_t m) {
+            if (m_column[p * harmonic_count + m] == no_column)
+                return;
             std::vector<float> line(length, 0.0f);
             for (std::size_t n = 0; n < samples; ++n)
                 line[n] = static_cast<float>(2.0 * sample_step * projection(static_cast<double>(n) * sample_step, m));
             line[0] *= 0.5f;
             std::vector<Complex> half(length / 2 + 1);
             real_to_half(line.data(), half.data(), 1, length);
-            float* column = m_table.data() + p * harmonic_count + m;
+            float* column = m_table.data() + m_column[p * harmonic_count + m];
             for (std::size_t i = 0; i <= last; ++i)
                 column[(i + 1) * columns] = m % 2 == 0 ? half[i].real() : -half[i].imag();
             column[0] = m % 2 == 0 ? column[2 * columns] : -column[2 * columns];
@@ -296,6 +311,9 @@ void KernelSpectra::integrate_near()
         });
     }
     const std::size_t frequencies = m_plane.padded_height / 2 + 1;
+    for (std::size_t f = 0; f < frequencies; ++f)
+        m_sinc_y.push_back(
+            static_cast<float>(sinc(pi * static_cast<double>(f) / static_cast<double>(m_plane.padded_height))));
     m_near_trig.resize(2 * (m_near_y + 1) * frequencies);
     for (std::size_t y = 0; y <= m_near_y; ++y) {
         float* cosine = m_near_trig.data() + y * frequencies;
@@ -322,7 +340,7 @@ void KernelSpectra::start(std::size_t frequency, Column& column) const
     if (!m_far)
         return;
     const std::size_t frequencies = m_plane.padded_height / 2 + 1;
-    const std::size_t functions = m_profiles.size() * harmonic_count;
+    const std::size_t functions = m_table_columns;
     column.trig.resize(2 * harmonic_count * frequencies);
     column.hankel.resize(functions * frequencies);
     // Per metre, then per texel of unit length.
@@ -333,32 +351,36 @@ void KernelSpectra::start(std::size_t frequency, Column& column) const
 
     column.values.resize(functions);
     float* values = column.values.data();
+    column.k.resize(frequencies);
+    for (auto* part : {&column.cos_psi, &column.sin_psi, &column.cosine, &column.sine})
+        part->resize(frequencies);
     for (std::size_t f = 0; f < frequencies; ++f) {
         const double y_turn = pi * static_cast<double>(f) / static_cast<double>(m_plane.padded_height);
         const double ky = 2.0 * y_turn * m_texel / m_plane.pitch_y;
-        const bool y_nyquist = 2 * f == m_plane.padded_height;
         const double k = std::sqrt(kx * kx + ky * ky);
-        const double cos_psi = k > 0.0 ? kx / k : 1.0;
-        const double sin_psi = k > 0.0 ? ky / k : 0.0;
-        double c = sinc_x * sinc(y_turn);
-        double s = 0.0;
-        for (std::size_t m = 0; m < harmonic_count; ++m) {
-            // At the Nyquist frequency a function that is odd along that axis has no spectrum.
-            const bool cosine_odd_x = m % 2 == 1;
-            column.trig[2 * m * frequencies + f] = x_nyquist && cosine_odd_x ? 0.0f : static_cast<float>(c);
-            column.trig[(2 * m + 1) * frequencies + f] =
-                y_nyquist || (x_nyquist && !cosine_odd_x) ? 0.0f : static_cast<float>(s);
-            const double next = c * cos_psi - s * sin_psi;
-            s = s * cos_psi + c * sin_psi;
-            c = next;
-        }
-        const double place = k / m_k_step;
+        column.k[f] = k;
+        column.cos_psi[f] = static_cast<float>(k > 0.0 ? kx / k : 1.0);
+        column.sin_psi[f] = static_cast<float>(k > 0.0 ? ky / k : 0.0);
+        column.cosine[f] = static_cast<float>(sinc_x) * m_sinc_y[f];
+        column.sine[f] = 0.0f;
+    }
+    for (std::size_t m = 0; m < harmonic_count; ++m) {
+        float* trig = column.trig.data() + 2 * m * frequencies;
+        std::copy(column.cosine.begin(), column.cosine.end(), trig);
+        std::copy(column.sine.begin(), column.sine.end(), trig + frequencies);
+        // At the Nyquist frequency a function that is odd along that axis has no spectrum.
+        if (x_nyquist)
+            std::fill_n(m % 2 == 1 ? trig : trig + frequencies, frequencies, 0.0f);
+        trig[2 * frequencies - 1] = 0.0f;
+        turn(column.cosine.data(), column.sine.data(), column.cos_psi.data(), column.sin_psi.data(), frequencies);
+    }
+    for (std::size_t f = 0; f < frequencies; ++f) {
+        const double place = column.k[f] / m_k_step;
         const std::size_t row = std::min(static_cast<std::size_t>(place), m_table_rows - 4);
         const auto w = cubic_weights(std::min(place - static_cast<double>(row), 1.0));
-        const float* table = m_table.data() + row * functions;
         const std::array<float, 4> weights = {static_cast<float>(w[0]), static_cast<float>(w[1]),
                                               static_cast<float>(w[2]), static_cast<float>(w[3])};
-        interpolate(values, table, functions, weights.data(), functions);
+        interpolate(values, m_table.data() + row * functions, functions, weights.data(), functions);
         for (std::size_t i = 0; i < functions; ++i)
             column.hankel[i * frequencies + f] = values[i];
     }
@@ -394,7 +416,10 @@ void KernelSpectra::spectrum(const Column& column, const KernelTerm* terms, std:
     }
     for (std::size_t t = 0; m_far && t < count; ++t) {
         const float* trig = column.trig.data() + (2 * terms[t].m + (sine ? 1 : 0)) * frequencies;
-        const float* hankel = column.hankel.data() + (terms[t].profile * harmonic_count + terms[t].m) * frequencies;
+        const std::size_t function = m_column[terms[t].profile * harmonic_count + terms[t].m];
+        if (function == no_column)
+            continue;
+        const float* hankel = column.hankel.data() + function * frequencies;
         add_scaled_product(values, trig, hankel, static_cast<float>(terms[t].weight), frequencies);
     }
     for (std::size_t f = frequencies; f < m_plane.padded_height; ++f)

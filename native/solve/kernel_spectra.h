@@ -54,21 +54,27 @@ struct PaddedPlane {
 class KernelSpectra {
 public:
     // Chooses the padding: the least where nothing that the kernels hold within reach comes back on the other side;
-    // and as few tiles as keep rows() x columns() frequencies within `budget` bytes, if any do.
+    // and as few tiles as keep rows() x columns() frequencies within `budget` bytes, if any do: for `terms` at once, if
+    // that costs little, else for one.
     // `window_deviation`: width of the window's border, texels. The wider, the less detail beyond what texels resolve is
     // left outside, and the longer the sums.
     KernelSpectra(std::size_t width, std::size_t height, double pitch_x, double pitch_y,
-                  std::vector<ScaledProfile> profiles, double window_deviation, std::size_t budget);
+                  std::vector<ScaledProfile> profiles, double window_deviation, std::size_t budget, std::size_t terms);
 
     const PaddedPlane& plane() const { return m_plane; }
 
     // What one column of frequencies needs for all kernels; use it again for the next one.
     struct Column {
         std::vector<float> trig;      // [2 m + phase][frequency]: cos, sin (m psi) times the sinc of the texel
-        std::vector<float> hankel;    // [profile * harmonics + m][frequency]
+        std::vector<float> hankel;    // [column of the table][frequency]
         std::vector<double> near_cosine;  // [column of the window]: 1, then 2 cos
         std::vector<double> near_sine;
         std::vector<float> values;  // of one frequency
+        std::vector<double> k;      // of each frequency, per texel
+        std::vector<float> cos_psi;
+        std::vector<float> sin_psi;
+        std::vector<float> cosine;  // of m psi
+        std::vector<float> sine;
     };
 
     // For kx = 2 pi frequency / padded_width.
@@ -80,7 +86,7 @@ public:
 
 private:
     void choose_window();
-    void choose_tiles(std::size_t budget);
+    void choose_tiles(std::size_t budget, std::size_t terms);
     void tabulate_hankel();
     void integrate_near();
 
@@ -95,8 +101,11 @@ private:
     std::size_t m_near_y = 0;
     double m_k_step = 1.0;
     std::size_t m_table_rows = 0;
-    std::vector<float> m_table;          // [k][profile * harmonics + m], first row for -m_k_step
+    std::size_t m_table_columns = 0;
+    std::vector<std::size_t> m_column;   // [profile * harmonics + m]: place in a row of the table
+    std::vector<float> m_table;          // [k][column], first row for -m_k_step
     std::vector<float> m_near;           // [profile][m][phase][y][x], quadrant
+    std::vector<float> m_sinc_y;         // of each frequency
     std::vector<float> m_near_trig;      // [cos, sin][y][frequency]
 };
 

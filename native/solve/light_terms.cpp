@@ -76,26 +76,23 @@ void TermRow::start(const LightTerms& terms, const RowSpan& span)
         Light& row = m_lights[l];
         const LightField& light = terms.changing[l];
         row.m = 0;
+        row.function.reset();
+        row.u.resize(span.width);
         for (auto* values : {&row.part, &row.cos_beta, &row.sin_beta, &row.cosine, &row.sine})
             values->resize(span.width);
         row.step.resize(span.width);
         const std::size_t steps = basis.functions.front().values.size() - 1;
         const double per_step =
             basis.last > basis.first ? static_cast<double>(steps) / (basis.last - basis.first) : 0.0;
-        const float* d = light.directions.field + 3 * (span.y * light.irradiance.width + span.x);
-        for (std::size_t i = 0; i < span.width; ++i, d += 3) {
+        for (std::size_t i = 0; i < span.width; ++i)
             row.cosine[i] = light.irradiance(span.y, span.x + i);
-            row.sine[i] = 0.0f;
-            const bool lit = row.cosine[i] != 0.0f;  // where it is dark the direction may be anything
-            const double x = lit ? static_cast<double>(d[0]) : 0.0;
-            const double y = lit ? static_cast<double>(d[1]) : 0.0;
-            const double z = lit ? static_cast<double>(d[2]) : -1.0;
-            const double across = std::sqrt(x * x + y * y);
-            const double per_across = across > 0.0 ? 1.0 / across : 0.0;
-            row.cos_beta[i] = across > 0.0 ? static_cast<float>(x * per_across) : 1.0f;
-            row.sin_beta[i] = static_cast<float>(y * per_across);
-            const double place =
-                std::clamp((half_tangent(x, y, z) - basis.first) * per_step, 0.0, static_cast<double>(steps));
+        std::fill(row.sine.begin(), row.sine.end(), 0.0f);
+        const float* directions = light.directions.field + 3 * (span.y * light.irradiance.width + span.x);
+        find_angles(directions, row.cosine.data(), row.cos_beta.data(), row.sin_beta.data(), row.part.data(),
+                    span.width);
+        for (std::size_t i = 0; i < span.width; ++i) {
+            const double place = std::clamp((static_cast<double>(row.part[i]) - basis.first) * per_step, 0.0,
+                                            static_cast<double>(steps));
             row.step[i] = std::min(static_cast<std::uint32_t>(place), static_cast<std::uint32_t>(steps - 1));
             row.part[i] = static_cast<float>(place - static_cast<double>(row.step[i]));
         }
@@ -117,8 +114,10 @@ void TermRow::evaluate(const LightTerms& terms, std::size_t t, float* values)
         for (; light.m < function.m; ++light.m)
             turn(light.cosine.data(), light.sine.data(), light.cos_beta.data(), light.sin_beta.data(), m_span.width);
         const std::vector<float>& by_azimuth = term.phase == Phase::cosine ? light.cosine : light.sine;
-        add_from_table(values, function.values.data(), light.step.data(), light.part.data(), by_azimuth.data(),
-                       m_span.width);
+        if (light.function != term.function)
+            look_up(light.u.data(), function.values.data(), light.step.data(), light.part.data(), m_span.width);
+        light.function = term.function;
+        add_scaled_product(values, light.u.data(), by_azimuth.data(), 1.0f, m_span.width);
     }
 }
 

@@ -55,6 +55,8 @@ private:
         std::vector<float> sin_beta;
         std::vector<float> cosine;  // cos(m beta), sin(m beta) times irradiance
         std::vector<float> sine;
+        std::vector<float> u;
+        std::optional<std::size_t> function;  // that u holds
         std::size_t m = 0;
     };
     RowSpan m_span{};

@@ -1,5 +1,7 @@
 #include "solve/loops.h"
 
+#include <cmath>
+
 #define BEAMSPREAD_CLONES __attribute__((target_clones("default", "avx2", "avx512f")))
 
 namespace beamspread {
@@ -52,12 +54,33 @@ BEAMSPREAD_CLONES void turn(float* __restrict cosine, float* __restrict sine, co
     }
 }
 
-BEAMSPREAD_CLONES void add_from_table(float* __restrict sum, const float* table, const std::uint32_t* step,
-                                      const float* part, const float* factor, std::size_t count)
+BEAMSPREAD_CLONES void find_angles(const float* directions, const float* irradiance, float* __restrict cos_beta,
+                                   float* __restrict sin_beta, float* __restrict half_tangent, std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i) {
+        const bool lit = irradiance[i] != 0.0f;
+        const float dx = directions[3 * i];
+        const float dy = directions[3 * i + 1];
+        const float dz = directions[3 * i + 2];
+        const float x = lit ? dx : 0.0f;
+        const float y = lit ? dy : 0.0f;
+        const float z = lit ? dz : -1.0f;
+        const float across = std::sqrt(x * x + y * y);
+        const float length = std::sqrt(x * x + y * y + z * z);
+        const bool slants = across > 0.0f;
+        const float per_across = 1.0f / (slants ? across : 1.0f);
+        cos_beta[i] = slants ? x * per_across : 1.0f;
+        sin_beta[i] = y * per_across;
+        half_tangent[i] = across / (length - z);
+    }
+}
+
+BEAMSPREAD_CLONES void look_up(float* __restrict result, const float* table, const std::uint32_t* step,
+                               const float* part, std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i) {
         const float first = table[step[i]];
-        sum[i] += factor[i] * (first + part[i] * (table[step[i] + 1] - first));
+        result[i] = first + part[i] * (table[step[i] + 1] - first);
     }
 }
 

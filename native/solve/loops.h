@@ -27,8 +27,12 @@ void interpolate(float* result, const float* table, std::size_t stride, const fl
 // (cosine, sine)[i] turned by the angle of (cos_beta, sin_beta)[i]
 void turn(float* cosine, float* sine, const float* cos_beta, const float* sin_beta, std::size_t count);
 
-// sum[i] += factor[i] times the table interpolated between step[i] and step[i] + 1
-void add_from_table(float* sum, const float* table, const std::uint32_t* step, const float* part, const float* factor,
-                    std::size_t count);
+// Azimuths beta and tan(theta / 2) of directions of travel, (x, y, z) after (x, y, z). Where the irradiance is
+// zero the direction may be anything.
+void find_angles(const float* directions, const float* irradiance, float* cos_beta, float* sin_beta,
+                 float* half_tangent, std::size_t count);
+
+// result[i] = the table interpolated between step[i] and step[i] + 1
+void look_up(float* result, const float* table, const std::uint32_t* step, const float* part, std::size_t count);
 
 }  // namespace beamspread

@@ -10,6 +10,7 @@
 
 #include "base/constants.h"
 #include "base/threads.h"
+#include "solve/loops.h"
 
 namespace beamspread {
 
@@ -33,42 +34,67 @@ double angle_deg(double half_tangent)
     return 2.0 * std::atan(half_tangent) / radians_per_degree;
 }
 
-// Calls use(irradiance, half_tangent) for the lit texels of a row.
-template <class Use>
-void visit_row(const LightField& light, std::size_t y, const Use& use)
+// Fine bins of half_tangent from 0 to 1, and rows that are counted together.
+constexpr std::size_t fine_bins = 2048;
+constexpr std::size_t rows_per_item = 32;
+
+struct AngleCounts {
+    float first = 1.0f;
+    float last = 0.0f;
+    std::vector<double> light = std::vector<double>(fine_bins, 0.0);
+    std::vector<double> texels = std::vector<double>(fine_bins, 0.0);
+};
+
+AngleCounts count_angles(const LightField& light, std::size_t first_row, std::size_t last_row)
 {
-    const Vec3& d = light.directions.uniform;
-    const double uniform = half_tangent(d.x, d.y, d.z);
-    for (std::size_t x = 0; x < light.irradiance.width; ++x) {
-        const float irradiance = light.irradiance(y, x);
-        if (irradiance == 0.0f)
-            continue;
-        const float* field = light.directions.field;
-        if (field != nullptr) {
-            const float* at = field + 3 * (y * light.irradiance.width + x);
-            use(static_cast<double>(irradiance), half_tangent(at[0], at[1], at[2]));
-        } else {
-            use(static_cast<double>(irradiance), uniform);
+    AngleCounts counts;
+    const std::size_t width = light.irradiance.width;
+    std::vector<float> irradiance(width);
+    std::vector<float> cosine(width);
+    std::vector<float> sine(width);
+    std::vector<float> place(width);
+    for (std::size_t y = first_row; y < last_row; ++y) {
+        for (std::size_t x = 0; x < width; ++x)
+            irradiance[x] = light.irradiance(y, x);
+        find_angles(light.directions.field + 3 * y * width, irradiance.data(), cosine.data(), sine.data(), place.data(),
+                    width);
+        for (std::size_t x = 0; x < width; ++x) {
+            if (irradiance[x] == 0.0f)
+                continue;
+            counts.first = std::min(counts.first, place[x]);
+            counts.last = std::max(counts.last, place[x]);
+            const auto bin =
+                std::min(static_cast<std::size_t>(place[x] * static_cast<float>(fine_bins)), fine_bins - 1);
+            counts.light[bin] += static_cast<double>(irradiance[x]);
+            counts.texels[bin] += 1.0;
         }
     }
+    return counts;
 }
 
 PresentAngles present_angles(const std::vector<LightField>& lights)
 {
     PresentAngles present;
+    AngleCounts counted;
     const std::size_t height = lights.front().irradiance.height;
     for (const LightField& light : lights) {
-        std::vector<double> first(height, 1.0);
-        std::vector<double> last(height, 0.0);
-        parallel_for(height, [&](std::size_t y) {
-            visit_row(light, y, [&](double, double t) {
-                first[y] = std::min(first[y], t);
-                last[y] = std::max(last[y], t);
-            });
-        });
-        present.first = std::min(present.first, *std::min_element(first.begin(), first.end()));
-        present.last = std::max(present.last, *std::max_element(last.begin(), last.end()));
+        parallel_ordered<AngleCounts>((height + rows_per_item - 1) / rows_per_item,
+                                      [&](std::size_t item) {
+                                          return count_angles(light, item * rows_per_item,
+                                                              std::min(height, (item + 1) * rows_per_item));
+                                      },
+                                      [&](std::size_t, const AngleCounts& rows) {
+                                          counted.first = std::min(counted.first, rows.first);
+                                          counted.last = std::max(counted.last, rows.last);
+                                          for (std::size_t i = 0; i < fine_bins; ++i) {
+                                              counted.light[i] += rows.light[i];
+                                              counted.texels[i] += rows.texels[i];
+                                          }
+                                      });
     }
+    present.first = static_cast<double>(counted.first);
+    // Rounded up to 90 degrees exactly, an angle would be no angle of incidence.
+    present.last = std::min(static_cast<double>(counted.last), 1.0 - 1e-6);
     if (present.first > present.last)
         return present;
 
@@ -78,24 +104,11 @@ PresentAngles present_angles(const std::vector<LightField>& lights)
     };
     Sums total;
     const double width = std::max(present.last - present.first, 1e-12) / static_cast<double>(angle_bins);
-    for (const LightField& light : lights) {
-        parallel_ordered<Sums>(
-            height,
-            [&](std::size_t y) {
-                Sums row;
-                visit_row(light, y, [&](double irradiance, double t) {
-                    const auto bin = std::min(static_cast<std::size_t>((t - present.first) / width), angle_bins - 1);
-                    row.light[bin] += irradiance;
-                    row.texels[bin] += 1.0;
-                });
-                return row;
-            },
-            [&](std::size_t, const Sums& row) {
-                for (std::size_t i = 0; i < angle_bins; ++i) {
-                    total.light[i] += row.light[i];
-                    total.texels[i] += row.texels[i];
-                }
-            });
+    for (std::size_t i = 0; i < fine_bins; ++i) {
+        const double middle = (static_cast<double>(i) + 0.5) / static_cast<double>(fine_bins);
+        const double place = std::clamp((middle - present.first) / width, 0.0, static_cast<double>(angle_bins - 1));
+        total.light[static_cast<std::size_t>(place)] += counted.light[i];
+        total.texels[static_cast<std::size_t>(place)] += counted.texels[i];
     }
     double light = 0.0;
     double texels = 0.0;

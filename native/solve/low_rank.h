@@ -1,7 +1,6 @@
 // A few light terms in place of a beam per texel, for light whose direction changes from texel to texel.
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -26,22 +25,15 @@ struct KernelMedium {
     bool operator==(const KernelMedium&) const = default;
 };
 
-// Place of an angle of incidence in tables: tan(theta / 2), which needs no trigonometry and is smooth everywhere.
-inline double half_tangent(double x, double y, double z)
-{
-    const double across = std::sqrt(x * x + y * y);
-    return across / (std::sqrt(across * across + z * z) - z);
-}
-
-// The harmonic m of a kernel as sum over i of u_i(theta) e_i(r): u_i are tables over half_tangent, e_i is the harmonic
-// m of a profile per medium.
+// The harmonic m of a kernel as sum over i of u_i(theta) e_i(r): u_i are tables over tan(theta / 2), which needs no
+// trigonometry and is smooth everywhere; e_i is the harmonic m of a profile per medium.
 struct LowRankBasis {
     struct AngleFunction {
         std::size_t m;
         std::size_t rank;
         std::vector<float> values;
     };
-    double first = 0.0;  // half_tangent of the first and last entries of the tables
+    double first = 0.0;  // tan(theta / 2) of the first and last entries of the tables
     double last = 0.0;
     std::vector<AngleFunction> functions;              // ascending m, then rank
     std::vector<std::vector<ScaledProfile>> profiles;  // [medium][rank]

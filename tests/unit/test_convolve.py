@@ -286,3 +286,10 @@ def test_transforms_of_many_sizes_at_once(library):
 def test_public_names():
     names = {"Medium", "simulate", "library", "LdfLibrary", "convolve", "albedo_from_color", "presets", "Cancelled"}
     assert names <= set(dir(beamspread))
+
+
+def test_light_that_grazes(library):
+    """Directions whose angle rounds to 90 degrees."""
+    direction = np.array([[[1, 0, -1e-9], [0, 1, -1e-6], [0, 0, -1]]], np.float32)
+    arguments = (np.ones((1, 3), np.float32), direction, library, ALBEDO, 0.5, 1.0)
+    assert convolve(*arguments) == pytest.approx(convolve(*arguments, solver="direct"), rel=1e-3)

@@ -1,0 +1,167 @@
+"""The fft solver, counted in padded real transforms of twice the plane's size (T), beside what else there is.
+
+PYTHONPATH=build/stage build/venv/bin/python tests/bench/fft.py [--quick]
+
+Times are CPU seconds of all threads, the least of several runs, so that they hold on a machine that is busy with
+other things; T is taken next to what it is compared with.
+"""
+
+import argparse
+import math
+import os
+import time
+
+import beamspread
+import numpy as np
+from beamspread import _native
+from scipy import fft as scipy_fft
+from scipy.signal import fftconvolve, oaconvolve
+
+SUN = (math.sin(math.radians(50)), 0.0, -math.cos(math.radians(50)))
+THREADS = os.cpu_count()
+
+
+def seconds(runs, function, *arguments, **options):
+    best = math.inf
+    for _ in range(runs):
+        start = time.process_time()
+        function(*arguments, **options)
+        best = min(best, time.process_time() - start)
+    return best
+
+
+def transform_seconds(size):
+    """T for a plane of this size."""
+    values = np.random.default_rng(0).random((2 * size, 2 * size), np.float32)
+    return seconds(5, _native.real_transform, values)
+
+
+def shadows(size):
+    """Three fifths of the squares of a chessboard are lit."""
+    lit = np.random.default_rng(1).random((16, 16)) < 0.6
+    return np.kron(lit, np.ones((size // 16, size // 16), np.float32))
+
+
+def lamp(size, x=0.0, y=0.0, height=0.1):
+    """Irradiance and directions of a point lamp, lengths in widths of the plane."""
+    across = (np.arange(size, dtype=np.float32) + 0.5) / size - 0.5
+    field = np.stack([*np.meshgrid(across - x, across - y), np.full((size, size), -height, np.float32)], -1)
+    distance = np.linalg.norm(field, axis=-1, keepdims=True)
+    return height / distance[..., 0] ** 3, field / distance
+
+
+def transforms(size):
+    """DUCC as it is compiled here, SciPy's and FFTW, one padded real transform in single precision."""
+    import pyfftw
+
+    values = np.random.default_rng(0).random((2 * size, 2 * size), np.float32)
+    spectrum = pyfftw.empty_aligned((2 * size, size + 1), np.complex64)
+    aligned = pyfftw.empty_aligned(values.shape, np.float32)
+    print(f"\none real transform, {2 * size} x {2 * size}, single precision, CPU seconds")
+    print(f"  DUCC ({_native.fft_instruction_set()})       {seconds(3, _native.real_transform, values):8.3f}")
+    print(f"  SciPy               {seconds(3, scipy_fft.rfft2, values, workers=THREADS):8.3f}")
+    for effort in ("FFTW_ESTIMATE", "FFTW_MEASURE"):
+        start = time.perf_counter()
+        plan = pyfftw.FFTW(aligned, spectrum, axes=(0, 1), flags=(effort,), threads=THREADS)
+        planning = time.perf_counter() - start
+        aligned[:] = values
+        print(f"  {effort:20s}{seconds(3, plan):8.3f}, and {planning:.1f} s to plan")
+
+
+def sun(size, library):
+    light = shadows(size)
+    print(f"\nsun, {size} x {size} RGB, shadows; 4 T are one transform of the light and three back")
+    for path in (0.3, 1.0, 4.0):
+        arguments = light, SUN, library, (0.6, 0.9, 0.3), (path, 0.7 * path, 0.5 * path), 1.0
+        cost = seconds(2, beamspread.convolve, *arguments)
+        unit = transform_seconds(size)
+        print(f"  mean free path {path:4.1f} texels: {cost:7.2f} s = {cost / unit:5.1f} T")
+
+
+def scipy_sun(size, library):
+    """The same kernels, given to SciPy as an image."""
+    light = shadows(size)
+    path, reach = 4.0, 255
+    one = np.zeros((2 * reach + 1, 2 * reach + 1), np.float32)
+    one[reach, reach] = 1
+    arguments = SUN, library, (0.6, 0.9, 0.3), path, 1.0
+    kernels = beamspread.convolve(one, *arguments, solver="direct")
+    ours, cost = None, math.inf
+    for _ in range(2):
+        start = time.process_time()
+        ours = beamspread.convolve(light, *arguments)
+        cost = min(cost, time.process_time() - start)
+    print(
+        f"\nsun, {size} x {size} RGB, beside SciPy with kernels of {2 * reach + 1} texels made beforehand"
+    )
+    print(f"  ours         {cost:7.2f} s, kernels included")
+    for function in (fftconvolve, oaconvolve):
+        start = time.process_time()
+        theirs = np.stack([function(light, kernels[..., c], mode="same") for c in range(3)], -1)
+        took = time.process_time() - start
+        print(
+            f"  {function.__name__:12s} {took:7.2f} s; largest difference {abs(theirs - ours).max() / ours.max():.1e}"
+        )
+
+
+def lamps(size, libraries):
+    light = lamp(size)
+    two = [light, lamp(size, 0.2, -0.1)]
+    print(f"\npoint lamp at a tenth of the width, {size} x {size} RGB; L1 error and worst texel against full rank")
+    for ior, albedo in ((1.0, 0.9), (1.4, 0.99)):
+        library = libraries[ior]
+        for paths in ((1.0, 1.0, 1.0), (4.0, 4.0, 4.0), (1.0, 0.7, 0.5)):
+            rest = library, albedo, paths, 1.0
+            exact = beamspread.convolve(*light, *rest, tolerance=1e-5)
+            for tolerance in (1e-2, 4e-2):
+                result = beamspread.convolve(*light, *rest, tolerance=tolerance)
+                cost = seconds(1, beamspread.convolve, *light, *rest, tolerance=tolerance)
+                unit = transform_seconds(size)
+                error = np.abs(result - exact)
+                print(
+                    f"  ior {ior}, albedo {albedo}, paths {paths}, tolerance {tolerance:4.2f}: {cost:6.2f} s = "
+                    f"{cost / unit:5.1f} T, L1 {error.sum() / exact.sum():.1e}, worst {(error / exact).max():.1e}"
+                )
+        options = {"tolerance": 4e-2}
+        rest = library, albedo, 1.0, 1.0
+        one_cost = seconds(2, beamspread.convolve, *light, *rest, **options)
+        two_cost = seconds(2, beamspread.convolve_lights, two, *rest, **options)
+        print(f"  ior {ior}: two lamps cost {two_cost / one_cost:.2f} times one")
+
+
+def check(size, library):
+    """Full rank is as good as direct, where that is feasible."""
+    arguments = *lamp(size), library, (0.6, 0.9, 0.3), 1.0, 1.0
+    direct = beamspread.convolve(*arguments, solver="direct")
+    error = np.abs(beamspread.convolve(*arguments, tolerance=1e-5) - direct)
+    print(f"\nfull rank against direct, lamp, {size} x {size}: L1 {error.sum() / direct.sum():.1e}")
+
+
+def growth(sizes, library):
+    print("\ngrowth, sun and lamp (tolerance 0.04), CPU seconds over N^2 log N, relative to the first")
+    first = None
+    for size in sizes:
+        costs = []
+        for light in ((shadows(size), SUN), lamp(size)):
+            arguments = *light, library, 0.9, 1.0, 1.0
+            costs.append(seconds(2, beamspread.convolve, *arguments, tolerance=4e-2) / (size**2 * math.log(size)))
+        first = first or costs
+        print(f"  {size:6d}: {costs[0] / first[0]:.2f} {costs[1] / first[1]:.2f}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="quarter of the size")
+    smaller = 4 if parser.parse_args().quick else 1
+    libraries = {ior: beamspread.library(beamspread.Medium(0.8, ior)) for ior in (1.0, 1.4)}
+    print(f"{THREADS} threads")
+    transforms(4096 // smaller)
+    sun(4096 // smaller, libraries[1.0])
+    scipy_sun(2048 // smaller, libraries[1.0])
+    check(96, libraries[1.0])
+    lamps(2048 // smaller, libraries)
+    growth([n // smaller for n in (512, 1024, 2048, 4096, 8192)], libraries[1.0])
+
+
+if __name__ == "__main__":
+    main()
