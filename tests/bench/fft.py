@@ -91,9 +91,7 @@ def scipy_sun(size, library):
         start = time.process_time()
         ours = beamspread.convolve(light, *arguments)
         cost = min(cost, time.process_time() - start)
-    print(
-        f"\nsun, {size} x {size} RGB, beside SciPy with kernels of {2 * reach + 1} texels made beforehand"
-    )
+    print(f"\nsun, {size} x {size} RGB, beside SciPy with kernels of {2 * reach + 1} texels made beforehand")
     print(f"  ours         {cost:7.2f} s, kernels included")
     for function in (fftconvolve, oaconvolve):
         start = time.process_time()
