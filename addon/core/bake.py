@@ -20,7 +20,7 @@ from .scene import Grid, Light, Mesh, PointLight, SpotLight, SunLight
 LIBRARY_WEIGHT, BEAMS_WEIGHT, SOLVE_WEIGHT = 2.0, 1.0, 3.0
 LIGHT_WEIGHT = BEAMS_WEIGHT + SOLVE_WEIGHT
 
-# Of the solvers: luminance within about a tenth of it, less than the noise of the libraries.
+# Of the solvers, see `convolve`: errors of `fft` add up to less than 0.3 % of the light, below the noise of libraries.
 TOLERANCE = 1e-2
 
 # Lights solved together; each keeps its irradiance and directions in memory until then.
