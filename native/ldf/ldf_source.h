@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "ldf/radial_profile.h"
+#include "transport/ballistic.h"
 #include "transport/tally.h"
 
 namespace beamspread {
@@ -26,6 +27,9 @@ public:
         std::vector<double> odd;
     };
     virtual AngleWeights angle_weights(double angle_deg) const = 0;
+
+    // The unscattered light, per unit power incident; none where it is part of the profiles.
+    virtual std::vector<BallisticExit> ballistic(double /*angle_deg*/, Side /*side*/) const { return {}; }
 
     // Throws InvalidArgument for an angle that the source does not reach to.
     virtual void check_angle(double angle_deg) const = 0;

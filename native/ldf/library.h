@@ -10,7 +10,6 @@
 #include "ldf/angle_spline.h"
 #include "ldf/ldf_source.h"
 #include "medium/medium.h"
-#include "transport/ballistic.h"
 #include "transport/simulation.h"
 
 namespace beamspread {
@@ -70,8 +69,7 @@ public:
     std::vector<RadialProfile> node_profiles(double albedo, Side side) const override;
     AngleWeights angle_weights(double angle_deg) const override;
 
-    // The unscattered light, per unit power incident.
-    std::vector<BallisticExit> ballistic(double angle_deg, Side side) const;
+    std::vector<BallisticExit> ballistic(double angle_deg, Side side) const override;
 
     // Throws InvalidArgument if the library does not reach to this angle.
     void check_angle(double angle_deg) const override;

@@ -97,6 +97,7 @@ Array<float> convolve(const std::vector<Light>& lights, const std::vector<std::s
         float* data = luminance.mutable_data();
         const py::gil_scoped_release release;
         solve_fft(problems, report, data);
+        add_unscattered(problems, data);
         return luminance;
     }
     if (solver != "direct" && solver != "adaptive")
@@ -108,7 +109,11 @@ Array<float> convolve(const std::vector<Light>& lights, const std::vector<std::s
         const py::gil_scoped_release release;
         planes = solver == "direct" ? solve_direct(first, report) : solve_adaptive(first, report);
     }
-    return interleaved(planes, first.height, first.width);
+    Array<float> luminance = interleaved(planes, first.height, first.width);
+    float* data = luminance.mutable_data();
+    const py::gil_scoped_release release;
+    add_unscattered(problems, data);
+    return luminance;
 }
 
 using Squares = std::tuple<Array<std::int64_t>, Array<double>>;

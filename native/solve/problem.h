@@ -53,4 +53,8 @@ Luminance solve_adaptive(const Problem& problem, Progress& progress);
 // several lights, which differ in irradiance and directions only. Writes (height, width, channels).
 void solve_fft(const std::vector<Problem>& lights, Progress& progress, float* luminance);
 
+// What all solvers leave out, as it has no place in a smooth kernel: light that a slab with an ior above 1 returns
+// unscattered from its far boundary. Adds to (height, width, channels).
+void add_unscattered(const std::vector<Problem>& lights, float* luminance);
+
 }  // namespace beamspread

@@ -150,7 +150,7 @@ def far_field(albedo, pitch):
     return simulate(Medium(0.8), [45], 4_000_000).image(45, albedo, 101, pitch)
 
 
-@pytest.mark.parametrize("medium", [Medium(0.8, 1.4), Medium(0.0, 1.0, 2.0)], ids=str)
+@pytest.mark.parametrize("medium", [Medium(0.8, 1.4), Medium(0.0, 1.0, 2.0), Medium(0.8, 1.4, 0.5)], ids=str)
 def test_a_bake_keeps_energy(medium):
     """What a large plane gives off is the exact reflectance times the power it receives, to .1 %."""
     irradiance = np.zeros((96, 96), np.float32)
