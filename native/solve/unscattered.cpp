@@ -61,8 +61,7 @@ public:
         m_per_step = last > first ? static_cast<float>(table_steps) / (last - first) : 0.0f;
         for (std::size_t i = 0; i <= table_steps; ++i) {
             const double t = first + (last - first) * static_cast<double>(i) / static_cast<double>(table_steps);
-            const auto exits =
-                channel.library->ballistic(2.0 * std::atan(t) / radians_per_degree, Side::reflected);
+            const auto exits = channel.library->ballistic(2.0 * std::atan(t) / radians_per_degree, Side::reflected);
             for (std::size_t k = 0; k < exits.size(); ++k) {
                 if (k == m_exits.size() && exits[k].power >= negligible_power)
                     m_exits.emplace_back(table_steps + 1);
@@ -75,7 +74,7 @@ public:
 
     struct Exit {
         float distance = 0.0f;  // metres
-        float power = 0.0f;     // per unit power incident
+        float power = 0.0f;  // per unit power incident
     };
 
     std::size_t count() const { return m_exits.size(); }
@@ -154,12 +153,13 @@ public:
         if (m_exits.count() == 0)
             return;
         const std::size_t strips = (m_problem.height + rows_per_strip - 1) / rows_per_strip;
-        parallel_ordered<Strip>(strips, [&](std::size_t i) { return strip(i * rows_per_strip); },
-                                [&](std::size_t, const Strip& done) {
-                                    float* out = luminance + done.first_row * m_problem.width * stride;
-                                    for (std::size_t i = 0; i < done.values.size(); ++i)
-                                        out[i * stride] += done.values[i];
-                                });
+        parallel_ordered<Strip>(
+            strips, [&](std::size_t i) { return strip(i * rows_per_strip); },
+            [&](std::size_t, const Strip& done) {
+                float* out = luminance + done.first_row * m_problem.width * stride;
+                for (std::size_t i = 0; i < done.values.size(); ++i)
+                    out[i * stride] += done.values[i];
+            });
     }
 
 private:
