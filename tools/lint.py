@@ -90,9 +90,9 @@ def check_tidy() -> bool:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--fix", action="store_true", help="rewrite what format and ruff can put right")
-    parser.add_argument("checks", nargs="*", choices=["format", "ruff", "tidy"], help="default: all")
+    parser.add_argument("checks", nargs="*", choices=["format", "ruff", "tidy", "all"], default="all")
     arguments = parser.parse_args()
-    checks = arguments.checks or ["format", "ruff", "tidy"]
+    checks = ["format", "ruff", "tidy"] if "all" in arguments.checks else arguments.checks
     good = True
     if "format" in checks and not check_format(arguments.fix):
         print("lint: put right by `tools/lint.py --fix format`", file=sys.stderr)
