@@ -25,7 +25,7 @@ Harmonics point_value(const RadialFunction& point, double r)
     const Harmonics inner = point.remaining(r * (1.0 - step));
     const Harmonics outer = point.remaining(r * (1.0 + step));
     Harmonics value{};
-    for (std::size_t m = 0; m < harmonic_count; ++m)
+    for (std::size_t m = 0; m < point.harmonics(); ++m)
         value[m] = (inner[m] - outer[m]) / (2.0 * step * r * r);
     return value;
 }
@@ -59,7 +59,7 @@ Harmonics disk_mean(const RadialFunction& point, double radius, double s)
             const Harmonics radial = near ? point.cumulative(r) : point.remaining(r);
             double previous = cos_phi;
             double cosine = 1.0;
-            for (std::size_t m = 0; m < harmonic_count; ++m) {
+            for (std::size_t m = 0; m < point.harmonics(); ++m) {
                 sum[m] += (near ? weight : -weight) * radial[m] * cosine;
                 const double next = 2.0 * cos_phi * cosine - previous;
                 previous = cosine;
@@ -127,7 +127,8 @@ double area_below(double radius, double x0, double x1, double y)
 }  // namespace
 
 DiskProfile::DiskProfile(const RadialFunction& point, double radius)
-    : m_edge(radius),
+    : m_harmonics(point.harmonics()),
+      m_edge(radius),
       m_radii(breakpoints(radius, point.support())),
       m_remaining(m_radii.size(), Harmonics{}),
       m_slope(m_radii.size(), Harmonics{})
@@ -139,7 +140,7 @@ DiskProfile::DiskProfile(const RadialFunction& point, double radius)
         for (std::size_t q = 0; q < gauss_node.size(); ++q) {
             const double s = r + half * (1.0 + gauss_node[q]);
             const Harmonics mean = disk_mean(point, radius, s);
-            for (std::size_t m = 0; m < harmonic_count; ++m)
+            for (std::size_t m = 0; m < m_harmonics; ++m)
                 power[k + 1][m] += gauss_weight[q] * half * s * mean[m];
         }
         m_slope[k] = disk_mean(point, radius, r);
@@ -147,7 +148,7 @@ DiskProfile::DiskProfile(const RadialFunction& point, double radius)
             slope *= r;
     });
     for (std::size_t k = m_radii.size() - 1; k-- > 0;)
-        for (std::size_t m = 0; m < harmonic_count; ++m)
+        for (std::size_t m = 0; m < m_harmonics; ++m)
             m_remaining[k][m] = m_remaining[k + 1][m] + power[k + 1][m];
 
     // The rings are summed by quadrature, the total is known.
@@ -174,7 +175,7 @@ Harmonics DiskProfile::remaining(double r) const
     const double v1 = t * t * (3.0 - 2.0 * t);
     const double s0 = t * (1.0 - t) * (1.0 - t) * h;
     const double s1 = t * t * (t - 1.0) * h;
-    for (std::size_t m = 0; m < harmonic_count; ++m)
+    for (std::size_t m = 0; m < m_harmonics; ++m)
         out[m] =
             (1.0 - v1) * m_remaining[k - 1][m] + v1 * m_remaining[k][m] - s0 * m_slope[k - 1][m] - s1 * m_slope[k][m];
     return out;
@@ -183,7 +184,7 @@ Harmonics DiskProfile::remaining(double r) const
 Harmonics DiskProfile::cumulative(double r) const
 {
     Harmonics out = remaining(r);
-    for (std::size_t m = 0; m < harmonic_count; ++m)
+    for (std::size_t m = 0; m < m_harmonics; ++m)
         out[m] = m_remaining[0][m] - out[m];
     return out;
 }

@@ -15,12 +15,14 @@ public:
     // radius > 0. The total stays the same.
     DiskProfile(const RadialFunction& point, double radius);
 
+    std::size_t harmonics() const override { return m_harmonics; }
     Harmonics cumulative(double r) const override;
     Harmonics remaining(double r) const override;
     double support() const override { return m_radii.back(); }
     double edge() const override { return m_edge; }
 
 private:
+    std::size_t m_harmonics;
     double m_edge;
     std::vector<double> m_radii;  // ascending from 0
     std::vector<Harmonics> m_remaining;

@@ -74,7 +74,7 @@ std::vector<double> texel_power(const RadialProfile& profile, std::size_t size, 
                                          : integrate_texels(DiskProfile(profile, 0.5 * beam_diameter), grid);
     const std::size_t count = size * size;
     std::vector<double> texels(count, 0.0);
-    for (std::size_t m = 0; m < harmonic_count; ++m)
+    for (std::size_t m = 0; m < integrals.harmonics; ++m)
         for (std::size_t i = 0; i < count; ++i)
             texels[i] += integrals.cosine[m * count + i];
     return texels;

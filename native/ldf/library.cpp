@@ -21,6 +21,9 @@ constexpr double grazing_deg = 88.0;
 // Below this exponent a bin's weight is zero to any purpose, and the expansion in its variance no longer holds.
 constexpr double negligible_log_weight = -60.0;
 
+// Harmonics at the end of the row that move less than this part of a profile's power only cost time.
+constexpr double negligible_harmonics = 1e-4;
+
 // Sums over the orders, [radius bin][harmonic].
 std::vector<double> contract_orders(const SideResult& side, double albedo)
 {
@@ -42,7 +45,9 @@ RadialProfile profile_of(const AngleResult& angle, Side side, std::vector<double
         for (std::size_t i = 0; i < sums.size(); ++i)
             if (i % harmonic_count != 0)
                 sums[i] = 0.0;
-    return RadialProfile(angle.sides[static_cast<std::size_t>(side)].centre, sums);
+    RadialProfile profile(angle.sides[static_cast<std::size_t>(side)].centre, sums);
+    profile.drop_negligible(negligible_harmonics);
+    return profile;
 }
 
 }  // namespace
@@ -242,6 +247,7 @@ RadialProfile LdfLibrary::interpolated(double angle_deg, const std::vector<Radia
     }
     // The weights hold the transmittance at entry, which changes power and no place.
     sum.set_centre(centre / entry_transmittance(angle_deg));
+    sum.drop_negligible(negligible_harmonics);
     return sum;
 }
 

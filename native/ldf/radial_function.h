@@ -15,6 +15,9 @@ class RadialFunction {
 public:
     virtual ~RadialFunction() = default;
 
+    // Leading harmonics in use: c_m is zero from this m on.
+    virtual std::size_t harmonics() const = 0;
+
     // C_m(r) for every m.
     virtual Harmonics cumulative(double r) const = 0;
 

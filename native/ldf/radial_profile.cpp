@@ -88,14 +88,15 @@ RadialProfile::RadialProfile() : m_remaining(edge_count, Harmonics{}), m_slope(e
 RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments) : RadialProfile()
 {
     m_centre = centre;
+    m_harmonics = bin_moments.size() / edge_count;
     // integral of cos^2(m phi) over a turn: 2 pi for m = 0, pi above.
     const auto norm = [](std::size_t m) { return m == 0 ? inv_pi / 2.0 : inv_pi; };
     // From outside in, so that what remains far out is not the difference of large sums.
     Harmonics sum{};
     for (std::size_t k = edge_count; k-- > 0;) {
         m_remaining[k] = sum;
-        for (std::size_t m = 0; m < harmonic_count; ++m)
-            sum[m] += norm(m) * bin_moments[k * harmonic_count + m];
+        for (std::size_t m = 0; m < m_harmonics; ++m)
+            sum[m] += norm(m) * bin_moments[k * m_harmonics + m];
     }
     m_total = sum;
 
@@ -127,10 +128,10 @@ Harmonics RadialProfile::slope_at(std::size_t k) const
     for (std::size_t i = 0; i < 5; ++i) {
         const Harmonics& there = m_remaining[stencil.first + i];
         slope[0] -= stencil.weight[i] * here * std::log(there[0] / here);
-        for (std::size_t m = 1; m < harmonic_count; ++m)
+        for (std::size_t m = 1; m < m_harmonics; ++m)
             slope[m] -= stencil.weight[i] * here * there[m] / there[0];
     }
-    for (std::size_t m = 1; m < harmonic_count; ++m)
+    for (std::size_t m = 1; m < m_harmonics; ++m)
         slope[m] += m_remaining[k][m] / here * slope[0];
     return slope;
 }
@@ -138,14 +139,17 @@ Harmonics RadialProfile::slope_at(std::size_t k) const
 void RadialProfile::add(const RadialProfile& other, double even_weight, double odd_weight)
 {
     Harmonics weights{};
-    for (std::size_t m = 0; m < harmonic_count; ++m)
+    for (std::size_t m = 0; m < other.m_harmonics; ++m)
         weights[m] = m % 2 == 0 ? even_weight : odd_weight;
     add(other, weights);
 }
 
 void RadialProfile::add(const RadialProfile& other, const Harmonics& weights)
 {
-    for (std::size_t m = 0; m < harmonic_count; ++m) {
+    for (std::size_t m = 0; m < other.m_harmonics; ++m) {
+        if (weights[m] == 0.0)
+            continue;
+        m_harmonics = std::max(m_harmonics, m + 1);
         m_total[m] += weights[m] * other.m_total[m];
         for (std::size_t k = 0; k < edge_count; ++k) {
             m_remaining[k][m] += weights[m] * other.m_remaining[k][m];
@@ -153,6 +157,24 @@ void RadialProfile::add(const RadialProfile& other, const Harmonics& weights)
         }
     }
     m_support = std::max(m_support, other.m_support);
+}
+
+void RadialProfile::drop_negligible(double fraction)
+{
+    // Over a turn |cos(m phi)| integrates to 4, and 1 to 2 pi.
+    double moved = 0.0;
+    while (m_harmonics > 1) {
+        const std::size_t m = m_harmonics - 1;
+        moved += std::abs(m_total[m] - m_remaining[0][m]);
+        for (std::size_t k = 1; k < edge_count; ++k)
+            moved += std::abs(m_remaining[k - 1][m] - m_remaining[k][m]);
+        if (2.0 * inv_pi * moved > fraction * m_total[0])
+            return;
+        m_harmonics = m;
+        m_total[m] = 0.0;
+        for (std::size_t k = 0; k < edge_count; ++k)
+            m_remaining[k][m] = m_slope[k][m] = 0.0;
+    }
 }
 
 void RadialProfile::update_support()
@@ -173,13 +195,13 @@ Harmonics RadialProfile::remaining(double r) const
     if (k == 0) {
         // Single scattering makes g grow like 1/r toward the point of entry.
         const double t = std::min(1.0, r / edge[0]);
-        for (std::size_t m = 0; m < harmonic_count; ++m)
+        for (std::size_t m = 0; m < m_harmonics; ++m)
             out[m] = m_total[m] + t * (m_remaining[0][m] - m_total[m]);
         return out;
     }
     const double h = edge[k] - edge[k - 1];
     const Cubic c = cubic_value((r - edge[k - 1]) / h, h);
-    for (std::size_t m = 0; m < harmonic_count; ++m)
+    for (std::size_t m = 0; m < m_harmonics; ++m)
         out[m] =
             c.v0 * m_remaining[k - 1][m] + c.v1 * m_remaining[k][m] - c.s0 * m_slope[k - 1][m] - c.s1 * m_slope[k][m];
     return out;
@@ -193,13 +215,13 @@ Harmonics RadialProfile::density(double r) const
     const auto& edge = edges();
     const std::size_t k = radius_bin(static_cast<float>(r));
     if (k == 0) {
-        for (std::size_t m = 0; m < harmonic_count; ++m)
+        for (std::size_t m = 0; m < m_harmonics; ++m)
             out[m] = (m_total[m] - m_remaining[0][m]) / (edge[0] * r);
         return out;
     }
     const double h = edge[k] - edge[k - 1];
     const Cubic c = cubic_derivative((r - edge[k - 1]) / h, h);
-    for (std::size_t m = 0; m < harmonic_count; ++m)
+    for (std::size_t m = 0; m < m_harmonics; ++m)
         out[m] = (c.s0 * m_slope[k - 1][m] + c.s1 * m_slope[k][m] - c.v0 * m_remaining[k - 1][m] -
                   c.v1 * m_remaining[k][m]) /
                  r;
@@ -209,7 +231,7 @@ Harmonics RadialProfile::density(double r) const
 Harmonics RadialProfile::cumulative(double r) const
 {
     Harmonics out = remaining(r);
-    for (std::size_t m = 0; m < harmonic_count; ++m)
+    for (std::size_t m = 0; m < m_harmonics; ++m)
         out[m] = m_total[m] - out[m];
     return out;
 }

@@ -15,7 +15,7 @@ class RadialProfile final : public RadialFunction {
 public:
     RadialProfile();
 
-    // From sums of weight * cos(m phi) per radius bin, [radius bin][harmonic].
+    // From sums of weight * cos(m phi) per radius bin, [radius bin][harmonic], as many harmonics as the sums hold.
     RadialProfile(double centre, std::span<const double> bin_moments);
 
     // Adds `weight` times another profile, harmonics of even and odd m apart. The centre stays.
@@ -24,6 +24,10 @@ public:
     // The same with a weight for each harmonic.
     void add(const RadialProfile& other, const Harmonics& weights);
 
+    // Drops the trailing harmonics that together move no more than this fraction of the power.
+    void drop_negligible(double fraction);
+
+    std::size_t harmonics() const override { return m_harmonics; }
     Harmonics cumulative(double r) const override;
     Harmonics remaining(double r) const override;
 
@@ -42,6 +46,7 @@ private:
     Harmonics slope_at(std::size_t edge) const;
     void update_support();
 
+    std::size_t m_harmonics = 0;
     double m_centre = 0.0;
     double m_support = 0.0;
     std::vector<Harmonics> m_remaining;  // at each edge

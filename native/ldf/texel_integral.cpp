@@ -19,6 +19,9 @@ constexpr std::array<double, 3> gauss_weight = {5.0 / 9.0, 8.0 / 9.0, 5.0 / 9.0}
 constexpr double max_step = 0.2;
 
 struct BorderIntegral {
+    explicit BorderIntegral(std::size_t count) : harmonics(count) {}
+
+    std::size_t harmonics;
     Harmonics cosine{};
     Harmonics sine{};
 
@@ -26,7 +29,7 @@ struct BorderIntegral {
     {
         double c = weight;
         double s = 0.0;
-        for (std::size_t m = 0; m < harmonic_count; ++m) {
+        for (std::size_t m = 0; m < harmonics; ++m) {
             cosine[m] += radial[m] * c;
             sine[m] += radial[m] * s;
             const double next = c * cos_phi - s * sin_phi;
@@ -37,7 +40,7 @@ struct BorderIntegral {
 
     void add(const BorderIntegral& other, double sign)
     {
-        for (std::size_t m = 0; m < harmonic_count; ++m) {
+        for (std::size_t m = 0; m < harmonics; ++m) {
             cosine[m] += sign * other.cosine[m];
             sine[m] += sign * other.sine[m];
         }
@@ -52,7 +55,7 @@ template <class Place>
 BorderIntegral integrate_piece(const RadialFunction& profile, Radial radial, double distance, double s0, double s1,
                                double turn, const Place& place)
 {
-    BorderIntegral sum;
+    BorderIntegral sum(profile.harmonics());
     if (distance == 0.0)
         return sum;  // d phi = 0 along a line through the pole
     const double nearest = std::hypot(distance, s0 * s1 <= 0.0 ? 0.0 : std::min(std::abs(s0), std::abs(s1)));
@@ -96,7 +99,7 @@ BorderIntegral integrate_border(const RadialFunction& profile, Radial radial, do
     if (!(distance < profile.edge()))
         return integrate_piece(profile, radial, distance, s0, s1, turn, place);
     const double chord = std::sqrt(profile.edge() * profile.edge() - distance * distance);
-    BorderIntegral sum;
+    BorderIntegral sum(profile.harmonics());
     double from = s0;
     for (const double to : {std::clamp(-chord, s0, s1), std::clamp(chord, s0, s1), s1}) {
         if (to > from)
@@ -125,7 +128,7 @@ BorderIntegral vertical(const RadialFunction& profile, Radial radial, double x, 
 TexelIntegrals integrate_texels(const RadialFunction& profile, const TexelGrid& grid)
 {
     const std::size_t texels = grid.width * grid.height;
-    TexelIntegrals out(texels);
+    TexelIntegrals out(profile.harmonics(), texels);
     // A border that misses the pole only by rounding goes through it.
     const double rounding = 1e-9 * std::min(grid.pitch_x, grid.pitch_y);
     const auto snapped = [rounding](double x) { return std::abs(x) < rounding ? 0.0 : x; };
@@ -134,7 +137,7 @@ TexelIntegrals integrate_texels(const RadialFunction& profile, const TexelGrid& 
 
     const auto store = [&](std::size_t i, std::size_t j, const BorderIntegral& value, double sign) {
         const std::size_t texel = i * grid.width + j;
-        for (std::size_t m = 0; m < harmonic_count; ++m) {
+        for (std::size_t m = 0; m < out.harmonics; ++m) {
             out.cosine[m * texels + texel] = sign * value.cosine[m];
             out.sine[m * texels + texel] = sign * value.sine[m];
         }
@@ -146,7 +149,7 @@ TexelIntegrals integrate_texels(const RadialFunction& profile, const TexelGrid& 
         const std::size_t first = block * rows_per_block;
         const std::size_t last = std::min(grid.height, first + rows_per_block);
         const auto horizontal_borders = [&](std::size_t i) {
-            std::vector<BorderIntegral> borders(grid.width);
+            std::vector<BorderIntegral> borders(grid.width, BorderIntegral(0));
             for (std::size_t j = 0; j < grid.width; ++j)
                 borders[j] = horizontal(profile, Radial::remaining, y_at(i), x_at(j), x_at(j + 1));
             return borders;

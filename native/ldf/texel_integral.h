@@ -19,13 +19,17 @@ struct TexelGrid {
     std::size_t height = 0;
 };
 
-// Integrals over each texel of c_m(r) cos(m phi) and c_m(r) sin(m phi), [m][i][j].
+// Integrals over each texel of c_m(r) cos(m phi) and c_m(r) sin(m phi), [m][i][j], for the harmonics that the profile uses.
 struct TexelIntegrals {
+    std::size_t harmonics = 0;
     std::vector<double> cosine;
     std::vector<double> sine;
 
     TexelIntegrals() = default;
-    explicit TexelIntegrals(std::size_t texels) : cosine(harmonic_count * texels), sine(harmonic_count * texels) {}
+    TexelIntegrals(std::size_t used, std::size_t texels)
+        : harmonics(used), cosine(harmonics * texels), sine(harmonics * texels)
+    {
+    }
 };
 
 // By Green's theorem the integral over a texel is that of C_m(r) cos(m phi) d phi around its border.

@@ -61,7 +61,7 @@ void QuadrantKernel::row(std::ptrdiff_t dy, const Harmonics& cosine, const Harmo
     values.assign(2 * m_width - 1, 0.0);
     double* right = values.data() + (m_width - 1);
     const std::size_t first = static_cast<std::size_t>(std::abs(dy)) * m_width;
-    for (std::size_t m = 0; m < harmonic_count; ++m) {
+    for (std::size_t m = 0; m < m_integrals.harmonics; ++m) {
         // phi -> -phi for dy < 0, and phi -> pi - phi for dx < 0.
         const double by_sine = dy < 0 ? -sine[m] : sine[m];
         const double mirrored = m % 2 == 0 ? 1.0 : -1.0;

@@ -53,6 +53,8 @@ class QuadrantKernel {
 public:
     QuadrantKernel(const RadialProfile& profile, const Problem& problem, const Channel& channel);
 
+    std::size_t harmonics() const { return m_integrals.harmonics; }
+
     // The sum over m of cosine[m] A_m + sine[m] B_m for the row offset dy and dx = -(width - 1) .. width - 1.
     void row(std::ptrdiff_t dy, const Harmonics& cosine, const Harmonics& sine, std::vector<double>& values) const;
 

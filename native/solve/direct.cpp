@@ -21,20 +21,20 @@ struct Term {
 };
 
 // The combinations of node, harmonic and phase whose kernels are kept apart: one for a uniform direction.
-std::vector<Term> basis_terms(const Problem& problem, const BeamBasis& basis)
+std::vector<Term> basis_terms(const Problem& problem, const std::vector<QuadrantKernel>& kernels)
 {
     std::vector<Term> terms;
     if (!problem.directions.field) {
         Term term{0, {}, {}};
         const double beta = azimuth(problem.directions.uniform);
-        for (std::size_t m = 0; m < harmonic_count; ++m) {
+        for (std::size_t m = 0; m < kernels[0].harmonics(); ++m) {
             term.cosine[m] = std::cos(static_cast<double>(m) * beta);
             term.sine[m] = std::sin(static_cast<double>(m) * beta);
         }
         return {term};
     }
-    for (std::size_t j = 0; j < basis.node_count(); ++j) {
-        for (std::size_t m = 0; m < harmonic_count; ++m) {
+    for (std::size_t j = 0; j < kernels.size(); ++j) {
+        for (std::size_t m = 0; m < kernels[j].harmonics(); ++m) {
             Term cosine{j, {}, {}};
             cosine.cosine[m] = 1.0;
             terms.push_back(cosine);
@@ -49,15 +49,16 @@ std::vector<Term> basis_terms(const Problem& problem, const BeamBasis& basis)
 }
 
 // Factors of the terms for the beam at one texel, in the order of basis_terms.
-std::vector<double> beam_factors(const Problem& problem, const BeamBasis& basis, const Vec3& direction)
+std::vector<double> beam_factors(const Problem& problem, const BeamBasis& basis,
+                                 const std::vector<QuadrantKernel>& kernels, const Vec3& direction)
 {
     if (!problem.directions.field)
         return {1.0};
     const BeamBasis::Weights weights = basis.weights(direction);
     const double beta = azimuth(direction);
     std::vector<double> factors;
-    for (std::size_t j = 0; j < basis.node_count(); ++j) {
-        for (std::size_t m = 0; m < harmonic_count; ++m) {
+    for (std::size_t j = 0; j < kernels.size(); ++j) {
+        for (std::size_t m = 0; m < kernels[j].harmonics(); ++m) {
             const double weight = m % 2 == 0 ? weights.even[j] : weights.odd[j];
             factors.push_back(weight * std::cos(static_cast<double>(m) * beta));
             if (m > 0)
@@ -76,10 +77,10 @@ std::vector<float> solve_channel(const Problem& problem, const Channel& channel,
 {
     const BeamBasis basis =
         problem.directions.field ? BeamBasis::library_nodes(*channel.library) : BeamBasis::uniform(problem);
-    const std::vector<Term> terms = basis_terms(problem, basis);
     std::vector<QuadrantKernel> kernels;
     for (const RadialProfile& profile : basis.profiles(channel))
         kernels.emplace_back(profile, problem, channel);
+    const std::vector<Term> terms = basis_terms(problem, kernels);
 
     const auto height = static_cast<std::ptrdiff_t>(problem.height);
     // rows[(dy + height - 1) * terms + k][dx + width - 1]
@@ -96,7 +97,7 @@ std::vector<float> solve_channel(const Problem& problem, const Channel& channel,
             const auto irradiance = static_cast<double>(channel.irradiance(y, x));
             if (irradiance == 0.0)
                 continue;
-            Beam beam{x, beam_factors(problem, basis, direction_at(problem, y, x))};
+            Beam beam{x, beam_factors(problem, basis, kernels, direction_at(problem, y, x))};
             for (double& factor : beam.factors)
                 factor *= irradiance;
             beams[y].push_back(std::move(beam));

@@ -92,6 +92,8 @@ KernelSpectra::KernelSpectra(std::size_t width, std::size_t height, double pitch
       m_texel(std::max(pitch_x, pitch_y)),
       m_deviation(window_deviation)
 {
+    for (const ScaledProfile& each : m_profiles)
+        m_harmonics = std::max(m_harmonics, each.profile.harmonics());
     choose_window();
     choose_tiles(budget, terms);
     if (m_far)
@@ -181,7 +183,7 @@ void KernelSpectra::tabulate_hankel()
         for (std::size_t m = 0; m < harmonic_count; ++m) {
             const RadialProfile& profile = m_profiles[p].profile;
             bool empty = true;
-            for (std::size_t k = 0; k < radius_bin_count; ++k)
+            for (std::size_t k = 0; k < radius_bin_count && m < profile.harmonics(); ++k)
                 empty = empty && profile.remaining(radius_bin_edge(k))[m] == 0.0;
             m_column.push_back(empty ? no_column : m_table_columns++);
         }
@@ -230,7 +232,7 @@ void KernelSpectra::tabulate_hankel()
                     const Harmonics c = profile.density(r * to_paths);
                     double t0 = 1.0;
                     double t1 = x / r;
-                    for (std::size_t m = 0; m < harmonic_count; ++m) {
+                    for (std::size_t m = 0; m < profile.harmonics(); ++m) {
                         sum[m] += weight * c[m] * t0;
                         const double t2 = 2.0 * (x / r) * t1 - t0;
                         t0 = t1;
@@ -253,7 +255,7 @@ void KernelSpectra::tabulate_hankel()
                 value += w[j] * projections[even_count + i - 1 + j][m];
             return value;
         };
-        parallel_for(harmonic_count, [&](std::size_t m) {
+        parallel_for(profile.harmonics(), [&](std::size_t m) {
             if (m_column[p * harmonic_count + m] == no_column)
                 return;
             std::vector<float> line(length, 0.0f);
@@ -298,12 +300,12 @@ void KernelSpectra::integrate_near()
                                       gauss_weight[i / gauss_node.size()] * to_paths * to_paths *
                                       outside_window(r, m_deviation) * before_cut(r, m_cut, m_taper);
                 const double phi = std::atan2(y, x);
-                for (std::size_t m = 0; m < harmonic_count; ++m) {
+                for (std::size_t m = 0; m < profile.harmonics(); ++m) {
                     cosine[m] += weight * c[m] * std::cos(static_cast<double>(m) * phi);
                     sine[m] += weight * c[m] * std::sin(static_cast<double>(m) * phi);
                 }
             }
-            for (std::size_t m = 0; m < harmonic_count; ++m) {
+            for (std::size_t m = 0; m < profile.harmonics(); ++m) {
                 float* kernel = m_near.data() + (p * harmonic_count + m) * 2 * texels + texel;
                 kernel[0] = static_cast<float>(exact.cosine[m * texels + texel] - cosine[m]);
                 kernel[texels] = static_cast<float>(exact.sine[m * texels + texel] - sine[m]);
@@ -341,7 +343,7 @@ void KernelSpectra::start(std::size_t frequency, Column& column) const
         return;
     const std::size_t frequencies = m_plane.padded_height / 2 + 1;
     const std::size_t functions = m_table_columns;
-    column.trig.resize(2 * harmonic_count * frequencies);
+    column.trig.resize(2 * m_harmonics * frequencies);
     column.hankel.resize(functions * frequencies);
     // Per metre, then per texel of unit length.
     const double x_turn = pi * static_cast<double>(frequency) / static_cast<double>(m_plane.padded_width);
@@ -364,7 +366,7 @@ void KernelSpectra::start(std::size_t frequency, Column& column) const
         column.cosine[f] = static_cast<float>(sinc_x) * m_sinc_y[f];
         column.sine[f] = 0.0f;
     }
-    for (std::size_t m = 0; m < harmonic_count; ++m) {
+    for (std::size_t m = 0; m < m_harmonics; ++m) {
         float* trig = column.trig.data() + 2 * m * frequencies;
         std::copy(column.cosine.begin(), column.cosine.end(), trig);
         std::copy(column.sine.begin(), column.sine.end(), trig + frequencies);
@@ -415,10 +417,10 @@ void KernelSpectra::spectrum(const Column& column, const KernelTerm* terms, std:
             add_scaled(values, trig, factor, frequencies);
     }
     for (std::size_t t = 0; m_far && t < count; ++t) {
-        const float* trig = column.trig.data() + (2 * terms[t].m + (sine ? 1 : 0)) * frequencies;
         const std::size_t function = m_column[terms[t].profile * harmonic_count + terms[t].m];
         if (function == no_column)
             continue;
+        const float* trig = column.trig.data() + (2 * terms[t].m + (sine ? 1 : 0)) * frequencies;
         const float* hankel = column.hankel.data() + function * frequencies;
         add_scaled_product(values, trig, hankel, static_cast<float>(terms[t].weight), frequencies);
     }

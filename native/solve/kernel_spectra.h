@@ -92,6 +92,7 @@ private:
 
     PaddedPlane m_plane;
     std::vector<ScaledProfile> m_profiles;
+    std::size_t m_harmonics = 0;  // that any of them uses
     double m_texel = 1.0;       // metres: the unit of length here
     double m_deviation = 1.0;
     double m_cut = 0.0;         // where the kernels end, texels

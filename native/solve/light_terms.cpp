@@ -11,12 +11,12 @@ namespace beamspread {
 namespace {
 
 // Every harmonic of a kernel whose beams travel toward azimuth beta.
-std::vector<KernelTerm> fixed_kernel(std::size_t profile, double beta)
+std::vector<KernelTerm> fixed_kernel(std::size_t profile, std::size_t harmonics, double beta)
 {
     std::vector<KernelTerm> kernel;
     for (const std::size_t first : {std::size_t{0}, std::size_t{1}})
         for (const Phase phase : {Phase::cosine, Phase::sine})
-            for (std::size_t m = first; m < harmonic_count; m += 2)
+            for (std::size_t m = first; m < harmonics; m += 2)
                 if (m > 0 || phase == Phase::cosine) {
                     const double turned = static_cast<double>(m) * beta;
                     kernel.push_back({profile, m, phase, phase == Phase::cosine ? std::cos(turned) : std::sin(turned)});
@@ -40,7 +40,8 @@ LightTerms light_terms(const std::vector<LightField>& lights, const std::vector<
             ScaledProfile profile{medium.library->profile(incidence_deg(direction), medium.albedo, Side::reflected),
                                   medium.mean_free_path, 0.0};
             profile.reach = reach(profile.profile, medium.mean_free_path, 1e-3 * std::min(tolerance, 1e-3));
-            term.kernels.push_back(fixed_kernel(result.profiles.size(), azimuth(direction)));
+            term.kernels.push_back(
+                fixed_kernel(result.profiles.size(), profile.profile.harmonics(), azimuth(direction)));
             result.profiles.push_back(std::move(profile));
         }
         result.terms.push_back(std::move(term));

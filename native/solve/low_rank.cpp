@@ -17,6 +17,7 @@ namespace beamspread {
 namespace {
 
 constexpr std::size_t angle_bins = 64;
+constexpr double least_gain = 1e-14;  // that is not rounding
 constexpr std::size_t table_steps = 1024;
 
 // Errors of m = 0 count so many times: under even light they add up, while those of the other harmonics cancel.
@@ -258,11 +259,13 @@ LowRankBasis low_rank_basis(const std::vector<LightField>& lights, const std::ve
             const Matrix rows = root_share.asDiagonal() * medium.weights.of(m) * medium.features[m];
             gram += rows * rows.transpose() / static_cast<double>(described.size());
         }
+        if (gram.trace() <= least_gain)
+            continue;
         const Eigen::SelfAdjointEigenSolver<Matrix> solver(gram);
         for (std::size_t rank = 0; rank < angle_bins; ++rank) {
             const Eigen::Index i = index(angle_bins - 1 - rank);
             const double gain = solver.eigenvalues()[i];
-            if (gain <= 1e-14)
+            if (gain <= least_gain)
                 break;
             error += gain;
             candidates.push_back({m, rank, gain, solver.eigenvectors().col(i)});

@@ -123,7 +123,7 @@ void TexelKernels::integrate(const Level& level, const HarmonicSum& harmonics, K
             // By parity of m: phi -> -phi for dy < 0, and phi -> pi - phi for dx < 0.
             std::array<double, 2> cosine{};
             std::array<double, 2> sine{};
-            for (std::size_t m = 0; m < harmonic_count; ++m) {
+            for (std::size_t m = 0; m < level.integrals.harmonics; ++m) {
                 const std::size_t at = m * blocks + i * level.width + j;
                 cosine[m % 2] += harmonics.cosine[m] * level.integrals.cosine[at];
                 sine[m % 2] += harmonics.sine[m] * level.integrals.sine[at];
