@@ -9,15 +9,13 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/pool.h"
 #include "base/threads.h"
-#include "scene/open_tiles.h"
+#include "scene/shadows.h"
 
 namespace beamspread {
 
 namespace {
-
-// Few enough for a prompt cancel, enough to hide the cost of scheduling.
-constexpr std::size_t rows_per_block = 4;
 
 // Rounding of a vertex, of a texel's position and of the ray's origin moves each by up to half a unit in the last place
 // of the largest coordinate; Embree's robust test adds a few. Starting this many units off the plane keeps a ray clear
@@ -54,19 +52,24 @@ public:
           m_occluders(occluders),
           m_points(sub_texel_points(settings.samples)),
           m_start(ray_start(grid, occluders, settings.clearance)),
-          m_open(grid, light.source(), occluders, m_start),
+          m_shadows(grid, light.source(), occluders, m_start),
           m_open_texel(gather_texel(0.0, 0.0, nullptr))
     {
     }
 
-    void gather_row(std::size_t y, const BeamArrays& beams) const
+    std::size_t bands() const { return m_shadows.bands(); }
+
+    // Returns the number of rows.
+    std::size_t gather_band(std::size_t band, const BeamArrays& beams)
     {
-        for (std::size_t x = 0; x < m_grid.width; ++x) {
-            const auto [irradiance, flow] = texel(x, y);
-            beams.irradiance(y, x) = static_cast<float>(irradiance);
-            if (beams.direction.data)
-                beams.direction(y, x) = Vec3f(mean_direction(flow, static_cast<double>(x), static_cast<double>(y)));
-        }
+        const auto lease = m_shades.lend();
+        std::vector<Shade>& shades = *lease;
+        m_shadows.shade_band(band, shades);
+        const std::size_t begin = band * Shadows::rows_per_band;
+        const std::size_t rows = shades.size() / m_grid.width;
+        for (std::size_t row = 0; row < rows; ++row)
+            gather_row(begin + row, &shades[row * m_grid.width], beams);
+        return rows;
     }
 
 private:
@@ -75,13 +78,24 @@ private:
         Vec3 flow;          // sum over the points of irradiance times direction of travel
     };
 
-    Texel texel(std::size_t x, std::size_t y) const
+    void gather_row(std::size_t y, const Shade* shades, const BeamArrays& beams) const
     {
-        const bool is_open = m_open.is_open(x, y);
+        for (std::size_t x = 0; x < m_grid.width; ++x) {
+            const auto [irradiance, flow] = texel(static_cast<double>(x), static_cast<double>(y), shades[x]);
+            beams.irradiance(y, x) = static_cast<float>(irradiance);
+            if (beams.direction.data)
+                beams.direction(y, x) = Vec3f(mean_direction(flow, static_cast<double>(x), static_cast<double>(y)));
+        }
+    }
+
+    Texel texel(double x, double y, Shade shade) const
+    {
+        if (shade == Shade::full)
+            return {};
+        if (shade == Shade::unknown)
+            return gather_texel(x, y, m_occluders);
         // A sun is the same everywhere.
-        if (std::is_same_v<AnyLight, SunLight> && is_open)
-            return m_open_texel;
-        return gather_texel(static_cast<double>(x), static_cast<double>(y), is_open ? nullptr : m_occluders);
+        return std::is_same_v<AnyLight, SunLight> ? m_open_texel : gather_texel(x, y, nullptr);
     }
 
     Texel gather_texel(double x, double y, const Occluders* occluders) const
@@ -145,7 +159,8 @@ private:
     const Occluders* m_occluders;
     std::vector<Vec2> m_points;
     RayStart m_start;
-    OpenTiles m_open;
+    Shadows m_shadows;
+    Pool<std::vector<Shade>> m_shades;
     Texel m_open_texel;  // texel (0, 0) with nothing in the way
 };
 
@@ -163,16 +178,11 @@ void compute_beams(const ReceiverGrid& grid, const Light& light, const Occluders
     progress.set_total(static_cast<double>(grid.height));
     std::visit(
         [&](const auto& any_light) {
-            const Gatherer gatherer(grid, any_light, occluders, settings);
-            const std::size_t blocks = (grid.height + rows_per_block - 1) / rows_per_block;
-            const auto gather_block = [&](std::size_t block) {
-                const std::size_t begin = block * rows_per_block;
-                const std::size_t end = std::min(begin + rows_per_block, grid.height);
-                for (std::size_t y = begin; y < end; ++y)
-                    gatherer.gather_row(y, beams);
-                progress.advance(static_cast<double>(end - begin));
+            Gatherer gatherer(grid, any_light, occluders, settings);
+            const auto gather_band = [&](std::size_t band) {
+                progress.advance(static_cast<double>(gatherer.gather_band(band, beams)));
             };
-            with_threads(settings.threads, [&] { parallel_for(blocks, gather_block); });
+            with_threads(settings.threads, [&] { parallel_for(gatherer.bands(), gather_band); });
         },
         light);
     progress.finish();

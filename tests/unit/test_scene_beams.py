@@ -139,42 +139,78 @@ def test_point_equals_brute_force(seed, samples, count, mirrored):
     assert (direction[..., 2] < 0).all()
 
 
-def corner_around(grid, height):
-    """A triangle whose shadow passes by the grid while the rectangle around it takes it in: rays are traced."""
-    corners = np.array([(-400, 300, height), (300, -400, height), (-400, -400, height)], float)
-    return grid["origin"] + corners @ np.array([grid["x_axis"], grid["y_axis"], grid["normal"]])
+def doubtful_texels(light, rng):
+    """Rows and columns of texels at borders of the light, and of some others."""
+    border = np.zeros(light.shape, bool)
+    for axis in (0, 1):
+        differs = np.diff(light > 0, axis=axis)
+        border |= np.insert(differs, 0, False, axis) | np.insert(differs, differs.shape[axis], False, axis)
+    chosen = rng.permutation(np.flatnonzero(border))[:60]
+    return np.unravel_index(np.concatenate([chosen, rng.integers(0, light.size, 20)]), light.shape)
 
 
-@settings(max_examples=40, deadline=None)
+def texel_around(grid, row, column, factor=1000):
+    """A grid of one huge texel, in which no shadow has room, with the centre of a texel of `grid`."""
+    x, y = ((number + 0.5 - factor / 2) * grid[f"pitch_{axis}"] for number, axis in ((column, "x"), (row, "y")))
+    size = {"width": 1, "height": 1, "pitch_x": factor * grid["pitch_x"], "pitch_y": factor * grid["pitch_y"]}
+    return grid | size | {"origin": grid["origin"] + x * grid["x_axis"] + y * grid["y_axis"]}
+
+
+@settings(max_examples=60, deadline=None)
 @given(
     seed=st.integers(0, 10**6),
     count=st.integers(1, 40),
     size=st.sampled_from([0.01, 0.1, 1.0]),
-    slant=st.sampled_from([0.0, 1.0, 30.0]),
+    slant=st.sampled_from([-1.0, 0.0, 1.0, 30.0]),
     lamp_height=st.sampled_from([None, 0.1, 1.0, 5.0]),
     clearance=st.sampled_from([0.0, 0.05]),
 )
-def test_texels_out_of_reach_of_shadows_need_no_rays(seed, count, size, slant, lamp_height, clearance):
+def test_texels_that_need_no_rays_are_as_if_traced(seed, count, size, slant, lamp_height, clearance):
     axes, centre, rng = rotation(seed), np.array([30.0, -20.0, 10.0]), np.random.default_rng(seed)
     grid = make_grid(width=150, height=110, axes=axes, centre=centre) | {"samples": 1, "clearance": clearance}
     # Also through the plane, behind it, and beyond the lamp.
     middle = rng.uniform([-1.5, -1.2, -0.3], [1.5, 1.2, 1.5], (count, 1, 3))
     local = middle + rng.normal(0, size, (count, 3, 3))
+    lamp = np.array([0.1 * slant, 0.2, lamp_height or 1.0])
     # Behind the plane, far away: where rays start depends on the largest coordinate, which is to be the same for both.
     far = np.array([(0, 0, -1000), (1, 0, -1000), (0, 1, -1000)])
-    vertices = np.concatenate([local.reshape(-1, 3), far]) @ axes + centre
+    vertices = (np.concatenate([local.reshape(-1, 3), far]) @ axes + centre).astype(np.float32)
+    occluders = native.Occluders(vertices, np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3))
 
-    def light(vertices):
-        triangles = np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)
-        occluders = native.Occluders(vertices.astype(np.float32), triangles)
+    def light(grid):
         if lamp_height is None:
             return native.sun_beams(**grid, direction=np.array([slant, 0.3, -1.0]) @ axes, occluders=occluders)
-        position = np.array([0.1 * slant, 0.2, lamp_height]) @ axes + centre
-        return native.point_beams(**grid, position=position, occluders=occluders)[0]
+        return native.point_beams(**grid, position=lamp @ axes + centre, occluders=occluders)[0]
 
-    skipped = light(vertices)
-    traced = light(np.concatenate([vertices, corner_around(grid, 0.5 * (lamp_height or 1.0))]))
-    np.testing.assert_array_equal(skipped, traced)
+    got = light(grid)
+    rows, columns = doubtful_texels(got, rng)
+    traced = [light(texel_around(grid, row, column))[0, 0] for row, column in zip(rows, columns)]
+    np.testing.assert_allclose(got[rows, columns], traced, rtol=1e-6)
+
+
+@pytest.mark.parametrize("sun", [(1, 0, -1), (-1, 0, -1), (0, 1, -1), (0, -1, -1), None])
+def test_rays_keep_clear_of_the_plane_and_of_the_lamp(sun):
+    clearance, lamp = 0.05, np.array([0.0, 0.0, 1.0])
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.1], [0, 1, 0.1]])
+    grid = make_grid(150, 110)
+    # Rays to a lamp end 0.05 from it, so that of two squares the nearer one, though it is wide, blocks none.
+    near_lamp = [square * (2, 2, 0) - (1, 1, -0.97), 0.3 * square - (0.2, 0.3, -0.5)]
+    corners = [square - (0.5, 0.4, -0.5)] if sun else near_lamp
+    vertices = np.concatenate(corners).astype(np.float32)
+    triangles = (np.array([[0, 1, 2], [0, 2, 3]]) + np.arange(0, len(vertices), 4)[:, None, None]).reshape(-1, 3)
+    triangles = triangles.astype(np.uint32)
+    light = {"occluders": native.Occluders(vertices, triangles), "samples": 1, "clearance": clearance}
+    points = points_of(grid, 1)[:, :, 0] + (0, 0, clearance)
+    if sun:
+        got = native.sun_beams(**grid, direction=sun, **light)
+        travel, distance = np.broadcast_to(sun, points.shape) / math.sqrt(2), np.full(points.shape[:2], 1e3)
+    else:
+        got = native.point_beams(**grid, position=lamp, **light)[0]
+        travel, _, distance = lamp_at(points, lamp)
+    blocked, doubt = cast(points, -travel, distance - clearance, vertices, triangles)
+    assert (doubt > 1e-3).mean() > 0.95
+    assert 0.05 < blocked.mean() < 0.5
+    np.testing.assert_array_equal((got == 0)[doubt > 1e-3], blocked[doubt > 1e-3])
 
 
 def spot_falloff(travel, frame, size, blend, falloff):

@@ -1,0 +1,220 @@
+#include "scene/shadows.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+namespace beamspread {
+
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+// A vertex nearly as high as the lamp throws its shadow too far to be worth finding.
+constexpr double min_relative_weight = 1e-6;
+
+// Texels: the rounding of what is computed here, far above that of double precision at the largest texture's side.
+constexpr double own_rounding = 1e-6;
+
+struct Interval {
+    double low = infinity;
+    double high = -infinity;
+
+    void extend(double x)
+    {
+        low = std::min(low, x);
+        high = std::max(high, x);
+    }
+};
+
+// A triangle's shadow in texels.
+struct Shadow {
+    std::array<Vec2, 3> corners;
+    Vec2 reach{};           // how far rounding moves it at most
+    bool is_whole = false;  // whether all of the triangle is between where rays start and where they end
+
+    Interval rows() const
+    {
+        Interval rows;
+        for (const Vec2& corner : corners)
+            rows.extend(corner.y);
+        return {rows.low - reach.y, rows.high + reach.y};
+    }
+
+    // Where a horizontal line cuts it; empty where it does not.
+    Interval cut(double y) const
+    {
+        Interval cut;
+        for (std::size_t i = 0; i < 3; ++i) {
+            const Vec2& a = corners[i];
+            const Vec2& b = corners[(i + 1) % 3];
+            if ((a.y <= y) != (b.y <= y))
+                cut.extend(a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x));
+        }
+        return cut;
+    }
+};
+
+// Central projection from the light onto the plane.
+class Projection {
+public:
+    Projection(const ReceiverGrid& grid, const LightSource& source, const RayStart& start)
+        : m_grid(grid),
+          m_source(source.position - (source.is_far ? Vec3(0.0) : grid.origin)),
+          m_is_near(source.is_far ? 0.0 : 1.0),
+          m_source_height(glm::dot(m_source, grid.normal)),
+          m_start(start)
+    {
+    }
+
+    bool is_lit() const { return m_source_height > 0.0; }
+
+    struct Heights {
+        std::array<double, 3> corners;
+        double lowest;
+        double highest;
+    };
+
+    Heights heights(const std::array<Vec3, 3>& triangle) const
+    {
+        const auto height = [this](const Vec3& corner) { return glm::dot(corner - m_grid.origin, m_grid.normal); };
+        const std::array<double, 3> all = {height(triangle[0]), height(triangle[1]), height(triangle[2])};
+        const auto [lowest, highest] = std::minmax({all[0], all[1], all[2]});
+        return {all, lowest, highest};
+    }
+
+    // Whether the triangle lies behind where rays start, or beyond the lamp where they end.
+    bool is_off_the_way(const Heights& heights) const
+    {
+        return heights.highest <= m_start.height() - 0.5 * m_start.rounding ||
+               (m_is_near > 0.0 && heights.lowest >= m_source_height + m_start.rounding);
+    }
+
+    // Whether the shadow has an end, not too far away.
+    bool has_shadow(const Heights& heights) const
+    {
+        return m_source_height > 2.0 * m_start.height() &&
+               weight(heights.highest) > min_relative_weight * m_source_height;
+    }
+
+    Shadow shadow(const std::array<Vec3, 3>& triangle, const Heights& heights) const
+    {
+        Shadow shadow{};
+        for (std::size_t i = 0; i < 3; ++i)
+            project(triangle[i], heights.corners[i], shadow.corners[i], shadow.reach);
+        const double margin = m_start.height() + m_start.rounding;
+        shadow.is_whole = heights.lowest >= margin && (m_is_near == 0.0 || heights.highest <= m_source_height - margin);
+        return shadow;
+    }
+
+private:
+    void project(const Vec3& vertex, double height, Vec2& corner, Vec2& reach) const
+    {
+        // With heights h above the plane: p = (h_s v - h_v s) / (h_s - h_v) for a lamp at s, and for a sun in the
+        // direction s p = v - (h_v / h_s) s.
+        const Vec3 point = (m_source_height * (vertex - m_grid.origin) - height * m_source) / weight(height);
+        corner = {glm::dot(point, m_grid.x_axis) / m_grid.pitch_x, glm::dot(point, m_grid.y_axis) / m_grid.pitch_y};
+        // A step of 1 at the vertex or at the ray's start moves the shadow by up to this: 1 / cos for a sun, for a lamp
+        // magnified besides.
+        const double magnification = glm::length(m_source - m_is_near * point) / weight(height);
+        const double step = 2.0 * m_start.height() * magnification;
+        reach = glm::max(reach, Vec2(step / m_grid.pitch_x, step / m_grid.pitch_y) + own_rounding);
+    }
+
+    double weight(double height) const { return m_source_height - m_is_near * height; }
+
+    const ReceiverGrid& m_grid;
+    Vec3 m_source;  // from the grid's origin to a lamp; the unit vector towards a sun
+    double m_is_near;
+    double m_source_height;
+    RayStart m_start;
+};
+
+// The nearest whole number of texels from 0 to `count`.
+std::size_t clamped(double texel, std::size_t count)
+{
+    return static_cast<std::size_t>(std::clamp(texel, 0.0, static_cast<double>(count)));
+}
+
+void shade_row(const Shadow& shadow, std::size_t row, std::size_t width, Shade* texels)
+{
+    // All rays that may start in the row, rounding included.
+    const double bottom = static_cast<double>(row) - shadow.reach.y;
+    const double top = static_cast<double>(row) + 1.0 + shadow.reach.y;
+    const Interval low = shadow.cut(bottom);
+    const Interval high = shadow.cut(top);
+
+    Interval touched{std::min(low.low, high.low), std::max(low.high, high.high)};
+    for (const Vec2& corner : shadow.corners)
+        if (corner.y >= bottom && corner.y <= top)
+            touched.extend(corner.x);
+    const std::size_t end = clamped(std::ceil(touched.high + shadow.reach.x), width);
+    for (std::size_t x = clamped(std::floor(touched.low - shadow.reach.x), width); x < end; ++x)
+        texels[x] = std::max(texels[x], Shade::unknown);
+
+    // A triangle is convex: a texel lies in it if its corners do.
+    if (!shadow.is_whole)
+        return;
+    const std::size_t full_begin = clamped(std::ceil(std::max(low.low, high.low) + shadow.reach.x), width);
+    const std::size_t full_end = clamped(std::floor(std::min(low.high, high.high) - shadow.reach.x), width);
+    if (full_begin < full_end)
+        std::fill(texels + full_begin, texels + full_end, Shade::full);
+}
+
+}  // namespace
+
+Shadows::Shadows(const ReceiverGrid& grid, const LightSource& source, const Occluders* occluders, const RayStart& start)
+    : m_grid(grid), m_source(source), m_occluders(occluders), m_start(start)
+{
+    const Projection projection(grid, source, start);
+    if (!occluders || !projection.is_lit())
+        return;
+    m_leaves = std::bit_ceil(bands());
+    m_nodes.resize(2 * m_leaves);
+    for (std::size_t i = 0; i < occluders->triangle_count(); ++i) {
+        const std::array<Vec3, 3> triangle = occluders->triangle(i);
+        const Projection::Heights heights = projection.heights(triangle);
+        if (projection.is_off_the_way(heights))
+            continue;
+        if (!projection.has_shadow(heights)) {
+            m_is_unknown = true;
+            continue;
+        }
+        const Interval rows = projection.shadow(triangle, heights).rows();
+        if (rows.high < 0.0 || rows.low > static_cast<double>(grid.height))
+            continue;
+        std::size_t first = m_leaves + clamped(rows.low, grid.height - 1) / rows_per_band;
+        std::size_t last = m_leaves + clamped(rows.high, grid.height - 1) / rows_per_band;
+        while (last - first > 1) {
+            first /= 2;
+            last /= 2;
+        }
+        m_nodes[first].push_back(static_cast<std::uint32_t>(i));
+        if (last != first)
+            m_nodes[last].push_back(static_cast<std::uint32_t>(i));
+    }
+}
+
+void Shadows::shade_band(std::size_t band, std::vector<Shade>& texels) const
+{
+    const std::size_t begin = band * rows_per_band;
+    const std::size_t end = std::min(begin + rows_per_band, m_grid.height);
+    texels.assign((end - begin) * m_grid.width, m_is_unknown ? Shade::unknown : Shade::none);
+    if (m_nodes.empty())
+        return;
+    const Projection projection(m_grid, m_source, m_start);
+    for (std::size_t node = m_leaves + band; node > 0; node /= 2) {
+        for (const std::uint32_t i : m_nodes[node]) {
+            const std::array<Vec3, 3> triangle = m_occluders->triangle(i);
+            const Shadow shadow = projection.shadow(triangle, projection.heights(triangle));
+            const Interval rows = shadow.rows();
+            const std::size_t first = std::max(begin, clamped(std::floor(rows.low), m_grid.height));
+            const std::size_t last = std::min(end, clamped(std::ceil(rows.high), m_grid.height));
+            for (std::size_t row = first; row < last; ++row)
+                shade_row(shadow, row, m_grid.width, &texels[(row - begin) * m_grid.width]);
+        }
+    }
+}
+
+}  // namespace beamspread

@@ -1,0 +1,53 @@
+// Which texels of a receiver no occluder can shade, and which one occluder shades all of, found without rays.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "scene/lights.h"
+#include "scene/occluders.h"
+#include "scene/receiver.h"
+
+namespace beamspread {
+
+// Shadow rays start this far off the plane.
+struct RayStart {
+    double rounding = 0.0;  // bound of the rounding of a ray and of what it meets, metres
+    double clearance = 0.0;
+
+    double height() const { return rounding + clearance; }
+};
+
+enum class Shade : std::uint8_t {
+    none,     // the texel is out of reach of all shadows: no ray from it is blocked
+    unknown,  // some of its rays may be blocked
+    full,     // the shadow of one triangle covers it: every ray from it is blocked
+};
+
+// The triangles' shadows on the plane, by bands of rows. Both bounds allow for the rounding of rays, so that tracing all
+// of them would give the same.
+class Shadows {
+public:
+    static constexpr std::size_t rows_per_band = 8;
+
+    // `occluders` may be null: no shade anywhere.
+    Shadows(const ReceiverGrid& grid, const LightSource& source, const Occluders* occluders, const RayStart& start);
+
+    std::size_t bands() const { return (m_grid.height + rows_per_band - 1) / rows_per_band; }
+
+    // The shade of the texels of a band, row by row.
+    void shade_band(std::size_t band, std::vector<Shade>& texels) const;
+
+private:
+    const ReceiverGrid& m_grid;
+    LightSource m_source;
+    const Occluders* m_occluders;
+    RayStart m_start;
+    bool m_is_unknown = false;  // a triangle whose shadow has no end lies in the way
+    // Numbers of triangles, in the nodes of a binary tree over the bands. A triangle is in the one or two nodes, side by
+    // side, that span its shadow's rows, so that tall ones take no more memory than small ones.
+    std::vector<std::vector<std::uint32_t>> m_nodes;
+    std::size_t m_leaves = 0;
+};
+
+}  // namespace beamspread
