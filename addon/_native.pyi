@@ -17,18 +17,21 @@ __all__: list[str] = [
     "Occluders",
     "SampleSource",
     "adaptive_beams",
+    "complex_lines",
     "convolve",
     "coverage",
     "embree_version",
     "exact_totals",
     "fast_size",
-    "fft_instruction_set",
+    "fft_instruction_sets",
     "fresnel",
+    "half_lines",
     "henyey_greenstein_pdf",
     "henyey_greenstein_sample",
     "interpolate",
     "point_beams",
     "read_exr",
+    "real_lines",
     "real_transform",
     "simulate",
     "spot_beams",
@@ -371,6 +374,11 @@ def adaptive_beams(
     float64 (N,) mean irradiance.
     """
 
+def complex_lines(values: numpy.ndarray, forward: bool, instruction_set: str = "") -> numpy.ndarray:
+    """
+    Transforms of lines of complex values, complex64 (N, size), by e^-i, or backward by e^i; both are plain sums.
+    """
+
 def convolve(
     lights: list[tuple[numpy.ndarray, numpy.ndarray]],
     ldf: list[LdfSource],
@@ -459,14 +467,21 @@ def fast_size(min_size: int) -> int:
     The smallest even size of fast transforms.
     """
 
-def fft_instruction_set() -> str:
+def fft_instruction_sets() -> list[str]:
     """
-    What the transforms of the solver use: 'avx512', 'avx2' or 'baseline'.
+    What the transforms were compiled for and this processor has, fastest first; the solver uses the first.
+
+    Of "avx512", "avx2" and "baseline". Where a function takes an `instruction_set`, an empty one stands for the fastest.
     """
 
 def fresnel(cos_theta_i: numpy.ndarray, eta: numpy.ndarray) -> typing.Any:
     """
     Reflectance of unpolarized light; eta is the index behind the boundary over the one before it.
+    """
+
+def half_lines(half: numpy.ndarray, size: int, instruction_set: str = "") -> numpy.ndarray:
+    """
+    Inverse of `real_lines` but for a factor: complex64 (N, size // 2 + 1) to `size` times float32 (N, size).
     """
 
 def henyey_greenstein_pdf(cos_theta: numpy.ndarray, g: numpy.ndarray) -> typing.Any:
@@ -603,7 +618,12 @@ def read_exr(path: str, part: str | None = None) -> tuple:
         The file is missing, damaged or larger than 2^30 numbers, has deep data or subsampled channels, or no such part.
     """
 
-def real_transform(values: numpy.ndarray, threads: int = 0) -> numpy.ndarray:
+def real_lines(values: numpy.ndarray, instruction_set: str = "") -> numpy.ndarray:
+    """
+    Transforms of lines of real values: float32 (N, size) to complex64 (N, size // 2 + 1).
+    """
+
+def real_transform(values: numpy.ndarray, threads: int = 0, instruction_set: str = "") -> numpy.ndarray:
     """
     Fourier transform of real values, float32 (H, W) with W even; complex64 (H, W / 2 + 1).
 

@@ -36,5 +36,6 @@ void bind_ldf_interpolate(py::module_& m);
 void bind_image(py::module_& m);
 void bind_scene(py::module_& m);
 void bind_solve(py::module_& m);
+void bind_fft(py::module_& m);
 
 }  // namespace beamspread

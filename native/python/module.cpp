@@ -35,4 +35,5 @@ PYBIND11_MODULE(_native, m)
     bind_image(m);
     bind_scene(m);
     bind_solve(m);
+    bind_fft(m);
 }

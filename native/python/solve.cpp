@@ -7,7 +7,6 @@
 
 #include "base/error.h"
 #include "python/casters.h"
-#include "solve/fft.h"
 #include "solve/mask_pyramid.h"
 #include "solve/problem.h"
 
@@ -143,32 +142,10 @@ Squares adaptive_beams(const Array<float>& irradiance, const Array<float>& direc
     return {places, light};
 }
 
-Array<Complex> real_transform(const Array<float>& values, int threads)
-{
-    if (values.ndim() != 2 || values.shape(1) % 2 != 0)
-        reject("values", shape_text(values), "(H, W) with W even");
-    const auto height = static_cast<std::size_t>(values.shape(0));
-    const auto width = static_cast<std::size_t>(values.shape(1));
-    Array<Complex> spectrum({height, width / 2 + 1});
-    Complex* out = spectrum.mutable_data();
-    const float* in = values.data();
-    const py::gil_scoped_release release;
-    real_to_half_2d(in, out, height, width, threads);
-    return spectrum;
-}
-
 }  // namespace
 
 void bind_solve(py::module_& m)
 {
-    m.def("real_transform", &real_transform, py::arg("values"), py::arg("threads") = 0,
-          R"(Fourier transform of real values, float32 (H, W) with W even; complex64 (H, W / 2 + 1).
-
-One of these is what tests/bench/fft.py counts the solver's time in.
-)");
-    m.def("fft_instruction_set", &fft_instruction_set,
-          "What the transforms of the solver use: 'avx512', 'avx2' or 'baseline'.");
-    m.def("fast_size", &fast_even_size, py::arg("min_size"), "The smallest even size of fast transforms.");
     m.def("convolve", &convolve, py::arg("lights"), py::arg("ldf"), py::arg("albedo"), py::arg("mean_free_path"),
           py::arg("pitch"), py::arg("solver"), py::arg("tolerance"), py::arg("threads"), py::arg("progress"),
           py::arg("memory") = Problem().memory,

@@ -58,7 +58,7 @@ def transforms(size):
     spectrum = pyfftw.empty_aligned((2 * size, size + 1), np.complex64)
     aligned = pyfftw.empty_aligned(values.shape, np.float32)
     print(f"\none real transform, {2 * size} x {2 * size}, single precision, CPU seconds")
-    print(f"  DUCC ({_native.fft_instruction_set()})       {seconds(3, _native.real_transform, values):8.3f}")
+    print(f"  DUCC ({_native.fft_instruction_sets()[0]})       {seconds(3, _native.real_transform, values):8.3f}")
     print(f"  SciPy               {seconds(3, scipy_fft.rfft2, values, workers=THREADS):8.3f}")
     for effort in ("FFTW_ESTIMATE", "FFTW_MEASURE"):
         start = time.perf_counter()
