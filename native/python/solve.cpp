@@ -65,7 +65,7 @@ using Light = std::pair<Array<float>, Array<float>>;  // irradiance and directio
 Array<float> convolve(const std::vector<Light>& lights, const std::vector<std::shared_ptr<LdfSource>>& ldf,
                       const std::vector<double>& albedo, const std::vector<double>& mean_free_path,
                       std::array<double, 2> pitch, const std::string& solver, double tolerance, int threads,
-                      const py::object& progress, std::size_t memory)
+                      const py::object& progress, std::size_t memory, std::size_t coarsening)
 {
     const std::size_t channels = albedo.size();
     if (ldf.size() != channels || mean_free_path.size() != channels)
@@ -83,6 +83,7 @@ Array<float> convolve(const std::vector<Light>& lights, const std::vector<std::s
         problem.tolerance = tolerance;
         problem.threads = threads;
         problem.memory = memory;
+        problem.coarsening = coarsening;
         for (std::size_t c = 0; c < channels; ++c) {
             problem.channels[c].library = ldf[c].get();
             problem.channels[c].albedo = albedo[c];
@@ -148,12 +149,13 @@ void bind_solve(py::module_& m)
 {
     m.def("convolve", &convolve, py::arg("lights"), py::arg("ldf"), py::arg("albedo"), py::arg("mean_free_path"),
           py::arg("pitch"), py::arg("solver"), py::arg("tolerance"), py::arg("threads"), py::arg("progress"),
-          py::arg("memory") = Problem().memory,
+          py::arg("memory") = Problem().memory, py::arg("coarsening") = Problem().coarsening,
           R"(Luminance of beams on a grid; the engine behind `beamspread.convolve`.
 
 Lights are pairs of irradiance, float32 (H, W) or (H, W, C) in W/m^2, and direction, float32 (3,) or (H, W, 3); C libraries,
 albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr). `memory`: bytes that the spectra of the solver 'fft' may take; where the whole plane
-needs more it is solved in tiles.
+needs more it is solved in tiles. `coarsening`: texels from node to node of the grid on which it spreads light far: 4, 8, 16, ... 64, 1 for no
+such grid, 0 for what costs least.
 )");
     m.def("adaptive_beams", &adaptive_beams, py::arg("irradiance"), py::arg("direction"), py::arg("tolerance"),
           R"(Squares that the adaptive solver lights by one beam each; the engine behind `beamspread.adaptive_beams`.

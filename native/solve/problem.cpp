@@ -37,6 +37,8 @@ void validate(const Problem& problem)
             reject("pitch", pitch, "pitch > 0 metres");
     if (!(problem.tolerance > 0.0))
         reject("tolerance", problem.tolerance, "tolerance > 0");
+    if (problem.coarsening > 64 || problem.coarsening == 2 || (problem.coarsening & (problem.coarsening - 1)) != 0)
+        reject("coarsening", static_cast<double>(problem.coarsening), "0, 1, 4, 8, 16, 32, 64");
     const float* checked = nullptr;
     for (const Channel& channel : problem.channels) {
         check_albedo(channel.albedo);

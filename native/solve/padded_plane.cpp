@@ -1,0 +1,157 @@
+#include "solve/padded_plane.h"
+
+#include <cmath>
+#include <limits>
+
+#include "solve/fft.h"
+#include "solve/spline_axis.h"
+
+namespace beamspread {
+
+namespace {
+
+// Planes up to this size are all centre.
+constexpr std::size_t small_plane = 32;
+
+// Coarse grids of more texels from node to node would save nothing on planes that fit into memory.
+constexpr std::size_t most_coarsening = 64;
+
+// Border between the levels, nodes of the coarse grid: what is outside has next to no detail that its splines don't
+// resolve.
+constexpr double level_deviation = 3.0;
+
+struct Tiling {
+    PaddedPlane plane;
+    double cost = 0.0;  // padded nodes of all tiles; infinite where no tiles fit into the budget
+};
+
+Tiling with_tiles(PaddedPlane plane, std::size_t count)
+{
+    // What wraps around falls into the halo, and on the whole plane beyond its end.
+    const auto pad = [&](std::size_t size, std::size_t halo, std::size_t& tile) {
+        tile = (size + count - 1) / count;
+        return fast_even_size(tile + (count > 1 ? 2 : 1) * halo);
+    };
+    plane.padded_width = pad(plane.width, plane.halo_x, plane.tile_width);
+    plane.padded_height = pad(plane.height, plane.halo_y, plane.tile_height);
+    return {plane, static_cast<double>(count * count * plane.padded_width * plane.padded_height)};
+}
+
+// As few tiles as keep the spectra of `terms` at once within the budget, if that costs little, else of one.
+Tiling choose_tiles(const PaddedPlane& plane, const LevelChoice& choice)
+{
+    constexpr std::size_t most_tiles = 16;  // along a side
+    constexpr double most_overlap = 1.25;   // that is worth having several light terms in memory at once
+    const Tiling whole = with_tiles(plane, 1);
+    for (const std::size_t allowed : {choice.budget / std::max<std::size_t>(choice.terms, 1), choice.budget}) {
+        for (std::size_t count = 1; count <= most_tiles; ++count) {
+            const Tiling tiling = with_tiles(plane, count);
+            if (tiling.plane.rows() * tiling.plane.columns() * sizeof(Complex) <= allowed &&
+                (allowed == choice.budget || tiling.cost <= most_overlap * whole.cost))
+                return tiling;
+        }
+    }
+    return {whole.plane, std::numeric_limits<double>::infinity()};
+}
+
+std::size_t texels_within(double length, double pitch)
+{
+    return static_cast<std::size_t>(std::ceil(length / pitch)) + 1;
+}
+
+// What a ring holds inside an outer window.
+RadialWindow inside(const RadialWindow& ring, double deviation)
+{
+    return {ring.inner, deviation, window_end * deviation, 0.0};
+}
+
+void set_halo(Level& level)
+{
+    PaddedPlane& plane = level.plane;
+    const auto halo = [&](double pitch) {
+        return level.ring ? texels_within(level.ring->end(), pitch / plane.unit()) : 0;
+    };
+    plane.halo_x = std::max(level.centre ? level.centre->x : 0, halo(plane.pitch_x));
+    plane.halo_y = std::max(level.centre ? level.centre->y : 0, halo(plane.pitch_y));
+}
+
+// The grid of nodes `coarsening` texels apart, on which the kernels begin outside the window that ends the texels'.
+Level coarse_level(const PaddedPlane& fine, const RadialWindow& ring, std::size_t coarsening)
+{
+    const auto step = [&](double pitch) { return coarsening * static_cast<std::size_t>(fine.unit() / pitch); };
+    Level level;
+    PaddedPlane& plane = level.plane;
+    plane.texels_x = step(fine.pitch_x);
+    plane.texels_y = step(fine.pitch_y);
+    plane.width = SplineAxis(fine.width, plane.texels_x).nodes();
+    plane.height = SplineAxis(fine.height, plane.texels_y).nodes();
+    plane.pitch_x = static_cast<double>(plane.texels_x) * fine.pitch_x;
+    plane.pitch_y = static_cast<double>(plane.texels_y) * fine.pitch_y;
+    const double per_unit = fine.unit() / plane.unit();
+    level.ring = {level_deviation, 0.0, ring.cut * per_unit, ring.taper * per_unit};
+    set_halo(level);
+    return level;
+}
+
+}  // namespace
+
+Levels choose_levels(std::size_t width, std::size_t height, double pitch_x, double pitch_y,
+                     const std::vector<ScaledProfile>& profiles, const LevelChoice& choice)
+{
+    Level one{{width, height, pitch_x, pitch_y}, KernelCentre{}, std::nullopt};
+    const double unit = one.plane.unit();
+    double cut = 0.0;
+    for (const ScaledProfile& each : profiles)
+        cut = std::max(cut, each.reach / unit);
+    const double diagonal =
+        std::hypot(static_cast<double>(width) * pitch_x / unit, static_cast<double>(height) * pitch_y / unit);
+    const double centre_end = window_end * choice.centre_deviation;
+    if (cut > centre_end && std::max(width, height) > small_plane) {
+        one.ring = {choice.centre_deviation, 0.0, cut, 0.0};
+        if (cut > diagonal) {
+            // No two texels are farther apart; an abrupt end would ring.
+            one.ring->cut = diagonal;
+            one.ring->taper = std::max(centre_end, diagonal / 8.0);
+        }
+    }
+    const auto half_width = [&](double pitch, std::size_t size) {
+        const double end = (one.ring ? centre_end : cut) * unit / pitch;
+        return static_cast<std::size_t>(std::min(std::ceil(end + 0.5), static_cast<double>(size - 1)));
+    };
+    one.centre = {half_width(pitch_x, width), half_width(pitch_y, height)};
+    set_halo(one);
+    Tiling best = choose_tiles(one.plane, choice);
+    Levels levels{one, std::nullopt, one.ring};
+    levels.texels.plane = best.plane;
+    if (!one.ring)
+        return levels;
+
+    for (std::size_t coarsening = 4; coarsening <= most_coarsening; coarsening *= 2) {
+        if (choice.coarsening != 0 && choice.coarsening != coarsening)
+            continue;
+        const double deviation = level_deviation * static_cast<double>(coarsening);
+        if (window_end * deviation >= one.ring->cut)
+            break;
+        Level fine = one;
+        fine.ring = inside(*one.ring, deviation);
+        set_halo(fine);
+        const Tiling tiling = choose_tiles(fine.plane, choice);
+        Level coarse = coarse_level(one.plane, *one.ring, coarsening);
+        const Tiling coarse_tiling = with_tiles(coarse.plane, 1);
+        const PaddedPlane& nodes = coarse_tiling.plane;
+        // The results of all media are kept; so are the texels' spectra, of which there are several in any case.
+        const bool fits = nodes.rows() * nodes.columns() * sizeof(Complex) <= choice.budget &&
+                          nodes.width * nodes.height * sizeof(float) * choice.media <= choice.budget / 4;
+        const double cost = tiling.cost + coarse_tiling.cost;
+        if (choice.coarsening == coarsening || (fits && cost < 0.9 * best.cost)) {
+            best.cost = cost;
+            fine.plane = tiling.plane;
+            coarse.plane = nodes;
+            levels.texels = fine;
+            levels.coarse = coarse;
+        }
+    }
+    return levels;
+}
+
+}  // namespace beamspread
