@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -43,6 +42,8 @@ def sentence(error: Exception) -> str:
         return "There is not enough memory: lower the resolution."
     if not isinstance(error, (ValueError, OSError)):
         # Nothing that an artist does should lead here: keep what a bug report needs.
+        import logging
+
         logging.getLogger(__name__).error("unexpected error", exc_info=error)
     return str(error) or type(error).__name__
 

@@ -9,7 +9,6 @@ import importlib
 import importlib.util
 import sys
 import time
-import traceback
 from pathlib import Path
 
 PACKAGE_FOLDER = Path(__file__).resolve().parent
@@ -210,6 +209,8 @@ def main() -> int:
         arguments = options.arguments_for_script(sys.argv, inside_blender)
         return importlib.import_module(f"{package}.batch").run(arguments)
     except Exception:  # noqa: BLE001 - Blender would print it and exit with 0
+        import traceback
+
         traceback.print_exc()
         return 1
 

@@ -84,8 +84,6 @@ def bake(
     Cancelled
         `progress` returned False.
     """
-    from .._load import native
-
     material.check()
     check_thickness(thickness)
     media_progress, *light_progress = stages(progress, [LIBRARY_WEIGHT] + [BEAMS_WEIGHT, SOLVE_WEIGHT] * len(lights))
@@ -93,16 +91,16 @@ def bake(
         libraries = _libraries(material, thickness, settings.quality, media_progress)
     else:
         libraries = [load_source(settings.sample_folder, settings.distributions)] * 3
-    caster = native.Occluders(occluders.vertices, occluders.triangles) if len(occluders.triangles) else None
     luminance = None
     # Lights of one colour, which comes last, so that the channels share the work on their beams.
     waiting, waiting_color = [], None
     for number, (light, beams_progress, solve_progress) in enumerate(
         zip(lights, light_progress[::2], light_progress[1::2]), 1
     ):
-        beams, direction, strength = unit_beams(grid, light, caster, settings, beams_progress)
+        beams, direction, strength = unit_beams(grid, light, occluders.ray_caster, settings, beams_progress)
         if beams.any() and any(strength):
-            waiting.append((beams * strength.max(), direction))
+            beams *= strength.max()
+            waiting.append((beams, direction))
             waiting_color = strength / strength.max()
         next_color = np.asarray(lights[number].color, np.float32) if number < len(lights) else None
         if waiting and (
@@ -111,7 +109,8 @@ def bake(
             or not np.allclose(next_color, waiting_color * next_color.max(), rtol=1e-5)
         ):
             spread = _spread(waiting, libraries, material, grid, settings, solve_progress)
-            spread *= waiting_color
+            if (waiting_color != 1).any():
+                spread *= waiting_color
             luminance = spread if luminance is None else np.add(luminance, spread, out=luminance)
             waiting = []
     return np.zeros((grid.height, grid.width, 3), np.float32) if luminance is None else luminance
@@ -174,7 +173,8 @@ def unit_beams(
         strength = light.power
     else:
         raise TypeError(f"light is a {type(light).__name__}; it must be a SunLight, PointLight or SpotLight")
-    return irradiance * grid.coverage, direction, np.asarray(light.color, np.float32) * np.float32(strength)
+    irradiance *= grid.coverage
+    return irradiance, direction, np.asarray(light.color, np.float32) * np.float32(strength)
 
 
 def _libraries(material: Material, thickness: float, quality: str, progress: Progress | None) -> list:

@@ -49,12 +49,20 @@ def parse(arguments: Sequence[str]) -> BatchOptions:
     )
 
 
+class _Help(argparse.HelpFormatter):
+    """Help of a fixed width: to ask for the terminal's, argparse would import much, also where no help is wanted."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, width=100)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="beamspread batch",
         description="Bake the light inside translucent surfaces of a scene into image files.",
         epilog="Exit code 0 only if every bake asked for was written.",
         allow_abbrev=False,
+        formatter_class=_Help,
     )
     parser.add_argument("scene", nargs="?", help="the .blend file, if Blender has not opened it already")
     parser.add_argument(

@@ -7,6 +7,7 @@ Rows of every array run up the plane: row 0 is the bottom (v = 0), as Blender st
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -106,6 +107,13 @@ class Mesh:
 
     vertices: np.ndarray
     triangles: np.ndarray
+
+    @cached_property
+    def ray_caster(self):
+        """The native `Occluders`, None without triangles; made once for all bakes under the same light."""
+        from .._load import native
+
+        return native.Occluders(self.vertices, self.triangles) if len(self.triangles) else None
 
     @classmethod
     def empty(cls) -> Mesh:

@@ -6,7 +6,6 @@ from dataclasses import replace
 import beamspread
 import numpy as np
 import pytest
-from beamspread._load import native
 from beamspread.core.bake import BakeSettings, bake, light_beams
 from beamspread.core.errors import MaterialError
 from beamspread.core.job import BakeJob, Surface
@@ -65,9 +64,15 @@ def test_an_uneven_receiver_does_not_shadow_itself():
     receiver = build_receiver(polygons, fit_uv_map(polygons), 32, 32)
     mesh = Mesh(corners.astype(np.float32), np.array([(0, 1, 2), (0, 2, 3)], np.uint32))
     low_sun = replace(SUN, direction=(math.sin(1.5), 0.0, -math.cos(1.5)))
-    occluders = native.Occluders(mesh.vertices, mesh.triangles)
-    irradiance, _ = light_beams(receiver.grid, low_sun, occluders, SETTINGS)
+    irradiance, _ = light_beams(receiver.grid, low_sun, mesh.ray_caster, SETTINGS)
     assert irradiance == pytest.approx(np.full((32, 32, 3), 2 * math.cos(1.5)), rel=1e-3)
+
+
+def test_objects_under_the_same_light_share_its_shadows():
+    roof = Mesh(np.array([[-9, -9, 1], [9, -9, 1], [0, 18, 1]], np.float32), np.array([[0, 1, 2]], np.uint32))
+    assert roof.ray_caster is roof.ray_caster
+    assert roof.ray_caster.triangle_count == 1
+    assert Mesh.empty().ray_caster is None
 
 
 def test_no_light():

@@ -8,7 +8,7 @@ import pytest
 from beamspread import LdfSample, Medium, simulate
 from beamspread.core.bake import BakeSettings, bake
 from beamspread.core.errors import BakeError
-from beamspread.core.samples import load_folder
+from beamspread.core.samples import load_source
 from beamspread.core.scene import Mesh
 from tests.unit.test_bake import MATERIAL, SUN, grid
 
@@ -58,4 +58,19 @@ def test_what_the_artist_is_told(folder, tmp_path):
         baked(tmp_path)
     (tmp_path / "b.exr").write_text("no image")
     with pytest.raises(BakeError, match=r"b\.exr"):
-        load_folder(str(tmp_path))
+        load_source(str(tmp_path), "angular")
+
+
+def test_samples_are_read_again_only_when_they_changed(tmp_path):
+    def write(name, albedo):
+        LdfSample(np.ones((3, 3)), 0.5, 0, albedo).save(tmp_path / name)
+
+    write("a.exr", 0.5)
+    first = load_source(str(tmp_path), "angular")
+    assert load_source(str(tmp_path), "angular") is first
+    write("b.exr", 0.6)
+    second = load_source(str(tmp_path), "angular")
+    assert second is not first
+    write("b.exr", 0.7)
+    assert load_source(str(tmp_path), "angular") is not second
+    assert load_source(str(tmp_path), "planar") is not load_source(str(tmp_path), "angular")
