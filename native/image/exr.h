@@ -35,6 +35,10 @@ enum class ExrCompression { none, zip };
 void write_exr_parts(const std::string& path, std::span<const ExrPart> parts,
                      ExrCompression compression = ExrCompression::zip);
 
+// The same for one part whose pixels are the host's: `pixels` in place of its own, from the file's last line to its first.
+void write_exr_bottom_up(const std::string& path, const ExrPart& part, std::span<const float> pixels,
+                         ExrCompression compression = ExrCompression::zip);
+
 // Reads every part of a flat file, scan lines or tiles, half, float or unsigned channels. Throws IoError, naming the
 // path, where the file is missing, damaged, too large, deep, or has subsampled channels.
 std::vector<ExrPart> read_exr_parts(const std::string& path);

@@ -2,9 +2,13 @@
 #include <OpenEXR/ImfMultiPartOutputFile.h>
 #include <OpenEXR/ImfOutputPart.h>
 #include <OpenEXR/ImfPartType.h>
+#include <OpenEXR/ImfStdIO.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <fstream>
 #include <set>
+#include <system_error>
 
 #include "base/error.h"
 #include "image/exr.h"
@@ -24,7 +28,7 @@ void check_name(const std::string& argument, const std::string& name)
         reject(argument, "'" + name + "'", "1 to 255 characters");
 }
 
-void check_part(const ExrPart& part)
+void check_part(const ExrPart& part, std::size_t pixel_values)
 {
     if (part.width < 1 || part.width > max_exr_side)
         reject("width", part.width, "1 to " + std::to_string(max_exr_side) + " texels");
@@ -41,8 +45,8 @@ void check_part(const ExrPart& part)
         static_cast<std::size_t>(part.width) * static_cast<std::size_t>(part.height) * part.channels.size();
     if (values > static_cast<std::size_t>(max_exr_values))
         reject("pixels", static_cast<double>(values), "at most 2^30 numbers");
-    if (part.pixels.size() != values)
-        reject("pixels", std::to_string(part.pixels.size()) + " numbers",
+    if (pixel_values != values)
+        reject("pixels", std::to_string(pixel_values) + " numbers",
                std::to_string(values) + ", height * width * channels");
 
     for (const auto& [name, value] : part.attributes) {
@@ -58,7 +62,7 @@ void check_parts(std::span<const ExrPart> parts)
         reject("parts", "empty", "at least one part");
     std::set<std::string> names;
     for (const ExrPart& part : parts) {
-        check_part(part);
+        check_part(part, part.pixels.size());
         if (parts.size() > 1)
             check_name("name", part.name);
         if (!names.insert(part.name).second)
@@ -79,32 +83,45 @@ Imf::Header make_header(const ExrPart& part, const Imath::Box2i& display_window,
     return header;
 }
 
+std::size_t line_values(const ExrPart& part)
+{
+    return part.channels.size() * static_cast<std::size_t>(part.width);
+}
+
 template <class T>
-void write_pixels(Imf::OutputPart output, const ExrPart& part, Imf::PixelType type, const std::vector<T>& pixels)
+void write_pixels(Imf::OutputPart output, const ExrPart& part, Imf::PixelType type, const T* first_line,
+                  std::size_t line_bytes)
 {
     const std::size_t pixel_bytes = part.channels.size() * sizeof(T);
-    const std::size_t row_bytes = pixel_bytes * static_cast<std::size_t>(part.width);
     Imf::FrameBuffer buffer;
     for (std::size_t c = 0; c < part.channels.size(); ++c)
         buffer.insert(part.channels[c],
-                      Imf::Slice::Make(type, pixels.data() + c, output.header().dataWindow(), pixel_bytes, row_bytes));
+                      Imf::Slice::Make(type, first_line + c, output.header().dataWindow(), pixel_bytes, line_bytes));
     output.setFrameBuffer(buffer);
     output.writePixels(part.height);
 }
 
 void write_part(Imf::OutputPart output, const ExrPart& part)
 {
-    if (part.half)
-        write_pixels(output, part, Imf::HALF, std::vector<half>(part.pixels.begin(), part.pixels.end()));
-    else
-        write_pixels(output, part, Imf::FLOAT, part.pixels);
+    if (part.half) {
+        const std::vector<half> pixels(part.pixels.begin(), part.pixels.end());
+        write_pixels(output, part, Imf::HALF, pixels.data(), line_values(part) * sizeof(half));
+    } else {
+        write_pixels(output, part, Imf::FLOAT, part.pixels.data(), line_values(part) * sizeof(float));
+    }
 }
 
-}  // namespace
-
-void write_exr_parts(const std::string& path, std::span<const ExrPart> parts, ExrCompression compression)
+void check(const std::ofstream& stream)
 {
-    check_parts(parts);
+    if (!stream)
+        throw std::system_error(errno, std::generic_category());
+}
+
+// Calls write_one(output, part) for every part.
+template <class WriteOne>
+void write_file(const std::string& path, std::span<const ExrPart> parts, ExrCompression compression,
+                const WriteOne& write_one)
+{
     PendingFile file(path);
 
     // The format wants one display window for all parts.
@@ -117,14 +134,44 @@ void write_exr_parts(const std::string& path, std::span<const ExrPart> parts, Ex
 
     constexpr int own_threads = 0;  // OpenEXR's thread pool is global state of the host's process
     try {
-        Imf::MultiPartOutputFile output(file.path().c_str(), headers.data(), static_cast<int>(headers.size()), false,
-                                        own_threads);
-        for (std::size_t i = 0; i < parts.size(); ++i)
-            write_part(Imf::OutputPart(output, static_cast<int>(i)), parts[i]);
+        // OpenEXR writes line by line, which costs the system thrice as much as writing the whole.
+        std::vector<char> buffer(std::size_t{1} << 20);
+        std::ofstream stream;
+        stream.rdbuf()->pubsetbuf(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+        stream.open(file.path(), std::ios::binary);
+        check(stream);
+        {
+            Imf::StdOFStream named(stream, file.path().c_str());
+            Imf::MultiPartOutputFile output(named, headers.data(), static_cast<int>(headers.size()), false,
+                                            own_threads);
+            for (std::size_t i = 0; i < parts.size(); ++i)
+                write_one(Imf::OutputPart(output, static_cast<int>(i)), parts[i]);
+        }
+        stream.close();
+        check(stream);
     } catch (const std::exception& error) {
         throw IoError("cannot write '" + path + "': " + detail::reason_of(error, file.path()));
     }
     file.commit();
+}
+
+}  // namespace
+
+void write_exr_parts(const std::string& path, std::span<const ExrPart> parts, ExrCompression compression)
+{
+    check_parts(parts);
+    write_file(path, parts, compression, write_part);
+}
+
+void write_exr_bottom_up(const std::string& path, const ExrPart& part, std::span<const float> pixels,
+                         ExrCompression compression)
+{
+    check_part(part, pixels.size());
+    write_file(path, {&part, 1}, compression, [&](Imf::OutputPart output, const ExrPart&) {
+        const std::size_t values = line_values(part);
+        // OpenEXR only adds strides to addresses: one that wraps around goes back, as Blender's own files are written.
+        write_pixels(output, part, Imf::FLOAT, pixels.data() + pixels.size() - values, 0 - values * sizeof(float));
+    });
 }
 
 }  // namespace beamspread

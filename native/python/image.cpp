@@ -74,14 +74,10 @@ void write_exr(const std::string& path, const py::array& array, const std::vecto
     part.width = static_cast<int>(array.shape(1));
     part.channels = channels;
     part.attributes = to_attributes(attributes);
-    const auto* pixels = static_cast<const float*>(array.data());
-    const auto height = static_cast<std::size_t>(part.height);
-    const std::size_t row_values = static_cast<std::size_t>(part.width) * channels.size();
+    const std::span pixels(static_cast<const float*>(array.data()), static_cast<std::size_t>(array.size()));
 
     const py::gil_scoped_release released;
-    part.pixels.resize(height * row_values);
-    flip_rows(pixels, part.pixels.data(), height, row_values);
-    write_exr_parts(path, {&part, 1}, packing);
+    write_exr_bottom_up(path, part, pixels, packing);
 }
 
 py::tuple read_exr(const std::string& path, const std::optional<std::string>& part_name)

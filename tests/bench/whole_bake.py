@@ -10,6 +10,7 @@ import argparse
 import os
 import resource
 import shutil
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -57,9 +58,10 @@ def run(arguments):
     return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done.stdout
 
 
-def best(results):
-    """The least wall and CPU seconds."""
-    return min(result[0] for result in results), min(result[1] for result in results)
+def summary(pairs, index):
+    """Least seconds of both, their ratio, and the median ratio of those that ran one after the other."""
+    saved, baked = (min(run[index] for run in runs) for runs in zip(*pairs))
+    return saved, baked, baked / saved, statistics.median(bake[index] / save[index] for save, bake in pairs)
 
 
 def measure(program, folder, resolution, runs):
@@ -71,11 +73,10 @@ def measure(program, folder, resolution, runs):
         save = command(program, scene, INSIDE, "save", str(Path(folder) / "saved.exr"), size)
         run(bake)  # fills the cache and warms the disk's
         pairs = [(run(save), run(bake)) for _ in range(runs)]
-        saved, baked = best([pair[0] for pair in pairs]), best([pair[1] for pair in pairs])
+        rows = zip(summary(pairs, 0), summary(pairs, 1))
         print(f"{version}, {scene.stem}, {size} x {size}:  wall s  CPU s")
-        print(f"  start, load, save      {saved[0]:8.2f}  {saved[1]:.2f}")
-        print(f"  start, load, bake      {baked[0]:8.2f}  {baked[1]:.2f}")
-        print(f"  ratio                  {baked[0] / saved[0]:8.2f}  {baked[1] / saved[1]:.2f}")
+        for name, (wall, cpu) in zip(("start, load, save", "start, load, bake", "ratio", "median of pairs"), rows):
+            print(f"  {name:22} {wall:8.2f}  {cpu:.2f}")
         for line in run(command(program, scene, INSIDE, "phases", folder))[2].splitlines():
             if line.startswith("phase "):
                 name, _, numbers = line.removeprefix("phase ").partition(": ")
@@ -86,7 +87,7 @@ def measure(program, folder, resolution, runs):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--resolution", type=int, default=1024)
-    parser.add_argument("--runs", type=int, default=3)
+    parser.add_argument("--runs", type=int, default=5)
     options = parser.parse_args()
     programs = [shutil.which("blender"), sys.executable if BPY_MODULE.exists() else None]
     for program in filter(None, programs):
