@@ -9,6 +9,8 @@ other things; T is taken next to what it is compared with.
 import argparse
 import math
 import os
+import subprocess
+import sys
 import time
 
 import beamspread
@@ -76,6 +78,41 @@ def sun(size, library):
         cost = seconds(2, beamspread.convolve, *arguments)
         unit = transform_seconds(size)
         print(f"  mean free path {path:4.1f} texels: {cost:7.2f} s = {cost / unit:5.1f} T")
+
+
+def far(size, library):
+    """Light that spreads farther than the plane, without and with a coarser grid; three albedos, three kernels."""
+    light, arguments = shadows(size), ((0.999, 0.998, 0.997), (40.0, 28.0, 20.0))
+    unit = transform_seconds(size)
+    print(f"\nsun, {size} x {size} RGB, ior 1.4, albedo .999, mean free path 40 texels")
+    lights = [(light, np.array(SUN, np.float32))]
+    for name, coarsening in (("padded by all of the reach", 1), ("as the solver chooses", 0)):
+        rest = [library] * 3, *map(list, arguments), (1.0, 1.0), "fft", 1e-3, 0, None
+        cost = seconds(2, _native.convolve, lights, *rest, coarsening=coarsening)
+        print(f"  {name:28s}: {cost:7.2f} s = {cost / unit:5.1f} T")
+
+
+MEMORY = """
+import time, numpy, beamspread
+size, path = {size}, {path}
+light = numpy.kron(numpy.random.default_rng(1).random((16, 16)) < 0.6, numpy.ones((size // 16,) * 2, numpy.float32))
+library = beamspread.library(beamspread.Medium(0.8, 1.4))
+wall, cpu = time.perf_counter(), time.process_time()
+beamspread.convolve(light, {sun}, library, 0.999, (path, 0.7 * path, 0.5 * path), 1.0)
+print(time.perf_counter() - wall, time.process_time() - cpu)
+print([line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM")][0])
+"""
+
+
+def memory(sizes):
+    """Of a process of its own, with input and result."""
+    print("\nsun, RGB, gray irradiance, ior 1.4, albedo .999: peak memory of the process, wall clock and CPU seconds")
+    for size in sizes:
+        for path in (4.0, 40.0):
+            code = MEMORY.format(size=size, path=path, sun=SUN)
+            output = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+            wall, cpu, kilobytes = map(float, output.split())
+            print(f"  {size:6d}, mean free path {path:4.1f}: {kilobytes / 2**20:5.2f} GiB, {wall:6.1f} s, {cpu:6.1f} s")
 
 
 def scipy_sun(size, library):
@@ -155,6 +192,8 @@ def main():
     print(f"{THREADS} threads")
     transforms(4096 // smaller)
     sun(4096 // smaller, libraries[1.0])
+    far(4096 // smaller, libraries[1.4])
+    memory([8192 // smaller, 16384 // smaller])
     scipy_sun(2048 // smaller, libraries[1.0])
     check(96, libraries[1.0])
     lamps(2048 // smaller, libraries)
