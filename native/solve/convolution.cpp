@@ -18,6 +18,16 @@ std::size_t rounds_of(std::size_t count, std::size_t at_once)
     return (count + at_once - 1) / at_once;
 }
 
+HarmonicRange harmonics_of(std::span<const LightTerm> terms)
+{
+    HarmonicRange range{harmonic_count, 0};
+    for (const LightTerm& term : terms)
+        for (const std::vector<KernelTerm>& kernel : term.kernels)
+            for (const KernelTerm& part : kernel)
+                range = {std::min(range.first, part.m), std::max(range.end, part.m + 1)};
+    return range.end == 0 ? HarmonicRange{} : range;  // light that no kernel spreads
+}
+
 }  // namespace
 
 Convolution::Convolution(const KernelSpectra& spectra, std::span<const LightTerm> terms, std::size_t media,
@@ -123,6 +133,7 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
     const std::size_t columns = m_plane.columns();
     const std::size_t offset = tile.y.first - tile.window_y.first;
     const std::size_t items = rounds_of(columns, columns_per_item);
+    const HarmonicRange harmonics = harmonics_of(m_terms.subspan(first_term, count));
     parallel_for(items, [&](std::size_t item) {
         const auto lease = m_column_scratch.lend();
         ColumnScratch& scratch = *lease;
@@ -132,7 +143,7 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
         const std::size_t last = std::min(columns, (item + 1) * columns_per_item);
         for (std::size_t x = item * columns_per_item; x < last; ++x) {
             std::fill(scratch.sums.begin(), scratch.sums.end(), Complex());
-            m_spectra.start(x, scratch.column);
+            m_spectra.start(x, harmonics, scratch.column);
             for (std::size_t first = 0; first < count; first += terms_per_batch) {
                 const std::size_t batch = std::min(terms_per_batch, count - first);
                 for (std::size_t t = 0; t < batch; ++t) {

@@ -93,6 +93,14 @@ Harmonics project(const RadialProfile& profile, const RadialWindow& window, doub
     return sum;
 }
 
+bool holds(const RadialProfile& profile, std::size_t m)
+{
+    for (std::size_t k = 0; k < radius_bin_count && m < profile.harmonics(); ++k)
+        if (profile.remaining(radius_bin_edge(k))[m] != 0.0)
+            return true;
+    return false;
+}
+
 }  // namespace
 
 HankelTable::HankelTable(const std::vector<ScaledProfile>& profiles, const RadialWindow& window, double unit_m)
@@ -102,14 +110,14 @@ HankelTable::HankelTable(const std::vector<ScaledProfile>& profiles, const Radia
     // would leave the cache, and such kernels hold little power at their ends.
     const std::size_t length = fast_even_size((samples <= 2048 ? 32 : 16) * samples);
     m_k_step = 2.0 * pi / (static_cast<double>(length) * sample_step);
-    for (const ScaledProfile& each : profiles) {
-        for (std::size_t m = 0; m < harmonic_count; ++m) {
-            bool empty = true;
-            for (std::size_t k = 0; k < radius_bin_count && m < each.profile.harmonics(); ++k)
-                empty = empty && each.profile.remaining(radius_bin_edge(k))[m] == 0.0;
-            m_column.push_back(empty ? no_column : m_columns++);
-        }
+    m_column.assign(profiles.size() * harmonic_count, no_column);
+    for (std::size_t m = 0; m < harmonic_count; ++m) {
+        m_columns_below.push_back(m_columns);
+        for (std::size_t p = 0; p < profiles.size(); ++p)
+            if (holds(profiles[p].profile, m))
+                m_column[p * harmonic_count + m] = m_columns++;
     }
+    m_columns_below.push_back(m_columns);
     m_rows = static_cast<std::size_t>(0.95 * 2.0 * pi / m_k_step) + 4;
     m_table.assign(m_rows * m_columns, 0.0f);
     for (std::size_t p = 0; p < profiles.size(); ++p)
@@ -158,14 +166,14 @@ void HankelTable::add_profile(const ScaledProfile& scaled, std::size_t index, co
     });
 }
 
-void HankelTable::row(double k, float* values) const
+void HankelTable::row(double k, std::size_t first, std::size_t count, float* values) const
 {
     const double place = k / m_k_step;
     const std::size_t row = std::min(static_cast<std::size_t>(place), m_rows - 4);
     const auto w = cubic_weights(std::min(place - static_cast<double>(row), 1.0));
     const std::array<float, 4> weights = {static_cast<float>(w[0]), static_cast<float>(w[1]), static_cast<float>(w[2]),
                                           static_cast<float>(w[3])};
-    interpolate(values, m_table.data() + row * m_columns, m_columns, weights.data(), m_columns);
+    interpolate(values, m_table.data() + row * m_columns + first, m_columns, weights.data(), count);
 }
 
 }  // namespace beamspread

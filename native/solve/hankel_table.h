@@ -18,13 +18,14 @@ public:
 
     HankelTable(const std::vector<ScaledProfile>& profiles, const RadialWindow& window, double unit_m);
 
-    std::size_t columns() const { return m_columns; }
+    // Columns of harmonics below m, which come first.
+    std::size_t columns_below(std::size_t m) const { return m_columns_below[m]; }
 
     // Place of a harmonic in a row; `no_column` where the profile lacks it.
     std::size_t column(std::size_t profile, std::size_t m) const { return m_column[profile * harmonic_count + m]; }
 
-    // H of all columns at k radians per unit.
-    void row(double k, float* values) const;
+    // H of `count` columns from `first` on at k radians per unit.
+    void row(double k, std::size_t first, std::size_t count, float* values) const;
 
 private:
     void add_profile(const ScaledProfile& scaled, std::size_t index, const RadialWindow& window, double unit_m,
@@ -33,8 +34,9 @@ private:
     double m_k_step = 1.0;
     std::size_t m_rows = 0;
     std::size_t m_columns = 0;
-    std::vector<std::size_t> m_column;
-    std::vector<float> m_table;  // [k][column], first row for -m_k_step
+    std::vector<std::size_t> m_columns_below;  // [m]
+    std::vector<std::size_t> m_column;         // [profile][m]
+    std::vector<float> m_table;  // [k][column], the first row for -m_k_step
 };
 
 }  // namespace beamspread

@@ -36,8 +36,6 @@ KernelSpectra::KernelSpectra(const Level& level, const std::vector<ScaledProfile
                              const std::optional<RadialWindow>& outside_centre)
     : m_plane(level.plane)
 {
-    for (const ScaledProfile& each : profiles)
-        m_harmonics = std::max(m_harmonics, each.profile.harmonics());
     if (level.centre)
         m_centre.emplace(m_plane, *level.centre, profiles, outside_centre);
     if (level.ring)
@@ -46,15 +44,17 @@ KernelSpectra::KernelSpectra(const Level& level, const std::vector<ScaledProfile
         m_texel_y.push_back(static_cast<float>(texel_transform(turns(f, m_plane.padded_height), m_plane.texels_y)));
 }
 
-void KernelSpectra::start(std::size_t frequency, Column& column) const
+void KernelSpectra::start(std::size_t frequency, const HarmonicRange& harmonics, Column& column) const
 {
     if (m_centre)
         m_centre->start(frequency, column.centre);
     if (!m_ring)
         return;
     const std::size_t frequencies = m_plane.padded_height / 2 + 1;
-    const std::size_t functions = m_ring->columns();
-    column.trig.resize(2 * m_harmonics * frequencies);
+    column.first_m = harmonics.first;
+    column.first_function = m_ring->columns_below(harmonics.first);
+    const std::size_t functions = m_ring->columns_below(harmonics.end) - column.first_function;
+    column.trig.resize(2 * (harmonics.end - harmonics.first) * frequencies);
     column.hankel.resize(functions * frequencies);
     // Per metre, then per unit of length.
     const double x_turns = turns(frequency, m_plane.padded_width);
@@ -62,8 +62,6 @@ void KernelSpectra::start(std::size_t frequency, Column& column) const
     const auto texel_x = static_cast<float>(texel_transform(x_turns, m_plane.texels_x));
     const bool x_nyquist = 2 * frequency == m_plane.padded_width;
 
-    column.values.resize(functions);
-    float* values = column.values.data();
     column.k.resize(frequencies);
     for (auto* part : {&column.cos_psi, &column.sin_psi, &column.cosine, &column.sine})
         part->resize(frequencies);
@@ -76,20 +74,30 @@ void KernelSpectra::start(std::size_t frequency, Column& column) const
         column.cosine[f] = texel_x * m_texel_y[f];
         column.sine[f] = 0.0f;
     }
-    for (std::size_t m = 0; m < m_harmonics; ++m) {
-        float* trig = column.trig.data() + 2 * m * frequencies;
+    const auto next = [&] {
+        turn(column.cosine.data(), column.sine.data(), column.cos_psi.data(), column.sin_psi.data(), frequencies);
+    };
+    for (std::size_t m = 0; m < harmonics.first; ++m)
+        next();
+    for (std::size_t m = harmonics.first; m < harmonics.end; ++m) {
+        float* trig = column.trig.data() + 2 * (m - harmonics.first) * frequencies;
         std::copy(column.cosine.begin(), column.cosine.end(), trig);
         std::copy(column.sine.begin(), column.sine.end(), trig + frequencies);
         // At the Nyquist frequency a function that is odd along that axis has no spectrum.
         if (x_nyquist)
             std::fill_n(m % 2 == 1 ? trig : trig + frequencies, frequencies, 0.0f);
         trig[2 * frequencies - 1] = 0.0f;
-        turn(column.cosine.data(), column.sine.data(), column.cos_psi.data(), column.sin_psi.data(), frequencies);
+        next();
     }
-    for (std::size_t f = 0; f < frequencies; ++f) {
-        m_ring->row(column.k[f], values);
+    constexpr std::size_t at_once = 16;  // fill a cache line of each function
+    column.values.resize(at_once * functions);
+    for (std::size_t first = 0; first < frequencies; first += at_once) {
+        const std::size_t count = std::min(at_once, frequencies - first);
+        for (std::size_t f = 0; f < count; ++f)
+            m_ring->row(column.k[first + f], column.first_function, functions, column.values.data() + f * functions);
         for (std::size_t i = 0; i < functions; ++i)
-            column.hankel[i * frequencies + f] = values[i];
+            for (std::size_t f = 0; f < count; ++f)
+                column.hankel[i * frequencies + first + f] = column.values[f * functions + i];
     }
 }
 
@@ -105,8 +113,8 @@ void KernelSpectra::spectrum(const Column& column, const KernelTerm* terms, std:
         const std::size_t function = m_ring->column(terms[t].profile, terms[t].m);
         if (function == HankelTable::no_column)
             continue;
-        const float* trig = column.trig.data() + (2 * terms[t].m + (sine ? 1 : 0)) * frequencies;
-        const float* hankel = column.hankel.data() + function * frequencies;
+        const float* trig = column.trig.data() + (2 * (terms[t].m - column.first_m) + (sine ? 1 : 0)) * frequencies;
+        const float* hankel = column.hankel.data() + (function - column.first_function) * frequencies;
         add_scaled_product(values, trig, hankel, static_cast<float>(terms[t].weight), frequencies);
     }
     for (std::size_t f = frequencies; f < m_plane.padded_height; ++f)

@@ -26,13 +26,15 @@ public:
 
     const PaddedPlane& plane() const { return m_plane; }
 
-    // What one column of frequencies needs for all kernels; use it again for the next one.
+    // What one column of frequencies needs for kernels of some harmonics; use it again for the next one.
     struct Column {
         CentreSpectrum::Column centre;
-        std::vector<float> trig;    // [2 m + phase][frequency]: cos, sin (m psi) times the texel's transform
-        std::vector<float> hankel;  // [column of the table][frequency]
-        std::vector<float> values;  // of one frequency
-        std::vector<double> k;      // of each frequency, per unit
+        std::size_t first_m = 0;
+        std::size_t first_function = 0;  // column of the table
+        std::vector<float> trig;  // [2 (m - first_m) + phase][frequency]: cos, sin (m psi) times the texel's transform
+        std::vector<float> hankel;  // [function - first_function][frequency]
+        std::vector<float> values;  // of some frequencies
+        std::vector<double> k;  // of each frequency, per unit
         std::vector<float> cos_psi;
         std::vector<float> sin_psi;
         std::vector<float> cosine;  // of m psi
@@ -40,7 +42,7 @@ public:
     };
 
     // For kx = 2 pi frequency / padded_width.
-    void start(std::size_t frequency, Column& column) const;
+    void start(std::size_t frequency, const HarmonicRange& harmonics, Column& column) const;
 
     // The sum of terms that share their phase and whether m is even, for all padded_height frequencies ky; for odd m
     // divided by -i, hence real.
@@ -48,7 +50,6 @@ public:
 
 private:
     PaddedPlane m_plane;
-    std::size_t m_harmonics = 0;  // that any profile uses
     std::optional<CentreSpectrum> m_centre;
     std::optional<HankelTable> m_ring;
     std::vector<float> m_texel_y;  // of each frequency: the transform of the texel

@@ -17,6 +17,12 @@ struct KernelTerm {
     double weight;
 };
 
+// Harmonics [first, end).
+struct HarmonicRange {
+    std::size_t first = 0;
+    std::size_t end = 0;
+};
+
 struct ScaledProfile {
     RadialProfile profile;
     double mean_free_path = 1.0;  // metres
