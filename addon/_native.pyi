@@ -99,8 +99,8 @@ class LdfLibrary(LdfSource):
         A copy whose totals are those of `exact_totals`.
 
         The light of each scattering order, with the distribution it was simulated with, is scaled: by as little as makes the
-        totals right at 16 albedos from .01 to .99999, least squares weighted by statistical variance. Albedos in between, and the
-        totals of every map, follow. `standard_error` then includes what `exact_totals` and the interpolation between angles
+        totals right at 16 albedos from .01 to .99999, least squares weighted by statistical variance. Albedos in between, and
+        the totals of every map, follow. `standard_error` then includes what `exact_totals` and the interpolation between angles
         leave; `image_standard_error` stays that of the simulation, an upper bound.
 
         Parameters
@@ -241,9 +241,9 @@ class LdfSample:
         """
         Read a sample from an OpenEXR file, ours or another program's.
 
-        The file has one part with the channel Y (or one channel alone) and the attributes, numbers of type float, double or int,
-        ``pitch`` (mean free paths), ``angle`` (degrees), ``albedo``, and where known ``beamDiameter`` (mean free paths) and ``g``.
-        Its first line is that of the largest v.
+        The file has one part with the channel Y (or one channel alone) and the attributes, numbers of type float, double or
+        int, ``pitch`` (mean free paths), ``angle`` (degrees), ``albedo``, and where known ``beamDiameter`` (mean free paths)
+        and ``g``. Its first line is that of the largest v.
 
         Raises
         ------
@@ -275,9 +275,9 @@ class LdfSample:
         """
         H, the brightest point, (u, v) in mean free paths.
 
-        On v = 0, as an LDF is even in v. The image is smoothed as little as brings its noise, the part odd in v, below 1 % of the
-        peak; H is the vertex of a paraboloid fitted to what is within 5 % of the peak. A peak next to O that the texels don't resolve, such as
-        a pencil beam's, is at O.
+        On v = 0, as an LDF is even in v. The image is smoothed as little as brings its noise, the part odd in v, below 1 % of
+        the peak; H is the vertex of a paraboloid fitted to what is within 5 % of the peak. A peak next to O that the texels
+        don't resolve, such as a pencil beam's, is at O.
         """
     @property
     def g(self) -> float | None: ...
@@ -300,9 +300,9 @@ class AngularSpace:
 
     Places P of the plane as seen from the reference point Q at `height` above the brightest point H: psi in [0, pi/2)
     is the angle at Q between the normal and the direction to P, phi in [0, 2 pi) the azimuth of P around H from the
-    beam's direction of travel, +u: ``P = H + height tan(psi) (cos phi, sin phi)``. The paper's text takes for phi the angle at P between
-    the directions to O and H, which is 0 everywhere at normal incidence; its Fig. 4 shows the azimuth. The maps therefore depend on H
-    and the height alone.
+    beam's direction of travel, +u: ``P = H + height tan(psi) (cos phi, sin phi)``. The paper's text takes for phi the angle
+    at P between the directions to O and H, which is 0 everywhere at normal incidence; its Fig. 4 shows the azimuth. The
+    maps therefore depend on H and the height alone.
 
     Parameters
     ----------
@@ -395,10 +395,11 @@ def convolve(
     """
     Luminance of beams on a grid; the engine behind `beamspread.convolve`.
 
-    Lights are pairs of irradiance, float32 (H, W) or (H, W, C) in W/m^2, and direction, float32 (3,) or (H, W, 3); C libraries,
-    albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr). `memory`: bytes that the spectra of the solver 'fft' may take; where the whole plane
-    needs more it is solved in tiles. `coarsening`: texels from node to node of the grid on which it spreads light far: 4, 8, 16, ... 64, 1 for no
-    such grid, 0 for what costs least.
+    Lights are pairs of irradiance, float32 (H, W) or (H, W, C) in W/m^2, and direction, float32 (3,) or (H, W, 3); C
+    libraries, albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr).
+    `memory`: bytes that the spectra of the solver 'fft' may take; where the whole plane needs more it is solved in tiles.
+    `coarsening`: texels from node to node of the grid on which it spreads light far: 4, 8, 16, ... 64, 1 for no such grid,
+    0 for what costs least.
     """
 
 def coverage(
@@ -510,19 +511,20 @@ def interpolate(
     Parameters
     ----------
     samples : sequence of LdfSample
-        On a regular grid of angles and albedos, and of g where that differs, in any order; alike in texels and beam. Only the
-        cell of the grid around what is asked for counts.
+        On a regular grid of angles and albedos, and of g where that differs, in any order; alike in texels and beam. Only
+        the cell of the grid around what is asked for counts.
     angle, albedo : float
         Within the samples' span.
     g : float, optional
         Anisotropy; needed where the samples span more than one.
     method : {"angular", "adaptive", "planar"}
-        ``angular`` is the paper's (Eq. 3, 4): exitance is blended with linear weights at the same place of angular space, H and Q
-        are blended with the same weights. ``planar`` blends at the same (u, v). ``adaptive`` blends logarithms, with weights that
-        follow how LDFs change with angle and albedo: nearer to the truth, by far where albedos differ.
+        ``angular`` is the paper's (Eq. 3, 4): exitance is blended with linear weights at the same place of angular space, H
+        and Q are blended with the same weights. ``planar`` blends at the same (u, v). ``adaptive`` blends logarithms, with
+        weights that follow how LDFs change with angle and albedo: nearer to the truth, by far where albedos differ.
     height : float, optional
-        Of Q above H for ``angular``, mean free paths; default: two thirds of the images' width, the paper's 100 units over a window of
-        150. The result doesn't depend on it but for rounding: with the same height for all samples it cancels out.
+        Of Q above H for ``angular``, mean free paths; default: two thirds of the images' width, the paper's 100 units over
+        a window of 150. The result doesn't depend on it but for rounding: with the same height for all samples it cancels
+        out.
 
     Returns
     -------

@@ -26,8 +26,8 @@ struct ExrPart {
 inline constexpr int max_exr_side = 1 << 17;
 inline constexpr long long max_exr_values = 1LL << 30;
 
-// The last bits of a simulated or baked number are noise, which packs badly: ZIP takes ten times as long to write a baked
-// RGB texture as no compression, and saves two fifths of it.
+// The last bits of a simulated or baked number are noise, which packs badly: ZIP takes ten times as long to write a
+// baked RGB texture as no compression, and saves two fifths of it.
 enum class ExrCompression { none, zip };
 
 // Writes the parts to a file beside `path` and renames it over `path` when it is whole.
@@ -35,7 +35,8 @@ enum class ExrCompression { none, zip };
 void write_exr_parts(const std::string& path, std::span<const ExrPart> parts,
                      ExrCompression compression = ExrCompression::zip);
 
-// The same for one part whose pixels are the host's: `pixels` in place of its own, from the file's last line to its first.
+// The same for one part whose pixels are the host's: `pixels` in place of its own, from the file's last line to its
+// first.
 void write_exr_bottom_up(const std::string& path, const ExrPart& part, std::span<const float> pixels,
                          ExrCompression compression = ExrCompression::zip);
 

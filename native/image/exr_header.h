@@ -21,7 +21,8 @@ std::map<std::string, ExrAttribute> get_attributes(const Imf::Header& header);
 
 void set_channels(Imf::Header& header, const std::vector<std::string>& channels, Imf::PixelType type);
 
-// As the file spells them. As written by us; of foreign files R, G, B, A first within each layer, then the others by name.
+// As the file spells them. As written by us; of foreign files R, G, B, A first within each layer, then the others by
+// name.
 std::vector<std::string> get_channels(const Imf::Header& header);
 
 // The text if it is valid UTF-8, else with "?" for its bytes outside ASCII: hosts such as Python take nothing else.

@@ -96,8 +96,8 @@ calibrated library does: the error halfway between simulated angles is known fro
             R"(A copy whose totals are those of `exact_totals`.
 
 The light of each scattering order, with the distribution it was simulated with, is scaled: by as little as makes the
-totals right at 16 albedos from .01 to .99999, least squares weighted by statistical variance. Albedos in between, and the
-totals of every map, follow. `standard_error` then includes what `exact_totals` and the interpolation between angles
+totals right at 16 albedos from .01 to .99999, least squares weighted by statistical variance. Albedos in between, and
+the totals of every map, follow. `standard_error` then includes what `exact_totals` and the interpolation between angles
 leave; `image_standard_error` stays that of the simulation, an upper bound.
 
 Parameters

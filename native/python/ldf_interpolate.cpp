@@ -101,9 +101,9 @@ void bind_ldf_interpolate(py::module_& m)
 
 Places P of the plane as seen from the reference point Q at `height` above the brightest point H: psi in [0, pi/2)
 is the angle at Q between the normal and the direction to P, phi in [0, 2 pi) the azimuth of P around H from the
-beam's direction of travel, +u: ``P = H + height tan(psi) (cos phi, sin phi)``. The paper's text takes for phi the angle at P between
-the directions to O and H, which is 0 everywhere at normal incidence; its Fig. 4 shows the azimuth. The maps therefore depend on H
-and the height alone.
+beam's direction of travel, +u: ``P = H + height tan(psi) (cos phi, sin phi)``. The paper's text takes for phi the angle
+at P between the directions to O and H, which is 0 everywhere at normal incidence; its Fig. 4 shows the azimuth. The
+maps therefore depend on H and the height alone.
 
 Parameters
 ----------
@@ -143,19 +143,20 @@ ValueError
 Parameters
 ----------
 samples : sequence of LdfSample
-    On a regular grid of angles and albedos, and of g where that differs, in any order; alike in texels and beam. Only the
-    cell of the grid around what is asked for counts.
+    On a regular grid of angles and albedos, and of g where that differs, in any order; alike in texels and beam. Only
+    the cell of the grid around what is asked for counts.
 angle, albedo : float
     Within the samples' span.
 g : float, optional
     Anisotropy; needed where the samples span more than one.
 method : {"angular", "adaptive", "planar"}
-    ``angular`` is the paper's (Eq. 3, 4): exitance is blended with linear weights at the same place of angular space, H and Q
-    are blended with the same weights. ``planar`` blends at the same (u, v). ``adaptive`` blends logarithms, with weights that
-    follow how LDFs change with angle and albedo: nearer to the truth, by far where albedos differ.
+    ``angular`` is the paper's (Eq. 3, 4): exitance is blended with linear weights at the same place of angular space, H
+    and Q are blended with the same weights. ``planar`` blends at the same (u, v). ``adaptive`` blends logarithms, with
+    weights that follow how LDFs change with angle and albedo: nearer to the truth, by far where albedos differ.
 height : float, optional
-    Of Q above H for ``angular``, mean free paths; default: two thirds of the images' width, the paper's 100 units over a window of
-    150. The result doesn't depend on it but for rounding: with the same height for all samples it cancels out.
+    Of Q above H for ``angular``, mean free paths; default: two thirds of the images' width, the paper's 100 units over
+    a window of 150. The result doesn't depend on it but for rounding: with the same height for all samples it cancels
+    out.
 
 Returns
 -------

@@ -106,9 +106,9 @@ ValueError
         },
         py::arg("path"), R"(Read a sample from an OpenEXR file, ours or another program's.
 
-The file has one part with the channel Y (or one channel alone) and the attributes, numbers of type float, double or int,
-``pitch`` (mean free paths), ``angle`` (degrees), ``albedo``, and where known ``beamDiameter`` (mean free paths) and ``g``.
-Its first line is that of the largest v.
+The file has one part with the channel Y (or one channel alone) and the attributes, numbers of type float, double or
+int, ``pitch`` (mean free paths), ``angle`` (degrees), ``albedo``, and where known ``beamDiameter`` (mean free paths)
+and ``g``. Its first line is that of the largest v.
 
 Raises
 ------
@@ -139,9 +139,9 @@ OSError
             },
             R"(H, the brightest point, (u, v) in mean free paths.
 
-On v = 0, as an LDF is even in v. The image is smoothed as little as brings its noise, the part odd in v, below 1 % of the
-peak; H is the vertex of a paraboloid fitted to what is within 5 % of the peak. A peak next to O that the texels don't resolve, such as
-a pencil beam's, is at O.)")
+On v = 0, as an LDF is even in v. The image is smoothed as little as brings its noise, the part odd in v, below 1 % of
+the peak; H is the vertex of a paraboloid fitted to what is within 5 % of the peak. A peak next to O that the texels
+don't resolve, such as a pencil beam's, is at O.)")
         .def("__repr__", [](const LdfSample& self) {
             return py::str("<LdfSample {}x{} pitch={} angle={} albedo={} beam_diameter={} g={}>")
                 .format(self.height, self.width, self.pitch, self.angle_deg, self.albedo, self.beam_diameter, self.g);

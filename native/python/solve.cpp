@@ -152,10 +152,11 @@ void bind_solve(py::module_& m)
           py::arg("memory") = Problem().memory, py::arg("coarsening") = Problem().coarsening,
           R"(Luminance of beams on a grid; the engine behind `beamspread.convolve`.
 
-Lights are pairs of irradiance, float32 (H, W) or (H, W, C) in W/m^2, and direction, float32 (3,) or (H, W, 3); C libraries,
-albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr). `memory`: bytes that the spectra of the solver 'fft' may take; where the whole plane
-needs more it is solved in tiles. `coarsening`: texels from node to node of the grid on which it spreads light far: 4, 8, 16, ... 64, 1 for no
-such grid, 0 for what costs least.
+Lights are pairs of irradiance, float32 (H, W) or (H, W, C) in W/m^2, and direction, float32 (3,) or (H, W, 3); C
+libraries, albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr).
+`memory`: bytes that the spectra of the solver 'fft' may take; where the whole plane needs more it is solved in tiles.
+`coarsening`: texels from node to node of the grid on which it spreads light far: 4, 8, 16, ... 64, 1 for no such grid,
+0 for what costs least.
 )");
     m.def("adaptive_beams", &adaptive_beams, py::arg("irradiance"), py::arg("direction"), py::arg("tolerance"),
           R"(Squares that the adaptive solver lights by one beam each; the engine behind `beamspread.adaptive_beams`.

@@ -53,8 +53,9 @@ private:
 // How the spot's falloff f follows from the angle theta between the lamp's -z axis and the ray; with
 // c = cos(theta), c0 = cos(spot_size / 2), f = smoothstep((c - c0) / ((1 - c0) blend)), a step at c0 where blend is 0.
 enum class SpotFalloff {
-    // Measured in Blender 4.2, 4.5, 5.0; the change was made for 3.5 (D17129): c is taken in the lamp's own space, so a scaled lamp has an elliptic cone. (Cycles culls
-    // the far side of the cone of a lamp that is sheared by its parents; we do not.)
+    // Measured in Blender 4.2, 4.5, 5.0; the change was made for 3.5 (D17129): c is taken in the lamp's own space, so a
+    // scaled lamp has an elliptic cone. (Cycles culls the far side of the cone of a lamp that is sheared by its
+    // parents; we do not.)
     scaled,
     // Blender 3.4: the lamp's scale is ignored, and f has a further factor c.
     legacy,

@@ -43,7 +43,8 @@ void check_arrays(std::span<const float> vertices, std::span<const std::uint32_t
     }
 }
 
-// Copies `values` into a new buffer of Embree's, which pads it as its vector loads need; it lives as long as the geometry.
+// Copies `values` into a new buffer of Embree's, which pads it as its vector loads need; it lives as long as the
+// geometry.
 template <class T>
 const T* set_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::span<const T> values)
 {

@@ -10,16 +10,16 @@
 
 namespace beamspread {
 
-// Towards a light: what lies in (0, distance) from `origin` along the unit vector `direction` shades `origin`. The distance
-// may be infinite.
+// Towards a light: what lies in (0, distance) from `origin` along the unit vector `direction` shades `origin`. The
+// distance may be infinite.
 struct ShadowRay {
     Vec3 origin{};
     Vec3 direction{};
     double distance = 0.0;
 };
 
-// An immutable set of triangles with a bounding volume hierarchy; both sides of a triangle block. Its queries may run on
-// any number of threads at once.
+// An immutable set of triangles with a bounding volume hierarchy; both sides of a triangle block. Its queries may run
+// on any number of threads at once.
 class Occluders {
 public:
     // `vertices` holds x, y, z of each vertex in world metres, `triangles` three vertex indices each; both are copied.

@@ -24,8 +24,8 @@ enum class Shade : std::uint8_t {
     full,     // the shadow of one triangle covers it: every ray from it is blocked
 };
 
-// The triangles' shadows on the plane, by bands of rows. Both bounds allow for the rounding of rays, so that tracing all
-// of them would give the same.
+// The triangles' shadows on the plane, by bands of rows. Both bounds allow for the rounding of rays, so that tracing
+// all of them would give the same.
 class Shadows {
 public:
     static constexpr std::size_t rows_per_band = 8;
@@ -44,8 +44,8 @@ private:
     const Occluders* m_occluders;
     RayStart m_start;
     bool m_is_unknown = false;  // a triangle whose shadow has no end lies in the way
-    // Numbers of triangles, in the nodes of a binary tree over the bands. A triangle is in the one or two nodes, side by
-    // side, that span its shadow's rows, so that tall ones take no more memory than small ones.
+    // Numbers of triangles, in the nodes of a binary tree over the bands. A triangle is in the one or two nodes, side
+    // by side, that span its shadow's rows, so that tall ones take no more memory than small ones.
     std::vector<std::vector<std::uint32_t>> m_nodes;
     std::size_t m_leaves = 0;
 };

@@ -1,5 +1,5 @@
-// Light that a slab's far boundary returns without a single scattering. It leaves displaced, and is otherwise as sharp as
-// it entered: of each texel's light squares, which are shared among the texels that they cover.
+// Light that a slab's far boundary returns without a single scattering. It leaves displaced, and is otherwise as sharp
+// as it entered: of each texel's light squares, which are shared among the texels that they cover.
 #include <algorithm>
 #include <array>
 #include <cmath>

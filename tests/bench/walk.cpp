@@ -1,7 +1,8 @@
 // Figure of merit, 1 / (variance x time), of the simulation against a plain photon walk, at albedo .999 and 45 degrees.
 //
 // The plain walk is what a textbook gives: photons lose weight at every scattering, leave when they cross the surface
-// (Fresnel decides), are ended by roulette when their weight is small, and one albedo is tallied. Both are compiled with the same flags.
+// (Fresnel decides), are ended by roulette when their weight is small, and one albedo is tallied. Both are compiled
+// with the same flags.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
