@@ -192,10 +192,13 @@ private:
     void add_terms(Grid& sum)
     {
         // Half a share for directions: what is left out is a root mean square, and a single texel may be farther off.
-        const LightTerms terms =
-            light_terms({{m_channel.irradiance, m_problem.directions}},
-                        {{m_channel.library, m_channel.albedo, m_channel.mean_free_path}},
-                        std::max(m_problem.pitch_x, m_problem.pitch_y), 0.5 * tolerance_share * m_problem.tolerance);
+        const double kernel_error = 0.5 * tolerance_share * m_problem.tolerance;
+        const LightTerms terms = light_terms({{m_channel.irradiance, m_problem.directions}},
+                                             {{m_channel.library, m_channel.albedo, m_channel.mean_free_path}},
+                                             std::max(m_problem.pitch_x, m_problem.pitch_y), 1e-3 * kernel_error,
+                                             [&](const KernelDecomposition& kernels, const std::vector<LightField>&) {
+                                                 return kernels.within(kernel_error);
+                                             });
         std::vector<TexelKernels> kernels;
         for (const ScaledProfile& profile : terms.profiles)
             kernels.emplace_back(profile.profile, m_problem.pitch_x / m_channel.mean_free_path,

@@ -10,6 +10,7 @@
 #include "base/pool.h"
 #include "base/threads.h"
 #include "solve/channel_groups.h"
+#include "solve/choose_terms.h"
 #include "solve/coarse_grid.h"
 #include "solve/convolution.h"
 #include "solve/light_terms.h"
@@ -20,10 +21,13 @@ namespace beamspread {
 
 namespace {
 
-// Borders of the kernels' centres, texels: errors of some 1e-6 of the brightest texel, and of some 1e-5 where a basis
-// makes larger ones and sums its many kernels.
-constexpr double fixed_deviation = 3.0;
-constexpr double changing_deviation = 1.5;
+// Border of the kernels' centres, texels: errors of some 1e-6 of the brightest texel, and of some 1e-5 where a basis sums
+// many kernels of grazing light.
+constexpr double centre_deviation = 3.0;
+
+// Power that kernels of changing directions may lack at their ends: dark texels are off by less than such a fraction of
+// the brightest.
+constexpr double most_beyond = 1e-5;
 
 // Light on the texels themselves.
 class TexelRow final : public LightRow {
@@ -66,11 +70,15 @@ public:
           m_problem(plane),
           m_progress(progress),
           m_luminance(luminance),
-          m_terms(light_terms(group.lights, group.media, std::max(plane.pitch_x, plane.pitch_y), plane.tolerance)),
-          m_levels(choose_levels(
-              plane.width, plane.height, plane.pitch_x, plane.pitch_y, m_terms.profiles,
-              {m_terms.changing.empty() ? fixed_deviation : changing_deviation, plane.memory / 2,
-               std::min(m_terms.terms.size(), terms_per_batch / 2), group.media.size(), plane.coarsening}))
+          m_terms(light_terms(group.lights, group.media, std::max(plane.pitch_x, plane.pitch_y),
+                              std::min(1e-2 * plane.tolerance, most_beyond),
+                              [&](const KernelDecomposition& kernels, const std::vector<LightField>& lights) {
+                                  return choose_terms(kernels, lights, plane.pitch_x, plane.pitch_y, plane.tolerance);
+                              })),
+          m_levels(
+              choose_levels(plane.width, plane.height, plane.pitch_x, plane.pitch_y, m_terms.profiles,
+                            {centre_deviation, plane.memory / 2, std::min(m_terms.terms.size(), terms_per_batch / 2),
+                             group.media.size(), plane.coarsening}))
     {
     }
 

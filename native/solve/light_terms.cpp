@@ -24,10 +24,31 @@ std::vector<KernelTerm> fixed_kernel(std::size_t profile, std::size_t harmonics,
     return kernel;
 }
 
+void add_basis(LightTerms& terms, LowRankBasis basis)
+{
+    terms.basis = std::move(basis);
+    std::vector<std::size_t> first_profile;
+    for (const std::vector<ScaledProfile>& profiles : terms.basis.profiles) {
+        first_profile.push_back(terms.profiles.size());
+        terms.profiles.insert(terms.profiles.end(), profiles.begin(), profiles.end());
+    }
+    for (std::size_t f = 0; f < terms.basis.functions.size(); ++f) {
+        const auto& [m, rank, values] = terms.basis.functions[f];
+        for (const Phase phase : {Phase::cosine, Phase::sine}) {
+            if (m == 0 && phase == Phase::sine)
+                continue;
+            LightTerm term{std::nullopt, f, phase, {}};
+            for (const std::size_t profile : first_profile)
+                term.kernels.push_back({{profile + rank, m, phase, 1.0}});
+            terms.terms.push_back(std::move(term));
+        }
+    }
+}
+
 }  // namespace
 
 LightTerms light_terms(const std::vector<LightField>& lights, const std::vector<KernelMedium>& media, double texel,
-                       double tolerance)
+                       double beyond, const TermChoice& choose)
 {
     LightTerms result;
     for (const LightField& light : lights)
@@ -39,7 +60,7 @@ LightTerms light_terms(const std::vector<LightField>& lights, const std::vector<
         for (const KernelMedium& medium : media) {
             ScaledProfile profile{medium.library->profile(incidence_deg(direction), medium.albedo, Side::reflected),
                                   medium.mean_free_path, 0.0};
-            profile.reach = reach(profile.profile, medium.mean_free_path, 1e-3 * std::min(tolerance, 1e-3));
+            profile.reach = reach(profile.profile, medium.mean_free_path, std::min(beyond, 1e-6));
             term.kernels.push_back(
                 fixed_kernel(result.profiles.size(), profile.profile.harmonics(), azimuth(direction)));
             result.profiles.push_back(std::move(profile));
@@ -48,23 +69,11 @@ LightTerms light_terms(const std::vector<LightField>& lights, const std::vector<
     }
     if (result.changing.empty())
         return result;
-    result.basis = low_rank_basis(result.changing, media, texel, tolerance);
-    std::vector<std::size_t> first_profile;
-    for (const std::vector<ScaledProfile>& profiles : result.basis.profiles) {
-        first_profile.push_back(result.profiles.size());
-        result.profiles.insert(result.profiles.end(), profiles.begin(), profiles.end());
-    }
-    for (std::size_t f = 0; f < result.basis.functions.size(); ++f) {
-        const auto& [m, rank, values] = result.basis.functions[f];
-        for (const Phase phase : {Phase::cosine, Phase::sine}) {
-            if (m == 0 && phase == Phase::sine)
-                continue;
-            LightTerm term{std::nullopt, f, phase, {}};
-            for (const std::size_t profile : first_profile)
-                term.kernels.push_back({{profile + rank, m, phase, 1.0}});
-            result.terms.push_back(std::move(term));
-        }
-    }
+    const PresentAngles present(result.changing);
+    if (present.none())
+        return result;
+    const KernelDecomposition kernels(present, media, texel);
+    add_basis(result, kernels.basis(choose(kernels, result.changing), beyond));
     return result;
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -29,8 +30,13 @@ struct LightTerms {
     std::vector<ScaledProfile> profiles;
 };
 
+// The terms of a decomposition that the lights of changing direction need.
+using TermChoice = std::function<std::vector<std::size_t>(const KernelDecomposition&, const std::vector<LightField>&)>;
+
+// `texel`: its side in metres. Kernels end where all but the fraction `beyond` of their power lies inside; those of one
+// direction no earlier than for a millionth.
 LightTerms light_terms(const std::vector<LightField>& lights, const std::vector<KernelMedium>& media, double texel,
-                       double tolerance);
+                       double beyond, const TermChoice& choose);
 
 // Part of a row of texels.
 struct RowSpan {

@@ -25,6 +25,14 @@ BEAMSPREAD_CLONES void add_scaled_product(float* __restrict sum, const float* a,
         sum[i] += factor * (a[i] * b[i]);
 }
 
+BEAMSPREAD_CLONES void scale_columns(float* __restrict product, const float* values, const float* by_column,
+                                     float factor, std::size_t rows, std::size_t columns)
+{
+    for (std::size_t row = 0; row < rows; ++row)
+        for (std::size_t i = 0; i < columns; ++i)
+            product[row * columns + i] = factor * (values[row * columns + i] * by_column[i]);
+}
+
 BEAMSPREAD_CLONES void add_product(Complex* sum, const float* factor, const Complex* values, std::size_t count)
 {
     // std::complex is two floats by definition ([complex.numbers]).

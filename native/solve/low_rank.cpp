@@ -4,126 +4,22 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <utility>
+#include <numeric>
 
 #include <Eigen/Dense>
 
-#include "base/constants.h"
 #include "base/threads.h"
-#include "solve/loops.h"
 
 namespace beamspread {
 
 namespace {
 
-constexpr std::size_t angle_bins = 64;
+constexpr std::size_t angle_bins = PresentAngles::bins;
 constexpr double least_gain = 1e-14;  // that is not rounding
-constexpr std::size_t table_steps = 1024;
+constexpr std::size_t table_steps = 4096;
 
 // Errors of m = 0 count so many times: under even light they add up, while those of the other harmonics cancel.
 constexpr double power_weight = 3.0;
-
-struct PresentAngles {
-    double first = 1.0;  // half_tangent
-    double last = 0.0;
-    std::array<double, angle_bins> share{};  // in even bins between them, sum 1: mean of those
-                                             // of light, of lit texels and of angles
-};
-
-double angle_deg(double half_tangent)
-{
-    return 2.0 * std::atan(half_tangent) / radians_per_degree;
-}
-
-// Fine bins of half_tangent from 0 to 1, and rows that are counted together.
-constexpr std::size_t fine_bins = 2048;
-constexpr std::size_t rows_per_item = 32;
-
-struct AngleCounts {
-    float first = 1.0f;
-    float last = 0.0f;
-    std::vector<double> light = std::vector<double>(fine_bins, 0.0);
-    std::vector<double> texels = std::vector<double>(fine_bins, 0.0);
-};
-
-AngleCounts count_angles(const LightField& light, std::size_t first_row, std::size_t last_row)
-{
-    AngleCounts counts;
-    const std::size_t width = light.irradiance.width;
-    std::vector<float> irradiance(width);
-    std::vector<float> cosine(width);
-    std::vector<float> sine(width);
-    std::vector<float> place(width);
-    for (std::size_t y = first_row; y < last_row; ++y) {
-        for (std::size_t x = 0; x < width; ++x)
-            irradiance[x] = light.irradiance(y, x);
-        find_angles(light.directions.field + 3 * y * width, irradiance.data(), cosine.data(), sine.data(), place.data(),
-                    width);
-        for (std::size_t x = 0; x < width; ++x) {
-            if (irradiance[x] == 0.0f)
-                continue;
-            counts.first = std::min(counts.first, place[x]);
-            counts.last = std::max(counts.last, place[x]);
-            const auto bin =
-                std::min(static_cast<std::size_t>(place[x] * static_cast<float>(fine_bins)), fine_bins - 1);
-            counts.light[bin] += static_cast<double>(irradiance[x]);
-            counts.texels[bin] += 1.0;
-        }
-    }
-    return counts;
-}
-
-PresentAngles present_angles(const std::vector<LightField>& lights)
-{
-    PresentAngles present;
-    AngleCounts counted;
-    const std::size_t height = lights.front().irradiance.height;
-    for (const LightField& light : lights) {
-        parallel_ordered<AngleCounts>((height + rows_per_item - 1) / rows_per_item,
-                                      [&](std::size_t item) {
-                                          return count_angles(light, item * rows_per_item,
-                                                              std::min(height, (item + 1) * rows_per_item));
-                                      },
-                                      [&](std::size_t, const AngleCounts& rows) {
-                                          counted.first = std::min(counted.first, rows.first);
-                                          counted.last = std::max(counted.last, rows.last);
-                                          for (std::size_t i = 0; i < fine_bins; ++i) {
-                                              counted.light[i] += rows.light[i];
-                                              counted.texels[i] += rows.texels[i];
-                                          }
-                                      });
-    }
-    present.first = static_cast<double>(counted.first);
-    // Rounded up to 90 degrees exactly, an angle would be no angle of incidence.
-    present.last = std::min(static_cast<double>(counted.last), 1.0 - 1e-6);
-    if (present.first > present.last)
-        return present;
-
-    struct Sums {
-        std::array<double, angle_bins> light{};
-        std::array<double, angle_bins> texels{};
-    };
-    Sums total;
-    const double width = std::max(present.last - present.first, 1e-12) / static_cast<double>(angle_bins);
-    for (std::size_t i = 0; i < fine_bins; ++i) {
-        const double middle = (static_cast<double>(i) + 0.5) / static_cast<double>(fine_bins);
-        const double place = std::clamp((middle - present.first) / width, 0.0, static_cast<double>(angle_bins - 1));
-        total.light[static_cast<std::size_t>(place)] += counted.light[i];
-        total.texels[static_cast<std::size_t>(place)] += counted.texels[i];
-    }
-    double light = 0.0;
-    double texels = 0.0;
-    for (std::size_t i = 0; i < angle_bins; ++i) {
-        light += total.light[i];
-        texels += total.texels[i];
-    }
-    const auto occupied = std::count_if(total.texels.begin(), total.texels.end(), [](double x) { return x > 0.0; });
-    for (std::size_t i = 0; i < angle_bins; ++i)
-        if (total.texels[i] > 0.0)
-            present.share[i] =
-                (total.light[i] / light + total.texels[i] / texels + 1.0 / static_cast<double>(occupied)) / 3.0;
-    return present;
-}
 
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
@@ -221,43 +117,37 @@ AngularMedium describe(const KernelMedium& of, const PresentAngles& present, con
     return medium;
 }
 
-// One term of the singular value decomposition of a harmonic: angles times (medium, radius).
-struct Candidate {
-    std::size_t m;
-    std::size_t rank;
-    double gain;  // square error that it takes away
-    Vector direction;
-};
-
 }  // namespace
 
-LowRankBasis low_rank_basis(const std::vector<LightField>& lights, const std::vector<KernelMedium>& media, double texel,
-                            double tolerance)
+struct KernelDecomposition::Angular {
+    std::vector<AngularMedium> media;
+    std::vector<Vector> direction;  // of each term, unit vectors over the angle bins
+    Vector root_share;
+    std::map<const LdfSource*, NodeWeights> tables;
+};
+
+KernelDecomposition::KernelDecomposition(const PresentAngles& present, const std::vector<KernelMedium>& media,
+                                         double texel)
+    : m_media(media), m_first(present.first), m_last(present.last), m_angular(std::make_unique<Angular>())
 {
-    LowRankBasis basis;
-    const PresentAngles present = present_angles(lights);
-    if (present.first > present.last)
-        return basis;
     for (const KernelMedium& medium : media) {
-        medium.library->check_angle(angle_deg(present.first));
-        medium.library->check_angle(angle_deg(present.last));
+        medium.library->check_angle(angle_deg(m_first));
+        medium.library->check_angle(angle_deg(m_last));
     }
-    basis.first = present.first;
-    basis.last = present.last;
-
-    const std::vector<double> angles = evenly(present.first, present.last, angle_bins, 0.5);
-    std::vector<AngularMedium> described;
-    for (const KernelMedium& medium : media)
-        described.push_back(describe(medium, present, angles, texel));
-
+    const std::vector<double> angles = evenly(m_first, m_last, angle_bins, 0.5);
+    for (const KernelMedium& medium : media) {
+        m_angular->media.push_back(describe(medium, present, angles, texel));
+        if (!m_angular->tables.contains(medium.library))
+            m_angular->tables[medium.library] =
+                NodeWeights(*medium.library, evenly(m_first, m_last, table_steps + 1, 0.0));
+    }
     const Vector root_share = Eigen::Map<const Vector>(present.share.data(), index(angle_bins)).cwiseSqrt();
-    std::vector<Candidate> candidates;
-    double error = 0.0;
+    m_angular->root_share = root_share;
     for (std::size_t m = 0; m < harmonic_count; ++m) {
         Matrix gram = Matrix::Zero(index(angle_bins), index(angle_bins));
-        for (const AngularMedium& medium : described) {
+        for (const AngularMedium& medium : m_angular->media) {
             const Matrix rows = root_share.asDiagonal() * medium.weights.of(m) * medium.features[m];
-            gram += rows * rows.transpose() / static_cast<double>(described.size());
+            gram += rows * rows.transpose() / static_cast<double>(media.size());
         }
         if (gram.trace() <= least_gain)
             continue;
@@ -267,54 +157,72 @@ LowRankBasis low_rank_basis(const std::vector<LightField>& lights, const std::ve
             const double gain = solver.eigenvalues()[i];
             if (gain <= least_gain)
                 break;
-            error += gain;
-            candidates.push_back({m, rank, gain, solver.eigenvectors().col(i)});
+            m_terms.push_back({m, rank, gain});
+            m_angular->direction.emplace_back(solver.eigenvectors().col(i));
         }
     }
-    // Harmonics above 0 take two transforms each.
-    const auto worth = [](const Candidate& c) { return c.m == 0 ? 2.0 * c.gain : c.gain; };
-    std::stable_sort(candidates.begin(), candidates.end(),
-                     [&](const Candidate& a, const Candidate& b) { return worth(a) > worth(b); });
-    std::size_t count = 0;
-    while (count < candidates.size() && error > tolerance * tolerance)
-        error -= candidates[count++].gain;
-    candidates.resize(count);
-    std::sort(candidates.begin(), candidates.end(),
-              [](const Candidate& a, const Candidate& b) { return std::pair(a.m, a.rank) < std::pair(b.m, b.rank); });
+}
 
+KernelDecomposition::~KernelDecomposition() = default;
+
+std::vector<std::size_t> KernelDecomposition::within(double tolerance) const
+{
+    std::vector<std::size_t> order(m_terms.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    // Harmonics above 0 take two transforms each.
+    const auto worth = [&](std::size_t t) { return m_terms[t].m == 0 ? 2.0 * m_terms[t].gain : m_terms[t].gain; };
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return worth(a) < worth(b); });
+    double error = 0.0;
+    std::size_t dropped = 0;
+    while (dropped < order.size() && error + m_terms[order[dropped]].gain <= tolerance * tolerance)
+        error += m_terms[order[dropped++]].gain;
+    order.erase(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(dropped));
+    std::sort(order.begin(), order.end());
+    return order;
+}
+
+LowRankBasis KernelDecomposition::basis(const std::vector<std::size_t>& chosen, double beyond) const
+{
+    LowRankBasis basis;
+    basis.first = m_first;
+    basis.last = m_last;
     std::size_t ranks = 0;
-    for (const Candidate& c : candidates)
-        ranks = std::max(ranks, c.rank + 1);
-    for (std::size_t k = 0; k < media.size(); ++k) {
-        ScaledProfile empty{RadialProfile(), media[k].mean_free_path,
-                            reach(described[k].mean, media[k].mean_free_path, 1e-3 * tolerance)};
+    for (const std::size_t t : chosen)
+        ranks = std::max(ranks, m_terms[t].rank + 1);
+    for (std::size_t k = 0; k < m_media.size(); ++k) {
+        const ScaledProfile empty{RadialProfile(), m_media[k].mean_free_path,
+                                  reach(m_angular->media[k].mean, m_media[k].mean_free_path, beyond)};
         basis.profiles.emplace_back(ranks, empty);
     }
-    std::map<const LdfSource*, NodeWeights> tables;
-    for (const KernelMedium& medium : media)
-        if (!tables.contains(medium.library))
-            tables[medium.library] =
-                NodeWeights(*medium.library, evenly(present.first, present.last, table_steps + 1, 0.0));
-    for (const Candidate& c : candidates) {
+    // [medium][rank][node]
+    std::vector<std::vector<std::vector<Harmonics>>> weights;
+    for (const AngularMedium& medium : m_angular->media)
+        weights.emplace_back(ranks, std::vector<Harmonics>(medium.nodes.size()));
+    for (const std::size_t t : chosen) {
+        const auto& [m, rank, gain] = m_terms[t];
         // The mean over the media, once for each of the two factors of the decomposition.
-        const Vector by_angle =
-            root_share.cwiseProduct(c.direction) / std::sqrt(c.gain * static_cast<double>(media.size()));
+        const Vector by_angle = m_angular->root_share.cwiseProduct(m_angular->direction[t]) /
+                                std::sqrt(gain * static_cast<double>(m_media.size()));
         Vector values = Vector::Zero(index(table_steps + 1));
-        for (std::size_t k = 0; k < media.size(); ++k) {
-            const Vector by_node = described[k].weights.of(c.m).transpose() * by_angle;
-            for (std::size_t j = 0; j < described[k].nodes.size(); ++j) {
-                Harmonics weights{};
-                weights[c.m] = by_node[index(j)];
-                basis.profiles[k][c.rank].profile.add(described[k].nodes[j], weights);
-            }
-            const Matrix& features = described[k].features[c.m];
-            values += tables[media[k].library].of(c.m) * (features * (features.transpose() * by_node));
+        for (std::size_t k = 0; k < m_media.size(); ++k) {
+            const AngularMedium& medium = m_angular->media[k];
+            const Vector by_node = medium.weights.of(m).transpose() * by_angle;
+            for (std::size_t j = 0; j < medium.nodes.size(); ++j)
+                weights[k][rank][j][m] = by_node[index(j)];
+            const Matrix& features = medium.features[m];
+            values += m_angular->tables.at(m_media[k].library).of(m) * (features * (features.transpose() * by_node));
         }
-        LowRankBasis::AngleFunction function{c.m, c.rank, {}};
+        LowRankBasis::AngleFunction function{m, rank, {}};
         for (const double value : values)
             function.values.push_back(static_cast<float>(value));
         basis.functions.push_back(std::move(function));
     }
+    parallel_for(m_media.size() * ranks, [&](std::size_t item) {
+        const std::size_t k = item / ranks;
+        const std::size_t rank = item % ranks;
+        for (std::size_t j = 0; j < weights[k][rank].size(); ++j)
+            basis.profiles[k][rank].profile.add(m_angular->media[k].nodes[j], weights[k][rank][j]);
+    });
     return basis;
 }
 

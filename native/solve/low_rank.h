@@ -2,19 +2,13 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <vector>
 
-#include "base/view.h"
 #include "solve/kernel_spectra.h"
-#include "solve/problem.h"
+#include "solve/present_angles.h"
 
 namespace beamspread {
-
-// Light of one source on the plane.
-struct LightField {
-    View2D<const float> irradiance;
-    Directions directions;
-};
 
 // What decides a kernel, besides the direction.
 struct KernelMedium {
@@ -39,11 +33,39 @@ struct LowRankBasis {
     std::vector<std::vector<ScaledProfile>> profiles;  // [medium][rank]
 };
 
-// The least costly basis whose kernels are off by at most `tolerance`: relative L1 error (bounded by the chi-square
-// distance to the mean kernel), root mean square over the media, the light, the lit texels and the angles present. The
-// media share the functions of the angle. `texel` is the side of a texel in metres: detail inside the one where a beam
-// enters does not count. Empty where nothing is lit.
-LowRankBasis low_rank_basis(const std::vector<LightField>& lights, const std::vector<KernelMedium>& media, double texel,
-                            double tolerance);
+// Kernels of all angles present, taken apart: for each harmonic the singular value decomposition of angles times (medium,
+// radius), by the chi-square distance to the mean kernel, which bounds the relative L1 error; mean square over the media,
+// the light, the lit texels and the angles present. The media share the functions of the angle.
+class KernelDecomposition {
+public:
+    // `texel` is the side of a texel in metres: detail inside the one where a beam enters does not count.
+    KernelDecomposition(const PresentAngles& present, const std::vector<KernelMedium>& media, double texel);
+    ~KernelDecomposition();
+
+    struct Term {
+        std::size_t m;
+        std::size_t rank;
+        double gain;  // square error that it takes away
+    };
+
+    // Ascending m, then rank.
+    const std::vector<Term>& terms() const { return m_terms; }
+
+    // The cheapest terms by which the kernels are off by no more than `tolerance`.
+    std::vector<std::size_t> within(double tolerance) const;
+
+    // Of some of the terms, in their order, without what the kernels hold beyond the radius that all but the fraction
+    // `beyond` of their power stays within.
+    LowRankBasis basis(const std::vector<std::size_t>& chosen, double beyond) const;
+
+private:
+    struct Angular;
+
+    std::vector<KernelMedium> m_media;
+    double m_first;
+    double m_last;
+    std::vector<Term> m_terms;
+    std::unique_ptr<Angular> m_angular;
+};
 
 }  // namespace beamspread

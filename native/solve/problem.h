@@ -32,7 +32,7 @@ struct Problem {
     double pitch_y = 1.0;
     Directions directions;
     std::vector<Channel> channels;
-    double tolerance = 1e-3;  // relative error of the kernels that an approximating solver may make
+    double tolerance = 1e-3;  // relative error of the luminance that an approximating solver may make
     int threads = 0;
     std::size_t memory = std::size_t{1} << 30;  // bytes that spectra may take at once; beyond, in tiles
     std::size_t coarsening = 0;  // of the grid that light spreads far on, texels; 1: none, 0: what costs least

@@ -1,0 +1,161 @@
+"""The fft solver where directions change: `tolerance` bounds the luminance's errors, and costs no more than it must."""
+
+import numpy as np
+import pytest
+from beamspread import Medium, convolve, convolve_lights, library, simulate
+from scipy.ndimage import uniform_filter
+
+# Planes up to 192 x 192 texels keep all terms.
+SIZE = 200
+
+# Next to nothing in deep shadow is off by a fraction of the brightest texel, whatever the tolerance.
+FLOOR = 1e-5
+
+MEDIA = {
+    "ior 1": lambda: library(Medium(0.8, 1.0)),
+    "ior 1.4": lambda: library(Medium(0.8, 1.4)),
+    "slab": lambda: simulate(Medium(0.8, 1.4, 2.0), [0, 25, 50, 75, 89.9], 20_000),
+}
+
+
+@pytest.fixture(scope="module")
+def media():
+    return {name: make() for name, make in MEDIA.items()}
+
+
+def travel(theta, beta):
+    field = [np.sin(theta) * np.cos(beta), np.sin(theta) * np.sin(beta), -np.cos(theta)]
+    return np.stack(field, -1).astype(np.float32)
+
+
+def lamp(x, y, height):
+    """Irradiance and directions of a point lamp, lengths in widths of the plane."""
+    across = (np.arange(SIZE) + 0.5) / SIZE - 0.5
+    field = np.stack([*np.meshgrid(across - x, across - y), np.full((SIZE, SIZE), -height)], -1)
+    distance = np.linalg.norm(field, axis=-1, keepdims=True)
+    return (height / distance[..., 0] ** 3).astype(np.float32), (field / distance).astype(np.float32)
+
+
+def noise(rng, waves):
+    """Smooth noise of standard deviation 1."""
+    frequencies = np.hypot(*np.meshgrid(*[np.fft.fftfreq(SIZE) * SIZE] * 2))
+    spectrum = np.fft.fft2(rng.normal(size=(SIZE, SIZE))) * np.exp(-0.5 * (frequencies / waves) ** 2)
+    smooth = np.fft.ifft2(spectrum).real
+    return smooth / smooth.std()
+
+
+def field(kind, rng):
+    """Lights of some kind: irradiance and directions of each."""
+    if kind == "smooth":  # few texels have extreme angles
+        directions = travel(np.radians(np.clip(45 + 20 * noise(rng, 3), 0, 89)), 2 * noise(rng, 3))
+    elif kind in ("texels", "blocks"):
+        side = {"texels": 1, "blocks": 8}[kind]
+        shape = SIZE // side, SIZE // side
+        theta, beta = np.radians(rng.uniform(0, 89, shape)), rng.uniform(0, 2 * np.pi, shape)
+        directions = np.kron(travel(theta, beta), np.ones((side, side, 1), np.float32))
+    else:
+        return {
+            "lamp": [lamp(0.1, -0.2, 0.1)],
+            "grazing": [lamp(-0.2, 0.1, 0.01)],
+            "outside": [lamp(0.8, 0.1, 0.02)],
+            "two lamps": [lamp(-0.02, -0.2, 0.05), lamp(0.22, 0.15, 0.05)],
+        }[kind]
+    return [(np.ones((SIZE, SIZE), np.float32), directions)]
+
+
+def mask(kind, rng):
+    lit = np.zeros((SIZE, SIZE), np.float32)
+    if kind == "texels":
+        lit[rng.random(lit.shape) < 0.3] = 1
+    elif kind == "blocks":
+        lit = np.kron(rng.random((8, 8)) < 0.6, np.ones((SIZE // 8, SIZE // 8))).astype(np.float32)
+    else:
+        part = {"none": np.s_[:], "half": np.s_[:, : SIZE // 2], "stripes": np.s_[:, ::8], "corner": np.s_[:33, :33]}
+        lit[part[kind]] = 1
+    return lit
+
+
+def assert_within(tolerance, result, expected):
+    """Of every channel the sum of the errors, and each texel relative to the mean of those around."""
+    error = np.abs(result - expected)
+    nearby = uniform_filter(expected, (17, 17, 0), mode="nearest")
+    assert np.all(error.sum((0, 1)) <= tolerance * expected.sum((0, 1)))
+    assert (error / (tolerance * nearby + FLOOR * expected.max((0, 1)))).max() <= 1
+
+
+@pytest.mark.parametrize(
+    ("medium", "albedo", "light", "shadows", "mean_free_path"),
+    [
+        ("ior 1", (0.9, 0.9, 0.9), "lamp", "none", 4.0),
+        ("ior 1", (0.6, 0.9, 0.3), "grazing", "blocks", 0.4),
+        ("ior 1", (0.6, 0.9, 0.3), "outside", "none", 200.0),
+        ("ior 1.4", (0.999, 0.99, 0.9), "blocks", "half", 0.13),
+        ("ior 1.4", (0.999, 0.9, 0.5), "smooth", "texels", 1.9),
+        ("ior 1.4", (0.99, 0.9, 0.3), "two lamps", "stripes", 0.11),
+        ("ior 1.4", (0.999, 0.99, 0.9), "texels", "corner", 30.0),
+        ("slab", (0.9, 0.99, 0.3), "grazing", "half", 3.0),
+    ],
+)
+def test_all_errors_are_below_the_tolerance(media, medium, albedo, light, shadows, mean_free_path):
+    """Against all terms, which the tests of `convolve` and the next one compare with `direct`."""
+    rng = np.random.default_rng(31)
+    lit = mask(shadows, rng)
+    lights = [(irradiance * lit, directions) for irradiance, directions in field(light, rng)]
+    paths = mean_free_path * np.array([1, 0.7, 0.5])
+    arguments = lights, media[medium], albedo, paths, 1.0
+    exact = convolve_lights(*arguments, tolerance=1e-7)
+    for tolerance in (1e-2, 2e-3):
+        assert_within(tolerance, convolve_lights(*arguments, tolerance=tolerance), exact)
+
+
+@pytest.mark.parametrize("mean_free_path", [0.3, 20.0])
+def test_patches_of_light_against_direct(media, mean_free_path):
+    rng = np.random.default_rng(32)
+    lit = np.zeros((SIZE, SIZE), np.float32)
+    for y, x in rng.integers(0, SIZE - 5, (6, 2)):
+        lit[y : y + 5, x : x + 5] = 1
+    ((irradiance, directions),) = field("texels", rng)
+    arguments = irradiance * lit, directions, media["ior 1"], (0.6, 0.9, 0.3), mean_free_path, 1.0
+    direct = convolve(*arguments, solver="direct")
+    for tolerance in (1e-2, 1e-3):
+        assert_within(tolerance, convolve(*arguments, tolerance=tolerance), direct)
+
+
+def test_grazing_light_against_direct(media):
+    """All terms are kept; kernels bend at the library's last angle, which a table of angles smooths over."""
+    rng = np.random.default_rng(33)
+    theta = np.where(rng.random((48, 48)) < 0.5, rng.uniform(0, 89, (48, 48)), rng.uniform(88, 89.99, (48, 48)))
+    directions = travel(np.radians(theta), rng.uniform(0, 2 * np.pi, (48, 48)))
+    beams = (rng.random((48, 48)) < 0.1).astype(np.float32)
+    for mean_free_path in (0.3, 5.0):
+        arguments = beams, directions, media["ior 1"], (0.6, 0.9, 0.3), mean_free_path, 1.0
+        direct = convolve(*arguments, solver="direct")
+        assert_within(2e-3, convolve(*arguments, tolerance=1e-3), direct)
+
+
+def test_terms_are_left_out(media):
+    """A loose tolerance changes the result by about what it allows."""
+    ((irradiance, directions),) = field("lamp", None)
+    arguments = irradiance, directions, media["ior 1"], 0.9, 4.0, 1.0
+    loose, strict = (convolve(*arguments, tolerance=tolerance) for tolerance in (1e-2, 1e-7))
+    assert np.abs(loose / strict - 1).max() > 2e-4
+
+
+def test_same_choice_for_any_number_of_threads(media):
+    arguments = field("two lamps", None), media["ior 1"], (0.6, 0.9, 0.3), 2.0, 1.0
+    runs = [convolve_lights(*arguments, tolerance=1e-2, threads=n) for n in (1, 2)]
+    assert np.array_equal(*runs)
+
+
+@pytest.mark.parametrize("albedo", [(0.0, 0.9, 0.5), 0.0])
+def test_channels_may_be_black(media, albedo):
+    ((irradiance, directions),) = field("lamp", None)
+    result = convolve(irradiance, directions, media["ior 1"], albedo, 2.0, 1.0)
+    assert np.isfinite(result).all()
+    assert np.array_equal(result.max((0, 1)) > 0, np.broadcast_to(albedo, 3) != 0)
+
+
+def test_darkness(media):
+    _, directions = lamp(0.0, 0.0, 0.1)
+    dark = np.zeros((SIZE, SIZE), np.float32)
+    assert not convolve(dark, directions, media["ior 1"], 0.9, 2.0, 1.0).any()
