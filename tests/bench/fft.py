@@ -17,6 +17,7 @@ import beamspread
 import numpy as np
 from beamspread import _native
 from scipy import fft as scipy_fft
+from scipy.ndimage import uniform_filter
 from scipy.signal import fftconvolve, oaconvolve
 
 SUN = (math.sin(math.radians(50)), 0.0, -math.cos(math.radians(50)))
@@ -140,28 +141,25 @@ def scipy_sun(size, library):
 
 
 def lamps(size, libraries):
+    """Errors against nearly all terms of the basis; the worst texel's relative to the 17 x 17 around."""
     light = lamp(size)
     two = [light, lamp(size, 0.2, -0.1)]
-    print(f"\npoint lamp at a tenth of the width, {size} x {size} RGB; L1 error and worst texel against full rank")
+    options = {"tolerance": 5e-3}
+    print(f"\npoint lamp at a tenth of the width, {size} x {size} RGB, tolerance {options['tolerance']}")
     for ior, albedo in ((1.0, 0.9), (1.4, 0.99)):
-        library = libraries[ior]
         for paths in ((1.0, 1.0, 1.0), (4.0, 4.0, 4.0), (1.0, 0.7, 0.5)):
-            rest = library, albedo, paths, 1.0
+            rest = libraries[ior], albedo, paths, 1.0
             exact = beamspread.convolve(*light, *rest, tolerance=1e-5)
-            for tolerance in (1e-2, 4e-2):
-                result = beamspread.convolve(*light, *rest, tolerance=tolerance)
-                cost = seconds(1, beamspread.convolve, *light, *rest, tolerance=tolerance)
-                unit = transform_seconds(size)
-                error = np.abs(result - exact)
-                print(
-                    f"  ior {ior}, albedo {albedo}, paths {paths}, tolerance {tolerance:4.2f}: {cost:6.2f} s = "
-                    f"{cost / unit:5.1f} T, L1 {error.sum() / exact.sum():.1e}, worst {(error / exact).max():.1e}"
-                )
-        options = {"tolerance": 4e-2}
-        rest = library, albedo, 1.0, 1.0
-        one_cost = seconds(2, beamspread.convolve, *light, *rest, **options)
-        two_cost = seconds(2, beamspread.convolve_lights, two, *rest, **options)
-        print(f"  ior {ior}: two lamps cost {two_cost / one_cost:.2f} times one")
+            error = np.abs(beamspread.convolve(*light, *rest, **options) - exact)
+            worst = (error / uniform_filter(exact, (17, 17, 0), mode="nearest")).max()
+            unit = transform_seconds(size)
+            one_cost = seconds(2, beamspread.convolve, *light, *rest, **options)
+            two_cost = seconds(2, beamspread.convolve_lights, two, *rest, **options)
+            print(
+                f"  ior {ior}, albedo {albedo}, paths {paths}: {one_cost:6.2f} s = {one_cost / unit:5.1f} T, "
+                f"L1 {error.sum() / exact.sum():.1e}, worst {worst:.1e}; "
+                f"two lamps cost {two_cost / one_cost:.2f} times one"
+            )
 
 
 def check(size, library):
@@ -173,13 +171,13 @@ def check(size, library):
 
 
 def growth(sizes, library):
-    print("\ngrowth, sun and lamp (tolerance 0.04), CPU seconds over N^2 log N, relative to the first")
+    print("\ngrowth, sun and lamp (tolerance 0.005), CPU seconds over N^2 log N, relative to the first")
     first = None
     for size in sizes:
         costs = []
         for light in ((shadows(size), SUN), lamp(size)):
             arguments = *light, library, 0.9, 1.0, 1.0
-            costs.append(seconds(2, beamspread.convolve, *arguments, tolerance=4e-2) / (size**2 * math.log(size)))
+            costs.append(seconds(2, beamspread.convolve, *arguments, tolerance=5e-3) / (size**2 * math.log(size)))
         first = first or costs
         print(f"  {size:6d}: {costs[0] / first[0]:.2f} {costs[1] / first[1]:.2f}")
 
