@@ -1,23 +1,23 @@
 // The adaptive method: geometric means in angular space, with weights and heights of Q from the distributions.
 //
-// 1. Means of logarithms. LDFs fall off exponentially, and by powers of the albedo: between samples their logarithm is what
-//    changes evenly. Of noisy images the logarithm is taken from their envelope S; the result is
+// 1. Means of logarithms. LDFs fall off exponentially, and by powers of the albedo: between samples their logarithm is
+//    what changes evenly. Of noisy images the logarithm is taken from their envelope S; the result is
 //        S* sum of w_k image_k / S_k,   log S* = sum of W_k log S_k,
-//    with linear weights w_k, less where image_k is noisier than the others: so texels without light, noise and the mean over
-//    noise stay what they are.
-// 2. Angle. A beam from the other side gives the mirrored LDF, so log g is the sum of a part even in u, which is even in the
-//    angle, and of one odd in u, odd in the angle. With s = tan(theta / 2), interpolating both through the samples and
-//    their mirror images gives  even: linear in s^2;  odd: s times linear in s^2. Why s: reflection goes like
-//    1 / (mu + mu') in the cosines of incidence and exit (Chandrasekhar 1960, Ch. III), toward the normal
+//    with linear weights w_k, less where image_k is noisier than the others: so texels without light, noise and the
+//    mean over noise stay what they are.
+// 2. Angle. A beam from the other side gives the mirrored LDF, so log g is the sum of a part even in u, which is even
+//    in the angle, and of one odd in u, odd in the angle. With s = tan(theta / 2), interpolating both through the
+//    samples and their mirror images gives  even: linear in s^2;  odd: s times linear in s^2. Why s: reflection goes
+//    like 1 / (mu + mu') in the cosines of incidence and exit (Chandrasekhar 1960, Ch. III), toward the normal
 //    1 / (1 + mu) = (1 + s^2) / 2.
 // 3. Albedo. Every path scatters once, hence log(g / albedo). For a pencil beam that is linear in what light decays
-//    with, the diffusion exponent kappa = sqrt(3 (1 - albedo) (1 - g albedo)): exactly so far out, and near O next to nothing
-//    changes. Deep inside a wide beam exitance goes like the reflectance R: there log(g / albedo) is linear in
+//    with, the diffusion exponent kappa = sqrt(3 (1 - albedo) (1 - g albedo)): exactly so far out, and near O next to
+//    nothing changes. Deep inside a wide beam exitance goes like the reflectance R: there log(g / albedo) is linear in
 //    log(R / albedo) by van de Hulst's approximation. Near the border of the beam one goes over into the other within
 //    `interior_depth`. Q's height stays out of it: not a unit of length changes but an exponent.
-// 4. Anisotropy. What is far out scales with the transport mean free path: Q stands above O at a height of the root mean
-//    square radius of each sample, that of the result is their geometric mean, and g height^2 is blended, which keeps
-//    the power. log g is linear in log(1 - g). Along the other axes one height does for all, and cancels out.
+// 4. Anisotropy. What is far out scales with the transport mean free path: Q stands above O at a height of the root
+//    mean square radius of each sample, that of the result is their geometric mean, and g height^2 is blended, which
+//    keeps the power. log g is linear in log(1 - g). Along the other axes one height does for all, and cancels out.
 #include "ldf/adaptive_interpolation.h"
 
 #include <algorithm>

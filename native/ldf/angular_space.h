@@ -10,8 +10,8 @@ struct AngularCoordinates {
     double psi = 0.0;  // [0, pi/2)
 };
 
-// Places P of the plane as seen from the reference point Q at `height` above the brightest point H: psi is the angle at Q
-// between the normal and the direction to P, phi the azimuth of P around H from the beam's direction of travel,
+// Places P of the plane as seen from the reference point Q at `height` above the brightest point H: psi is the angle at
+// Q between the normal and the direction to P, phi the azimuth of P around H from the beam's direction of travel,
 //   P = H + height tan(psi) (cos phi, sin phi).
 // The paper's text takes for phi the angle at P between the directions to O and H, but that is 0 everywhere at normal
 // incidence, and its Fig. 4 shows phi from 0 to 2 pi. O, the origin, therefore takes no part in the maps; O - H is the

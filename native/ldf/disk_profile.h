@@ -7,9 +7,9 @@
 
 namespace beamspread {
 
-// The convolution of an LDF with an evenly lit disk of total weight 1. A disk is the same from everywhere, so the result
-// has the same harmonics: their radial functions are the means of g cos(m phi) over disks, here by Green's theorem as
-// integrals of C_m(r) cos(m phi) d phi around their borders.
+// The convolution of an LDF with an evenly lit disk of total weight 1. A disk is the same from everywhere, so the
+// result has the same harmonics: their radial functions are the means of g cos(m phi) over disks, here by Green's
+// theorem as integrals of C_m(r) cos(m phi) d phi around their borders.
 class DiskProfile final : public RadialFunction {
 public:
     // radius > 0. The total stays the same.

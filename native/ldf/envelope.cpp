@@ -87,8 +87,8 @@ std::vector<Ring> rings_of(const LdfSample& sample, const std::vector<double>& v
     return rings;
 }
 
-// Mean over rings around O at every texel: exponential between the rings, and beyond the last one, where it declines at least
-// as fast as on the whole.
+// Mean over rings around O at every texel: exponential between the rings, and beyond the last one, where it declines at
+// least as fast as on the whole.
 std::vector<double> ring_means(const LdfSample& sample, const std::vector<double>& variance)
 {
     const std::vector<Ring> rings = rings_of(sample, variance);

@@ -9,8 +9,8 @@
 namespace beamspread {
 
 // Mean exitance of each texel per unit incident power, in 1/mfp^2: size x size texels of side `pitch` mean
-// free paths, rows v upward, columns u, O at the centre of the image. The beam evenly lights a disk of this diameter on the
-// surface, centred at O (0: a point). Throws InvalidArgument.
+// free paths, rows v upward, columns u, O at the centre of the image. The beam evenly lights a disk of this diameter on
+// the surface, centred at O (0: a point). Throws InvalidArgument.
 std::vector<float> ldf_image(const LdfLibrary& library, double angle_deg, double albedo, std::size_t size, double pitch,
                              Side side, double beam_diameter);
 

@@ -14,8 +14,8 @@
 
 namespace beamspread {
 
-// Albedos at which the totals of calibrated libraries are compared with exact ones. Calibration makes them equal at every
-// other one of these, from the first to the last: their weights of the orders span those of all albedos.
+// Albedos at which the totals of calibrated libraries are compared with exact ones. Calibration makes them equal at
+// every other one of these, from the first to the last: their weights of the orders span those of all albedos.
 inline constexpr std::array<double, 31> compared_albedos = {
     0.01,  0.05,   0.1,    0.2,    0.3,    0.4,     0.5,     0.6,     0.7,    0.75,  0.8,
     0.86,  0.9,    0.93,   0.95,   0.97,   0.98,    0.986,   0.99,    0.995,  0.997, 0.9983,
@@ -34,8 +34,8 @@ using SideResiduals = std::array<Residuals, side_count>;
 
 class LdfLibrary final : public LdfSource {
 public:
-    // Results in any order, one per angle; of a calibrated library also, by ascending angles, what is left of its errors.
-    // Throws InvalidArgument.
+    // Results in any order, one per angle; of a calibrated library also, by ascending angles, what is left of its
+    // errors. Throws InvalidArgument.
     LdfLibrary(const Medium& medium, std::uint64_t photons, std::uint64_t seed, std::vector<AngleResult> results,
                std::vector<SideResiduals> residuals = {});
 
@@ -51,8 +51,8 @@ public:
     // at entry excluded. Angle in degrees within the simulated ones, albedo in [0, 1).
     double total(double angle_deg, double albedo, Side side) const;
 
-    // Standard error of `total`, from the scatter of the batches. For a calibrated library, whose statistical error is next
-    // to nothing, also the error of the exact totals, and what calibration and interpolation between angles left.
+    // Standard error of `total`, from the scatter of the batches. For a calibrated library, whose statistical error is
+    // next to nothing, also the error of the exact totals, and what calibration and interpolation between angles left.
     double standard_error(double angle_deg, double albedo, Side side) const;
 
     // `total` of the reflected side under uniform diffuse light: the mean over the hemisphere, weighted by cosine.

@@ -31,8 +31,8 @@ struct LdfSample {
     double power() const;
 };
 
-// Throws InvalidArgument. Exitance is finite and not negative, but for undershoots of up to 10 % of the brightest texel: few
-// harmonics (ldf_image.h) and denoised simulations have them.
+// Throws InvalidArgument. Exitance is finite and not negative, but for undershoots of up to 10 % of the brightest
+// texel: few harmonics (ldf_image.h) and denoised simulations have them.
 void validate(const LdfSample& sample);
 
 // One-part OpenEXR file; see sample_file.cpp for the layout. Throw IoError.

@@ -1,5 +1,6 @@
 // Files of LdfSample: OpenEXR with one part. The first line of the file is that of the largest v, columns run
-// toward +u, and O is the centre of the data window. The pixels are those of the channel Y, or of the only channel there is.
+// toward +u, and O is the centre of the data window. The pixels are those of the channel Y, or of the only channel
+// there is.
 //
 //   pitch         side of a pixel, mean free paths         needed
 //   angle         of incidence, degrees                    needed

@@ -29,11 +29,12 @@ struct SampleCell {
 
 class SampleGrid {
 public:
-    // In any order, one per corner of the grid, all with the same texels and beam; pointers stay with the caller. Throws
-    // InvalidArgument.
+    // In any order, one per corner of the grid, all with the same texels and beam; pointers stay with the caller.
+    // Throws InvalidArgument.
     explicit SampleGrid(std::vector<const LdfSample*> samples);
 
-    // Throws InvalidArgument, naming the span, for what lies outside of it. Without g, that of the samples, if it is one.
+    // Throws InvalidArgument, naming the span, for what lies outside of it. Without g, that of the samples, if it is
+    // one.
     SampleCell cell(double angle_deg, double albedo, std::optional<double> g) const;
 
     const LdfSample& first() const { return *m_samples.front(); }

@@ -11,8 +11,9 @@
 
 namespace beamspread {
 
-// The image as radial functions around O, one per azimuthal harmonic: rings of the image, its texels evenly bright. The power is
-// that of the image. What is odd in v is left out, and at normal incidence what is not round: an LDF has neither.
+// The image as radial functions around O, one per azimuthal harmonic: rings of the image, its texels evenly bright. The
+// power is that of the image. What is odd in v is left out, and at normal incidence what is not round: an LDF has
+// neither.
 RadialProfile sample_profile(const LdfSample& sample);
 
 // LDFs interpolated from samples of one medium, between angles at most 5 degrees apart; in between linearly.

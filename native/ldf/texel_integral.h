@@ -19,7 +19,8 @@ struct TexelGrid {
     std::size_t height = 0;
 };
 
-// Integrals over each texel of c_m(r) cos(m phi) and c_m(r) sin(m phi), [m][i][j], for the harmonics that the profile uses.
+// Integrals over each texel of c_m(r) cos(m phi) and c_m(r) sin(m phi), [m][i][j], for the harmonics that the profile
+// uses.
 struct TexelIntegrals {
     std::size_t harmonics = 0;
     std::vector<double> cosine;

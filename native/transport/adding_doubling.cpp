@@ -1,8 +1,9 @@
-// Radiance averaged over the azimuth, on a quadrature of cosines inside the medium (van de Hulst 1980, Prahl et al. 1993).
+// Radiance averaged over the azimuth, on a quadrature of cosines inside the medium (van de Hulst 1980, Prahl et al.
+// 1993).
 //
 // By reciprocity the totals of a beam are the radiance that the medium returns toward it under uniform diffuse
-// light. That asks for one vector of incident light and, beside the quadrature's own nodes, for rows of the matrices at the
-// angles of the beams: directions that light leaves by, but that feed nothing else.
+// light. That asks for one vector of incident light and, beside the quadrature's own nodes, for rows of the matrices at
+// the angles of the beams: directions that light leaves by, but that feed nothing else.
 #include "transport/adding_doubling.h"
 
 #include <algorithm>
@@ -102,8 +103,8 @@ Angular angular_problem(const Medium& medium, std::span<const double> angles_deg
     };
     a.among = {kernel(p, even), kernel(p, odd)};
     a.to_beams = {kernel(p_beams, even), kernel(p_beams, odd)};
-    // What the quadrature misses of the phase function's integral is taken for unscattered too, so that no energy is lost
-    // (Grant, Hunt 1969).
+    // What the quadrature misses of the phase function's integral is taken for unscattered too, so that no energy is
+    // lost (Grant, Hunt 1969).
     const VectorXd lost =
         VectorXd::Ones(a.cosine.size()) - a.among.forward.rowwise().sum() - a.among.backward.rowwise().sum();
     a.among.forward.diagonal() += lost;

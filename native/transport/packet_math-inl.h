@@ -1,5 +1,5 @@
-// Random numbers and directions for as many photons as a vector has lanes. Compiled once per target: no include guard of the
-// usual kind (Highway's documentation, "foreach_target").
+// Random numbers and directions for as many photons as a vector has lanes. Compiled once per target: no include guard
+// of the usual kind (Highway's documentation, "foreach_target").
 #if defined(BEAMSPREAD_TRANSPORT_PACKET_MATH_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BEAMSPREAD_TRANSPORT_PACKET_MATH_INL_H
 #undef BEAMSPREAD_TRANSPORT_PACKET_MATH_INL_H

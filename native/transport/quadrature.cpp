@@ -9,8 +9,8 @@ namespace beamspread {
 namespace {
 
 // A polynomial of high degree swings like the cosine of degree * angle, and Gauss's rule of n nodes is exact for
-// products of degree 2 n: this many nodes more than that needs for what is no polynomial. Measured: 8 more change no total
-// by 1e-5.
+// products of degree 2 n: this many nodes more than that needs for what is no polynomial. Measured: 8 more change no
+// total by 1e-5.
 constexpr int spare_nodes = 10;
 
 int node_count(int degree, double angle)

@@ -11,9 +11,9 @@ struct Quadrature {
     Eigen::ArrayXd weight;
 };
 
-// For radiance inside a medium of this refractive index, resolving Legendre polynomials up to `degree`: Gauss's rule, in
-// two pieces where there is a critical angle. Beyond it the variable is the cosine outside, in which what
-// leaves is smooth.
+// For radiance inside a medium of this refractive index, resolving Legendre polynomials up to `degree`: Gauss's rule,
+// in two pieces where there is a critical angle. Beyond it the variable is the cosine outside, in which what leaves is
+// smooth.
 Quadrature directions_inside(double ior, int degree);
 
 }  // namespace beamspread

@@ -131,8 +131,8 @@ private:
         return w.z * w.z > 1.0 - m_plan.exit_cone ? std::abs(w.z) * inv_pi / m_plan.exit_cone : 0.0;
     }
 
-    // An exit of low order is sampled in two ways, by the phase function (the walk itself) and by a direction chosen among those that
-    // leave, weighted by the balance heuristic (Veach, Guibas 1995).
+    // An exit of low order is sampled in two ways, by the phase function (the walk itself) and by a direction chosen
+    // among those that leave, weighted by the balance heuristic (Veach, Guibas 1995).
     void tally_connections(const Vec3& before)
     {
         const double phase = henyey_greenstein_pdf(glm::dot(before, m_w), m_medium.g);

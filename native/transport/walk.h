@@ -33,8 +33,8 @@ struct WalkJob {
     Progress& progress;
 };
 
-// One implementation of the walk: `scalar` is walk_photon in a loop, the truth for the others, which walk as many photons at a time as
-// a vector has lanes, in single precision.
+// One implementation of the walk: `scalar` is walk_photon in a loop, the truth for the others, which walk as many
+// photons at a time as a vector has lanes, in single precision.
 struct WalkKernel {
     std::string_view name;
     void (*walk)(const WalkJob& job);

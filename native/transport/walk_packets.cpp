@@ -198,8 +198,8 @@ private:
     }
 
     // Low orders: the exits along the flights that begin here, instead of waiting for one. Far from the boundary the
-    // flight itself decides whether its exit is tallied: it comes this close with the probability exp(-to_boundary) / rare_exit.
-    // High orders: the exits that happen.
+    // flight itself decides whether its exit is tallied: it comes this close with the probability exp(-to_boundary) /
+    // rare_exit. High orders: the exits that happen.
     HWY_INLINE void tally_exits(const Packet& packet, FloatMask active, const Vectors& x, const Vectors& w,
                                 Floats to_boundary, Floats flight, Floats reflectance, FloatMask leaves)
     {

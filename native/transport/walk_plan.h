@@ -23,8 +23,8 @@ struct WalkPlan {
 
     // Up to this order exits are tallied at their expected value at every flight, and sampled by connections too: a
     // forward-peaked phase function seldom sends such light back to the surface. Beyond it light has forgotten its
-    // direction and finds its way out; then the exits that happen are tallied, because the sum of the expected ones along a
-    // walk varies more than the one that ends it.
+    // direction and finds its way out; then the exits that happen are tallied, because the sum of the expected ones
+    // along a walk varies more than the one that ends it.
     std::uint32_t last_expected_order;
 
     // A walk that outlives 2^k first_roulette scatterings goes on with a certain probability at each k. Internal
