@@ -63,8 +63,8 @@ MatrixXd batch_powers(const SideResult& side)
     return Eigen::Map<const Eigen::MatrixXf>(side.batch_totals.data(), bins, batches).cast<double>();
 }
 
-// Relative variance of the mean power of each bin. Deep orders are reached by ever fewer photons, a handful at last, which
-// says little of their own variance: none is taken for better known than a bin before it.
+// Relative variance of the mean power of each bin. Deep orders are reached by ever fewer photons, a handful at last,
+// which says little of their own variance: none is taken for better known than a bin before it.
 VectorXd relative_variances(const MatrixXd& powers, const VectorXd& mean)
 {
     const VectorXd variance = (powers.colwise() - mean).rowwise().squaredNorm() / (batches * (batches - 1));
@@ -85,9 +85,9 @@ struct Observation {
     VectorXd tolerance;  // [albedo]
 };
 
-// The likeliest scale of each bin's power, around 1 with this relative variance, given the totals and within the limits: a
-// quadratic programme with bounds. Its dual has a variable per total, is convex, smooth and piecewise quadratic: solved
-// by Newton's method, halving steps that do not go down.
+// The likeliest scale of each bin's power, around 1 with this relative variance, given the totals and within the
+// limits: a quadratic programme with bounds. Its dual has a variable per total, is convex, smooth and piecewise
+// quadratic: solved by Newton's method, halving steps that do not go down.
 VectorXd likeliest_scale(const VectorXd& power, const VectorXd& relative, const Observation& observed)
 {
     const MatrixXd of_scale = observed.tolerance.cwiseInverse().asDiagonal() * observed.weights * power.asDiagonal();
@@ -137,8 +137,8 @@ void calibrate(SideResult& side, const Observation& observed)
     const VectorXd relative = relative_variances(powers, before);
     const VectorXd scale = likeliest_scale(before, relative, observed);
     for (Eigen::Index b = 0; b < bins; ++b) {
-        float* moments = side.moments.data() + static_cast<std::size_t>(b) * ring_value_count;
-        std::transform(moments, moments + ring_value_count, moments,
+        float* power = side.power.data() + static_cast<std::size_t>(b) * radius_bin_count;
+        std::transform(power, power + radius_bin_count, power,
                        [&](float x) { return static_cast<float>(scale(b) * static_cast<double>(x)); });
     }
     // Had a batch been the whole simulation, it would have been led to the same totals; the mean of all stays.
@@ -165,7 +165,7 @@ LdfLibrary calibrated(const LdfLibrary& library, int threads)
         const double entering = 1.0 - fresnel(std::cos(theta), medium.ior);
         for (const Side side : {Side::reflected, Side::transmitted}) {
             SideResult& result = results[j].sides[static_cast<std::size_t>(side)];
-            if (result.moments.empty())
+            if (result.power.empty())
                 continue;
             const double ballistic = ballistic_total(medium, refracted_angle(theta, medium.ior), side);
             Observation observed{MatrixXd(albedos, bins), VectorXd(albedos), VectorXd(albedos)};

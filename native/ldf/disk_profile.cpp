@@ -38,10 +38,13 @@ Harmonics disk_mean(const RadialFunction& point, double radius, double s)
     Harmonics sum{};
     // Any constant may be added to C_m around a closed border, unless the pole is inside; there C_m itself is needed.
     const bool near = s < 2.0 * radius;
-    // tau: angle at the disk's centre from the point nearest to the pole. With tau = a sinh(x) the steps are short there.
+    // tau: angle at the disk's centre from the point nearest to the pole. With tau = a sinh(x) the steps are short
+    // there.
     const double a = std::max(1e-4, std::abs(radius - s) / std::sqrt(std::max(s, 1e-12 * radius) * radius));
     const double last = std::asinh(pi / a);
-    const int panels = std::max(16, static_cast<int>(std::ceil(last / 0.2)));
+    // As along the borders of texels: half a period of the shortest harmonic at most.
+    const double step = std::min(0.2, 3.2 / static_cast<double>(point.harmonics()));
+    const int panels = std::max(16, static_cast<int>(std::ceil(last / step)));
     const double half = 0.5 * last / panels;
     for (int i = 0; i < panels; ++i) {
         for (std::size_t q = 0; q < gauss_node.size(); ++q) {

@@ -24,28 +24,40 @@ constexpr double negligible_log_weight = -60.0;
 // Harmonics at the end of the row that move less than this part of a profile's power only cost time.
 constexpr double negligible_harmonics = 1e-4;
 
-// Sums over the orders, [radius bin][harmonic].
+// Sums over the orders, [harmonic][radius bin].
 std::vector<double> contract_orders(const SideResult& side, double albedo)
 {
     const auto weights = order_weights(side, albedo);
-    std::vector<double> sums(ring_value_count, 0.0);
+    std::vector<double> sums(most_harmonics(side) * radius_bin_count, 0.0);
+    const float* ratios = side.ratios.data();
     for (std::size_t b = 0; b < order_bin_count; ++b) {
-        if (weights[b] == 0.0)
-            continue;
-        const float* moments = side.moments.data() + b * sums.size();
-        for (std::size_t i = 0; i < sums.size(); ++i)
-            sums[i] += weights[b] * static_cast<double>(moments[i]);
+        const std::size_t harmonics = side.harmonics[b];
+        if (weights[b] != 0.0) {
+            std::array<double, radius_bin_count> power;
+            for (std::size_t k = 0; k < radius_bin_count; ++k) {
+                power[k] = weights[b] * static_cast<double>(side.power[b * radius_bin_count + k]);
+                sums[k] += power[k];
+            }
+            for (std::size_t m = 1; m < harmonics; ++m)
+                for (std::size_t k = 0; k < radius_bin_count; ++k)
+                    sums[m * radius_bin_count + k] +=
+                        power[k] * static_cast<double>(ratios[(m - 1) * radius_bin_count + k]);
+        }
+        ratios += (harmonics - 1) * radius_bin_count;
     }
     return sums;
 }
 
-RadialProfile profile_of(const AngleResult& angle, Side side, std::vector<double> sums)
+// Nothing but the mirror image of the beam in the far side is as sharp as the finer bins.
+RadialDetail detail_of(const Medium& medium, Side side)
 {
-    if (angle.angle_deg == 0.0)  // rotational symmetry: what the higher harmonics hold is noise
-        for (std::size_t i = 0; i < sums.size(); ++i)
-            if (i % harmonic_count != 0)
-                sums[i] = 0.0;
-    RadialProfile profile(angle.sides[static_cast<std::size_t>(side)].centre, sums);
+    const bool mirrors = side == Side::reflected && !medium.is_half_space() && medium.ior > 1.0;
+    return mirrors ? RadialDetail::all : RadialDetail::quarters;
+}
+
+RadialProfile profile_of(const SideResult& side, const std::vector<double>& sums, RadialDetail detail)
+{
+    RadialProfile profile(side.centre, sums, detail);
     profile.drop_negligible(negligible_harmonics);
     return profile;
 }
@@ -155,7 +167,7 @@ double LdfLibrary::total(double angle_deg, double albedo, Side side) const
                  ballistic_total(m_medium, refracted_angle(angle_deg * radians_per_degree, m_medium.ior), side);
     for (std::size_t j = 0; j < m_results.size(); ++j) {
         const SideResult& result = m_results[j].sides[static_cast<std::size_t>(side)];
-        if (result.moments.empty())
+        if (result.power.empty())
             continue;
         const auto by_order = order_weights(result, albedo);
         double scattered = 0.0;
@@ -173,7 +185,7 @@ double LdfLibrary::standard_error(double angle_deg, double albedo, Side side) co
     double variance = 0.0;  // angles are simulated independently
     for (std::size_t j = 0; j < m_results.size(); ++j) {
         const SideResult& result = m_results[j].sides[static_cast<std::size_t>(side)];
-        if (result.moments.empty())
+        if (result.power.empty())
             continue;
         const auto by_order = order_weights(result, albedo);
         std::array<double, batch_count> totals{};
@@ -230,8 +242,9 @@ std::vector<RadialProfile> LdfLibrary::node_profiles(double albedo, Side side) c
     std::vector<RadialProfile> profiles;
     for (const AngleResult& result : m_results) {
         const SideResult& from = result.sides[static_cast<std::size_t>(side)];
-        profiles.push_back(from.moments.empty() ? RadialProfile()
-                                                : profile_of(result, side, contract_orders(from, albedo)));
+        profiles.push_back(from.power.empty()
+                               ? RadialProfile()
+                               : profile_of(from, contract_orders(from, albedo), detail_of(m_medium, side)));
     }
     return profiles;
 }
@@ -247,6 +260,12 @@ RadialProfile LdfLibrary::interpolated(double angle_deg, const std::vector<Radia
     }
     // The weights hold the transmittance at entry, which changes power and no place.
     sum.set_centre(centre / entry_transmittance(angle_deg));
+    // A spline rings around what begins at the next node but one; a harmonic that neither neighbour has is not there.
+    const double angle = clamped_angle(angle_deg);
+    std::size_t j = 0;
+    while (j + 2 < nodes.size() && angle >= m_results[j + 1].angle_deg)
+        ++j;
+    sum.keep_harmonics(std::max(nodes[j].harmonics(), nodes[std::min(j + 1, nodes.size() - 1)].harmonics()));
     sum.drop_negligible(negligible_harmonics);
     return sum;
 }
@@ -262,18 +281,15 @@ RadialProfile LdfLibrary::group_profile(double angle_deg, double albedo, Side si
     std::vector<RadialProfile> nodes;
     for (const AngleResult& result : m_results) {
         const SideResult& from = result.sides[static_cast<std::size_t>(side)];
-        if (from.moments.empty()) {
+        if (from.power.empty()) {
             nodes.emplace_back();
             continue;
         }
         const std::vector<double> deviations = deviations_at(from.deviations, group, albedo);
         std::vector<double> sums = contract_orders(from, albedo);
-        for (std::size_t ring = 0; ring < radius_bin_count; ++ring) {
-            const double power = sums[ring * harmonic_count];
-            for (std::size_t i = ring * harmonic_count; i < (ring + 1) * harmonic_count; ++i)
-                sums[i] += power * deviations[i];
-        }
-        nodes.push_back(profile_of(result, side, std::move(sums)));
+        for (std::size_t i = sums.size(); i-- > 0;)  // the powers, which come first, last
+            sums[i] += sums[i % radius_bin_count] * deviations[i];
+        nodes.push_back(profile_of(from, sums, detail_of(m_medium, side)));
     }
     return interpolated(angle_deg, nodes);
 }

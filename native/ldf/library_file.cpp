@@ -2,14 +2,18 @@
 //
 // Every part carries the attributes beamspreadLdf (format version), g, ior, thickness (mean free
 // paths, inf: half-space), photons, seed, angle (degrees), centre (mean free paths) and a checksum of itself. For the
-// j-th angle and each side there are
-//   "<side>.<j>"         columns: radius bins, lines: order bins, channels m0 .. m16: sums of weight * cos(m phi)
-//                        per unit power that entered (transport/bins.h, tally.h), up to the last bins that are not empty;
-//                        of a calibrated library also the attributes residuals and residualsHalfway (ldf/library.h);
+// j-th angle and each side, radius bins up to the last that is not empty (transport/bins.h), there are
+//   "<side>.<j>"         columns: radius bins, lines: order bins up to the last that is not empty: power that leaves
+//                        per unit power that entered; attribute harmonics: how many each order bin has; of a calibrated
+//                        library also residuals and residualsHalfway (ldf/library.h);
+//   "<side>.<j>.ratios"  means of cos(m phi) over each ring, weighted by power, m = 1 and on: [order bin][m][radius
+//                        bin] in lines of a fixed length, filled up with zeros, half precision; left out where no order
+//                        has any;
 //   "<side>.<j>.orders"  columns: order bins; line 0 and 1: mean and variance of the order; then one
 //                        line per batch: power that leaves;
-//   "<side>.<j>.scatter" columns: radius bins, lines: albedos within groups of batches, channels m0 .. m16:
-//                        deviations of the groups (transport/map_scatter.h).
+//   "<side>.<j>.scatter" columns: [harmonic][radius bin], lines: albedos within groups of batches: deviations of the
+//                        groups (transport/map_scatter.h), half precision.
+// One channel each: OpenEXR takes longer to sort channels into pixels than to read.
 #include <algorithm>
 #include <bit>
 #include <charconv>
@@ -23,38 +27,29 @@ namespace beamspread {
 
 namespace {
 
-constexpr int format_version = 4;
+constexpr int format_version = 5;
+constexpr std::size_t ratio_columns = 2048;
 constexpr std::size_t scatter_lines = group_count * scatter_albedos.size();
 constexpr std::array<const char*, side_count> side_names = {"reflected", "transmitted"};
 
-std::vector<std::string> harmonic_channels()
-{
-    std::vector<std::string> names;
-    for (std::size_t m = 0; m < harmonic_count; ++m)
-        names.push_back(std::string("m").append(std::to_string(m)));
-    return names;
-}
-
-// Lines of radius bins, cut after `columns` of them or filled up with zeros.
+// Lines of another length: what is too long is cut off, what is missing filled up with zeros.
 std::vector<float> with_columns(const std::vector<float>& values, std::size_t from_columns, std::size_t columns)
 {
-    const std::size_t lines = values.size() / (from_columns * harmonic_count);
-    const std::size_t kept = std::min(from_columns, columns) * harmonic_count;
-    std::vector<float> result(lines * columns * harmonic_count, 0.0F);
+    const std::size_t lines = values.size() / from_columns;
+    std::vector<float> result(lines * columns, 0.0F);
     for (std::size_t i = 0; i < lines; ++i)
-        std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * from_columns * harmonic_count), kept,
-                    result.begin() + static_cast<std::ptrdiff_t>(i * columns * harmonic_count));
+        std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * from_columns), std::min(from_columns, columns),
+                    result.begin() + static_cast<std::ptrdiff_t>(i * columns));
     return result;
 }
 
 // Bins that something was counted in, up to the last one; at least one of each.
 struct UsedBins {
-    explicit UsedBins(const std::vector<float>& moments)
+    explicit UsedBins(const std::vector<float>& power)
     {
-        for (std::size_t i = 0; i < moments.size(); i += harmonic_count) {
-            if (moments[i] == 0.0F)
+        for (std::size_t bin = 0; bin < power.size(); ++bin) {
+            if (power[bin] == 0.0F)
                 continue;
-            const std::size_t bin = i / harmonic_count;
             orders = std::max(orders, bin / radius_bin_count + 1);
             radii = std::max(radii, bin % radius_bin_count + 1);
         }
@@ -95,17 +90,31 @@ public:
     }
     void add(const std::vector<float>& values)
     {
-        for (float x : values)
-            add(std::uint64_t{std::bit_cast<std::uint32_t>(x)});
+        // Two at a time, and all finite as long as no exponent is all ones.
+        std::size_t i = 0;
+        for (; i + 1 < values.size(); i += 2)
+            add(bits(values[i]) | bits(values[i + 1]) << 32);
+        if (i < values.size())
+            add(bits(values[i]));
         add(values.size());
     }
+    bool is_finite() const { return m_finite; }
     std::string text() const { return std::to_string(m_hash); }
 
 private:
+    std::uint64_t bits(float x)
+    {
+        constexpr std::uint32_t exponent = 0x7f800000;
+        const auto word = std::bit_cast<std::uint32_t>(x);
+        m_finite = m_finite && (word & exponent) != exponent;
+        return word;
+    }
+
     std::uint64_t m_hash = 0xcbf29ce484222325ULL;
+    bool m_finite = true;
 };
 
-std::string checksum(const ExrPart& part)
+Checksum checksum(const ExrPart& part)
 {
     Checksum sum;
     sum.add(part.name);
@@ -116,7 +125,7 @@ std::string checksum(const ExrPart& part)
         std::visit([&sum](const auto& x) { sum.add(x); }, value);
     }
     sum.add(part.pixels);
-    return sum.text();
+    return sum;
 }
 
 class Reader {
@@ -145,7 +154,7 @@ public:
                     result.sides[side] = side_result(part_name(side, results.size()));
             if (is_calibrated)
                 residuals.push_back(side_residuals(results.size()));
-            if (result.sides[1].moments.empty() != medium.is_half_space())
+            if (result.sides[1].power.empty() != medium.is_half_space())
                 fail("does not fit its own thickness");
             results.push_back(std::move(result));
         }
@@ -189,28 +198,70 @@ private:
         return value;
     }
 
-    const ExrPart& checked(const std::string& name, std::size_t height, const std::vector<std::string>& channels) const
+    const ExrPart& checked(const std::string& name) const
     {
         const ExrPart* part = find(name);
         if (!part)
             fail("has no part '" + name + "'");
-        if (part->height > static_cast<int>(height) || part->channels != channels)
-            fail("has a part '" + name + "' of another size");
-        if (!std::all_of(part->pixels.begin(), part->pixels.end(), [](float x) { return std::isfinite(x); }))
+        if (part->channels != std::vector<std::string>{"Y"})
+            fail_size(name);
+        const Checksum sum = checksum(*part);
+        if (!sum.is_finite())
             fail("has a part '" + name + "' with values that are not finite");
-        if (attribute<std::string>(*part, "checksum") != checksum(*part))
+        if (attribute<std::string>(*part, "checksum") != sum.text())
             fail("has a damaged part '" + name + "'");
         return *part;
     }
 
-    // [line][radius bin][harmonic] of a part of at most this many lines, the missing bins empty.
-    std::vector<float> rings(const ExrPart& part, std::size_t lines) const
+    [[noreturn]] void fail_size(const std::string& name) const { fail("has a part '" + name + "' of another size"); }
+
+    // A part of lines of radius bins, the missing bins empty.
+    std::vector<float> power(const ExrPart& part) const
     {
-        if (part.width > static_cast<int>(radius_bin_count))
-            fail("has a part '" + part.name + "' of another size");
+        if (part.width > static_cast<int>(radius_bin_count) || part.height > static_cast<int>(order_bin_count))
+            fail_size(part.name);
         auto values = with_columns(part.pixels, static_cast<std::size_t>(part.width), radius_bin_count);
-        values.resize(lines * radius_bin_count * harmonic_count, 0.0F);
+        values.resize(order_bin_count * radius_bin_count, 0.0F);
         return values;
+    }
+
+    std::vector<std::size_t> harmonics(const ExrPart& part) const
+    {
+        std::vector<std::size_t> counts;
+        for (const float count : attribute<std::vector<float>>(part, "harmonics")) {
+            const bool fits = counts.size() < order_bin_count && count >= 1.0F && count == std::floor(count) &&
+                              count <= static_cast<float>(harmonics_of(counts.size()));
+            if (!fits)
+                fail("has an attribute 'harmonics' that is no list of their numbers");
+            counts.push_back(static_cast<std::size_t>(count));
+        }
+        if (counts.size() != order_bin_count)
+            fail("has an attribute 'harmonics' of another size");
+        return counts;
+    }
+
+    std::vector<float> ratios(const std::string& name, const std::vector<std::size_t>& harmonics,
+                              std::size_t radii) const
+    {
+        std::size_t rings = 0;
+        for (const std::size_t count : harmonics)
+            rings += count - 1;
+        if (rings == 0)
+            return {};
+        const ExrPart& part = checked(name);
+        const std::size_t lines = (rings * radii + ratio_columns - 1) / ratio_columns;
+        if (part.width != static_cast<int>(ratio_columns) || part.height != static_cast<int>(lines))
+            fail_size(name);
+        std::vector<float> values(part.pixels.begin(),
+                                  part.pixels.begin() + static_cast<std::ptrdiff_t>(rings * radii));
+        return with_columns(values, radii, radius_bin_count);
+    }
+
+    std::vector<float> scatter(const ExrPart& part, std::size_t harmonics, std::size_t radii) const
+    {
+        if (part.width != static_cast<int>(harmonics * radii) || part.height != static_cast<int>(scatter_lines))
+            fail_size(part.name);
+        return with_columns(part.pixels, radii, radius_bin_count);
     }
 
     void read_residuals(const ExrPart& part, const std::string& name,
@@ -237,21 +288,24 @@ private:
     SideResult side_result(const std::string& name) const
     {
         SideResult result;
-        const ExrPart& moments = checked(name, order_bin_count, harmonic_channels());
-        result.centre = attribute<double>(moments, "centre");
+        const ExrPart& first = checked(name);
+        const auto radii = static_cast<std::size_t>(first.width);
+        result.centre = attribute<double>(first, "centre");
         if (!std::isfinite(result.centre))
             fail("has a centre that is not finite");
-        result.moments = rings(moments, order_bin_count);
-        const ExrPart& orders = checked(name + ".orders", 2 + batch_count, {"Y"});
+        result.power = power(first);
+        result.harmonics = harmonics(first);
+        result.ratios = ratios(name + ".ratios", result.harmonics, radii);
+        const ExrPart& orders = checked(name + ".orders");
         if (orders.width != static_cast<int>(order_bin_count) || orders.height != static_cast<int>(2 + batch_count))
-            fail("has a part '" + orders.name + "' of another size");
+            fail_size(orders.name);
         const auto line = [&](std::size_t i) {
             return orders.pixels.begin() + static_cast<std::ptrdiff_t>(i * order_bin_count);
         };
         result.mean_order.assign(line(0), line(1));
         result.order_variance.assign(line(1), line(2));
         result.batch_totals.assign(line(2), orders.pixels.end());
-        result.deviations = rings(checked(name + ".scatter", scatter_lines, harmonic_channels()), scatter_lines);
+        result.deviations = scatter(checked(name + ".scatter"), most_harmonics(result), radii);
         return result;
     }
 
@@ -268,36 +322,41 @@ void save_library(const LdfLibrary& library, const std::string& path)
         const AngleResult& result = library.results()[j];
         for (std::size_t side = 0; side < side_count; ++side) {
             const SideResult& from = result.sides[side];
-            if (from.moments.empty())
+            if (from.power.empty())
                 continue;
             const auto attributes = common_attributes(library, result.angle_deg, from.centre);
-            auto moments_attributes = attributes;
+            auto first_attributes = attributes;
+            first_attributes["harmonics"] = std::vector<float>(from.harmonics.begin(), from.harmonics.end());
             if (library.is_calibrated()) {
                 const Residuals& left = library.residuals()[j][side];
-                moments_attributes["residuals"] = std::vector<float>(left.here.begin(), left.here.end());
-                moments_attributes["residualsHalfway"] = std::vector<float>(left.halfway.begin(), left.halfway.end());
+                first_attributes["residuals"] = std::vector<float>(left.here.begin(), left.here.end());
+                first_attributes["residualsHalfway"] = std::vector<float>(left.halfway.begin(), left.halfway.end());
             }
-            const UsedBins used(from.moments);
-            std::vector<float> moments = with_columns(from.moments, radius_bin_count, used.radii);
-            moments.resize(used.orders * used.radii * harmonic_count);
-            parts.push_back({part_name(side, j), static_cast<int>(used.radii), static_cast<int>(used.orders),
-                             harmonic_channels(), std::move(moments), moments_attributes});
+            const UsedBins used(from.power);
+            const auto add = [&](const std::string& name, std::size_t columns, std::vector<float> values,
+                                 const std::map<std::string, ExrAttribute>& with, bool half) {
+                const std::size_t lines = values.size() / columns;
+                parts.push_back(
+                    {name, static_cast<int>(columns), static_cast<int>(lines), {"Y"}, std::move(values), with, half});
+            };
+            std::vector<float> power = with_columns(from.power, radius_bin_count, used.radii);
+            power.resize(used.orders * used.radii);
+            add(part_name(side, j), used.radii, std::move(power), first_attributes, false);
+            if (!from.ratios.empty()) {
+                std::vector<float> ratios = with_columns(from.ratios, radius_bin_count, used.radii);
+                ratios.resize((ratios.size() + ratio_columns - 1) / ratio_columns * ratio_columns, 0.0F);
+                add(part_name(side, j) + ".ratios", ratio_columns, std::move(ratios), attributes, true);
+            }
             std::vector<float> orders = from.mean_order;
             orders.insert(orders.end(), from.order_variance.begin(), from.order_variance.end());
             orders.insert(orders.end(), from.batch_totals.begin(), from.batch_totals.end());
-            parts.push_back({part_name(side, j) + ".orders",
-                             static_cast<int>(order_bin_count),
-                             static_cast<int>(2 + batch_count),
-                             {"Y"},
-                             std::move(orders),
-                             attributes});
-            parts.push_back({part_name(side, j) + ".scatter", static_cast<int>(used.radii),
-                             static_cast<int>(scatter_lines), harmonic_channels(),
-                             with_columns(from.deviations, radius_bin_count, used.radii), attributes, true});
+            add(part_name(side, j) + ".orders", order_bin_count, std::move(orders), attributes, false);
+            add(part_name(side, j) + ".scatter", most_harmonics(from) * used.radii,
+                with_columns(from.deviations, radius_bin_count, used.radii), attributes, true);
         }
     }
     for (ExrPart& part : parts)
-        part.attributes["checksum"] = checksum(part);
+        part.attributes["checksum"] = checksum(part).text();
     write_exr_parts(path, parts);
 }
 

@@ -22,44 +22,58 @@ const std::array<double, edge_count>& edges()
     return table;
 }
 
-// Weights of the values at up to five neighbouring edges in the derivative at each edge: that of the
+// Weights of the values at five neighbouring knots, from `first` on, in the derivative at one of them: that of the
 // polynomial through them.
 struct Stencil {
     std::size_t first = 0;
     std::array<double, 5> weight{};
 };
 
-Stencil derivative_stencil(std::size_t k)
+// The edges that the cubics meet at.
+struct Knots {
+    std::vector<std::size_t> edge;
+    std::vector<Stencil> stencil;
+};
+
+Stencil derivative_stencil(const std::vector<std::size_t>& knots, std::size_t i)
 {
-    const auto& r = edges();
     Stencil stencil;
-    stencil.first = std::clamp<std::size_t>(k, 2, edge_count - 3) - 2;
-    for (std::size_t i = 0; i < 5; ++i) {
-        const double ri = r[stencil.first + i];
-        double derivative = 0.0;  // of Lagrange's i-th polynomial at r[k]
+    stencil.first = std::clamp<std::size_t>(i, 2, knots.size() - 3) - 2;
+    std::array<double, 5> r{};
+    for (std::size_t j = 0; j < 5; ++j)
+        r[j] = edges()[knots[stencil.first + j]];
+    const double here = edges()[knots[i]];
+    for (std::size_t n = 0; n < 5; ++n) {
+        double derivative = 0.0;  // of Lagrange's n-th polynomial at r[k]
         for (std::size_t skip = 0; skip < 5; ++skip) {
-            if (skip == i)
+            if (skip == n)
                 continue;
-            double product = 1.0 / (ri - r[stencil.first + skip]);
+            double product = 1.0 / (r[n] - r[skip]);
             for (std::size_t j = 0; j < 5; ++j)
-                if (j != i && j != skip)
-                    product *= (r[k] - r[stencil.first + j]) / (ri - r[stencil.first + j]);
+                if (j != n && j != skip)
+                    product *= (here - r[j]) / (r[n] - r[j]);
             derivative += product;
         }
-        stencil.weight[i] = derivative;
+        stencil.weight[n] = derivative;
     }
     return stencil;
 }
 
-const std::array<Stencil, edge_count>& stencils()
+const Knots& knots(RadialDetail detail)
 {
     static const auto table = [] {
-        std::array<Stencil, edge_count> all{};
-        for (std::size_t k = 0; k < edge_count; ++k)
-            all[k] = derivative_stencil(k);
+        std::array<Knots, 2> all;
+        for (const RadialDetail each : {RadialDetail::quarters, RadialDetail::all}) {
+            Knots& of = all[static_cast<std::size_t>(each)];
+            for (std::size_t k = 0; k < edge_count; ++k)
+                if (each == RadialDetail::all || ends_quarter(k))
+                    of.edge.push_back(k);
+            for (std::size_t i = 0; i < of.edge.size(); ++i)
+                of.stencil.push_back(derivative_stencil(of.edge, i));
+        }
         return all;
     }();
-    return table;
+    return table[static_cast<std::size_t>(detail)];
 }
 
 // The cubic Hermite polynomials, or their derivatives, at t in [0, 1] of a bin of width h: factors of values and
@@ -85,7 +99,7 @@ Cubic cubic_derivative(double t, double h)
 
 RadialProfile::RadialProfile() : m_remaining(edge_count, Harmonics{}), m_slope(edge_count, Harmonics{}) {}
 
-RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments) : RadialProfile()
+RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments, RadialDetail detail) : RadialProfile()
 {
     m_centre = centre;
     m_harmonics = bin_moments.size() / edge_count;
@@ -96,43 +110,66 @@ RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments)
     for (std::size_t k = edge_count; k-- > 0;) {
         m_remaining[k] = sum;
         for (std::size_t m = 0; m < m_harmonics; ++m)
-            sum[m] += norm(m) * bin_moments[k * m_harmonics + m];
+            sum[m] += norm(m) * bin_moments[m * edge_count + k];
     }
     m_total = sum;
 
     const auto& r = edges();
-    for (std::size_t k = 0; k < edge_count; ++k) {
-        m_slope[k] = slope_at(k);
+    const std::vector<std::size_t>& knot = knots(detail).edge;
+    for (std::size_t i = 0; i + 1 < knot.size(); ++i) {
+        const std::size_t k = knot[i];
+        m_slope[k] = slope_at(i, detail);
         // A monotone C_0 keeps the azimuthal mean of g positive: slopes at most three times those of the
         // chords beside them (Fritsch, Carlson 1980).
-        const auto chord = [&](std::size_t bin) {
-            return bin == 0 ? (m_total[0] - m_remaining[0][0]) / r[0]
-                            : (m_remaining[bin - 1][0] - m_remaining[bin][0]) / (r[bin] - r[bin - 1]);
+        const auto chord = [&](std::size_t end) {
+            return end == 0 ? (m_total[0] - m_remaining[0][0]) / r[0]
+                            : (m_remaining[knot[end - 1]][0] - m_remaining[knot[end]][0]) /
+                                  (r[knot[end]] - r[knot[end - 1]]);
         };
-        const double limit = 3.0 * (k + 1 < edge_count ? std::min(chord(k), chord(k + 1)) : 0.0);
+        const double limit = 3.0 * std::min(chord(i), chord(i + 1));
         m_slope[k][0] = std::clamp(m_slope[k][0], 0.0, std::max(0.0, limit));
     }
-    m_slope[edge_count - 1] = {};
+    for (std::size_t i = 1; i < knot.size(); ++i)
+        subdivide(knot[i - 1], knot[i]);
     update_support();
+}
+
+// Edges between two knots lie on the knots' cubic.
+void RadialProfile::subdivide(std::size_t first, std::size_t last)
+{
+    const auto& r = edges();
+    const double h = r[last] - r[first];
+    for (std::size_t k = first + 1; k < last; ++k) {
+        const double t = (r[k] - r[first]) / h;
+        const Cubic value = cubic_value(t, h);
+        const Cubic slope = cubic_derivative(t, h);
+        for (std::size_t m = 0; m < m_harmonics; ++m) {
+            m_remaining[k][m] = value.v0 * m_remaining[first][m] + value.v1 * m_remaining[last][m] -
+                                value.s0 * m_slope[first][m] - value.s1 * m_slope[last][m];
+            m_slope[k][m] = slope.s0 * m_slope[first][m] + slope.s1 * m_slope[last][m] -
+                            slope.v0 * m_remaining[first][m] - slope.v1 * m_remaining[last][m];
+        }
+    }
 }
 
 // Far out g falls exponentially, by several times within a bin: the logarithm of what remains of m = 0 and
 // the ratios of the other harmonics to it are what a polynomial follows well.
-Harmonics RadialProfile::slope_at(std::size_t k) const
+Harmonics RadialProfile::slope_at(std::size_t i, RadialDetail detail) const
 {
-    const Stencil& stencil = stencils()[k];
+    const Knots& of = knots(detail);
+    const Stencil& stencil = of.stencil[i];
     Harmonics slope{};
-    if (m_remaining[stencil.first + 4][0] <= 0.0)
+    if (m_remaining[of.edge[stencil.first + 4]][0] <= 0.0)
         return slope;  // next to where the counts end
-    const double here = m_remaining[k][0];
-    for (std::size_t i = 0; i < 5; ++i) {
-        const Harmonics& there = m_remaining[stencil.first + i];
-        slope[0] -= stencil.weight[i] * here * std::log(there[0] / here);
+    const Harmonics& here = m_remaining[of.edge[i]];
+    for (std::size_t j = 0; j < 5; ++j) {
+        const Harmonics& there = m_remaining[of.edge[stencil.first + j]];
+        slope[0] -= stencil.weight[j] * here[0] * std::log(there[0] / here[0]);
         for (std::size_t m = 1; m < m_harmonics; ++m)
-            slope[m] -= stencil.weight[i] * here * there[m] / there[0];
+            slope[m] -= stencil.weight[j] * here[0] * there[m] / there[0];
     }
     for (std::size_t m = 1; m < m_harmonics; ++m)
-        slope[m] += m_remaining[k][m] / here * slope[0];
+        slope[m] += here[m] / here[0] * slope[0];
     return slope;
 }
 
@@ -159,22 +196,34 @@ void RadialProfile::add(const RadialProfile& other, const Harmonics& weights)
     m_support = std::max(m_support, other.m_support);
 }
 
-void RadialProfile::drop_negligible(double fraction)
+void RadialProfile::keep_harmonics(std::size_t count)
 {
-    // Over a turn |cos(m phi)| integrates to 4, and 1 to 2 pi.
-    double moved = 0.0;
-    while (m_harmonics > 1) {
+    for (; m_harmonics > count; --m_harmonics) {
         const std::size_t m = m_harmonics - 1;
-        moved += std::abs(m_total[m] - m_remaining[0][m]);
-        for (std::size_t k = 1; k < edge_count; ++k)
-            moved += std::abs(m_remaining[k - 1][m] - m_remaining[k][m]);
-        if (2.0 * inv_pi * moved > fraction * m_total[0])
-            return;
-        m_harmonics = m;
         m_total[m] = 0.0;
         for (std::size_t k = 0; k < edge_count; ++k)
             m_remaining[k][m] = m_slope[k][m] = 0.0;
     }
+}
+
+std::size_t RadialProfile::harmonics_beyond(double r, double power) const
+{
+    double moved = 0.0;
+    std::size_t count = m_harmonics;
+    for (; count > 1; --count) {
+        const std::size_t m = count - 1;
+        for (std::size_t k = 0; k < edge_count; ++k)
+            if (edges()[k] > r)
+                moved += std::abs((k == 0 ? m_total[m] : m_remaining[k - 1][m]) - m_remaining[k][m]);
+        if (4.0 * moved > power)  // |cos(m phi)| integrates to 4 over a turn
+            break;
+    }
+    return count;
+}
+
+void RadialProfile::drop_negligible(double fraction)
+{
+    keep_harmonics(harmonics_beyond(0.0, fraction * total()));
 }
 
 void RadialProfile::update_support()

@@ -8,6 +8,10 @@
 
 namespace beamspread {
 
+// Whether a profile follows all radius bins, or quarters of octaves only: finer bins hold more noise, which costs where
+// they show nothing.
+enum class RadialDetail { quarters, all };
+
 // g(r, phi) = sum over m of c_m(r) cos(m phi) around (centre, 0), lengths in mean free paths, kept
 // as C_m(r) = integral of c_m(s) s ds from 0 to r: a piecewise cubic through its values at the edges of the
 // radius bins, whose power therefore is exactly what was counted.
@@ -15,14 +19,20 @@ class RadialProfile final : public RadialFunction {
 public:
     RadialProfile();
 
-    // From sums of weight * cos(m phi) per radius bin, [radius bin][harmonic], as many harmonics as the sums hold.
-    RadialProfile(double centre, std::span<const double> bin_moments);
+    // From sums of weight * cos(m phi), [harmonic][radius bin], for as many harmonics as there are.
+    RadialProfile(double centre, std::span<const double> bin_moments, RadialDetail detail);
 
     // Adds `weight` times another profile, harmonics of even and odd m apart. The centre stays.
     void add(const RadialProfile& other, double even_weight, double odd_weight);
 
     // The same with a weight for each harmonic.
     void add(const RadialProfile& other, const Harmonics& weights);
+
+    // Drops those from this m on.
+    void keep_harmonics(std::size_t count);
+
+    // Leading harmonics of which none can be dropped without moving more than this power outside r.
+    std::size_t harmonics_beyond(double r, double power) const;
 
     // Drops the trailing harmonics that together move no more than this fraction of the power.
     void drop_negligible(double fraction);
@@ -43,7 +53,8 @@ public:
     void set_centre(double centre) { m_centre = centre; }
 
 private:
-    Harmonics slope_at(std::size_t edge) const;
+    Harmonics slope_at(std::size_t knot, RadialDetail detail) const;
+    void subdivide(std::size_t first, std::size_t last);
     void update_support();
 
     std::size_t m_harmonics = 0;

@@ -1,6 +1,7 @@
 #include "ldf/sample_source.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <sstream>
 #include <utility>
@@ -21,6 +22,9 @@ constexpr double rounding_deg = 1e-4;
 // Points along each side of a texel that rings are summed over.
 constexpr double points_per_texel = 4.0;
 
+// An image of texels resolves no more, and seldom as much.
+constexpr std::size_t sample_harmonics = 17;
+
 // Exitance of the texel at a place, 0 outside of the image; the mean of v and -v.
 double even_exitance(const LdfSample& sample, double u, double v)
 {
@@ -39,12 +43,12 @@ double even_exitance(const LdfSample& sample, double u, double v)
 }
 
 // Integrals of the image times cos(m phi) over the ring from r0 to r1.
-Harmonics ring_moments(const LdfSample& sample, double r0, double r1)
+std::array<double, sample_harmonics> ring_moments(const LdfSample& sample, double r0, double r1)
 {
     const double spacing = sample.pitch / points_per_texel;
     const auto radii = static_cast<int>(std::max(2.0, std::ceil((r1 - r0) / spacing)));
-    const auto azimuths = static_cast<int>(std::max(8.0 * harmonic_count, std::ceil(pi * r1 / spacing)));
-    Harmonics moments{};
+    const auto azimuths = static_cast<int>(std::max(8.0 * sample_harmonics, std::ceil(pi * r1 / spacing)));
+    std::array<double, sample_harmonics> moments{};
     for (int j = 0; j < azimuths; ++j) {
         const double phi = (j + 0.5) * pi / azimuths;
         const double cos_phi = std::cos(phi);
@@ -86,23 +90,23 @@ std::vector<double> node_angles(const std::vector<LdfSample>& samples)
 RadialProfile sample_profile(const LdfSample& sample)
 {
     const double farthest = 0.5 * sample.pitch * std::hypot(sample.width, sample.height);
-    std::vector<double> moments(radius_bin_count * harmonic_count, 0.0);
+    const std::size_t harmonics = sample.angle_deg == 0.0 ? 1 : sample_harmonics;
+    std::vector<double> moments(harmonics * radius_bin_count, 0.0);
     double power = 0.0;
     double inner = 0.0;
     for (std::size_t k = 0; k < radius_bin_count && inner < farthest; ++k) {
         // What lies beyond the last bin is counted in it.
         const double outer = k + 1 < radius_bin_count ? std::min(radius_bin_edge(k), farthest) : farthest;
-        const Harmonics ring = ring_moments(sample, inner, outer);
-        const bool round = sample.angle_deg == 0.0;
-        std::copy_n(ring.begin(), round ? 1 : harmonic_count,
-                    moments.begin() + static_cast<std::ptrdiff_t>(k * harmonic_count));
+        const auto ring = ring_moments(sample, inner, outer);
+        for (std::size_t m = 0; m < harmonics; ++m)
+            moments[m * radius_bin_count + k] = ring[m];
         power += ring[0];
         inner = outer;
     }
     if (power > 0.0)
         for (double& moment : moments)
             moment *= std::max(0.0, sample.power()) / power;
-    return RadialProfile(0.0, moments);
+    return RadialProfile(0.0, moments, RadialDetail::quarters);
 }
 
 SampleSource::SampleSource(std::vector<LdfSample> samples, Interpolation method)

@@ -14,9 +14,12 @@ namespace {
 constexpr std::array<double, 3> gauss_node = {-0.77459666924148338, 0.0, 0.77459666924148338};
 constexpr std::array<double, 3> gauss_weight = {5.0 / 9.0, 8.0 / 9.0, 5.0 / 9.0};
 
-// Longest step of asinh(s / distance) along a border: a fifth of the radius, about the width of a
-// radius bin, and a third of the shortest harmonic's phase at m = 8.
-constexpr double max_step = 0.2;
+// Longest step of asinh(s / distance) along a border: a fifth of the radius, about the width of most
+// radius bins, and half a period of the shortest harmonic.
+double longest_step(const RadialFunction& profile)
+{
+    return std::min(0.2, 3.2 / static_cast<double>(profile.harmonics()));
+}
 
 struct BorderIntegral {
     explicit BorderIntegral(std::size_t count) : harmonics(count) {}
@@ -66,6 +69,7 @@ BorderIntegral integrate_piece(const RadialFunction& profile, Radial radial, dou
         const auto [x, y] = place(s);
         sum.add(radial == Radial::remaining ? profile.remaining(r) : profile.cumulative(r), x / r, y / r, weight);
     };
+    const double max_step = longest_step(profile);
     if (std::abs(s1 - s0) < max_step * nearest) {
         const double half = 0.5 * (s1 - s0);
         for (std::size_t q = 0; q < gauss_node.size(); ++q) {

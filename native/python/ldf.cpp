@@ -136,7 +136,7 @@ Returns
 -------
 float32, shape (size, size)
     1/mfp^2; rows v, columns u, O at the centre, +u (the beam's direction of travel) to the right.
-    The few texels where seventeen azimuthal harmonics undershoot may be slightly negative.
+    The few texels where azimuthal harmonics undershoot may be slightly negative.
 
 Raises
 ------

@@ -37,10 +37,14 @@ RingIntegrals integrate_ring(const RadialProfile& profile, const RadialWindow& o
         const Harmonics c = profile.density(r * to_paths);
         const double weight =
             0.25 * px * py * gauss_weight[ix] * gauss_weight[iy] * to_paths * to_paths * outside.weight(r);
-        const double phi = std::atan2(y, x);
+        double cos_m_phi = weight;
+        double sin_m_phi = 0.0;
         for (std::size_t m = 0; m < profile.harmonics(); ++m) {
-            sum.cosine[m] += weight * c[m] * std::cos(static_cast<double>(m) * phi);
-            sum.sine[m] += weight * c[m] * std::sin(static_cast<double>(m) * phi);
+            sum.cosine[m] += c[m] * cos_m_phi;
+            sum.sine[m] += c[m] * sin_m_phi;
+            const double next = (cos_m_phi * x - sin_m_phi * y) / r;
+            sin_m_phi = (sin_m_phi * x + cos_m_phi * y) / r;
+            cos_m_phi = next;
         }
     }
     return sum;

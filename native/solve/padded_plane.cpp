@@ -20,6 +20,25 @@ constexpr std::size_t most_coarsening = 64;
 // resolve.
 constexpr double level_deviation = 3.0;
 
+// Harmonics that a border of this deviation serves: no shorter than three nodes around it. Others may hold this part of
+// the largest kernel's power outside.
+constexpr double harmonics_per_deviation = 10.0;
+constexpr double negligible_outside = 3e-4;
+
+// The detail of a harmonic grows finer toward the pole: where many reach beyond a border, a wider one takes them in.
+double widened(double deviation, const std::vector<ScaledProfile>& profiles, double unit)
+{
+    double power = 0.0;
+    for (const ScaledProfile& each : profiles)
+        power = std::max(power, each.profile.total());
+    std::size_t harmonics = 0;
+    for (const ScaledProfile& each : profiles) {
+        const double border = window_radius * deviation * unit / each.mean_free_path;
+        harmonics = std::max(harmonics, each.profile.harmonics_beyond(border, negligible_outside * power));
+    }
+    return std::max(deviation, static_cast<double>(harmonics) / harmonics_per_deviation);
+}
+
 struct Tiling {
     PaddedPlane plane;
     double cost = 0.0;  // padded nodes of all tiles; infinite where no tiles fit into the budget
@@ -75,8 +94,9 @@ void set_halo(Level& level)
     plane.halo_y = std::max(level.centre ? level.centre->y : 0, halo(plane.pitch_y));
 }
 
-// The grid of nodes `coarsening` texels apart, on which the kernels begin outside the window that ends the texels'.
-Level coarse_level(const PaddedPlane& fine, const RadialWindow& ring, std::size_t coarsening)
+// The grid of nodes `coarsening` texels apart, on which the kernels begin outside the window that ends the texels', of
+// this many texels' deviation.
+Level coarse_level(const PaddedPlane& fine, const RadialWindow& ring, std::size_t coarsening, double deviation)
 {
     const auto step = [&](double pitch) { return coarsening * static_cast<std::size_t>(fine.unit() / pitch); };
     Level level;
@@ -88,7 +108,7 @@ Level coarse_level(const PaddedPlane& fine, const RadialWindow& ring, std::size_
     plane.pitch_x = static_cast<double>(plane.texels_x) * fine.pitch_x;
     plane.pitch_y = static_cast<double>(plane.texels_y) * fine.pitch_y;
     const double per_unit = fine.unit() / plane.unit();
-    level.ring = {level_deviation, 0.0, ring.cut * per_unit, ring.taper * per_unit};
+    level.ring = {deviation * per_unit, 0.0, ring.cut * per_unit, ring.taper * per_unit};
     set_halo(level);
     return level;
 }
@@ -105,9 +125,10 @@ Levels choose_levels(std::size_t width, std::size_t height, double pitch_x, doub
         cut = std::max(cut, each.reach / unit);
     const double diagonal =
         std::hypot(static_cast<double>(width) * pitch_x / unit, static_cast<double>(height) * pitch_y / unit);
-    const double centre_end = window_end * choice.centre_deviation;
+    const double centre_deviation = widened(choice.centre_deviation, profiles, unit);
+    const double centre_end = window_end * centre_deviation;
     if (cut > centre_end && std::max(width, height) > small_plane) {
-        one.ring = {choice.centre_deviation, 0.0, cut, 0.0};
+        one.ring = {centre_deviation, 0.0, cut, 0.0};
         if (cut > diagonal) {
             // No two texels are farther apart; an abrupt end would ring.
             one.ring->cut = diagonal;
@@ -129,14 +150,15 @@ Levels choose_levels(std::size_t width, std::size_t height, double pitch_x, doub
     for (std::size_t coarsening = 4; coarsening <= most_coarsening; coarsening *= 2) {
         if (choice.coarsening != 0 && choice.coarsening != coarsening)
             continue;
-        const double deviation = level_deviation * static_cast<double>(coarsening);
+        const auto step = static_cast<double>(coarsening);
+        const double deviation = step * widened(level_deviation, profiles, step * unit);
         if (window_end * deviation >= one.ring->cut)
             break;
         Level fine = one;
         fine.ring = inside(*one.ring, deviation);
         set_halo(fine);
         const Tiling tiling = choose_tiles(fine.plane, choice);
-        Level coarse = coarse_level(one.plane, *one.ring, coarsening);
+        Level coarse = coarse_level(one.plane, *one.ring, coarsening, deviation);
         const Tiling coarse_tiling = with_tiles(coarse.plane, 1);
         const PaddedPlane& nodes = coarse_tiling.plane;
         // The results of all media are kept; so are the texels' spectra, of which there are several in any case.

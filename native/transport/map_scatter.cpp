@@ -7,8 +7,6 @@ namespace beamspread {
 
 namespace {
 
-constexpr std::size_t group_values = scatter_albedos.size() * ring_value_count;
-
 // To what half precision holds exactly.
 float rounded_to_five_bits(double x)
 {
@@ -19,38 +17,47 @@ float rounded_to_five_bits(double x)
     return static_cast<float>(std::ldexp(std::round(mantissa * 32.0) / 32.0, exponent));
 }
 
-}  // namespace
-
-MapScatter::MapScatter() : m_moments(group_count * group_values, 0.0) {}
-
-void MapScatter::add(std::size_t group, const Tally& batch)
+// Sums over the orders at an albedo, [harmonic][radius bin].
+std::vector<double> contracted(const Tally& tally, double albedo, std::span<const std::size_t> harmonics)
 {
+    const std::size_t most = *std::max_element(harmonics.begin(), harmonics.end());
+    std::vector<double> sums(most * radius_bin_count, 0.0);
     for (std::size_t b = 1; b < order_bin_count; ++b) {
-        if (batch.weight[b] == 0.0)
+        if (tally.weight[b] == 0.0)
             continue;
-        const double mean_order = batch.weight_order[b] / batch.weight[b];
-        const double* from = batch.moments.data() + b * ring_value_count;
-        for (std::size_t a = 0; a < scatter_albedos.size(); ++a) {
-            const double weight = std::pow(scatter_albedos[a], mean_order);
-            double* to = m_moments.data() + group * group_values + a * ring_value_count;
-            for (std::size_t i = 0; i < ring_value_count; ++i)
-                to[i] += weight * from[i];
+        const double weight = std::pow(albedo, tally.weight_order[b] / tally.weight[b]);
+        for (std::size_t k = 0; k < radius_bin_count; ++k) {
+            const double* ring = tally.ring(b, k);
+            for (std::size_t m = 0; m < harmonics[b]; ++m)
+                sums[m * radius_bin_count + k] += weight * ring[m];
         }
     }
+    return sums;
 }
 
-std::vector<float> MapScatter::relative_deviations() const
+}  // namespace
+
+std::vector<float> relative_deviations(std::span<const Tally* const> groups, std::span<const std::size_t> harmonics)
 {
-    std::vector<double> mean(group_values, 0.0);
-    for (std::size_t i = 0; i < m_moments.size(); ++i)
-        mean[i % group_values] += m_moments[i] / static_cast<double>(group_count);
-    std::vector<float> deviations(m_moments.size(), 0.0F);
-    for (std::size_t i = 0; i < m_moments.size(); ++i) {
-        const std::size_t value = i % group_values;
-        const double ring = mean[value - value % harmonic_count];
-        if (ring > 0.0)
-            deviations[i] = rounded_to_five_bits((m_moments[i] - mean[value]) / ring);
+    std::vector<std::vector<std::vector<double>>> by_albedo;
+    std::vector<std::vector<double>> means;
+    for (const double albedo : scatter_albedos) {
+        std::vector<std::vector<double>>& of_groups = by_albedo.emplace_back();
+        for (const Tally* group : groups)
+            of_groups.push_back(contracted(*group, albedo, harmonics));
+        std::vector<double>& mean = means.emplace_back(of_groups.front().size(), 0.0);
+        for (const std::vector<double>& sums : of_groups)
+            for (std::size_t i = 0; i < sums.size(); ++i)
+                mean[i] += sums[i] / static_cast<double>(groups.size());
     }
+    std::vector<float> deviations;
+    for (std::size_t group = 0; group < groups.size(); ++group)
+        for (std::size_t a = 0; a < scatter_albedos.size(); ++a)
+            for (std::size_t i = 0; i < means[a].size(); ++i) {
+                const double ring = means[a][i % radius_bin_count];
+                const double difference = by_albedo[a][group][i] - means[a][i];
+                deviations.push_back(ring > 0.0 ? rounded_to_five_bits(difference / ring) : 0.0F);
+            }
     return deviations;
 }
 
@@ -62,10 +69,11 @@ std::vector<double> deviations_at(std::span<const float> deviations, std::size_t
     while (a + 2 < scatter_albedos.size() && x < place(scatter_albedos[a + 1]))
         ++a;
     const double t = (x - place(scatter_albedos[a])) / (place(scatter_albedos[a + 1]) - place(scatter_albedos[a]));
-    const float* low = deviations.data() + group * group_values + a * ring_value_count;
-    const float* high = low + ring_value_count;
-    std::vector<double> result(ring_value_count);
-    for (std::size_t i = 0; i < ring_value_count; ++i)
+    const std::size_t values = deviations.size() / (group_count * scatter_albedos.size());
+    const float* low = deviations.data() + (group * scatter_albedos.size() + a) * values;
+    const float* high = low + values;
+    std::vector<double> result(values);
+    for (std::size_t i = 0; i < values; ++i)
         result[i] = (1.0 - t) * static_cast<double>(low[i]) + t * static_cast<double>(high[i]);
     return result;
 }

@@ -17,25 +17,12 @@ inline constexpr std::size_t group_count = 8;
 // slowly with the albedo: it is interpolated in log(1 - albedo).
 inline constexpr std::array<double, 4> scatter_albedos = {0.6, 0.95, 0.995, 0.9995};
 
-inline constexpr std::size_t ring_value_count = radius_bin_count * harmonic_count;
+// Deviation of each group's moments from those of all, divided by the m = 0 moment of the ring,
+// [group][albedo][harmonic][radius bin], for the harmonics that are kept of each order bin. Rounded to five bits,
+// enough for an error of an error, so that files stay small.
+std::vector<float> relative_deviations(std::span<const Tally* const> groups, std::span<const std::size_t> harmonics);
 
-// Collects the moments of one side of one angle by group, orders already contracted.
-class MapScatter {
-public:
-    MapScatter();
-
-    void add(std::size_t group, const Tally& batch);
-
-    // Deviation of each group's moments from those of all, divided by the m = 0 moment of the ring,
-    // [group][albedo][radius bin][harmonic]. Rounded to five bits, enough for an error of an error, so that files
-    // stay small.
-    std::vector<float> relative_deviations() const;
-
-private:
-    std::vector<double> m_moments;  // as above, sums over the group's batches
-};
-
-// The deviations of one group at an albedo, [radius bin][harmonic].
+// The deviations of one group at an albedo, [harmonic][radius bin].
 std::vector<double> deviations_at(std::span<const float> deviations, std::size_t group, double albedo);
 
 }  // namespace beamspread

@@ -22,18 +22,23 @@ constexpr int side_shift = 20;
 constexpr int batch_shift = 21;
 static_assert(max_order <= 1u << side_shift);
 
-// [m][k]: of cos(phi)^k in cos(m phi).
+// Harmonics are added in blocks of this many.
+constexpr std::size_t block = 8;
+
+// [m][k]: of c^k in T_m(c), the Chebyshev polynomial, which is cos(m phi) for c = cos(phi).
 constexpr auto chebyshev_coefficients = [] {
-    std::array<std::array<double, harmonic_count>, harmonic_count> c{};
+    std::array<std::array<double, block>, block> c{};
     c[0][0] = c[1][1] = 1.0;
-    for (std::size_t m = 2; m < harmonic_count; ++m)
+    for (std::size_t m = 2; m < block; ++m)
         for (std::size_t k = 0; k <= m; ++k)
             c[m][k] = (k > 0 ? 2.0 * c[m - 1][k - 1] : 0.0) - c[m - 2][k];
     return c;
 }();
 
 // Collects exits, and adds them to the tallies when there are enough to fill vectors. Until `finish` the moments
-// hold powers of cos(phi) in the place of cos(m phi), which take no recurrence.
+// hold T_8j(c) c^k, c = cos(phi), in the place of cos((8 j + k) phi): a step from one block to the next is one
+// operation. Powers alone would lose twelve digits on the way back to the sixty-third harmonic, within a block of eight
+// it is three.
 class PacketTally {
 public:
     explicit PacketTally(std::span<SideTallies> batches) : m_batches(batches) {}
@@ -53,9 +58,7 @@ public:
         flush();
         for (SideTallies& sides : m_batches)
             for (Tally& tally : sides)
-                for (std::size_t i = 0; i < tally.moments.size(); i += harmonic_count)
-                    if (tally.moments[i] != 0.0)
-                        powers_to_harmonics(tally.moments.data() + i);
+                to_harmonics(tally);
     }
 
 private:
@@ -63,15 +66,28 @@ private:
     template <class T>
     using Queue = std::array<T, capacity + 2 * lane_count>;
 
-    // From sums of c^m, c = cos(phi), to sums of cos(m phi), which is the m-th Chebyshev polynomial of c.
-    static void powers_to_harmonics(double* sums)
+    static void to_harmonics(Tally& tally)
     {
-        std::array<double, harmonic_count> powers;
-        std::copy_n(sums, harmonic_count, powers.begin());
-        for (std::size_t m = 0; m < harmonic_count; ++m) {
-            sums[m] = 0.0;
-            for (std::size_t k = m % 2; k <= m; k += 2)
-                sums[m] += chebyshev_coefficients[m][k] * powers[k];
+        if (tally.moments.empty())
+            return;
+        for (std::size_t order = 0; order < order_bin_count; ++order)
+            for (std::size_t radius = 0; radius < radius_bin_count; ++radius)
+                if (double* sums = tally.ring(order, radius); sums[0] != 0.0)
+                    blocks_to_harmonics(sums, harmonics_of(order));
+    }
+
+    // From sums of T_8j c^k to sums of T_8j+k = 2 T_8j T_k - T_8j-k.
+    static void blocks_to_harmonics(double* sums, std::size_t count)
+    {
+        for (std::size_t first = 0; first < count; first += block) {
+            std::array<double, block> powers;
+            std::copy_n(sums + first, block, powers.begin());
+            for (std::size_t m = 1; m < block; ++m) {
+                double product = 0.0;  // T_8j T_m
+                for (std::size_t k = m % 2; k <= m; k += 2)
+                    product += chebyshev_coefficients[m][k] * powers[k];
+                sums[first + m] = first == 0 ? product : 2.0 * product - sums[first - m];
+            }
         }
     }
 
@@ -105,10 +121,17 @@ private:
         const Floats cosine = hn::IfThenElse(hn::Gt(r, hn::Zero(floats)), hn::Div(x, r), broadcast(1.0));
         hn::StoreU(cosine, floats, m_x.data() + first);
 
-        const auto quarters = hn::ShiftRight<quarter_bits>(hn::BitCast(integers, r));
-        const auto radius = hn::Sub(quarters, hn::Set(integers, 4 * (bias + min_radius_exponent) - 1));
-        const auto radius_clamped = hn::Min(hn::Max(radius, hn::Zero(integers)),
-                                            hn::Set(integers, static_cast<std::int32_t>(radius_bin_count) - 1));
+        const auto bits = hn::BitCast(integers, r);
+        const auto between = [&](auto value, int low, int high) {
+            return hn::Min(hn::Max(value, hn::Set(integers, low)), hn::Set(integers, high));
+        };
+        const auto quarter =
+            hn::Sub(hn::ShiftRight<quarter_bits>(bits), hn::Set(integers, 4 * (bias + min_radius_exponent) - 1));
+        const auto fine = hn::Sub(hn::ShiftRight<quarter_bits + 2 - fine_bits>(bits),
+                                  hn::Set(integers, (bias + min_fine_exponent) << fine_bits));
+        const auto replaced = between(hn::Sub(quarter, hn::Set(integers, first_fine_bin)), 0, replaced_bin_count);
+        const auto radius = hn::Add(hn::Sub(quarter, replaced), between(fine, 0, fine_bin_count));
+        const auto radius_clamped = between(radius, 0, static_cast<int>(radius_bin_count) - 1);
         const auto order = hn::BitCast(integers, hn::And(what, hn::Set(words, max_order - 1)));
         const auto order_quarters = hn::ShiftRight<quarter_bits>(hn::BitCast(integers, hn::ConvertTo(floats, order)));
         const auto binned = hn::Sub(order_quarters, hn::Set(integers, 4 * (bias + 4) - static_cast<int>(exact_orders)));
@@ -122,8 +145,7 @@ private:
         const std::uint32_t what = m_what[i];
         Tally& tally = m_batches[what >> batch_shift][(what >> side_shift) & 1u];
         const auto bin = static_cast<std::size_t>(m_order_bin[i]);
-        const std::size_t place = bin * radius_bin_count + static_cast<std::size_t>(m_radius_bin[i]);
-        add_powers(tally.moments.data() + place * harmonic_count, m_x[i], m_weight[i]);
+        add_blocks(tally.ring(bin, static_cast<std::size_t>(m_radius_bin[i])), harmonics_of(bin), m_x[i], m_weight[i]);
         const auto w = static_cast<double>(m_weight[i]);
         const double n = static_cast<double>(what & (max_order - 1));
         tally.weight[bin] += w;
@@ -144,24 +166,33 @@ private:
         return hn::IfThenElse(chosen, hn::Mul(values, hn::Set(doubles, factor)), values);
     }
 
-    // sums[m] += weight * c^m
-    static HWY_INLINE void add_powers(double* sums, float c, float weight)
+    // sums[8 j + k] += weight * T_8j(c) c^k
+    static HWY_INLINE void add_blocks(double* sums, std::size_t count, float cosine, float weight)
     {
         const DoubleTag doubles;
-        constexpr std::size_t step = HWY_MIN(HWY_LANES(double), 8);
-        constexpr std::size_t last = harmonic_count - 1;
-        static_assert(last % step == 0);
+        constexpr std::size_t step = HWY_MIN(HWY_LANES(double), block);
+        const double c = cosine;
         auto powers = hn::Set(doubles, static_cast<double>(weight));
         double power = c;  // c^bit
         for (std::uint64_t bit = 1; bit < step; bit *= 2) {
             powers = times_where(bit, powers, power);
             power *= power;
         }
-        for (std::size_t m = 0; m < last; m += step) {
-            hn::StoreU(hn::Add(hn::LoadU(doubles, sums + m), powers), doubles, sums + m);
+        const double t2 = 2.0 * c * c - 1.0;
+        const double t4 = 2.0 * t2 * t2 - 1.0;
+        const auto t8 = hn::Set(doubles, 2.0 * t4 * t4 - 1.0);
+        const auto twice_t8 = hn::Add(t8, t8);
+        for (std::size_t part = 0; part < block; part += step) {
+            auto previous = hn::Mul(t8, powers);  // T_-8 = T_8
+            auto current = powers;
+            for (double* to = sums + part; to < sums + count; to += block) {
+                hn::StoreU(hn::Add(hn::LoadU(doubles, to), current), doubles, to);
+                const auto next = hn::MulSub(twice_t8, current, previous);
+                previous = current;
+                current = next;
+            }
             powers = hn::Mul(powers, hn::Set(doubles, power));
         }
-        sums[last] += hn::GetLane(powers);
     }
 
     std::span<SideTallies> m_batches;

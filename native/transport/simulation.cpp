@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "base/threads.h"
 #include "medium/fresnel.h"
+#include "transport/harmonic_choice.h"
 
 namespace beamspread {
 
@@ -19,8 +20,8 @@ namespace {
 
 constexpr std::uint64_t enough_photons_per_job = 200'000;
 
-// The far side's distribution peaks where the beam leaves, if light has not forgotten its direction by then, and with it the
-// few scatterings that light of low albedos has; deeper down it is broad, and its centre stays behind.
+// The far side's distribution peaks where the beam leaves, if light has not forgotten its direction by then, and with
+// it the few scatterings that light of low albedos has; deeper down it is broad, and its centre stays behind.
 double far_side_centre(const Medium& medium, double theta_inside)
 {
     const double memory = 2.0 / (1.0 - medium.g);
@@ -43,24 +44,62 @@ SideTallies empty_tallies(const Medium& medium, double theta_inside)
 
 // Sums of batches, and what is kept of each.
 struct AngleSums {
-    SideTallies total;
+    std::array<SideTallies, group_count> groups;
     std::array<std::vector<double>, side_count> batch_totals;
-    std::array<MapScatter, side_count> scatter;
 };
+
+// The sum of every `step`-th group from the first one.
+Tally sum_of(const AngleSums& sums, std::size_t side, std::size_t first, std::size_t step)
+{
+    Tally sum = sums.groups[first][side];
+    for (std::size_t group = first + step; group < group_count; group += step)
+        sum.merge(sums.groups[group][side]);
+    return sum;
+}
+
+// The nearest number that half precision holds; of numbers up to 1.
+float rounded_to_half(double x)
+{
+    constexpr int digits = 11;
+    constexpr int least_exponent = -13;  // of the fraction that frexp gives; below, digits are lost
+    int exponent = 0;
+    std::frexp(x, &exponent);
+    const double unit = std::ldexp(1.0, std::max(exponent, least_exponent) - digits);
+    return static_cast<float>(std::round(x / unit) * unit);
+}
+
+void normalize_rings(const Tally& tally, double photons, SideResult& out)
+{
+    out.power.reserve(order_bin_count * radius_bin_count);
+    for (std::size_t b = 0; b < order_bin_count; ++b) {
+        for (std::size_t k = 0; k < radius_bin_count; ++k)
+            out.power.push_back(static_cast<float>(tally.ring(b, k)[0] / photons));
+        for (std::size_t m = 1; m < out.harmonics[b]; ++m)
+            for (std::size_t k = 0; k < radius_bin_count; ++k) {
+                const double* ring = tally.ring(b, k);
+                out.ratios.push_back(ring[0] > 0.0 ? rounded_to_half(ring[m] / ring[0]) : 0.0F);
+            }
+    }
+}
 
 AngleResult normalized(double angle_deg, const AngleSums& sums, double photons)
 {
     AngleResult result;
     result.angle_deg = angle_deg;
     for (std::size_t side = 0; side < side_count; ++side) {
-        const Tally& tally = sums.total[side];
         SideResult& out = result.sides[side];
-        out.centre = tally.centre;
-        if (tally.moments.empty())
+        out.centre = sums.groups[0][side].centre;
+        if (sums.groups[0][side].moments.empty())
             continue;
-        out.moments.resize(tally.moments.size());
-        std::transform(tally.moments.begin(), tally.moments.end(), out.moments.begin(),
-                       [photons](double x) { return static_cast<float>(x / photons); });
+        Tally tally = sum_of(sums, side, 0, 2);
+        const Tally other = sum_of(sums, side, 1, 2);
+        out.harmonics.assign(order_bin_count, 1);
+        if (angle_deg > 0.0) {  // at 0 there is rotational symmetry: what the other harmonics hold is noise
+            const auto worth = harmonics_worth_keeping(tally, other);
+            out.harmonics.assign(worth.begin(), worth.end());
+        }
+        tally.merge(other);
+        normalize_rings(tally, photons, out);
         out.mean_order.resize(order_bin_count);
         out.order_variance.resize(order_bin_count);
         for (std::size_t b = 0; b < order_bin_count; ++b) {
@@ -74,7 +113,10 @@ AngleResult normalized(double angle_deg, const AngleSums& sums, double photons)
         const double per_photon = static_cast<double>(batch_count) / photons;
         for (double x : sums.batch_totals[side])
             out.batch_totals.push_back(static_cast<float>(x * per_photon));
-        out.deviations = sums.scatter[side].relative_deviations();
+        std::array<const Tally*, group_count> groups{};
+        for (std::size_t group = 0; group < group_count; ++group)
+            groups[group] = &sums.groups[group][side];
+        out.deviations = relative_deviations(groups, out.harmonics);
     }
     return result;
 }
@@ -84,13 +126,13 @@ void merge_batch(std::size_t index, SideTallies batch, AngleSums& sums)
     for (std::size_t side = 0; side < side_count; ++side) {
         const auto& weight = batch[side].weight;
         sums.batch_totals[side].insert(sums.batch_totals[side].end(), weight.begin(), weight.end());
-        sums.scatter[side].add(index % group_count, batch[side]);
     }
-    if (sums.total[0].moments.empty())
-        sums.total = std::move(batch);
+    SideTallies& group = sums.groups[index % group_count];
+    if (group[0].moments.empty())
+        group = std::move(batch);
     else
         for (std::size_t side = 0; side < side_count; ++side)
-            sums.total[side].merge(batch[side]);
+            group[side].merge(batch[side]);
 }
 
 // The first batches take one more each where the photons do not divide evenly.
@@ -102,7 +144,8 @@ std::vector<std::uint64_t> batch_sizes(std::uint64_t photons)
     return sizes;
 }
 
-// Batches that one thread walks together: the last walks of a job leave most lanes of a packet idle, so that a job should not be short.
+// Batches that one thread walks together: the last walks of a job leave most lanes of a packet idle, so that a job
+// should not be short.
 std::size_t batches_per_job(std::uint64_t photons)
 {
     std::size_t batches = batch_count;
@@ -127,6 +170,11 @@ WalkKernel find_kernel(std::string_view name)
 }
 
 }  // namespace
+
+std::size_t most_harmonics(const SideResult& side)
+{
+    return *std::max_element(side.harmonics.begin(), side.harmonics.end());
+}
 
 std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> angles_deg, std::uint64_t photons,
                                   std::uint64_t seed, int threads, std::string_view kernel_name, Progress& progress)

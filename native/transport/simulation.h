@@ -19,20 +19,26 @@ inline constexpr std::size_t batch_count = 32;
 // One side of one angle, normalized to one unit of power that entered the medium.
 struct SideResult {
     double centre = 0.0;              // pole of (r, phi): u, mean free paths
-    std::vector<float> moments;       // [order bin][radius bin][harmonic]; empty: nothing leaves here
-    std::vector<float> mean_order;    // [order bin]
+    std::vector<float> power;         // [order bin][radius bin]; empty: nothing leaves here
+    std::vector<std::size_t> harmonics;  // [order bin]: how many are kept, at least 1, see transport/harmonic_choice.h
+    std::vector<float>
+        ratios;  // means of cos(m phi) weighted by power, m > 0: [order bin][harmonic][radius bin], as half holds them
+    std::vector<float> mean_order;  // [order bin]
     std::vector<float> order_variance;  // [order bin]
-    std::vector<float> batch_totals;    // [batch][order bin], power
-    std::vector<float> deviations;      // of groups of batches, see transport/map_scatter.h
+    std::vector<float> batch_totals;  // [batch][order bin], power
+    std::vector<float> deviations;  // of groups of batches, see transport/map_scatter.h
 };
+
+// The most harmonics that any order has.
+std::size_t most_harmonics(const SideResult& side);
 
 struct AngleResult {
     double angle_deg = 0.0;  // outside the medium, from the normal
     std::array<SideResult, side_count> sides;
 };
 
-// `photons` per angle. The result depends on seed, photons and kernel (a name of walk_kernels(), or empty: the fastest), never on
-// threads. Throws InvalidArgument, Cancelled.
+// `photons` per angle. The result depends on seed, photons and kernel (a name of walk_kernels(), or empty: the
+// fastest), never on threads. Throws InvalidArgument, Cancelled.
 std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> angles_deg, std::uint64_t photons,
                                   std::uint64_t seed, int threads, std::string_view kernel_name, Progress& progress);
 

@@ -17,12 +17,21 @@ inline constexpr std::size_t side_count = 2;
 // phi = 0 along the beam's direction of travel. Conservative walk: albedo a scales order n by a^n.
 struct Tally {
     double centre = 0.0;          // u of the pole of (r, phi), mean free paths
-    std::vector<double> moments;  // [order bin][radius bin][harmonic]; empty: nothing leaves this side
+    std::vector<double> moments;  // [order bin][radius bin][harmonic], see `ring`; empty: nothing leaves this side
     std::array<double, order_bin_count> weight{};
     std::array<double, order_bin_count> weight_order{};   // sum of weight * order
     std::array<double, order_bin_count> weight_order2{};  // sum of weight * order^2
 
-    void allocate() { moments.assign(order_bin_count * radius_bin_count * harmonic_count, 0.0); }
+    void allocate() { moments.assign(ring_offsets.back(), 0.0); }
+
+    double* ring(std::size_t order, std::size_t radius)
+    {
+        return moments.data() + ring_offsets[order] + radius * harmonics_of(order);
+    }
+    const double* ring(std::size_t order, std::size_t radius) const
+    {
+        return moments.data() + ring_offsets[order] + radius * harmonics_of(order);
+    }
 
     void add(double u, double v, std::uint32_t order, double w)
     {
@@ -31,14 +40,14 @@ struct Tally {
         const double r = std::sqrt(r2);
         const double cos_phi = r > 0.0 ? x / r : 1.0;
         const std::size_t bin = order_bin(order);
-        const std::size_t place = bin * radius_bin_count + radius_bin(static_cast<float>(r));
-        double* sums = moments.data() + place * harmonic_count;
+        const std::size_t harmonics = harmonics_of(bin);
+        double* sums = ring(bin, radius_bin(static_cast<float>(r)));
         // cos(m phi) by the recurrence of the Chebyshev polynomials.
         double previous = w;
         double current = w * cos_phi;
         sums[0] += previous;
         sums[1] += current;
-        for (std::size_t m = 2; m < harmonic_count; ++m) {
+        for (std::size_t m = 2; m < harmonics; ++m) {
             const double next = 2.0 * cos_phi * current - previous;
             previous = current;
             current = next;
