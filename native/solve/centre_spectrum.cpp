@@ -92,7 +92,7 @@ void CentreSpectrum::integrate(const ScaledProfile& scaled, const PaddedPlane& p
         const RingIntegrals ring =
             outside ? integrate_ring(scaled.profile, *outside, to_paths, x0, y0, px, py) : RingIntegrals();
         for (std::size_t m = 0; m < scaled.profile.harmonics(); ++m) {
-            float* kernel = kernels + m * 2 * texels + texel;
+            float* kernel = kernels + m * 2 * texels + texel % m_width * m_height + row;
             kernel[0] = static_cast<float>(exact.cosine[m * texels + texel] - ring.cosine[m]);
             kernel[texels] = static_cast<float>(exact.sine[m * texels + texel] - ring.sine[m]);
         }
@@ -120,18 +120,19 @@ void CentreSpectrum::spectrum(const Column& column, const KernelTerm* terms, std
     // odd functions bring factors -i: squared for B_m of even m, once for odd m, where it is left out.
     const std::vector<double>& along_x = odd_m != sine ? column.sine : column.cosine;
     const double sign = sine && !odd_m ? -1.0 : 1.0;
-    for (std::size_t y = 0; y < m_height; ++y) {
-        double sum = 0.0;
-        for (std::size_t t = 0; t < count; ++t) {
-            const std::size_t function = terms[t].profile * harmonic_count + terms[t].m;
-            const float* kernel = m_texels.data() + (function * 2 + (sine ? 1 : 0)) * texels + y * m_width;
-            double row = 0.0;
-            for (std::size_t x = 0; x < m_width; ++x)
-                row += along_x[x] * static_cast<double>(kernel[x]);
-            sum += terms[t].weight * row;
+    std::vector<double> rows(m_height, 0.0);
+    for (std::size_t t = 0; t < count; ++t) {
+        const std::size_t function = terms[t].profile * harmonic_count + terms[t].m;
+        const float* kernel = m_texels.data() + (function * 2 + (sine ? 1 : 0)) * texels;
+        for (std::size_t x = 0; x < m_width; ++x, kernel += m_height) {
+            const double factor = terms[t].weight * along_x[x];
+            for (std::size_t y = 0; y < m_height; ++y)
+                rows[y] += factor * static_cast<double>(kernel[y]);
         }
+    }
+    for (std::size_t y = 0; y < m_height; ++y) {
         const float* trig = m_trig.data() + ((sine ? m_height : 0) + y) * m_frequencies;
-        const auto factor = static_cast<float>(sign * sum);
+        const auto factor = static_cast<float>(sign * rows[y]);
         if (y == 0)
             scale(values, trig, factor, m_frequencies);
         else

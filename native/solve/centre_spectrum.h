@@ -36,7 +36,7 @@ private:
     std::size_t m_height;
     std::size_t m_padded_width;
     std::size_t m_frequencies;
-    std::vector<float> m_texels;  // [profile][m][phase][y][x], quadrant
+    std::vector<float> m_texels;  // [profile][m][phase][x][y], quadrant
     std::vector<float> m_trig;    // [cos, sin][y][frequency]
 };
 

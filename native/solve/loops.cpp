@@ -26,11 +26,11 @@ BEAMSPREAD_CLONES void add_scaled_product(float* __restrict sum, const float* a,
 }
 
 BEAMSPREAD_CLONES void scale_columns(float* __restrict product, const float* values, const float* by_column,
-                                     float factor, std::size_t rows, std::size_t columns)
+                                     float factor, const std::size_t* starts, std::size_t rows)
 {
     for (std::size_t row = 0; row < rows; ++row)
-        for (std::size_t i = 0; i < columns; ++i)
-            product[row * columns + i] = factor * (values[row * columns + i] * by_column[i]);
+        for (std::size_t i = starts[row]; i < starts[row + 1]; ++i)
+            product[i] = factor * (values[i] * by_column[i - starts[row]]);
 }
 
 BEAMSPREAD_CLONES void add_product(Complex* sum, const float* factor, const Complex* values, std::size_t count)

@@ -18,9 +18,10 @@ void scale(float* product, const float* values, float factor, std::size_t count)
 // sum[i] += factor * a[i] * b[i]
 void add_scaled_product(float* sum, const float* a, const float* b, float factor, std::size_t count);
 
-// product[row][i] = factor * values[row][i] * by_column[i]
-void scale_columns(float* product, const float* values, const float* by_column, float factor, std::size_t rows,
-                   std::size_t columns);
+// product[i] = factor * values[i] * by_column[i - first], in rows of i from `first` = starts[row] on, before that of the
+// next.
+void scale_columns(float* product, const float* values, const float* by_column, float factor, const std::size_t* starts,
+                   std::size_t rows);
 
 // sum[i] += factor[i] * values[i]
 void add_product(Complex* sum, const float* factor, const Complex* values, std::size_t count);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <complex>
 
+#include "base/constants.h"
 #include "base/threads.h"
 #include "ldf/texel_integral.h"
 #include "solve/loops.h"
@@ -13,8 +14,7 @@ namespace beamspread {
 
 namespace {
 
-// Squares are looked at as a whole if more than so many of their size lie between them and the texel: they are then
-// narrow enough for harmonics up to m = 16.
+// Squares are looked at as a whole if more than so many of their size lie between them and the texel.
 constexpr std::size_t squares_between = 3;
 
 constexpr std::size_t angle_steps = 256;
@@ -71,10 +71,16 @@ LuminanceProbe::LuminanceProbe(const std::vector<LightPyramid>& lights, const Lo
       m_per_step(basis.last > basis.first ? static_cast<double>(angle_steps) / (basis.last - basis.first) : 0.0),
       m_least_radius(std::min(pitch_x, pitch_y))
 {
+    std::vector<std::size_t> harmonics(m_ranks, 1);  // m = 0 has a place in every row
     for (const LowRankBasis::AngleFunction& function : basis.functions)
-        m_harmonics = std::max(m_harmonics, function.m + 1);
+        harmonics[function.rank] = std::max(harmonics[function.rank], function.m + 1);
+    m_starts.push_back(0);
+    for (const std::size_t count : harmonics) {
+        m_starts.push_back(m_starts.back() + count);
+        m_harmonics = std::max(m_harmonics, count);
+    }
     for (const LowRankBasis::AngleFunction& function : basis.functions)
-        m_place.push_back(function.rank * m_harmonics + function.m);
+        m_place.push_back(m_starts[function.rank] + function.m);
     tabulate_angles(basis);
     tabulate_radii(basis);
     integrate_near(basis);
@@ -103,16 +109,16 @@ void LuminanceProbe::tabulate_radii(const LowRankBasis& basis)
     m_by_radius.resize(m_radii * m_media * functions());
     parallel_for(m_radii, [&](std::size_t step) {
         const double r = m_least_radius * std::exp2(static_cast<double>(step) / radii_per_octave);
-        float* row = m_by_radius.data() + step * m_media * functions();
         for (std::size_t k = 0; k < m_media; ++k)
-            for (std::size_t rank = 0; rank < m_ranks; ++rank, row += m_harmonics) {
+            for (std::size_t rank = 0; rank < m_ranks; ++rank) {
                 const ScaledProfile& scaled = basis.profiles[k][rank];
                 const double path = scaled.mean_free_path;
                 if (r > scaled.reach)
                     continue;
                 const Harmonics density = scaled.profile.density(r / path);
-                for (std::size_t m = 0; m < m_harmonics; ++m)
-                    row[m] = static_cast<float>(m_pitch_x * m_pitch_y / (path * path) * density[m]);
+                float* values = m_by_radius.data() + (step * m_media + k) * functions();
+                for (std::size_t i = m_starts[rank]; i < m_starts[rank + 1]; ++i)
+                    values[i] = static_cast<float>(m_pitch_x * m_pitch_y / (path * path) * density[i - m_starts[rank]]);
             }
     });
 }
@@ -124,10 +130,12 @@ void LuminanceProbe::integrate_near(const LowRankBasis& basis)
     parallel_for(m_media * m_ranks, [&](std::size_t item) {
         const TexelIntegrals integrals =
             integrate_quadrant(basis.profiles[item / m_ranks][item % m_ranks], m_pitch_x, m_pitch_y, size);
+        const std::size_t rank = item % m_ranks;
+        const std::size_t harmonics = m_starts[rank + 1] - m_starts[rank];
         for (std::size_t texel = 0; texel < size * size; ++texel) {
-            float* cosine = m_near.data() + (2 * texel * m_media * m_ranks + item) * m_harmonics;
+            float* cosine = m_near.data() + (2 * texel * m_media + item / m_ranks) * functions() + m_starts[rank];
             float* sine = cosine + m_media * functions();
-            for (std::size_t m = 0; m < std::min(m_harmonics, integrals.harmonics); ++m) {
+            for (std::size_t m = 0; m < std::min(harmonics, integrals.harmonics); ++m) {
                 cosine[m] = static_cast<float>(integrals.cosine[m * size * size + texel]);
                 sine[m] = static_cast<float>(integrals.sine[m * size * size + texel]);
             }
@@ -184,10 +192,10 @@ LuminanceProbe::Reading LuminanceProbe::read(std::size_t y, std::size_t x) const
             reading.parts.push_back(near[f] + far[f]);
             beyond += static_cast<double>(far[f]);
             within += static_cast<double>(near[f]);
-            if (f % m_harmonics == 0) {
-                beyond_evenly += static_cast<double>(far[f]);
-                within_evenly += static_cast<double>(near[f]);
-            }
+        }
+        for (std::size_t rank = 0; rank < m_ranks; ++rank) {
+            beyond_evenly += static_cast<double>(far[m_starts[rank]]);
+            within_evenly += static_cast<double>(near[m_starts[rank]]);
         }
         // Where light travels away from, `nearby` holds too much: it knows m = 0 only. A single beam's sum of harmonics
         // may be far too small.
@@ -206,7 +214,7 @@ void LuminanceProbe::add_square(Place& place, const LightPyramid& light, std::si
         return;
     if (std::max(distance(place.y >> level, y), distance(place.x >> level, x)) > squares_between) {
         const double middle = 0.5 * static_cast<double>((std::size_t{1} << level) - 1);
-        add_far(place, beam, static_cast<double>(place.x) - static_cast<double>(x << level) - middle,
+        add_far(place, beam, level, static_cast<double>(place.x) - static_cast<double>(x << level) - middle,
                 static_cast<double>(place.y) - static_cast<double>(y << level) - middle);
     } else if (level == 0) {
         add_near(place, beam, static_cast<std::ptrdiff_t>(place.x) - static_cast<std::ptrdiff_t>(x),
@@ -225,7 +233,8 @@ const float* LuminanceProbe::at_angle(const Vec3f& direction) const
     return m_by_angle.data() + static_cast<std::size_t>(std::lround(place)) * functions();
 }
 
-void LuminanceProbe::add_far(Place& place, const LightPyramid::Beam& beam, double dx, double dy) const
+void LuminanceProbe::add_far(Place& place, const LightPyramid::Beam& beam, std::size_t level, double dx,
+                             double dy) const
 {
     const double x = dx * m_pitch_x;
     const double y = dy * m_pitch_y;
@@ -236,21 +245,25 @@ void LuminanceProbe::add_far(Place& place, const LightPyramid::Beam& beam, doubl
         return;
     const float* by_radius = m_by_radius.data() + step * m_media * functions();
 
-    // cos(m (phi - beta)) by Chebyshev's recurrence.
+    // cos(m (phi - beta)) by Chebyshev's recurrence. Over an angle w, that of the square, its mean is by about
+    // sinc(m w / 2) smaller: a parabola is above that up to where it first is zero.
     const auto u = static_cast<double>(beam.direction.x);
     const auto v = static_cast<double>(beam.direction.y);
     const double lengths = std::sqrt(square * (u * u + v * v));
     const double cosine = lengths > 0.0 ? (x * u + y * v) / lengths : 1.0;
     double before = cosine;
     double now = 1.0;
-    for (float& each : place.cosine) {
-        each = static_cast<float>(now);
+    const double first_zero = 2.0 * pi * std::hypot(dx, dy) / static_cast<double>(std::size_t{1} << level);
+    std::fill(place.cosine.begin(), place.cosine.end(), 0.0f);
+    for (std::size_t m = 0; m < m_harmonics && static_cast<double>(m) < first_zero; ++m) {
+        const double part = static_cast<double>(m) / first_zero;
+        place.cosine[m] = static_cast<float>((1.0 - part * part) * now);
         const double next = 2.0 * cosine * now - before;
         before = now;
         now = next;
     }
-    scale_columns(place.light.data(), at_angle(beam.direction), place.cosine.data(), beam.irradiance, m_ranks,
-                  m_harmonics);
+    scale_columns(place.light.data(), at_angle(beam.direction), place.cosine.data(), beam.irradiance, m_starts.data(),
+                  m_ranks);
     const bool nearby = std::max(std::abs(dx), std::abs(dy)) < static_cast<double>(nearby_sources) + 0.5;
     float* sums = nearby ? place.near.data() : place.far.data();
     for (std::size_t k = 0; k < m_media; ++k)
@@ -276,7 +289,7 @@ void LuminanceProbe::add_near(Place& place, const LightPyramid::Beam& beam, std:
     const float* kernels = m_near.data() + 2 * texel * m_media * functions();
     const float* by_angle = at_angle(beam.direction);
     for (const std::vector<float>* phase : {&place.cosine, &place.sine}) {
-        scale_columns(place.light.data(), by_angle, phase->data(), beam.irradiance, m_ranks, m_harmonics);
+        scale_columns(place.light.data(), by_angle, phase->data(), beam.irradiance, m_starts.data(), m_ranks);
         for (std::size_t k = 0; k < m_media; ++k, kernels += functions())
             add_scaled_product(place.near.data() + k * functions(), place.light.data(), kernels, 1.0f, functions());
     }
@@ -314,7 +327,7 @@ void LuminanceProbe::add_nearby(Place& place, const LightPyramid& light) const
             for (std::size_t k = 0; k < m_media; ++k)
                 for (std::size_t rank = 0; rank < ranks; ++rank, sums += size * size)
                     place.nearby[k] +=
-                        static_cast<double>(beam.irradiance * by_angle[rank * m_harmonics]) / texels *
+                        static_cast<double>(beam.irradiance * by_angle[m_starts[rank]]) / texels *
                         (sums[y1 * size + x1] - sums[y0 * size + x1] - sums[y1 * size + x0] + sums[y0 * size + x0]);
         }
     }

@@ -26,8 +26,8 @@ public:
 private:
     struct Place;
 
-    // Tables below hold, for each rank, a row of harmonics; zero for functions that the basis lacks.
-    std::size_t functions() const { return m_ranks * m_harmonics; }
+    // Tables below hold, for each rank, a row of harmonics up to the last that the basis has; zero for those it lacks.
+    std::size_t functions() const { return m_starts.back(); }
 
     void tabulate_angles(const LowRankBasis& basis);
     void tabulate_radii(const LowRankBasis& basis);
@@ -35,7 +35,7 @@ private:
     void integrate_nearby(const LowRankBasis& basis);
 
     void add_square(Place& place, const LightPyramid& light, std::size_t level, std::size_t y, std::size_t x) const;
-    void add_far(Place& place, const LightPyramid::Beam& beam, double dx, double dy) const;
+    void add_far(Place& place, const LightPyramid::Beam& beam, std::size_t level, double dx, double dy) const;
     void add_near(Place& place, const LightPyramid::Beam& beam, std::ptrdiff_t dx, std::ptrdiff_t dy) const;
     void add_nearby(Place& place, const LightPyramid& light) const;
     const float* at_angle(const Vec3f& direction) const;
@@ -48,8 +48,9 @@ private:
     std::size_t m_media;
     std::size_t m_ranks;
     std::size_t m_harmonics = 0;
-    std::vector<std::size_t> m_place;  // of each function in rows of tables
-    double m_first;                    // of the table of angles
+    std::vector<std::size_t> m_starts;  // of each rank's row, and the end of the last
+    std::vector<std::size_t> m_place;   // of each function in these rows
+    double m_first;                     // of the table of angles
     double m_per_step;
     std::vector<float> m_by_angle;   // [step]
     double m_least_radius;           // of the table of radii, metres
