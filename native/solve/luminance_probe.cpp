@@ -5,7 +5,6 @@
 #include <cmath>
 #include <complex>
 
-#include "base/constants.h"
 #include "base/threads.h"
 #include "ldf/texel_integral.h"
 #include "solve/loops.h"
@@ -245,19 +244,18 @@ void LuminanceProbe::add_far(Place& place, const LightPyramid::Beam& beam, std::
         return;
     const float* by_radius = m_by_radius.data() + step * m_media * functions();
 
-    // cos(m (phi - beta)) by Chebyshev's recurrence. Over an angle w, that of the square, its mean is by about
-    // sinc(m w / 2) smaller: a parabola is above that up to where it first is zero.
+    // cos(m (phi - beta)) by Chebyshev's recurrence. Over the angle 2 w of the square its mean is by about
+    // sin(m w) / (m w) smaller, of which this is the envelope: what is left where light ends.
     const auto u = static_cast<double>(beam.direction.x);
     const auto v = static_cast<double>(beam.direction.y);
     const double lengths = std::sqrt(square * (u * u + v * v));
     const double cosine = lengths > 0.0 ? (x * u + y * v) / lengths : 1.0;
     double before = cosine;
     double now = 1.0;
-    const double first_zero = 2.0 * pi * std::hypot(dx, dy) / static_cast<double>(std::size_t{1} << level);
-    std::fill(place.cosine.begin(), place.cosine.end(), 0.0f);
-    for (std::size_t m = 0; m < m_harmonics && static_cast<double>(m) < first_zero; ++m) {
-        const double part = static_cast<double>(m) / first_zero;
-        place.cosine[m] = static_cast<float>((1.0 - part * part) * now);
+    const float half_width = 0.5f * static_cast<float>(std::size_t{1} << level) / static_cast<float>(std::hypot(dx, dy));
+    for (std::size_t m = 0; m < m_harmonics; ++m) {
+        const float turned = half_width * static_cast<float>(m);
+        place.cosine[m] = static_cast<float>(now) / std::sqrt(1.0f + turned * turned);
         const double next = 2.0 * cosine * now - before;
         before = now;
         now = next;
