@@ -14,7 +14,7 @@ namespace beamspread {
 namespace {
 
 // Squares are looked at as a whole if more than so many of their size lie between them and the texel.
-constexpr std::size_t squares_between = 3;
+constexpr std::size_t squares_between = 2;
 
 constexpr std::size_t angle_steps = 256;
 constexpr double radii_per_octave = 16.0;
