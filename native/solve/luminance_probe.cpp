@@ -252,7 +252,8 @@ void LuminanceProbe::add_far(Place& place, const LightPyramid::Beam& beam, std::
     const double cosine = lengths > 0.0 ? (x * u + y * v) / lengths : 1.0;
     double before = cosine;
     double now = 1.0;
-    const float half_width = 0.5f * static_cast<float>(std::size_t{1} << level) / static_cast<float>(std::hypot(dx, dy));
+    const float half_width =
+        0.5f * static_cast<float>(std::size_t{1} << level) / static_cast<float>(std::hypot(dx, dy));
     for (std::size_t m = 0; m < m_harmonics; ++m) {
         const float turned = half_width * static_cast<float>(m);
         place.cosine[m] = static_cast<float>(now) / std::sqrt(1.0f + turned * turned);
