@@ -18,7 +18,8 @@ namespace {
 // On planes of up to so many texels, the square of this, all terms are kept: choosing would take as long.
 constexpr std::size_t small_plane = 192;
 
-// What the texels looked at may use up of the tolerance. The rest is for those between, and for what the probe is off by.
+// What the texels looked at may use up of the tolerance. The rest is for those between, and for what the probe is off
+// by.
 constexpr double share = 0.3;
 
 // So often there is a closer look around the texels where errors are largest.

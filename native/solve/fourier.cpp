@@ -21,8 +21,8 @@ namespace beamspread {
 
 namespace {
 
-// Border of the kernels' centres, texels: errors of some 1e-6 of the brightest texel, and of some 1e-5 where a basis sums
-// many kernels of grazing light.
+// Border of the kernels' centres, texels: errors of some 1e-6 of the brightest texel, and of some 1e-5 where a basis
+// sums many kernels of grazing light.
 constexpr double centre_deviation = 3.0;
 
 // Power that kernels of changing directions may lack at their ends: dark texels are off by less than such a fraction of

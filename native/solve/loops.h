@@ -18,8 +18,8 @@ void scale(float* product, const float* values, float factor, std::size_t count)
 // sum[i] += factor * a[i] * b[i]
 void add_scaled_product(float* sum, const float* a, const float* b, float factor, std::size_t count);
 
-// product[i] = factor * values[i] * by_column[i - first], in rows of i from `first` = starts[row] on, before that of the
-// next.
+// product[i] = factor * values[i] * by_column[i - first], in rows of i from `first` = starts[row] on, before that of
+// the next.
 void scale_columns(float* product, const float* values, const float* by_column, float factor, const std::size_t* starts,
                    std::size_t rows);
 

@@ -33,9 +33,9 @@ struct LowRankBasis {
     std::vector<std::vector<ScaledProfile>> profiles;  // [medium][rank]
 };
 
-// Kernels of all angles present, taken apart: for each harmonic the singular value decomposition of angles times (medium,
-// radius), by the chi-square distance to the mean kernel, which bounds the relative L1 error; mean square over the media,
-// the light, the lit texels and the angles present. The media share the functions of the angle.
+// Kernels of all angles present, taken apart: for each harmonic the singular value decomposition of angles times
+// (medium, radius), by the chi-square distance to the mean kernel, which bounds the relative L1 error; mean square over
+// the media, the light, the lit texels and the angles present. The media share the functions of the angle.
 class KernelDecomposition {
 public:
     // `texel` is the side of a texel in metres: detail inside the one where a beam enters does not count.

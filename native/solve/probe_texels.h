@@ -13,8 +13,8 @@ struct Texel {
     std::size_t x;
 };
 
-// Some thousand, drawn by chance but always the same: all over the plane, where it is lit, where the light changes and in
-// the dark beside, and around the places where each light is extreme.
+// Some thousand, drawn by chance but always the same: all over the plane, where it is lit, where the light changes and
+// in the dark beside, and around the places where each light is extreme.
 std::vector<Texel> probe_texels(const std::vector<LightPyramid>& lights);
 
 // Others close to some; different ones for every `draw`.
