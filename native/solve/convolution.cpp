@@ -18,7 +18,7 @@ std::size_t rounds_of(std::size_t count, std::size_t at_once)
     return (count + at_once - 1) / at_once;
 }
 
-HarmonicRange harmonics_of(std::span<const LightTerm> terms)
+HarmonicRange harmonic_range(std::span<const LightTerm> terms)
 {
     HarmonicRange range{harmonic_count, 0};
     for (const LightTerm& term : terms)
@@ -133,7 +133,7 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
     const std::size_t columns = m_plane.columns();
     const std::size_t offset = tile.y.first - tile.window_y.first;
     const std::size_t items = rounds_of(columns, columns_per_item);
-    const HarmonicRange harmonics = harmonics_of(m_terms.subspan(first_term, count));
+    const HarmonicRange harmonics = harmonic_range(m_terms.subspan(first_term, count));
     parallel_for(items, [&](std::size_t item) {
         const auto lease = m_column_scratch.lend();
         ColumnScratch& scratch = *lease;

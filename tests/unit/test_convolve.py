@@ -74,7 +74,7 @@ def random_directions(height, width):
 @pytest.mark.parametrize("field", [random_directions, lamp_directions, "near", "grazing"])
 @pytest.mark.parametrize("mean_free_path", [0.05, 0.4, 4.0, 64.0])
 def test_fft_keeps_the_tolerance_where_directions_change(library, field, mean_free_path):
-    """As `convolve` says; next to nothing in deep shadow is off by a fraction of the brightest texel."""
+    """As `convolve` says, the sum even below .3 of it; deep shadow is off by a fraction of the brightest texel."""
     heights = {"near": 0.1, "grazing": 0.02}
     direction = lamp_directions(64, 64, heights[field]) if field in heights else field(64, 64)
     rng = np.random.default_rng(13)
@@ -85,7 +85,7 @@ def test_fft_keeps_the_tolerance_where_directions_change(library, field, mean_fr
         nearby = uniform_filter(direct, (17, 17, 0), mode="nearest")
         for tolerance in (1e-3, 2e-2):
             error = np.abs(convolve(*arguments, tolerance=tolerance) - direct)
-            assert np.all(error.sum((0, 1)) < tolerance * direct.sum((0, 1)))
+            assert np.all(error.sum((0, 1)) < 0.3 * tolerance * direct.sum((0, 1)))
             assert np.all(error < tolerance * nearby + 1e-5 * direct.max((0, 1)))
 
 

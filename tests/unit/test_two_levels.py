@@ -103,7 +103,7 @@ def test_two_levels_keep_the_tolerance_where_directions_change(ldf):
     beams, directions = light(*shape), lamp(*shape)
     direct = convolve(beams, directions, ldf, ALBEDO, (60.0, 42.0, 30.0), 1.0, solver="direct")
     error = np.abs(solve(ldf, shape, lamp, 60.0, coarsening=4) - direct)
-    assert np.all(error.sum((0, 1)) < tolerance * direct.sum((0, 1)))
+    assert np.all(error.sum((0, 1)) < 0.3 * tolerance * direct.sum((0, 1)))
     nearby = uniform_filter(direct, (17, 17, 0), mode="nearest")
     assert np.all(error < tolerance * nearby + 2e-5 * direct.max((0, 1)))
 
