@@ -1,29 +1,68 @@
 #include "solve/problem.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/error.h"
+#include "base/threads.h"
 #include "ldf/library.h"
 
 namespace beamspread {
 
 namespace {
 
+bool is_irradiance(float irradiance)
+{
+    return irradiance >= 0.0f && irradiance <= std::numeric_limits<float>::max();
+}
+
+// Single-precision unit vectors are off by 1e-7; what is off by more was never normalized.
+bool is_unit(float x, float y, float z)
+{
+    return std::abs(x * x + y * y + z * z - 1.0f) < 2e-3f;
+}
+
 void check_direction(const Vec3& d)
 {
-    // Single-precision unit vectors are off by 1e-7; what is off by more was never normalized.
-    if (!(std::abs(glm::dot(d, d) - 1.0) < 2e-3))
+    if (!is_unit(static_cast<float>(d.x), static_cast<float>(d.y), static_cast<float>(d.z)))
         reject("direction", "of length " + std::to_string(glm::length(d)), "unit vectors of travel");
     if (!(d.z < 0.0))
         reject("direction", "with z = " + std::to_string(d.z), "z < 0: light travels toward the surface");
 }
 
-void check_irradiance(const View2D<const float>& irradiance)
+bool is_row_fine(const View2D<const float>& irradiance, const float* directions, std::size_t y)
 {
+    bool fine = true;
+    for (std::size_t x = 0; x < irradiance.width; ++x)
+        fine &= is_irradiance(irradiance(y, x));
+    if (directions == nullptr)
+        return fine;
+    const float* d = directions + 3 * y * irradiance.width;
+    for (std::size_t x = 0; x < irradiance.width; ++x, d += 3)
+        fine &= irradiance(y, x) == 0.0f || (is_unit(d[0], d[1], d[2]) & (d[2] < 0.0f));
+    return fine;
+}
+
+// Says what is wrong in a row that is not fine.
+void check_row(const View2D<const float>& irradiance, const float* directions, std::size_t y)
+{
+    for (std::size_t x = 0; x < irradiance.width; ++x)
+        if (!is_irradiance(irradiance(y, x)))
+            reject("irradiance", static_cast<double>(irradiance(y, x)), "finite values >= 0 W/m^2");
+    const float* d = directions + 3 * y * irradiance.width;
+    for (std::size_t x = 0; x < irradiance.width; ++x, d += 3)
+        if (irradiance(y, x) > 0.0f)
+            check_direction(Vec3(d[0], d[1], d[2]));
+}
+
+void check_light(const View2D<const float>& irradiance, const float* directions)
+{
+    std::vector<char> fine(irradiance.height);
+    parallel_for(irradiance.height, [&](std::size_t y) { fine[y] = is_row_fine(irradiance, directions, y) ? 1 : 0; });
     for (std::size_t y = 0; y < irradiance.height; ++y)
-        for (std::size_t x = 0; x < irradiance.width; ++x)
-            if (!(irradiance(y, x) >= 0.0f && std::isfinite(irradiance(y, x))))
-                reject("irradiance", static_cast<double>(irradiance(y, x)), "finite values >= 0 W/m^2");
+        if (fine[y] == 0)
+            check_row(irradiance, directions, y);
 }
 
 }  // namespace
@@ -39,28 +78,16 @@ void validate(const Problem& problem)
         reject("tolerance", problem.tolerance, "tolerance > 0");
     if (problem.coarsening > 64 || problem.coarsening == 2 || (problem.coarsening & (problem.coarsening - 1)) != 0)
         reject("coarsening", static_cast<double>(problem.coarsening), "0, 1, 4, 8, 16, 32, 64");
+    if (problem.directions.field == nullptr)
+        check_direction(problem.directions.uniform);
     const float* checked = nullptr;
     for (const Channel& channel : problem.channels) {
         check_albedo(channel.albedo);
         if (!(channel.mean_free_path > 0.0 && std::isfinite(channel.mean_free_path)))
             reject("mean_free_path", channel.mean_free_path, "mean_free_path > 0 metres");
         if (channel.irradiance.data != checked)
-            check_irradiance(channel.irradiance);
+            with_threads(problem.threads, [&] { check_light(channel.irradiance, problem.directions.field); });
         checked = channel.irradiance.data;
-    }
-    if (!problem.directions.field) {
-        check_direction(problem.directions.uniform);
-        return;
-    }
-    for (std::size_t y = 0; y < problem.height; ++y) {
-        for (std::size_t x = 0; x < problem.width; ++x) {
-            bool lit = false;
-            for (const Channel& channel : problem.channels)
-                lit = lit || channel.irradiance(y, x) > 0.0f;
-            const float* d = problem.directions.field + 3 * (y * problem.width + x);
-            if (lit)
-                check_direction(Vec3(d[0], d[1], d[2]));
-        }
     }
 }
 
