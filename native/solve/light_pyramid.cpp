@@ -1,24 +1,22 @@
 #include "solve/light_pyramid.h"
 
+#include <array>
+
 #include "base/threads.h"
 
 namespace beamspread {
 
 namespace {
 
-using Beam = LightPyramid::Beam;
-
 // Mean directions this long stand for all; shorter ones are means of too different directions.
 constexpr float even_length = 0.98f;
 
-// Square beams side by side, added up: with their mean direction where directions hardly differ, else with that of the
-// beam in the middle of the light.
-template <class BeamAt>
-Beam merge(std::size_t count, const BeamAt& beam_at)
+// The four squares that make up one of the next level: with their mean direction where directions hardly differ, else
+// with that of the beam in the middle of the light.
+SquareBeam merge(const std::array<SquareBeam, 4>& beams)
 {
-    Beam sum;
-    for (std::size_t i = 0; i < count; ++i) {
-        const Beam beam = beam_at(i);
+    SquareBeam sum;
+    for (const SquareBeam& beam : beams) {
         sum.irradiance += beam.irradiance;
         sum.direction += beam.irradiance * beam.direction;
     }
@@ -30,52 +28,61 @@ Beam merge(std::size_t count, const BeamAt& beam_at)
         return sum;
     }
     float passed = 0.0f;
-    for (std::size_t i = 0; i < count && 2.0f * passed < sum.irradiance; ++i) {
-        const Beam beam = beam_at(i);
-        passed += beam.irradiance;
-        if (beam.irradiance > 0.0f)
-            sum.direction = beam.direction;
+    for (std::size_t i = 0; 2.0f * passed < sum.irradiance && i < beams.size(); ++i) {
+        passed += beams[i].irradiance;
+        if (beams[i].irradiance > 0.0f)
+            sum.direction = beams[i].direction;
     }
     return sum;
+}
+
+// Of a light's texels.
+template <std::size_t level>
+SquareBeam add_up(const LightField& light, std::size_t y, std::size_t x)
+{
+    if constexpr (level > 0) {
+        return merge({add_up<level - 1>(light, 2 * y, 2 * x), add_up<level - 1>(light, 2 * y, 2 * x + 1),
+                      add_up<level - 1>(light, 2 * y + 1, 2 * x), add_up<level - 1>(light, 2 * y + 1, 2 * x + 1)});
+    } else {
+        const View2D<const float>& irradiance = light.irradiance;
+        if (y >= irradiance.height || x >= irradiance.width || irradiance(y, x) == 0.0f)
+            return {};
+        const float* d = light.directions.field + 3 * (y * irradiance.width + x);
+        return {irradiance(y, x), Vec3f(d[0], d[1], d[2])};
+    }
 }
 
 }  // namespace
 
 LightPyramid::LightPyramid(const LightField& light) : m_light(light)
 {
-    std::size_t height = light.irradiance.height;
-    std::size_t width = light.irradiance.width;
-    for (std::size_t level = 0; level < first_level; ++level) {
-        height = (height + 1) / 2;
-        width = (width + 1) / 2;
-    }
+    static_assert(first_level == 2);
     for (m_top = first_level;; ++m_top) {
-        Level next{height, width, std::vector<Beam>(height * width)};
-        const std::size_t below = m_levels.empty() ? 0 : m_top - 1;
-        const std::size_t side = std::size_t{1} << (m_top - below);
-        parallel_for(height, [&](std::size_t y) {
-            for (std::size_t x = 0; x < width; ++x)
-                next.beams[y * width + x] = merge(
-                    side * side, [&](std::size_t i) { return beam(below, y * side + i / side, x * side + i % side); });
+        const auto squares = [&](std::size_t texels) { return ((texels - 1) >> m_top) + 1; };
+        Level level{squares(height()), squares(width()), {}};
+        level.beams.resize(level.height * level.width);
+        parallel_for(level.height, [&](std::size_t y) {
+            for (std::size_t x = 0; x < level.width; ++x)
+                level.beams[y * level.width + x] =
+                    m_top == first_level
+                        ? add_up<first_level>(m_light, y, x)
+                        : merge({beam(m_top - 1, 2 * y, 2 * x), beam(m_top - 1, 2 * y, 2 * x + 1),
+                                 beam(m_top - 1, 2 * y + 1, 2 * x), beam(m_top - 1, 2 * y + 1, 2 * x + 1)});
         });
-        m_levels.push_back(std::move(next));
-        if (height * width == 1)
+        m_levels.push_back(std::move(level));
+        if (m_levels.back().beams.size() == 1)
             return;
-        height = (height + 1) / 2;
-        width = (width + 1) / 2;
     }
 }
 
-Beam LightPyramid::beam(std::size_t level, std::size_t y, std::size_t x) const
+SquareBeam LightPyramid::beam(std::size_t level, std::size_t y, std::size_t x) const
 {
     if (level == 0)
-        return texel(y, x);
-    if (level < first_level) {
-        const std::size_t side = std::size_t{1} << level;
-        return merge(side * side, [&](std::size_t i) { return texel(y * side + i / side, x * side + i % side); });
-    }
+        return add_up<0>(m_light, y, x);
+    if (level == 1)
+        return add_up<1>(m_light, y, x);
     const Level& stored = m_levels[level - first_level];
-    return y < stored.height && x < stored.width ? stored.beams[y * stored.width + x] : Beam();
+    return y < stored.height && x < stored.width ? stored.beams[y * stored.width + x] : SquareBeam();
 }
 
 }  // namespace beamspread

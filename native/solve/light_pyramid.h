@@ -9,42 +9,32 @@
 
 namespace beamspread {
 
+// Light of a square of 2^level texels, as one beam. Squares (y, x) of a level lie side by side from texel (0, 0) on;
+// those of level 0 are texels.
+struct SquareBeam {
+    float irradiance = 0.0f;  // sum over the texels
+    Vec3f direction{0.0f};    // a unit vector, or zero where it is dark
+};
+
 class LightPyramid {
 public:
     explicit LightPyramid(const LightField& light);
 
-    // Light of a square of 2^level texels, as one beam.
-    struct Beam {
-        float irradiance = 0.0f;  // sum over the texels
-        Vec3f direction{0.0f};    // a unit vector, or zero where it is dark
-    };
-
-    // Square (y, x) of those side by side from texel (0, 0) on; level 0: texels.
-    Beam beam(std::size_t level, std::size_t y, std::size_t x) const;
+    // The first level that is stored, and the highest, which has one square.
+    static constexpr std::size_t first_level = 2;
+    std::size_t top() const { return m_top; }
 
     std::size_t height() const { return m_light.irradiance.height; }
     std::size_t width() const { return m_light.irradiance.width; }
 
-    // The highest level has one square.
-    std::size_t top() const { return m_top; }
-
-    // The first level that is stored: light of lower ones is added up when it is asked for.
-    static constexpr std::size_t first_level = 3;
+    // Dark beyond the plane.
+    SquareBeam beam(std::size_t level, std::size_t y, std::size_t x) const;
 
 private:
-    Beam texel(std::size_t y, std::size_t x) const
-    {
-        const View2D<const float>& irradiance = m_light.irradiance;
-        if (y >= irradiance.height || x >= irradiance.width || irradiance(y, x) == 0.0f)
-            return {};
-        const float* d = m_light.directions.field + 3 * (y * irradiance.width + x);
-        return {irradiance(y, x), Vec3f(d[0], d[1], d[2])};
-    }
-
     struct Level {
         std::size_t height = 0;
         std::size_t width = 0;
-        std::vector<Beam> beams;
+        std::vector<SquareBeam> beams;
     };
 
     LightField m_light;

@@ -25,12 +25,32 @@ BEAMSPREAD_CLONES void add_scaled_product(float* __restrict sum, const float* a,
         sum[i] += factor * (a[i] * b[i]);
 }
 
-BEAMSPREAD_CLONES void scale_columns(float* __restrict product, const float* values, const float* by_column,
-                                     float factor, const std::size_t* starts, std::size_t rows)
+BEAMSPREAD_CLONES void add_scaled_columns(float* __restrict sum, const float* values, const float* by_column,
+                                          float factor, const std::size_t* columns, std::size_t size,
+                                          std::size_t blocks)
 {
-    for (std::size_t row = 0; row < rows; ++row)
-        for (std::size_t i = starts[row]; i < starts[row + 1]; ++i)
-            product[i] = factor * (values[i] * by_column[i - starts[row]]);
+    for (std::size_t block = 0; block < blocks; ++block) {
+        const float* column = by_column + columns[block];
+        for (std::size_t i = 0; i < size; ++i)
+            sum[i] += factor * (values[i] * column[i]);
+        sum += size;
+        values += size;
+    }
+}
+
+void multiple_angles(float* result, float cosine, std::size_t count)
+{
+    result[0] = 1.0f;
+    result[1] = cosine;
+    // cos((a + b) x) = 2 cos(a x) cos(b x) - cos((a - b) x), with a - b = 0 or 1.
+    for (std::size_t m = 2; m < count; ++m)
+        result[m] = 2.0f * result[m / 2] * result[(m + 1) / 2] - result[m % 2];
+}
+
+BEAMSPREAD_CLONES void multiply(float* __restrict product, const float* a, const float* b, std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i)
+        product[i] = a[i] * b[i];
 }
 
 BEAMSPREAD_CLONES void add_product(Complex* sum, const float* factor, const Complex* values, std::size_t count)
@@ -83,12 +103,13 @@ BEAMSPREAD_CLONES void find_angles(const float* directions, const float* irradia
     }
 }
 
-BEAMSPREAD_CLONES void look_up(float* __restrict result, const float* table, const std::uint32_t* step,
-                               const float* part, std::size_t count)
+// Pairs are loaded at once, faster than any gather.
+void look_up(float* __restrict result, const TableStep* table, const std::uint32_t* step, const float* part,
+             std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i) {
-        const float first = table[step[i]];
-        result[i] = first + part[i] * (table[step[i] + 1] - first);
+        const TableStep& at = table[step[i]];
+        result[i] = at.value + part[i] * at.rise;
     }
 }
 

@@ -213,8 +213,11 @@ LowRankBasis KernelDecomposition::basis(const std::vector<std::size_t>& chosen, 
             values += m_angular->tables.at(m_media[k].library).of(m) * (features * (features.transpose() * by_node));
         }
         LowRankBasis::AngleFunction function{m, rank, {}};
-        for (const double value : values)
-            function.values.push_back(static_cast<float>(value));
+        for (Eigen::Index i = 0; i < values.size(); ++i) {
+            const auto here = static_cast<float>(values[i]);
+            const auto next = static_cast<float>(values[std::min(i + 1, values.size() - 1)]);
+            function.values.push_back({here, next - here});
+        }
         basis.functions.push_back(std::move(function));
     }
     parallel_for(m_media.size() * ranks, [&](std::size_t item) {

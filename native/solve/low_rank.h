@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "solve/kernel_spectra.h"
+#include "solve/loops.h"
 #include "solve/present_angles.h"
 
 namespace beamspread {
@@ -25,7 +26,7 @@ struct LowRankBasis {
     struct AngleFunction {
         std::size_t m;
         std::size_t rank;
-        std::vector<float> values;
+        std::vector<TableStep> values;
     };
     double first = 0.0;  // tan(theta / 2) of the first and last entries of the tables
     double last = 0.0;

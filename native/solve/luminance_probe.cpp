@@ -17,13 +17,24 @@ namespace {
 constexpr std::size_t squares_between = 2;
 
 constexpr std::size_t angle_steps = 256;
-constexpr double radii_per_octave = 16.0;
+
+// Harmonics of a block: their loops have no remainders.
+constexpr std::size_t columns_at_once = 8;
+constexpr float radii_per_octave = 16.0f;
+
+// Of the distances of squares looked at as a whole, in units of their size.
+constexpr float distances_per_size = 8.0f;
+constexpr std::size_t distances = 8 * 4 * (squares_between + 1);
 
 // Texels from the middle to the border of the 17 x 17; light from farther than `nearby_sources` is taken to be the same
 // on all of them.
 constexpr std::size_t nearby_texels = 8;
 constexpr std::size_t nearby_sources = 16;
-constexpr std::size_t nearby_reach = nearby_texels + nearby_sources;
+
+// The mean over the 17 x 17 takes this light in squares.
+constexpr std::size_t nearby_level = 2;
+constexpr std::size_t nearby_side = std::size_t{1} << nearby_level;
+constexpr std::size_t nearby_reach = nearby_texels + nearby_sources + 1;  // from a square's first texel
 
 // Functions of m = 0 that the mean over these is made of: others are as small as its error.
 constexpr std::size_t nearby_ranks = 4;
@@ -54,6 +65,7 @@ struct LuminanceProbe::Place {
     std::vector<float> light;  // of a beam by rank and harmonic
     std::vector<float> cosine;
     std::vector<float> sine;
+    std::vector<float> mean;  // of cosines over a square
     std::vector<double> nearby;
 };
 
@@ -66,8 +78,8 @@ LuminanceProbe::LuminanceProbe(const std::vector<LightPyramid>& lights, const Lo
       m_pitch_y(pitch_y),
       m_media(basis.profiles.size()),
       m_ranks(basis.profiles.front().size()),
-      m_first(basis.first),
-      m_per_step(basis.last > basis.first ? static_cast<double>(angle_steps) / (basis.last - basis.first) : 0.0),
+      m_first(static_cast<float>(basis.first)),
+      m_per_step(basis.last > basis.first ? static_cast<float>(angle_steps / (basis.last - basis.first)) : 0.0f),
       m_least_radius(std::min(pitch_x, pitch_y))
 {
     std::vector<std::size_t> harmonics(m_ranks, 1);  // m = 0 has a place in every row
@@ -75,13 +87,17 @@ LuminanceProbe::LuminanceProbe(const std::vector<LightPyramid>& lights, const Lo
         harmonics[function.rank] = std::max(harmonics[function.rank], function.m + 1);
     m_starts.push_back(0);
     for (const std::size_t count : harmonics) {
-        m_starts.push_back(m_starts.back() + count);
-        m_harmonics = std::max(m_harmonics, count);
+        const std::size_t padded = (count + columns_at_once - 1) / columns_at_once * columns_at_once;
+        for (std::size_t m = 0; m < padded; m += columns_at_once)
+            m_columns.push_back(m);
+        m_starts.push_back(m_starts.back() + padded);
+        m_harmonics = std::max(m_harmonics, padded);
     }
     for (const LowRankBasis::AngleFunction& function : basis.functions)
         m_place.push_back(m_starts[function.rank] + function.m);
     tabulate_angles(basis);
     tabulate_radii(basis);
+    tabulate_widths();
     integrate_near(basis);
     integrate_nearby(basis);
 }
@@ -91,8 +107,8 @@ void LuminanceProbe::tabulate_angles(const LowRankBasis& basis)
     m_by_angle.resize((angle_steps + 1) * functions());
     for (std::size_t step = 0; step <= angle_steps; ++step)
         for (std::size_t f = 0; f < m_place.size(); ++f) {
-            const std::vector<float>& values = basis.functions[f].values;
-            m_by_angle[step * functions() + m_place[f]] = values[step * (values.size() - 1) / angle_steps];
+            const std::vector<TableStep>& values = basis.functions[f].values;
+            m_by_angle[step * functions() + m_place[f]] = values[step * (values.size() - 1) / angle_steps].value;
         }
 }
 
@@ -104,10 +120,10 @@ void LuminanceProbe::tabulate_radii(const LowRankBasis& basis)
     longest = std::min(longest,
                        std::hypot(static_cast<double>(m_width) * m_pitch_x, static_cast<double>(m_height) * m_pitch_y));
     const double octaves = std::log2(std::max(longest / m_least_radius, 1.0));
-    m_radii = static_cast<std::size_t>(std::ceil(octaves * radii_per_octave)) + 1;
+    m_radii = static_cast<std::size_t>(std::ceil(octaves * static_cast<double>(radii_per_octave))) + 1;
     m_by_radius.resize(m_radii * m_media * functions());
     parallel_for(m_radii, [&](std::size_t step) {
-        const double r = m_least_radius * std::exp2(static_cast<double>(step) / radii_per_octave);
+        const double r = m_least_radius * std::exp2(static_cast<double>(step) / static_cast<double>(radii_per_octave));
         for (std::size_t k = 0; k < m_media; ++k)
             for (std::size_t rank = 0; rank < m_ranks; ++rank) {
                 const ScaledProfile& scaled = basis.profiles[k][rank];
@@ -120,6 +136,20 @@ void LuminanceProbe::tabulate_radii(const LowRankBasis& basis)
                     values[i] = static_cast<float>(m_pitch_x * m_pitch_y / (path * path) * density[i - m_starts[rank]]);
             }
     });
+}
+
+// Over the angle 2 w that a square takes up, the mean of a harmonic is by about sin(m w) / (m w) smaller, of which this
+// is the envelope: what is left where light ends.
+void LuminanceProbe::tabulate_widths()
+{
+    m_by_width.resize(distances * m_harmonics);
+    for (std::size_t step = 0; step < distances; ++step) {
+        const float half_width = 0.5f * distances_per_size / (static_cast<float>(step) + 0.5f);
+        for (std::size_t m = 0; m < m_harmonics; ++m) {
+            const float turned = half_width * static_cast<float>(m);
+            m_by_width[step * m_harmonics + m] = 1.0f / std::sqrt(1.0f + turned * turned);
+        }
+    }
 }
 
 void LuminanceProbe::integrate_near(const LowRankBasis& basis)
@@ -153,14 +183,21 @@ void LuminanceProbe::integrate_nearby(const LowRankBasis& basis)
         Harmonics only{};
         only[0] = 1.0;
         power.profile.add(scaled.profile, only);
-        const TexelIntegrals integrals = integrate_quadrant(power, m_pitch_x, m_pitch_y, nearby_reach + 1);
+        constexpr std::size_t quadrant = nearby_reach + nearby_side;
+        const TexelIntegrals integrals = integrate_quadrant(power, m_pitch_x, m_pitch_y, quadrant);
+        // At places in the table, from the texel (y0, x0) of the square.
+        const auto integral = [&](std::size_t y, std::size_t x, std::size_t y0, std::size_t x0) {
+            return integrals.cosine[distance(y, nearby_reach + 1 + y0) * quadrant + distance(x, nearby_reach + 1 + x0)];
+        };
         double* sums = m_nearby.data() + item * size * size;
         for (std::size_t y = 1; y < size; ++y)
-            for (std::size_t x = 1; x < size; ++x)
+            for (std::size_t x = 1; x < size; ++x) {
+                double mean = 0.0;
+                for (std::size_t i = 0; i < nearby_side * nearby_side; ++i)
+                    mean += integral(y, x, i / nearby_side, i % nearby_side) / (nearby_side * nearby_side);
                 sums[y * size + x] =
-                    integrals
-                        .cosine[distance(y, nearby_reach + 1) * (nearby_reach + 1) + distance(x, nearby_reach + 1)] +
-                    sums[(y - 1) * size + x] + sums[y * size + x - 1] - sums[(y - 1) * size + x - 1];
+                    mean + sums[(y - 1) * size + x] + sums[y * size + x - 1] - sums[(y - 1) * size + x - 1];
+            }
     });
 }
 
@@ -174,11 +211,10 @@ LuminanceProbe::Reading LuminanceProbe::read(std::size_t y, std::size_t x) const
                 std::vector<float>(functions()),
                 std::vector<float>(m_harmonics),
                 std::vector<float>(m_harmonics),
+                std::vector<float>(m_harmonics),
                 std::vector<double>(m_media)};
-    for (const LightPyramid& light : m_lights) {
-        add_square(place, light, light.top(), 0, 0);
-        add_nearby(place, light);
-    }
+    add_square(place, m_lights.front().top(), 0, 0);
+    add_nearby(place);
     Reading reading{{}, std::move(place.nearby)};
     for (std::size_t k = 0; k < m_media; ++k) {
         const float* near = place.near.data() + k * functions();
@@ -205,131 +241,140 @@ LuminanceProbe::Reading LuminanceProbe::read(std::size_t y, std::size_t x) const
     return reading;
 }
 
-void LuminanceProbe::add_square(Place& place, const LightPyramid& light, std::size_t level, std::size_t y,
-                                std::size_t x) const
+void LuminanceProbe::add_square(Place& place, std::size_t level, std::size_t y, std::size_t x) const
 {
-    const LightPyramid::Beam beam = light.beam(level, y, x);
-    if (beam.irradiance == 0.0f)
-        return;
-    if (std::max(distance(place.y >> level, y), distance(place.x >> level, x)) > squares_between) {
-        const double middle = 0.5 * static_cast<double>((std::size_t{1} << level) - 1);
-        add_far(place, beam, level, static_cast<double>(place.x) - static_cast<double>(x << level) - middle,
-                static_cast<double>(place.y) - static_cast<double>(y << level) - middle);
-    } else if (level == 0) {
-        add_near(place, beam, static_cast<std::ptrdiff_t>(place.x) - static_cast<std::ptrdiff_t>(x),
-                 static_cast<std::ptrdiff_t>(place.y) - static_cast<std::ptrdiff_t>(y));
-    } else {
+    if (std::max(distance(place.y >> level, y), distance(place.x >> level, x)) > squares_between)
+        add_far(place, level, y, x);
+    else if (level == 0)
+        add_near(place, y, x);
+    else if (std::any_of(m_lights.begin(), m_lights.end(),
+                         [&](const LightPyramid& light) { return light.beam(level, y, x).irradiance > 0.0f; }))
         for (std::size_t i = 0; i < 4; ++i)
-            add_square(place, light, level - 1, 2 * y + i / 2, 2 * x + i % 2);
-    }
+            add_square(place, level - 1, 2 * y + i / 2, 2 * x + i % 2);
 }
 
 const float* LuminanceProbe::at_angle(const Vec3f& direction) const
 {
-    const double across = std::sqrt(static_cast<double>(direction.x * direction.x + direction.y * direction.y));
-    const double half_tangent = across / (1.0 - static_cast<double>(direction.z));
-    const double place = std::clamp((half_tangent - m_first) * m_per_step, 0.0, static_cast<double>(angle_steps));
-    return m_by_angle.data() + static_cast<std::size_t>(std::lround(place)) * functions();
+    const float across = std::sqrt(direction.x * direction.x + direction.y * direction.y);
+    const float half_tangent = across / (1.0f - direction.z);
+    const float place = std::clamp((half_tangent - m_first) * m_per_step, 0.0f, static_cast<float>(angle_steps));
+    return m_by_angle.data() + static_cast<std::size_t>(place + 0.5f) * functions();
 }
 
-void LuminanceProbe::add_far(Place& place, const LightPyramid::Beam& beam, std::size_t level, double dx,
-                             double dy) const
+void LuminanceProbe::add_far(Place& place, std::size_t level, std::size_t y, std::size_t x) const
 {
-    const double x = dx * m_pitch_x;
-    const double y = dy * m_pitch_y;
-    const double square = x * x + y * y;
-    const double octave = 0.5 * std::log2(square / (m_least_radius * m_least_radius));
-    const auto step = static_cast<std::size_t>(std::lround(std::max(octave, 0.0) * radii_per_octave));
-    if (step >= m_radii)
+    // From the middle of the square to the texel, in texels.
+    const auto size = static_cast<float>(std::size_t{1} << level);
+    const auto away = [&](std::size_t at, std::size_t square) {
+        return static_cast<float>(at) - (static_cast<float>(square) + 0.5f) * size + 0.5f;
+    };
+    const float dx = away(place.x, x);
+    const float dy = away(place.y, y);
+    const float offset_x = dx * static_cast<float>(m_pitch_x / m_least_radius);
+    const float offset_y = dy * static_cast<float>(m_pitch_y / m_least_radius);
+    const float square = offset_x * offset_x + offset_y * offset_y;
+    const float octave = 0.5f * std::log2(square);
+    const auto radius = static_cast<std::size_t>(std::max(octave, 0.0f) * radii_per_octave + 0.5f);
+    if (radius >= m_radii)
         return;
-    const float* by_radius = m_by_radius.data() + step * m_media * functions();
+    const auto width = static_cast<std::size_t>(std::sqrt(dx * dx + dy * dy) * distances_per_size / size);
+    const float* by_width = m_by_width.data() + std::min(width, distances - 1) * m_harmonics;
 
-    // cos(m (phi - beta)) by Chebyshev's recurrence. Over the angle 2 w of the square its mean is by about
-    // sin(m w) / (m w) smaller, of which this is the envelope: what is left where light ends.
-    const auto u = static_cast<double>(beam.direction.x);
-    const auto v = static_cast<double>(beam.direction.y);
-    const double lengths = std::sqrt(square * (u * u + v * v));
-    const double cosine = lengths > 0.0 ? (x * u + y * v) / lengths : 1.0;
-    double before = cosine;
-    double now = 1.0;
-    const float half_width =
-        0.5f * static_cast<float>(std::size_t{1} << level) / static_cast<float>(std::hypot(dx, dy));
-    for (std::size_t m = 0; m < m_harmonics; ++m) {
-        const float turned = half_width * static_cast<float>(m);
-        place.cosine[m] = static_cast<float>(now) / std::sqrt(1.0f + turned * turned);
-        const double next = 2.0 * cosine * now - before;
-        before = now;
-        now = next;
+    std::fill(place.light.begin(), place.light.end(), 0.0f);
+    bool lit = false;
+    for (const LightPyramid& light : m_lights) {
+        const SquareBeam beam = light.beam(level, y, x);
+        if (beam.irradiance == 0.0f)
+            continue;
+        lit = true;
+        const float u = beam.direction.x;
+        const float v = beam.direction.y;
+        const float lengths = std::sqrt(square * (u * u + v * v));
+        const float cosine = lengths > 0.0f ? (offset_x * u + offset_y * v) / lengths : 1.0f;
+        multiple_angles(place.cosine.data(), std::clamp(cosine, -1.0f, 1.0f), m_harmonics);
+        multiply(place.mean.data(), place.cosine.data(), by_width, m_harmonics);
+        add_scaled_columns(place.light.data(), at_angle(beam.direction), place.mean.data(), beam.irradiance,
+                           m_columns.data(), columns_at_once, m_columns.size());
     }
-    scale_columns(place.light.data(), at_angle(beam.direction), place.cosine.data(), beam.irradiance, m_starts.data(),
-                  m_ranks);
-    const bool nearby = std::max(std::abs(dx), std::abs(dy)) < static_cast<double>(nearby_sources) + 0.5;
+    if (!lit)
+        return;
+    const bool nearby = std::max(std::abs(dx), std::abs(dy)) < static_cast<float>(nearby_sources) + 0.5f;
     float* sums = nearby ? place.near.data() : place.far.data();
+    const float* by_radius = m_by_radius.data() + radius * m_media * functions();
     for (std::size_t k = 0; k < m_media; ++k)
         add_scaled_product(sums + k * functions(), place.light.data(), by_radius + k * functions(), 1.0f, functions());
 }
 
-void LuminanceProbe::add_near(Place& place, const LightPyramid::Beam& beam, std::ptrdiff_t dx, std::ptrdiff_t dy) const
+void LuminanceProbe::add_near(Place& place, std::size_t y, std::size_t x) const
 {
-    // cos(m beta), sin(m beta); phi -> -phi for dy < 0, and phi -> pi - phi for dx < 0.
-    const std::complex<double> travel(static_cast<double>(beam.direction.x), static_cast<double>(beam.direction.y));
-    std::complex<double> once = std::abs(travel) > 0.0 ? travel / std::abs(travel) : 1.0;
-    if (dx < 0)
-        once = -std::conj(once);
-    if (dy < 0)
-        once = std::conj(once);
-    std::complex<double> turned = 1.0;
-    for (std::size_t m = 0; m < m_harmonics; ++m, turned *= once) {
-        place.cosine[m] = static_cast<float>(turned.real());
-        place.sine[m] = static_cast<float>(turned.imag());
-    }
-    const std::size_t texel =
-        static_cast<std::size_t>(std::abs(dy)) * (squares_between + 1) + static_cast<std::size_t>(std::abs(dx));
-    const float* kernels = m_near.data() + 2 * texel * m_media * functions();
-    const float* by_angle = at_angle(beam.direction);
-    for (const std::vector<float>* phase : {&place.cosine, &place.sine}) {
-        scale_columns(place.light.data(), by_angle, phase->data(), beam.irradiance, m_starts.data(), m_ranks);
-        for (std::size_t k = 0; k < m_media; ++k, kernels += functions())
-            add_scaled_product(place.near.data() + k * functions(), place.light.data(), kernels, 1.0f, functions());
+    const std::size_t texel = distance(place.y, y) * (squares_between + 1) + distance(place.x, x);
+    for (const LightPyramid& light : m_lights) {
+        const SquareBeam beam = light.beam(0, y, x);
+        if (beam.irradiance == 0.0f)
+            continue;
+        // cos(m beta), sin(m beta); phi -> pi - phi where the texel lies to the left of the light, and phi -> -phi
+        // where below.
+        const std::complex<double> travel(static_cast<double>(beam.direction.x), static_cast<double>(beam.direction.y));
+        std::complex<double> once = std::abs(travel) > 0.0 ? travel / std::abs(travel) : 1.0;
+        if (place.x < x)
+            once = -std::conj(once);
+        if (place.y < y)
+            once = std::conj(once);
+        std::complex<double> turned = 1.0;
+        for (std::size_t m = 0; m < m_harmonics; ++m, turned *= once) {
+            place.cosine[m] = static_cast<float>(turned.real());
+            place.sine[m] = static_cast<float>(turned.imag());
+        }
+        const float* kernels = m_near.data() + 2 * texel * m_media * functions();
+        const float* by_angle = at_angle(beam.direction);
+        for (const std::vector<float>* phase : {&place.cosine, &place.sine}) {
+            std::fill(place.light.begin(), place.light.end(), 0.0f);
+            add_scaled_columns(place.light.data(), by_angle, phase->data(), beam.irradiance, m_columns.data(),
+                               columns_at_once, m_columns.size());
+            for (std::size_t k = 0; k < m_media; ++k, kernels += functions())
+                add_scaled_product(place.near.data() + k * functions(), place.light.data(), kernels, 1.0f, functions());
+        }
     }
 }
 
 // The mean over those of the 17 x 17 texels that lie on the plane, of light that enters up to 16 texels away.
-void LuminanceProbe::add_nearby(Place& place, const LightPyramid& light) const
+void LuminanceProbe::add_nearby(Place& place) const
 {
     constexpr std::size_t size = 2 * nearby_reach + 2;
     struct Span {
         std::size_t first;
         std::size_t end;
     };
-    const auto around = [](std::size_t at, std::size_t reach, std::size_t texels) {
-        return Span{at - std::min(at, reach), std::min(texels, at + reach + 1)};
+    const auto window = [](std::size_t at, std::size_t texels) {
+        return Span{at - std::min(at, nearby_texels), std::min(texels, at + nearby_texels + 1)};
     };
-    const Span window_y = around(place.y, nearby_texels, m_height);
-    const Span window_x = around(place.x, nearby_texels, m_width);
-    const Span sources_y = around(place.y, nearby_sources, m_height);
-    const Span sources_x = around(place.x, nearby_sources, m_width);
+    // Squares whose middle lies that near.
+    const auto sources = [](std::size_t at) {
+        return Span{(at + 2 - std::min(at + 2, nearby_sources)) / nearby_side, (at + nearby_sources + 2) / nearby_side};
+    };
+    const Span window_y = window(place.y, m_height);
+    const Span window_x = window(place.x, m_width);
     const double texels = static_cast<double>((window_y.end - window_y.first) * (window_x.end - window_x.first));
     const std::size_t ranks = std::min(m_ranks, nearby_ranks);
-    for (std::size_t y = sources_y.first; y < sources_y.end; ++y) {
-        for (std::size_t x = sources_x.first; x < sources_x.end; ++x) {
-            const LightPyramid::Beam beam = light.beam(0, y, x);
-            if (beam.irradiance == 0.0f)
-                continue;
-            const float* by_angle = at_angle(beam.direction);
-            // Where the window lies in tables around the source.
-            const std::size_t y0 = window_y.first + nearby_reach - y;
-            const std::size_t y1 = window_y.end + nearby_reach - y;
-            const std::size_t x0 = window_x.first + nearby_reach - x;
-            const std::size_t x1 = window_x.end + nearby_reach - x;
-            const double* sums = m_nearby.data();
-            for (std::size_t k = 0; k < m_media; ++k)
-                for (std::size_t rank = 0; rank < ranks; ++rank, sums += size * size)
-                    place.nearby[k] +=
-                        static_cast<double>(beam.irradiance * by_angle[m_starts[rank]]) / texels *
-                        (sums[y1 * size + x1] - sums[y0 * size + x1] - sums[y1 * size + x0] + sums[y0 * size + x0]);
-        }
-    }
+    for (std::size_t y = sources(place.y).first; y < sources(place.y).end; ++y)
+        for (std::size_t x = sources(place.x).first; x < sources(place.x).end; ++x)
+            for (const LightPyramid& light : m_lights) {
+                const SquareBeam beam = light.beam(nearby_level, y, x);
+                if (beam.irradiance == 0.0f)
+                    continue;
+                const float* by_angle = at_angle(beam.direction);
+                // Where the window lies in tables around the source.
+                const std::size_t y0 = window_y.first + nearby_reach - nearby_side * y;
+                const std::size_t y1 = window_y.end + nearby_reach - nearby_side * y;
+                const std::size_t x0 = window_x.first + nearby_reach - nearby_side * x;
+                const std::size_t x1 = window_x.end + nearby_reach - nearby_side * x;
+                const double* sums = m_nearby.data();
+                for (std::size_t k = 0; k < m_media; ++k)
+                    for (std::size_t rank = 0; rank < ranks; ++rank, sums += size * size)
+                        place.nearby[k] +=
+                            static_cast<double>(beam.irradiance * by_angle[m_starts[rank]]) / texels *
+                            (sums[y1 * size + x1] - sums[y0 * size + x1] - sums[y1 * size + x0] + sums[y0 * size + x0]);
+            }
 }
 
 }  // namespace beamspread

@@ -12,7 +12,7 @@ namespace beamspread {
 namespace {
 
 // Texels are drawn from squares of side x side, or from around them.
-constexpr std::size_t level = LightPyramid::first_level;
+constexpr std::size_t level = 3;
 constexpr std::size_t side = std::size_t{1} << level;
 
 // How many are drawn: from all squares, from lit ones, and, more often where the light changes more from square to
@@ -95,9 +95,9 @@ float change(const std::vector<LightPyramid>& lights, const Square& square)
     float difference = 0.0f;
     float sum = 0.0f;
     for (const LightPyramid& light : lights) {
-        const LightPyramid::Beam here = light.beam(level, square.y, square.x);
+        const SquareBeam here = light.beam(level, square.y, square.x);
         for (const Square& next : {Square{square.y + 1, square.x}, Square{square.y, square.x + 1}}) {
-            const LightPyramid::Beam there = light.beam(level, next.y, next.x);
+            const SquareBeam there = light.beam(level, next.y, next.x);
             difference += glm::length(here.irradiance * here.direction - there.irradiance * there.direction);
             sum += here.irradiance + there.irradiance;
         }
@@ -112,7 +112,7 @@ std::array<Square, 3> extremes(const LightPyramid& light, const Sampler& plane)
     std::array<float, 3> most{0.0f, 0.0f, 0.0f};
     for (std::size_t y = 0; y < plane.rows(); ++y)
         for (std::size_t x = 0; x < plane.columns(); ++x) {
-            const LightPyramid::Beam beam = light.beam(level, y, x);
+            const SquareBeam beam = light.beam(level, y, x);
             if (beam.irradiance == 0.0f)
                 continue;
             const std::array<float, 3> values{beam.irradiance, -beam.direction.z, 1.0f + beam.direction.z};
