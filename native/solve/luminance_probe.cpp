@@ -17,14 +17,14 @@ namespace {
 constexpr std::size_t squares_between = 2;
 
 constexpr std::size_t angle_steps = 256;
+constexpr float radii_per_octave = 16.0f;
 
 // Harmonics of a block: their loops have no remainders.
 constexpr std::size_t columns_at_once = 8;
-constexpr float radii_per_octave = 16.0f;
 
 // Of the distances of squares looked at as a whole, in units of their size.
-constexpr float distances_per_size = 8.0f;
-constexpr std::size_t distances = 8 * 4 * (squares_between + 1);
+constexpr std::size_t distances_per_size = 8;
+constexpr std::size_t distances = 4 * distances_per_size * (squares_between + 1);
 
 // Texels from the middle to the border of the 17 x 17; light from farther than `nearby_sources` is taken to be the same
 // on all of them.
@@ -104,11 +104,12 @@ LuminanceProbe::LuminanceProbe(const std::vector<LightPyramid>& lights, const Lo
 
 void LuminanceProbe::tabulate_angles(const LowRankBasis& basis)
 {
-    m_by_angle.resize((angle_steps + 1) * functions());
-    for (std::size_t step = 0; step <= angle_steps; ++step)
+    m_by_angle.resize(angle_steps * functions());
+    for (std::size_t step = 0; step < angle_steps; ++step)
         for (std::size_t f = 0; f < m_place.size(); ++f) {
             const std::vector<TableStep>& values = basis.functions[f].values;
-            m_by_angle[step * functions() + m_place[f]] = values[step * (values.size() - 1) / angle_steps].value;
+            m_by_angle[step * functions() + m_place[f]] =
+                values[(2 * step + 1) * (values.size() - 1) / (2 * angle_steps)].value;
         }
 }
 
@@ -123,7 +124,8 @@ void LuminanceProbe::tabulate_radii(const LowRankBasis& basis)
     m_radii = static_cast<std::size_t>(std::ceil(octaves * static_cast<double>(radii_per_octave))) + 1;
     m_by_radius.resize(m_radii * m_media * functions());
     parallel_for(m_radii, [&](std::size_t step) {
-        const double r = m_least_radius * std::exp2(static_cast<double>(step) / static_cast<double>(radii_per_octave));
+        const double r =
+            m_least_radius * std::exp2((static_cast<double>(step) + 0.5) / static_cast<double>(radii_per_octave));
         for (std::size_t k = 0; k < m_media; ++k)
             for (std::size_t rank = 0; rank < m_ranks; ++rank) {
                 const ScaledProfile& scaled = basis.profiles[k][rank];
@@ -144,7 +146,7 @@ void LuminanceProbe::tabulate_widths()
 {
     m_by_width.resize(distances * m_harmonics);
     for (std::size_t step = 0; step < distances; ++step) {
-        const float half_width = 0.5f * distances_per_size / (static_cast<float>(step) + 0.5f);
+        const float half_width = 0.5f * static_cast<float>(distances_per_size) / (static_cast<float>(step) + 0.5f);
         for (std::size_t m = 0; m < m_harmonics; ++m) {
             const float turned = half_width * static_cast<float>(m);
             m_by_width[step * m_harmonics + m] = 1.0f / std::sqrt(1.0f + turned * turned);
@@ -257,8 +259,8 @@ const float* LuminanceProbe::at_angle(const Vec3f& direction) const
 {
     const float across = std::sqrt(direction.x * direction.x + direction.y * direction.y);
     const float half_tangent = across / (1.0f - direction.z);
-    const float place = std::clamp((half_tangent - m_first) * m_per_step, 0.0f, static_cast<float>(angle_steps));
-    return m_by_angle.data() + static_cast<std::size_t>(place + 0.5f) * functions();
+    const auto step = static_cast<std::size_t>(std::max((half_tangent - m_first) * m_per_step, 0.0f));
+    return m_by_angle.data() + std::min(step, angle_steps - 1) * functions();
 }
 
 void LuminanceProbe::add_far(Place& place, std::size_t level, std::size_t y, std::size_t x) const
@@ -274,10 +276,11 @@ void LuminanceProbe::add_far(Place& place, std::size_t level, std::size_t y, std
     const float offset_y = dy * static_cast<float>(m_pitch_y / m_least_radius);
     const float square = offset_x * offset_x + offset_y * offset_y;
     const float octave = 0.5f * std::log2(square);
-    const auto radius = static_cast<std::size_t>(std::max(octave, 0.0f) * radii_per_octave + 0.5f);
+    const auto radius = static_cast<std::size_t>(std::max(octave, 0.0f) * radii_per_octave);
     if (radius >= m_radii)
         return;
-    const auto width = static_cast<std::size_t>(std::sqrt(dx * dx + dy * dy) * distances_per_size / size);
+    const auto width =
+        static_cast<std::size_t>(std::sqrt(dx * dx + dy * dy) * static_cast<float>(distances_per_size) / size);
     const float* by_width = m_by_width.data() + std::min(width, distances - 1) * m_harmonics;
 
     std::fill(place.light.begin(), place.light.end(), 0.0f);
