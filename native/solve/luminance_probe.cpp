@@ -39,8 +39,9 @@ constexpr std::size_t nearby_reach = nearby_texels + nearby_sources + 1;  // fro
 // Functions of m = 0 that the mean over these is made of: others are as small as its error.
 constexpr std::size_t nearby_ranks = 4;
 
-// What beams bring to where they travel away from, at least, relative to the mean of all azimuths.
-constexpr double least_asymmetry = 0.1;
+// What beams bring to where they travel away from, at least, relative to the mean of all azimuths: about what the sum of
+// harmonics is off by.
+constexpr double least_asymmetry = 0.03;
 
 std::size_t distance(std::size_t a, std::size_t b)
 {
