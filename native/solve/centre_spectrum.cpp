@@ -111,25 +111,30 @@ void CentreSpectrum::start(std::size_t frequency, Column& column) const
     }
 }
 
-void CentreSpectrum::spectrum(const Column& column, const KernelTerm* terms, std::size_t count, float* values) const
+std::vector<float> CentreSpectrum::add_up(std::span<const KernelTerm> terms) const
 {
     const std::size_t texels = m_width * m_height;
-    const bool sine = terms[0].phase == Phase::sine;
-    const bool odd_m = terms[0].m % 2 == 1;
+    std::vector<double> sum(texels, 0.0);
+    for (const KernelTerm& term : terms) {
+        const std::size_t function = term.profile * harmonic_count + term.m;
+        const float* kernel = m_texels.data() + (function * 2 + (term.phase == Phase::sine ? 1 : 0)) * texels;
+        for (std::size_t i = 0; i < texels; ++i)
+            sum[i] += term.weight * static_cast<double>(kernel[i]);
+    }
+    return {sum.begin(), sum.end()};
+}
+
+void CentreSpectrum::spectrum(const Column& column, const std::vector<float>& sum, bool sine, bool odd_m,
+                              float* values) const
+{
     // A_m is even along x for even m, odd for odd m, and even along y; B_m the other way round. Sums over pairs of
     // odd functions bring factors -i: squared for B_m of even m, once for odd m, where it is left out.
     const std::vector<double>& along_x = odd_m != sine ? column.sine : column.cosine;
     const double sign = sine && !odd_m ? -1.0 : 1.0;
     std::vector<double> rows(m_height, 0.0);
-    for (std::size_t t = 0; t < count; ++t) {
-        const std::size_t function = terms[t].profile * harmonic_count + terms[t].m;
-        const float* kernel = m_texels.data() + (function * 2 + (sine ? 1 : 0)) * texels;
-        for (std::size_t x = 0; x < m_width; ++x, kernel += m_height) {
-            const double factor = terms[t].weight * along_x[x];
-            for (std::size_t y = 0; y < m_height; ++y)
-                rows[y] += factor * static_cast<double>(kernel[y]);
-        }
-    }
+    for (std::size_t x = 0; x < m_width; ++x)
+        for (std::size_t y = 0; y < m_height; ++y)
+            rows[y] += along_x[x] * static_cast<double>(sum[x * m_height + y]);
     for (std::size_t y = 0; y < m_height; ++y) {
         const float* trig = m_trig.data() + ((sine ? m_height : 0) + y) * m_frequencies;
         const auto factor = static_cast<float>(sign * rows[y]);

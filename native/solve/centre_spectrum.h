@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "solve/kernel_term.h"
@@ -25,8 +26,11 @@ public:
     };
     void start(std::size_t frequency, Column& column) const;
 
-    // Frequencies ky up to that of Nyquist, see `KernelSpectra::spectrum`.
-    void spectrum(const Column& column, const KernelTerm* terms, std::size_t count, float* values) const;
+    // The sum of terms that share their phase and whether m is even, [x][y] of a quadrant.
+    std::vector<float> add_up(std::span<const KernelTerm> terms) const;
+
+    // Frequencies ky up to that of Nyquist of such a sum, see `KernelSpectra::spectrum`.
+    void spectrum(const Column& column, const std::vector<float>& sum, bool sine, bool odd_m, float* values) const;
 
 private:
     void integrate(const ScaledProfile& scaled, const PaddedPlane& plane, const std::optional<RadialWindow>& outside,

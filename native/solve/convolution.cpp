@@ -38,6 +38,11 @@ Convolution::Convolution(const KernelSpectra& spectra, std::span<const LightTerm
       m_media(media),
       m_at_once(std::max<std::size_t>(budget / (m_plane.columns() * m_plane.rows() * sizeof(Complex)), 1))
 {
+    for (const LightTerm& term : terms) {
+        m_kernels.emplace_back();
+        for (const std::vector<KernelTerm>& kernel : term.kernels)
+            m_kernels.back().push_back(spectra.parts(kernel));
+    }
 }
 
 void Convolution::solve(const MakeLightRow& light, const StoreRow& store, Progress& progress, double work)
@@ -154,8 +159,8 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
                 complex_in_place(scratch.lines.data(), batch, height, true);
                 for (std::size_t t = 0; t < batch; ++t)
                     for (std::size_t k = 0; k < results.size(); ++k)
-                        add_kernels(m_terms[first_term + first + t].kernels[first_medium + k], scratch,
-                                    scratch.lines.data() + t * height, scratch.sums.data() + 2 * k * height);
+                        add_kernel(m_kernels[first_term + first + t][first_medium + k], scratch,
+                                   scratch.lines.data() + t * height, scratch.sums.data() + 2 * k * height);
             }
             for (std::size_t k = 0; k < results.size(); ++k) {
                 Complex* even = scratch.sums.data() + 2 * k * height;
@@ -173,18 +178,13 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
 }
 
 // Adds the product of a light's spectrum and its kernel's to those of even m and to those of odd m.
-void Convolution::add_kernels(const std::vector<KernelTerm>& kernel, ColumnScratch& scratch, const Complex* light,
-                              Complex* sums) const
+void Convolution::add_kernel(const std::vector<KernelSpectra::Part>& kernel, ColumnScratch& scratch,
+                             const Complex* light, Complex* sums) const
 {
     const std::size_t height = m_plane.padded_height;
-    for (std::size_t first = 0; first < kernel.size();) {
-        const std::size_t parity = kernel[first].m % 2;
-        std::size_t last = first + 1;
-        while (last < kernel.size() && kernel[last].phase == kernel[first].phase && kernel[last].m % 2 == parity)
-            ++last;
-        m_spectra.spectrum(scratch.column, kernel.data() + first, last - first, scratch.kernel.data());
-        add_product(sums + parity * height, scratch.kernel.data(), light, height);
-        first = last;
+    for (const KernelSpectra::Part& part : kernel) {
+        m_spectra.spectrum(scratch.column, part, scratch.kernel.data());
+        add_product(sums + (part.odd_m() ? height : 0), scratch.kernel.data(), light, height);
     }
 }
 

@@ -86,13 +86,14 @@ private:
     void convolve_columns(const Tile& tile, std::size_t first_term, std::size_t count,
                           std::vector<ColumnSpectrum>& light, std::size_t first_medium,
                           std::vector<ColumnSpectrum>& results);
-    void add_kernels(const std::vector<KernelTerm>& kernel, ColumnScratch& scratch, const Complex* light,
-                     Complex* sums) const;
+    void add_kernel(const std::vector<KernelSpectra::Part>& kernel, ColumnScratch& scratch, const Complex* light,
+                    Complex* sums) const;
     void store_result(const Tile& tile, std::size_t medium, ColumnSpectrum& result);
 
     const KernelSpectra& m_spectra;
     const PaddedPlane& m_plane;
     std::span<const LightTerm> m_terms;
+    std::vector<std::vector<std::vector<KernelSpectra::Part>>> m_kernels;  // [term][medium]
     std::size_t m_media;
     std::size_t m_at_once;  // spectra of terms, and of results
     Pool<RowScratch> m_row_scratch;

@@ -101,22 +101,37 @@ void KernelSpectra::start(std::size_t frequency, const HarmonicRange& harmonics,
     }
 }
 
-void KernelSpectra::spectrum(const Column& column, const KernelTerm* terms, std::size_t count, float* values) const
+std::vector<KernelSpectra::Part> KernelSpectra::parts(const std::vector<KernelTerm>& kernel) const
+{
+    std::vector<Part> parts;
+    for (auto first = kernel.begin(); first != kernel.end();) {
+        const auto last = std::find_if(first, kernel.end(), [&](const KernelTerm& term) {
+            return term.phase != first->phase || term.m % 2 != first->m % 2;
+        });
+        const std::span<const KernelTerm> terms(first, last);
+        parts.push_back({terms, m_centre ? m_centre->add_up(terms) : std::vector<float>()});
+        first = last;
+    }
+    return parts;
+}
+
+void KernelSpectra::spectrum(const Column& column, const Part& part, float* values) const
 {
     const std::size_t frequencies = m_plane.padded_height / 2 + 1;
-    const bool sine = terms[0].phase == Phase::sine;
+    const bool sine = part.sine();
     if (m_centre)
-        m_centre->spectrum(column.centre, terms, count, values);
+        m_centre->spectrum(column.centre, part.centre, sine, part.odd_m(), values);
     else
         std::fill_n(values, frequencies, 0.0f);
-    for (std::size_t t = 0; m_ring && t < count; ++t) {
-        const std::size_t function = m_ring->column(terms[t].profile, terms[t].m);
-        if (function == HankelTable::no_column)
-            continue;
-        const float* trig = column.trig.data() + (2 * (terms[t].m - column.first_m) + (sine ? 1 : 0)) * frequencies;
-        const float* hankel = column.hankel.data() + (function - column.first_function) * frequencies;
-        add_scaled_product(values, trig, hankel, static_cast<float>(terms[t].weight), frequencies);
-    }
+    if (m_ring)
+        for (const KernelTerm& term : part.terms) {
+            const std::size_t function = m_ring->column(term.profile, term.m);
+            if (function == HankelTable::no_column)
+                continue;
+            const float* trig = column.trig.data() + (2 * (term.m - column.first_m) + (sine ? 1 : 0)) * frequencies;
+            const float* hankel = column.hankel.data() + (function - column.first_function) * frequencies;
+            add_scaled_product(values, trig, hankel, static_cast<float>(term.weight), frequencies);
+        }
     for (std::size_t f = frequencies; f < m_plane.padded_height; ++f)
         values[f] = sine ? -values[m_plane.padded_height - f] : values[m_plane.padded_height - f];
 }

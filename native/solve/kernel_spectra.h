@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "solve/centre_spectrum.h"
@@ -44,9 +45,20 @@ public:
     // For kx = 2 pi frequency / padded_width.
     void start(std::size_t frequency, const HarmonicRange& harmonics, Column& column) const;
 
-    // The sum of terms that share their phase and whether m is even, for all padded_height frequencies ky; for odd m
-    // divided by -i, hence real.
-    void spectrum(const Column& column, const KernelTerm* terms, std::size_t count, float* values) const;
+    // Terms of a kernel that share their phase and whether m is even; the kernel's terms must outlive it.
+    struct Part {
+        std::span<const KernelTerm> terms;
+        std::vector<float> centre;  // their sum
+
+        bool sine() const { return terms.front().phase == Phase::sine; }
+        bool odd_m() const { return terms.front().m % 2 == 1; }
+    };
+
+    // A kernel's terms must be sorted so that those of a part follow each other.
+    std::vector<Part> parts(const std::vector<KernelTerm>& kernel) const;
+
+    // The sum of a part's terms, for all padded_height frequencies ky; for odd m divided by -i, hence real.
+    void spectrum(const Column& column, const Part& part, float* values) const;
 
 private:
     PaddedPlane m_plane;

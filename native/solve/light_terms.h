@@ -18,7 +18,7 @@ struct LightTerm {
     std::optional<std::size_t> fixed;  // one light as it is; none: all lights of changing direction, times
     std::size_t function = 0;          // this function u(theta) of the basis and cos or sin(m beta)
     Phase phase = Phase::cosine;
-    std::vector<std::vector<KernelTerm>> kernels;  // [medium]: sorted, see `KernelSpectra::spectrum`
+    std::vector<std::vector<KernelTerm>> kernels;  // [medium]: sorted, see `KernelSpectra::parts`
 };
 
 // Lights of one group: those of one direction each have a term with all harmonics, the others share a basis.
