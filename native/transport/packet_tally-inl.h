@@ -45,10 +45,10 @@ public:
 
     HWY_INLINE void add(FloatMask mask, Floats x, Floats y, Floats weight, Words what)
     {
-        hn::CompressStore(x, mask, floats, m_x.data() + m_count);
-        hn::CompressStore(y, mask, floats, m_y.data() + m_count);
-        hn::CompressStore(weight, mask, floats, m_weight.data() + m_count);
-        m_count += hn::CompressStore(what, hn::RebindMask(words, mask), words, m_what.data() + m_count);
+        store_compressed(mask, floats, x, m_x.data() + m_count);
+        store_compressed(mask, floats, y, m_y.data() + m_count);
+        store_compressed(mask, floats, weight, m_weight.data() + m_count);
+        m_count += store_compressed(mask, words, what, m_what.data() + m_count);
         if (m_count > capacity)
             flush();
     }

@@ -246,14 +246,14 @@ private:
 
         HWY_INLINE void push(FloatMask mask, const Vectors& from, const Vectors& before, Floats w, Words order_batch)
         {
-            hn::CompressStore(from.x, mask, floats, x.data() + count);
-            hn::CompressStore(from.y, mask, floats, y.data() + count);
-            hn::CompressStore(from.z, mask, floats, z.data() + count);
-            hn::CompressStore(before.x, mask, floats, wx.data() + count);
-            hn::CompressStore(before.y, mask, floats, wy.data() + count);
-            hn::CompressStore(before.z, mask, floats, wz.data() + count);
-            hn::CompressStore(w, mask, floats, weight.data() + count);
-            count += hn::CompressStore(order_batch, hn::RebindMask(words, mask), words, what.data() + count);
+            store_compressed(mask, floats, from.x, x.data() + count);
+            store_compressed(mask, floats, from.y, y.data() + count);
+            store_compressed(mask, floats, from.z, z.data() + count);
+            store_compressed(mask, floats, before.x, wx.data() + count);
+            store_compressed(mask, floats, before.y, wy.data() + count);
+            store_compressed(mask, floats, before.z, wz.data() + count);
+            store_compressed(mask, floats, w, weight.data() + count);
+            count += store_compressed(mask, words, order_batch, what.data() + count);
         }
 
         std::size_t count = 0;
