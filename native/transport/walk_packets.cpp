@@ -27,21 +27,41 @@ constexpr std::size_t packet_count = 2;
 template <class T>
 using Lanes = std::array<T, lane_count>;
 
+// A photon in every lane.
+struct Photons {
+    Vectors x;  // mean free paths; z points into the medium
+    Vectors w;
+    Floats weight;
+    Floats exit_weight;  // of the exit along the walk, among the ways to sample it
+    Words order;
+    Words next_roulette;
+    Words batch;  // shifted into place
+};
+
 struct Packet {
-    HWY_ALIGN Lanes<float> x{};  // mean free paths; z points into the medium
-    HWY_ALIGN Lanes<float> y{};
-    HWY_ALIGN Lanes<float> z{};
-    HWY_ALIGN Lanes<float> wx{};
-    HWY_ALIGN Lanes<float> wy{};
-    HWY_ALIGN Lanes<float> wz{};
-    HWY_ALIGN Lanes<float> weight{};
-    HWY_ALIGN Lanes<float> exit_weight{};  // of the exit along the walk, among the ways to sample it
-    HWY_ALIGN Lanes<std::uint32_t> order{};
-    HWY_ALIGN Lanes<std::uint32_t> next_roulette{};
-    HWY_ALIGN Lanes<std::uint32_t> batch{};  // shifted into place
+    HWY_INLINE Photons load() const
+    {
+        const auto at = [&](std::size_t i) { return hn::Load(floats, numbers[i].data()); };
+        const auto word = [&](std::size_t i) { return hn::Load(words, counts[i].data()); };
+        return {{at(0), at(1), at(2)}, {at(3), at(4), at(5)}, at(6), at(7), word(0), word(1), word(2)};
+    }
+
+    HWY_INLINE void store(const Photons& photons)
+    {
+        std::size_t i = 0;
+        for (const Floats value : {photons.x.x, photons.x.y, photons.x.z, photons.w.x, photons.w.y, photons.w.z,
+                                   photons.weight, photons.exit_weight})
+            hn::Store(value, floats, numbers[i++].data());
+        i = 0;
+        for (const Words value : {photons.order, photons.next_roulette, photons.batch})
+            hn::Store(value, words, counts[i++].data());
+    }
+
+    HWY_ALIGN std::array<Lanes<float>, 8> numbers{};
+    HWY_ALIGN std::array<Lanes<std::uint32_t>, 3> counts{};
     HWY_ALIGN Lanes<std::uint32_t> active{};  // all bits, or none: nobody is left to walk
     RandomState random{};
-    std::size_t active_count = 0;
+    std::size_t active_count = lane_count;
 };
 
 class PacketWalk {
@@ -62,8 +82,10 @@ public:
         Random random(m_job.seed, m_job.stream, m_job.first_batch);
         for (Packet& packet : m_packets) {
             PacketRandom::seed(random, packet.random);
-            for (std::size_t lane = 0; lane < lane_count; ++lane)
-                start_photon(packet, lane);
+            packet.active.fill(~0u);
+            Photons photons = packet.load();
+            start_photons(packet, hn::FirstN(floats, lane_count), photons);
+            packet.store(photons);
         }
         PacketRandom::seed(random, m_connection_random);
         bool alive = true;
@@ -78,36 +100,70 @@ public:
         }
         connect_all();
         m_tally.finish();
-        m_job.progress.advance(static_cast<double>(m_started % photons_per_progress));
+        m_job.progress.advance(static_cast<double>(m_unreported));
     }
 
 private:
-    // The next photon of the job, if there is one, into a lane.
-    void start_photon(Packet& packet, std::size_t lane)
+    // The next photons of the job into these lanes.
+    HWY_INLINE void start_photons(Packet& packet, FloatMask lanes, Photons& photons)
     {
-        while (m_batch < m_job.photons.size() && m_started_in_batch == m_job.photons[m_batch]) {
-            ++m_batch;
-            m_started_in_batch = 0;
+        const auto start = [lanes](Floats& value, float at) {
+            value = hn::IfThenElse(lanes, hn::Set(floats, at), value);
+        };
+        start(photons.x.x, 0.0f);
+        start(photons.x.y, 0.0f);
+        start(photons.x.z, 0.0f);
+        start(photons.w.x, m_sin_theta);
+        start(photons.w.y, 0.0f);
+        start(photons.w.z, m_cos_theta);
+        start(photons.weight, 1.0f);
+        start(photons.exit_weight, 1.0f);
+        const auto started = hn::RebindMask(words, lanes);
+        photons.order = hn::IfThenZeroElse(started, photons.order);
+        photons.next_roulette =
+            hn::IfThenElse(started, hn::Set(words, m_plan.first_roulette), photons.next_roulette);
+        const std::size_t count = hn::CountTrue(floats, lanes);
+        if (count <= m_left_in_batch) {
+            m_left_in_batch -= count;
+            report(count);
+            photons.batch = hn::IfThenElse(started, hn::Set(words, m_batch_word), photons.batch);
+        } else {
+            photons.batch = start_next_batches(packet, lanes, photons.batch);
         }
-        const bool was_active = packet.active[lane] != 0;
-        if (m_batch == m_job.photons.size()) {
-            packet.active[lane] = 0;
-            packet.active_count -= was_active ? 1 : 0;
-            return;
+    }
+
+    // Batches of these lanes where the current one has too few photons left for them; those that none has are idle.
+    HWY_NOINLINE Words start_next_batches(Packet& packet, FloatMask lanes, Words batch)
+    {
+        HWY_ALIGN Lanes<std::uint32_t> batches;
+        hn::Store(batch, words, batches.data());
+        std::array<std::uint8_t, 8> bytes{};
+        hn::StoreMaskBits(floats, lanes, bytes.data());
+        for (auto bits = std::bit_cast<std::uint64_t>(bytes); bits != 0; bits &= bits - 1) {
+            const auto lane = static_cast<std::size_t>(std::countr_zero(bits));
+            while (m_left_in_batch == 0 && m_next_batch < m_job.photons.size()) {
+                m_batch_word = static_cast<std::uint32_t>(m_next_batch << batch_shift);
+                m_left_in_batch = m_job.photons[m_next_batch++];
+            }
+            if (m_left_in_batch == 0) {
+                packet.active[lane] = 0;
+                --packet.active_count;
+                continue;
+            }
+            --m_left_in_batch;
+            report(1);
+            batches[lane] = m_batch_word;
         }
-        ++m_started_in_batch;
-        if (++m_started % photons_per_progress == 0)
-            m_job.progress.advance(static_cast<double>(photons_per_progress));
-        packet.x[lane] = packet.y[lane] = packet.z[lane] = 0.0f;
-        packet.wx[lane] = m_sin_theta;
-        packet.wy[lane] = 0.0f;
-        packet.wz[lane] = m_cos_theta;
-        packet.weight[lane] = packet.exit_weight[lane] = 1.0f;
-        packet.order[lane] = 0;
-        packet.next_roulette[lane] = m_plan.first_roulette;
-        packet.batch[lane] = static_cast<std::uint32_t>(m_batch << batch_shift);
-        packet.active[lane] = ~0u;
-        packet.active_count += was_active ? 0 : 1;
+        return hn::Load(words, batches.data());
+    }
+
+    HWY_INLINE void report(std::size_t started)
+    {
+        m_unreported += started;
+        if (m_unreported >= photons_per_progress) {
+            m_job.progress.advance(static_cast<double>(m_unreported));
+            m_unreported = 0;
+        }
     }
 
     HWY_INLINE Floats distance_to_boundary(Floats z, Floats wz) const
@@ -124,13 +180,9 @@ private:
         PacketRandom random(packet.random);
         const double g = m_job.medium.g;
         const FloatMask active = float_mask(hn::Ne(hn::Load(words, packet.active.data()), hn::Zero(words)));
-        Vectors x{hn::Load(floats, packet.x.data()), hn::Load(floats, packet.y.data()),
-                  hn::Load(floats, packet.z.data())};
-        const Vectors w{hn::Load(floats, packet.wx.data()), hn::Load(floats, packet.wy.data()),
-                        hn::Load(floats, packet.wz.data())};
-        Floats weight = hn::Load(floats, packet.weight.data());
-        Words order = hn::Load(words, packet.order.data());
-        const Words batch = hn::Load(words, packet.batch.data());
+        Photons photons = packet.load();
+        Vectors& x = photons.x;
+        const Vectors w = photons.w;
 
         const Floats to_boundary = distance_to_boundary(x.z, w.z);
         const Floats flight = hn::Neg(hn::Log(floats, random.uniform()));
@@ -139,7 +191,7 @@ private:
         // The part that leaves is tallied; the rest turns back.
         const FloatMask turns_back = hn::And(hits, hn::Lt(random.uniform(), reflectance));
         FloatMask ends = hn::AndNot(turns_back, hits);
-        tally_exits(packet, active, x, w, to_boundary, flight, reflectance, ends);
+        tally_exits(photons, active, to_boundary, flight, reflectance, ends);
         const FloatMask scatters = hn::Not(hits);
         const Floats path = hn::Min(flight, to_boundary);
         x = {hn::MulAdd(path, w.x, x.x), hn::MulAdd(path, w.y, x.y), hn::MulAdd(path, w.z, x.z)};
@@ -148,62 +200,50 @@ private:
 
         const Deflection deflection = sample_henyey_greenstein(g, random.uniform());
         const Vectors scattered = turn(w, deflection.cos_theta, deflection.sin_theta, random_azimuth(random));
+        Words& order = photons.order;
         order = hn::IfThenElse(hn::RebindMask(words, scatters), hn::Add(order, hn::Set(words, 1u)), order);
 
-        Floats exit_weight = broadcast(1.0);
+        photons.exit_weight = broadcast(1.0);
         const FloatMask connected =
             hn::AndNot(greater(order, hn::Set(words, m_plan.last_expected_order)), hn::And(scatters, active));
         if (!hn::AllFalse(floats, connected)) {
             const Floats balanced = hn::Div(deflection.pdf, hn::Add(deflection.pdf, connection_pdf(scattered.z)));
             const FloatMask rivalled =
                 m_half_space ? hn::And(connected, hn::Lt(scattered.z, hn::Zero(floats))) : connected;
-            exit_weight = hn::IfThenElse(rivalled, balanced, exit_weight);
-            m_requests.push(connected, x, w, weight, hn::Or(order, batch));
+            photons.exit_weight = hn::IfThenElse(rivalled, balanced, photons.exit_weight);
+            m_requests.push(connected, x, w, photons.weight, hn::Or(order, photons.batch));
             if (m_requests.count > Requests::capacity)
                 connect_all();
         }
 
         ends = hn::Or(ends, greater(order, hn::Set(words, max_order - 1)));
-        const Words next_roulette = hn::Load(words, packet.next_roulette.data());
-        const FloatMask at_risk = hn::AndNot(greater(next_roulette, order), scatters);
+        const FloatMask at_risk = hn::AndNot(greater(photons.next_roulette, order), scatters);
         if (!hn::AllFalse(floats, at_risk)) {
             const FloatMask late = greater(order, hn::Set(words, last_common_order));
             const Floats survival =
                 hn::IfThenElse(late, broadcast(late_roulette_survival), broadcast(roulette_survival));
             ends = hn::Or(ends, hn::And(at_risk, hn::Ge(random.uniform(), survival)));
-            weight = hn::IfThenElse(at_risk, hn::Div(weight, survival), weight);
-            hn::Store(
-                hn::IfThenElse(hn::RebindMask(words, at_risk), hn::Add(next_roulette, next_roulette), next_roulette),
-                words, packet.next_roulette.data());
+            photons.weight = hn::IfThenElse(at_risk, hn::Div(photons.weight, survival), photons.weight);
+            photons.next_roulette = hn::Add(photons.next_roulette,
+                                            hn::IfThenElseZero(hn::RebindMask(words, at_risk), photons.next_roulette));
         }
 
-        hn::Store(x.x, floats, packet.x.data());
-        hn::Store(x.y, floats, packet.y.data());
-        hn::Store(x.z, floats, packet.z.data());
-        hn::Store(hn::IfThenElse(scatters, scattered.x, w.x), floats, packet.wx.data());
-        hn::Store(hn::IfThenElse(scatters, scattered.y, w.y), floats, packet.wy.data());
-        hn::Store(hn::IfThenElse(scatters, scattered.z, hn::Neg(w.z)), floats, packet.wz.data());
-        hn::Store(weight, floats, packet.weight.data());
-        hn::Store(exit_weight, floats, packet.exit_weight.data());
-        hn::Store(order, words, packet.order.data());
-        random.store();
-
+        photons.w = {hn::IfThenElse(scatters, scattered.x, w.x), hn::IfThenElse(scatters, scattered.y, w.y),
+                     hn::IfThenElse(scatters, scattered.z, hn::Neg(w.z))};
         ends = hn::And(ends, active);
-        if (!hn::AllFalse(floats, ends)) {
-            std::array<std::uint8_t, 8> bytes{};
-            hn::StoreMaskBits(floats, ends, bytes.data());
-            for (auto bits = std::bit_cast<std::uint64_t>(bytes); bits != 0; bits &= bits - 1)
-                start_photon(packet, static_cast<std::size_t>(std::countr_zero(bits)));
-        }
+        if (!hn::AllFalse(floats, ends))
+            start_photons(packet, ends, photons);
+        packet.store(photons);
+        random.store();
     }
 
     // Low orders: the exits along the flights that begin here, instead of waiting for one. Far from the boundary the
     // flight itself decides whether its exit is tallied: it comes this close with the probability exp(-to_boundary) /
     // rare_exit. High orders: the exits that happen.
-    HWY_INLINE void tally_exits(const Packet& packet, FloatMask active, const Vectors& x, const Vectors& w,
-                                Floats to_boundary, Floats flight, Floats reflectance, FloatMask leaves)
+    HWY_INLINE void tally_exits(const Photons& photons, FloatMask active, Floats to_boundary, Floats flight,
+                                Floats reflectance, FloatMask leaves)
     {
-        const Words order = hn::Load(words, packet.order.data());
+        const Words order = photons.order;
         const Floats rare_distance = broadcast(rare_exit_distance);
         const FloatMask late = greater(order, hn::Set(words, m_plan.last_expected_order));
         const FloatMask close =
@@ -214,11 +254,11 @@ private:
         if (hn::AllFalse(floats, tallied))
             return;
         const Floats escape = hn::Mul(hn::Exp(floats, hn::Neg(hn::Min(to_boundary, rare_distance))),
-                                      hn::Load(floats, packet.exit_weight.data()));
+                                      photons.exit_weight);
         const Floats probability =
             hn::IfThenElse(late, broadcast(1.0), hn::Mul(escape, hn::Sub(broadcast(1.0), reflectance)));
-        add_exits(tallied, x, w, to_boundary, hn::Mul(hn::Load(floats, packet.weight.data()), probability),
-                  hn::Or(order, hn::Load(words, packet.batch.data())));
+        add_exits(tallied, photons.x, photons.w, to_boundary, hn::Mul(photons.weight, probability),
+                  hn::Or(order, photons.batch));
     }
 
     HWY_INLINE void add_exits(FloatMask mask, const Vectors& x, const Vectors& w, Floats to_boundary, Floats weight,
@@ -314,9 +354,10 @@ private:
     std::array<Packet, packet_count> m_packets{};
     Requests m_requests;
     RandomState m_connection_random{};
-    std::size_t m_batch = 0;
-    std::uint64_t m_started_in_batch = 0;
-    std::uint64_t m_started = 0;
+    std::uint32_t m_batch_word = 0;
+    std::size_t m_next_batch = 0;
+    std::uint64_t m_left_in_batch = 0;
+    std::uint64_t m_unreported = 0;
 };
 
 void walk_packets(const WalkJob& job)
