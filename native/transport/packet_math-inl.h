@@ -176,12 +176,16 @@ HWY_INLINE Vectors turn(const Vectors& w, Floats cos_theta, Floats sin_theta, co
     const Floats b = hn::Mul(sin_theta, azimuth.sine);
     const Floats tangent_x = hn::MulAdd(hn::Mul(sign, w.x), hn::Mul(w.x, k), one);
     const Floats bitangent_y = hn::MulAdd(hn::Mul(w.y, w.y), k, sign);
-    const Vectors out{hn::MulAdd(tangent_x, a, hn::MulAdd(xy, b, hn::Mul(w.x, cos_theta))),
-                      hn::MulAdd(hn::Mul(sign, xy), a, hn::MulAdd(bitangent_y, b, hn::Mul(w.y, cos_theta))),
-                      hn::NegMulAdd(hn::Mul(sign, w.x), a, hn::NegMulAdd(w.y, b, hn::Mul(w.z, cos_theta)))};
-    // One step of Newton's method keeps the length at 1.
-    const Floats scale = hn::NegMulAdd(broadcast(0.5), dot(out, out), broadcast(1.5));
-    return {hn::Mul(out.x, scale), hn::Mul(out.y, scale), hn::Mul(out.z, scale)};
+    return {hn::MulAdd(tangent_x, a, hn::MulAdd(xy, b, hn::Mul(w.x, cos_theta))),
+            hn::MulAdd(hn::Mul(sign, xy), a, hn::MulAdd(bitangent_y, b, hn::Mul(w.y, cos_theta))),
+            hn::NegMulAdd(hn::Mul(sign, w.x), a, hn::NegMulAdd(w.y, b, hn::Mul(w.z, cos_theta)))};
+}
+
+// One step of Newton's method brings a length that has strayed from 1 by rounding back.
+HWY_INLINE Vectors renormalized(const Vectors& w)
+{
+    const Floats scale = hn::NegMulAdd(broadcast(0.5), dot(w, w), broadcast(1.5));
+    return {hn::Mul(w.x, scale), hn::Mul(w.y, scale), hn::Mul(w.z, scale)};
 }
 
 struct Deflection {

@@ -1,5 +1,6 @@
 #include "transport/walk.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/constants.h"
@@ -50,58 +51,93 @@ public:
           m_random(random),
           m_tallies(tallies),
           m_plan(medium),
-          m_w(std::sin(theta_inside), 0.0, std::cos(theta_inside))
+          m_w(std::sin(theta_inside), 0.0, std::cos(theta_inside)),
+          m_next_roulette(m_plan.first_roulette)
     {
     }
 
     void run()
     {
-        std::uint32_t next_roulette = m_plan.first_roulette;
-        while (true) {
-            const double to_boundary = distance_to_boundary(m_w);
-            const double flight = -std::log(m_random.uniform_positive());
-            // Far from the boundary the flight itself decides whether its exit is tallied: it comes this
-            // close with the probability exp(-to_boundary) / rare_exit.
-            const bool expected = m_order <= m_plan.last_expected_order;
-            if (expected && m_order > 0) {
-                if (to_boundary < rare_exit_distance)
-                    tally_exit(m_w, to_boundary, m_exit_weight * std::exp(-to_boundary));
-                else if (flight >= to_boundary - rare_exit_distance)
-                    tally_exit(m_w, to_boundary, m_exit_weight * rare_exit);
-            }
-            if (flight >= to_boundary) {
-                const double reflectance = fresnel(std::abs(m_w.z), 1.0 / m_medium.ior);
-                if (m_random.uniform() >= reflectance) {
-                    // Fresnel's transmittance is in the decision, and not in the tally.
-                    if (!expected)
-                        tally(m_w, to_boundary, 1.0);
-                    return;
-                }
-                m_x += to_boundary * m_w;
-                m_x.z = m_w.z < 0.0 ? 0.0 : m_medium.thickness;
-                m_w.z = -m_w.z;
-                m_exit_weight = 1.0;
-                continue;
-            }
-            m_x += flight * m_w;
-            const Vec3 before = m_w;
-            m_w = scatter(before, m_medium.g, m_random);
-            if (++m_order >= max_order)
+        while (m_order <= m_plan.last_expected_order)
+            if (!step_early())
                 return;
-            m_exit_weight = 1.0;
-            if (m_order <= m_plan.last_expected_order)
-                tally_connections(before);
-            if (m_order >= next_roulette) {
-                const double survival = m_order <= last_common_order ? roulette_survival : late_roulette_survival;
-                if (m_random.uniform() >= survival)
-                    return;
-                m_weight /= survival;
-                next_roulette *= 2;
+        m_weight /= late_walks;
+        const Walk start = *this;
+        for (std::size_t i = 0; i < late_walks; ++i) {
+            Walk walk = start;
+            while (walk.step_late()) {
             }
         }
     }
 
 private:
+    // One flight, with its expected exit, and the scattering or reflection at its end; false: the photon left.
+    bool step_early()
+    {
+        const double to_boundary = distance_to_boundary(m_w);
+        const double flight = -std::log(m_random.uniform_positive());
+        // Far from the boundary the flight itself decides whether its exit is tallied: it comes this
+        // close with the probability exp(-to_boundary) / rare_exit.
+        if (m_order > 0) {
+            if (to_boundary < rare_exit_distance)
+                tally_exit(m_w, to_boundary, m_exit_weight * std::exp(-to_boundary));
+            else if (flight >= to_boundary - rare_exit_distance)
+                tally_exit(m_w, to_boundary, m_exit_weight * rare_exit);
+        }
+        m_exit_weight = 1.0;
+        if (flight >= to_boundary)
+            return turn_back(to_boundary);
+        const Vec3 before = m_w;
+        scatter_after(flight);
+        if (m_order <= m_plan.last_expected_order)
+            tally_connections(before);
+        return true;
+    }
+
+    // The same, tallying the exit that happens; false: the photon left or was given up.
+    bool step_late()
+    {
+        const double to_boundary = distance_to_boundary(m_w);
+        const double flight = -std::log(m_random.uniform_positive());
+        if (flight >= to_boundary) {
+            if (turn_back(to_boundary))
+                return true;
+            // Fresnel's transmittance is in the decision, and not in the tally.
+            tally(m_w, to_boundary, 1.0);
+            return false;
+        }
+        scatter_after(flight);
+        return m_order < m_next_roulette || survive_roulette();
+    }
+
+    void scatter_after(double flight)
+    {
+        m_x += flight * m_w;
+        m_w = scatter(m_w, m_medium.g, m_random);
+        ++m_order;
+    }
+
+    // Fresnel's decision at the boundary; false: the photon leaves.
+    bool turn_back(double to_boundary)
+    {
+        if (m_random.uniform() >= fresnel(std::abs(m_w.z), 1.0 / m_medium.ior))
+            return false;
+        m_x += to_boundary * m_w;
+        m_x.z = m_w.z < 0.0 ? 0.0 : m_medium.thickness;
+        m_w.z = -m_w.z;
+        return true;
+    }
+
+    bool survive_roulette()
+    {
+        const double survival = m_order <= last_common_order ? roulette_survival : late_roulette_survival;
+        if (m_order >= max_order || m_random.uniform() >= survival)
+            return false;
+        m_weight /= survival;
+        m_next_roulette = std::min(2 * m_next_roulette, max_order);
+        return true;
+    }
+
     // In units of free paths; infinite where nothing can leave.
     double distance_to_boundary(const Vec3& w) const
     {
@@ -143,13 +179,18 @@ private:
             connect(before, 1.0);
     }
 
+    // From deep inside an exit is rare: as many fewer are sampled as exp(-depth) is below rare_exit.
     void connect(const Vec3& before, double side)
     {
+        const double depth = side < 0.0 ? m_x.z : m_medium.thickness - m_x.z;
+        const double beyond = std::max(0.0, depth - rare_exit_distance);
+        if (beyond > 0.0 && m_random.uniform() >= std::exp(-beyond))
+            return;
         const double cos_theta = std::sqrt(1.0 - m_plan.exit_cone * m_random.uniform());
         const Vec3 w = around_z(side * cos_theta, m_random);
         const double phase = henyey_greenstein_pdf(glm::dot(before, w), m_medium.g);
         const double to_boundary = distance_to_boundary(w);
-        double probability = phase / (phase + connection_pdf(w)) * std::exp(-to_boundary);
+        double probability = phase / (phase + connection_pdf(w)) * std::exp(beyond - to_boundary);
         if (probability < rare_exit) {
             if (m_random.uniform() * rare_exit >= probability)
                 return;
@@ -167,6 +208,7 @@ private:
     double m_weight = 1.0;
     double m_exit_weight = 1.0;  // of the exit along the walk, among the ways to sample it
     std::uint32_t m_order = 0;
+    std::uint32_t m_next_roulette;
 };
 
 }  // namespace

@@ -1,6 +1,6 @@
-// The photon walk of walk.cpp for many photons at a time: every lane of a vector is a photon, and a lane whose
-// photon has ended takes the next one. What only some lanes need (exits, connections) is queued until vectors are full.
-// The oldest instruction set runs the scalar walk.
+// The photon walk of walk.cpp for many photons at a time, one in each lane of a vector. As many as a vector holds start
+// together and make their early flights, whose exits are tallied at their expected values; those that are left join a
+// pool, from which vectors are filled for the flights that follow. The oldest instruction set runs the scalar walk.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "transport/walk_packets.cpp"
@@ -8,266 +8,198 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
 
-#include "hwy/contrib/math/math-inl.h"
 #include "medium/fresnel.h"
+#include "transport/packet_flight-inl.h"
 #include "transport/packet_math-inl.h"
 #include "transport/packet_tally-inl.h"
+#include "transport/photon_pool-inl.h"
 #include "transport/walk_plan.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace beamspread {
 namespace HWY_NAMESPACE {
 
-constexpr std::size_t packet_count = 2;
-
-template <class T>
-using Lanes = std::array<T, lane_count>;
-
-// A photon in every lane.
-struct Photons {
-    Vectors x;  // mean free paths; z points into the medium
-    Vectors w;
-    Floats weight;
-    Floats exit_weight;  // of the exit along the walk, among the ways to sample it
-    Words order;
-    Words next_roulette;
-    Words batch;  // shifted into place
-};
-
-struct Packet {
-    HWY_INLINE Photons load() const
-    {
-        const auto at = [&](std::size_t i) { return hn::Load(floats, numbers[i].data()); };
-        const auto word = [&](std::size_t i) { return hn::Load(words, counts[i].data()); };
-        return {{at(0), at(1), at(2)}, {at(3), at(4), at(5)}, at(6), at(7), word(0), word(1), word(2)};
-    }
-
-    HWY_INLINE void store(const Photons& photons)
-    {
-        std::size_t i = 0;
-        for (const Floats value : {photons.x.x, photons.x.y, photons.x.z, photons.w.x, photons.w.y, photons.w.z,
-                                   photons.weight, photons.exit_weight})
-            hn::Store(value, floats, numbers[i++].data());
-        i = 0;
-        for (const Words value : {photons.order, photons.next_roulette, photons.batch})
-            hn::Store(value, words, counts[i++].data());
-    }
-
-    HWY_ALIGN std::array<Lanes<float>, 8> numbers{};
-    HWY_ALIGN std::array<Lanes<std::uint32_t>, 3> counts{};
-    HWY_ALIGN Lanes<std::uint32_t> active{};  // all bits, or none: nobody is left to walk
-    RandomState random{};
-    std::size_t active_count = lane_count;
-};
+// Flights of the photons in the pool between two looks at which of them are left.
+constexpr int flights_per_sweep = 4;
 
 class PacketWalk {
 public:
     explicit PacketWalk(const WalkJob& job)
-        : m_job(job),
-          m_plan(job.medium),
-          m_half_space(job.medium.is_half_space()),
-          m_thickness(broadcast(job.medium.thickness)),
-          m_sin_theta(static_cast<float>(std::sin(job.theta_inside))),
-          m_cos_theta(static_cast<float>(std::cos(job.theta_inside))),
-          m_tally(job.tallies)
+        : m_job(job), m_medium(job.medium), m_plan(job.medium), m_tally(job.tallies)
     {
+        Random random(job.seed, job.stream, job.first_batch);
+        PacketRandom::seed(random, m_random);
     }
 
     void run()
     {
-        Random random(m_job.seed, m_job.stream, m_job.first_batch);
-        for (Packet& packet : m_packets) {
-            PacketRandom::seed(random, packet.random);
-            packet.active.fill(~0u);
-            Photons photons = packet.load();
-            start_photons(packet, hn::FirstN(floats, lane_count), photons);
-            packet.store(photons);
-        }
-        PacketRandom::seed(random, m_connection_random);
-        bool alive = true;
-        while (alive) {
-            alive = false;
-            for (Packet& packet : m_packets) {
-                if (packet.active_count == 0)
-                    continue;
-                step(packet);
-                alive = true;
+        bool more = true;
+        while (more) {
+            while (more && m_pool.count() + late_walks * lane_count <= PhotonPool::capacity) {
+                more = next_batch();
+                if (more)
+                    walk_early();
             }
+            walk_late();
         }
-        connect_all();
+        while (m_pool.count() > 0)
+            walk_late();
         m_tally.finish();
         m_job.progress.advance(static_cast<double>(m_unreported));
     }
 
 private:
-    // The next photons of the job into these lanes.
-    HWY_INLINE void start_photons(Packet& packet, FloatMask lanes, Photons& photons)
+    // Whether a batch has photons left to start.
+    bool next_batch()
     {
-        const auto start = [lanes](Floats& value, float at) {
-            value = hn::IfThenElse(lanes, hn::Set(floats, at), value);
-        };
-        start(photons.x.x, 0.0f);
-        start(photons.x.y, 0.0f);
-        start(photons.x.z, 0.0f);
-        start(photons.w.x, m_sin_theta);
-        start(photons.w.y, 0.0f);
-        start(photons.w.z, m_cos_theta);
-        start(photons.weight, 1.0f);
-        start(photons.exit_weight, 1.0f);
-        const auto started = hn::RebindMask(words, lanes);
-        photons.order = hn::IfThenZeroElse(started, photons.order);
-        photons.next_roulette =
-            hn::IfThenElse(started, hn::Set(words, m_plan.first_roulette), photons.next_roulette);
-        const std::size_t count = hn::CountTrue(floats, lanes);
-        if (count <= m_left_in_batch) {
-            m_left_in_batch -= count;
-            report(count);
-            photons.batch = hn::IfThenElse(started, hn::Set(words, m_batch_word), photons.batch);
-        } else {
-            photons.batch = start_next_batches(packet, lanes, photons.batch);
+        while (m_batch < m_job.photons.size() && m_started == m_job.photons[m_batch]) {
+            ++m_batch;
+            m_started = 0;
         }
+        return m_batch < m_job.photons.size();
     }
 
-    // Batches of these lanes where the current one has too few photons left for them; those that none has are idle.
-    HWY_NOINLINE Words start_next_batches(Packet& packet, FloatMask lanes, Words batch)
+    // As many photons of the batch as a vector holds.
+    HWY_INLINE FloatMask start(Photons& photons)
     {
-        HWY_ALIGN Lanes<std::uint32_t> batches;
-        hn::Store(batch, words, batches.data());
-        std::array<std::uint8_t, 8> bytes{};
-        hn::StoreMaskBits(floats, lanes, bytes.data());
-        for (auto bits = std::bit_cast<std::uint64_t>(bytes); bits != 0; bits &= bits - 1) {
-            const auto lane = static_cast<std::size_t>(std::countr_zero(bits));
-            while (m_left_in_batch == 0 && m_next_batch < m_job.photons.size()) {
-                m_batch_word = static_cast<std::uint32_t>(m_next_batch << batch_shift);
-                m_left_in_batch = m_job.photons[m_next_batch++];
-            }
-            if (m_left_in_batch == 0) {
-                packet.active[lane] = 0;
-                --packet.active_count;
-                continue;
-            }
-            --m_left_in_batch;
-            report(1);
-            batches[lane] = m_batch_word;
-        }
-        return hn::Load(words, batches.data());
-    }
-
-    HWY_INLINE void report(std::size_t started)
-    {
-        m_unreported += started;
+        const std::uint64_t left = m_job.photons[m_batch] - m_started;
+        const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(left, lane_count));
+        m_started += count;
+        m_unreported += count;
         if (m_unreported >= photons_per_progress) {
             m_job.progress.advance(static_cast<double>(m_unreported));
             m_unreported = 0;
         }
+        const Floats zero = hn::Zero(floats);
+        photons = {{zero, zero, zero},
+                   {broadcast(std::sin(m_job.theta_inside)), zero, broadcast(std::cos(m_job.theta_inside))},
+                   broadcast(1.0),
+                   hn::Zero(words),
+                   hn::Set(words, m_plan.first_roulette),
+                   hn::Set(words, static_cast<std::uint32_t>(m_batch << batch_shift))};
+        return hn::FirstN(floats, count);
     }
 
-    HWY_INLINE Floats distance_to_boundary(Floats z, Floats wz) const
+    // From the entry to the scattering after `last_expected_order`.
+    HWY_NOINLINE void walk_early()
     {
-        const FloatMask up = hn::Lt(wz, hn::Zero(floats));
-        const Floats depth = hn::IfThenElse(up, z, hn::Sub(m_thickness, z));
-        // |wz| from below: a flight along the surface has a finite end that it never reaches.
-        return hn::Div(depth, hn::Max(hn::Abs(wz), broadcast(1e-30)));
-    }
+        Photons photons;
+        FloatMask active = start(photons);
+        PacketRandom random(m_random);
+        Floats exit_weight = broadcast(1.0);  // of the exit along the walk, among the ways to sample it
+        while (!hn::AllFalse(floats, active)) {
+            const Photons from = photons;
+            const Flight flight = fly(m_medium, from, random);
+            const Floats to_boundary = hn::Div(flight.depth, flight.cosine);
+            const Floats reflectance = internal_reflectance(m_medium.ior, flight.cosine);
+            tally_expected(active, from, flight, to_boundary, hn::Sub(broadcast(1.0), reflectance), exit_weight);
 
-    // One flight, and the scattering or reflection at its end.
-    HWY_INLINE void step(Packet& packet)
-    {
-        PacketRandom random(packet.random);
-        const double g = m_job.medium.g;
-        const FloatMask active = float_mask(hn::Ne(hn::Load(words, packet.active.data()), hn::Zero(words)));
-        Photons photons = packet.load();
-        Vectors& x = photons.x;
-        const Vectors w = photons.w;
+            const Deflection deflection = sample_henyey_greenstein(m_medium.g, random.uniform());
+            scatter(photons, flight, deflection, random);
+            const FloatMask turns_back = hn::And(flight.hits, hn::Lt(random.uniform(), reflectance));
+            turn_back(photons, turns_back, from, to_boundary, m_medium.thickness);
+            active = hn::And(active, hn::Or(hn::Not(flight.hits), turns_back));
 
-        const Floats to_boundary = distance_to_boundary(x.z, w.z);
-        const Floats flight = hn::Neg(hn::Log(floats, random.uniform()));
-        const FloatMask hits = hn::Ge(flight, to_boundary);
-        const Floats reflectance = internal_reflectance(m_job.medium.ior, hn::Abs(w.z));
-        // The part that leaves is tallied; the rest turns back.
-        const FloatMask turns_back = hn::And(hits, hn::Lt(random.uniform(), reflectance));
-        FloatMask ends = hn::AndNot(turns_back, hits);
-        tally_exits(photons, active, to_boundary, flight, reflectance, ends);
-        const FloatMask scatters = hn::Not(hits);
-        const Floats path = hn::Min(flight, to_boundary);
-        x = {hn::MulAdd(path, w.x, x.x), hn::MulAdd(path, w.y, x.y), hn::MulAdd(path, w.z, x.z)};
-        const FloatMask up = hn::Lt(w.z, hn::Zero(floats));
-        x.z = hn::IfThenElse(hits, hn::IfThenElse(up, hn::Zero(floats), m_thickness), x.z);
-
-        const Deflection deflection = sample_henyey_greenstein(g, random.uniform());
-        const Vectors scattered = turn(w, deflection.cos_theta, deflection.sin_theta, random_azimuth(random));
-        Words& order = photons.order;
-        order = hn::IfThenElse(hn::RebindMask(words, scatters), hn::Add(order, hn::Set(words, 1u)), order);
-
-        photons.exit_weight = broadcast(1.0);
-        const FloatMask connected =
-            hn::AndNot(greater(order, hn::Set(words, m_plan.last_expected_order)), hn::And(scatters, active));
-        if (!hn::AllFalse(floats, connected)) {
-            const Floats balanced = hn::Div(deflection.pdf, hn::Add(deflection.pdf, connection_pdf(scattered.z)));
-            const FloatMask rivalled =
-                m_half_space ? hn::And(connected, hn::Lt(scattered.z, hn::Zero(floats))) : connected;
-            photons.exit_weight = hn::IfThenElse(rivalled, balanced, photons.exit_weight);
-            m_requests.push(connected, x, w, photons.weight, hn::Or(order, photons.batch));
-            if (m_requests.count > Requests::capacity)
-                connect_all();
+            const FloatMask late = greater(photons.order, hn::Set(words, m_plan.last_expected_order));
+            const FloatMask connected = hn::AndNot(hn::Or(flight.hits, late), active);
+            exit_weight = broadcast(1.0);
+            if (!hn::AllFalse(floats, connected)) {
+                const FloatMask rivalled = m_medium.is_half_space()
+                                               ? hn::And(connected, hn::Lt(photons.w.z, hn::Zero(floats)))
+                                               : connected;
+                const Floats balanced = hn::Div(deflection.pdf, hn::Add(deflection.pdf, connection_pdf(photons.w.z)));
+                exit_weight = hn::IfThenElse(rivalled, balanced, exit_weight);
+                connect(connected, photons, from.w, -1.0, random);
+                if (!m_medium.is_half_space())
+                    connect(connected, photons, from.w, 1.0, random);
+            }
+            if (const FloatMask leaving = hn::And(active, late); !hn::AllFalse(floats, leaving)) {
+                photons.weight = hn::Mul(photons.weight, broadcast(1.0 / late_walks));
+                for (std::size_t copy = 0; copy < late_walks; ++copy)
+                    m_pool.append(leaving, photons);
+                photons.weight = hn::Mul(photons.weight, broadcast(late_walks));
+                active = hn::AndNot(leaving, active);
+            }
         }
-
-        ends = hn::Or(ends, greater(order, hn::Set(words, max_order - 1)));
-        const FloatMask at_risk = hn::AndNot(greater(photons.next_roulette, order), scatters);
-        if (!hn::AllFalse(floats, at_risk)) {
-            const FloatMask late = greater(order, hn::Set(words, last_common_order));
-            const Floats survival =
-                hn::IfThenElse(late, broadcast(late_roulette_survival), broadcast(roulette_survival));
-            ends = hn::Or(ends, hn::And(at_risk, hn::Ge(random.uniform(), survival)));
-            photons.weight = hn::IfThenElse(at_risk, hn::Div(photons.weight, survival), photons.weight);
-            photons.next_roulette = hn::Add(photons.next_roulette,
-                                            hn::IfThenElseZero(hn::RebindMask(words, at_risk), photons.next_roulette));
-        }
-
-        photons.w = {hn::IfThenElse(scatters, scattered.x, w.x), hn::IfThenElse(scatters, scattered.y, w.y),
-                     hn::IfThenElse(scatters, scattered.z, hn::Neg(w.z))};
-        ends = hn::And(ends, active);
-        if (!hn::AllFalse(floats, ends))
-            start_photons(packet, ends, photons);
-        packet.store(photons);
         random.store();
     }
 
-    // Low orders: the exits along the flights that begin here, instead of waiting for one. Far from the boundary the
-    // flight itself decides whether its exit is tallied: it comes this close with the probability exp(-to_boundary) /
-    // rare_exit. High orders: the exits that happen.
-    HWY_INLINE void tally_exits(const Photons& photons, FloatMask active, Floats to_boundary, Floats flight,
-                                Floats reflectance, FloatMask leaves)
+    // Some more flights of all photons in the pool.
+    HWY_NOINLINE void walk_late()
     {
-        const Words order = photons.order;
-        const Floats rare_distance = broadcast(rare_exit_distance);
-        const FloatMask late = greater(order, hn::Set(words, m_plan.last_expected_order));
-        const FloatMask close =
-            hn::Or(hn::Lt(to_boundary, rare_distance), hn::Ge(flight, hn::Sub(to_boundary, rare_distance)));
-        const FloatMask scattered = greater(order, hn::Zero(words));
-        const FloatMask may_leave = hn::And(hn::And(close, scattered), hn::Lt(reflectance, broadcast(1.0)));
-        const FloatMask tallied = hn::And(active, hn::Or(hn::And(late, leaves), hn::AndNot(late, may_leave)));
-        if (hn::AllFalse(floats, tallied))
-            return;
-        const Floats escape = hn::Mul(hn::Exp(floats, hn::Neg(hn::Min(to_boundary, rare_distance))),
-                                      photons.exit_weight);
-        const Floats probability =
-            hn::IfThenElse(late, broadcast(1.0), hn::Mul(escape, hn::Sub(broadcast(1.0), reflectance)));
-        add_exits(tallied, photons.x, photons.w, to_boundary, hn::Mul(photons.weight, probability),
-                  hn::Or(order, photons.batch));
+        PacketRandom random(m_random);
+        const std::size_t count = m_pool.count();
+        m_pool.clear();
+        for (std::size_t first = 0; first < count; first += lane_count) {
+            FloatMask active = hn::FirstN(floats, count - first);
+            Photons photons = m_pool.load(first);
+            for (int i = 0; i < flights_per_sweep; ++i)
+                active = step(photons, active, random);
+            photons.w = renormalized(photons.w);
+            m_pool.append(active, photons);
+        }
+        random.store();
     }
 
-    HWY_INLINE void add_exits(FloatMask mask, const Vectors& x, const Vectors& w, Floats to_boundary, Floats weight,
-                              Words what)
+    // One flight, and the scattering or reflection at its end; returns who goes on.
+    HWY_INLINE FloatMask step(Photons& photons, FloatMask active, PacketRandom& random)
+    {
+        const Photons from = photons;
+        const Flight flight = fly(m_medium, from, random);
+        scatter(photons, flight, sample_henyey_greenstein(m_medium.g, random.uniform()), random);
+        if (const FloatMask hits = hn::And(active, flight.hits); !hn::AllFalse(floats, hits)) {
+            const Floats to_boundary = hn::Div(flight.depth, flight.cosine);
+            const FloatMask turns_back =
+                hn::And(hits, hn::Lt(random.uniform(), internal_reflectance(m_medium.ior, flight.cosine)));
+            turn_back(photons, turns_back, from, to_boundary, m_medium.thickness);
+            const FloatMask leaves = hn::AndNot(turns_back, hits);
+            tally(leaves, from, from.w, to_boundary, from.weight);
+            active = hn::AndNot(leaves, active);
+        }
+        const FloatMask at_risk = hn::AndNot(greater(photons.next_roulette, photons.order), active);
+        if (!hn::AllFalse(floats, at_risk))
+            active = hn::And(active, play_roulette(photons, at_risk, random));
+        return active;
+    }
+
+    // Returns who survives.
+    HWY_INLINE FloatMask play_roulette(Photons& photons, FloatMask at_risk, PacketRandom& random) const
+    {
+        const FloatMask late = greater(photons.order, hn::Set(words, last_common_order));
+        const Floats survival = hn::IfThenElse(late, broadcast(late_roulette_survival), broadcast(roulette_survival));
+        photons.weight = hn::IfThenElse(at_risk, hn::Div(photons.weight, survival), photons.weight);
+        const Words next = hn::Min(hn::Add(photons.next_roulette, photons.next_roulette), hn::Set(words, max_order));
+        photons.next_roulette = hn::IfThenElse(hn::RebindMask(words, at_risk), next, photons.next_roulette);
+        const FloatMask ends = hn::Or(hn::Ge(random.uniform(), survival),
+                                      greater(photons.order, hn::Set(words, max_order - 1)));
+        return hn::Not(hn::And(at_risk, ends));
+    }
+
+    HWY_INLINE void tally(FloatMask mask, const Photons& from, const Vectors& w, Floats to_boundary, Floats weight)
     {
         const FloatMask up = hn::Lt(w.z, hn::Zero(floats));
-        const Words side = hn::IfThenElse(hn::RebindMask(words, up), hn::Zero(words), hn::Set(words, 1u << side_shift));
-        m_tally.add(mask, hn::MulAdd(to_boundary, w.x, x.x), hn::MulAdd(to_boundary, w.y, x.y), weight,
-                    hn::Or(what, side));
+        const Words side = hn::IfThenZeroElse(hn::RebindMask(words, up), hn::Set(words, 1u << side_shift));
+        m_tally.add(mask, hn::MulAdd(to_boundary, w.x, from.x.x), hn::MulAdd(to_boundary, w.y, from.x.y), weight,
+                    hn::Or(hn::Or(from.order, from.batch), side));
+    }
+
+    // The exits along flights that begin here, instead of waiting for one. Far from the boundary the flight itself
+    // decides whether its exit is tallied: it comes this close with the probability exp(-to_boundary) / rare_exit.
+    HWY_INLINE void tally_expected(FloatMask active, const Photons& from, const Flight& flight, Floats to_boundary,
+                                   Floats transmittance, Floats exit_weight)
+    {
+        const Floats rare_distance = broadcast(rare_exit_distance);
+        const FloatMask close =
+            hn::Or(hn::Lt(to_boundary, rare_distance), hn::Ge(flight.length, hn::Sub(to_boundary, rare_distance)));
+        const FloatMask may_leave = hn::And(close, hn::Gt(transmittance, hn::Zero(floats)));
+        const FloatMask tallied = hn::And(hn::And(active, may_leave), greater(from.order, hn::Zero(words)));
+        if (hn::AllFalse(floats, tallied))
+            return;
+        const Floats escape = hn::Exp(floats, hn::Neg(hn::Min(to_boundary, rare_distance)));
+        tally(tallied, from, from.w, to_boundary,
+              hn::Mul(hn::Mul(from.weight, transmittance), hn::Mul(escape, exit_weight)));
     }
 
     // Density per steradian of the connections below: proportional to the cosine, inside the cone that
@@ -278,86 +210,40 @@ private:
         return hn::IfThenElseZero(inside, hn::Mul(hn::Abs(wz), broadcast(inv_pi / m_plan.exit_cone)));
     }
 
-    // Scatterings from which an exit is to be sampled by a direction that leaves: see Walk::tally_connections.
-    struct Requests {
-        static constexpr std::size_t capacity = 128;
-        template <class T>
-        using Queue = std::array<T, capacity + 2 * lane_count>;
-
-        HWY_INLINE void push(FloatMask mask, const Vectors& from, const Vectors& before, Floats w, Words order_batch)
-        {
-            store_compressed(mask, floats, from.x, x.data() + count);
-            store_compressed(mask, floats, from.y, y.data() + count);
-            store_compressed(mask, floats, from.z, z.data() + count);
-            store_compressed(mask, floats, before.x, wx.data() + count);
-            store_compressed(mask, floats, before.y, wy.data() + count);
-            store_compressed(mask, floats, before.z, wz.data() + count);
-            store_compressed(mask, floats, w, weight.data() + count);
-            count += store_compressed(mask, words, order_batch, what.data() + count);
-        }
-
-        std::size_t count = 0;
-        Queue<float> x{};
-        Queue<float> y{};
-        Queue<float> z{};
-        Queue<float> wx{};
-        Queue<float> wy{};
-        Queue<float> wz{};
-        Queue<float> weight{};
-        Queue<std::uint32_t> what{};
-    };
-
-    HWY_NOINLINE void connect_all()
+    // An exit after a scattering, sampled by a direction that leaves: see Walk::connect.
+    HWY_INLINE void connect(FloatMask mask, const Photons& at, const Vectors& before, double side, PacketRandom& random)
     {
-        PacketRandom random(m_connection_random);
-        for (std::size_t i = 0; i < m_requests.count; i += lane_count) {
-            const FloatMask valid = hn::FirstN(floats, m_requests.count - i);
-            connect(valid, i, -1.0, random);
-            if (!m_half_space)
-                connect(valid, i, 1.0, random);
-        }
-        random.store();
-        m_requests.count = 0;
-    }
-
-    HWY_INLINE void connect(FloatMask valid, std::size_t i, double side, PacketRandom& random)
-    {
-        const Vectors x{hn::LoadU(floats, m_requests.x.data() + i), hn::LoadU(floats, m_requests.y.data() + i),
-                        hn::LoadU(floats, m_requests.z.data() + i)};
-        const Vectors before{hn::LoadU(floats, m_requests.wx.data() + i), hn::LoadU(floats, m_requests.wy.data() + i),
-                             hn::LoadU(floats, m_requests.wz.data() + i)};
+        const Floats depth = side < 0.0 ? at.x.z : hn::Sub(broadcast(m_medium.thickness), at.x.z);
+        const Floats beyond = hn::Max(hn::Sub(depth, broadcast(rare_exit_distance)), hn::Zero(floats));
+        const FloatMask chosen = hn::And(mask, hn::Lt(random.uniform(), hn::Exp(floats, hn::Neg(beyond))));
+        if (hn::AllFalse(floats, chosen))
+            return;
         const Floats sin2 = hn::Mul(broadcast(m_plan.exit_cone), random.uniform());
         const Floats cos_theta = hn::Sqrt(hn::Sub(broadcast(1.0), sin2));
         const Floats sin_theta = hn::Sqrt(sin2);
         const SinCos azimuth = random_azimuth(random);
         const Vectors w{hn::Mul(sin_theta, azimuth.cosine), hn::Mul(sin_theta, azimuth.sine),
                         hn::Mul(broadcast(side), cos_theta)};
-        const Floats phase = henyey_greenstein_density(m_job.medium.g, dot(before, w));
-        const Floats to_boundary = distance_to_boundary(x.z, w.z);
+        const Floats phase = henyey_greenstein_density(m_medium.g, dot(before, w));
+        const Floats to_boundary = hn::Div(depth, cos_theta);
         const Floats balanced = hn::Div(phase, hn::Add(phase, connection_pdf(w.z)));
-        const Floats probability = hn::Mul(balanced, hn::Exp(floats, hn::Neg(to_boundary)));
+        const Floats probability = hn::Mul(balanced, hn::Exp(floats, hn::Sub(beyond, to_boundary)));
         const Floats rare = broadcast(rare_exit);
-        const FloatMask tallied = hn::And(valid, hn::Lt(hn::Mul(random.uniform(), rare), probability));
-        const Floats weight = hn::Mul(hn::LoadU(floats, m_requests.weight.data() + i), hn::Max(probability, rare));
-        const Floats transmittance = hn::Sub(broadcast(1.0), internal_reflectance(m_job.medium.ior, cos_theta));
-        add_exits(tallied, x, w, to_boundary, hn::Mul(weight, transmittance),
-                  hn::LoadU(words, m_requests.what.data() + i));
+        const FloatMask tallied = hn::And(chosen, hn::Lt(hn::Mul(random.uniform(), rare), probability));
+        const Floats transmittance = hn::Sub(broadcast(1.0), internal_reflectance(m_medium.ior, cos_theta));
+        tally(tallied, at, w, to_boundary,
+              hn::Mul(hn::Mul(at.weight, transmittance), hn::Max(probability, rare)));
     }
 
     const WalkJob& m_job;
+    const Medium& m_medium;
     WalkPlan m_plan;
-    bool m_half_space;
-    Floats m_thickness;
-    float m_sin_theta;
-    float m_cos_theta;
     PacketTally m_tally;
-    std::array<Packet, packet_count> m_packets{};
-    Requests m_requests;
-    RandomState m_connection_random{};
-    std::uint32_t m_batch_word = 0;
-    std::size_t m_next_batch = 0;
-    std::uint64_t m_left_in_batch = 0;
-    std::uint64_t m_unreported = 0;
+    PhotonPool m_pool;
+    RandomState m_random{};
+    std::size_t m_batch = 0;
+    std::uint64_t m_started = 0;     // photons of the batch
+    std::uint64_t m_unreported = 0;  // photons
 };
 
 void walk_packets(const WalkJob& job)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 
 #include "medium/medium.h"
@@ -14,7 +15,7 @@ struct WalkPlan {
     {
         // Scatterings that change the direction as much as one isotropic one.
         const double transport = 1.0 / (1.0 - std::max(0.0, medium.g));
-        last_expected_order = static_cast<std::uint32_t>(2.0 * transport);
+        last_expected_order = 1 + static_cast<std::uint32_t>(0.2 * transport);
         first_roulette = static_cast<std::uint32_t>(8.0 * medium.ior * medium.ior * transport);
     }
 
@@ -22,15 +23,18 @@ struct WalkPlan {
     double exit_cone;
 
     // Up to this order exits are tallied at their expected value at every flight, and sampled by connections too: a
-    // forward-peaked phase function seldom sends such light back to the surface. Beyond it light has forgotten its
-    // direction and finds its way out; then the exits that happen are tallied, because the sum of the expected ones
-    // along a walk varies more than the one that ends it.
+    // forward-peaked phase function seldom sends such light back to the surface. Beyond it the exits that happen are
+    // tallied, because the sum of the expected ones along a walk varies more than the one that ends it.
     std::uint32_t last_expected_order;
 
     // A walk that outlives 2^k first_roulette scatterings goes on with a certain probability at each k. Internal
     // reflection keeps light inside for longer.
     std::uint32_t first_roulette;
 };
+
+// Every photon goes on from its last expected exit as this many walks with an equal part of its weight: after so few
+// scatterings next to nothing is decided yet of where it will leave, and those are not walked again for each.
+inline constexpr std::size_t late_walks = 4;
 
 // In a half-space the chance to be still inside falls like order^-1/2. Giving up as many again makes each octave
 // of orders cost the same and add the same variance.
@@ -42,7 +46,7 @@ inline constexpr double late_roulette_survival = 0.5;
 
 // Exits less likely than this are tallied at random with this weight: unbiased, and the many deep
 // flights that have next to no chance to leave cost one comparison.
-inline constexpr double rare_exit = 0.02;
-inline constexpr double rare_exit_distance = 3.912023005428146;  // exp of its negative is rare_exit
+inline constexpr double rare_exit = 0.1;
+inline constexpr double rare_exit_distance = 2.302585092994046;  // exp of its negative is rare_exit
 
 }  // namespace beamspread
