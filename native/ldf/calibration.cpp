@@ -27,7 +27,7 @@ constexpr double max_scale = 50.0;
 
 // Of Newton's method below. The last is in squares of tolerances.
 constexpr int max_rounds = 200;
-constexpr int max_halvings = 40;
+constexpr double least_part = 1e-3;  // of a step
 constexpr double settled = 1e-6;
 
 // Part of the light that enters. Simulations know nothing of less, and no picture shows it.
@@ -87,7 +87,8 @@ struct Observation {
 
 // The likeliest scale of each bin's power, around 1 with this relative variance, given the totals and within the
 // limits: a quadratic programme with bounds. Its dual has a variable per total, is convex, smooth and piecewise
-// quadratic: solved by Newton's method, halving steps that do not go down.
+// quadratic: solved by Newton's method, halving steps that do not go down. Where bins meet or leave their limits at once
+// no part of Newton's step may; the step for all bins free, than which the dual is nowhere more curved, always does.
 VectorXd likeliest_scale(const VectorXd& power, const VectorXd& relative, const Observation& observed)
 {
     const MatrixXd of_scale = observed.tolerance.cwiseInverse().asDiagonal() * observed.weights * power.asDiagonal();
@@ -106,6 +107,12 @@ VectorXd likeliest_scale(const VectorXd& power, const VectorXd& relative, const 
                 sum += scale(b) * force(b) - (scale(b) - 1.0) * (scale(b) - 1.0) / (2.0 * relative(b));
         return sum;
     };
+    const auto hessian = [&](const VectorXd& free) {
+        MatrixXd h = of_scale * free.asDiagonal() * of_scale.transpose();
+        h.diagonal().array() += 1.0;
+        return h;
+    };
+    const auto most_curved = hessian(relative).ldlt();
     VectorXd pull = VectorXd::Zero(albedos);
     VectorXd scale = VectorXd::Ones(bins);
     for (int round = 0; round < max_rounds; ++round) {
@@ -114,16 +121,15 @@ VectorXd likeliest_scale(const VectorXd& power, const VectorXd& relative, const 
         for (Eigen::Index b = 0; b < bins; ++b)
             if (scale(b) <= 1.0 / max_scale || scale(b) >= max_scale)
                 free(b) = 0.0;
-        MatrixXd hessian = of_scale * free.asDiagonal() * of_scale.transpose();
-        hessian.diagonal().array() += 1.0;
-        VectorXd step = -hessian.ldlt().solve(gradient);
+        VectorXd step = -hessian(free).ldlt().solve(gradient);
         const double slope = gradient.dot(step);
         if (!(-slope > settled))
             break;
         const double here = dual(pull);
-        for (int halving = 0; halving < max_halvings && !(dual(pull + step) < here + 1e-4 * slope); ++halving)
-            step *= 0.5;
-        pull += step;
+        double part = 1.0;
+        while (part > least_part && !(dual(pull + part * step) < here + 1e-4 * part * slope))
+            part *= 0.5;
+        pull += part > least_part ? VectorXd(part * step) : VectorXd(-most_curved.solve(gradient));
         scale = scale_of(pull);
     }
     return scale;

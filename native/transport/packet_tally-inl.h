@@ -41,7 +41,7 @@ constexpr auto chebyshev_coefficients = [] {
 // it is three.
 class PacketTally {
 public:
-    explicit PacketTally(std::span<SideTallies> batches) : m_batches(batches) {}
+    explicit PacketTally(const WalkJob& job) : m_job(job) {}
 
     HWY_INLINE void add(FloatMask mask, Floats x, Floats y, Floats weight, Words what)
     {
@@ -56,7 +56,7 @@ public:
     void finish()
     {
         flush();
-        for (SideTallies& sides : m_batches)
+        for (SideTallies& sides : m_job.tallies)
             for (Tally& tally : sides)
                 to_harmonics(tally);
     }
@@ -114,7 +114,7 @@ private:
         const Words what = hn::LoadU(words, m_what.data() + first);
         const FloatMask transmitted = float_mask(hn::TestBit(what, hn::Set(words, 1u << side_shift)));
         const Floats centre =
-            hn::IfThenElse(transmitted, broadcast(m_batches[0][1].centre), broadcast(m_batches[0][0].centre));
+            hn::IfThenElse(transmitted, broadcast(m_job.tallies[0][1].centre), broadcast(m_job.tallies[0][0].centre));
         const Floats x = hn::Sub(hn::LoadU(floats, m_x.data() + first), centre);
         const Floats y = hn::LoadU(floats, m_y.data() + first);
         const Floats r = hn::Sqrt(hn::MulAdd(x, x, hn::Mul(y, y)));
@@ -143,11 +143,14 @@ private:
     HWY_INLINE void add_one(std::size_t i)
     {
         const std::uint32_t what = m_what[i];
-        Tally& tally = m_batches[what >> batch_shift][(what >> side_shift) & 1u];
+        const std::size_t batch = what >> batch_shift;
+        const std::size_t side = (what >> side_shift) & 1u;
+        Tally& tally = m_job.tallies[batch / m_job.batches_per_tally][side];
         const auto bin = static_cast<std::size_t>(m_order_bin[i]);
         add_blocks(tally.ring(bin, static_cast<std::size_t>(m_radius_bin[i])), harmonics_of(bin), m_x[i], m_weight[i]);
         const auto w = static_cast<double>(m_weight[i]);
         const double n = static_cast<double>(what & (max_order - 1));
+        m_job.weights[batch][side][bin] += w;
         tally.weight[bin] += w;
         tally.weight_order[bin] += w * n;
         tally.weight_order2[bin] += w * n * n;
@@ -195,7 +198,7 @@ private:
         }
     }
 
-    std::span<SideTallies> m_batches;
+    const WalkJob& m_job;
     std::size_t m_count = 0;
     Queue<float> m_x{};  // then cos(phi)
     Queue<float> m_y{};

@@ -20,6 +20,9 @@ namespace {
 
 constexpr std::uint64_t enough_photons_per_job = 200'000;
 
+// Consecutive ones, see transport/map_scatter.h.
+constexpr std::size_t batches_per_group = batch_count / group_count;
+
 // The far side's distribution peaks where the beam leaves, if light has not forgotten its direction by then, and with
 // it the few scatterings that light of low albedos has; deeper down it is broad, and its centre stays behind.
 double far_side_centre(const Medium& medium, double theta_inside)
@@ -121,18 +124,25 @@ AngleResult normalized(double angle_deg, const AngleSums& sums, double photons)
     return result;
 }
 
-void merge_batch(std::size_t index, SideTallies batch, AngleSums& sums)
+// What one thread walked: consecutive batches.
+struct JobSums {
+    std::vector<SideTallies> groups;
+    std::vector<SideWeights> batches;
+};
+
+void merge(std::size_t first_batch, JobSums job, AngleSums& sums)
 {
-    for (std::size_t side = 0; side < side_count; ++side) {
-        const auto& weight = batch[side].weight;
-        sums.batch_totals[side].insert(sums.batch_totals[side].end(), weight.begin(), weight.end());
-    }
-    SideTallies& group = sums.groups[index % group_count];
-    if (group[0].moments.empty())
-        group = std::move(batch);
-    else
+    for (const SideWeights& sides : job.batches)
         for (std::size_t side = 0; side < side_count; ++side)
-            group[side].merge(batch[side]);
+            sums.batch_totals[side].insert(sums.batch_totals[side].end(), sides[side].begin(), sides[side].end());
+    for (std::size_t i = 0; i < job.groups.size(); ++i) {
+        SideTallies& group = sums.groups[first_batch / batches_per_group + i];
+        if (group[0].moments.empty())
+            group = std::move(job.groups[i]);
+        else
+            for (std::size_t side = 0; side < side_count; ++side)
+                group[side].merge(job.groups[i][side]);
+    }
 }
 
 // The first batches take one more each where the photons do not divide evenly.
@@ -200,25 +210,28 @@ std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> 
         const double angle = angles_deg[item / jobs_per_angle];
         const double theta = refracted_angle(angle * radians_per_degree, medium.ior);
         const std::size_t first = item % jobs_per_angle * per_job;
-        std::vector<SideTallies> tallies(per_job, empty_tallies(medium, theta));
+        JobSums sums;
+        for (std::size_t batch = 0; batch < per_job; batch += batches_per_group)
+            sums.groups.push_back(empty_tallies(medium, theta));
+        sums.batches.resize(per_job);
         kernel.walk({medium, theta, seed, std::bit_cast<std::uint64_t>(angle), first,
-                     std::span(batches).subspan(first, per_job), tallies, progress});
-        return tallies;
+                     std::span(batches).subspan(first, per_job), batches_per_group, sums.groups, sums.batches,
+                     progress});
+        return sums;
     };
 
     std::vector<AngleResult> results;
     AngleSums sums;
-    const auto merge_job = [&](std::size_t item, std::vector<SideTallies> tallies) {
+    const auto merge_job = [&](std::size_t item, JobSums job_sums) {
         const std::size_t job = item % jobs_per_angle;
         if (job == 0)
             sums = AngleSums{};
-        for (std::size_t b = 0; b < per_job; ++b)
-            merge_batch(job * per_job + b, std::move(tallies[b]), sums);
+        merge(job * per_job, std::move(job_sums), sums);
         if (job + 1 == jobs_per_angle)
             results.push_back(normalized(angles_deg[item / jobs_per_angle], sums, total_photons));
     };
     with_threads(threads, [&] {
-        parallel_ordered<std::vector<SideTallies>>(angles_deg.size() * jobs_per_angle, walk_job, merge_job);
+        parallel_ordered<JobSums>(angles_deg.size() * jobs_per_angle, walk_job, merge_job);
     });
     progress.finish();
     return results;

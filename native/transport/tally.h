@@ -13,14 +13,17 @@ namespace beamspread {
 enum class Side : std::size_t { reflected = 0, transmitted = 1 };
 inline constexpr std::size_t side_count = 2;
 
+// One number for each bin.
+using OrderWeights = std::array<double, order_bin_count>;
+
 // Sums over photons of weight * cos(m phi), with (r, phi) the place of exit around (centre, 0) and
 // phi = 0 along the beam's direction of travel. Conservative walk: albedo a scales order n by a^n.
 struct Tally {
     double centre = 0.0;          // u of the pole of (r, phi), mean free paths
     std::vector<double> moments;  // [order bin][radius bin][harmonic], see `ring`; empty: nothing leaves this side
-    std::array<double, order_bin_count> weight{};
-    std::array<double, order_bin_count> weight_order{};   // sum of weight * order
-    std::array<double, order_bin_count> weight_order2{};  // sum of weight * order^2
+    OrderWeights weight{};
+    OrderWeights weight_order{};   // sum of weight * order
+    OrderWeights weight_order2{};  // sum of weight * order^2
 
     void allocate() { moments.assign(ring_offsets.back(), 0.0); }
 

@@ -76,14 +76,8 @@ private:
     {
         const double to_boundary = distance_to_boundary(m_w);
         const double flight = -std::log(m_random.uniform_positive());
-        // Far from the boundary the flight itself decides whether its exit is tallied: it comes this
-        // close with the probability exp(-to_boundary) / rare_exit.
-        if (m_order > 0) {
-            if (to_boundary < rare_exit_distance)
-                tally_exit(m_w, to_boundary, m_exit_weight * std::exp(-to_boundary));
-            else if (flight >= to_boundary - rare_exit_distance)
-                tally_exit(m_w, to_boundary, m_exit_weight * rare_exit);
-        }
+        if (m_order > 0)
+            tally_expected(flight, to_boundary);
         m_exit_weight = 1.0;
         if (flight >= to_boundary)
             return turn_back(to_boundary);
@@ -108,6 +102,14 @@ private:
         }
         scatter_after(flight);
         return m_order < m_next_roulette || survive_roulette();
+    }
+
+    // Far from the boundary the flight itself decides whether its exit is tallied: it comes this close with the
+    // probability exp(-to_boundary) / rare_exit.
+    void tally_expected(double flight, double to_boundary)
+    {
+        if (flight >= to_boundary - rare_exit_distance)
+            tally_exit(m_w, to_boundary, m_exit_weight * std::exp(-std::min(to_boundary, rare_exit_distance)));
     }
 
     void scatter_after(double flight)

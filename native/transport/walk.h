@@ -15,6 +15,7 @@
 namespace beamspread {
 
 using SideTallies = std::array<Tally, side_count>;
+using SideWeights = std::array<OrderWeights, side_count>;
 
 // Walks one photon that has entered at O, travelling at theta_inside (radians) from the inward normal
 // toward +u, and adds what leaves after at least one scattering to the tallies: see transport/walk_plan.h. Unscattered
@@ -29,7 +30,9 @@ struct WalkJob {
     std::uint64_t stream;  // of random numbers; with the seed and the batch it determines the result
     std::size_t first_batch;
     std::span<const std::uint64_t> photons;  // of each batch
-    std::span<SideTallies> tallies;          // of each batch
+    std::size_t batches_per_tally;
+    std::span<SideTallies> tallies;  // of as many batches each
+    std::span<SideWeights> weights;  // of each batch
     Progress& progress;
 };
 

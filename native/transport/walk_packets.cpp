@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "medium/fresnel.h"
 #include "transport/packet_flight-inl.h"
@@ -27,7 +28,7 @@ constexpr int flights_per_sweep = 4;
 class PacketWalk {
 public:
     explicit PacketWalk(const WalkJob& job)
-        : m_job(job), m_medium(job.medium), m_plan(job.medium), m_tally(job.tallies)
+        : m_job(job), m_medium(job.medium), m_plan(job.medium), m_tally(job)
     {
         Random random(job.seed, job.stream, job.first_batch);
         PacketRandom::seed(random, m_random);
@@ -94,7 +95,8 @@ private:
             const Flight flight = fly(m_medium, from, random);
             const Floats to_boundary = hn::Div(flight.depth, flight.cosine);
             const Floats reflectance = internal_reflectance(m_medium.ior, flight.cosine);
-            tally_expected(active, from, flight, to_boundary, hn::Sub(broadcast(1.0), reflectance), exit_weight);
+            tally_expected(hn::And(hn::And(active, comes_close(flight)), greater(from.order, hn::Zero(words))), from,
+                           to_boundary, reflectance, exit_weight);
 
             const Deflection deflection = sample_henyey_greenstein(m_medium.g, random.uniform());
             scatter(photons, flight, deflection, random);
@@ -154,6 +156,7 @@ private:
             const FloatMask turns_back =
                 hn::And(hits, hn::Lt(random.uniform(), internal_reflectance(m_medium.ior, flight.cosine)));
             turn_back(photons, turns_back, from, to_boundary, m_medium.thickness);
+            // Fresnel's transmittance is in the decision, and not in the tally.
             const FloatMask leaves = hn::AndNot(turns_back, hits);
             tally(leaves, from, from.w, to_boundary, from.weight);
             active = hn::AndNot(leaves, active);
@@ -185,19 +188,22 @@ private:
                     hn::Or(hn::Or(from.order, from.batch), side));
     }
 
-    // The exits along flights that begin here, instead of waiting for one. Far from the boundary the flight itself
-    // decides whether its exit is tallied: it comes this close with the probability exp(-to_boundary) / rare_exit.
-    HWY_INLINE void tally_expected(FloatMask active, const Photons& from, const Flight& flight, Floats to_boundary,
-                                   Floats transmittance, Floats exit_weight)
+    // Far from the boundary the flight itself decides whether its exit is tallied: it comes this close with the
+    // probability exp(-to_boundary) / rare_exit.
+    static HWY_INLINE FloatMask comes_close(const Flight& flight)
     {
-        const Floats rare_distance = broadcast(rare_exit_distance);
-        const FloatMask close =
-            hn::Or(hn::Lt(to_boundary, rare_distance), hn::Ge(flight.length, hn::Sub(to_boundary, rare_distance)));
-        const FloatMask may_leave = hn::And(close, hn::Gt(transmittance, hn::Zero(floats)));
-        const FloatMask tallied = hn::And(hn::And(active, may_leave), greater(from.order, hn::Zero(words)));
+        return hn::Ge(hn::Mul(hn::Add(flight.length, broadcast(rare_exit_distance)), flight.cosine), flight.depth);
+    }
+
+    // The exits along flights that begin here, instead of waiting for one.
+    HWY_INLINE void tally_expected(FloatMask close, const Photons& from, Floats to_boundary, Floats reflectance,
+                                   Floats exit_weight)
+    {
+        const FloatMask tallied = hn::And(close, hn::Lt(reflectance, broadcast(1.0)));
         if (hn::AllFalse(floats, tallied))
             return;
-        const Floats escape = hn::Exp(floats, hn::Neg(hn::Min(to_boundary, rare_distance)));
+        const Floats escape = hn::Exp(floats, hn::Neg(hn::Min(to_boundary, broadcast(rare_exit_distance))));
+        const Floats transmittance = hn::Sub(broadcast(1.0), reflectance);
         tally(tallied, from, from.w, to_boundary,
               hn::Mul(hn::Mul(from.weight, transmittance), hn::Mul(escape, exit_weight)));
     }
@@ -264,13 +270,20 @@ void walk_scalar(const WalkJob& job)
 {
     for (std::size_t b = 0; b < job.photons.size(); ++b) {
         Random random(job.seed, job.stream, job.first_batch + b);
+        SideTallies& tallies = job.tallies[b / job.batches_per_tally];
+        SideWeights before;
+        for (std::size_t side = 0; side < side_count; ++side)
+            before[side] = tallies[side].weight;
         for (std::uint64_t done = 0; done < job.photons[b];) {
             const std::uint64_t block = std::min(photons_per_progress, job.photons[b] - done);
             for (std::uint64_t i = 0; i < block; ++i)
-                walk_photon(job.medium, job.theta_inside, random, job.tallies[b]);
+                walk_photon(job.medium, job.theta_inside, random, tallies);
             done += block;
             job.progress.advance(static_cast<double>(block));
         }
+        for (std::size_t side = 0; side < side_count; ++side)
+            std::transform(tallies[side].weight.begin(), tallies[side].weight.end(), before[side].begin(),
+                           job.weights[b][side].begin(), std::minus{});
     }
 }
 
