@@ -27,7 +27,7 @@ constexpr double max_scale = 50.0;
 
 // Of Newton's method below. The last is in squares of tolerances.
 constexpr int max_rounds = 200;
-constexpr double least_part = 1e-3;  // of a step
+constexpr double least_damping = 1e-9;
 constexpr double settled = 1e-6;
 
 // Part of the light that enters. Simulations know nothing of less, and no picture shows it.
@@ -87,8 +87,8 @@ struct Observation {
 
 // The likeliest scale of each bin's power, around 1 with this relative variance, given the totals and within the
 // limits: a quadratic programme with bounds. Its dual has a variable per total, is convex, smooth and piecewise
-// quadratic: solved by Newton's method, halving steps that do not go down. Where bins meet or leave their limits at once
-// no part of Newton's step may; the step for all bins free, than which the dual is nowhere more curved, always does.
+// quadratic: solved by Newton's method, damped where bins meet or leave their limits (Levenberg, Marquardt) by the
+// Hessian for all bins free, than which the dual is nowhere more curved: so damped a step always goes down.
 VectorXd likeliest_scale(const VectorXd& power, const VectorXd& relative, const Observation& observed)
 {
     const MatrixXd of_scale = observed.tolerance.cwiseInverse().asDiagonal() * observed.weights * power.asDiagonal();
@@ -112,7 +112,8 @@ VectorXd likeliest_scale(const VectorXd& power, const VectorXd& relative, const 
         h.diagonal().array() += 1.0;
         return h;
     };
-    const auto most_curved = hessian(relative).ldlt();
+    const MatrixXd most_curved = hessian(relative);
+    double damping = 0.0;
     VectorXd pull = VectorXd::Zero(albedos);
     VectorXd scale = VectorXd::Ones(bins);
     for (int round = 0; round < max_rounds; ++round) {
@@ -121,15 +122,20 @@ VectorXd likeliest_scale(const VectorXd& power, const VectorXd& relative, const 
         for (Eigen::Index b = 0; b < bins; ++b)
             if (scale(b) <= 1.0 / max_scale || scale(b) >= max_scale)
                 free(b) = 0.0;
-        VectorXd step = -hessian(free).ldlt().solve(gradient);
-        const double slope = gradient.dot(step);
-        if (!(-slope > settled))
+        const MatrixXd curvature = hessian(free);
+        const auto damped_step = [&]() -> VectorXd {
+            return -(curvature + damping * most_curved).ldlt().solve(gradient);
+        };
+        if (!(gradient.dot(curvature.ldlt().solve(gradient)) > settled))
             break;
         const double here = dual(pull);
-        double part = 1.0;
-        while (part > least_part && !(dual(pull + part * step) < here + 1e-4 * part * slope))
-            part *= 0.5;
-        pull += part > least_part ? VectorXd(part * step) : VectorXd(-most_curved.solve(gradient));
+        damping = damping > least_damping ? 0.1 * damping : 0.0;
+        VectorXd step = damped_step();
+        while (damping < 1.0 && !(dual(pull + step) < here + 1e-4 * gradient.dot(step))) {
+            damping = std::max(10.0 * damping, least_damping);
+            step = damped_step();
+        }
+        pull += step;
         scale = scale_of(pull);
     }
     return scale;
