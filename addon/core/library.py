@@ -7,12 +7,12 @@ from pathlib import Path
 
 from .._load import native
 
-PHOTONS = {"preview": 150_000, "final": 4_000_000}
+PHOTONS = {"preview": 80_000, "final": 4_000_000}
 """Photons per angle for a medium with g .8 and ior 1; see `photons_for`."""
 
 _MAX_PHOTONS = 4_000_000
 
-_FILE_VERSION = 6
+_FILE_VERSION = 7
 """Raised when the simulation changes, so that older cached files are made again."""
 
 SHIPPED_FOLDER = Path(__file__).resolve().parents[1] / "library"

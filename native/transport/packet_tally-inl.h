@@ -7,7 +7,6 @@
 #endif
 
 #include <array>
-#include <span>
 
 #include "transport/packet_math-inl.h"
 #include "transport/tally.h"
@@ -145,8 +144,8 @@ private:
         const std::uint32_t what = m_what[i];
         const std::size_t batch = what >> batch_shift;
         const std::size_t side = (what >> side_shift) & 1u;
-        Tally& tally = m_job.tallies[batch / m_job.batches_per_tally][side];
         const auto bin = static_cast<std::size_t>(m_order_bin[i]);
+        Tally& tally = m_job.tallies[batch / m_job.batches_per_tally][side];
         add_blocks(tally.ring(bin, static_cast<std::size_t>(m_radius_bin[i])), harmonics_of(bin), m_x[i], m_weight[i]);
         const auto w = static_cast<double>(m_weight[i]);
         const double n = static_cast<double>(what & (max_order - 1));

@@ -36,15 +36,15 @@ public:
     {
         const auto number = [&](std::size_t i) { return hn::LoadU(floats, m_numbers[i].data() + first); };
         const auto word = [&](std::size_t i) { return hn::LoadU(words, m_words[i].data() + first); };
-        return {{number(0), number(1), number(2)}, {number(3), number(4), number(5)}, number(6), word(0), word(1),
-                word(2)};
+        return {
+            {number(0), number(1), number(2)}, {number(3), number(4), number(5)}, number(6), word(0), word(1), word(2)};
     }
 
     HWY_INLINE void append(FloatMask mask, const Photons& photons)
     {
         std::size_t i = 0;
-        for (const Floats values : {photons.x.x, photons.x.y, photons.x.z, photons.w.x, photons.w.y, photons.w.z,
-                                    photons.weight})
+        for (const Floats values :
+             {photons.x.x, photons.x.y, photons.x.z, photons.w.x, photons.w.y, photons.w.z, photons.weight})
             store_compressed(mask, floats, values, m_numbers[i++].data() + m_count);
         i = 0;
         for (const Words values : {photons.order, photons.next_roulette, photons.batch})

@@ -27,8 +27,7 @@ constexpr int flights_per_sweep = 4;
 
 class PacketWalk {
 public:
-    explicit PacketWalk(const WalkJob& job)
-        : m_job(job), m_medium(job.medium), m_plan(job.medium), m_tally(job)
+    explicit PacketWalk(const WalkJob& job) : m_job(job), m_medium(job.medium), m_plan(job.medium), m_tally(job)
     {
         Random random(job.seed, job.stream, job.first_batch);
         PacketRandom::seed(random, m_random);
@@ -108,9 +107,8 @@ private:
             const FloatMask connected = hn::AndNot(hn::Or(flight.hits, late), active);
             exit_weight = broadcast(1.0);
             if (!hn::AllFalse(floats, connected)) {
-                const FloatMask rivalled = m_medium.is_half_space()
-                                               ? hn::And(connected, hn::Lt(photons.w.z, hn::Zero(floats)))
-                                               : connected;
+                const FloatMask rivalled =
+                    m_medium.is_half_space() ? hn::And(connected, hn::Lt(photons.w.z, hn::Zero(floats))) : connected;
                 const Floats balanced = hn::Div(deflection.pdf, hn::Add(deflection.pdf, connection_pdf(photons.w.z)));
                 exit_weight = hn::IfThenElse(rivalled, balanced, exit_weight);
                 connect(connected, photons, from.w, -1.0, random);
@@ -175,8 +173,8 @@ private:
         photons.weight = hn::IfThenElse(at_risk, hn::Div(photons.weight, survival), photons.weight);
         const Words next = hn::Min(hn::Add(photons.next_roulette, photons.next_roulette), hn::Set(words, max_order));
         photons.next_roulette = hn::IfThenElse(hn::RebindMask(words, at_risk), next, photons.next_roulette);
-        const FloatMask ends = hn::Or(hn::Ge(random.uniform(), survival),
-                                      greater(photons.order, hn::Set(words, max_order - 1)));
+        const FloatMask ends =
+            hn::Or(hn::Ge(random.uniform(), survival), greater(photons.order, hn::Set(words, max_order - 1)));
         return hn::Not(hn::And(at_risk, ends));
     }
 
@@ -237,8 +235,7 @@ private:
         const Floats rare = broadcast(rare_exit);
         const FloatMask tallied = hn::And(chosen, hn::Lt(hn::Mul(random.uniform(), rare), probability));
         const Floats transmittance = hn::Sub(broadcast(1.0), internal_reflectance(m_medium.ior, cos_theta));
-        tally(tallied, at, w, to_boundary,
-              hn::Mul(hn::Mul(at.weight, transmittance), hn::Max(probability, rare)));
+        tally(tallied, at, w, to_boundary, hn::Mul(hn::Mul(at.weight, transmittance), hn::Max(probability, rare)));
     }
 
     const WalkJob& m_job;
@@ -248,7 +245,7 @@ private:
     PhotonPool m_pool;
     RandomState m_random{};
     std::size_t m_batch = 0;
-    std::uint64_t m_started = 0;     // photons of the batch
+    std::uint64_t m_started = 0;  // photons of the batch
     std::uint64_t m_unreported = 0;  // photons
 };
 

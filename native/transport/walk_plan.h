@@ -46,7 +46,7 @@ inline constexpr double late_roulette_survival = 0.5;
 
 // Exits less likely than this are tallied at random with this weight: unbiased, and the many deep
 // flights that have next to no chance to leave cost one comparison.
-inline constexpr double rare_exit = 0.05;
-inline constexpr double rare_exit_distance = 2.995732273553991;  // exp of its negative is rare_exit
+inline constexpr double rare_exit = 0.02;
+inline constexpr double rare_exit_distance = 3.912023005428146;  // exp of its negative is rare_exit
 
 }  // namespace beamspread
