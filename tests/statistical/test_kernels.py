@@ -4,7 +4,7 @@ import functools
 
 import numpy as np
 import pytest
-from beamspread import Medium, simulate, walk_kernels
+from beamspread import Medium, exact_totals, simulate, walk_kernels
 from scipy import stats
 
 ALBEDOS = (0.05, 0.5, 0.9, 0.99, 0.9999)
@@ -86,6 +86,17 @@ def test_kernels_walk_every_photon(kernel):
     library = simulate(medium, [0.0], 20_000, seed=2, kernel=kernel)
     total = library.reflectance(0, 0.999999) + library.transmittance(0, 0.999999)
     assert total == pytest.approx(1, abs=0.02)
+
+
+@pytest.mark.parametrize("kernel", walk_kernels())
+def test_rare_exits_far_from_the_boundary(kernel):
+    """Light that was scattered about once and crosses a thick slab, against adding-doubling: 4 standard errors."""
+    medium, albedo = Medium(0.0, 1.0, 6.0), 0.05
+    library = simulate(medium, [0.0], 600_000, seed=3, kernel=kernel)
+    exact = exact_totals(medium, [0.0], [albedo])[1][0, 0]
+    error = library.standard_error(0, albedo, "transmitted")
+    assert library.transmittance(0, albedo) == pytest.approx(exact, abs=4 * error)
+    assert error < 0.02 * (exact - np.exp(-6.0))
 
 
 def test_unknown_kernel_is_refused():
