@@ -124,19 +124,29 @@ def test_fft_equals_direct_for_a_lamp(library):
         assert convolve(*arguments, solver="fft") == pytest.approx(convolve(*arguments, solver="direct"), rel=1e-3)
 
 
+def assert_a_field_is_its_direction(library, angle, mean_free_path, solver, allowed):
+    beams = np.random.default_rng(3).random((12, 17), np.float32)
+    direction = np.array(travel(angle, 130), np.float32)
+    field = np.broadcast_to(direction, (12, 17, 3))
+    one, same = (
+        convolve(beams, directions, library, ALBEDO, mean_free_path, 1.0, solver=solver)
+        for directions in (direction, field)
+    )
+    assert same == pytest.approx(one, rel=allowed)
+
+
 @pytest.mark.parametrize("solver", ["fft", "direct"])
 def test_a_field_of_one_direction_is_that_direction(library, solver):
-    """Between simulated angles one direction lacks the harmonics that neither neighbour has, which a spline makes up.
+    assert_a_field_is_its_direction(library, 45, 0.5, solver, 1e-5)
 
-    These are 15 degrees apart here; rings of 2e-3 are what is left of them.
-    """
-    rng = np.random.default_rng(3)
-    beams = rng.random((12, 17), np.float32)
-    for angle, allowed in ((45, 1e-5), (50, 2e-3)):
-        direction = np.array(travel(angle, 130), np.float32)
-        field = np.broadcast_to(direction, (12, 17, 3))
-        one = convolve(beams, direction, library, ALBEDO, 0.5, 1.0, solver=solver)
-        assert convolve(beams, field, library, ALBEDO, 0.5, 1.0, solver=solver) == pytest.approx(one, rel=allowed)
+
+@pytest.mark.parametrize("solver", ["fft", "direct"])
+@pytest.mark.parametrize("ior", [1.0, 1.4])
+@pytest.mark.parametrize("angle", [17, 50, 81])
+def test_a_field_of_one_direction_between_simulated_ones(angle, ior, solver):
+    """One direction lacks the harmonics that neither neighbour has, which a spline makes up: less than `tolerance`."""
+    for mean_free_path in (0.5, 3.0):
+        assert_a_field_is_its_direction(beamspread.library(Medium(0.8, ior)), angle, mean_free_path, solver, 1e-3)
 
 
 def brute_force(beams, angle, azimuth, library, albedo, mean_free_path, pitch):
