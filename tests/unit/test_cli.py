@@ -192,10 +192,15 @@ def test_reader_that_stops_reading(slab_file, tmp_path):
 
 
 def start_on_terminal(folder, *arguments):
-    """The process, and the other end of the terminal that its stderr is."""
+    """The process, and the other end of the terminal that its stderr is. Jobs in the background ignore Ctrl-C."""
     ours, theirs = pty.openpty()
     process = subprocess.Popen(
-        [*COMMAND, *arguments], cwd=folder, env=environment(folder), stdout=subprocess.PIPE, stderr=theirs, text=True
+        ["env", "--default-signal=INT", *COMMAND, *arguments],
+        cwd=folder,
+        env=environment(folder),
+        stdout=subprocess.PIPE,
+        stderr=theirs,
+        text=True,
     )
     os.close(theirs)
     return process, ours
