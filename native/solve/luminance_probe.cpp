@@ -63,7 +63,7 @@ struct LuminanceProbe::Place {
     std::size_t x;
     std::vector<float> near;   // [medium][rank][m]: by light from up to `nearby_sources` away
     std::vector<float> far;    // and from beyond
-    std::vector<float> light;  // of a beam by rank and harmonic
+    std::vector<float> light;  // of a square by rank and harmonic
     std::vector<float> cosine;
     std::vector<float> sine;
     std::vector<float> mean;  // of cosines over a square
