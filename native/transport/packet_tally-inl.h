@@ -44,10 +44,12 @@ public:
 
     HWY_INLINE void add(FloatMask mask, Floats x, Floats y, Floats weight, Words what)
     {
-        store_compressed(mask, floats, x, m_x.data() + m_count);
-        store_compressed(mask, floats, y, m_y.data() + m_count);
-        store_compressed(mask, floats, weight, m_weight.data() + m_count);
-        m_count += store_compressed(mask, words, what, m_what.data() + m_count);
+        const Compression chosen(mask);
+        chosen.store(floats, x, m_x.data() + m_count);
+        chosen.store(floats, y, m_y.data() + m_count);
+        chosen.store(floats, weight, m_weight.data() + m_count);
+        chosen.store(words, what, m_what.data() + m_count);
+        m_count += chosen.count();
         if (m_count > capacity)
             flush();
     }

@@ -42,14 +42,15 @@ public:
 
     HWY_INLINE void append(FloatMask mask, const Photons& photons)
     {
+        const Compression chosen(mask);
         std::size_t i = 0;
         for (const Floats values :
              {photons.x.x, photons.x.y, photons.x.z, photons.w.x, photons.w.y, photons.w.z, photons.weight})
-            store_compressed(mask, floats, values, m_numbers[i++].data() + m_count);
+            chosen.store(floats, values, m_numbers[i++].data() + m_count);
         i = 0;
         for (const Words values : {photons.order, photons.next_roulette, photons.batch})
-            store_compressed(mask, words, values, m_words[i++].data() + m_count);
-        m_count += hn::CountTrue(floats, mask);
+            chosen.store(words, values, m_words[i++].data() + m_count);
+        m_count += chosen.count();
     }
 
 private:
