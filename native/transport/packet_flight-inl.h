@@ -6,9 +6,8 @@
 #define BEAMSPREAD_TRANSPORT_PACKET_FLIGHT_INL_H
 #endif
 
-#include "hwy/contrib/math/math-inl.h"
-#include "medium/medium.h"
 #include "transport/packet_math-inl.h"
+#include "transport/packet_optics-inl.h"
 #include "transport/photon_pool-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -22,11 +21,11 @@ struct Flight {
     FloatMask hits;   // the boundary, before it ends
 };
 
-HWY_INLINE Flight fly(const Medium& medium, const Photons& photons, PacketRandom& random)
+HWY_INLINE Flight fly(const PacketMedium& medium, const Photons& photons, PacketRandom& random)
 {
-    const Floats length = hn::Neg(hn::Log(floats, random.uniform()));
-    const FloatMask up = hn::Lt(photons.w.z, hn::Zero(floats));
-    const Floats depth = hn::IfThenElse(up, photons.x.z, hn::Sub(broadcast(medium.thickness), photons.x.z));
+    const Floats length = minus_log(random.uniform());
+    const Floats depth =
+        hn::IfNegativeThenElse(photons.w.z, photons.x.z, hn::Sub(hn::Set(floats, medium.thickness), photons.x.z));
     // From below: a flight along the surface has a finite end that it never reaches.
     const Floats cosine = hn::Max(hn::Abs(photons.w.z), broadcast(1e-30));
     return {length, depth, cosine, hn::Ge(hn::Mul(length, cosine), depth)};
@@ -44,13 +43,13 @@ HWY_INLINE void scatter(Photons& photons, const Flight& flight, const Deflection
 }
 
 // Inner reflection of some photons, given where they came from.
-HWY_INLINE void turn_back(Photons& photons, FloatMask mask, const Photons& from, Floats to_boundary, double thickness)
+HWY_INLINE void turn_back(Photons& photons, FloatMask mask, const Photons& from, Floats to_boundary, float thickness)
 {
     const auto choose = [mask](Floats value, Floats& to) { to = hn::IfThenElse(mask, value, to); };
     const FloatMask up = hn::Lt(from.w.z, hn::Zero(floats));
     choose(hn::MulAdd(to_boundary, from.w.x, from.x.x), photons.x.x);
     choose(hn::MulAdd(to_boundary, from.w.y, from.x.y), photons.x.y);
-    choose(hn::IfThenElse(up, hn::Zero(floats), broadcast(thickness)), photons.x.z);
+    choose(hn::IfThenElse(up, hn::Zero(floats), hn::Set(floats, thickness)), photons.x.z);
     choose(from.w.x, photons.w.x);
     choose(from.w.y, photons.w.y);
     choose(hn::Neg(from.w.z), photons.w.z);

@@ -162,10 +162,9 @@ public:
     // shortens the mean by 1e-6.
     HWY_INLINE Floats uniform()
     {
-        const Words cell = hn::ShiftRight<9>(bits());
-        const Floats midpoint =
-            hn::Add(hn::ConvertTo(floats, hn::BitCast(hn::RebindToSigned<FloatTag>(), cell)), hn::Set(floats, 0.5f));
-        return hn::Mul(midpoint, hn::Set(floats, 0x1p-23f));
+        // In [1, 2) the bits of a number are equally spaced; the difference is exact.
+        const Words one_to_two = hn::Or(hn::ShiftRight<9>(bits()), hn::Set(words, 0x3f800000u));
+        return hn::Sub(hn::BitCast(floats, one_to_two), hn::Set(floats, 1.0f - 0x1p-24f));
     }
 
 private:
@@ -225,16 +224,18 @@ HWY_INLINE Floats dot(const Vectors& a, const Vectors& b)
 HWY_INLINE Vectors turn(const Vectors& w, Floats cos_theta, Floats sin_theta, const SinCos& azimuth)
 {
     const Floats one = broadcast(1.0);
-    const Floats sign = hn::CopySign(one, w.z);
-    const Floats k = hn::Neg(hn::Div(one, hn::Add(sign, w.z)));
+    const Floats sign_bit = hn::And(w.z, hn::SignBit(floats));
+    const Floats sign = hn::Or(one, sign_bit);
+    const Floats k = hn::Div(broadcast(-1.0), hn::Add(sign, w.z));
     const Floats xy = hn::Mul(hn::Mul(w.x, w.y), k);
     const Floats a = hn::Mul(sin_theta, azimuth.cosine);
     const Floats b = hn::Mul(sin_theta, azimuth.sine);
-    const Floats tangent_x = hn::MulAdd(hn::Mul(sign, w.x), hn::Mul(w.x, k), one);
+    const Floats signed_x = hn::Xor(w.x, sign_bit);
+    const Floats tangent_x = hn::MulAdd(signed_x, hn::Mul(w.x, k), one);
     const Floats bitangent_y = hn::MulAdd(hn::Mul(w.y, w.y), k, sign);
     return {hn::MulAdd(tangent_x, a, hn::MulAdd(xy, b, hn::Mul(w.x, cos_theta))),
-            hn::MulAdd(hn::Mul(sign, xy), a, hn::MulAdd(bitangent_y, b, hn::Mul(w.y, cos_theta))),
-            hn::NegMulAdd(hn::Mul(sign, w.x), a, hn::NegMulAdd(w.y, b, hn::Mul(w.z, cos_theta)))};
+            hn::MulAdd(hn::Xor(xy, sign_bit), a, hn::MulAdd(bitangent_y, b, hn::Mul(w.y, cos_theta))),
+            hn::NegMulAdd(signed_x, a, hn::NegMulAdd(w.y, b, hn::Mul(w.z, cos_theta)))};
 }
 
 // One step of Newton's method brings a length that has strayed from 1 by rounding back.
@@ -244,54 +245,28 @@ HWY_INLINE Vectors renormalized(const Vectors& w)
     return {hn::Mul(w.x, scale), hn::Mul(w.y, scale), hn::Mul(w.z, scale)};
 }
 
-struct Deflection {
-    Floats cos_theta;
-    Floats sin_theta;
-    Floats pdf;  // per steradian
-};
-
-// A sample of the Henyey-Greenstein phase function. With t = 1 + g (2 u - 1) its inverted distribution gives
-//   1 - cos = 2 (1 - g)^2 (1 - u) (1 + g u) / t^2,   1 + cos = 2 (1 + g)^2 u (1 - g (1 - u)) / t^2,
-// which lose no digits for any g, and the density is t^3 / (4 pi (1 - g^2)^2).
-HWY_INLINE Deflection sample_henyey_greenstein(double g, Floats u)
+// -log of a normal number, by the method of FreeBSD's logf as in hn::Log, less what that does for subnormal ones.
+HWY_INLINE Floats minus_log(Floats x)
 {
-    const Floats one = broadcast(1.0);
-    const Floats vg = broadcast(g);
-    const Floats rest = hn::Sub(one, u);
-    const Floats t = hn::MulAdd(vg, hn::Sub(u, rest), one);
-    const Floats inv_t = hn::Div(one, t);
-    const Floats inv_t2 = hn::Mul(inv_t, inv_t);
-    const Floats forward = hn::Mul(rest, hn::MulAdd(vg, u, one));
-    const Floats backward = hn::Mul(u, hn::NegMulAdd(vg, rest, one));
-    const Floats cos_theta = hn::NegMulAdd(hn::Mul(broadcast(2.0 * (1.0 - g) * (1.0 - g)), forward), inv_t2, one);
-    const Floats sin_theta =
-        hn::Mul(hn::Mul(broadcast(2.0 * (1.0 - g * g)), inv_t2), hn::Sqrt(hn::Mul(forward, backward)));
-    const Floats pdf = hn::Mul(hn::Mul(broadcast(0.25 * inv_pi / ((1.0 - g * g) * (1.0 - g * g))), t), hn::Mul(t, t));
-    return {cos_theta, sin_theta, pdf};
-}
-
-// As medium/henyey_greenstein.h and medium/fresnel.h.
-HWY_INLINE Floats henyey_greenstein_density(double g, Floats cos_theta)
-{
-    const Floats denominator = hn::NegMulAdd(broadcast(2.0 * g), cos_theta, broadcast(1.0 + g * g));
-    return hn::Div(broadcast(0.25 * inv_pi * (1.0 - g * g)), hn::Mul(denominator, hn::Sqrt(denominator)));
-}
-
-// From inside to outside.
-HWY_INLINE Floats internal_reflectance(double ior, Floats cos_i)
-{
-    if (ior == 1.0)
-        return hn::Zero(floats);
-    const Floats one = broadcast(1.0);
-    const Floats eta = broadcast(1.0 / ior);
-    const Floats sin2_t = hn::Mul(hn::NegMulAdd(cos_i, cos_i, one), broadcast(ior * ior));
-    const Floats cos_t = hn::Sqrt(hn::Max(hn::Zero(floats), hn::Sub(one, sin2_t)));
-    const Floats eta_cos_i = hn::Mul(eta, cos_i);
-    const Floats eta_cos_t = hn::Mul(eta, cos_t);
-    const Floats parallel = hn::Div(hn::Sub(eta_cos_i, cos_t), hn::Add(eta_cos_i, cos_t));
-    const Floats perpendicular = hn::Div(hn::Sub(cos_i, eta_cos_t), hn::Add(cos_i, eta_cos_t));
-    const Floats mean = hn::Mul(broadcast(0.5), hn::MulAdd(parallel, parallel, hn::Mul(perpendicular, perpendicular)));
-    return hn::IfThenElse(hn::Ge(sin2_t, one), one, mean);
+    const hn::RebindToSigned<FloatTag> integers;
+    constexpr std::int32_t bits_of_one = 0x3f800000;
+    constexpr std::int32_t bits_of_sqrt_half = 0x3f3504f3;
+    constexpr int mantissa_bits = 23;
+    const auto bits = hn::Add(hn::BitCast(integers, x), hn::Set(integers, bits_of_one - bits_of_sqrt_half));
+    const Floats exponent = hn::ConvertTo(floats, hn::Sub(hn::ShiftRight<mantissa_bits>(bits), hn::Set(integers, 127)));
+    const Floats y = hn::BitCast(floats, hn::Add(hn::And(bits, hn::Set(integers, (1 << mantissa_bits) - 1)),
+                                                 hn::Set(integers, bits_of_sqrt_half)));  // in [sqrt(1/2), sqrt(2))
+    const Floats f = hn::Sub(y, broadcast(1.0));
+    const Floats s = hn::Div(f, hn::Add(y, broadcast(1.0)));
+    const Floats s2 = hn::Mul(s, s);
+    const Floats s4 = hn::Mul(s2, s2);
+    const Floats odd = hn::MulAdd(hn::Set(floats, 0.28498786688f), s4, hn::Set(floats, 0.66666662693f));
+    const Floats even = hn::MulAdd(hn::Set(floats, 0.24279078841f), s4, hn::Set(floats, 0.40000972152f));
+    const Floats series = hn::MulAdd(odd, s2, hn::Mul(even, s4));
+    // log 2 in two parts, the first of which has few digits.
+    const Floats low = hn::Mul(exponent, hn::Set(floats, 9.0580006145e-6f));
+    const Floats rest = hn::Sub(hn::MulSub(s, hn::Sub(f, series), low), f);
+    return hn::NegMulAdd(exponent, hn::Set(floats, 0.69313812256f), rest);
 }
 
 }  // namespace HWY_NAMESPACE

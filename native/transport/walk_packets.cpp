@@ -11,9 +11,10 @@
 #include <cmath>
 #include <functional>
 
-#include "medium/fresnel.h"
+#include "hwy/contrib/math/math-inl.h"
 #include "transport/packet_flight-inl.h"
 #include "transport/packet_math-inl.h"
+#include "transport/packet_optics-inl.h"
 #include "transport/packet_tally-inl.h"
 #include "transport/photon_pool-inl.h"
 #include "transport/walk_plan.h"
@@ -93,11 +94,11 @@ private:
             const Photons from = photons;
             const Flight flight = fly(m_medium, from, random);
             const Floats to_boundary = hn::Div(flight.depth, flight.cosine);
-            const Floats reflectance = internal_reflectance(m_medium.ior, flight.cosine);
+            const Floats reflectance = m_medium.boundary.reflectance(flight.cosine);
             tally_expected(hn::And(hn::And(active, comes_close(flight)), greater(from.order, hn::Zero(words))), from,
                            to_boundary, reflectance, exit_weight);
 
-            const Deflection deflection = sample_henyey_greenstein(m_medium.g, random.uniform());
+            const Deflection deflection = m_medium.phase.sample(random.uniform());
             scatter(photons, flight, deflection, random);
             const FloatMask turns_back = hn::And(flight.hits, hn::Lt(random.uniform(), reflectance));
             turn_back(photons, turns_back, from, to_boundary, m_medium.thickness);
@@ -108,11 +109,11 @@ private:
             exit_weight = broadcast(1.0);
             if (!hn::AllFalse(floats, connected)) {
                 const FloatMask rivalled =
-                    m_medium.is_half_space() ? hn::And(connected, hn::Lt(photons.w.z, hn::Zero(floats))) : connected;
+                    m_medium.is_half_space ? hn::And(connected, hn::Lt(photons.w.z, hn::Zero(floats))) : connected;
                 const Floats balanced = hn::Div(deflection.pdf, hn::Add(deflection.pdf, connection_pdf(photons.w.z)));
                 exit_weight = hn::IfThenElse(rivalled, balanced, exit_weight);
                 connect(connected, photons, from.w, -1.0, random);
-                if (!m_medium.is_half_space())
+                if (!m_medium.is_half_space)
                     connect(connected, photons, from.w, 1.0, random);
             }
             if (const FloatMask leaving = hn::And(active, late); !hn::AllFalse(floats, leaving)) {
@@ -148,11 +149,11 @@ private:
     {
         const Photons from = photons;
         const Flight flight = fly(m_medium, from, random);
-        scatter(photons, flight, sample_henyey_greenstein(m_medium.g, random.uniform()), random);
+        scatter(photons, flight, m_medium.phase.sample(random.uniform()), random);
         if (const FloatMask hits = hn::And(active, flight.hits); !hn::AllFalse(floats, hits)) {
             const Floats to_boundary = hn::Div(flight.depth, flight.cosine);
             const FloatMask turns_back =
-                hn::And(hits, hn::Lt(random.uniform(), internal_reflectance(m_medium.ior, flight.cosine)));
+                hn::And(hits, hn::Lt(random.uniform(), m_medium.boundary.reflectance(flight.cosine)));
             turn_back(photons, turns_back, from, to_boundary, m_medium.thickness);
             // Fresnel's transmittance is in the decision, and not in the tally.
             const FloatMask leaves = hn::AndNot(turns_back, hits);
@@ -217,7 +218,7 @@ private:
     // An exit after a scattering, sampled by a direction that leaves: see Walk::connect.
     HWY_INLINE void connect(FloatMask mask, const Photons& at, const Vectors& before, double side, PacketRandom& random)
     {
-        const Floats depth = side < 0.0 ? at.x.z : hn::Sub(broadcast(m_medium.thickness), at.x.z);
+        const Floats depth = side < 0.0 ? at.x.z : hn::Sub(hn::Set(floats, m_medium.thickness), at.x.z);
         const Floats beyond = hn::Max(hn::Sub(depth, broadcast(rare_exit_distance)), hn::Zero(floats));
         const FloatMask chosen = hn::And(mask, hn::Lt(random.uniform(), hn::Exp(floats, hn::Neg(beyond))));
         if (hn::AllFalse(floats, chosen))
@@ -228,18 +229,18 @@ private:
         const SinCos azimuth = random_azimuth(random);
         const Vectors w{hn::Mul(sin_theta, azimuth.cosine), hn::Mul(sin_theta, azimuth.sine),
                         hn::Mul(broadcast(side), cos_theta)};
-        const Floats phase = henyey_greenstein_density(m_medium.g, dot(before, w));
+        const Floats phase = m_medium.phase.pdf(dot(before, w));
         const Floats to_boundary = hn::Div(depth, cos_theta);
         const Floats balanced = hn::Div(phase, hn::Add(phase, connection_pdf(w.z)));
         const Floats probability = hn::Mul(balanced, hn::Exp(floats, hn::Sub(beyond, to_boundary)));
         const Floats rare = broadcast(rare_exit);
         const FloatMask tallied = hn::And(chosen, hn::Lt(hn::Mul(random.uniform(), rare), probability));
-        const Floats transmittance = hn::Sub(broadcast(1.0), internal_reflectance(m_medium.ior, cos_theta));
+        const Floats transmittance = hn::Sub(broadcast(1.0), m_medium.boundary.reflectance(cos_theta));
         tally(tallied, at, w, to_boundary, hn::Mul(hn::Mul(at.weight, transmittance), hn::Max(probability, rare)));
     }
 
     const WalkJob& m_job;
-    const Medium& m_medium;
+    PacketMedium m_medium;
     WalkPlan m_plan;
     PacketTally m_tally;
     PhotonPool m_pool;
