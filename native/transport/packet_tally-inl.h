@@ -6,6 +6,8 @@
 #define BEAMSPREAD_TRANSPORT_PACKET_TALLY_INL_H
 #endif
 
+#include <hwy/cache_control.h>
+
 #include <array>
 
 #include "transport/packet_math-inl.h"
@@ -64,17 +66,19 @@ public:
 
 private:
     static constexpr std::size_t capacity = 256;
+    static constexpr std::size_t exits_ahead = 8;
     template <class T>
     using Queue = std::array<T, capacity + 2 * lane_count>;
 
     static void to_harmonics(Tally& tally)
     {
-        if (tally.moments.empty())
-            return;
-        for (std::size_t order = 0; order < order_bin_count; ++order)
+        for (std::size_t order = 0; order < order_bin_count; ++order) {
+            if (tally.weight[order] == 0.0)
+                continue;
             for (std::size_t radius = 0; radius < radius_bin_count; ++radius)
                 if (double* sums = tally.ring(order, radius); sums[0] != 0.0)
                     blocks_to_harmonics(sums, harmonics_of(order));
+        }
     }
 
     // From sums of T_8j c^k to sums of T_8j+k = 2 T_8j T_k - T_8j-k.
@@ -102,7 +106,12 @@ private:
         for (std::size_t i = 0; i < m_count; i += lane_count)
             find_bins(i);
         for (std::size_t i = 0; i < m_count; ++i)
+            m_ring[i] = find_ring(i);
+        for (std::size_t i = 0; i < m_count; ++i) {
+            if (i + exits_ahead < m_count)
+                fetch_ring(i + exits_ahead);
             add_one(i);
+        }
         m_count = 0;
     }
 
@@ -141,14 +150,34 @@ private:
         hn::StoreU(hn::IfThenElse(exact, order, binned), integers, m_order_bin.data() + first);
     }
 
+    HWY_INLINE Tally& tally_of(std::uint32_t what) const
+    {
+        return m_job.tallies[(what >> batch_shift) / m_job.batches_per_tally][(what >> side_shift) & 1u];
+    }
+
+    HWY_INLINE double* find_ring(std::size_t i) const
+    {
+        return tally_of(m_what[i]).ring(static_cast<std::size_t>(m_order_bin[i]),
+                                        static_cast<std::size_t>(m_radius_bin[i]));
+    }
+
+    // The processor cannot foresee which ring is next, and would wait for memory at each.
+    HWY_INLINE void fetch_ring(std::size_t i) const
+    {
+        const double* ring = m_ring[i];
+        const std::size_t count = harmonics_of(static_cast<std::size_t>(m_order_bin[i]));
+        for (std::size_t m = 0; m < count; m += block)
+            hwy::Prefetch(ring + m);
+    }
+
     HWY_INLINE void add_one(std::size_t i)
     {
         const std::uint32_t what = m_what[i];
         const std::size_t batch = what >> batch_shift;
         const std::size_t side = (what >> side_shift) & 1u;
         const auto bin = static_cast<std::size_t>(m_order_bin[i]);
-        Tally& tally = m_job.tallies[batch / m_job.batches_per_tally][side];
-        add_blocks(tally.ring(bin, static_cast<std::size_t>(m_radius_bin[i])), harmonics_of(bin), m_x[i], m_weight[i]);
+        Tally& tally = tally_of(what);
+        add_blocks(m_ring[i], harmonics_of(bin), m_x[i], m_weight[i]);
         const auto w = static_cast<double>(m_weight[i]);
         const double n = static_cast<double>(what & (max_order - 1));
         m_job.weights[batch][side][bin] += w;
@@ -207,6 +236,7 @@ private:
     Queue<std::uint32_t> m_what{};
     Queue<std::int32_t> m_order_bin{};
     Queue<std::int32_t> m_radius_bin{};
+    Queue<double*> m_ring{};
 };
 
 }  // namespace HWY_NAMESPACE

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/huge_pages.h"
 #include "transport/bins.h"
 
 namespace beamspread {
@@ -20,7 +21,8 @@ using OrderWeights = std::array<double, order_bin_count>;
 // phi = 0 along the beam's direction of travel. Conservative walk: albedo a scales order n by a^n.
 struct Tally {
     double centre = 0.0;          // u of the pole of (r, phi), mean free paths
-    std::vector<double> moments;  // [order bin][radius bin][harmonic], see `ring`; empty: nothing leaves this side
+    // [order bin][radius bin][harmonic], see `ring`; empty: nothing leaves this side
+    std::vector<double, HugePageAllocator<double>> moments;
     OrderWeights weight{};
     OrderWeights weight_order{};   // sum of weight * order
     OrderWeights weight_order2{};  // sum of weight * order^2
@@ -64,9 +66,11 @@ struct Tally {
 
     void merge(const Tally& other)
     {
-        for (std::size_t i = 0; i < moments.size(); ++i)
-            moments[i] += other.moments[i];
         for (std::size_t b = 0; b < order_bin_count; ++b) {
+            if (other.weight[b] == 0.0)
+                continue;
+            for (std::size_t i = ring_offsets[b]; i < ring_offsets[b + 1]; ++i)
+                moments[i] += other.moments[i];
             weight[b] += other.weight[b];
             weight_order[b] += other.weight_order[b];
             weight_order2[b] += other.weight_order2[b];
