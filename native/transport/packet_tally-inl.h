@@ -9,6 +9,7 @@
 #include <hwy/cache_control.h>
 
 #include <array>
+#include <vector>
 
 #include "transport/packet_math-inl.h"
 #include "transport/tally.h"
@@ -42,7 +43,11 @@ constexpr auto chebyshev_coefficients = [] {
 // it is three.
 class PacketTally {
 public:
-    explicit PacketTally(const WalkJob& job) : m_job(job) {}
+    explicit PacketTally(const WalkJob& job) : m_job(job)
+    {
+        for (std::size_t batch = 0; batch < job.photons.size(); ++batch)
+            m_tallies.push_back(&job.tallies[batch / job.batches_per_tally]);
+    }
 
     HWY_INLINE void add(FloatMask mask, Floats x, Floats y, Floats weight, Words what)
     {
@@ -152,7 +157,7 @@ private:
 
     HWY_INLINE Tally& tally_of(std::uint32_t what) const
     {
-        return m_job.tallies[(what >> batch_shift) / m_job.batches_per_tally][(what >> side_shift) & 1u];
+        return (*m_tallies[what >> batch_shift])[(what >> side_shift) & 1u];
     }
 
     HWY_INLINE double* find_ring(std::size_t i) const
@@ -229,6 +234,7 @@ private:
     }
 
     const WalkJob& m_job;
+    std::vector<SideTallies*> m_tallies;  // of each batch: a division for each exit would take time
     std::size_t m_count = 0;
     Queue<float> m_x{};  // then cos(phi)
     Queue<float> m_y{};
