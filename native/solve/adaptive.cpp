@@ -196,7 +196,7 @@ private:
         const LightTerms terms = light_terms({{m_channel.irradiance, m_problem.directions}},
                                              {{m_channel.library, m_channel.albedo, m_channel.mean_free_path}},
                                              std::max(m_problem.pitch_x, m_problem.pitch_y), 1e-3 * kernel_error,
-                                             [&](const KernelDecomposition& kernels, const std::vector<LightField>&) {
+                                             [&](const KernelDecomposition& kernels, const std::vector<LightPyramid>&) {
                                                  return kernels.within(kernel_error);
                                              });
         std::vector<TexelKernels> kernels;

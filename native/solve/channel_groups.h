@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "solve/light_field.h"
 #include "solve/low_rank.h"
 #include "solve/problem.h"
 

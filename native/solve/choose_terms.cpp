@@ -104,21 +104,21 @@ std::vector<Texel> worst_texels(const std::vector<Texel>& texels, const Eigen::A
 
 }  // namespace
 
-std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const std::vector<LightField>& lights,
+std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const std::vector<LightPyramid>& lights,
                                       double pitch_x, double pitch_y, double tolerance)
 {
     std::vector<std::size_t> candidates(kernels.terms().size());
     std::iota(candidates.begin(), candidates.end(), std::size_t{0});
-    const View2D<const float>& plane = lights.front().irradiance;
-    if (candidates.empty() || plane.height * plane.width <= small_plane * small_plane)
+    const std::size_t height = lights.front().height();
+    const std::size_t width = lights.front().width();
+    if (candidates.empty() || height * width <= small_plane * small_plane)
         return candidates;
 
     std::vector<float> transforms;
     for (const KernelDecomposition::Term& term : kernels.terms())
         transforms.push_back(term.m > 0 ? 2.0f : 1.0f);
-    const std::vector<LightPyramid> pyramids(lights.begin(), lights.end());
-    const LuminanceProbe probe(pyramids, kernels.basis(candidates, rounding), pitch_x, pitch_y);
-    std::vector<Texel> texels = probe_texels(pyramids);
+    const LuminanceProbe probe(lights, kernels.basis(candidates, rounding), pitch_x, pitch_y);
+    std::vector<Texel> texels = probe_texels(lights);
     std::vector<LuminanceProbe::Reading> readings;
     for (std::size_t round = 0;; ++round) {
         const std::size_t known = readings.size();
@@ -130,8 +130,7 @@ std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const 
         Choice choice = leave_out(relative_parts(readings, candidates.size(), tolerance), transforms);
         if (round == refinements)
             return std::move(choice.kept);
-        const std::vector<Texel> more =
-            texels_around(worst_texels(texels, choice.error), plane.height, plane.width, round);
+        const std::vector<Texel> more = texels_around(worst_texels(texels, choice.error), height, width, round);
         texels.insert(texels.end(), more.begin(), more.end());
     }
 }

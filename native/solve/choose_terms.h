@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "solve/light_pyramid.h"
 #include "solve/low_rank.h"
 
 namespace beamspread {
@@ -14,7 +15,7 @@ namespace beamspread {
 // Errors of kernels cancel over light that varies smoothly and add up in the dark beside it, so the luminance decides,
 // at some texels: what every term brings there is found first, and then terms are left out as long as all that is left
 // out stays within a share of the tolerance. Small planes keep all.
-std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const std::vector<LightField>& lights,
+std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const std::vector<LightPyramid>& lights,
                                       double pitch_x, double pitch_y, double tolerance);
 
 }  // namespace beamspread

@@ -72,7 +72,7 @@ public:
           m_luminance(luminance),
           m_terms(light_terms(group.lights, group.media, std::max(plane.pitch_x, plane.pitch_y),
                               std::min(1e-2 * plane.tolerance, most_beyond),
-                              [&](const KernelDecomposition& kernels, const std::vector<LightField>& lights) {
+                              [&](const KernelDecomposition& kernels, const std::vector<LightPyramid>& lights) {
                                   return choose_terms(kernels, lights, plane.pitch_x, plane.pitch_y, plane.tolerance);
                               })),
           m_levels(

@@ -1,8 +1,11 @@
 #include "solve/light_pyramid.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "base/threads.h"
+#include "solve/loops.h"
 
 namespace beamspread {
 
@@ -10,6 +13,29 @@ namespace {
 
 // Mean directions this long stand for all; shorter ones are means of too different directions.
 constexpr float even_length = 0.98f;
+
+// Of texels whose angles are all the same to about a quarter of a degree.
+constexpr float one_angle_length = 0.99999f;
+
+// Rows of squares, and squares whose sums are in the cache at once.
+constexpr std::size_t rows_per_item = 8;
+constexpr std::size_t squares_at_once = 64;
+
+double half_tangent(const Vec3f& direction)
+{
+    return static_cast<double>(std::sqrt(direction.x * direction.x + direction.y * direction.y) / (1.0f - direction.z));
+}
+
+// Of the sum of directions times irradiance, makes the mean direction, if it is at least so long.
+bool normalize(SquareBeam& sum, float least_length)
+{
+    const float length = glm::length(sum.direction);
+    if (length < least_length * sum.irradiance)
+        return false;
+    if (length > 0.0f)
+        sum.direction *= 1.0f / length;
+    return true;
+}
 
 // The four squares that make up one of the next level: with their mean direction where directions hardly differ, else
 // with that of the beam in the middle of the light.
@@ -20,13 +46,8 @@ SquareBeam merge(const std::array<SquareBeam, 4>& beams)
         sum.irradiance += beam.irradiance;
         sum.direction += beam.irradiance * beam.direction;
     }
-    if (sum.irradiance == 0.0f)
-        return {};
-    const float length = glm::length(sum.direction);
-    if (length >= even_length * sum.irradiance) {
-        sum.direction /= length;
+    if (normalize(sum, even_length))
         return sum;
-    }
     float passed = 0.0f;
     for (std::size_t i = 0; 2.0f * passed < sum.irradiance && i < beams.size(); ++i) {
         passed += beams[i].irradiance;
@@ -56,22 +77,92 @@ SquareBeam add_up(const LightField& light, std::size_t y, std::size_t x)
 
 LightPyramid::LightPyramid(const LightField& light) : m_light(light)
 {
-    static_assert(first_level == 2);
-    for (m_top = first_level;; ++m_top) {
-        const auto squares = [&](std::size_t texels) { return ((texels - 1) >> m_top) + 1; };
-        Level level{squares(height()), squares(width()), {}};
+    add_up_texels();
+    while (m_levels.back().beams.size() > 1) {
+        ++m_top;
+        Level level{squares(height(), m_top), squares(width(), m_top), {}};
         level.beams.resize(level.height * level.width);
         parallel_for(level.height, [&](std::size_t y) {
             for (std::size_t x = 0; x < level.width; ++x)
                 level.beams[y * level.width + x] =
-                    m_top == first_level
-                        ? add_up<first_level>(m_light, y, x)
-                        : merge({beam(m_top - 1, 2 * y, 2 * x), beam(m_top - 1, 2 * y, 2 * x + 1),
-                                 beam(m_top - 1, 2 * y + 1, 2 * x), beam(m_top - 1, 2 * y + 1, 2 * x + 1)});
+                    merge({beam(m_top - 1, 2 * y, 2 * x), beam(m_top - 1, 2 * y, 2 * x + 1),
+                           beam(m_top - 1, 2 * y + 1, 2 * x), beam(m_top - 1, 2 * y + 1, 2 * x + 1)});
         });
         m_levels.push_back(std::move(level));
-        if (m_levels.back().beams.size() == 1)
-            return;
+    }
+}
+
+void LightPyramid::add_up_texels()
+{
+    m_top = first_level;
+    Level level{squares(height(), m_top), squares(width(), m_top), {}};
+    level.beams.resize(level.height * level.width);
+    parallel_ordered<AngleCounts>(
+        (level.height + rows_per_item - 1) / rows_per_item,
+        [&](std::size_t item) {
+            AngleCounts angles;
+            for (std::size_t y = item * rows_per_item; y < std::min(level.height, (item + 1) * rows_per_item); ++y)
+                for (std::size_t x = 0; x < level.width; x += squares_at_once)
+                    add_up_squares(y, x, std::min(level.width, x + squares_at_once), level, angles);
+            return angles;
+        },
+        [&](std::size_t, const AngleCounts& angles) { m_angles.add(angles); });
+    m_levels.push_back(std::move(level));
+}
+
+void LightPyramid::add_texels(AngleCounts& angles, std::size_t y, std::size_t x) const
+{
+    constexpr std::size_t side = std::size_t{1} << first_level;
+    for (std::size_t i = 0; i < side * side; ++i) {
+        const SquareBeam texel = beam(0, y * side + i / side, x * side + i % side);
+        if (texel.irradiance > 0.0f)
+            angles.add(half_tangent(texel.direction), static_cast<double>(texel.irradiance), 1.0);
+    }
+}
+
+// Squares [first, end) of a row. Every texel is read here: all that is needed of it is found at once.
+void LightPyramid::add_up_squares(std::size_t y, std::size_t first, std::size_t end, Level& level,
+                                  AngleCounts& angles) const
+{
+    constexpr std::size_t side = std::size_t{1} << first_level;
+    using Columns = std::array<float, side * squares_at_once>;
+    Columns irradiance;
+    Columns half_tangents;
+    Columns power{};
+    Columns to_x{};
+    Columns to_y{};
+    Columns to_z{};
+    Columns texels{};
+    Columns least;
+    Columns most{};
+    least.fill(1.0f);
+    const std::size_t texel = first * side;
+    const std::size_t count = std::min(width(), end * side) - texel;
+    for (std::size_t row = y * side; row < std::min(height(), (y + 1) * side); ++row) {
+        for (std::size_t x = 0; x < count; ++x)
+            irradiance[x] = m_light.irradiance(row, texel + x);
+        add_light(power.data(), to_x.data(), to_y.data(), to_z.data(), half_tangents.data(), irradiance.data(),
+                  m_light.directions.field + 3 * (row * width() + texel), count);
+        add_lit(texels.data(), least.data(), most.data(), half_tangents.data(), irradiance.data(), count);
+    }
+    angles.include(*std::min_element(least.begin(), least.end()), *std::max_element(most.begin(), most.end()));
+    for (std::size_t x = first; x < end; ++x) {
+        const auto sum = [&](const Columns& values) {
+            const float* of = values.data() + (x - first) * side;
+            return (of[0] + of[1]) + (of[2] + of[3]);
+        };
+        SquareBeam beam{sum(power), Vec3f(sum(to_x), sum(to_y), sum(to_z))};
+        if (beam.irradiance == 0.0f)
+            continue;
+        if (normalize(beam, one_angle_length)) {
+            angles.add(half_tangent(beam.direction), static_cast<double>(beam.irradiance),
+                       static_cast<double>(sum(texels)));
+        } else {
+            add_texels(angles, y, x);
+            if (!normalize(beam, even_length))
+                beam = add_up<first_level>(m_light, y, x);
+        }
+        level.beams[y * level.width + x] = beam;
     }
 }
 

@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "base/vec.h"
-#include "solve/present_angles.h"
+#include "solve/angle_counts.h"
+#include "solve/light_field.h"
 
 namespace beamspread {
 
@@ -27,6 +28,9 @@ public:
     std::size_t height() const { return m_light.irradiance.height; }
     std::size_t width() const { return m_light.irradiance.width; }
 
+    // Of the texels.
+    const AngleCounts& angles() const { return m_angles; }
+
     // Dark beyond the plane.
     SquareBeam beam(std::size_t level, std::size_t y, std::size_t x) const;
 
@@ -37,7 +41,13 @@ private:
         std::vector<SquareBeam> beams;
     };
 
+    static std::size_t squares(std::size_t texels, std::size_t level) { return ((texels - 1) >> level) + 1; }
+    void add_up_texels();
+    void add_up_squares(std::size_t y, std::size_t first, std::size_t end, Level& level, AngleCounts& angles) const;
+    void add_texels(AngleCounts& angles, std::size_t y, std::size_t x) const;  // of a square
+
     LightField m_light;
+    AngleCounts m_angles;
     std::size_t m_top = 0;
     std::vector<Level> m_levels;
 };

@@ -69,11 +69,15 @@ LightTerms light_terms(const std::vector<LightField>& lights, const std::vector<
     }
     if (result.changing.empty())
         return result;
-    const PresentAngles present(result.changing);
+    const std::vector<LightPyramid> pyramids(result.changing.begin(), result.changing.end());
+    AngleCounts angles;
+    for (const LightPyramid& pyramid : pyramids)
+        angles.add(pyramid.angles());
+    const PresentAngles present(angles);
     if (present.none())
         return result;
     const KernelDecomposition kernels(present, media, texel);
-    add_basis(result, kernels.basis(choose(kernels, result.changing), beyond));
+    add_basis(result, kernels.basis(choose(kernels, pyramids), beyond));
     return result;
 }
 
@@ -98,14 +102,9 @@ void TermRow::start(const LightTerms& terms, const RowSpan& span)
             row.cosine[i] = light.irradiance(span.y, span.x + i);
         std::fill(row.sine.begin(), row.sine.end(), 0.0f);
         const float* directions = light.directions.field + 3 * (span.y * light.irradiance.width + span.x);
-        find_angles(directions, row.cosine.data(), row.cos_beta.data(), row.sin_beta.data(), row.part.data(),
-                    span.width);
-        for (std::size_t i = 0; i < span.width; ++i) {
-            const double place = std::clamp((static_cast<double>(row.part[i]) - basis.first) * per_step, 0.0,
-                                            static_cast<double>(steps));
-            row.step[i] = std::min(static_cast<std::uint32_t>(place), static_cast<std::uint32_t>(steps - 1));
-            row.part[i] = static_cast<float>(place - static_cast<double>(row.step[i]));
-        }
+        find_angles(directions, row.cosine.data(), row.cos_beta.data(), row.sin_beta.data(), row.u.data(), span.width);
+        find_steps(row.step.data(), row.part.data(), row.u.data(), static_cast<float>(basis.first),
+                   static_cast<float>(per_step), static_cast<std::uint32_t>(steps), span.width);
     }
 }
 

@@ -9,6 +9,7 @@
 
 #include "solve/fft.h"
 #include "solve/kernel_spectra.h"
+#include "solve/light_pyramid.h"
 #include "solve/low_rank.h"
 
 namespace beamspread {
@@ -31,7 +32,8 @@ struct LightTerms {
 };
 
 // The terms of a decomposition that the lights of changing direction need.
-using TermChoice = std::function<std::vector<std::size_t>(const KernelDecomposition&, const std::vector<LightField>&)>;
+using TermChoice =
+    std::function<std::vector<std::size_t>(const KernelDecomposition&, const std::vector<LightPyramid>&)>;
 
 // `texel`: its side in metres. Kernels end where all but the fraction `beyond` of their power lies inside; those of one
 // direction no earlier than for a millionth.

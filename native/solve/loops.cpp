@@ -1,10 +1,15 @@
 #include "solve/loops.h"
 
+#include <array>
 #include <cmath>
+#include <cstring>
 
 #define BEAMSPREAD_CLONES __attribute__((target_clones("default", "avx2", "avx512f")))
 
 namespace beamspread {
+
+// Of harmonics.
+using Block = float __attribute__((vector_size(harmonics_per_block * sizeof(float))));
 
 BEAMSPREAD_CLONES void add_scaled(float* __restrict sum, const float* values, float factor, std::size_t count)
 {
@@ -25,32 +30,50 @@ BEAMSPREAD_CLONES void add_scaled_product(float* __restrict sum, const float* a,
         sum[i] += factor * (a[i] * b[i]);
 }
 
-BEAMSPREAD_CLONES void add_scaled_columns(float* __restrict sum, const float* values, const float* by_column,
-                                          float factor, const std::size_t* columns, std::size_t size,
-                                          std::size_t blocks)
+BEAMSPREAD_CLONES void add_harmonics(float* __restrict sum, const float* values, const float* by_harmonic,
+                                     const std::size_t* first, std::size_t blocks)
 {
     for (std::size_t block = 0; block < blocks; ++block) {
-        const float* column = by_column + columns[block];
-        for (std::size_t i = 0; i < size; ++i)
-            sum[i] += factor * (values[i] * column[i]);
-        sum += size;
-        values += size;
+        const float* harmonics = by_harmonic + first[block];
+        for (std::size_t i = 0; i < harmonics_per_block; ++i)
+            sum[i] += values[i] * harmonics[i];
+        sum += harmonics_per_block;
+        values += harmonics_per_block;
     }
 }
 
-void multiple_angles(float* result, float cosine, std::size_t count)
+BEAMSPREAD_CLONES void multiple_angles(float* __restrict cosine, float* __restrict sine, float cos_angle,
+                                       float sin_angle, std::size_t count)
 {
-    result[0] = 1.0f;
-    result[1] = cosine;
-    // cos((a + b) x) = 2 cos(a x) cos(b x) - cos((a - b) x), with a - b = 0 or 1.
-    for (std::size_t m = 2; m < count; ++m)
-        result[m] = 2.0f * result[m / 2] * result[(m + 1) / 2] - result[m % 2];
+    // Angle times i bit by bit of i: few steps, each for all i at once.
+    constexpr std::array<Block, 3> bits = {Block{0, 1, 0, 1, 0, 1, 0, 1}, Block{0, 0, 1, 1, 0, 0, 1, 1},
+                                           Block{0, 0, 0, 0, 1, 1, 1, 1}};
+    Block c = Block{} + 1.0f;
+    Block s{};
+    for (const Block& bit : bits) {
+        const Block by_cos = 1.0f + bit * (cos_angle - 1.0f);
+        const Block by_sin = bit * sin_angle;
+        const Block next = c * by_cos - s * by_sin;
+        s = s * by_cos + c * by_sin;
+        c = next;
+        const float twice = 2.0f * cos_angle * sin_angle;
+        cos_angle = cos_angle * cos_angle - sin_angle * sin_angle;
+        sin_angle = twice;
+    }
+    for (std::size_t m = 0; m < count; m += harmonics_per_block) {
+        std::memcpy(cosine + m, &c, sizeof(c));
+        std::memcpy(sine + m, &s, sizeof(s));
+        const Block next = c * cos_angle - s * sin_angle;
+        s = s * cos_angle + c * sin_angle;
+        c = next;
+    }
 }
 
-BEAMSPREAD_CLONES void multiply(float* __restrict product, const float* a, const float* b, std::size_t count)
+BEAMSPREAD_CLONES void multiply(float* __restrict product, const float* a, const float* b, float factor,
+                                std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i)
-        product[i] = a[i] * b[i];
+        product[i] = factor * (a[i] * b[i]);
 }
 
 BEAMSPREAD_CLONES void add_product(Complex* sum, const float* factor, const Complex* values, std::size_t count)
@@ -100,6 +123,54 @@ BEAMSPREAD_CLONES void find_angles(const float* directions, const float* irradia
         cos_beta[i] = slants ? x * per_across : 1.0f;
         sin_beta[i] = y * per_across;
         half_tangent[i] = across / (length - z);
+    }
+}
+
+BEAMSPREAD_CLONES void add_light(float* __restrict sum, float* __restrict x, float* __restrict y, float* __restrict z,
+                                 float* __restrict half_tangent, const float* irradiance, const float* directions,
+                                 std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i) {
+        const bool lit = irradiance[i] != 0.0f;
+        const float dx = directions[3 * i];
+        const float dy = directions[3 * i + 1];
+        const float dz = directions[3 * i + 2];
+        const float u = lit ? dx : 0.0f;
+        const float v = lit ? dy : 0.0f;
+        const float w = lit ? dz : -1.0f;
+        sum[i] += irradiance[i];
+        x[i] += irradiance[i] * u;
+        y[i] += irradiance[i] * v;
+        z[i] += irradiance[i] * w;
+        half_tangent[i] = std::sqrt(u * u + v * v) / (std::sqrt(u * u + v * v + w * w) - w);
+    }
+}
+
+BEAMSPREAD_CLONES void add_lit(float* __restrict texels, float* __restrict first, float* __restrict last,
+                               const float* half_tangent, const float* irradiance, std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i) {
+        const bool lit = irradiance[i] != 0.0f;
+        const float least = lit ? half_tangent[i] : 1.0f;
+        texels[i] += lit ? 1.0f : 0.0f;
+        first[i] = least < first[i] ? least : first[i];
+        last[i] = half_tangent[i] > last[i] ? half_tangent[i] : last[i];
+    }
+}
+
+BEAMSPREAD_CLONES void find_steps(std::uint32_t* __restrict step, float* __restrict part, const float* half_tangent,
+                                  float first, float per_step, std::uint32_t steps, std::size_t count)
+{
+    const auto end = static_cast<float>(steps);
+    const auto last = static_cast<std::int32_t>(steps - 1);
+    for (std::size_t i = 0; i < count; ++i) {
+        const float unbounded = (half_tangent[i] - first) * per_step;
+        const float above = unbounded > 0.0f ? unbounded : 0.0f;
+        const float place = above < end ? above : end;
+        const auto whole = static_cast<std::int32_t>(place);
+        const std::int32_t before = whole < last ? whole : last;
+        step[i] = static_cast<std::uint32_t>(before);
+        part[i] = place - static_cast<float>(before);
     }
 }
 

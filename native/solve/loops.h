@@ -18,15 +18,19 @@ void scale(float* product, const float* values, float factor, std::size_t count)
 // sum[i] += factor * a[i] * b[i]
 void add_scaled_product(float* sum, const float* a, const float* b, float factor, std::size_t count);
 
-// sum[i] += factor * values[i] * by_column[columns[i / size] + i % size], in blocks of this size
-void add_scaled_columns(float* sum, const float* values, const float* by_column, float factor,
-                        const std::size_t* columns, std::size_t size, std::size_t blocks);
+// Harmonics of a block: their loops have no remainders, and their number is known when they are compiled.
+inline constexpr std::size_t harmonics_per_block = 8;
 
-// result[m] = cos(m angle) of cosine = cos(angle), m below count >= 2, to some m^2 roundings
-void multiple_angles(float* result, float cosine, std::size_t count);
+// sum[i] += values[i] * by_harmonic[first[i / 8] + i % 8], in blocks of harmonics
+void add_harmonics(float* sum, const float* values, const float* by_harmonic, const std::size_t* first,
+                   std::size_t blocks);
 
-// product[i] = a[i] * b[i]
-void multiply(float* product, const float* a, const float* b, std::size_t count);
+// cosine[m], sine[m] = cos(m angle), sin(m angle) of cos(angle), sin(angle), m below count, a multiple of a block; to
+// some m roundings
+void multiple_angles(float* cosine, float* sine, float cos_angle, float sin_angle, std::size_t count);
+
+// product[i] = factor * a[i] * b[i]
+void multiply(float* product, const float* a, const float* b, float factor, std::size_t count);
 
 // sum[i] += factor[i] * values[i]
 void add_product(Complex* sum, const float* factor, const Complex* values, std::size_t count);
@@ -41,6 +45,19 @@ void turn(float* cosine, float* sine, const float* cos_beta, const float* sin_be
 // zero the direction may be anything.
 void find_angles(const float* directions, const float* irradiance, float* cos_beta, float* sin_beta,
                  float* half_tangent, std::size_t count);
+
+// Adds light that arrives along `directions`, (x, y, z) after (x, y, z): sum += irradiance, (x, y, z) += irradiance
+// times direction; sets tan(theta / 2). Where the irradiance is zero the direction may be anything.
+void add_light(float* sum, float* x, float* y, float* z, float* half_tangent, const float* irradiance,
+               const float* directions, std::size_t count);
+
+// Counts lit texels and widens the ranges [first, last] of their tan(theta / 2).
+void add_lit(float* texels, float* first, float* last, const float* half_tangent, const float* irradiance,
+             std::size_t count);
+
+// Where the tables of a function of tan(theta / 2) have that value: after this step, by this part of the next.
+void find_steps(std::uint32_t* step, float* part, const float* half_tangent, float first, float per_step,
+                std::uint32_t steps, std::size_t count);
 
 // A table's value at a step, and from there to the next.
 struct TableStep {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "ldf/ldf_source.h"
 #include "solve/kernel_spectra.h"
 #include "solve/loops.h"
 #include "solve/present_angles.h"

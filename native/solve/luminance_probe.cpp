@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <complex>
 
 #include "base/threads.h"
 #include "ldf/texel_integral.h"
@@ -18,9 +17,6 @@ constexpr std::size_t squares_between = 2;
 
 constexpr std::size_t angle_steps = 256;
 constexpr float radii_per_octave = 16.0f;
-
-// Harmonics of a block: their loops have no remainders.
-constexpr std::size_t columns_at_once = 8;
 
 // Of the distances of squares looked at as a whole, in units of their size.
 constexpr std::size_t distances_per_size = 8;
@@ -88,8 +84,8 @@ LuminanceProbe::LuminanceProbe(const std::vector<LightPyramid>& lights, const Lo
         harmonics[function.rank] = std::max(harmonics[function.rank], function.m + 1);
     m_starts.push_back(0);
     for (const std::size_t count : harmonics) {
-        const std::size_t padded = (count + columns_at_once - 1) / columns_at_once * columns_at_once;
-        for (std::size_t m = 0; m < padded; m += columns_at_once)
+        const std::size_t padded = (count + harmonics_per_block - 1) / harmonics_per_block * harmonics_per_block;
+        for (std::size_t m = 0; m < padded; m += harmonics_per_block)
             m_columns.push_back(m);
         m_starts.push_back(m_starts.back() + padded);
         m_harmonics = std::max(m_harmonics, padded);
@@ -294,11 +290,13 @@ void LuminanceProbe::add_far(Place& place, std::size_t level, std::size_t y, std
         const float u = beam.direction.x;
         const float v = beam.direction.y;
         const float lengths = std::sqrt(square * (u * u + v * v));
-        const float cosine = lengths > 0.0f ? (offset_x * u + offset_y * v) / lengths : 1.0f;
-        multiple_angles(place.cosine.data(), std::clamp(cosine, -1.0f, 1.0f), m_harmonics);
-        multiply(place.mean.data(), place.cosine.data(), by_width, m_harmonics);
-        add_scaled_columns(place.light.data(), at_angle(beam.direction), place.mean.data(), beam.irradiance,
-                           m_columns.data(), columns_at_once, m_columns.size());
+        const float per_length = lengths > 0.0f ? 1.0f / lengths : 0.0f;
+        const float cosine = lengths > 0.0f ? (offset_x * u + offset_y * v) * per_length : 1.0f;
+        const float sine = (offset_y * u - offset_x * v) * per_length;
+        multiple_angles(place.cosine.data(), place.sine.data(), cosine, sine, m_harmonics);
+        multiply(place.mean.data(), place.cosine.data(), by_width, beam.irradiance, m_harmonics);
+        add_harmonics(place.light.data(), at_angle(beam.direction), place.mean.data(), m_columns.data(),
+                      m_columns.size());
     }
     if (!lit)
         return;
@@ -318,25 +316,19 @@ void LuminanceProbe::add_near(Place& place, std::size_t y, std::size_t x) const
             continue;
         // cos(m beta), sin(m beta); phi -> pi - phi where the texel lies to the left of the light, and phi -> -phi
         // where below.
-        const std::complex<double> travel(static_cast<double>(beam.direction.x), static_cast<double>(beam.direction.y));
-        std::complex<double> once = std::abs(travel) > 0.0 ? travel / std::abs(travel) : 1.0;
-        if (place.x < x)
-            once = -std::conj(once);
-        if (place.y < y)
-            once = std::conj(once);
-        std::complex<double> turned = 1.0;
-        for (std::size_t m = 0; m < m_harmonics; ++m, turned *= once) {
-            place.cosine[m] = static_cast<float>(turned.real());
-            place.sine[m] = static_cast<float>(turned.imag());
-        }
+        const float across = std::hypot(beam.direction.x, beam.direction.y);
+        const float cosine = across > 0.0f ? beam.direction.x / across : 1.0f;
+        const float sine = across > 0.0f ? beam.direction.y / across : 0.0f;
+        multiple_angles(place.cosine.data(), place.sine.data(), place.x < x ? -cosine : cosine,
+                        place.y < y ? -sine : sine, m_harmonics);
         const float* kernels = m_near.data() + 2 * texel * m_media * functions();
         const float* by_angle = at_angle(beam.direction);
         for (const std::vector<float>* phase : {&place.cosine, &place.sine}) {
             std::fill(place.light.begin(), place.light.end(), 0.0f);
-            add_scaled_columns(place.light.data(), by_angle, phase->data(), beam.irradiance, m_columns.data(),
-                               columns_at_once, m_columns.size());
+            add_harmonics(place.light.data(), by_angle, phase->data(), m_columns.data(), m_columns.size());
             for (std::size_t k = 0; k < m_media; ++k, kernels += functions())
-                add_scaled_product(place.near.data() + k * functions(), place.light.data(), kernels, 1.0f, functions());
+                add_scaled_product(place.near.data() + k * functions(), place.light.data(), kernels, beam.irradiance,
+                                   functions());
         }
     }
 }

@@ -3,20 +3,12 @@
 
 #include <array>
 #include <cstddef>
-#include <vector>
 
-#include "base/view.h"
-#include "solve/problem.h"
+#include "solve/angle_counts.h"
 
 namespace beamspread {
 
-// Light of one source on the plane.
-struct LightField {
-    View2D<const float> irradiance;
-    Directions directions;
-};
-
-// Angles as tan(theta / 2), which needs no trigonometry and in which LDFs are smooth everywhere.
+// Angles as tan(theta / 2), as they are counted.
 struct PresentAngles {
     static constexpr std::size_t bins = 64;
     double first = 1.0;  // beyond `last`: nothing is lit
@@ -24,7 +16,7 @@ struct PresentAngles {
     std::array<double, bins> share{};  // in even bins between them, sum 1: mean of those
                                        // of light, of lit texels and of angles
 
-    explicit PresentAngles(const std::vector<LightField>& lights);
+    explicit PresentAngles(const AngleCounts& counts);
 
     bool none() const { return first > last; }
 };
