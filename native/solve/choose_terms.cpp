@@ -22,6 +22,9 @@ constexpr std::size_t small_plane = 192;
 // by.
 constexpr double share = 0.3;
 
+// Of what is allowed: errors that need no weighing.
+constexpr float negligible = 0.05f;
+
 // So often there is a closer look around the texels where errors are largest.
 constexpr std::size_t refinements = 2;
 constexpr std::size_t worst_count = 64;
@@ -60,6 +63,24 @@ struct Choice {
     Eigen::ArrayXf error;  // [texel and medium]
 };
 
+// Leaves out the least, as many as bring no more than `negligible` together anywhere: looking for the best order among
+// them takes longest and changes nothing.
+void leave_out_least(const Eigen::ArrayXXf& parts, Choice& choice)
+{
+    std::vector<std::size_t> order = choice.kept;
+    std::vector<float> most(order.size());
+    parallel_for(most.size(), [&](std::size_t c) { most[c] = parts.col(index(c)).abs().maxCoeff(); });
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return most[a] < most[b]; });
+    float sum = 0.0f;
+    std::size_t dropped = 0;
+    for (; dropped < order.size() && sum + most[order[dropped]] <= negligible; ++dropped) {
+        sum += most[order[dropped]];
+        choice.error += parts.col(index(order[dropped]));
+    }
+    choice.kept.assign(order.begin() + static_cast<std::ptrdiff_t>(dropped), order.end());
+    std::sort(choice.kept.begin(), choice.kept.end());
+}
+
 // Leaves out one after the other, always the one by which the sum of the errors' fourth powers grows least for what it
 // costs, until each would take an error beyond 1.
 Choice leave_out(const Eigen::ArrayXXf& parts, const std::vector<float>& cost)
@@ -67,6 +88,7 @@ Choice leave_out(const Eigen::ArrayXXf& parts, const std::vector<float>& cost)
     Choice choice{std::vector<std::size_t>(cost.size()), Eigen::ArrayXf::Zero(parts.rows())};
     auto& [kept, error] = choice;
     std::iota(kept.begin(), kept.end(), std::size_t{0});
+    leave_out_least(parts, choice);
     std::vector<float> growth;
     while (!kept.empty()) {
         const float now = error.square().square().sum();
