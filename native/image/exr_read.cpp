@@ -1,5 +1,6 @@
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfInputPart.h>
 #include <OpenEXR/ImfMultiPartInputFile.h>
 #include <OpenEXR/ImfPartType.h>
@@ -8,8 +9,11 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <system_error>
 
 #include "base/error.h"
+#include "base/threads.h"
 #include "image/exr.h"
 #include "image/exr_header.h"
 
@@ -23,6 +27,9 @@ constexpr long long max_inflation = 1032;
 constexpr long long inflation_slack = 1 << 20;
 // Tiles are unpacked into a cache of one row of tiles.
 constexpr unsigned max_tile_side = 1 << 14;
+constexpr bool reconstruct = false;  // a truncated file is refused, not guessed at
+// Numbers that take one thread some milliseconds, several times as long as reading some hundred headers once more.
+constexpr long long values_per_reader = 1 << 20;
 
 [[noreturn]] void fail(const std::string& reason)
 {
@@ -101,6 +108,36 @@ ExrPart read_part(Imf::MultiPartInputFile& file, int index)
     return part;
 }
 
+// The bytes of a file for several readers at a time: what one file holds, though another may take its place meanwhile.
+class MemoryStream final : public Imf::IStream {
+public:
+    MemoryStream(const std::string& name, const std::vector<char>& bytes) : IStream(name.c_str()), m_bytes(bytes) {}
+
+    bool read(char* to, int count) override
+    {
+        if (count < 0 || static_cast<std::uint64_t>(count) > m_bytes.size() - m_position)
+            fail("it ends early");
+        std::copy_n(m_bytes.begin() + static_cast<std::ptrdiff_t>(m_position), count, to);
+        m_position += static_cast<std::uint64_t>(count);
+        return m_position < m_bytes.size();
+    }
+    std::uint64_t tellg() override { return m_position; }
+    void seekg(std::uint64_t position) override { m_position = std::min<std::uint64_t>(position, m_bytes.size()); }
+
+private:
+    const std::vector<char>& m_bytes;
+    std::uint64_t m_position = 0;
+};
+
+std::vector<char> bytes_of(const std::string& path)
+{
+    std::vector<char> bytes(std::filesystem::file_size(path));
+    std::ifstream stream(path, std::ios::binary);
+    if (!stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size())))
+        throw std::system_error(errno, std::generic_category());
+    return bytes;
+}
+
 // Opens the file and hands it to `read(file, file_bytes)`; whatever goes wrong becomes an IoError that names the path.
 template <class Read>
 auto with_file(const std::string& path, const Read& read)
@@ -112,7 +149,6 @@ auto with_file(const std::string& path, const Read& read)
             fail(error.message());
         // OpenEXR's thread pool is global state of the host's process: used as the host has set it up, and left so.
         const int host_threads = Imf::globalThreadCount();
-        constexpr bool reconstruct = false;  // a truncated file is refused, not guessed at
         Imf::MultiPartInputFile file(path.c_str(), host_threads, reconstruct);
         return read(file, static_cast<long long>(file_bytes));
     } catch (const std::exception& error) {
@@ -120,16 +156,43 @@ auto with_file(const std::string& path, const Read& read)
     }
 }
 
+// The parts of one file on several threads, each of which reads the headers anew: OpenEXR reads one part at a time.
+std::vector<ExrPart> read_parallel(const std::string& path, const std::vector<int>& readers_of_parts)
+{
+    const std::vector<char> bytes = bytes_of(path);
+    std::vector<ExrPart> parts(readers_of_parts.size());
+    const auto readers = static_cast<std::size_t>(readers_of_parts.back()) + 1;
+    parallel_for(readers, [&](std::size_t reader) {
+        MemoryStream stream(path, bytes);
+        constexpr int own_threads = 0;
+        Imf::MultiPartInputFile file(stream, own_threads, reconstruct);
+        if (static_cast<std::size_t>(file.parts()) != parts.size())
+            fail("it changed while it was read");
+        for (int i = 0; i < file.parts(); ++i) {
+            if (static_cast<std::size_t>(readers_of_parts[static_cast<std::size_t>(i)]) != reader)
+                continue;
+            check_header(file.header(i), static_cast<long long>(bytes.size()));
+            parts[static_cast<std::size_t>(i)] = read_part(file, i);
+        }
+    });
+    return parts;
+}
+
 }  // namespace
 
 std::vector<ExrPart> read_exr_parts(const std::string& path)
 {
-    return with_file(path, [](Imf::MultiPartInputFile& file, long long file_bytes) {
+    return with_file(path, [&path](Imf::MultiPartInputFile& file, long long file_bytes) {
         long long values = 0;
-        for (int i = 0; i < file.parts(); ++i)
+        std::vector<int> readers;  // of each part
+        for (int i = 0; i < file.parts(); ++i) {
+            readers.push_back(static_cast<int>(values / values_per_reader));
             values += check_header(file.header(i), file_bytes);
+        }
         if (values > max_exr_values)
             fail("it holds more than 2^30 numbers");
+        if (readers.back() > 0)
+            return read_parallel(path, readers);
         std::vector<ExrPart> parts;
         for (int i = 0; i < file.parts(); ++i)
             parts.push_back(read_part(file, i));

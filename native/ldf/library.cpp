@@ -24,15 +24,15 @@ constexpr double negligible_log_weight = -60.0;
 // Harmonics at the end of the row that move less than this part of a profile's power only cost time.
 constexpr double negligible_harmonics = 1e-4;
 
-// Sums over the orders, [harmonic][radius bin].
-std::vector<double> contract_orders(const SideResult& side, double albedo)
+// Sums over order bins [first, last), [harmonic][radius bin].
+std::vector<double> contract_orders(const SideResult& side, const std::array<double, order_bin_count>& weights,
+                                    std::size_t first, std::size_t last)
 {
-    const auto weights = order_weights(side, albedo);
     std::vector<double> sums(most_harmonics(side) * radius_bin_count, 0.0);
     const float* ratios = side.ratios.data();
     for (std::size_t b = 0; b < order_bin_count; ++b) {
         const std::size_t harmonics = side.harmonics[b];
-        if (weights[b] != 0.0) {
+        if (b >= first && b < last && weights[b] != 0.0) {
             std::array<double, radius_bin_count> power;
             for (std::size_t k = 0; k < radius_bin_count; ++k) {
                 power[k] = weights[b] * static_cast<double>(side.power[b * radius_bin_count + k]);
@@ -48,18 +48,36 @@ std::vector<double> contract_orders(const SideResult& side, double albedo)
     return sums;
 }
 
-// Nothing but the mirror image of the beam in the far side is as sharp as the finer bins.
-RadialDetail detail_of(const Medium& medium, Side side)
-{
-    const bool mirrors = side == Side::reflected && !medium.is_half_space() && medium.ior > 1.0;
-    return mirrors ? RadialDetail::all : RadialDetail::quarters;
-}
+// From the sums over what is counted in all radius bins, and over what is counted in quarters of octaves.
+struct OrderSums {
+    OrderSums(const Medium& medium, const SideResult& side, double albedo) : centre(side.centre)
+    {
+        const auto weights = order_weights(side, albedo);
+        const std::size_t fine_count = fine_orders(medium);
+        if (fine_count > 0)
+            fine = contract_orders(side, weights, 0, fine_count);
+        quarters = contract_orders(side, weights, fine_count, order_bin_count);
+    }
 
-RadialProfile profile_of(const SideResult& side, const std::vector<double>& sums, RadialDetail detail)
+    RadialProfile profile() const
+    {
+        RadialProfile sum(centre, quarters, RadialDetail::quarters);
+        if (!fine.empty())
+            sum.add(RadialProfile(centre, fine, RadialDetail::all), 1.0, 1.0);
+        sum.drop_negligible(negligible_harmonics);
+        return sum;
+    }
+
+    double centre;
+    std::vector<double> fine;
+    std::vector<double> quarters;
+};
+
+// Relative deviations [harmonic][radius bin] of the powers of the rings, and of harmonics in parts of those.
+void deviate(std::vector<double>& sums, const std::vector<double>& deviations)
 {
-    RadialProfile profile(side.centre, sums, detail);
-    profile.drop_negligible(negligible_harmonics);
-    return profile;
+    for (std::size_t i = sums.size(); i-- > 0;)  // the powers, which come first, last
+        sums[i] += sums[i % radius_bin_count] * deviations[i];
 }
 
 }  // namespace
@@ -242,9 +260,7 @@ std::vector<RadialProfile> LdfLibrary::node_profiles(double albedo, Side side) c
     std::vector<RadialProfile> profiles;
     for (const AngleResult& result : m_results) {
         const SideResult& from = result.sides[static_cast<std::size_t>(side)];
-        profiles.push_back(from.power.empty()
-                               ? RadialProfile()
-                               : profile_of(from, contract_orders(from, albedo), detail_of(m_medium, side)));
+        profiles.push_back(from.power.empty() ? RadialProfile() : OrderSums(m_medium, from, albedo).profile());
     }
     return profiles;
 }
@@ -286,10 +302,10 @@ RadialProfile LdfLibrary::group_profile(double angle_deg, double albedo, Side si
             continue;
         }
         const std::vector<double> deviations = deviations_at(from.deviations, group, albedo);
-        std::vector<double> sums = contract_orders(from, albedo);
-        for (std::size_t i = sums.size(); i-- > 0;)  // the powers, which come first, last
-            sums[i] += sums[i % radius_bin_count] * deviations[i];
-        nodes.push_back(profile_of(from, sums, detail_of(m_medium, side)));
+        OrderSums sums(m_medium, from, albedo);
+        deviate(sums.fine, deviations);
+        deviate(sums.quarters, deviations);
+        nodes.push_back(sums.profile());
     }
     return interpolated(angle_deg, nodes);
 }

@@ -94,7 +94,7 @@ void check_albedo(double albedo);
 LdfLibrary simulate_library(const Medium& medium, const std::vector<double>& angles_deg, std::uint64_t photons,
                             std::uint64_t seed, int threads, std::string_view kernel, Progress& progress);
 
-// One multi-part OpenEXR file; see library_file.cpp for the layout. Throw IoError.
+// One multi-part OpenEXR file; see library_format.h for the layout. Throw IoError.
 void save_library(const LdfLibrary& library, const std::string& path);
 LdfLibrary load_library(const std::string& path);
 

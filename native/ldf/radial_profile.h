@@ -8,10 +8,6 @@
 
 namespace beamspread {
 
-// Whether a profile follows all radius bins, or quarters of octaves only: finer bins hold more noise, which costs where
-// they show nothing.
-enum class RadialDetail { quarters, all };
-
 // g(r, phi) = sum over m of c_m(r) cos(m phi) around (centre, 0), lengths in mean free paths, kept
 // as C_m(r) = integral of c_m(s) s ds from 0 to r: a piecewise cubic through its values at the edges of the
 // radius bins, whose power therefore is exactly what was counted.
@@ -19,7 +15,8 @@ class RadialProfile final : public RadialFunction {
 public:
     RadialProfile();
 
-    // From sums of weight * cos(m phi), [harmonic][radius bin], for as many harmonics as there are.
+    // From sums of weight * cos(m phi), [harmonic][radius bin], for as many harmonics as there are. The cubics meet where
+    // the bins that are counted apart end.
     RadialProfile(double centre, std::span<const double> bin_moments, RadialDetail detail);
 
     // Adds `weight` times another profile, harmonics of even and odd m apart. The centre stays.

@@ -25,6 +25,9 @@ inline std::size_t order_bin(std::uint32_t order)
     return exact_orders + 4 * static_cast<std::size_t>(octave - 4) + quarter;
 }
 
+// Light of fewer scatterings may leave in sharp peaks; then it is blurred.
+inline constexpr std::uint32_t sharp_orders = 8;
+
 // Azimuthal harmonics cos(m phi), m from 0, that are counted at most. Light that was scattered once leaves in a peak
 // ahead of the beam that is about cos(theta) wide; every scattering blurs it. Root mean square of what is missing
 // around a ring, of a bin's power, for beams at 84 to 85 degrees with ior 1 and these numbers of harmonics:
@@ -34,20 +37,20 @@ inline constexpr std::size_t harmonic_count = 64;
 
 inline constexpr std::size_t harmonics_of(std::size_t order_bin)
 {
-    if (order_bin < 8)
+    if (order_bin < sharp_orders)
         return harmonic_count;
     return order_bin < exact_orders ? 32 : 16;
 }
 
 // Radii in mean free paths: bin 0 is [0, 2^-10), then four bins per octave up to 2^12. What leaves farther out is
-// counted in the last bin. Around the beam's mirror image in the far side of a thin slab light peaks so sharply that
-// with four bins texels whose border is next to it had up to 10 % of all light wrong (g .9, ior 1.5, thickness 1, 85
-// degrees); sixteen, within the radii where that matters, leave .5 %.
+// counted in the last bin. Around the beam's mirror images in the sides of a thin slab light peaks so sharply, as 1 / r
+// around each, that with four bins texels whose border is next to one had up to 10 % of all light wrong (g .9, ior 1.5,
+// thickness 1, 85 degrees). Hence finer bins within the radii where that matters.
 inline constexpr int min_radius_exponent = -10;
 inline constexpr int max_radius_exponent = 12;
 inline constexpr int min_fine_exponent = -1;
 inline constexpr int max_fine_exponent = 2;
-inline constexpr int fine_bits = 4;  // 2^fine_bits bins per octave
+inline constexpr int fine_bits = 5;  // 2^fine_bits bins per octave
 
 // First of the finer bins, their number, and of how many quarters of octaves they take the place.
 inline constexpr int first_fine_bin = 4 * (min_fine_exponent - min_radius_exponent) + 1;
@@ -57,11 +60,20 @@ inline constexpr int replaced_bin_count = 4 * (max_fine_exponent - min_fine_expo
 inline constexpr std::size_t radius_bin_count =
     1 + 4 * (max_radius_exponent - min_radius_exponent) + fine_bin_count - replaced_bin_count;
 
-inline std::size_t radius_bin(float radius)
+// What is counted apart: all bins, or quarters of octaves, the finer ones in the last of each. Finer bins hold more
+// noise and make longer files, which costs where they show nothing.
+enum class RadialDetail { quarters, all };
+
+// Bits of a float that tell radii of the same quarter apart. All set, they make the largest of them.
+inline constexpr int quarter_bits = 21;
+inline constexpr std::uint32_t within_quarter = (1u << quarter_bits) - 1;
+
+inline std::size_t radius_bin(float radius, RadialDetail detail = RadialDetail::all)
 {
     constexpr int mantissa_bits = 23;
     constexpr int bias = 127;
-    const auto steps = [bits = std::bit_cast<std::uint32_t>(radius)](int from_exponent, int bits_per_octave) {
+    const std::uint32_t set = detail == RadialDetail::quarters ? within_quarter : 0;
+    const auto steps = [bits = std::bit_cast<std::uint32_t>(radius) | set](int from_exponent, int bits_per_octave) {
         return static_cast<int>(bits >> (mantissa_bits - bits_per_octave)) -
                ((bias + from_exponent) << bits_per_octave);
     };

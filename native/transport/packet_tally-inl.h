@@ -123,7 +123,6 @@ private:
     // The bins of transport/bins.h, read off the bits of a float.
     HWY_INLINE void find_bins(std::size_t first)
     {
-        constexpr int quarter_bits = 21;
         constexpr int bias = 127;
         const hn::RebindToSigned<FloatTag> integers;
         const Words what = hn::LoadU(words, m_what.data() + first);
@@ -136,7 +135,11 @@ private:
         const Floats cosine = hn::IfThenElse(hn::Gt(r, hn::Zero(floats)), hn::Div(x, r), broadcast(1.0));
         hn::StoreU(cosine, floats, m_x.data() + first);
 
-        const auto bits = hn::BitCast(integers, r);
+        const auto order = hn::BitCast(integers, hn::And(what, hn::Set(words, max_order - 1)));
+        const auto fine_orders = hn::Set(integers, static_cast<int>(m_job.tallies[0][0].fine_orders));
+        const auto same_quarter = hn::Set(integers, static_cast<int>(within_quarter));
+        const auto bits =
+            hn::Or(hn::BitCast(integers, r), hn::IfThenZeroElse(hn::Lt(order, fine_orders), same_quarter));
         const auto between = [&](auto value, int low, int high) {
             return hn::Min(hn::Max(value, hn::Set(integers, low)), hn::Set(integers, high));
         };
@@ -147,7 +150,6 @@ private:
         const auto replaced = between(hn::Sub(quarter, hn::Set(integers, first_fine_bin)), 0, replaced_bin_count);
         const auto radius = hn::Add(hn::Sub(quarter, replaced), between(fine, 0, fine_bin_count));
         const auto radius_clamped = between(radius, 0, static_cast<int>(radius_bin_count) - 1);
-        const auto order = hn::BitCast(integers, hn::And(what, hn::Set(words, max_order - 1)));
         const auto order_quarters = hn::ShiftRight<quarter_bits>(hn::BitCast(integers, hn::ConvertTo(floats, order)));
         const auto binned = hn::Sub(order_quarters, hn::Set(integers, 4 * (bias + 4) - static_cast<int>(exact_orders)));
         const auto exact = hn::Lt(order, hn::Set(integers, static_cast<int>(exact_orders)));

@@ -16,6 +16,12 @@
 
 namespace beamspread {
 
+std::uint32_t fine_orders(const Medium& medium)
+{
+    const bool mirrors = medium.ior > 1.0 && medium.thickness <= 1 << max_fine_exponent;
+    return mirrors ? sharp_orders : 0;
+}
+
 namespace {
 
 constexpr std::uint64_t enough_photons_per_job = 200'000;
@@ -38,6 +44,7 @@ SideTallies empty_tallies(const Medium& medium, double theta_inside)
 {
     SideTallies tallies;
     tallies[0].allocate();
+    tallies[0].fine_orders = tallies[1].fine_orders = fine_orders(medium);
     if (!medium.is_half_space()) {
         tallies[1].allocate();
         tallies[1].centre = far_side_centre(medium, theta_inside);

@@ -37,6 +37,10 @@ struct AngleResult {
     std::array<SideResult, side_count> sides;
 };
 
+// Order bins below this go by all radius bins. Nothing is as sharp as the finer ones but few scatterings around the
+// mirror images of the beam in a thin slab's sides.
+std::uint32_t fine_orders(const Medium& medium);
+
 // `photons` per angle. The result depends on seed, photons and kernel (a name of walk_kernels(), or empty: the
 // fastest), never on threads. Throws InvalidArgument, Cancelled.
 std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> angles_deg, std::uint64_t photons,

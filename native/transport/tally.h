@@ -21,6 +21,7 @@ using OrderWeights = std::array<double, order_bin_count>;
 // phi = 0 along the beam's direction of travel. Conservative walk: albedo a scales order n by a^n.
 struct Tally {
     double centre = 0.0;          // u of the pole of (r, phi), mean free paths
+    std::uint32_t fine_orders = 0;  // order bins below go by all radius bins, the others by quarters
     // [order bin][radius bin][harmonic], see `ring`; empty: nothing leaves this side
     std::vector<double, HugePageAllocator<double>> moments;
     OrderWeights weight{};
@@ -46,7 +47,8 @@ struct Tally {
         const double cos_phi = r > 0.0 ? x / r : 1.0;
         const std::size_t bin = order_bin(order);
         const std::size_t harmonics = harmonics_of(bin);
-        double* sums = ring(bin, radius_bin(static_cast<float>(r)));
+        const RadialDetail detail = bin < fine_orders ? RadialDetail::all : RadialDetail::quarters;
+        double* sums = ring(bin, radius_bin(static_cast<float>(r), detail));
         // cos(m phi) by the recurrence of the Chebyshev polynomials.
         double previous = w;
         double current = w * cos_phi;

@@ -47,7 +47,11 @@ CASES = [
     (Medium(-0.5, 1.6, 0.5), 62, 0.9, 0.8, "reflected"),
     (Medium(0.8, 1.4, 0.5), 75, 0.9, 0.5, "transmitted"),
     (Medium(0.8, 1.4, 0.5), 75, 0.5, 0.42, "reflected"),
-    (Medium(0.9, 1.5, 1.0), 85, 0.9, 1.22, "reflected"),  # texels' borders are .05 from the beam's mirror image
+    # Texels' borders are .01 to .08 from mirror images of the beam.
+    (Medium(0.9, 1.5, 1.0), 85, 0.9, 1.22, "reflected"),
+    (Medium(0.9, 1.5, 0.5), 80, 0.9, 0.57, "reflected"),
+    (Medium(0.9, 1.5, 0.5), 80, 0.9, 0.84, "transmitted"),
+    (Medium(0.9, 1.3, 1.0), 85, 0.9, 1.54, "reflected"),
     (Medium(0.8), 84, 0.5, 0.2, "reflected"),
     (Medium(0.9), 84, 0.9, 0.5, "reflected"),
 ]

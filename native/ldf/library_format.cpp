@@ -1,0 +1,139 @@
+#include "ldf/library_format.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+
+namespace beamspread::library_format {
+
+namespace {
+
+constexpr std::array<const char*, side_count> side_names = {"reflected", "transmitted"};
+
+// FNV-1a over whole numbers instead of bytes: notices any damage to a part, be it to a single attribute.
+class Hash {
+public:
+    void add(std::uint64_t word) { m_hash = (m_hash ^ word) * 0x100000001b3ULL; }
+    void add(int value) { add(static_cast<std::uint64_t>(value)); }
+    void add(double value) { add(std::bit_cast<std::uint64_t>(value)); }
+    void add(const std::string& text)
+    {
+        for (char c : text)
+            add(static_cast<std::uint64_t>(c));
+        add(text.size());
+    }
+    void add(const std::vector<float>& values)
+    {
+        // Two at a time, and all finite as long as no exponent is all ones.
+        std::size_t i = 0;
+        for (; i + 1 < values.size(); i += 2)
+            add(bits(values[i]) | bits(values[i + 1]) << 32);
+        if (i < values.size())
+            add(bits(values[i]));
+        add(values.size());
+    }
+    bool is_finite() const { return m_finite; }
+    std::string text() const { return std::to_string(m_hash); }
+
+private:
+    std::uint64_t bits(float x)
+    {
+        constexpr std::uint32_t exponent = 0x7f800000;
+        const auto word = std::bit_cast<std::uint32_t>(x);
+        m_finite = m_finite && (word & exponent) != exponent;
+        return word;
+    }
+
+    std::uint64_t m_hash = 0xcbf29ce484222325ULL;
+    bool m_finite = true;
+};
+
+}  // namespace
+
+std::string part_name(std::size_t side, std::size_t angle)
+{
+    return std::string(side_names[side]) + "." + std::to_string(angle);
+}
+
+// Lines of another length: what is too long is cut off, what is missing filled up with zeros.
+std::vector<float> with_columns(const std::vector<float>& values, std::size_t from_columns, std::size_t columns)
+{
+    const std::size_t lines = values.size() / from_columns;
+    std::vector<float> result(lines * columns, 0.0F);
+    for (std::size_t i = 0; i < lines; ++i)
+        std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * from_columns), std::min(from_columns, columns),
+                    result.begin() + static_cast<std::ptrdiff_t>(i * columns));
+    return result;
+}
+
+std::vector<std::size_t> counted_bins(const Medium& medium, std::size_t order_bin, std::size_t radii)
+{
+    std::vector<std::size_t> bins;
+    for (std::size_t k = 0; k < radii; ++k)
+        if (order_bin < fine_orders(medium) || ends_quarter(k))
+            bins.push_back(k);
+    return bins;
+}
+
+std::vector<float> packed(const Medium& medium, std::span<const std::size_t> orders, std::size_t radii,
+                          std::span<const float> rings)
+{
+    std::vector<float> values;
+    std::vector<std::size_t> bins;
+    for (std::size_t i = 0; i < orders.size(); ++i) {
+        if (i == 0 || orders[i] != orders[i - 1])
+            bins = counted_bins(medium, orders[i], radii);
+        for (const std::size_t k : bins)
+            values.push_back(rings[i * radius_bin_count + k]);
+    }
+    return values;
+}
+
+std::vector<float> unpacked(const Medium& medium, std::span<const std::size_t> orders, std::size_t radii,
+                            std::span<const float> values)
+{
+    std::vector<float> rings(orders.size() * radius_bin_count, 0.0F);
+    std::vector<std::size_t> bins;
+    std::size_t from = 0;
+    for (std::size_t i = 0; i < orders.size(); ++i) {
+        if (i == 0 || orders[i] != orders[i - 1])
+            bins = counted_bins(medium, orders[i], radii);
+        for (const std::size_t k : bins)
+            rings[i * radius_bin_count + k] = values[from++];
+    }
+    return rings;
+}
+
+std::size_t packed_size(const Medium& medium, std::span<const std::size_t> orders, std::size_t radii)
+{
+    const std::size_t all = counted_bins(medium, 0, radii).size();
+    const std::size_t quarters = counted_bins(medium, order_bin_count, radii).size();
+    const auto fine =
+        std::count_if(orders.begin(), orders.end(), [&](std::size_t b) { return b < fine_orders(medium); });
+    return orders.size() * quarters + static_cast<std::size_t>(fine) * (all - quarters);
+}
+
+std::vector<std::size_t> ratio_orders(std::span<const std::size_t> harmonics)
+{
+    std::vector<std::size_t> orders;
+    for (std::size_t b = 0; b < harmonics.size(); ++b)
+        orders.insert(orders.end(), harmonics[b] - 1, b);
+    return orders;
+}
+
+Checksum checksum(const ExrPart& part)
+{
+    Hash sum;
+    sum.add(part.name);
+    for (const auto& [name, value] : part.attributes) {
+        if (name == "checksum")
+            continue;
+        sum.add(name);
+        std::visit([&sum](const auto& x) { sum.add(x); }, value);
+    }
+    sum.add(part.pixels);
+    return {sum.text(), sum.is_finite()};
+}
+
+}  // namespace beamspread::library_format
