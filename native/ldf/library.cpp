@@ -158,6 +158,15 @@ double LdfLibrary::clamped_angle(double angle_deg) const
     return std::clamp(angle_deg, m_results.front().angle_deg, m_results.back().angle_deg);
 }
 
+std::array<std::size_t, 2> LdfLibrary::neighbours(double angle_deg) const
+{
+    const double angle = clamped_angle(angle_deg);
+    std::size_t j = 0;
+    while (j + 2 < m_results.size() && angle >= m_results[j + 1].angle_deg)
+        ++j;
+    return {j, std::min(j + 1, m_results.size() - 1)};
+}
+
 double LdfLibrary::entry_transmittance(double angle_deg) const
 {
     return 1.0 - fresnel(std::cos(angle_deg * radians_per_degree), m_medium.ior);
@@ -169,7 +178,7 @@ LdfLibrary::AngleWeights LdfLibrary::angle_weights(double angle_deg) const
     const double theta = clamped_angle(angle_deg) * radians_per_degree;
     const double transmittance = entry_transmittance(angle_deg);
     AngleWeights weights{m_spline.weights(theta, AngleSpline::Parity::even),
-                         m_spline.weights(theta, AngleSpline::Parity::odd)};
+                         m_spline.weights(theta, AngleSpline::Parity::odd), neighbours(angle_deg)};
     for (double& w : weights.even)
         w *= transmittance;
     for (double& w : weights.odd)
@@ -276,12 +285,7 @@ RadialProfile LdfLibrary::interpolated(double angle_deg, const std::vector<Radia
     }
     // The weights hold the transmittance at entry, which changes power and no place.
     sum.set_centre(centre / entry_transmittance(angle_deg));
-    // A spline rings around what begins at the next node but one; a harmonic that neither neighbour has is not there.
-    const double angle = clamped_angle(angle_deg);
-    std::size_t j = 0;
-    while (j + 2 < nodes.size() && angle >= m_results[j + 1].angle_deg)
-        ++j;
-    sum.keep_harmonics(std::max(nodes[j].harmonics(), nodes[std::min(j + 1, nodes.size() - 1)].harmonics()));
+    sum.keep_harmonics(weights.harmonics(nodes));
     sum.drop_negligible(negligible_harmonics);
     return sum;
 }

@@ -76,6 +76,7 @@ public:
 
 private:
     double clamped_angle(double angle_deg) const;
+    std::array<std::size_t, 2> neighbours(double angle_deg) const;  // simulated angles around
     double residual(double angle_deg, double albedo, Side side) const;
     RadialProfile interpolated(double angle_deg, const std::vector<RadialProfile>& nodes) const;
     double entry_transmittance(double angle_deg) const;

@@ -165,14 +165,14 @@ LdfSource::AngleWeights SampleSource::angle_weights(double angle_deg) const
     std::vector<double> weights(m_angles.size(), 0.0);
     if (m_angles.size() == 1) {
         weights.front() = 1.0;
-        return {weights, weights};
+        return {weights, weights, {0, 0}};
     }
     const auto above = std::upper_bound(m_angles.begin() + 1, m_angles.end() - 1, angle_deg);
     const auto upper = static_cast<std::size_t>(above - m_angles.begin());
     const double t = std::clamp((angle_deg - *(above - 1)) / (*above - *(above - 1)), 0.0, 1.0);
     weights[upper - 1] = 1.0 - t;
     weights[upper] = t;
-    return {weights, weights};
+    return {weights, weights, {upper - 1, upper}};
 }
 
 }  // namespace beamspread

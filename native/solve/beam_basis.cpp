@@ -32,7 +32,7 @@ BeamBasis BeamBasis::uniform(const Problem& problem)
     basis.m_profiles = [angle](const Channel& channel) {
         return std::vector{channel.library->profile(angle, channel.albedo, Side::reflected)};
     };
-    basis.m_weights = [](const Vec3&) { return Weights{{1.0}, {1.0}}; };
+    basis.m_weights = [](const Vec3&) { return Weights{{1.0}, {1.0}, {0, 0}}; };
     return basis;
 }
 

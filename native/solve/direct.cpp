@@ -50,16 +50,17 @@ std::vector<Term> basis_terms(const Problem& problem, const std::vector<Quadrant
 
 // Factors of the terms for the beam at one texel, in the order of basis_terms.
 std::vector<double> beam_factors(const Problem& problem, const BeamBasis& basis,
-                                 const std::vector<QuadrantKernel>& kernels, const Vec3& direction)
+                                 const std::vector<RadialProfile>& profiles, const Vec3& direction)
 {
     if (!problem.directions.field)
         return {1.0};
     const BeamBasis::Weights weights = basis.weights(direction);
+    const std::size_t harmonics = weights.harmonics(profiles);
     const double beta = azimuth(direction);
     std::vector<double> factors;
-    for (std::size_t j = 0; j < kernels.size(); ++j) {
-        for (std::size_t m = 0; m < kernels[j].harmonics(); ++m) {
-            const double weight = m % 2 == 0 ? weights.even[j] : weights.odd[j];
+    for (std::size_t j = 0; j < profiles.size(); ++j) {
+        for (std::size_t m = 0; m < profiles[j].harmonics(); ++m) {
+            const double weight = m >= harmonics ? 0.0 : m % 2 == 0 ? weights.even[j] : weights.odd[j];
             factors.push_back(weight * std::cos(static_cast<double>(m) * beta));
             if (m > 0)
                 factors.push_back(weight * std::sin(static_cast<double>(m) * beta));
@@ -77,8 +78,9 @@ std::vector<float> solve_channel(const Problem& problem, const Channel& channel,
 {
     const BeamBasis basis =
         problem.directions.field ? BeamBasis::library_nodes(*channel.library) : BeamBasis::uniform(problem);
+    const std::vector<RadialProfile> profiles = basis.profiles(channel);
     std::vector<QuadrantKernel> kernels;
-    for (const RadialProfile& profile : basis.profiles(channel))
+    for (const RadialProfile& profile : profiles)
         kernels.emplace_back(profile, problem, channel);
     const std::vector<Term> terms = basis_terms(problem, kernels);
 
@@ -97,7 +99,7 @@ std::vector<float> solve_channel(const Problem& problem, const Channel& channel,
             const auto irradiance = static_cast<double>(channel.irradiance(y, x));
             if (irradiance == 0.0)
                 continue;
-            Beam beam{x, beam_factors(problem, basis, kernels, direction_at(problem, y, x))};
+            Beam beam{x, beam_factors(problem, basis, profiles, direction_at(problem, y, x))};
             for (double& factor : beam.factors)
                 factor *= irradiance;
             beams[y].push_back(std::move(beam));

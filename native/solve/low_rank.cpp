@@ -29,25 +29,44 @@ Eigen::Index index(std::size_t i)
     return static_cast<Eigen::Index>(i);
 }
 
-// Weights of a library's nodes at some angles, [angle][node].
-struct NodeWeights {
-    Matrix even;
-    Matrix odd;
-
+// Weights of a library's nodes at some angles.
+class NodeWeights {
+public:
     NodeWeights() = default;
-    NodeWeights(const LdfSource& library, const std::vector<double>& half_tangents)
-        : even(index(half_tangents.size()), index(library.node_count())), odd(even)
+    NodeWeights(const LdfSource& library, const std::vector<double>& half_tangents) : m_weights(half_tangents.size())
     {
-        parallel_for(half_tangents.size(), [&](std::size_t a) {
-            const LdfSource::AngleWeights weights = library.angle_weights(angle_deg(half_tangents[a]));
-            for (std::size_t j = 0; j < weights.even.size(); ++j) {
-                even(index(a), index(j)) = weights.even[j];
-                odd(index(a), index(j)) = weights.odd[j];
-            }
-        });
+        parallel_for(half_tangents.size(),
+                     [&](std::size_t a) { m_weights[a] = library.angle_weights(angle_deg(half_tangents[a])); });
     }
 
-    const Matrix& of(std::size_t m) const { return m % 2 == 0 ? even : odd; }
+    // Of a harmonic, [angle][node].
+    Matrix of(std::size_t m, const std::vector<RadialProfile>& nodes) const
+    {
+        Matrix matrix = Matrix::Zero(index(m_weights.size()), index(nodes.size()));
+        for (std::size_t a = 0; a < m_weights.size(); ++a)
+            if (m < m_weights[a].harmonics(nodes))
+                matrix.row(index(a)) = row(a, m);
+        return matrix;
+    }
+
+    // Values of a harmonic at the angles.
+    Vector interpolated(std::size_t m, const std::vector<RadialProfile>& nodes, const Vector& at_nodes) const
+    {
+        Vector values = Vector::Zero(index(m_weights.size()));
+        for (std::size_t a = 0; a < m_weights.size(); ++a)
+            if (m < m_weights[a].harmonics(nodes))
+                values[index(a)] = row(a, m).dot(at_nodes);
+        return values;
+    }
+
+private:
+    Eigen::Map<const Vector> row(std::size_t a, std::size_t m) const
+    {
+        const std::vector<double>& weights = m % 2 == 0 ? m_weights[a].even : m_weights[a].odd;
+        return {weights.data(), index(weights.size())};
+    }
+
+    std::vector<LdfSource::AngleWeights> m_weights;
 };
 
 std::vector<double> evenly(double first, double last, std::size_t count, double offset)
@@ -76,7 +95,7 @@ AngularMedium describe(const KernelMedium& of, const PresentAngles& present, con
     const std::size_t nodes = medium.nodes.size();
     medium.weights = NodeWeights(*of.library, angles);
     const Vector share = Eigen::Map<const Vector>(present.share.data(), index(angle_bins));
-    const Vector mean_weights = medium.weights.even.transpose() * share;
+    const Vector mean_weights = medium.weights.of(0, medium.nodes).transpose() * share;
     for (std::size_t j = 0; j < nodes; ++j)
         medium.mean.add(medium.nodes[j], mean_weights[index(j)], 0.0);
 
@@ -146,7 +165,7 @@ KernelDecomposition::KernelDecomposition(const PresentAngles& present, const std
     for (std::size_t m = 0; m < harmonic_count; ++m) {
         Matrix gram = Matrix::Zero(index(angle_bins), index(angle_bins));
         for (const AngularMedium& medium : m_angular->media) {
-            const Matrix rows = root_share.asDiagonal() * medium.weights.of(m) * medium.features[m];
+            const Matrix rows = root_share.asDiagonal() * medium.weights.of(m, medium.nodes) * medium.features[m];
             gram += rows * rows.transpose() / static_cast<double>(media.size());
         }
         if (gram.trace() <= least_gain)
@@ -206,11 +225,12 @@ LowRankBasis KernelDecomposition::basis(const std::vector<std::size_t>& chosen, 
         Vector values = Vector::Zero(index(table_steps + 1));
         for (std::size_t k = 0; k < m_media.size(); ++k) {
             const AngularMedium& medium = m_angular->media[k];
-            const Vector by_node = medium.weights.of(m).transpose() * by_angle;
+            const Vector by_node = medium.weights.of(m, medium.nodes).transpose() * by_angle;
             for (std::size_t j = 0; j < medium.nodes.size(); ++j)
                 weights[k][rank][j][m] = by_node[index(j)];
             const Matrix& features = medium.features[m];
-            values += m_angular->tables.at(m_media[k].library).of(m) * (features * (features.transpose() * by_node));
+            const NodeWeights& table = m_angular->tables.at(m_media[k].library);
+            values += table.interpolated(m, medium.nodes, features * (features.transpose() * by_node));
         }
         LowRankBasis::AngleFunction function{m, rank, {}};
         for (Eigen::Index i = 0; i < values.size(); ++i) {
