@@ -27,6 +27,10 @@ def angles_for(medium):
     85 degrees by more than .15 % (.8 % from 75 degrees on), whatever the albedo, for g -.5 to .95 and
     thicknesses from .5, up to 1e-6 of the incident power.
     """
+    if medium.ior < 1.02 and medium.thickness <= max(4.0, 0.5 / (1.0 - medium.g)):
+        # The place where the beam leaves the far side runs away toward grazing.
+        return (0.0, 10.0, 20.0, 30.0, 39.0, 47.0, 54.0, 60.0, 65.0, 69.0, 72.5, 75.3, 77.6, 79.5, 81.1, 82.5, 83.4,
+                84.1, 84.6, 85.0, 86.2, 88.5)  # fmt: skip
     if medium.ior > 1.0 and medium.thickness < 2.0:
         # What comes back from the far side surrounds the beam's mirror image, which moves with the angle.
         return (*map(float, range(0, 73, 6)), 76.0, 80.0, 84.0, 88.0)

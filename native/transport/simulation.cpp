@@ -30,10 +30,11 @@ constexpr std::uint64_t enough_photons_per_job = 200'000;
 constexpr std::size_t batches_per_group = batch_count / group_count;
 
 // The far side's distribution peaks where the beam leaves, if light has not forgotten its direction by then, and with
-// it the few scatterings that light of low albedos has; deeper down it is broad, and its centre stays behind.
+// it the few scatterings that light of low albedos has; deeper down it is broad, and its centre stays behind. Whatever g,
+// much light still gets through two mean free paths as it came.
 double far_side_centre(const Medium& medium, double theta_inside)
 {
-    const double memory = 2.0 / (1.0 - medium.g);
+    const double memory = 2.0 + 2.0 / (1.0 - medium.g);
     const double through = medium.thickness / std::cos(theta_inside);
     // A smooth minimum, as the spline over angles wants it.
     const double path = std::pow(std::pow(memory, -4.0) + std::pow(through, -4.0), -0.25);

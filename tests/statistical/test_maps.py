@@ -52,6 +52,9 @@ CASES = [
     (Medium(0.9, 1.5, 0.5), 80, 0.9, 0.57, "reflected"),
     (Medium(0.9, 1.5, 0.5), 80, 0.9, 0.84, "transmitted"),
     (Medium(0.9, 1.3, 1.0), 85, 0.9, 1.54, "reflected"),
+    # Between angles where the place at which the beam leaves moves most.
+    (Medium(0.0, 1.0, 0.5), 80.3, 0.9, 0.4, "transmitted"),
+    (Medium(0.9, 1.0, 1.0), 83.7, 0.9, 1.5, "transmitted"),
     (Medium(0.8), 84, 0.5, 0.2, "reflected"),
     (Medium(0.9), 84, 0.9, 0.5, "reflected"),
 ]
