@@ -101,6 +101,7 @@ RadialProfile::RadialProfile() : m_remaining(edge_count, Harmonics{}), m_slope(e
 
 RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments, RadialDetail detail) : RadialProfile()
 {
+    m_detail = detail;
     m_centre = centre;
     m_harmonics = bin_moments.size() / edge_count;
     // integral of cos^2(m phi) over a turn: 2 pi for m = 0, pi above.
@@ -194,6 +195,7 @@ void RadialProfile::add(const RadialProfile& other, const Harmonics& weights)
         }
     }
     m_support = std::max(m_support, other.m_support);
+    m_detail = std::max(m_detail, other.m_detail);
 }
 
 void RadialProfile::keep_harmonics(std::size_t count)

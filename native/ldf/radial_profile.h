@@ -49,11 +49,15 @@ public:
     double centre() const { return m_centre; }
     void set_centre(double centre) { m_centre = centre; }
 
+    // Whether it follows the finer bins.
+    RadialDetail detail() const { return m_detail; }
+
 private:
     Harmonics slope_at(std::size_t knot, RadialDetail detail) const;
     void subdivide(std::size_t first, std::size_t last);
     void update_support();
 
+    RadialDetail m_detail = RadialDetail::quarters;
     std::size_t m_harmonics = 0;
     double m_centre = 0.0;
     double m_support = 0.0;

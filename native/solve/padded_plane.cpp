@@ -25,6 +25,11 @@ constexpr double level_deviation = 3.0;
 constexpr double harmonics_per_deviation = 10.0;
 constexpr double negligible_outside = 3e-4;
 
+// Kernels with finer bins of radius are sharper than texels around the beam's images in a thin slab's sides. A border of
+// half the distance up to which bins are finer takes these in; farther than this they are wider than texels, and the
+// centre would cost more than all else. Without, errors of 6e-3 of the brightest texel were seen, with this 4e-4.
+constexpr double widest_deviation = 16.0;
+
 // The detail of a harmonic grows finer toward the pole: where many reach beyond a border, a wider one takes them in.
 double widened(double deviation, const std::vector<ScaledProfile>& profiles, double unit)
 {
@@ -36,7 +41,12 @@ double widened(double deviation, const std::vector<ScaledProfile>& profiles, dou
         const double border = window_radius * deviation * unit / each.mean_free_path;
         harmonics = std::max(harmonics, each.profile.harmonics_beyond(border, negligible_outside * power));
     }
-    return std::max(deviation, static_cast<double>(harmonics) / harmonics_per_deviation);
+    deviation = std::max(deviation, static_cast<double>(harmonics) / harmonics_per_deviation);
+    const double finest_end = 1 << max_fine_exponent;  // mean free paths
+    for (const ScaledProfile& each : profiles)
+        if (each.profile.detail() == RadialDetail::all)
+            deviation = std::max(deviation, std::min(0.5 * finest_end * each.mean_free_path / unit, widest_deviation));
+    return deviation;
 }
 
 struct Tiling {
