@@ -54,13 +54,17 @@ def libraries(folder):
     calibrated.save(str(Path(folder) / "calibrated.exr"))
     for name in ("library.exr", "calibrated.exr"):
         fuzz(Path(folder, name).read_bytes(), str(Path(folder) / "fuzzed.exr"), type(slab))
+    # Several threads read this one.
+    large = simulate(Medium(0.9, 1.5, 0.5), angles=[60, 65, 70, 75, 80, 85], photons=20_000, threads=THREADS)
+    large.save(str(Path(folder) / "large.exr"))
+    fuzz(Path(folder, "large.exr").read_bytes(), str(Path(folder) / "fuzzed.exr"), type(slab), cases=30)
     return slab
 
 
-def fuzz(whole, path, library):
+def fuzz(whole, path, library, cases=150):
     """Load files with bytes changed or cut off, most in the headers: each is refused or fit for use."""
     rng = np.random.default_rng(1)
-    for case in range(150):
+    for case in range(cases):
         damaged = bytearray(whole)
         if case % 5 == 0:
             damaged = damaged[: rng.integers(1, len(whole))]

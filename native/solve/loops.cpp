@@ -105,17 +105,29 @@ BEAMSPREAD_CLONES void turn(float* __restrict cosine, float* __restrict sine, co
     }
 }
 
+namespace {
+
+// Of a texel's light; straight down where there is none.
+struct Travel {
+    float x, y, z;
+};
+
+[[gnu::always_inline]] inline Travel travel(const float* direction, float irradiance)
+{
+    const bool lit = irradiance != 0.0f;
+    const float x = direction[0];
+    const float y = direction[1];
+    const float z = direction[2];
+    return {lit ? x : 0.0f, lit ? y : 0.0f, lit ? z : -1.0f};
+}
+
+}  // namespace
+
 BEAMSPREAD_CLONES void find_angles(const float* directions, const float* irradiance, float* __restrict cos_beta,
                                    float* __restrict sin_beta, float* __restrict half_tangent, std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i) {
-        const bool lit = irradiance[i] != 0.0f;
-        const float dx = directions[3 * i];
-        const float dy = directions[3 * i + 1];
-        const float dz = directions[3 * i + 2];
-        const float x = lit ? dx : 0.0f;
-        const float y = lit ? dy : 0.0f;
-        const float z = lit ? dz : -1.0f;
+        const auto [x, y, z] = travel(directions + 3 * i, irradiance[i]);
         const float across = std::sqrt(x * x + y * y);
         const float length = std::sqrt(x * x + y * y + z * z);
         const bool slants = across > 0.0f;
@@ -131,13 +143,7 @@ BEAMSPREAD_CLONES void add_light(float* __restrict sum, float* __restrict x, flo
                                  std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i) {
-        const bool lit = irradiance[i] != 0.0f;
-        const float dx = directions[3 * i];
-        const float dy = directions[3 * i + 1];
-        const float dz = directions[3 * i + 2];
-        const float u = lit ? dx : 0.0f;
-        const float v = lit ? dy : 0.0f;
-        const float w = lit ? dz : -1.0f;
+        const auto [u, v, w] = travel(directions + 3 * i, irradiance[i]);
         sum[i] += irradiance[i];
         x[i] += irradiance[i] * u;
         y[i] += irradiance[i] * v;

@@ -42,10 +42,9 @@ double widened(double deviation, const std::vector<ScaledProfile>& profiles, dou
         harmonics = std::max(harmonics, each.profile.harmonics_beyond(border, negligible_outside * power));
     }
     deviation = std::max(deviation, static_cast<double>(harmonics) / harmonics_per_deviation);
-    const double finest_end = 1 << max_fine_exponent;  // mean free paths
     for (const ScaledProfile& each : profiles)
         if (each.profile.detail() == RadialDetail::all)
-            deviation = std::max(deviation, std::min(0.5 * finest_end * each.mean_free_path / unit, widest_deviation));
+            deviation = std::max(deviation, std::min(0.5 * fine_end * each.mean_free_path / unit, widest_deviation));
     return deviation;
 }
 

@@ -51,6 +51,7 @@ inline constexpr int max_radius_exponent = 12;
 inline constexpr int min_fine_exponent = -1;
 inline constexpr int max_fine_exponent = 2;
 inline constexpr int fine_bits = 5;  // 2^fine_bits bins per octave
+inline constexpr double fine_end = 1 << max_fine_exponent;  // mean free paths
 
 // First of the finer bins, their number, and of how many quarters of octaves they take the place.
 inline constexpr int first_fine_bin = 4 * (min_fine_exponent - min_radius_exponent) + 1;

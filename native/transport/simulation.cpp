@@ -18,7 +18,7 @@ namespace beamspread {
 
 std::uint32_t fine_orders(const Medium& medium)
 {
-    const bool mirrors = medium.ior > 1.0 && medium.thickness <= 1 << max_fine_exponent;
+    const bool mirrors = medium.ior > 1.0 && medium.thickness <= fine_end;
     return mirrors ? sharp_orders : 0;
 }
 
