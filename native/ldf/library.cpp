@@ -24,6 +24,23 @@ constexpr double negligible_log_weight = -60.0;
 // Harmonics at the end of the row that move less than this part of a profile's power only cost time.
 constexpr double negligible_harmonics = 1e-4;
 
+// Weights of the harmonics of light so sharp that it needs more than are counted. Cut off, they would ring around rings
+// with a peak, below zero beside it; fading out they do not, and texels finer than the last ones resolve are nearer to the
+// truth. Around mirror images in thin slabs that was 1 % of all power below zero (g .9, ior 1.5, thickness .5, 80 degrees,
+// texels of .05 mean free paths), and is 2e-5.
+const std::array<double, harmonic_count>& fading_harmonics()
+{
+    static const std::array<double, harmonic_count> fading = [] {
+        constexpr std::size_t half = harmonic_count / 2;
+        std::array<double, harmonic_count> weights;
+        weights.fill(1.0);
+        for (std::size_t m = half; m < harmonic_count; ++m)
+            weights[m] = 0.5 + 0.5 * std::cos(pi * static_cast<double>(m - half) / half);
+        return weights;
+    }();
+    return fading;
+}
+
 // Sums over order bins [first, last), [harmonic][radius bin].
 std::vector<double> contract_orders(const SideResult& side, const std::array<double, order_bin_count>& weights,
                                     std::size_t first, std::size_t last)
@@ -38,10 +55,12 @@ std::vector<double> contract_orders(const SideResult& side, const std::array<dou
                 power[k] = weights[b] * static_cast<double>(side.power[b * radius_bin_count + k]);
                 sums[k] += power[k];
             }
-            for (std::size_t m = 1; m < harmonics; ++m)
+            for (std::size_t m = 1; m < harmonics; ++m) {
+                const double weight = harmonics == harmonic_count ? fading_harmonics()[m] : 1.0;
                 for (std::size_t k = 0; k < radius_bin_count; ++k)
                     sums[m * radius_bin_count + k] +=
-                        power[k] * static_cast<double>(ratios[(m - 1) * radius_bin_count + k]);
+                        weight * power[k] * static_cast<double>(ratios[(m - 1) * radius_bin_count + k]);
+            }
         }
         ratios += (harmonics - 1) * radius_bin_count;
     }
