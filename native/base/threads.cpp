@@ -21,6 +21,11 @@ void with_threads(int threads, const std::function<void()>& body)
     arena.execute(body);
 }
 
+std::size_t thread_count()
+{
+    return static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+}
+
 void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body)
 {
     tbb::parallel_for(std::size_t{0}, count, body, tbb::simple_partitioner{});
@@ -31,7 +36,7 @@ void detail::parallel_ordered(std::size_t count, const std::function<std::shared
 {
     using Item = std::pair<std::size_t, std::shared_ptr<void>>;
     // Twice as many results in flight as threads: enough to hide uneven work items.
-    const auto in_flight = static_cast<std::size_t>(2 * tbb::this_task_arena::max_concurrency());
+    const auto in_flight = 2 * thread_count();
     std::size_t next = 0;
     const auto take =
         tbb::make_filter<void, std::size_t>(tbb::filter_mode::serial_in_order, [&](tbb::flow_control& flow) {

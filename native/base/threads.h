@@ -10,6 +10,9 @@ namespace beamspread {
 // them. Once around a whole job: setting the threads up costs more than a short loop.
 void with_threads(int threads, const std::function<void()>& body);
 
+// How many threads a parallel loop started here may use.
+std::size_t thread_count();
+
 // Calls body(0) .. body(count - 1). An exception in a body stops the loop and is rethrown here.
 void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body);
 

@@ -6,10 +6,14 @@
 #include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfThreading.h>
 #include <OpenEXR/ImfTileDescription.h>
+#include <OpenEXR/ImfVersion.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <mutex>
 #include <system_error>
 
 #include "base/error.h"
@@ -28,8 +32,8 @@ constexpr long long inflation_slack = 1 << 20;
 // Tiles are unpacked into a cache of one row of tiles.
 constexpr unsigned max_tile_side = 1 << 14;
 constexpr bool reconstruct = false;  // a truncated file is refused, not guessed at
-// Numbers that take one thread some milliseconds, several times as long as reading some hundred headers once more.
-constexpr long long values_per_reader = 1 << 20;
+// Of a file, packed: they take a thread several times as long as reading some hundred headers once more.
+constexpr std::size_t bytes_per_reader = std::size_t{1} << 20;
 
 [[noreturn]] void fail(const std::string& reason)
 {
@@ -138,42 +142,55 @@ std::vector<char> bytes_of(const std::string& path)
     return bytes;
 }
 
-// Opens the file and hands it to `read(file, file_bytes)`; whatever goes wrong becomes an IoError that names the path.
+// Whether the first bytes of a file say that it holds several parts.
+bool is_multi_part(const std::string& path)
+{
+    std::array<char, 8> start{};  // magic number and version
+    std::ifstream(path, std::ios::binary).read(start.data(), start.size());
+    return (static_cast<unsigned char>(start[5]) & (Imf::MULTI_PART_FILE_FLAG >> 8)) != 0;
+}
+
+// Calls read(file_bytes); whatever goes wrong becomes an IoError that names the path.
 template <class Read>
-auto with_file(const std::string& path, const Read& read)
+auto reading(const std::string& path, const Read& read)
 {
     try {
         std::error_code error;
         const auto file_bytes = std::filesystem::file_size(path, error);
         if (error)
             fail(error.message());
-        // OpenEXR's thread pool is global state of the host's process: used as the host has set it up, and left so.
-        const int host_threads = Imf::globalThreadCount();
-        Imf::MultiPartInputFile file(path.c_str(), host_threads, reconstruct);
-        return read(file, static_cast<long long>(file_bytes));
+        return read(static_cast<long long>(file_bytes));
     } catch (const std::exception& error) {
         throw IoError("cannot read '" + path + "': " + detail::reason_of(error, path));
     }
 }
 
-// The parts of one file on several threads, each of which reads the headers anew: OpenEXR reads one part at a time.
-std::vector<ExrPart> read_parallel(const std::string& path, const std::vector<int>& readers_of_parts)
+// Checks all headers before anything of the size that they claim is allocated.
+void check_headers(const Imf::MultiPartInputFile& file, long long file_bytes)
+{
+    long long values = 0;
+    for (int i = 0; i < file.parts(); ++i)
+        values += check_header(file.header(i), file_bytes);
+    if (values > max_exr_values)
+        fail("it holds more than 2^30 numbers");
+}
+
+// OpenEXR reads one part at a time: every thread reads the headers for itself, and takes the next part until none is
+// left.
+std::vector<ExrPart> read_multi_part(const std::string& path)
 {
     const std::vector<char> bytes = bytes_of(path);
-    std::vector<ExrPart> parts(readers_of_parts.size());
-    const auto readers = static_cast<std::size_t>(readers_of_parts.back()) + 1;
-    parallel_for(readers, [&](std::size_t reader) {
+    std::vector<ExrPart> parts;
+    std::once_flag counted;
+    std::atomic<int> next = 0;
+    parallel_for(std::min(thread_count(), 1 + bytes.size() / bytes_per_reader), [&](std::size_t) {
         MemoryStream stream(path, bytes);
         constexpr int own_threads = 0;
         Imf::MultiPartInputFile file(stream, own_threads, reconstruct);
-        if (static_cast<std::size_t>(file.parts()) != parts.size())
-            fail("it changed while it was read");
-        for (int i = 0; i < file.parts(); ++i) {
-            if (static_cast<std::size_t>(readers_of_parts[static_cast<std::size_t>(i)]) != reader)
-                continue;
-            check_header(file.header(i), static_cast<long long>(bytes.size()));
+        check_headers(file, static_cast<long long>(bytes.size()));
+        std::call_once(counted, [&] { parts.resize(static_cast<std::size_t>(file.parts())); });
+        for (int i = next++; i < file.parts(); i = next++)
             parts[static_cast<std::size_t>(i)] = read_part(file, i);
-        }
     });
     return parts;
 }
@@ -182,27 +199,22 @@ std::vector<ExrPart> read_parallel(const std::string& path, const std::vector<in
 
 std::vector<ExrPart> read_exr_parts(const std::string& path)
 {
-    return with_file(path, [&path](Imf::MultiPartInputFile& file, long long file_bytes) {
-        long long values = 0;
-        std::vector<int> readers;  // of each part
-        for (int i = 0; i < file.parts(); ++i) {
-            readers.push_back(static_cast<int>(values / values_per_reader));
-            values += check_header(file.header(i), file_bytes);
-        }
-        if (values > max_exr_values)
-            fail("it holds more than 2^30 numbers");
-        if (readers.back() > 0)
-            return read_parallel(path, readers);
+    return reading(path, [&path](long long file_bytes) {
+        if (is_multi_part(path))
+            return read_multi_part(path);
+        // OpenEXR's thread pool is global state of the host's process: used as the host has set it up, and left so.
+        Imf::MultiPartInputFile file(path.c_str(), Imf::globalThreadCount(), reconstruct);
+        check_headers(file, file_bytes);
         std::vector<ExrPart> parts;
-        for (int i = 0; i < file.parts(); ++i)
-            parts.push_back(read_part(file, i));
+        parts.push_back(read_part(file, 0));
         return parts;
     });
 }
 
 ExrPart read_exr_part(const std::string& path, const std::string& name)
 {
-    return with_file(path, [&name](Imf::MultiPartInputFile& file, long long file_bytes) {
+    return reading(path, [&](long long file_bytes) {
+        Imf::MultiPartInputFile file(path.c_str(), Imf::globalThreadCount(), reconstruct);
         std::string names;
         for (int i = 0; i < file.parts(); ++i) {
             if (part_name(file.header(i)) == name) {
