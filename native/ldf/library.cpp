@@ -324,7 +324,7 @@ RadialProfile LdfLibrary::group_profile(double angle_deg, double albedo, Side si
             nodes.emplace_back();
             continue;
         }
-        const std::vector<double> deviations = deviations_at(from.deviations, group, albedo);
+        const std::vector<double> deviations = deviations_at(m_medium, from.deviations, from.radii, group, albedo);
         OrderSums sums(m_medium, from, albedo);
         deviate(sums.fine, deviations);
         deviate(sums.quarters, deviations);

@@ -51,6 +51,16 @@ private:
 
 }  // namespace
 
+int version(const Medium& medium)
+{
+    return fine_orders(medium) > 0 ? 7 : 6;
+}
+
+std::size_t scatter_lines(const Medium& medium)
+{
+    return fine_orders(medium) > 0 ? group_count : group_count * scatter_albedos.size();
+}
+
 std::string part_name(std::size_t side, std::size_t angle)
 {
     return std::string(side_names[side]) + "." + std::to_string(angle);
@@ -65,15 +75,6 @@ std::vector<float> with_columns(const std::vector<float>& values, std::size_t fr
         std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * from_columns), std::min(from_columns, columns),
                     result.begin() + static_cast<std::ptrdiff_t>(i * columns));
     return result;
-}
-
-std::vector<std::size_t> counted_bins(const Medium& medium, std::size_t order_bin, std::size_t radii)
-{
-    std::vector<std::size_t> bins;
-    for (std::size_t k = 0; k < radii; ++k)
-        if (order_bin < fine_orders(medium) || ends_quarter(k))
-            bins.push_back(k);
-    return bins;
 }
 
 std::vector<float> packed(const Medium& medium, std::span<const std::size_t> orders, std::size_t radii,

@@ -11,8 +11,10 @@
 //                        length, filled up with zeros, half precision; left out where no order has any;
 //   "<side>.<j>.orders"  columns: order bins; line 0 and 1: mean and variance of the order; then one
 //                        line per batch: power that leaves;
-//   "<side>.<j>.scatter" columns: [harmonic][radius bin], as order bin 0 is counted, lines: albedos within groups of
-//                        batches: deviations of the groups (transport/map_scatter.h), half precision.
+//   "<side>.<j>.scatter" columns: [harmonic][radius bin], lines: albedos within groups of batches: deviations of the
+//                        groups, half precision. Of media that are counted in finer radius bins (transport/
+//                        counted_bins.h), columns: [albedo][harmonic][radius bin], lines: groups. Which bins there are at
+//                        each albedo is in transport/map_scatter.h.
 // One channel each: OpenEXR takes longer to sort channels into pixels than to read.
 #pragma once
 
@@ -26,9 +28,12 @@
 
 namespace beamspread::library_format {
 
-inline constexpr int version = 6;
 inline constexpr std::size_t ratio_columns = 2048;
-inline constexpr std::size_t scatter_lines = group_count * scatter_albedos.size();
+
+// Goes up when the layout of a medium's files changes. Files come with the package: other media's need not change.
+int version(const Medium& medium);
+
+std::size_t scatter_lines(const Medium& medium);
 
 std::string part_name(std::size_t side, std::size_t angle);
 
@@ -40,9 +45,6 @@ inline std::size_t ratio_lines(std::size_t values)
 
 // Lines of another length: what is too long is cut off, what is missing filled up with zeros.
 std::vector<float> with_columns(const std::vector<float>& values, std::size_t from_columns, std::size_t columns);
-
-// Of the first `radii` bins, those that light of an order bin is counted in, see fine_orders().
-std::vector<std::size_t> counted_bins(const Medium& medium, std::size_t order_bin, std::size_t radii);
 
 // What is counted of [ring][radius bin], ring after ring, and back; `orders`: each ring's order bin. How many values that
 // are.

@@ -2,8 +2,10 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <utility>
 
 #include "base/error.h"
+#include "base/threads.h"
 #include "image/exr.h"
 #include "ldf/library.h"
 #include "ldf/library_format.h"
@@ -18,32 +20,24 @@ class Reader {
 public:
     explicit Reader(const std::string& path) : m_path(path), m_parts(read_exr_parts(path)) {}
 
-    LdfLibrary library() const
+    LdfLibrary library()
     {
         if (m_parts.empty())
             fail("holds no parts");
         const ExrPart& first = m_parts.front();
-        if (attribute<int>(first, "beamspreadLdf") != format::version)
-            fail("is of another format version");
+        const auto version = attribute<int>(first, "beamspreadLdf");
         const Medium medium{attribute<double>(first, "g"), attribute<double>(first, "ior"),
                             attribute<double>(first, "thickness")};
+        if (version != format::version(medium))
+            fail("is of another format version");
         std::vector<AngleResult> results;
         std::vector<SideResiduals> residuals;
         const bool is_calibrated = first.attributes.contains("residuals");
-        while (const ExrPart* part = find(format::part_name(0, results.size()))) {
-            AngleResult result;
-            result.angle_deg = attribute<double>(*part, "angle");
-            if (!(result.angle_deg >= 0.0 && result.angle_deg < 90.0))
-                fail("has an angle out of range");
-            for (std::size_t side = 0; side < side_count; ++side)
-                if (find(format::part_name(side, results.size())))
-                    result.sides[side] = side_result(format::part_name(side, results.size()), medium);
-            if (is_calibrated)
-                residuals.push_back(side_residuals(results.size()));
-            if (result.sides[1].power.empty() != medium.is_half_space())
-                fail("does not fit its own thickness");
-            results.push_back(std::move(result));
-        }
+        while (find(format::part_name(0, results.size())))
+            results.emplace_back();
+        parallel_for(results.size(), [&](std::size_t j) { results[j] = angle_result(j, medium); });
+        for (std::size_t j = 0; is_calibrated && j < results.size(); ++j)
+            residuals.push_back(side_residuals(j));
         try {
             return LdfLibrary(medium, number(first, "photons"), number(first, "seed"), std::move(results),
                               std::move(residuals));
@@ -53,12 +47,26 @@ public:
     }
 
 private:
+    AngleResult angle_result(std::size_t j, const Medium& medium)
+    {
+        AngleResult result;
+        result.angle_deg = attribute<double>(*find(format::part_name(0, j)), "angle");
+        if (!(result.angle_deg >= 0.0 && result.angle_deg < 90.0))
+            fail("has an angle out of range");
+        for (std::size_t side = 0; side < side_count; ++side)
+            if (find(format::part_name(side, j)))
+                result.sides[side] = side_result(format::part_name(side, j), medium);
+        if (result.sides[1].power.empty() != medium.is_half_space())
+            fail("does not fit its own thickness");
+        return result;
+    }
+
     [[noreturn]] void fail(const std::string& why) const
     {
         throw IoError("'" + m_path + "' is not an LDF library: it " + why);
     }
 
-    const ExrPart* find(const std::string& name) const
+    ExrPart* find(const std::string& name)
     {
         const auto found =
             std::find_if(m_parts.begin(), m_parts.end(), [&](const ExrPart& p) { return p.name == name; });
@@ -84,9 +92,9 @@ private:
         return value;
     }
 
-    const ExrPart& checked(const std::string& name) const
+    ExrPart& checked(const std::string& name)
     {
-        const ExrPart* part = find(name);
+        ExrPart* part = find(name);
         if (!part)
             fail("has no part '" + name + "'");
         if (part->channels != std::vector<std::string>{"Y"})
@@ -127,7 +135,7 @@ private:
     }
 
     std::vector<float> ratios(const std::string& name, const Medium& medium, const std::vector<std::size_t>& harmonics,
-                              std::size_t radii) const
+                              std::size_t radii)
     {
         const std::vector<std::size_t> orders = format::ratio_orders(harmonics);
         if (orders.empty())
@@ -139,14 +147,13 @@ private:
         return format::unpacked(medium, orders, radii, part.pixels);
     }
 
-    std::vector<float> scatter(const ExrPart& part, const Medium& medium, std::size_t harmonics,
-                               std::size_t radii) const
+    // Most of a file: what was read is kept, not copied.
+    std::vector<float> scatter(ExrPart& part, const Medium& medium, std::size_t harmonics, std::size_t radii) const
     {
-        const std::vector<std::size_t> orders(harmonics * format::scatter_lines, 0);
-        if (part.height != static_cast<int>(format::scatter_lines) ||
-            part.pixels.size() != format::packed_size(medium, orders, radii))
+        if (part.height != static_cast<int>(format::scatter_lines(medium)) ||
+            part.pixels.size() != group_count * harmonics * scatter_count(medium, radii))
             fail_size(part.name);
-        return format::unpacked(medium, orders, radii, part.pixels);
+        return std::move(part.pixels);
     }
 
     void read_residuals(const ExrPart& part, const std::string& name,
@@ -159,7 +166,7 @@ private:
         std::copy(values.begin(), values.end(), to.begin());
     }
 
-    SideResiduals side_residuals(std::size_t j) const
+    SideResiduals side_residuals(std::size_t j)
     {
         SideResiduals residuals{};
         for (std::size_t side = 0; side < side_count; ++side)
@@ -170,17 +177,17 @@ private:
         return residuals;
     }
 
-    SideResult side_result(const std::string& name, const Medium& medium) const
+    SideResult side_result(const std::string& name, const Medium& medium)
     {
         SideResult result;
         const ExrPart& first = checked(name);
-        const auto radii = static_cast<std::size_t>(first.width);
+        result.radii = static_cast<std::size_t>(first.width);
         result.centre = attribute<double>(first, "centre");
         if (!std::isfinite(result.centre))
             fail("has a centre that is not finite");
         result.power = power(first);
         result.harmonics = harmonics(first);
-        result.ratios = ratios(name + ".ratios", medium, result.harmonics, radii);
+        result.ratios = ratios(name + ".ratios", medium, result.harmonics, result.radii);
         const ExrPart& orders = checked(name + ".orders");
         if (orders.width != static_cast<int>(order_bin_count) || orders.height != static_cast<int>(2 + batch_count))
             fail_size(orders.name);
@@ -190,7 +197,7 @@ private:
         result.mean_order.assign(line(0), line(1));
         result.order_variance.assign(line(1), line(2));
         result.batch_totals.assign(line(2), orders.pixels.end());
-        result.deviations = scatter(checked(name + ".scatter"), medium, most_harmonics(result), radii);
+        result.deviations = scatter(checked(name + ".scatter"), medium, most_harmonics(result), result.radii);
         return result;
     }
 

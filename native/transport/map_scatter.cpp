@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "transport/counted_bins.h"
+
 namespace beamspread {
 
 namespace {
@@ -37,7 +39,27 @@ std::vector<double> contracted(const Tally& tally, double albedo, std::span<cons
 
 }  // namespace
 
-std::vector<float> relative_deviations(std::span<const Tally* const> groups, std::span<const std::size_t> harmonics)
+std::vector<std::size_t> scatter_bins(const Medium& medium, std::size_t albedo, std::size_t radii)
+{
+    if (fine_orders(medium) == 0 || albedo < 2)
+        return counted_bins(medium, 0, radii);
+    if (albedo > 2)
+        return {};
+    std::vector<std::size_t> bins = counted_bins(medium, order_bin_count, radii);
+    std::erase_if(bins, [](std::size_t k) { return k < first_fine_bin; });
+    return bins;
+}
+
+std::size_t scatter_count(const Medium& medium, std::size_t radii)
+{
+    std::size_t count = 0;
+    for (std::size_t a = 0; a < scatter_albedos.size(); ++a)
+        count += scatter_bins(medium, a, radii).size();
+    return count;
+}
+
+std::vector<float> relative_deviations(const Medium& medium, std::span<const Tally* const> groups,
+                                       std::span<const std::size_t> harmonics, std::size_t radii)
 {
     std::vector<std::vector<std::vector<double>>> by_albedo;
     std::vector<std::vector<double>> means;
@@ -52,29 +74,43 @@ std::vector<float> relative_deviations(std::span<const Tally* const> groups, std
     }
     std::vector<float> deviations;
     for (std::size_t group = 0; group < groups.size(); ++group)
-        for (std::size_t a = 0; a < scatter_albedos.size(); ++a)
-            for (std::size_t i = 0; i < means[a].size(); ++i) {
-                const double ring = means[a][i % radius_bin_count];
-                const double difference = by_albedo[a][group][i] - means[a][i];
-                deviations.push_back(ring > 0.0 ? rounded_to_five_bits(difference / ring) : 0.0F);
-            }
+        for (std::size_t a = 0; a < scatter_albedos.size(); ++a) {
+            const std::vector<std::size_t> bins = scatter_bins(medium, a, radii);
+            for (std::size_t ring = 0; ring < means[a].size(); ring += radius_bin_count)
+                for (const std::size_t k : bins) {
+                    const double power = means[a][k];
+                    const double difference = by_albedo[a][group][ring + k] - means[a][ring + k];
+                    deviations.push_back(power > 0.0 ? rounded_to_five_bits(difference / power) : 0.0F);
+                }
+        }
     return deviations;
 }
 
-std::vector<double> deviations_at(std::span<const float> deviations, std::size_t group, double albedo)
+std::vector<double> deviations_at(const Medium& medium, std::span<const float> deviations, std::size_t radii,
+                                  std::size_t group, double albedo)
 {
     const auto place = [](double a) { return std::log1p(-a); };
     const double x = std::clamp(place(albedo), place(scatter_albedos.back()), place(scatter_albedos.front()));
-    std::size_t a = 0;
-    while (a + 2 < scatter_albedos.size() && x < place(scatter_albedos[a + 1]))
-        ++a;
-    const double t = (x - place(scatter_albedos[a])) / (place(scatter_albedos[a + 1]) - place(scatter_albedos[a]));
-    const std::size_t values = deviations.size() / (group_count * scatter_albedos.size());
-    const float* low = deviations.data() + (group * scatter_albedos.size() + a) * values;
-    const float* high = low + values;
-    std::vector<double> result(values);
-    for (std::size_t i = 0; i < values; ++i)
-        result[i] = (1.0 - t) * static_cast<double>(low[i]) + t * static_cast<double>(high[i]);
+    std::size_t high = 1;
+    while (high + 1 < scatter_albedos.size() && x < place(scatter_albedos[high]))
+        ++high;
+    const double t =
+        (x - place(scatter_albedos[high - 1])) / (place(scatter_albedos[high]) - place(scatter_albedos[high - 1]));
+
+    const std::size_t values = deviations.size() / group_count;
+    const std::size_t harmonics = values / scatter_count(medium, radii);
+    const float* kept = deviations.data() + group * values;
+    std::vector<double> result(harmonics * radius_bin_count, 0.0);
+    for (std::size_t a = 0; a <= high; ++a) {
+        const std::vector<std::size_t> bins = scatter_bins(medium, a, radii);
+        // What is not kept at the higher albedo stays as it is at the lower one.
+        const double weight = a < high ? 1.0 : t;
+        for (std::size_t m = 0; m < harmonics; ++m)
+            for (const std::size_t k : bins) {
+                double& deviation = result[m * radius_bin_count + k];
+                deviation += weight * (static_cast<double>(*kept++) - deviation);
+            }
+    }
     return result;
 }
 

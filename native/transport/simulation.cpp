@@ -16,12 +16,6 @@
 
 namespace beamspread {
 
-std::uint32_t fine_orders(const Medium& medium)
-{
-    const bool mirrors = medium.ior > 1.0 && medium.thickness <= fine_end;
-    return mirrors ? sharp_orders : 0;
-}
-
 namespace {
 
 constexpr std::uint64_t enough_photons_per_job = 200'000;
@@ -93,7 +87,17 @@ void normalize_rings(const Tally& tally, double photons, SideResult& out)
     }
 }
 
-AngleResult normalized(double angle_deg, const AngleSums& sums, double photons)
+// Up to the last that anything was counted in, at least one.
+std::size_t used_radii(const std::vector<float>& power)
+{
+    std::size_t used = 1;
+    for (std::size_t bin = 0; bin < power.size(); ++bin)
+        if (power[bin] != 0.0F)
+            used = std::max(used, bin % radius_bin_count + 1);
+    return used;
+}
+
+AngleResult normalized(const Medium& medium, double angle_deg, const AngleSums& sums, double photons)
 {
     AngleResult result;
     result.angle_deg = angle_deg;
@@ -111,6 +115,7 @@ AngleResult normalized(double angle_deg, const AngleSums& sums, double photons)
         }
         tally.merge(other);
         normalize_rings(tally, photons, out);
+        out.radii = used_radii(out.power);
         out.mean_order.resize(order_bin_count);
         out.order_variance.resize(order_bin_count);
         for (std::size_t b = 0; b < order_bin_count; ++b) {
@@ -127,7 +132,7 @@ AngleResult normalized(double angle_deg, const AngleSums& sums, double photons)
         std::array<const Tally*, group_count> groups{};
         for (std::size_t group = 0; group < group_count; ++group)
             groups[group] = &sums.groups[group][side];
-        out.deviations = relative_deviations(groups, out.harmonics);
+        out.deviations = relative_deviations(medium, groups, out.harmonics, out.radii);
     }
     return result;
 }
@@ -236,7 +241,7 @@ std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> 
             sums = AngleSums{};
         merge(job * per_job, std::move(job_sums), sums);
         if (job + 1 == jobs_per_angle)
-            results.push_back(normalized(angles_deg[item / jobs_per_angle], sums, total_photons));
+            results.push_back(normalized(medium, angles_deg[item / jobs_per_angle], sums, total_photons));
     };
     with_threads(threads, [&] { parallel_ordered<JobSums>(angles_deg.size() * jobs_per_angle, walk_job, merge_job); });
     progress.finish();

@@ -8,6 +8,7 @@
 
 #include "base/progress.h"
 #include "medium/medium.h"
+#include "transport/counted_bins.h"
 #include "transport/map_scatter.h"
 #include "transport/walk.h"
 
@@ -20,6 +21,7 @@ inline constexpr std::size_t batch_count = 32;
 struct SideResult {
     double centre = 0.0;              // pole of (r, phi): u, mean free paths
     std::vector<float> power;         // [order bin][radius bin]; empty: nothing leaves here
+    std::size_t radii = 0;            // radius bins up to the last that is not empty, at least 1
     std::vector<std::size_t> harmonics;  // [order bin]: how many are kept, at least 1, see transport/harmonic_choice.h
     std::vector<float>
         ratios;  // means of cos(m phi) weighted by power, m > 0: [order bin][harmonic][radius bin], as half holds them
@@ -36,10 +38,6 @@ struct AngleResult {
     double angle_deg = 0.0;  // outside the medium, from the normal
     std::array<SideResult, side_count> sides;
 };
-
-// Order bins below this go by all radius bins. Nothing is as sharp as the finer ones but few scatterings around the
-// mirror images of the beam in a thin slab's sides.
-std::uint32_t fine_orders(const Medium& medium);
 
 // `photons` per angle. The result depends on seed, photons and kernel (a name of walk_kernels(), or empty: the
 // fastest), never on threads. Throws InvalidArgument, Cancelled.

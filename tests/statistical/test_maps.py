@@ -133,6 +133,9 @@ def test_a_small_tilt_shifts_in_proportion():
         (Medium(0.8, 1.4), 0.98, 1.0, "reflected"),
         (Medium(0.5, 1.2, 3.0), 0.8, 0.3, "transmitted"),
         (Medium(0.5, 1.2, 3.0), 0.998, 0.05, "reflected"),
+        # Around the beam's mirror image, between the finer radius bins' last albedo and the next.
+        (Medium(0.9, 1.5, 0.5), 0.98, 0.08, "reflected"),
+        (Medium(0.9, 1.5, 0.5), 0.6, 0.08, "transmitted"),
     ],
     ids=str,
 )

@@ -107,6 +107,32 @@ def test_damaged_files_are_refused(fixture, request, tmp_path):
     assert refused > 200
 
 
+@pytest.mark.parametrize("fixture", ["small", "slab", "mirrors"])
+def test_files_of_another_version_are_refused(fixture, request, tmp_path):
+    """The layout, and with it the version, depends on whether the medium has the finer radius bins."""
+    path = tmp_path / "a.exr"
+    request.getfixturevalue(fixture).save(path)
+    whole = path.read_bytes()
+    name = b"beamspreadLdf\0int\0" + (4).to_bytes(4, "little")
+    version = (7 if fixture == "mirrors" else 6).to_bytes(4, "little")
+    assert name + version in whole
+    for other in (5, 13 - version[0], 8):
+        path.write_bytes(whole.replace(name + version, name + other.to_bytes(4, "little")))
+        with pytest.raises(OSError, match="another format version"):
+            LdfLibrary.load(path)
+
+
+def test_shipped_files_are_saved_as_they_are(tmp_path):
+    """Whatever becomes of the layout of other media's files, theirs stays."""
+    from beamspread.core import library as module
+
+    shipped = sorted(module.SHIPPED_FOLDER.glob("*.exr"))
+    assert len(shipped) == 12
+    for path in shipped:
+        LdfLibrary.load(path).save(tmp_path / path.name)
+        assert (tmp_path / path.name).read_bytes() == path.read_bytes()
+
+
 def test_files_that_are_no_library(tmp_path):
     from beamspread._load import native
 
