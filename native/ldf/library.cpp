@@ -95,8 +95,11 @@ struct OrderSums {
 // Relative deviations [harmonic][radius bin] of the powers of the rings, and of harmonics in parts of those.
 void deviate(std::vector<double>& sums, const std::vector<double>& deviations)
 {
-    for (std::size_t i = sums.size(); i-- > 0;)  // the powers, which come first, last
-        sums[i] += sums[i % radius_bin_count] * deviations[i];
+    const bool fades = deviations.size() == harmonic_count * radius_bin_count;
+    for (std::size_t i = sums.size(); i-- > 0;) {  // the powers, which come first, last
+        const double weight = fades ? fading_harmonics()[i / radius_bin_count] : 1.0;
+        sums[i] += weight * sums[i % radius_bin_count] * deviations[i];
+    }
 }
 
 }  // namespace
