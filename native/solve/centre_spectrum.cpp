@@ -1,5 +1,6 @@
 #include "solve/centre_spectrum.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/constants.h"
@@ -11,6 +12,12 @@
 namespace beamspread {
 
 namespace {
+
+// Rows of a quadrant up to which sums take less time than transforms.
+constexpr std::size_t most_summed_rows = 40;
+
+// Rows that are transformed at once: a multiple of what the transforms do side by side.
+constexpr std::size_t lines_at_once = 16;
 
 // 2 pi steps / size; whole turns are left out before they cost digits.
 double turn_angle(std::size_t steps, std::size_t size)
@@ -56,20 +63,24 @@ CentreSpectrum::CentreSpectrum(const PaddedPlane& plane, const KernelCentre& hal
                                const std::vector<ScaledProfile>& profiles, const std::optional<RadialWindow>& outside)
     : m_width(half_width.x + 1),
       m_height(half_width.y + 1),
+      m_stride((m_height + values_per_block - 1) / values_per_block * values_per_block),
       m_padded_width(plane.padded_width),
+      m_padded_height(plane.padded_height),
       m_frequencies(plane.padded_height / 2 + 1)
 {
     const std::size_t per_profile = harmonic_count * 2 * m_width * m_height;
     m_texels.resize(profiles.size() * per_profile);
     for (std::size_t p = 0; p < profiles.size(); ++p)
         integrate(profiles[p], plane, outside, m_texels.data() + p * per_profile);
+    if (m_height > most_summed_rows)
+        return;
     m_trig.resize(2 * m_height * m_frequencies);
     for (std::size_t y = 0; y < m_height; ++y) {
         float* cosine = m_trig.data() + y * m_frequencies;
         float* sine = cosine + m_height * m_frequencies;
         const double twice = y == 0 ? 1.0 : 2.0;
         for (std::size_t f = 0; f < m_frequencies; ++f) {
-            const double angle = turn_angle(y * f, plane.padded_height);
+            const double angle = turn_angle(y * f, m_padded_height);
             cosine[f] = static_cast<float>(twice * std::cos(angle));
             sine[f] = static_cast<float>(twice * std::sin(angle));
         }
@@ -99,49 +110,80 @@ void CentreSpectrum::integrate(const ScaledProfile& scaled, const PaddedPlane& p
     });
 }
 
-void CentreSpectrum::start(std::size_t frequency, Column& column) const
+CentreSpectrum::Sum CentreSpectrum::add_up(std::span<const KernelTerm> terms) const
 {
-    column.cosine.resize(m_width);
-    column.sine.resize(m_width);
+    Sum sum{std::vector<float>(m_width * m_stride), terms.front().phase == Phase::sine, terms.front().m % 2 == 1};
+    // A_m is even along x for even m, odd for odd m, and even along y; B_m the other way round. Sums over pairs of odd
+    // functions bring factors -i: squared for B_m of even m, once for odd m, where it is left out.
+    const double sign = sum.sine && !sum.odd_m ? -1.0 : 1.0;
+    std::vector<double> column(m_height);
     for (std::size_t x = 0; x < m_width; ++x) {
+        std::fill(column.begin(), column.end(), 0.0);
+        for (const KernelTerm& term : terms) {
+            const std::size_t function = 2 * (term.profile * harmonic_count + term.m) + (sum.sine ? 1 : 0);
+            const float* kernel = m_texels.data() + (function * m_width + x) * m_height;
+            for (std::size_t y = 0; y < m_height; ++y)
+                column[y] += sign * term.weight * static_cast<double>(kernel[y]);
+        }
+        std::copy(column.begin(), column.end(), sum.texels.begin() + static_cast<std::ptrdiff_t>(x * m_stride));
+    }
+    return sum;
+}
+
+void CentreSpectrum::start(std::size_t first_frequency, std::size_t count, Columns& columns) const
+{
+    columns.count = count;
+    columns.cosine.resize(count * m_width);
+    columns.sine.resize(count * m_width);
+    for (std::size_t i = 0; i < count * m_width; ++i) {
+        const std::size_t x = i % m_width;
         const double twice = x == 0 ? 1.0 : 2.0;
-        const double angle = turn_angle(x * frequency, m_padded_width);
-        column.cosine[x] = twice * std::cos(angle);
-        column.sine[x] = twice * std::sin(angle);
+        const double angle = turn_angle(x * (first_frequency + i / m_width), m_padded_width);
+        columns.cosine[i] = static_cast<float>(twice * std::cos(angle));
+        columns.sine[i] = static_cast<float>(twice * std::sin(angle));
+    }
+    columns.rows.resize(columns.sums.size() * count * m_stride);
+    for (std::size_t i = 0; i < columns.sums.size(); ++i) {
+        const Sum& sum = *columns.sums[i];
+        const std::vector<float>& along_x = sum.odd_m != sum.sine ? columns.sine : columns.cosine;
+        multiply_rows(columns.rows.data() + i * count * m_stride, along_x.data(), sum.texels.data(), count, m_width,
+                      m_stride);
     }
 }
 
-std::vector<float> CentreSpectrum::add_up(std::span<const KernelTerm> terms) const
+void CentreSpectrum::spectrum(const Columns& columns, std::size_t column, std::size_t sum, float* values) const
 {
-    const std::size_t texels = m_width * m_height;
-    std::vector<double> sum(texels, 0.0);
-    for (const KernelTerm& term : terms) {
-        const std::size_t function = term.profile * harmonic_count + term.m;
-        const float* kernel = m_texels.data() + (function * 2 + (term.phase == Phase::sine ? 1 : 0)) * texels;
-        for (std::size_t i = 0; i < texels; ++i)
-            sum[i] += term.weight * static_cast<double>(kernel[i]);
-    }
-    return {sum.begin(), sum.end()};
+    const float* rows = columns.rows.data() + (sum * columns.count + column) * m_stride;
+    const float* trig = m_trig.data() + (columns.sums[sum]->sine ? m_height * m_frequencies : 0);
+    scale(values, trig, rows[0], m_frequencies);
+    for (std::size_t y = 1; y < m_height; ++y)
+        add_scaled(values, trig + y * m_frequencies, rows[y], m_frequencies);
 }
 
-void CentreSpectrum::spectrum(const Column& column, const std::vector<float>& sum, bool sine, bool odd_m,
-                              float* values) const
+void CentreSpectrum::spectra(Columns& columns, std::size_t column, std::size_t first, std::size_t count,
+                             float* values) const
 {
-    // A_m is even along x for even m, odd for odd m, and even along y; B_m the other way round. Sums over pairs of
-    // odd functions bring factors -i: squared for B_m of even m, once for odd m, where it is left out.
-    const std::vector<double>& along_x = odd_m != sine ? column.sine : column.cosine;
-    const double sign = sine && !odd_m ? -1.0 : 1.0;
-    std::vector<double> rows(m_height, 0.0);
-    for (std::size_t x = 0; x < m_width; ++x)
-        for (std::size_t y = 0; y < m_height; ++y)
-            rows[y] += along_x[x] * static_cast<double>(sum[x * m_height + y]);
-    for (std::size_t y = 0; y < m_height; ++y) {
-        const float* trig = m_trig.data() + ((sine ? m_height : 0) + y) * m_frequencies;
-        const auto factor = static_cast<float>(sign * rows[y]);
-        if (y == 0)
-            scale(values, trig, factor, m_frequencies);
-        else
-            add_scaled(values, trig, factor, m_frequencies);
+    for (std::size_t i = 0; i < count; i += lines_at_once)
+        transform(columns, column, first + i, std::min(lines_at_once, count - i), values + i * m_frequencies);
+}
+
+void CentreSpectrum::transform(Columns& columns, std::size_t column, std::size_t first, std::size_t count,
+                               float* values) const
+{
+    columns.lines.assign(lines_at_once * m_padded_height, 0.0f);
+    columns.half.resize(lines_at_once * m_frequencies);
+    for (std::size_t i = 0; i < count; ++i) {
+        const float* rows = columns.rows.data() + ((first + i) * columns.count + column) * m_stride;
+        float* line = columns.lines.data() + i * m_padded_height;
+        line[0] = rows[0];
+        std::transform(rows + 1, rows + m_height, line + 1, [](float row) { return 2.0f * row; });
+    }
+    real_to_half(columns.lines.data(), columns.half.data(), count, m_padded_height);
+    for (std::size_t i = 0; i < count; ++i) {
+        const Complex* half = columns.half.data() + i * m_frequencies;
+        const bool sine = columns.sums[first + i]->sine;
+        std::transform(half, half + m_frequencies, values + i * m_frequencies,
+                       [sine](const Complex& z) { return sine ? -z.imag() : z.real(); });
     }
 }
 

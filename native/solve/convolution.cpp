@@ -139,6 +139,15 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
     const std::size_t offset = tile.y.first - tile.window_y.first;
     const std::size_t items = rounds_of(columns, columns_per_item);
     const HarmonicRange harmonics = harmonic_range(m_terms.subspan(first_term, count));
+    std::vector<const KernelSpectra::Part*> parts;  // of all terms, and for each of all media
+    std::vector<std::size_t> first_part;            // [term * media + medium]
+    for (std::size_t t = 0; t < count; ++t)
+        for (std::size_t k = 0; k < results.size(); ++k) {
+            first_part.push_back(parts.size());
+            for (const KernelSpectra::Part& part : m_kernels[first_term + t][first_medium + k])
+                parts.push_back(&part);
+        }
+    first_part.push_back(parts.size());
     parallel_for(items, [&](std::size_t item) {
         const auto lease = m_column_scratch.lend();
         ColumnScratch& scratch = *lease;
@@ -146,6 +155,7 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
         scratch.sums.resize(2 * results.size() * height);
         scratch.kernel.resize(height);
         const std::size_t last = std::min(columns, (item + 1) * columns_per_item);
+        m_spectra.start(item * columns_per_item, last - item * columns_per_item, parts, scratch.centres);
         for (std::size_t x = item * columns_per_item; x < last; ++x) {
             std::fill(scratch.sums.begin(), scratch.sums.end(), Complex());
             m_spectra.start(x, harmonics, scratch.column);
@@ -157,10 +167,18 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
                     std::fill(line + tile.window_y.count, line + height, Complex());
                 }
                 complex_in_place(scratch.lines.data(), batch, height, true);
+                const std::size_t begin = first_part[first * results.size()];
+                const std::size_t end = first_part[(first + batch) * results.size()];
+                m_spectra.select(x - item * columns_per_item, begin, end - begin, scratch.centres);
                 for (std::size_t t = 0; t < batch; ++t)
-                    for (std::size_t k = 0; k < results.size(); ++k)
-                        add_kernel(m_kernels[first_term + first + t][first_medium + k], scratch,
-                                   scratch.lines.data() + t * height, scratch.sums.data() + 2 * k * height);
+                    for (std::size_t k = 0; k < results.size(); ++k) {
+                        const std::size_t pair = (first + t) * results.size() + k;
+                        for (std::size_t i = first_part[pair]; i < first_part[pair + 1]; ++i) {
+                            m_spectra.spectrum(scratch.column, scratch.centres, i, *parts[i], scratch.kernel.data());
+                            add_product(scratch.sums.data() + (2 * k + (parts[i]->odd_m() ? 1 : 0)) * height,
+                                        scratch.kernel.data(), scratch.lines.data() + t * height, height);
+                        }
+                    }
             }
             for (std::size_t k = 0; k < results.size(); ++k) {
                 Complex* even = scratch.sums.data() + 2 * k * height;
@@ -175,17 +193,6 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
         }
         tile.progress.advance(0.6 * tile.work / static_cast<double>(items));
     });
-}
-
-// Adds the product of a light's spectrum and its kernel's to those of even m and to those of odd m.
-void Convolution::add_kernel(const std::vector<KernelSpectra::Part>& kernel, ColumnScratch& scratch,
-                             const Complex* light, Complex* sums) const
-{
-    const std::size_t height = m_plane.padded_height;
-    for (const KernelSpectra::Part& part : kernel) {
-        m_spectra.spectrum(scratch.column, part, scratch.kernel.data());
-        add_product(sums + (part.odd_m() ? height : 0), scratch.kernel.data(), light, height);
-    }
 }
 
 // Transforms a tile's result back along x.

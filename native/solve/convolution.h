@@ -77,6 +77,7 @@ private:
         std::vector<Complex> sums;  // [medium][even, odd m][frequency]
         std::vector<float> kernel;
         KernelSpectra::Column column;
+        KernelSpectra::Centres centres;
     };
 
     static std::vector<Span> tiles(std::size_t size, std::size_t tile);
@@ -86,8 +87,6 @@ private:
     void convolve_columns(const Tile& tile, std::size_t first_term, std::size_t count,
                           std::vector<ColumnSpectrum>& light, std::size_t first_medium,
                           std::vector<ColumnSpectrum>& results);
-    void add_kernel(const std::vector<KernelSpectra::Part>& kernel, ColumnScratch& scratch, const Complex* light,
-                    Complex* sums) const;
     void store_result(const Tile& tile, std::size_t medium, ColumnSpectrum& result);
 
     const KernelSpectra& m_spectra;

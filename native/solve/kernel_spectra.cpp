@@ -46,8 +46,6 @@ KernelSpectra::KernelSpectra(const Level& level, const std::vector<ScaledProfile
 
 void KernelSpectra::start(std::size_t frequency, const HarmonicRange& harmonics, Column& column) const
 {
-    if (m_centre)
-        m_centre->start(frequency, column.centre);
     if (!m_ring)
         return;
     const std::size_t frequencies = m_plane.padded_height / 2 + 1;
@@ -109,18 +107,42 @@ std::vector<KernelSpectra::Part> KernelSpectra::parts(const std::vector<KernelTe
             return term.phase != first->phase || term.m % 2 != first->m % 2;
         });
         const std::span<const KernelTerm> terms(first, last);
-        parts.push_back({terms, m_centre ? m_centre->add_up(terms) : std::vector<float>()});
+        parts.push_back({terms, m_centre ? m_centre->add_up(terms) : CentreSpectrum::Sum()});
         first = last;
     }
     return parts;
 }
 
-void KernelSpectra::spectrum(const Column& column, const Part& part, float* values) const
+void KernelSpectra::start(std::size_t first_frequency, std::size_t count, std::span<const Part* const> parts,
+                          Centres& centres) const
+{
+    if (!m_centre)
+        return;
+    centres.columns.sums.clear();
+    for (const Part* part : parts)
+        centres.columns.sums.push_back(&part->centre);
+    m_centre->start(first_frequency, count, centres.columns);
+}
+
+void KernelSpectra::select(std::size_t column, std::size_t first, std::size_t count, Centres& centres) const
+{
+    centres.column = column;
+    centres.first = first;
+    if (!m_centre || !m_centre->is_wide())
+        return;
+    centres.spectra.resize(count * (m_plane.padded_height / 2 + 1));
+    m_centre->spectra(centres.columns, column, first, count, centres.spectra.data());
+}
+
+void KernelSpectra::spectrum(const Column& column, const Centres& centres, std::size_t i, const Part& part,
+                             float* values) const
 {
     const std::size_t frequencies = m_plane.padded_height / 2 + 1;
     const bool sine = part.sine();
-    if (m_centre)
-        m_centre->spectrum(column.centre, part.centre, sine, part.odd_m(), values);
+    if (m_centre && !m_centre->is_wide())
+        m_centre->spectrum(centres.columns, centres.column, i, values);
+    else if (m_centre)
+        std::copy_n(centres.spectra.data() + (i - centres.first) * frequencies, frequencies, values);
     else
         std::fill_n(values, frequencies, 0.0f);
     if (m_ring)

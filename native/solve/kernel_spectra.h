@@ -29,7 +29,6 @@ public:
 
     // What one column of frequencies needs for kernels of some harmonics; use it again for the next one.
     struct Column {
-        CentreSpectrum::Column centre;
         std::size_t first_m = 0;
         std::size_t first_function = 0;  // column of the table
         std::vector<float> trig;  // [2 (m - first_m) + phase][frequency]: cos, sin (m psi) times the texel's transform
@@ -48,7 +47,7 @@ public:
     // Terms of a kernel that share their phase and whether m is even; the kernel's terms must outlive it.
     struct Part {
         std::span<const KernelTerm> terms;
-        std::vector<float> centre;  // their sum
+        CentreSpectrum::Sum centre;
 
         bool sine() const { return terms.front().phase == Phase::sine; }
         bool odd_m() const { return terms.front().m % 2 == 1; }
@@ -57,8 +56,19 @@ public:
     // A kernel's terms must be sorted so that those of a part follow each other.
     std::vector<Part> parts(const std::vector<KernelTerm>& kernel) const;
 
-    // The sum of a part's terms, for all padded_height frequencies ky; for odd m divided by -i, hence real.
-    void spectrum(const Column& column, const Part& part, float* values) const;
+    // The centres of some parts, found together for several columns, and then for several parts of one.
+    struct Centres {
+        CentreSpectrum::Columns columns;
+        std::size_t column = 0;
+        std::size_t first = 0;  // part
+        std::vector<float> spectra;  // [part - first][frequency], of wide centres
+    };
+    void start(std::size_t first_frequency, std::size_t count, std::span<const Part* const> parts,
+               Centres& centres) const;
+    void select(std::size_t column, std::size_t first, std::size_t count, Centres& centres) const;
+
+    // The sum of the terms of part i of those selected, for all padded_height frequencies ky; for odd m divided by -i, hence real.
+    void spectrum(const Column& column, const Centres& centres, std::size_t i, const Part& part, float* values) const;
 
 private:
     PaddedPlane m_plane;

@@ -17,6 +17,30 @@ BEAMSPREAD_CLONES void add_scaled(float* __restrict sum, const float* values, fl
         sum[i] += factor * values[i];
 }
 
+BEAMSPREAD_CLONES void multiply_rows(float* __restrict product, const float* factors, const float* rows,
+                                     std::size_t columns, std::size_t count, std::size_t width)
+{
+    using Values = float __attribute__((vector_size(values_per_block * sizeof(float))));
+    // As many as keep an adder busy and fit into registers; what is read of the rows serves all.
+    constexpr std::size_t at_once = 4;
+    for (std::size_t first = 0; first < columns; first += at_once) {
+        std::array<const float*, at_once> factor;
+        for (std::size_t c = 0; c < at_once; ++c)
+            factor[c] = factors + (first + c < columns ? first + c : first) * count;
+        for (std::size_t i = 0; i < width; i += values_per_block) {
+            std::array<Values, at_once> sums{};
+            for (std::size_t k = 0; k < count; ++k) {
+                Values row;
+                std::memcpy(&row, rows + k * width + i, sizeof(row));
+                for (std::size_t c = 0; c < at_once; ++c)
+                    sums[c] += factor[c][k] * row;
+            }
+            for (std::size_t c = 0; c < at_once && first + c < columns; ++c)
+                std::memcpy(product + (first + c) * width + i, &sums[c], sizeof(Values));
+        }
+    }
+}
+
 BEAMSPREAD_CLONES void scale(float* __restrict product, const float* values, float factor, std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i)

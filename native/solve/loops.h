@@ -12,6 +12,14 @@ namespace beamspread {
 // sum[i] += factor * values[i]
 void add_scaled(float* sum, const float* values, float factor, std::size_t count);
 
+// Values of a block: `multiply_rows` has no remainders.
+inline constexpr std::size_t values_per_block = 16;
+
+// product[c * width + i] = sum over k of factors[c * count + k] * rows[k * width + i]; k below count, c below columns,
+// i below width, a multiple of a block
+void multiply_rows(float* product, const float* factors, const float* rows, std::size_t columns, std::size_t count,
+                   std::size_t width);
+
 // product[i] = factor * values[i]
 void scale(float* product, const float* values, float factor, std::size_t count);
 
