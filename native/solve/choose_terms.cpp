@@ -140,7 +140,7 @@ std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const 
     for (const KernelDecomposition::Term& term : kernels.terms())
         transforms.push_back(term.m > 0 ? 2.0f : 1.0f);
     const LuminanceProbe probe(lights, kernels.basis(candidates, rounding), pitch_x, pitch_y);
-    std::vector<Texel> texels = probe_texels(lights);
+    std::vector<Texel> texels = probe_texels(lights, pitch_x, pitch_y);
     std::vector<LuminanceProbe::Reading> readings;
     for (std::size_t round = 0;; ++round) {
         const std::size_t known = readings.size();
