@@ -59,6 +59,7 @@ def field(kind, rng):
             "aside": [lamp(0.3, 0.0, 0.1)],
             "grazing": [lamp(-0.2, 0.1, 0.01)],
             "outside": [lamp(0.8, 0.1, 0.02)],
+            "beside": [lamp(0.2, -0.2, 0.02)],
             "two lamps": [lamp(-0.02, -0.2, 0.05), lamp(0.22, 0.15, 0.05)],
         }[kind]
     return [(np.ones((SIZE, SIZE), np.float32), directions)]
@@ -91,6 +92,7 @@ def assert_within(tolerance, result, expected, floor=FLOOR):
         ("ior 1", (0.6, 0.9, 0.3), "grazing", "blocks", 0.4),
         ("ior 1", (0.6, 0.9, 0.3), "outside", "none", 200.0),
         ("ior 1", (0.9, 0.9, 0.9), "aside", "corner", 115.0),  # dark is what light travels away from
+        ("ior 1", (0.9, 0.9, 0.9), "beside", "half", 200.0),  # dark below the lamp, where all harmonics meet
         ("ior 1.4", (0.999, 0.99, 0.9), "blocks", "half", 0.13),
         ("ior 1.4", (0.999, 0.9, 0.5), "smooth", "texels", 1.9),
         ("ior 1.4", (0.99, 0.9, 0.3), "two lamps", "stripes", 0.11),
