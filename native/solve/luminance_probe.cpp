@@ -19,12 +19,12 @@ std::size_t distance(std::size_t a, std::size_t b)
     return a > b ? a - b : b - a;
 }
 
-// By how much the azimuth of beams turns; zero where one of them is dark or they have little to do with each other.
+// By how much the azimuth of beams turns, about; zero where one of them is dark or they have little to do with each other.
 float turn_between(const SquareBeam& from, const SquareBeam& to)
 {
     const float cosine = from.direction.x * to.direction.x + from.direction.y * to.direction.y;
     const float sine = from.direction.x * to.direction.y - from.direction.y * to.direction.x;
-    return cosine > 0.0f ? sine / std::sqrt(cosine * cosine + sine * sine) : 0.0f;
+    return cosine > 0.0f ? sine / cosine : 0.0f;
 }
 
 }  // namespace
@@ -139,8 +139,9 @@ void LuminanceProbe::add_far(Place& place, std::size_t level, std::size_t y, std
     if (by_radius == nullptr)
         return;
     // The azimuth of the texel turns by this from the square to the next.
-    const float turn_x = size * unit_x * offset_y / square;
-    const float turn_y = -size * unit_y * offset_x / square;
+    const float per_square = size / square;
+    const float turn_x = unit_x * offset_y * per_square;
+    const float turn_y = -unit_y * offset_x * per_square;
 
     const std::size_t harmonics = m_tables.harmonics();
     std::fill(place.light.begin(), place.light.end(), 0.0f);

@@ -63,7 +63,7 @@ public:
     // What is left of each harmonic over a square from one side of which to the other it turns by so much, radians.
     const float* over_turn(float turn) const
     {
-        const auto step = static_cast<std::size_t>(turn * turn_steps_per_radian);
+        const auto step = static_cast<std::size_t>(std::min(turn, most_turn) * turn_steps_per_radian);
         return m_by_turn.data() + std::min(step, turn_steps - 1) * m_harmonics;
     }
 
@@ -98,6 +98,7 @@ private:
     static constexpr float radii_per_octave = 16.0f;
     static constexpr std::size_t turn_steps = 64;
     static constexpr float turn_steps_per_radian = 64.0f;
+    static constexpr float most_turn = 1.0f;  // larger ones may not be finite
     static constexpr std::size_t most_nearby_ranks = 4;
     static constexpr std::size_t nearby_size = 2 * nearby_reach + 2;  // a row and a column of zeros come first
 
