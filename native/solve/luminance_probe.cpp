@@ -156,10 +156,12 @@ void LuminanceProbe::add_far(Place& place, std::size_t level, std::size_t y, std
         const float cosine = lengths > 0.0f ? (offset_x * u + offset_y * v) * per_length : 1.0f;
         const float sine = (offset_y * u - offset_x * v) * per_length;
         multiple_angles(place.cosine.data(), place.sine.data(), cosine, sine, harmonics);
-        // Where all beams travel toward or away from the texel, as below a lamp, nothing turns.
+        // Where all beams travel toward or away from the texel, as below a lamp, nothing turns. Beams that have nothing to
+        // do with each other turn by much, but their harmonics don't cancel for that.
         const float seen_x = turn_x - turn_between(quarters[2 * (y % 2)], quarters[2 * (y % 2) + 1]);
         const float seen_y = turn_y - turn_between(quarters[x % 2], quarters[2 + x % 2]);
-        const float* left = m_tables.over_turn(std::sqrt(seen_x * seen_x + seen_y * seen_y));
+        const float seen = std::min(seen_x * seen_x + seen_y * seen_y, turn_x * turn_x + turn_y * turn_y);
+        const float* left = m_tables.over_turn(std::sqrt(seen));
         multiply(place.mean.data(), place.cosine.data(), left, beam.irradiance, harmonics);
         add_harmonics(place.light.data(), m_tables.at_angle(beam.direction), place.mean.data(),
                       m_tables.columns().data(), m_tables.columns().size());
