@@ -56,18 +56,21 @@ public:
     // A kernel's terms must be sorted so that those of a part follow each other.
     std::vector<Part> parts(const std::vector<KernelTerm>& kernel) const;
 
-    // The centres of some parts, found together for several columns, and then for several parts of one.
+    // The centres of some parts: what is read once for several columns, and the spectra of several parts of one column.
     struct Centres {
         CentreSpectrum::Columns columns;
         std::size_t column = 0;
         std::size_t first = 0;  // part
         std::vector<float> spectra;  // [part - first][frequency], of wide centres
     };
+    // For `count` frequencies kx from the first.
     void start(std::size_t first_frequency, std::size_t count, std::span<const Part* const> parts,
                Centres& centres) const;
+    // One of these columns, and parts [first, first + count), for `spectrum`.
     void select(std::size_t column, std::size_t first, std::size_t count, Centres& centres) const;
 
-    // The sum of the terms of part i of those selected, for all padded_height frequencies ky; for odd m divided by -i, hence real.
+    // The sum of the terms of part i of those selected, for all padded_height frequencies ky; for odd m divided by -i,
+    // hence real.
     void spectrum(const Column& column, const Centres& centres, std::size_t i, const Part& part, float* values) const;
 
 private:

@@ -14,11 +14,6 @@ namespace {
 // harmonics are off by.
 constexpr double least_asymmetry = 0.01;
 
-std::size_t distance(std::size_t a, std::size_t b)
-{
-    return a > b ? a - b : b - a;
-}
-
 // By how much the azimuth of beams turns, about; zero where one of them is dark or they have little to do with each other.
 float turn_between(const SquareBeam& from, const SquareBeam& to)
 {

@@ -8,11 +8,6 @@ namespace beamspread {
 
 namespace {
 
-std::size_t distance(std::size_t a, std::size_t b)
-{
-    return a > b ? a - b : b - a;
-}
-
 // A quadrant of texels around a beam.
 TexelIntegrals integrate_quadrant(const ScaledProfile& scaled, double pitch_x, double pitch_y, std::size_t size)
 {

@@ -23,6 +23,11 @@ inline constexpr std::size_t nearby_sources = 16;
 inline constexpr std::size_t nearby_level = 2;
 inline constexpr std::size_t nearby_side = std::size_t{1} << nearby_level;
 
+inline std::size_t distance(std::size_t a, std::size_t b)
+{
+    return a > b ? a - b : b - a;
+}
+
 // Rows of the tables hold, for each rank, the harmonics up to the last that the basis has, in whole blocks; zero for
 // those that it lacks.
 class ProbeTables {
@@ -63,8 +68,8 @@ public:
     // What is left of each harmonic over a square from one side of which to the other it turns by so much, radians.
     const float* over_turn(float turn) const
     {
-        const auto step = static_cast<std::size_t>(std::min(turn, most_turn) * turn_steps_per_radian);
-        return m_by_turn.data() + std::min(step, turn_steps - 1) * m_harmonics;
+        const float step = std::min(turn * turn_steps_per_radian, static_cast<float>(turn_steps - 1));
+        return m_by_turn.data() + static_cast<std::size_t>(step) * m_harmonics;
     }
 
     // Rows of the media: integrals over the texel so far away, of cosines and then of sines.
@@ -98,7 +103,6 @@ private:
     static constexpr float radii_per_octave = 16.0f;
     static constexpr std::size_t turn_steps = 64;
     static constexpr float turn_steps_per_radian = 64.0f;
-    static constexpr float most_turn = 1.0f;  // larger ones may not be finite
     static constexpr std::size_t most_nearby_ranks = 4;
     static constexpr std::size_t nearby_size = 2 * nearby_reach + 2;  // a row and a column of zeros come first
 
