@@ -12,7 +12,7 @@ PHOTONS = {"preview": 80_000, "final": 4_000_000}
 
 _MAX_PHOTONS = 4_000_000
 
-_FILE_VERSION = 8
+_FILE_VERSION = 9
 """Raised when the simulation changes, so that older cached files are made again."""
 
 SHIPPED_FOLDER = Path(__file__).resolve().parents[1] / "library"

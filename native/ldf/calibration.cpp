@@ -148,10 +148,11 @@ void calibrate(SideResult& side, const Observation& observed)
     const VectorXd before = powers.rowwise().mean();
     const VectorXd relative = relative_variances(powers, before);
     const VectorXd scale = likeliest_scale(before, relative, observed);
-    for (Eigen::Index b = 0; b < bins; ++b) {
-        float* power = side.power.data() + static_cast<std::size_t>(b) * radius_bin_count;
+    for (std::size_t row = 0; row < row_count; ++row) {
+        const double factor = scale(static_cast<Eigen::Index>(order_bin_of(row)));
+        float* power = side.power.data() + row * radius_bin_count;
         std::transform(power, power + radius_bin_count, power,
-                       [&](float x) { return static_cast<float>(scale(b) * static_cast<double>(x)); });
+                       [factor](float x) { return static_cast<float>(factor * static_cast<double>(x)); });
     }
     // Had a batch been the whole simulation, it would have been led to the same totals; the mean of all stays.
     powers = scale.asDiagonal() * powers;

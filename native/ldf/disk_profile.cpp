@@ -5,6 +5,7 @@
 
 #include "base/constants.h"
 #include "base/threads.h"
+#include "ldf/radial_edges.h"
 
 namespace beamspread {
 
@@ -90,10 +91,10 @@ std::vector<double> breakpoints(double radius, double support)
     const int steps = static_cast<int>(std::ceil(std::log(std::max(1.0, support / finest)) / std::log(ratio)));
     for (int i = 0; i < steps; ++i)
         add_offset(finest * std::pow(ratio, i));
-    for (std::size_t k = 0; k < radius_bin_count && radius_bin_edge(k) < support; ++k) {
-        add_offset(radius_bin_edge(k));
-        if (radius_bin_edge(k) > 2.0 * radius)
-            radii.push_back(radius_bin_edge(k));
+    for (std::size_t k = 0; k < edge_count && radial_edge(k) < support; ++k) {
+        add_offset(radial_edge(k));
+        if (radial_edge(k) > 2.0 * radius)
+            radii.push_back(radial_edge(k));
     }
     std::sort(radii.begin(), radii.end());
     constexpr double rounding = 1e-9;

@@ -65,18 +65,21 @@ bool is_point(double beam_diameter, double pitch)
 }
 
 // Power of the scattered light in each texel.
-std::vector<double> texel_power(const RadialProfile& profile, std::size_t size, double pitch, double beam_diameter)
+std::vector<double> texel_power(const std::vector<RadialProfile>& profiles, std::size_t size, double pitch,
+                                double beam_diameter)
 {
     const double corner = -0.5 * static_cast<double>(size) * pitch;
-    const TexelGrid grid{corner - profile.centre(), corner, pitch, pitch, size, size};
-    const TexelIntegrals integrals = is_point(beam_diameter, pitch)
-                                         ? integrate_texels(profile, grid)
-                                         : integrate_texels(DiskProfile(profile, 0.5 * beam_diameter), grid);
     const std::size_t count = size * size;
     std::vector<double> texels(count, 0.0);
-    for (std::size_t m = 0; m < integrals.harmonics; ++m)
-        for (std::size_t i = 0; i < count; ++i)
-            texels[i] += integrals.cosine[m * count + i];
+    for (const RadialProfile& profile : profiles) {
+        const TexelGrid grid{corner - profile.centre(), corner, pitch, pitch, size, size};
+        const TexelIntegrals integrals = is_point(beam_diameter, pitch)
+                                             ? integrate_texels(profile, grid)
+                                             : integrate_texels(DiskProfile(profile, 0.5 * beam_diameter), grid);
+        for (std::size_t m = 0; m < integrals.harmonics; ++m)
+            for (std::size_t i = 0; i < count; ++i)
+                texels[i] += integrals.cosine[m * count + i];
+    }
     return texels;
 }
 
@@ -86,7 +89,8 @@ std::vector<float> ldf_image(const LdfLibrary& library, double angle_deg, double
                              Side side, double beam_diameter)
 {
     check_grid(size, pitch, beam_diameter);
-    std::vector<double> texels = texel_power(library.profile(angle_deg, albedo, side), size, pitch, beam_diameter);
+    std::vector<double> texels =
+        texel_power(library.pole_profiles(angle_deg, albedo, side), size, pitch, beam_diameter);
     for (const BallisticExit& exit : library.ballistic(angle_deg, side)) {
         if (is_point(beam_diameter, pitch))
             add_delta(texels, size, pitch, exit);
@@ -108,7 +112,7 @@ std::vector<float> ldf_image_standard_error(const LdfLibrary& library, double an
     std::vector<double> squares(size * size, 0.0);
     for (std::size_t group = 0; group < group_count; ++group) {
         const auto texels =
-            texel_power(library.group_profile(angle_deg, albedo, side, group), size, pitch, beam_diameter);
+            texel_power(library.pole_profiles(angle_deg, albedo, side, group), size, pitch, beam_diameter);
         for (std::size_t i = 0; i < texels.size(); ++i) {
             const double difference = texels[i] - mean[i];
             mean[i] += difference / static_cast<double>(group + 1);

@@ -7,6 +7,9 @@
 
 #include "base/constants.h"
 #include "base/error.h"
+#include "base/threads.h"
+#include "ldf/fading.h"
+#include "ldf/recentred.h"
 #include "medium/fresnel.h"
 #include "transport/adding_doubling.h"
 
@@ -24,35 +27,19 @@ constexpr double negligible_log_weight = -60.0;
 // Harmonics at the end of the row that move less than this part of a profile's power only cost time.
 constexpr double negligible_harmonics = 1e-4;
 
-// Weights of the harmonics of light so sharp that it needs more than are counted. Cut off, they would ring around rings
-// with a peak, below zero beside it; fading out they do not, and texels finer than the last ones resolve are nearer to the
-// truth. Around mirror images in thin slabs that was 1 % of all power below zero (g .9, ior 1.5, thickness .5, 80 degrees,
-// texels of .05 mean free paths), and is 2e-5.
-const std::array<double, harmonic_count>& fading_harmonics()
+// Sums over the rows of a pole, [harmonic][radius bin].
+std::vector<double> contract_orders(const SideResult& side, double albedo, std::size_t pole)
 {
-    static const std::array<double, harmonic_count> fading = [] {
-        constexpr std::size_t half = harmonic_count / 2;
-        std::array<double, harmonic_count> weights;
-        weights.fill(1.0);
-        for (std::size_t m = half; m < harmonic_count; ++m)
-            weights[m] = 0.5 + 0.5 * std::cos(pi * static_cast<double>(m - half) / half);
-        return weights;
-    }();
-    return fading;
-}
-
-// Sums over order bins [first, last), [harmonic][radius bin].
-std::vector<double> contract_orders(const SideResult& side, const std::array<double, order_bin_count>& weights,
-                                    std::size_t first, std::size_t last)
-{
-    std::vector<double> sums(most_harmonics(side) * radius_bin_count, 0.0);
+    const std::array<double, order_bin_count> weights = order_weights(side, albedo);
+    std::vector<double> sums(most_harmonics(side.harmonics, pole) * radius_bin_count, 0.0);
     const float* ratios = side.ratios.data();
-    for (std::size_t b = 0; b < order_bin_count; ++b) {
-        const std::size_t harmonics = side.harmonics[b];
-        if (b >= first && b < last && weights[b] != 0.0) {
+    for (std::size_t row = 0; row < end_row(pole); ++row) {
+        const std::size_t harmonics = side.harmonics[row];
+        const double order_weight = weights[order_bin_of(row)];
+        if (row >= first_row(pole) && order_weight != 0.0) {
             std::array<double, radius_bin_count> power;
             for (std::size_t k = 0; k < radius_bin_count; ++k) {
-                power[k] = weights[b] * static_cast<double>(side.power[b * radius_bin_count + k]);
+                power[k] = order_weight * static_cast<double>(side.power[row * radius_bin_count + k]);
                 sums[k] += power[k];
             }
             for (std::size_t m = 1; m < harmonics; ++m) {
@@ -67,31 +54,6 @@ std::vector<double> contract_orders(const SideResult& side, const std::array<dou
     return sums;
 }
 
-// From the sums over what is counted in all radius bins, and over what is counted in quarters of octaves.
-struct OrderSums {
-    OrderSums(const Medium& medium, const SideResult& side, double albedo) : centre(side.centre)
-    {
-        const auto weights = order_weights(side, albedo);
-        const std::size_t fine_count = fine_orders(medium);
-        if (fine_count > 0)
-            fine = contract_orders(side, weights, 0, fine_count);
-        quarters = contract_orders(side, weights, fine_count, order_bin_count);
-    }
-
-    RadialProfile profile() const
-    {
-        RadialProfile sum(centre, quarters, RadialDetail::quarters);
-        if (!fine.empty())
-            sum.add(RadialProfile(centre, fine, RadialDetail::all), 1.0, 1.0);
-        sum.drop_negligible(negligible_harmonics);
-        return sum;
-    }
-
-    double centre;
-    std::vector<double> fine;
-    std::vector<double> quarters;
-};
-
 // Relative deviations [harmonic][radius bin] of the powers of the rings, and of harmonics in parts of those.
 void deviate(std::vector<double>& sums, const std::vector<double>& deviations)
 {
@@ -100,6 +62,11 @@ void deviate(std::vector<double>& sums, const std::vector<double>& deviations)
         const double weight = fades ? fading_harmonics()[i / radius_bin_count] : 1.0;
         sums[i] += weight * sums[i % radius_bin_count] * deviations[i];
     }
+}
+
+std::size_t poles_of(const Medium& medium)
+{
+    return mirrored_orders(medium) == 0 ? 1 : pole_count;
 }
 
 }  // namespace
@@ -140,25 +107,12 @@ LdfLibrary::LdfLibrary(const Medium& medium, std::uint64_t photons, std::uint64_
               [](const AngleResult& a, const AngleResult& b) { return a.angle_deg < b.angle_deg; });
     if (is_calibrated() && m_residuals.size() != m_results.size())
         reject("residuals", static_cast<double>(m_residuals.size()), "as many as angles");
-    // Outside the medium both the refracted angle and the Fresnel factor of light that comes back from a slab's other
-    // boundary are smooth functions of the angle; inside, the latter turns up infinitely fast toward grazing.
-    std::vector<double> nodes;
-    for (const AngleResult& result : m_results) {
-        const double node = result.angle_deg * radians_per_degree;
-        // Closer nodes would only amplify the simulation's noise.
-        if (!nodes.empty() && !(node - nodes.back() > 1e-3))
-            reject("angles", result.angle_deg, "distinct angles, at least 0.1 degrees apart");
-        nodes.push_back(node);
-    }
-    m_spline = AngleSpline(std::move(nodes));
-}
-
-std::vector<double> LdfLibrary::angles_deg() const
-{
     std::vector<double> angles;
     for (const AngleResult& result : m_results)
         angles.push_back(result.angle_deg);
-    return angles;
+    m_simulated = AngleNodes(std::move(angles));
+    // Around one pole the images of a beam have to move from node to node.
+    m_nodes = poles_of(medium) > 1 ? m_simulated.refined() : m_simulated;
 }
 
 void LdfLibrary::check_angle(double angle_deg) const
@@ -175,20 +129,6 @@ void LdfLibrary::check_angle(double angle_deg) const
     }
 }
 
-double LdfLibrary::clamped_angle(double angle_deg) const
-{
-    return std::clamp(angle_deg, m_results.front().angle_deg, m_results.back().angle_deg);
-}
-
-std::array<std::size_t, 2> LdfLibrary::neighbours(double angle_deg) const
-{
-    const double angle = clamped_angle(angle_deg);
-    std::size_t j = 0;
-    while (j + 2 < m_results.size() && angle >= m_results[j + 1].angle_deg)
-        ++j;
-    return {j, std::min(j + 1, m_results.size() - 1)};
-}
-
 double LdfLibrary::entry_transmittance(double angle_deg) const
 {
     return 1.0 - fresnel(std::cos(angle_deg * radians_per_degree), m_medium.ior);
@@ -197,21 +137,19 @@ double LdfLibrary::entry_transmittance(double angle_deg) const
 LdfLibrary::AngleWeights LdfLibrary::angle_weights(double angle_deg) const
 {
     check_angle(angle_deg);
-    const double theta = clamped_angle(angle_deg) * radians_per_degree;
-    const double transmittance = entry_transmittance(angle_deg);
-    AngleWeights weights{m_spline.weights(theta, AngleSpline::Parity::even),
-                         m_spline.weights(theta, AngleSpline::Parity::odd), neighbours(angle_deg)};
-    for (double& w : weights.even)
-        w *= transmittance;
-    for (double& w : weights.odd)
-        w *= transmittance;
-    return weights;
+    return m_nodes.weights(angle_deg, entry_transmittance(angle_deg));
+}
+
+LdfLibrary::AngleWeights LdfLibrary::simulated_weights(double angle_deg) const
+{
+    check_angle(angle_deg);
+    return m_simulated.weights(angle_deg, entry_transmittance(angle_deg));
 }
 
 double LdfLibrary::total(double angle_deg, double albedo, Side side) const
 {
     check_albedo(albedo);
-    const AngleWeights weights = angle_weights(angle_deg);
+    const AngleWeights weights = simulated_weights(angle_deg);
     double sum = entry_transmittance(angle_deg) *
                  ballistic_total(m_medium, refracted_angle(angle_deg * radians_per_degree, m_medium.ior), side);
     for (std::size_t j = 0; j < m_results.size(); ++j) {
@@ -230,7 +168,7 @@ double LdfLibrary::total(double angle_deg, double albedo, Side side) const
 double LdfLibrary::standard_error(double angle_deg, double albedo, Side side) const
 {
     check_albedo(albedo);
-    const AngleWeights weights = angle_weights(angle_deg);
+    const AngleWeights weights = simulated_weights(angle_deg);
     double variance = 0.0;  // angles are simulated independently
     for (std::size_t j = 0; j < m_results.size(); ++j) {
         const SideResult& result = m_results[j].sides[static_cast<std::size_t>(side)];
@@ -258,7 +196,7 @@ double LdfLibrary::standard_error(double angle_deg, double albedo, Side side) co
 // The largest of those at the compared angles and albedos around.
 double LdfLibrary::residual(double angle_deg, double albedo, Side side) const
 {
-    const double angle = clamped_angle(angle_deg);
+    const double angle = m_simulated.clamped(angle_deg);
     const auto s = static_cast<std::size_t>(side);
     const auto above = std::upper_bound(compared_albedos.begin(), compared_albedos.end() - 1, albedo);
     const auto k = static_cast<std::size_t>(above - compared_albedos.begin());
@@ -285,55 +223,71 @@ double LdfLibrary::diffuse_reflectance(double albedo) const
     return sum / points;
 }
 
-std::vector<RadialProfile> LdfLibrary::node_profiles(double albedo, Side side) const
+std::vector<LdfLibrary::PoleProfiles> LdfLibrary::simulated_profiles(double albedo, Side side,
+                                                                     std::optional<std::size_t> group) const
 {
     check_albedo(albedo);
-    std::vector<RadialProfile> profiles;
-    for (const AngleResult& result : m_results) {
-        const SideResult& from = result.sides[static_cast<std::size_t>(side)];
-        profiles.push_back(from.power.empty() ? RadialProfile() : OrderSums(m_medium, from, albedo).profile());
-    }
-    return profiles;
+    std::vector<PoleProfiles> poles(poles_of(m_medium));
+    for (std::size_t pole = 0; pole < poles.size(); ++pole)
+        for (const AngleResult& result : m_results) {
+            RadialProfile& profile = poles[pole].emplace_back();
+            const SideResult& from = result.sides[static_cast<std::size_t>(side)];
+            if (from.power.empty())
+                continue;
+            std::vector<double> sums = contract_orders(from, albedo, pole);
+            if (group)
+                deviate(sums, deviations_at(from.deviations, from.harmonics, from.radii, *group, pole, albedo));
+            profile = RadialProfile(0.0, sums, RadialDetail::bins);
+            profile.drop_negligible(negligible_harmonics);
+        }
+    return poles;
 }
 
-RadialProfile LdfLibrary::interpolated(double angle_deg, const std::vector<RadialProfile>& nodes) const
+RadialProfile LdfLibrary::interpolated(double angle_deg, Side side, std::size_t pole, const PoleProfiles& nodes,
+                                       const AngleWeights& weights) const
 {
-    const AngleWeights weights = angle_weights(angle_deg);
     RadialProfile sum;
-    double centre = 0.0;
-    for (std::size_t j = 0; j < nodes.size(); ++j) {
+    for (std::size_t j = 0; j < nodes.size(); ++j)
         sum.add(nodes[j], weights.even[j], weights.odd[j]);
-        centre += weights.odd[j] * nodes[j].centre();
-    }
-    // The weights hold the transmittance at entry, which changes power and no place.
-    sum.set_centre(centre / entry_transmittance(angle_deg));
+    const double theta = refracted_angle(m_simulated.clamped(angle_deg) * radians_per_degree, m_medium.ior);
+    sum.set_centre(pole_places(m_medium, theta)[static_cast<std::size_t>(side)][pole]);
     sum.keep_harmonics(weights.harmonics(nodes));
     sum.drop_negligible(negligible_harmonics);
     return sum;
 }
 
-RadialProfile LdfLibrary::profile(double angle_deg, double albedo, Side side) const
+std::vector<RadialProfile> LdfLibrary::node_profiles(double albedo, Side side) const
 {
-    return interpolated(angle_deg, node_profiles(albedo, side));
+    const std::vector<PoleProfiles> poles = simulated_profiles(albedo, side);
+    if (poles.size() == 1)
+        return poles.front();
+    std::vector<RadialProfile> profiles(m_nodes.count());
+    parallel_for(profiles.size(), [&](std::size_t j) {
+        const double angle = m_nodes.angles_deg()[j];
+        const AngleWeights weights = m_simulated.weights(angle, 1.0);
+        profiles[j] = interpolated(angle, side, 0, poles.front(), weights);
+        for (std::size_t pole = 1; pole < poles.size(); ++pole)
+            profiles[j].add(recentred(interpolated(angle, side, pole, poles[pole], weights), profiles[j].centre()), 1.0,
+                            1.0);
+        profiles[j].drop_negligible(negligible_harmonics);
+    });
+    return profiles;
 }
 
-RadialProfile LdfLibrary::group_profile(double angle_deg, double albedo, Side side, std::size_t group) const
+RadialProfile LdfLibrary::profile(double angle_deg, double albedo, Side side) const
 {
-    check_albedo(albedo);
-    std::vector<RadialProfile> nodes;
-    for (const AngleResult& result : m_results) {
-        const SideResult& from = result.sides[static_cast<std::size_t>(side)];
-        if (from.power.empty()) {
-            nodes.emplace_back();
-            continue;
-        }
-        const std::vector<double> deviations = deviations_at(m_medium, from.deviations, from.radii, group, albedo);
-        OrderSums sums(m_medium, from, albedo);
-        deviate(sums.fine, deviations);
-        deviate(sums.quarters, deviations);
-        nodes.push_back(sums.profile());
-    }
-    return interpolated(angle_deg, nodes);
+    return interpolated(angle_deg, side, 0, node_profiles(albedo, side), angle_weights(angle_deg));
+}
+
+std::vector<RadialProfile> LdfLibrary::pole_profiles(double angle_deg, double albedo, Side side,
+                                                     std::optional<std::size_t> group) const
+{
+    const AngleWeights weights = simulated_weights(angle_deg);
+    const std::vector<PoleProfiles> poles = simulated_profiles(albedo, side, group);
+    std::vector<RadialProfile> profiles;
+    for (std::size_t pole = 0; pole < poles.size(); ++pole)
+        profiles.push_back(interpolated(angle_deg, side, pole, poles[pole], weights));
+    return profiles;
 }
 
 std::vector<BallisticExit> LdfLibrary::ballistic(double angle_deg, Side side) const

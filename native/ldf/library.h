@@ -2,12 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "base/progress.h"
-#include "ldf/angle_spline.h"
+#include "ldf/angle_nodes.h"
 #include "ldf/ldf_source.h"
 #include "medium/medium.h"
 #include "transport/simulation.h"
@@ -43,7 +44,7 @@ public:
     std::uint64_t photons() const { return m_photons; }  // per angle
     std::uint64_t seed() const { return m_seed; }
     const std::vector<AngleResult>& results() const { return m_results; }
-    std::vector<double> angles_deg() const;
+    const std::vector<double>& angles_deg() const { return m_simulated.angles_deg(); }
     bool is_calibrated() const { return !m_residuals.empty(); }  // see ldf/calibration.h
     const std::vector<SideResiduals>& residuals() const { return m_residuals; }
 
@@ -61,11 +62,14 @@ public:
     // The scattered part of the LDF, per unit power incident.
     RadialProfile profile(double angle_deg, double albedo, Side side) const override;
 
-    // The same from a group of batches alone, a simulation of its own; group < group_count.
-    RadialProfile group_profile(double angle_deg, double albedo, Side side, std::size_t group) const;
+    // The same as a sum of profiles around each pole (transport/poles.h), which shows what one pole blurs; or from a group
+    // of batches alone, a simulation of its own; group < group_count.
+    std::vector<RadialProfile> pole_profiles(double angle_deg, double albedo, Side side,
+                                             std::optional<std::size_t> group = {}) const;
 
-    // At the simulated angles, per unit power that *entered*; the weights include the Fresnel transmittance at entry.
-    std::size_t node_count() const override { return m_results.size(); }
+    // Per unit power that *entered*, around the first pole; the weights include the Fresnel transmittance at entry. At the
+    // simulated angles, and between them where a beam has images.
+    std::size_t node_count() const override { return m_nodes.count(); }
     std::vector<RadialProfile> node_profiles(double albedo, Side side) const override;
     AngleWeights angle_weights(double angle_deg) const override;
 
@@ -75,18 +79,24 @@ public:
     void check_angle(double angle_deg) const override;
 
 private:
-    double clamped_angle(double angle_deg) const;
-    std::array<std::size_t, 2> neighbours(double angle_deg) const;  // simulated angles around
+    using PoleProfiles = std::vector<RadialProfile>;  // of the simulated angles
+
+    AngleWeights simulated_weights(double angle_deg) const;
     double residual(double angle_deg, double albedo, Side side) const;
-    RadialProfile interpolated(double angle_deg, const std::vector<RadialProfile>& nodes) const;
     double entry_transmittance(double angle_deg) const;
+
+    // Of each pole, which has no place yet.
+    std::vector<PoleProfiles> simulated_profiles(double albedo, Side side, std::optional<std::size_t> group = {}) const;
+    RadialProfile interpolated(double angle_deg, Side side, std::size_t pole, const PoleProfiles& nodes,
+                               const AngleWeights& weights) const;
 
     Medium m_medium;
     std::uint64_t m_photons;
     std::uint64_t m_seed;
     std::vector<AngleResult> m_results;  // ascending angles
     std::vector<SideResiduals> m_residuals;
-    AngleSpline m_spline;  // over the angles outside, see the constructor
+    AngleNodes m_simulated;
+    AngleNodes m_nodes;  // that solvers know of
 };
 
 // 0 <= albedo < 1, or InvalidArgument.

@@ -51,16 +51,6 @@ private:
 
 }  // namespace
 
-int version(const Medium& medium)
-{
-    return fine_orders(medium) > 0 ? 7 : 6;
-}
-
-std::size_t scatter_lines(const Medium& medium)
-{
-    return fine_orders(medium) > 0 ? group_count : group_count * scatter_albedos.size();
-}
-
 std::string part_name(std::size_t side, std::size_t angle)
 {
     return std::string(side_names[side]) + "." + std::to_string(angle);
@@ -75,52 +65,6 @@ std::vector<float> with_columns(const std::vector<float>& values, std::size_t fr
         std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * from_columns), std::min(from_columns, columns),
                     result.begin() + static_cast<std::ptrdiff_t>(i * columns));
     return result;
-}
-
-std::vector<float> packed(const Medium& medium, std::span<const std::size_t> orders, std::size_t radii,
-                          std::span<const float> rings)
-{
-    std::vector<float> values;
-    std::vector<std::size_t> bins;
-    for (std::size_t i = 0; i < orders.size(); ++i) {
-        if (i == 0 || orders[i] != orders[i - 1])
-            bins = counted_bins(medium, orders[i], radii);
-        for (const std::size_t k : bins)
-            values.push_back(rings[i * radius_bin_count + k]);
-    }
-    return values;
-}
-
-std::vector<float> unpacked(const Medium& medium, std::span<const std::size_t> orders, std::size_t radii,
-                            std::span<const float> values)
-{
-    std::vector<float> rings(orders.size() * radius_bin_count, 0.0F);
-    std::vector<std::size_t> bins;
-    std::size_t from = 0;
-    for (std::size_t i = 0; i < orders.size(); ++i) {
-        if (i == 0 || orders[i] != orders[i - 1])
-            bins = counted_bins(medium, orders[i], radii);
-        for (const std::size_t k : bins)
-            rings[i * radius_bin_count + k] = values[from++];
-    }
-    return rings;
-}
-
-std::size_t packed_size(const Medium& medium, std::span<const std::size_t> orders, std::size_t radii)
-{
-    const std::size_t all = counted_bins(medium, 0, radii).size();
-    const std::size_t quarters = counted_bins(medium, order_bin_count, radii).size();
-    const auto fine =
-        std::count_if(orders.begin(), orders.end(), [&](std::size_t b) { return b < fine_orders(medium); });
-    return orders.size() * quarters + static_cast<std::size_t>(fine) * (all - quarters);
-}
-
-std::vector<std::size_t> ratio_orders(std::span<const std::size_t> harmonics)
-{
-    std::vector<std::size_t> orders;
-    for (std::size_t b = 0; b < harmonics.size(); ++b)
-        orders.insert(orders.end(), harmonics[b] - 1, b);
-    return orders;
 }
 
 Checksum checksum(const ExrPart& part)

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "base/error.h"
@@ -28,7 +29,7 @@ public:
         const auto version = attribute<int>(first, "beamspreadLdf");
         const Medium medium{attribute<double>(first, "g"), attribute<double>(first, "ior"),
                             attribute<double>(first, "thickness")};
-        if (version != format::version(medium))
+        if (version != format::version)
             fail("is of another format version");
         std::vector<AngleResult> results;
         std::vector<SideResiduals> residuals;
@@ -55,7 +56,7 @@ private:
             fail("has an angle out of range");
         for (std::size_t side = 0; side < side_count; ++side)
             if (find(format::part_name(side, j)))
-                result.sides[side] = side_result(format::part_name(side, j), medium);
+                result.sides[side] = side_result(format::part_name(side, j));
         if (result.sides[1].power.empty() != medium.is_half_space())
             fail("does not fit its own thickness");
         return result;
@@ -112,10 +113,10 @@ private:
     // A part of lines of radius bins, the missing bins empty.
     std::vector<float> power(const ExrPart& part) const
     {
-        if (part.width > static_cast<int>(radius_bin_count) || part.height > static_cast<int>(order_bin_count))
+        if (part.width > static_cast<int>(radius_bin_count) || part.height > static_cast<int>(row_count))
             fail_size(part.name);
         auto values = format::with_columns(part.pixels, static_cast<std::size_t>(part.width), radius_bin_count);
-        values.resize(order_bin_count * radius_bin_count, 0.0F);
+        values.resize(row_count * radius_bin_count, 0.0F);
         return values;
     }
 
@@ -123,35 +124,35 @@ private:
     {
         std::vector<std::size_t> counts;
         for (const float count : attribute<std::vector<float>>(part, "harmonics")) {
-            const bool fits = counts.size() < order_bin_count && count >= 1.0F && count == std::floor(count) &&
+            const bool fits = counts.size() < row_count && count >= 1.0F && count == std::floor(count) &&
                               count <= static_cast<float>(harmonics_of(counts.size()));
             if (!fits)
                 fail("has an attribute 'harmonics' that is no list of their numbers");
             counts.push_back(static_cast<std::size_t>(count));
         }
-        if (counts.size() != order_bin_count)
+        if (counts.size() != row_count)
             fail("has an attribute 'harmonics' of another size");
         return counts;
     }
 
-    std::vector<float> ratios(const std::string& name, const Medium& medium, const std::vector<std::size_t>& harmonics,
-                              std::size_t radii)
+    std::vector<float> ratios(const std::string& name, const std::vector<std::size_t>& harmonics, std::size_t radii)
     {
-        const std::vector<std::size_t> orders = format::ratio_orders(harmonics);
-        if (orders.empty())
+        const std::size_t rings = std::accumulate(harmonics.begin(), harmonics.end(), std::size_t{0}) - row_count;
+        if (rings == 0)
             return {};
-        const ExrPart& part = checked(name);
-        const std::size_t lines = format::ratio_lines(format::packed_size(medium, orders, radii));
+        ExrPart& part = checked(name);
+        const std::size_t lines = format::ratio_lines(rings * radii);
         if (part.width != static_cast<int>(format::ratio_columns) || part.height != static_cast<int>(lines))
             fail_size(name);
-        return format::unpacked(medium, orders, radii, part.pixels);
+        part.pixels.resize(rings * radii);
+        return format::with_columns(part.pixels, radii, radius_bin_count);
     }
 
     // Most of a file: what was read is kept, not copied.
-    std::vector<float> scatter(ExrPart& part, const Medium& medium, std::size_t harmonics, std::size_t radii) const
+    std::vector<float> scatter(ExrPart& part, const std::vector<std::size_t>& harmonics, std::size_t radii) const
     {
-        if (part.height != static_cast<int>(format::scatter_lines(medium)) ||
-            part.pixels.size() != group_count * harmonics * scatter_count(medium, radii))
+        if (part.height != static_cast<int>(group_count) ||
+            part.pixels.size() != group_count * scatter_count(harmonics, radii))
             fail_size(part.name);
         return std::move(part.pixels);
     }
@@ -177,17 +178,14 @@ private:
         return residuals;
     }
 
-    SideResult side_result(const std::string& name, const Medium& medium)
+    SideResult side_result(const std::string& name)
     {
         SideResult result;
         const ExrPart& first = checked(name);
         result.radii = static_cast<std::size_t>(first.width);
-        result.centre = attribute<double>(first, "centre");
-        if (!std::isfinite(result.centre))
-            fail("has a centre that is not finite");
         result.power = power(first);
         result.harmonics = harmonics(first);
-        result.ratios = ratios(name + ".ratios", medium, result.harmonics, result.radii);
+        result.ratios = ratios(name + ".ratios", result.harmonics, result.radii);
         const ExrPart& orders = checked(name + ".orders");
         if (orders.width != static_cast<int>(order_bin_count) || orders.height != static_cast<int>(2 + batch_count))
             fail_size(orders.name);
@@ -197,7 +195,7 @@ private:
         result.mean_order.assign(line(0), line(1));
         result.order_variance.assign(line(1), line(2));
         result.batch_totals.assign(line(2), orders.pixels.end());
-        result.deviations = scatter(checked(name + ".scatter"), medium, most_harmonics(result), result.radii);
+        result.deviations = scatter(checked(name + ".scatter"), result.harmonics, result.radii);
         return result;
     }
 

@@ -12,8 +12,8 @@ namespace format = library_format;
 
 namespace {
 
-// Order bins up to the last that is not empty; at least one.
-std::size_t used_orders(const std::vector<float>& power)
+// Up to the last that is not empty; at least one.
+std::size_t used_rows(const std::vector<float>& power)
 {
     std::size_t used = 1;
     for (std::size_t bin = 0; bin < power.size(); ++bin)
@@ -22,16 +22,15 @@ std::size_t used_orders(const std::vector<float>& power)
     return used;
 }
 
-std::map<std::string, ExrAttribute> common_attributes(const LdfLibrary& library, double angle_deg, double centre)
+std::map<std::string, ExrAttribute> common_attributes(const LdfLibrary& library, double angle_deg)
 {
-    return {{"beamspreadLdf", format::version(library.medium())},
+    return {{"beamspreadLdf", format::version},
             {"g", library.medium().g},
             {"ior", library.medium().ior},
             {"thickness", library.medium().thickness},
             {"photons", std::to_string(library.photons())},
             {"seed", std::to_string(library.seed())},
-            {"angle", angle_deg},
-            {"centre", centre}};
+            {"angle", angle_deg}};
 }
 
 }  // namespace
@@ -45,7 +44,7 @@ void save_library(const LdfLibrary& library, const std::string& path)
             const SideResult& from = result.sides[side];
             if (from.power.empty())
                 continue;
-            const auto attributes = common_attributes(library, result.angle_deg, from.centre);
+            const auto attributes = common_attributes(library, result.angle_deg);
             auto first_attributes = attributes;
             first_attributes["harmonics"] = std::vector<float>(from.harmonics.begin(), from.harmonics.end());
             if (library.is_calibrated()) {
@@ -60,11 +59,10 @@ void save_library(const LdfLibrary& library, const std::string& path)
                     {name, static_cast<int>(columns), static_cast<int>(lines), {"Y"}, std::move(values), with, half});
             };
             std::vector<float> power = format::with_columns(from.power, radius_bin_count, from.radii);
-            power.resize(used_orders(from.power) * from.radii);
+            power.resize(used_rows(from.power) * from.radii);
             add(format::part_name(side, j), from.radii, std::move(power), first_attributes, false);
             if (!from.ratios.empty()) {
-                std::vector<float> ratios =
-                    format::packed(library.medium(), format::ratio_orders(from.harmonics), from.radii, from.ratios);
+                std::vector<float> ratios = format::with_columns(from.ratios, radius_bin_count, from.radii);
                 ratios.resize(format::ratio_lines(ratios.size()) * format::ratio_columns, 0.0F);
                 add(format::part_name(side, j) + ".ratios", format::ratio_columns, std::move(ratios), attributes, true);
             }
@@ -72,8 +70,8 @@ void save_library(const LdfLibrary& library, const std::string& path)
             orders.insert(orders.end(), from.order_variance.begin(), from.order_variance.end());
             orders.insert(orders.end(), from.batch_totals.begin(), from.batch_totals.end());
             add(format::part_name(side, j) + ".orders", order_bin_count, std::move(orders), attributes, false);
-            add(format::part_name(side, j) + ".scatter",
-                from.deviations.size() / format::scatter_lines(library.medium()), from.deviations, attributes, true);
+            add(format::part_name(side, j) + ".scatter", from.deviations.size() / group_count, from.deviations,
+                attributes, true);
         }
     }
     for (ExrPart& part : parts)

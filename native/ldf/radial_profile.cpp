@@ -9,19 +9,6 @@ namespace beamspread {
 
 namespace {
 
-constexpr std::size_t edge_count = radius_bin_count;
-
-const std::array<double, edge_count>& edges()
-{
-    static const auto table = [] {
-        std::array<double, edge_count> r{};
-        for (std::size_t k = 0; k < edge_count; ++k)
-            r[k] = radius_bin_edge(k);
-        return r;
-    }();
-    return table;
-}
-
 // Weights of the values at five neighbouring knots, from `first` on, in the derivative at one of them: that of the
 // polynomial through them.
 struct Stencil {
@@ -41,8 +28,8 @@ Stencil derivative_stencil(const std::vector<std::size_t>& knots, std::size_t i)
     stencil.first = std::clamp<std::size_t>(i, 2, knots.size() - 3) - 2;
     std::array<double, 5> r{};
     for (std::size_t j = 0; j < 5; ++j)
-        r[j] = edges()[knots[stencil.first + j]];
-    const double here = edges()[knots[i]];
+        r[j] = radial_edge(knots[stencil.first + j]);
+    const double here = radial_edge(knots[i]);
     for (std::size_t n = 0; n < 5; ++n) {
         double derivative = 0.0;  // of Lagrange's n-th polynomial at r[k]
         for (std::size_t skip = 0; skip < 5; ++skip) {
@@ -63,10 +50,10 @@ const Knots& knots(RadialDetail detail)
 {
     static const auto table = [] {
         std::array<Knots, 2> all;
-        for (const RadialDetail each : {RadialDetail::quarters, RadialDetail::all}) {
+        for (const RadialDetail each : {RadialDetail::bins, RadialDetail::all}) {
             Knots& of = all[static_cast<std::size_t>(each)];
             for (std::size_t k = 0; k < edge_count; ++k)
-                if (each == RadialDetail::all || ends_quarter(k))
+                if (each == RadialDetail::all || is_bin_edge(k))
                     of.edge.push_back(k);
             for (std::size_t i = 0; i < of.edge.size(); ++i)
                 of.stencil.push_back(derivative_stencil(of.edge, i));
@@ -103,29 +90,28 @@ RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments,
 {
     m_detail = detail;
     m_centre = centre;
-    m_harmonics = bin_moments.size() / edge_count;
+    const std::vector<std::size_t>& knot = knots(detail).edge;
+    m_harmonics = bin_moments.size() / knot.size();
     // integral of cos^2(m phi) over a turn: 2 pi for m = 0, pi above.
     const auto norm = [](std::size_t m) { return m == 0 ? inv_pi / 2.0 : inv_pi; };
     // From outside in, so that what remains far out is not the difference of large sums.
     Harmonics sum{};
-    for (std::size_t k = edge_count; k-- > 0;) {
-        m_remaining[k] = sum;
+    for (std::size_t i = knot.size(); i-- > 0;) {
+        m_remaining[knot[i]] = sum;
         for (std::size_t m = 0; m < m_harmonics; ++m)
-            sum[m] += norm(m) * bin_moments[m * edge_count + k];
+            sum[m] += norm(m) * bin_moments[m * knot.size() + i];
     }
     m_total = sum;
 
-    const auto& r = edges();
-    const std::vector<std::size_t>& knot = knots(detail).edge;
     for (std::size_t i = 0; i + 1 < knot.size(); ++i) {
         const std::size_t k = knot[i];
         m_slope[k] = slope_at(i, detail);
         // A monotone C_0 keeps the azimuthal mean of g positive: slopes at most three times those of the
         // chords beside them (Fritsch, Carlson 1980).
         const auto chord = [&](std::size_t end) {
-            return end == 0 ? (m_total[0] - m_remaining[0][0]) / r[0]
+            return end == 0 ? (m_total[0] - m_remaining[0][0]) / radial_edge(0)
                             : (m_remaining[knot[end - 1]][0] - m_remaining[knot[end]][0]) /
-                                  (r[knot[end]] - r[knot[end - 1]]);
+                                  (radial_edge(knot[end]) - radial_edge(knot[end - 1]));
         };
         const double limit = 3.0 * std::min(chord(i), chord(i + 1));
         m_slope[k][0] = std::clamp(m_slope[k][0], 0.0, std::max(0.0, limit));
@@ -138,10 +124,10 @@ RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments,
 // Edges between two knots lie on the knots' cubic.
 void RadialProfile::subdivide(std::size_t first, std::size_t last)
 {
-    const auto& r = edges();
-    const double h = r[last] - r[first];
+    const double start = radial_edge(first);
+    const double h = radial_edge(last) - start;
     for (std::size_t k = first + 1; k < last; ++k) {
-        const double t = (r[k] - r[first]) / h;
+        const double t = (radial_edge(k) - start) / h;
         const Cubic value = cubic_value(t, h);
         const Cubic slope = cubic_derivative(t, h);
         for (std::size_t m = 0; m < m_harmonics; ++m) {
@@ -160,8 +146,9 @@ Harmonics RadialProfile::slope_at(std::size_t i, RadialDetail detail) const
     const Knots& of = knots(detail);
     const Stencil& stencil = of.stencil[i];
     Harmonics slope{};
-    if (m_remaining[of.edge[stencil.first + 4]][0] <= 0.0)
-        return slope;  // next to where the counts end
+    for (std::size_t j = 0; j < 5; ++j)
+        if (m_remaining[of.edge[stencil.first + j]][0] <= 0.0)
+            return slope;  // next to where the counts end, or in the noise that is left of others
     const Harmonics& here = m_remaining[of.edge[i]];
     for (std::size_t j = 0; j < 5; ++j) {
         const Harmonics& there = m_remaining[of.edge[stencil.first + j]];
@@ -215,7 +202,7 @@ std::size_t RadialProfile::harmonics_beyond(double r, double power) const
     for (; count > 1; --count) {
         const std::size_t m = count - 1;
         for (std::size_t k = 0; k < edge_count; ++k)
-            if (edges()[k] > r)
+            if (radial_edge(k) > r)
                 moved += std::abs((k == 0 ? m_total[m] : m_remaining[k - 1][m]) - m_remaining[k][m]);
         if (4.0 * moved > power)  // |cos(m phi)| integrates to 4 over a turn
             break;
@@ -233,7 +220,7 @@ void RadialProfile::update_support()
     std::size_t k = edge_count - 1;
     while (k > 0 && m_remaining[k - 1][0] <= 0.0)
         --k;
-    m_support = edges()[k];
+    m_support = radial_edge(k);
 }
 
 Harmonics RadialProfile::remaining(double r) const
@@ -241,17 +228,16 @@ Harmonics RadialProfile::remaining(double r) const
     Harmonics out{};
     if (r >= m_support)
         return out;
-    const auto& edge = edges();
-    const std::size_t k = radius_bin(static_cast<float>(r));
+    const std::size_t k = edge_beyond(static_cast<float>(r));
     if (k == 0) {
         // Single scattering makes g grow like 1/r toward the point of entry.
-        const double t = std::min(1.0, r / edge[0]);
+        const double t = std::min(1.0, r / radial_edge(0));
         for (std::size_t m = 0; m < m_harmonics; ++m)
             out[m] = m_total[m] + t * (m_remaining[0][m] - m_total[m]);
         return out;
     }
-    const double h = edge[k] - edge[k - 1];
-    const Cubic c = cubic_value((r - edge[k - 1]) / h, h);
+    const double h = radial_edge(k) - radial_edge(k - 1);
+    const Cubic c = cubic_value((r - radial_edge(k - 1)) / h, h);
     for (std::size_t m = 0; m < m_harmonics; ++m)
         out[m] =
             c.v0 * m_remaining[k - 1][m] + c.v1 * m_remaining[k][m] - c.s0 * m_slope[k - 1][m] - c.s1 * m_slope[k][m];
@@ -263,15 +249,14 @@ Harmonics RadialProfile::density(double r) const
     Harmonics out{};
     if (r >= m_support)
         return out;
-    const auto& edge = edges();
-    const std::size_t k = radius_bin(static_cast<float>(r));
+    const std::size_t k = edge_beyond(static_cast<float>(r));
     if (k == 0) {
         for (std::size_t m = 0; m < m_harmonics; ++m)
-            out[m] = (m_total[m] - m_remaining[0][m]) / (edge[0] * r);
+            out[m] = (m_total[m] - m_remaining[0][m]) / (radial_edge(0) * r);
         return out;
     }
-    const double h = edge[k] - edge[k - 1];
-    const Cubic c = cubic_derivative((r - edge[k - 1]) / h, h);
+    const double h = radial_edge(k) - radial_edge(k - 1);
+    const Cubic c = cubic_derivative((r - radial_edge(k - 1)) / h, h);
     for (std::size_t m = 0; m < m_harmonics; ++m)
         out[m] = (c.s0 * m_slope[k - 1][m] + c.s1 * m_slope[k][m] - c.v0 * m_remaining[k - 1][m] -
                   c.v1 * m_remaining[k][m]) /

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "ldf/radial_edges.h"
 #include "ldf/radial_function.h"
 
 namespace beamspread {
@@ -15,8 +16,8 @@ class RadialProfile final : public RadialFunction {
 public:
     RadialProfile();
 
-    // From sums of weight * cos(m phi), [harmonic][radius bin], for as many harmonics as there are. The cubics meet where
-    // the bins that are counted apart end.
+    // From sums of weight * cos(m phi) between the edges of this detail, [harmonic][radius], for as many harmonics as there
+    // are. The cubics meet at these edges.
     RadialProfile(double centre, std::span<const double> bin_moments, RadialDetail detail);
 
     // Adds `weight` times another profile, harmonics of even and odd m apart. The centre stays.
@@ -49,7 +50,7 @@ public:
     double centre() const { return m_centre; }
     void set_centre(double centre) { m_centre = centre; }
 
-    // Whether it follows the finer bins.
+    // Whether it follows the finer edges.
     RadialDetail detail() const { return m_detail; }
 
 private:
@@ -57,7 +58,7 @@ private:
     void subdivide(std::size_t first, std::size_t last);
     void update_support();
 
-    RadialDetail m_detail = RadialDetail::quarters;
+    RadialDetail m_detail = RadialDetail::bins;
     std::size_t m_harmonics = 0;
     double m_centre = 0.0;
     double m_support = 0.0;

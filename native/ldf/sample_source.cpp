@@ -106,7 +106,7 @@ RadialProfile sample_profile(const LdfSample& sample)
     if (power > 0.0)
         for (double& moment : moments)
             moment *= std::max(0.0, sample.power()) / power;
-    return RadialProfile(0.0, moments, RadialDetail::quarters);
+    return RadialProfile(0.0, moments, RadialDetail::bins);
 }
 
 SampleSource::SampleSource(std::vector<LdfSample> samples, Interpolation method)

@@ -48,9 +48,9 @@ std::vector<double> panel_breaks(const RadialWindow& window, double to_paths)
     std::vector<double> breaks;
     for (int r = 0; r < std::min(end, 2.0 * window_end * window.inner); ++r)
         breaks.push_back(r);
-    for (std::size_t k = 0; k < radius_bin_count; ++k) {
-        const double r = radius_bin_edge(k) / to_paths;
-        const double next = k + 1 < radius_bin_count ? radius_bin_edge(k + 1) / to_paths : r;
+    for (std::size_t k = 0; k < edge_count; ++k) {
+        const double r = radial_edge(k) / to_paths;
+        const double next = k + 1 < edge_count ? radial_edge(k + 1) / to_paths : r;
         for (const double edge : {r, 0.5 * (r + next)})
             if (edge > breaks.back() && edge < end)
                 breaks.push_back(edge);
@@ -95,8 +95,8 @@ Harmonics project(const RadialProfile& profile, const RadialWindow& window, doub
 
 bool holds(const RadialProfile& profile, std::size_t m)
 {
-    for (std::size_t k = 0; k < radius_bin_count && m < profile.harmonics(); ++k)
-        if (profile.remaining(radius_bin_edge(k))[m] != 0.0)
+    for (std::size_t k = 0; k < edge_count && m < profile.harmonics(); ++k)
+        if (profile.remaining(radial_edge(k))[m] != 0.0)
             return true;
     return false;
 }

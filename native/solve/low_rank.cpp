@@ -102,16 +102,16 @@ AngularMedium describe(const KernelMedium& of, const PresentAngles& present, con
     // Circles that fit into the texel where the beam enters: all that is seen of them is their power.
     const double inside = 0.5 * texel / of.mean_free_path;
     std::size_t first = 0;
-    while (first + 1 < radius_bin_count && radius_bin_edge(first + 1) <= inside)
+    while (first + 1 < edge_count && radial_edge(first + 1) <= inside)
         ++first;
     const auto bins_of = [&](const RadialProfile& profile) {
-        Matrix bins(index(harmonic_count), index(radius_bin_count - first));
+        Matrix bins(index(harmonic_count), index(edge_count - first));
         Harmonics inner{};
-        for (std::size_t k = first; k < radius_bin_count; ++k) {
-            const Harmonics outer = profile.cumulative(radius_bin_edge(k));
+        for (std::size_t k = first; k < edge_count; ++k) {
+            const Harmonics outer = profile.cumulative(radial_edge(k));
             for (std::size_t m = 0; m < harmonic_count; ++m)
                 bins(index(m), index(k - first)) =
-                    m > 0 && k == first && radius_bin_edge(first) <= inside ? 0.0 : outer[m] - inner[m];
+                    m > 0 && k == first && radial_edge(first) <= inside ? 0.0 : outer[m] - inner[m];
             inner = outer;
         }
         return bins;

@@ -11,7 +11,7 @@ namespace {
 // ever so little noise.
 constexpr double negligible = 3e-3;
 
-// Sums of cos(m phi) over an octave of radii and some orders.
+// Sums of cos(m phi) over an octave of radii and some rows.
 struct Octave {
     std::array<double, harmonic_count> half{};
     std::array<double, harmonic_count> other{};
@@ -25,10 +25,10 @@ std::vector<Octave> octaves(const Tally& half, const Tally& other, std::size_t f
     for (std::size_t k = 0; k < radius_bin_count; ++k) {
         if (k > 1 && std::ilogb(radius_bin_edge(k - 1)) != std::ilogb(radius_bin_edge(k - 2)))
             sums.emplace_back();
-        for (std::size_t order = first; order < last; ++order)
-            for (std::size_t m = 0; m < harmonics_of(order); ++m) {
-                sums.back().half[m] += half.ring(order, k)[m];
-                sums.back().other[m] += other.ring(order, k)[m];
+        for (std::size_t row = first; row < last; ++row)
+            for (std::size_t m = 0; m < harmonics_of(row); ++m) {
+                sums.back().half[m] += half.ring(row, k)[m];
+                sums.back().other[m] += other.ring(row, k)[m];
             }
     }
     return sums;
@@ -72,11 +72,12 @@ std::size_t worth_keeping(const std::vector<Octave>& octaves, std::size_t count)
 
 }  // namespace
 
-std::array<std::size_t, order_bin_count> harmonics_worth_keeping(const Tally& half, const Tally& other)
+std::array<std::size_t, row_count> harmonics_worth_keeping(const Tally& half, const Tally& other)
 {
-    std::array<std::size_t, order_bin_count> counts{};
-    for (std::size_t first = 0; first < order_bin_count;) {
-        const std::size_t last = first + (first < exact_orders ? 1 : 4);
+    std::array<std::size_t, row_count> counts{};
+    for (std::size_t first = 0; first < row_count;) {
+        const bool is_octave = first >= exact_orders && first < order_bin_count;
+        const std::size_t last = first + (is_octave ? 4 : 1);
         const std::size_t count = worth_keeping(octaves(half, other, first, last), harmonics_of(first));
         std::fill(counts.begin() + static_cast<std::ptrdiff_t>(first),
                   counts.begin() + static_cast<std::ptrdiff_t>(last), count);

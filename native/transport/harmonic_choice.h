@@ -8,8 +8,8 @@
 
 namespace beamspread {
 
-// Leading harmonics of each order bin that are worth keeping, at least one, from two halves of a simulation. Their sums
+// Leading harmonics of each row that are worth keeping, at least one, from two halves of a simulation. Their sums
 // differ by noise only, and their product's mean is what is there.
-std::array<std::size_t, order_bin_count> harmonics_worth_keeping(const Tally& half, const Tally& other);
+std::array<std::size_t, row_count> harmonics_worth_keeping(const Tally& half, const Tally& other);
 
 }  // namespace beamspread

@@ -8,6 +8,7 @@
 
 #include "transport/packet_math-inl.h"
 #include "transport/packet_optics-inl.h"
+#include "transport/packet_tally-inl.h"
 #include "transport/photon_pool-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -50,6 +51,12 @@ HWY_INLINE void turn_back(Photons& photons, FloatMask mask, const Photons& from,
     choose(hn::MulAdd(to_boundary, from.w.x, from.x.x), photons.x.x);
     choose(hn::MulAdd(to_boundary, from.w.y, from.x.y), photons.x.y);
     choose(hn::IfThenElse(up, hn::Zero(floats), hn::Set(floats, thickness)), photons.x.z);
+    // See transport/poles.h.
+    const Words meets =
+        hn::IfThenElse(hn::RebindMask(words, up), hn::Set(words, far_turn_bits << 1), hn::Set(words, far_turn_bits));
+    const Words next = hn::Or(hn::Add(photons.batch, photons.batch), hn::Set(words, turn_bit(0)));
+    const Words turned = hn::IfThenElseZero(hn::RebindMask(words, mask), hn::And(next, meets));
+    photons.batch = hn::Or(photons.batch, turned);
     choose(from.w.x, photons.w.x);
     choose(from.w.y, photons.w.y);
     choose(hn::Neg(from.w.z), photons.w.z);

@@ -19,10 +19,26 @@ HWY_BEFORE_NAMESPACE();
 namespace beamspread {
 namespace HWY_NAMESPACE {
 
-// Order, side and batch of an exit in one word.
+// Order, side, batch and turns (transport/poles.h) of an exit in one word. Turns are as many bits set from `turns_shift` on.
 constexpr int side_shift = 20;
 constexpr int batch_shift = 21;
+constexpr int turns_shift = 28;
+constexpr std::uint32_t order_bits = max_order - 1;
+constexpr std::uint32_t batch_bits = (1u << turns_shift) - (1u << batch_shift);
 static_assert(max_order <= 1u << side_shift);
+static_assert(most_turns <= 32 - turns_shift);
+
+// The bit of turn number i, from 0 on, and those of all turns at the far boundary.
+constexpr std::uint32_t turn_bit(std::uint32_t i)
+{
+    return 1u << (static_cast<std::uint32_t>(turns_shift) + i);
+}
+constexpr std::uint32_t far_turn_bits = [] {
+    std::uint32_t bits = 0;
+    for (std::uint32_t i = 0; i < most_turns; i += 2)
+        bits |= turn_bit(i);
+    return bits;
+}();
 
 // Harmonics are added in blocks of this many.
 constexpr std::size_t block = 8;
@@ -77,12 +93,12 @@ private:
 
     static void to_harmonics(Tally& tally)
     {
-        for (std::size_t order = 0; order < order_bin_count; ++order) {
-            if (tally.weight[order] == 0.0)
+        for (std::size_t row = 0; row < row_count; ++row) {
+            if (tally.weight[order_bin_of(row)] == 0.0)
                 continue;
             for (std::size_t radius = 0; radius < radius_bin_count; ++radius)
-                if (double* sums = tally.ring(order, radius); sums[0] != 0.0)
-                    blocks_to_harmonics(sums, harmonics_of(order));
+                if (double* sums = tally.ring(row, radius); sums[0] != 0.0)
+                    blocks_to_harmonics(sums, harmonics_of(row));
         }
     }
 
@@ -121,58 +137,64 @@ private:
     }
 
     // The bins of transport/bins.h, read off the bits of a float.
-    HWY_INLINE void find_bins(std::size_t first)
+    HWY_INLINE void find_bins(std::size_t from)
     {
         constexpr int bias = 127;
         const hn::RebindToSigned<FloatTag> integers;
-        const Words what = hn::LoadU(words, m_what.data() + first);
+        const Words what = hn::LoadU(words, m_what.data() + from);
+        const Tally& near = m_job.tallies[0][0];
+        const Tally& far = m_job.tallies[0][1];
+        const auto order = hn::BitCast(integers, hn::And(what, hn::Set(words, order_bits)));
+        const auto mirrored = hn::Lt(order, hn::Set(integers, static_cast<int>(near.mirrored_orders)));
         const FloatMask transmitted = float_mask(hn::TestBit(what, hn::Set(words, 1u << side_shift)));
-        const Floats centre =
-            hn::IfThenElse(transmitted, broadcast(m_job.tallies[0][1].centre), broadcast(m_job.tallies[0][0].centre));
-        const Floats x = hn::Sub(hn::LoadU(floats, m_x.data() + first), centre);
-        const Floats y = hn::LoadU(floats, m_y.data() + first);
+        Floats u = hn::IfThenElse(transmitted, broadcast(far.poles[0]), broadcast(near.poles[0]));
+        auto rows_before = hn::Zero(integers);
+        for (std::size_t pole = 1; pole < pole_count; ++pole) {
+            // Turns of light on the near side are odd, see pole_of.
+            const auto turn = static_cast<std::uint32_t>(2 * (pole - 1));
+            const Words bit = hn::IfThenElse(hn::RebindMask(words, transmitted), hn::Set(words, turn_bit(turn + 1)),
+                                             hn::Set(words, turn_bit(turn)));
+            const auto here = hn::And(mirrored, hn::RebindMask(integers, hn::TestBit(what, bit)));
+            u = hn::IfThenElse(hn::RebindMask(floats, here),
+                               hn::IfThenElse(transmitted, broadcast(far.poles[pole]), broadcast(near.poles[pole])), u);
+            rows_before = hn::IfThenElse(here, hn::Set(integers, static_cast<int>(first_row(pole))), rows_before);
+        }
+        const Floats x = hn::Sub(hn::LoadU(floats, m_x.data() + from), u);
+        const Floats y = hn::LoadU(floats, m_y.data() + from);
         const Floats r = hn::Sqrt(hn::MulAdd(x, x, hn::Mul(y, y)));
         const Floats cosine = hn::IfThenElse(hn::Gt(r, hn::Zero(floats)), hn::Div(x, r), broadcast(1.0));
-        hn::StoreU(cosine, floats, m_x.data() + first);
+        hn::StoreU(cosine, floats, m_x.data() + from);
 
-        const auto order = hn::BitCast(integers, hn::And(what, hn::Set(words, max_order - 1)));
-        const auto fine_orders = hn::Set(integers, static_cast<int>(m_job.tallies[0][0].fine_orders));
-        const auto same_quarter = hn::Set(integers, static_cast<int>(within_quarter));
-        const auto bits =
-            hn::Or(hn::BitCast(integers, r), hn::IfThenZeroElse(hn::Lt(order, fine_orders), same_quarter));
-        const auto between = [&](auto value, int low, int high) {
-            return hn::Min(hn::Max(value, hn::Set(integers, low)), hn::Set(integers, high));
-        };
-        const auto quarter =
-            hn::Sub(hn::ShiftRight<quarter_bits>(bits), hn::Set(integers, 4 * (bias + min_radius_exponent) - 1));
-        const auto fine = hn::Sub(hn::ShiftRight<quarter_bits + 2 - fine_bits>(bits),
-                                  hn::Set(integers, (bias + min_fine_exponent) << fine_bits));
-        const auto replaced = between(hn::Sub(quarter, hn::Set(integers, first_fine_bin)), 0, replaced_bin_count);
-        const auto radius = hn::Add(hn::Sub(quarter, replaced), between(fine, 0, fine_bin_count));
-        const auto radius_clamped = between(radius, 0, static_cast<int>(radius_bin_count) - 1);
-        const auto order_quarters = hn::ShiftRight<quarter_bits>(hn::BitCast(integers, hn::ConvertTo(floats, order)));
+        const auto quarter = hn::ShiftRight<within_bin_bits>(hn::BitCast(integers, r));
+        const auto radius = hn::Sub(quarter, hn::Set(integers, 4 * (bias + min_radius_exponent) - 1));
+        const auto radius_clamped =
+            hn::Min(hn::Max(radius, hn::Zero(integers)), hn::Set(integers, static_cast<int>(radius_bin_count) - 1));
+        const auto order_quarters =
+            hn::ShiftRight<within_bin_bits>(hn::BitCast(integers, hn::ConvertTo(floats, order)));
         const auto binned = hn::Sub(order_quarters, hn::Set(integers, 4 * (bias + 4) - static_cast<int>(exact_orders)));
         const auto exact = hn::Lt(order, hn::Set(integers, static_cast<int>(exact_orders)));
-        hn::StoreU(radius_clamped, integers, m_radius_bin.data() + first);
-        hn::StoreU(hn::IfThenElse(exact, order, binned), integers, m_order_bin.data() + first);
+        hn::StoreU(radius_clamped, integers, m_radius_bin.data() + from);
+        const auto row = hn::Add(hn::IfThenElse(exact, order, binned), rows_before);
+        hn::StoreU(row, integers, m_row.data() + from);
     }
+
+    static HWY_INLINE std::size_t batch_of(std::uint32_t what) { return (what & batch_bits) >> batch_shift; }
 
     HWY_INLINE Tally& tally_of(std::uint32_t what) const
     {
-        return (*m_tallies[what >> batch_shift])[(what >> side_shift) & 1u];
+        return (*m_tallies[batch_of(what)])[(what >> side_shift) & 1u];
     }
 
     HWY_INLINE double* find_ring(std::size_t i) const
     {
-        return tally_of(m_what[i]).ring(static_cast<std::size_t>(m_order_bin[i]),
-                                        static_cast<std::size_t>(m_radius_bin[i]));
+        return tally_of(m_what[i]).ring(static_cast<std::size_t>(m_row[i]), static_cast<std::size_t>(m_radius_bin[i]));
     }
 
     // The processor cannot foresee which ring is next, and would wait for memory at each.
     HWY_INLINE void fetch_ring(std::size_t i) const
     {
         const double* ring = m_ring[i];
-        const std::size_t count = harmonics_of(static_cast<std::size_t>(m_order_bin[i]));
+        const std::size_t count = harmonics_of(static_cast<std::size_t>(m_row[i]));
         for (std::size_t m = 0; m < count; m += block)
             hwy::Prefetch(ring + m);
     }
@@ -180,13 +202,14 @@ private:
     HWY_INLINE void add_one(std::size_t i)
     {
         const std::uint32_t what = m_what[i];
-        const std::size_t batch = what >> batch_shift;
+        const std::size_t batch = batch_of(what);
         const std::size_t side = (what >> side_shift) & 1u;
-        const auto bin = static_cast<std::size_t>(m_order_bin[i]);
+        const auto row = static_cast<std::size_t>(m_row[i]);
+        const std::size_t bin = order_bin_of(row);
         Tally& tally = tally_of(what);
-        add_blocks(m_ring[i], harmonics_of(bin), m_x[i], m_weight[i]);
+        add_blocks(m_ring[i], harmonics_of(row), m_x[i], m_weight[i]);
         const auto w = static_cast<double>(m_weight[i]);
-        const double n = static_cast<double>(what & (max_order - 1));
+        const double n = static_cast<double>(what & order_bits);
         m_job.weights[batch][side][bin] += w;
         tally.weight[bin] += w;
         tally.weight_order[bin] += w * n;
@@ -242,7 +265,7 @@ private:
     Queue<float> m_y{};
     Queue<float> m_weight{};
     Queue<std::uint32_t> m_what{};
-    Queue<std::int32_t> m_order_bin{};
+    Queue<std::int32_t> m_row{};
     Queue<std::int32_t> m_radius_bin{};
     Queue<double*> m_ring{};
 };

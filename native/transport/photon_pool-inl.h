@@ -21,7 +21,7 @@ struct Photons {
     Floats weight;
     Words order;
     Words next_roulette;  // order
-    Words batch;          // shifted into place, see transport/packet_tally-inl.h
+    Words batch;          // and turns, shifted into place, see transport/packet_tally-inl.h
 };
 
 // Photons that wait for their next flights, without gaps.

@@ -23,27 +23,17 @@ constexpr std::uint64_t enough_photons_per_job = 200'000;
 // Consecutive ones, see transport/map_scatter.h.
 constexpr std::size_t batches_per_group = batch_count / group_count;
 
-// The far side's distribution peaks where the beam leaves, if light has not forgotten its direction by then, and with
-// it the few scatterings that light of low albedos has; deeper down it is broad, and its centre stays behind. Whatever g,
-// much light still gets through two mean free paths as it came.
-double far_side_centre(const Medium& medium, double theta_inside)
-{
-    const double memory = 2.0 + 2.0 / (1.0 - medium.g);
-    const double through = medium.thickness / std::cos(theta_inside);
-    // A smooth minimum, as the spline over angles wants it.
-    const double path = std::pow(std::pow(memory, -4.0) + std::pow(through, -4.0), -0.25);
-    return std::sin(theta_inside) * path;
-}
-
 SideTallies empty_tallies(const Medium& medium, double theta_inside)
 {
+    const PolePlaces poles = pole_places(medium, theta_inside);
     SideTallies tallies;
-    tallies[0].allocate();
-    tallies[0].fine_orders = tallies[1].fine_orders = fine_orders(medium);
-    if (!medium.is_half_space()) {
-        tallies[1].allocate();
-        tallies[1].centre = far_side_centre(medium, theta_inside);
+    for (std::size_t side = 0; side < side_count; ++side) {
+        tallies[side].poles = poles[side];
+        tallies[side].mirrored_orders = mirrored_orders(medium);
     }
+    tallies[0].allocate();
+    if (!medium.is_half_space())
+        tallies[1].allocate();
     return tallies;
 }
 
@@ -75,13 +65,13 @@ float rounded_to_half(double x)
 
 void normalize_rings(const Tally& tally, double photons, SideResult& out)
 {
-    out.power.reserve(order_bin_count * radius_bin_count);
-    for (std::size_t b = 0; b < order_bin_count; ++b) {
+    out.power.reserve(row_count * radius_bin_count);
+    for (std::size_t row = 0; row < row_count; ++row) {
         for (std::size_t k = 0; k < radius_bin_count; ++k)
-            out.power.push_back(static_cast<float>(tally.ring(b, k)[0] / photons));
-        for (std::size_t m = 1; m < out.harmonics[b]; ++m)
+            out.power.push_back(static_cast<float>(tally.ring(row, k)[0] / photons));
+        for (std::size_t m = 1; m < out.harmonics[row]; ++m)
             for (std::size_t k = 0; k < radius_bin_count; ++k) {
-                const double* ring = tally.ring(b, k);
+                const double* ring = tally.ring(row, k);
                 out.ratios.push_back(ring[0] > 0.0 ? rounded_to_half(ring[m] / ring[0]) : 0.0F);
             }
     }
@@ -97,18 +87,17 @@ std::size_t used_radii(const std::vector<float>& power)
     return used;
 }
 
-AngleResult normalized(const Medium& medium, double angle_deg, const AngleSums& sums, double photons)
+AngleResult normalized(double angle_deg, const AngleSums& sums, double photons)
 {
     AngleResult result;
     result.angle_deg = angle_deg;
     for (std::size_t side = 0; side < side_count; ++side) {
         SideResult& out = result.sides[side];
-        out.centre = sums.groups[0][side].centre;
         if (sums.groups[0][side].moments.empty())
             continue;
         Tally tally = sum_of(sums, side, 0, 2);
         const Tally other = sum_of(sums, side, 1, 2);
-        out.harmonics.assign(order_bin_count, 1);
+        out.harmonics.assign(row_count, 1);
         if (angle_deg > 0.0) {  // at 0 there is rotational symmetry: what the other harmonics hold is noise
             const auto worth = harmonics_worth_keeping(tally, other);
             out.harmonics.assign(worth.begin(), worth.end());
@@ -132,7 +121,7 @@ AngleResult normalized(const Medium& medium, double angle_deg, const AngleSums& 
         std::array<const Tally*, group_count> groups{};
         for (std::size_t group = 0; group < group_count; ++group)
             groups[group] = &sums.groups[group][side];
-        out.deviations = relative_deviations(medium, groups, out.harmonics, out.radii);
+        out.deviations = relative_deviations(groups, out.harmonics, out.radii);
     }
     return result;
 }
@@ -194,11 +183,6 @@ WalkKernel find_kernel(std::string_view name)
 
 }  // namespace
 
-std::size_t most_harmonics(const SideResult& side)
-{
-    return *std::max_element(side.harmonics.begin(), side.harmonics.end());
-}
-
 std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> angles_deg, std::uint64_t photons,
                                   std::uint64_t seed, int threads, std::string_view kernel_name, Progress& progress)
 {
@@ -241,7 +225,7 @@ std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> 
             sums = AngleSums{};
         merge(job * per_job, std::move(job_sums), sums);
         if (job + 1 == jobs_per_angle)
-            results.push_back(normalized(medium, angles_deg[item / jobs_per_angle], sums, total_photons));
+            results.push_back(normalized(angles_deg[item / jobs_per_angle], sums, total_photons));
     };
     with_threads(threads, [&] { parallel_ordered<JobSums>(angles_deg.size() * jobs_per_angle, walk_job, merge_job); });
     progress.finish();

@@ -8,7 +8,6 @@
 
 #include "base/progress.h"
 #include "medium/medium.h"
-#include "transport/counted_bins.h"
 #include "transport/map_scatter.h"
 #include "transport/walk.h"
 
@@ -19,20 +18,16 @@ inline constexpr std::size_t batch_count = 32;
 
 // One side of one angle, normalized to one unit of power that entered the medium.
 struct SideResult {
-    double centre = 0.0;              // pole of (r, phi): u, mean free paths
-    std::vector<float> power;         // [order bin][radius bin]; empty: nothing leaves here
+    std::vector<float> power;         // [row][radius bin]; empty: nothing leaves here
     std::size_t radii = 0;            // radius bins up to the last that is not empty, at least 1
-    std::vector<std::size_t> harmonics;  // [order bin]: how many are kept, at least 1, see transport/harmonic_choice.h
+    std::vector<std::size_t> harmonics;  // [row]: how many are kept, at least 1, see transport/harmonic_choice.h
     std::vector<float>
-        ratios;  // means of cos(m phi) weighted by power, m > 0: [order bin][harmonic][radius bin], as half holds them
+        ratios;  // means of cos(m phi) weighted by power, m > 0: [row][harmonic][radius bin], as half holds them
     std::vector<float> mean_order;  // [order bin]
     std::vector<float> order_variance;  // [order bin]
     std::vector<float> batch_totals;  // [batch][order bin], power
     std::vector<float> deviations;  // of groups of batches, see transport/map_scatter.h
 };
-
-// The most harmonics that any order has.
-std::size_t most_harmonics(const SideResult& side);
 
 struct AngleResult {
     double angle_deg = 0.0;  // outside the medium, from the normal

@@ -126,6 +126,7 @@ private:
             return false;
         m_x += to_boundary * m_w;
         m_x.z = m_w.z < 0.0 ? 0.0 : m_medium.thickness;
+        m_turns = turned_back(m_turns, m_w.z > 0.0);
         m_w.z = -m_w.z;
         return true;
     }
@@ -158,8 +159,9 @@ private:
 
     void tally(const Vec3& w, double to_boundary, double probability)
     {
-        m_tallies[w.z < 0.0 ? 0 : 1].add(m_x.x + to_boundary * w.x, m_x.y + to_boundary * w.y, m_order,
-                                         m_weight * probability);
+        const Side side = w.z < 0.0 ? Side::reflected : Side::transmitted;
+        m_tallies[static_cast<std::size_t>(side)].add(m_x.x + to_boundary * w.x, m_x.y + to_boundary * w.y, m_order,
+                                                      pole_of(m_turns, side), m_weight * probability);
     }
 
     // Density per steradian of the connections below: proportional to the cosine, inside the cone that
@@ -210,6 +212,7 @@ private:
     double m_weight = 1.0;
     double m_exit_weight = 1.0;  // of the exit along the walk, among the ways to sample it
     std::uint32_t m_order = 0;
+    std::uint32_t m_turns = 0;  // see transport/poles.h
     std::uint32_t m_next_roulette;
 };
 
