@@ -17,9 +17,9 @@ inline constexpr int fine_bits = 5;
 inline constexpr double fine_end = 1 << max_fine_exponent;
 
 // The first of the finer edges, their number, and of how many edges of bins they take the place.
-inline constexpr std::size_t first_fine_edge = 4 * (min_fine_exponent - min_radius_exponent) + 1;
-inline constexpr std::size_t fine_edge_count = (max_fine_exponent - min_fine_exponent) << fine_bits;
-inline constexpr std::size_t replaced_edge_count = 4 * (max_fine_exponent - min_fine_exponent);
+inline constexpr std::size_t first_fine_edge = 4 * std::size_t{min_fine_exponent - min_radius_exponent} + 1;
+inline constexpr std::size_t fine_edge_count = std::size_t{max_fine_exponent - min_fine_exponent} << fine_bits;
+inline constexpr std::size_t replaced_edge_count = 4 * std::size_t{max_fine_exponent - min_fine_exponent};
 inline constexpr std::size_t edge_count = radius_bin_count + fine_edge_count - replaced_edge_count;
 
 // Edges of the bins alone, or all.
