@@ -20,6 +20,9 @@ constexpr double even_until = 32.0;
 constexpr double growth = 1.012;
 constexpr double sample_step = 0.5;  // of the transform: twice as fine as texels
 
+// Across a panel the last harmonic turns by no more than this, which four points integrate to some 5e-6.
+constexpr double panel_turn = pi;
+
 // Weights of four neighbours at t in [0, 1] between the second and the third (Lagrange).
 std::array<double, 4> cubic_weights(double t)
 {
@@ -64,16 +67,13 @@ std::vector<double> panel_breaks(const RadialWindow& window, double to_paths)
     return breaks;
 }
 
-// The integral over y of w(r) c_m(r) cos(m phi), cos(m phi) = T_m(x / r).
+// The integral over y of w(r) c_m(r) cos(m phi), cos(m phi) = T_m(x / r). Bins may be far wider than a turn of their
+// harmonics where they begin at x.
 Harmonics project(const RadialProfile& profile, const RadialWindow& window, double to_paths,
                   const std::vector<double>& breaks, double x)
 {
     Harmonics sum{};
-    for (std::size_t k = 0; k + 1 < breaks.size(); ++k) {
-        if (breaks[k + 1] <= x || breaks[k + 1] - breaks[k] <= 0.0)
-            continue;
-        const double y0 = breaks[k] > x ? std::sqrt(breaks[k] * breaks[k] - x * x) : 0.0;
-        const double y1 = std::sqrt(breaks[k + 1] * breaks[k + 1] - x * x);
+    const auto add = [&](double y0, double y1) {
         for (std::size_t q = 0; q < gauss_node.size(); ++q) {
             const double y = 0.5 * (y0 + y1 + (y1 - y0) * gauss_node[q]);
             const double r = std::hypot(x, y);
@@ -89,6 +89,17 @@ Harmonics project(const RadialProfile& profile, const RadialWindow& window, doub
                 t1 = t2;
             }
         }
+    };
+    for (std::size_t k = 0; k + 1 < breaks.size(); ++k) {
+        if (breaks[k + 1] <= x || breaks[k + 1] - breaks[k] <= 0.0)
+            continue;
+        const double y0 = breaks[k] > x ? std::sqrt(breaks[k] * breaks[k] - x * x) : 0.0;
+        const double y1 = std::sqrt(breaks[k + 1] * breaks[k + 1] - x * x);
+        const double turn = static_cast<double>(profile.harmonics()) * (std::atan2(y1, x) - std::atan2(y0, x));
+        const int parts = std::max(static_cast<int>(std::ceil(turn / panel_turn)), 1);
+        const double step = (y1 - y0) / parts;
+        for (int i = 0; i < parts; ++i)
+            add(y0 + i * step, y0 + (i + 1) * step);
     }
     return sum;
 }

@@ -126,6 +126,18 @@ def test_patches_of_light_against_direct(media, mean_free_path):
         assert_within(tolerance, convolve(*arguments, tolerance=tolerance), direct, floor=1e-4)
 
 
+def test_light_that_spreads_as_far_as_the_plane_against_direct(media):
+    """Quarters of octaves of radius are then far wider than a turn of the last harmonics."""
+    rng = np.random.default_rng(34)
+    lit = np.zeros((SIZE, SIZE), np.float32)
+    lit[:16, :16] = 1
+    ((irradiance, directions),) = field("texels", rng)
+    arguments = irradiance * lit, directions, media["ior 1"], 0.9, 300.0, 1.0
+    direct = convolve(*arguments, solver="direct")
+    for tolerance in (1e-2, 1e-3):
+        assert_within(tolerance, convolve(*arguments, tolerance=tolerance), direct)
+
+
 def test_grazing_light_against_direct(media):
     """All terms are kept; kernels bend at the library's last angle, which a table of angles smooths over."""
     rng = np.random.default_rng(33)
