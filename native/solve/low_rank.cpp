@@ -69,12 +69,11 @@ private:
     std::vector<LdfSource::AngleWeights> m_weights;
 };
 
-std::vector<double> evenly(double first, double last, std::size_t count, double offset)
+std::vector<double> evenly(double first, double last, std::size_t count)
 {
     std::vector<double> places(count);
     for (std::size_t i = 0; i < count; ++i)
-        places[i] = first + (last - first) * (static_cast<double>(i) + offset) /
-                                (static_cast<double>(count) - 1.0 + 2.0 * offset);
+        places[i] = first + (last - first) * static_cast<double>(i) / static_cast<double>(count - 1);
     return places;
 }
 
@@ -82,7 +81,7 @@ std::vector<double> evenly(double first, double last, std::size_t count, double 
 // chi-square distance to the mean LDF, relative to its power.
 struct AngularMedium {
     std::vector<RadialProfile> nodes;
-    NodeWeights weights;  // at the angle bins
+    NodeWeights weights;  // at the present angles
     RadialProfile mean;
     std::array<Matrix, harmonic_count> features;  // [node][radius bin]
 };
@@ -153,12 +152,12 @@ KernelDecomposition::KernelDecomposition(const PresentAngles& present, const std
         medium.library->check_angle(angle_deg(m_first));
         medium.library->check_angle(angle_deg(m_last));
     }
-    const std::vector<double> angles = evenly(m_first, m_last, angle_bins, 0.5);
+    const std::vector<double> angles = evenly(m_first, m_last, angle_bins);
     for (const KernelMedium& medium : media) {
         m_angular->media.push_back(describe(medium, present, angles, texel));
         if (!m_angular->tables.contains(medium.library))
             m_angular->tables[medium.library] =
-                NodeWeights(*medium.library, evenly(m_first, m_last, table_steps + 1, 0.0));
+                NodeWeights(*medium.library, evenly(m_first, m_last, table_steps + 1));
     }
     const Vector root_share = Eigen::Map<const Vector>(present.share.data(), index(angle_bins)).cwiseSqrt();
     m_angular->root_share = root_share;

@@ -8,6 +8,18 @@
 
 namespace beamspread {
 
+namespace {
+
+// Of four neighbours at t in [0, 1] between the second and the third.
+std::array<double, 4> cubic_b_spline(double t)
+{
+    const double s = 1.0 - t;
+    return {s * s * s / 6.0, (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0, (4.0 - 6.0 * s * s + 3.0 * s * s * s) / 6.0,
+            t * t * t / 6.0};
+}
+
+}  // namespace
+
 double angle_deg(double half_tangent)
 {
     return 2.0 * std::atan(half_tangent) / radians_per_degree;
@@ -22,13 +34,20 @@ PresentAngles::PresentAngles(const AngleCounts& counts) : first(static_cast<doub
 
     std::array<double, bins> light{};
     std::array<double, bins> texels{};
-    const double width = std::max(last - first, 1e-12) / static_cast<double>(bins);
+    const double step = std::max(last - first, 1e-12) / static_cast<double>(bins - 1);
     for (std::size_t i = 0; i < AngleCounts::bins; ++i) {
-        const double middle = (static_cast<double>(i) + 0.5) / static_cast<double>(AngleCounts::bins);
-        const double place = std::clamp((middle - first) / width, 0.0, static_cast<double>(bins - 1));
         const AngleCounts::Bin& bin = counts.bin(i);
-        light[static_cast<std::size_t>(place)] += bin.light;
-        texels[static_cast<std::size_t>(place)] += bin.texels;
+        if (bin.texels == 0.0)
+            continue;
+        const double middle = (static_cast<double>(i) + 0.5) / static_cast<double>(AngleCounts::bins);
+        const double place = std::clamp((middle - first) / step, 0.0, static_cast<double>(bins - 1));
+        const double below = std::min(std::floor(place), static_cast<double>(bins - 2));
+        const std::array<double, 4> weights = cubic_b_spline(place - below);
+        for (int k = 0; k < 4; ++k) {
+            const double node = std::clamp(below + k - 1.0, 0.0, static_cast<double>(bins - 1));
+            light[static_cast<std::size_t>(node)] += weights[static_cast<std::size_t>(k)] * bin.light;
+            texels[static_cast<std::size_t>(node)] += weights[static_cast<std::size_t>(k)] * bin.texels;
+        }
     }
     const double all_light = std::accumulate(light.begin(), light.end(), 0.0);
     const double all_texels = std::accumulate(texels.begin(), texels.end(), 0.0);

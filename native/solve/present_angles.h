@@ -13,8 +13,9 @@ struct PresentAngles {
     static constexpr std::size_t bins = 64;
     double first = 1.0;  // beyond `last`: nothing is lit
     double last = 0.0;
-    std::array<double, bins> share{};  // in even bins between them, sum 1: mean of those
-                                       // of light, of lit texels and of angles
+    // At `bins` angles evenly from first to last, sum 1: mean of those of light, of lit texels and of angles. Each angle
+    // that occurs counts at the four around it, so that a basis for these holds what is between them.
+    std::array<double, bins> share{};
 
     explicit PresentAngles(const AngleCounts& counts);
 
