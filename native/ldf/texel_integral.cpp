@@ -4,18 +4,15 @@
 #include <array>
 #include <cmath>
 
+#include "base/gauss_rule.h"
 #include "base/threads.h"
 
 namespace beamspread {
 
 namespace {
 
-// Gauss-Legendre rule of three points on [-1, 1].
-constexpr std::array<double, 3> gauss_node = {-0.77459666924148338, 0.0, 0.77459666924148338};
-constexpr std::array<double, 3> gauss_weight = {5.0 / 9.0, 8.0 / 9.0, 5.0 / 9.0};
-
 // Longest step of asinh(s / distance) along a border: a fifth of the radius, about the width of most
-// radius bins, and half a period of the shortest harmonic.
+// radius bins, and half a period of the shortest harmonic, which the rule integrates to 1e-5.
 double longest_step(const RadialFunction& profile)
 {
     return std::min(0.2, 3.2 / static_cast<double>(profile.harmonics()));

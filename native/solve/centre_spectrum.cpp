@@ -6,7 +6,7 @@
 #include "base/constants.h"
 #include "base/threads.h"
 #include "ldf/texel_integral.h"
-#include "solve/gauss_rule.h"
+#include "base/gauss_rule.h"
 #include "solve/loops.h"
 
 namespace beamspread {

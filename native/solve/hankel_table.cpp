@@ -7,7 +7,7 @@
 #include "base/constants.h"
 #include "base/threads.h"
 #include "solve/fft.h"
-#include "solve/gauss_rule.h"
+#include "base/gauss_rule.h"
 #include "solve/loops.h"
 
 namespace beamspread {

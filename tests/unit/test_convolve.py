@@ -61,7 +61,7 @@ def test_fft_equals_direct_where_spectra_are_tabulated(library, angle, mean_free
     arguments = (beams, travel(angle, 200), library, ALBEDO, mean_free_path, pitch)
     direct, fft = convolve(*arguments, solver="direct"), convolve(*arguments, solver="fft")
     worst = (np.abs(fft - direct) / direct.max((0, 1))).max()
-    assert worst < (7e-5 if angle < 80 else 3e-4)
+    assert worst < 7e-5
 
 
 @pytest.fixture(scope="module")
