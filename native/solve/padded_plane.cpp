@@ -25,8 +25,8 @@ constexpr double level_deviation = 3.0;
 constexpr double harmonics_per_deviation = 10.0;
 constexpr double negligible_outside = 3e-4;
 
-// Kernels with finer bins of radius are sharper than texels around the beam's images in a thin slab's sides. A border of
-// half the distance up to which bins are finer takes these in; farther than this they are wider than texels, and the
+// Kernels with finer edges of radius are sharper than texels around the beam's images in a thin slab's sides. A border of
+// half the distance up to which edges are finer takes these in; farther than this they are wider than texels, and the
 // centre would cost more than all else. Without, errors of 6e-3 of the brightest texel were seen, with this 4e-4.
 constexpr double widest_deviation = 16.0;
 
