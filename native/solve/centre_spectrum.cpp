@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "base/constants.h"
+#include "base/gauss_rule.h"
 #include "base/threads.h"
 #include "ldf/texel_integral.h"
-#include "base/gauss_rule.h"
 #include "solve/loops.h"
 
 namespace beamspread {

@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "base/constants.h"
+#include "base/gauss_rule.h"
 #include "base/threads.h"
 #include "solve/fft.h"
-#include "base/gauss_rule.h"
 #include "solve/loops.h"
 
 namespace beamspread {

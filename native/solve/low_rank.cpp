@@ -156,8 +156,7 @@ KernelDecomposition::KernelDecomposition(const PresentAngles& present, const std
     for (const KernelMedium& medium : media) {
         m_angular->media.push_back(describe(medium, present, angles, texel));
         if (!m_angular->tables.contains(medium.library))
-            m_angular->tables[medium.library] =
-                NodeWeights(*medium.library, evenly(m_first, m_last, table_steps + 1));
+            m_angular->tables[medium.library] = NodeWeights(*medium.library, evenly(m_first, m_last, table_steps + 1));
     }
     const Vector root_share = Eigen::Map<const Vector>(present.share.data(), index(angle_bins)).cwiseSqrt();
     m_angular->root_share = root_share;
