@@ -57,8 +57,8 @@ def cache_folder():
 def photons_for(medium, quality):
     """Photons per angle that take about the same time in every medium.
 
-    The number of scatterings before light leaves grows like 1 / (1 - g), in a slab no further than with its thickness, and
-    internal reflection keeps light in longer.
+    The number of scatterings before light leaves grows like 1 / (1 - g), in a slab no further than with its thickness,
+    and internal reflection keeps light in longer.
     """
     scatterings = min(1.0 / (1.0 - medium.g), 1.0 + medium.thickness)
     return round(min(5.0 * PHOTONS[quality] / scatterings / medium.ior**2, _MAX_PHOTONS))

@@ -217,7 +217,7 @@ def test_far_field_is_shifted_along_the_beam(radius):
     ("medium", "angle"), [(Medium(0.9, 1.5, 0.5), 45), (Medium(0.95, 1.6, 0.5), 45), (Medium(0.9, 1.4, 1.0), 33)]
 )
 def test_solvers_show_mirror_images(medium, angle):
-    """What one texel gives off is the map of a beam, be the images' light around one pole or around its own: within 1 %.
+    """What one texel gives off is the map of a beam, within 1 %, be the images' light around one pole or its own.
 
     Between simulated angles, for texels of half a mean free path and one; unscattered light, of which `image` knows the
     place within a texel, is left out.

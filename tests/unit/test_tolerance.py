@@ -117,9 +117,9 @@ def test_all_errors_are_below_the_tolerance(media, medium, albedo, light, shadow
     [("texels", 0.3), ("texels", 20.0), ("texels", 300.0), ("blocks", 20.0), ("blocks", 300.0)],
 )
 def test_patches_of_light_against_direct(media, light, mean_free_path):
-    """Beside grazing beams each texel shows how well kernels are integrated, and a score of directions what lies between
-    the angles that a basis is made for. 2e-5: toward grazing with ior 1 the border of the kernels' centres is narrow for
-    all 64 harmonics.
+    """Beside grazing beams each texel shows how well kernels are integrated, and a score of directions what lies
+    between the angles that a basis is made for. 2e-5: toward grazing with ior 1 the border of the kernels' centres is
+    narrow for all 64 harmonics.
     """
     rng = np.random.default_rng(32)
     lit = np.zeros((SIZE, SIZE), np.float32)
