@@ -4,16 +4,13 @@
 #include <cmath>
 
 #include "base/constants.h"
+#include "base/gauss_rule.h"
 #include "base/threads.h"
 #include "ldf/radial_edges.h"
 
 namespace beamspread {
 
 namespace {
-
-// Gauss-Legendre rule of three points on [-1, 1].
-constexpr std::array<double, 3> gauss_node = {-0.77459666924148338, 0.0, 0.77459666924148338};
-constexpr std::array<double, 3> gauss_weight = {5.0 / 9.0, 8.0 / 9.0, 5.0 / 9.0};
 
 // So many radii away the disk is a point: g changes by less than 1e-4 where it matters, while the border integral
 // would be a small difference of large numbers.

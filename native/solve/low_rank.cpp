@@ -14,7 +14,7 @@ namespace beamspread {
 
 namespace {
 
-constexpr std::size_t angle_bins = PresentAngles::bins;
+constexpr std::size_t angle_count = PresentAngles::count;
 constexpr double least_gain = 1e-14;  // that is not rounding
 constexpr std::size_t table_steps = 4096;
 
@@ -93,7 +93,7 @@ AngularMedium describe(const KernelMedium& of, const PresentAngles& present, con
     medium.nodes = of.library->node_profiles(of.albedo, Side::reflected);
     const std::size_t nodes = medium.nodes.size();
     medium.weights = NodeWeights(*of.library, angles);
-    const Vector share = Eigen::Map<const Vector>(present.share.data(), index(angle_bins));
+    const Vector share = Eigen::Map<const Vector>(present.share.data(), index(angle_count));
     const Vector mean_weights = medium.weights.of(0, medium.nodes).transpose() * share;
     for (std::size_t j = 0; j < nodes; ++j)
         medium.mean.add(medium.nodes[j], mean_weights[index(j)], 0.0);
@@ -139,7 +139,7 @@ AngularMedium describe(const KernelMedium& of, const PresentAngles& present, con
 
 struct KernelDecomposition::Angular {
     std::vector<AngularMedium> media;
-    std::vector<Vector> direction;  // of each term, unit vectors over the angle bins
+    std::vector<Vector> direction;  // of each term, unit vectors over the present angles
     Vector root_share;
     std::map<const LdfSource*, NodeWeights> tables;
 };
@@ -152,16 +152,16 @@ KernelDecomposition::KernelDecomposition(const PresentAngles& present, const std
         medium.library->check_angle(angle_deg(m_first));
         medium.library->check_angle(angle_deg(m_last));
     }
-    const std::vector<double> angles = evenly(m_first, m_last, angle_bins);
+    const std::vector<double> angles = evenly(m_first, m_last, angle_count);
     for (const KernelMedium& medium : media) {
         m_angular->media.push_back(describe(medium, present, angles, texel));
         if (!m_angular->tables.contains(medium.library))
             m_angular->tables[medium.library] = NodeWeights(*medium.library, evenly(m_first, m_last, table_steps + 1));
     }
-    const Vector root_share = Eigen::Map<const Vector>(present.share.data(), index(angle_bins)).cwiseSqrt();
+    const Vector root_share = Eigen::Map<const Vector>(present.share.data(), index(angle_count)).cwiseSqrt();
     m_angular->root_share = root_share;
     for (std::size_t m = 0; m < harmonic_count; ++m) {
-        Matrix gram = Matrix::Zero(index(angle_bins), index(angle_bins));
+        Matrix gram = Matrix::Zero(index(angle_count), index(angle_count));
         for (const AngularMedium& medium : m_angular->media) {
             const Matrix rows = root_share.asDiagonal() * medium.weights.of(m, medium.nodes) * medium.features[m];
             gram += rows * rows.transpose() / static_cast<double>(media.size());
@@ -169,8 +169,8 @@ KernelDecomposition::KernelDecomposition(const PresentAngles& present, const std
         if (gram.trace() <= least_gain)
             continue;
         const Eigen::SelfAdjointEigenSolver<Matrix> solver(gram);
-        for (std::size_t rank = 0; rank < angle_bins; ++rank) {
-            const Eigen::Index i = index(angle_bins - 1 - rank);
+        for (std::size_t rank = 0; rank < angle_count; ++rank) {
+            const Eigen::Index i = index(angle_count - 1 - rank);
             const double gain = solver.eigenvalues()[i];
             if (gain <= least_gain)
                 break;

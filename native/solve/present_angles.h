@@ -10,12 +10,12 @@ namespace beamspread {
 
 // Angles as tan(theta / 2), as they are counted.
 struct PresentAngles {
-    static constexpr std::size_t bins = 64;
+    static constexpr std::size_t count = 64;
     double first = 1.0;  // beyond `last`: nothing is lit
     double last = 0.0;
-    // At `bins` angles evenly from first to last, sum 1: mean of those of light, of lit texels and of angles. Each angle
+    // At `count` angles evenly from first to last, sum 1: mean of those of light, of lit texels and of angles. Each angle
     // that occurs counts at the four around it, so that a basis for these holds what is between them.
-    std::array<double, bins> share{};
+    std::array<double, count> share{};
 
     explicit PresentAngles(const AngleCounts& counts);
 
