@@ -84,9 +84,7 @@ LightPyramid::LightPyramid(const LightField& light) : m_light(light)
         level.beams.resize(level.height * level.width);
         parallel_for(level.height, [&](std::size_t y) {
             for (std::size_t x = 0; x < level.width; ++x)
-                level.beams[y * level.width + x] =
-                    merge({beam(m_top - 1, 2 * y, 2 * x), beam(m_top - 1, 2 * y, 2 * x + 1),
-                           beam(m_top - 1, 2 * y + 1, 2 * x), beam(m_top - 1, 2 * y + 1, 2 * x + 1)});
+                level.beams[y * level.width + x] = merge(quarters(m_top - 1, y, x));
         });
         m_levels.push_back(std::move(level));
     }

@@ -1,6 +1,7 @@
 // Light of a plane, more and more coarsely: what a texel sees of light from far away.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -34,6 +35,24 @@ public:
     // Dark beyond the plane.
     SquareBeam beam(std::size_t level, std::size_t y, std::size_t x) const;
 
+    // The squares of the level that make up square (y, x) of the next: in a row, then in the row below.
+    std::array<SquareBeam, 4> quarters(std::size_t level, std::size_t y, std::size_t x) const
+    {
+        if (level >= first_level) {
+            const Level& stored = m_levels[level - first_level];
+            if (2 * y + 1 < stored.height && 2 * x + 1 < stored.width) {
+                const SquareBeam* above = stored.beams.data() + 2 * y * stored.width + 2 * x;
+                const SquareBeam* below = above + stored.width;
+                return {above[0], above[1], below[0], below[1]};
+            }
+        }
+        return {beam(level, 2 * y, 2 * x), beam(level, 2 * y, 2 * x + 1), beam(level, 2 * y + 1, 2 * x),
+                beam(level, 2 * y + 1, 2 * x + 1)};
+    }
+
+    // Of a level, along so many texels.
+    static std::size_t squares(std::size_t texels, std::size_t level) { return ((texels - 1) >> level) + 1; }
+
 private:
     struct Level {
         std::size_t height = 0;
@@ -41,7 +60,6 @@ private:
         std::vector<SquareBeam> beams;
     };
 
-    static std::size_t squares(std::size_t texels, std::size_t level) { return ((texels - 1) >> level) + 1; }
     void add_up_texels();
     void add_up_squares(std::size_t y, std::size_t first, std::size_t end, Level& level, AngleCounts& angles) const;
     void add_texels(AngleCounts& angles, std::size_t y, std::size_t x) const;  // of a square

@@ -8,9 +8,6 @@
 
 namespace beamspread {
 
-// Of harmonics.
-using Block = float __attribute__((vector_size(harmonics_per_block * sizeof(float))));
-
 BEAMSPREAD_CLONES void add_scaled(float* __restrict sum, const float* values, float factor, std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i)
@@ -52,52 +49,6 @@ BEAMSPREAD_CLONES void add_scaled_product(float* __restrict sum, const float* a,
 {
     for (std::size_t i = 0; i < count; ++i)
         sum[i] += factor * (a[i] * b[i]);
-}
-
-BEAMSPREAD_CLONES void add_harmonics(float* __restrict sum, const float* values, const float* by_harmonic,
-                                     const std::size_t* first, std::size_t blocks)
-{
-    for (std::size_t block = 0; block < blocks; ++block) {
-        const float* harmonics = by_harmonic + first[block];
-        for (std::size_t i = 0; i < harmonics_per_block; ++i)
-            sum[i] += values[i] * harmonics[i];
-        sum += harmonics_per_block;
-        values += harmonics_per_block;
-    }
-}
-
-BEAMSPREAD_CLONES void multiple_angles(float* __restrict cosine, float* __restrict sine, float cos_angle,
-                                       float sin_angle, std::size_t count)
-{
-    // Angle times i bit by bit of i: few steps, each for all i at once.
-    constexpr std::array<Block, 3> bits = {Block{0, 1, 0, 1, 0, 1, 0, 1}, Block{0, 0, 1, 1, 0, 0, 1, 1},
-                                           Block{0, 0, 0, 0, 1, 1, 1, 1}};
-    Block c = Block{} + 1.0f;
-    Block s{};
-    for (const Block& bit : bits) {
-        const Block by_cos = 1.0f + bit * (cos_angle - 1.0f);
-        const Block by_sin = bit * sin_angle;
-        const Block next = c * by_cos - s * by_sin;
-        s = s * by_cos + c * by_sin;
-        c = next;
-        const float twice = 2.0f * cos_angle * sin_angle;
-        cos_angle = cos_angle * cos_angle - sin_angle * sin_angle;
-        sin_angle = twice;
-    }
-    for (std::size_t m = 0; m < count; m += harmonics_per_block) {
-        std::memcpy(cosine + m, &c, sizeof(c));
-        std::memcpy(sine + m, &s, sizeof(s));
-        const Block next = c * cos_angle - s * sin_angle;
-        s = s * cos_angle + c * sin_angle;
-        c = next;
-    }
-}
-
-BEAMSPREAD_CLONES void multiply(float* __restrict product, const float* a, const float* b, float factor,
-                                std::size_t count)
-{
-    for (std::size_t i = 0; i < count; ++i)
-        product[i] = factor * (a[i] * b[i]);
 }
 
 BEAMSPREAD_CLONES void add_product(Complex* sum, const float* factor, const Complex* values, std::size_t count)

@@ -26,20 +26,6 @@ void scale(float* product, const float* values, float factor, std::size_t count)
 // sum[i] += factor * a[i] * b[i]
 void add_scaled_product(float* sum, const float* a, const float* b, float factor, std::size_t count);
 
-// Harmonics of a block: their loops have no remainders, and their number is known when they are compiled.
-inline constexpr std::size_t harmonics_per_block = 8;
-
-// sum[i] += values[i] * by_harmonic[first[i / 8] + i % 8], in blocks of harmonics
-void add_harmonics(float* sum, const float* values, const float* by_harmonic, const std::size_t* first,
-                   std::size_t blocks);
-
-// cosine[m], sine[m] = cos(m angle), sin(m angle) of cos(angle), sin(angle), m below count, a multiple of a block; to
-// some m roundings
-void multiple_angles(float* cosine, float* sine, float cos_angle, float sin_angle, std::size_t count);
-
-// product[i] = factor * a[i] * b[i]
-void multiply(float* product, const float* a, const float* b, float factor, std::size_t count);
-
 // sum[i] += factor[i] * values[i]
 void add_product(Complex* sum, const float* factor, const Complex* values, std::size_t count);
 

@@ -24,17 +24,41 @@ float turn_between(const SquareBeam& from, const SquareBeam& to)
 
 }  // namespace
 
+struct LuminanceProbe::Span {
+    std::size_t first;
+    std::size_t end;
+
+    // Those of `count` that are no farther away than `reach`.
+    static Span around(std::size_t at, std::size_t count, std::size_t reach)
+    {
+        return {at - std::min(at, reach), std::min(count, at + reach + 1)};
+    }
+};
+
 struct LuminanceProbe::Place {
+    Place(const ProbeTables& tables, std::size_t at_y, std::size_t at_x)
+        : y(at_y),
+          x(at_x),
+          near(tables.media() * tables.functions()),
+          far(near.size()),
+          light(tables.functions()),
+          cosine(tables.harmonics()),
+          sine(tables.harmonics()),
+          nearby(tables.media()),
+          means(FarBeams::most * tables.harmonics())
+    {
+    }
+
     std::size_t y;
     std::size_t x;
     std::vector<float> near;   // [medium][rank][m]: by light from up to `nearby_sources` away
     std::vector<float> far;    // and from beyond
-    std::vector<float> light;  // of a square by rank and harmonic
+    std::vector<float> light;  // of a texel by rank and harmonic
     std::vector<float> cosine;
     std::vector<float> sine;
-    std::vector<float> mean;  // of cosines over a square
     std::vector<double> nearby;
-    std::vector<std::array<SquareBeam, 4>> quarters;  // [light]: of the square that is looked at
+    std::array<FarBeams, 2> beams;  // to be added to `far`, to `near`
+    std::vector<float> means;       // [beam][m]: of cosines over squares
 };
 
 LuminanceProbe::LuminanceProbe(const std::vector<LightPyramid>& lights, const LowRankBasis& basis, double pitch_x,
@@ -48,25 +72,40 @@ LuminanceProbe::LuminanceProbe(const std::vector<LightPyramid>& lights, const Lo
 {
 }
 
+bool LuminanceProbe::dark(std::size_t level, const Span& rows, const Span& columns) const
+{
+    for (std::size_t y = rows.first; y < rows.end; ++y)
+        for (std::size_t x = columns.first; x < columns.end; ++x)
+            for (const LightPyramid& light : m_lights)
+                if (light.beam(level, y, x).irradiance > 0.0f)
+                    return false;
+    return true;
+}
+
 LuminanceProbe::Reading LuminanceProbe::read(std::size_t y, std::size_t x) const
 {
     const std::size_t functions = m_tables.functions();
-    const std::size_t media = m_tables.media();
-    const std::size_t size = media * functions;
-    Place place{y,
-                x,
-                std::vector<float>(size),
-                std::vector<float>(size),
-                std::vector<float>(functions),
-                std::vector<float>(m_tables.harmonics()),
-                std::vector<float>(m_tables.harmonics()),
-                std::vector<float>(m_tables.harmonics()),
-                std::vector<double>(media),
-                std::vector<std::array<SquareBeam, 4>>(m_lights.size())};
-    add_square(place, m_lights.front().top(), 0, 0);
+    Place place(m_tables, y, x);
+    // Level by level, squares that are too near to be looked at as a whole are looked at by quarters.
+    for (std::size_t level = m_lights.front().top(); level > 0; --level) {
+        const Span rows = Span::around(y >> level, LightPyramid::squares(m_height, level), squares_between);
+        const Span columns = Span::around(x >> level, LightPyramid::squares(m_width, level), squares_between);
+        if (dark(level, rows, columns))
+            break;
+        for (std::size_t row = rows.first; row < rows.end; ++row)
+            for (std::size_t column = columns.first; column < columns.end; ++column)
+                add_quarters(place, level - 1, row, column);
+    }
+    add_far(place, false);
+    add_far(place, true);
+    const Span rows = Span::around(y, m_height, squares_between);
+    const Span columns = Span::around(x, m_width, squares_between);
+    for (std::size_t row = rows.first; row < rows.end; ++row)
+        for (std::size_t column = columns.first; column < columns.end; ++column)
+            add_near(place, row, column);
     add_nearby(place);
     Reading reading{{}, std::move(place.nearby)};
-    for (std::size_t k = 0; k < media; ++k) {
+    for (std::size_t k = 0; k < m_tables.media(); ++k) {
         const float* near = place.near.data() + k * functions;
         const float* far = place.far.data() + k * functions;
         double beyond = 0.0;
@@ -91,81 +130,76 @@ LuminanceProbe::Reading LuminanceProbe::read(std::size_t y, std::size_t x) const
     return reading;
 }
 
-// Of a square too near to be looked at as a whole.
-void LuminanceProbe::add_square(Place& place, std::size_t level, std::size_t y, std::size_t x) const
+// Of those quarters of a square that are far enough to be looked at as a whole.
+void LuminanceProbe::add_quarters(Place& place, std::size_t level, std::size_t y, std::size_t x) const
 {
-    if (level == 0)
-        return add_near(place, y, x);
-    std::array<bool, 4> lit{};
-    for (std::size_t l = 0; l < m_lights.size(); ++l)
-        for (std::size_t i = 0; i < 4; ++i) {
-            place.quarters[l][i] = m_lights[l].beam(level - 1, 2 * y + i / 2, 2 * x + i % 2);
-            lit[i] = lit[i] || place.quarters[l][i].irradiance > 0.0f;
-        }
-    std::array<bool, 4> open{};
-    for (std::size_t i = 0; i < 4; ++i) {
-        const std::size_t between =
-            std::max(distance(place.y >> (level - 1), 2 * y + i / 2), distance(place.x >> (level - 1), 2 * x + i % 2));
-        open[i] = lit[i] && between <= squares_between;
-        if (lit[i] && !open[i])
-            add_far(place, level - 1, 2 * y + i / 2, 2 * x + i % 2);
-    }
-    for (std::size_t i = 0; i < 4; ++i)
-        if (open[i])
-            add_square(place, level - 1, 2 * y + i / 2, 2 * x + i % 2);
-}
-
-// Of one of the quarters, as a whole.
-void LuminanceProbe::add_far(Place& place, std::size_t level, std::size_t y, std::size_t x) const
-{
-    // From the middle of the square to the texel, in texels.
     const auto size = static_cast<float>(std::size_t{1} << level);
-    const auto away = [&](std::size_t at, std::size_t square) {
-        return static_cast<float>(at) - (static_cast<float>(square) + 0.5f) * size + 0.5f;
-    };
-    const float dx = away(place.x, x);
-    const float dy = away(place.y, y);
     const auto unit_x = static_cast<float>(m_pitch_x / m_tables.unit());
     const auto unit_y = static_cast<float>(m_pitch_y / m_tables.unit());
-    const float offset_x = dx * unit_x;
-    const float offset_y = dy * unit_y;
-    const float square = offset_x * offset_x + offset_y * offset_y;
-    const float* by_radius = m_tables.at_radius_squared(square);
-    if (by_radius == nullptr)
-        return;
-    // The azimuth of the texel turns by this from the square to the next.
-    const float per_square = size / square;
-    const float turn_x = unit_x * offset_y * per_square;
-    const float turn_y = -unit_y * offset_x * per_square;
-
-    const std::size_t harmonics = m_tables.harmonics();
-    std::fill(place.light.begin(), place.light.end(), 0.0f);
-    for (const std::array<SquareBeam, 4>& quarters : place.quarters) {
-        const SquareBeam& beam = quarters[2 * (y % 2) + x % 2];
-        if (beam.irradiance == 0.0f)
-            continue;
-        const float u = beam.direction.x;
-        const float v = beam.direction.y;
-        const float lengths = std::sqrt(square * (u * u + v * v));
-        const float per_length = lengths > 0.0f ? 1.0f / lengths : 0.0f;
-        const float cosine = lengths > 0.0f ? (offset_x * u + offset_y * v) * per_length : 1.0f;
-        const float sine = (offset_y * u - offset_x * v) * per_length;
-        multiple_angles(place.cosine.data(), place.sine.data(), cosine, sine, harmonics);
-        // Where all beams travel toward or away from the texel, as below a lamp, nothing turns. Beams that have nothing to
-        // do with each other turn by much, but their harmonics don't cancel for that.
-        const float seen_x = turn_x - turn_between(quarters[2 * (y % 2)], quarters[2 * (y % 2) + 1]);
-        const float seen_y = turn_y - turn_between(quarters[x % 2], quarters[2 + x % 2]);
-        const float seen = std::min(seen_x * seen_x + seen_y * seen_y, turn_x * turn_x + turn_y * turn_y);
-        const float* left = m_tables.over_turn(std::sqrt(seen));
-        multiply(place.mean.data(), place.cosine.data(), left, beam.irradiance, harmonics);
-        add_harmonics(place.light.data(), m_tables.at_angle(beam.direction), place.mean.data(),
-                      m_tables.columns().data(), m_tables.columns().size());
+    const auto squares = [&](std::size_t at, std::size_t square) {
+        return std::array<std::size_t, 2>{distance(at >> level, 2 * square), distance(at >> level, 2 * square + 1)};
+    };
+    // From the middle of a square to the texel, in texels.
+    const auto away = [&](std::size_t at, std::size_t square) {
+        const float first = static_cast<float>(at) - (static_cast<float>(2 * square) + 0.5f) * size + 0.5f;
+        return std::array<float, 2>{first, first - size};
+    };
+    const std::array<std::size_t, 2> rows = squares(place.y, y);
+    const std::array<std::size_t, 2> columns = squares(place.x, x);
+    const std::array<float, 2> dx = away(place.x, x);
+    const std::array<float, 2> dy = away(place.y, y);
+    std::array<bool, 4> seen;
+    std::array<bool, 4> nearby;
+    for (std::size_t i = 0; i < 4; ++i) {
+        const float offset_x = dx[i % 2] * unit_x;
+        const float offset_y = dy[i / 2] * unit_y;
+        seen[i] = std::max(rows[i / 2], columns[i % 2]) > squares_between &&
+                  !m_tables.out_of_reach(offset_x * offset_x + offset_y * offset_y);
+        nearby[i] = std::max(std::abs(dx[i % 2]), std::abs(dy[i / 2])) < static_cast<float>(nearby_sources) + 0.5f;
     }
-    const bool nearby = std::max(std::abs(dx), std::abs(dy)) < static_cast<float>(nearby_sources) + 0.5f;
-    float* sums = nearby ? place.near.data() : place.far.data();
-    const std::size_t functions = m_tables.functions();
-    for (std::size_t k = 0; k < m_tables.media(); ++k)
-        add_scaled_product(sums + k * functions, place.light.data(), by_radius + k * functions, 1.0f, functions);
+    if (std::find(seen.begin(), seen.end(), true) == seen.end())
+        return;
+    for (const LightPyramid& light : m_lights) {
+        const std::array<SquareBeam, 4> quarters = light.quarters(level, y, x);
+        const std::array<float, 2> turn_x = {turn_between(quarters[0], quarters[1]),
+                                             turn_between(quarters[2], quarters[3])};
+        const std::array<float, 2> turn_y = {turn_between(quarters[0], quarters[2]),
+                                             turn_between(quarters[1], quarters[3])};
+        for (std::size_t i = 0; i < 4; ++i) {
+            const SquareBeam& beam = quarters[i];
+            if (!seen[i] || beam.irradiance == 0.0f)
+                continue;
+            FarBeams& beams = place.beams[nearby[i]];
+            if (beams.count == FarBeams::most)
+                add_far(place, nearby[i]);
+            const std::size_t next = beams.count++;
+            beams.x[next] = dx[i % 2] * unit_x;
+            beams.y[next] = dy[i / 2] * unit_y;
+            beams.width[next] = size * unit_x;
+            beams.height[next] = size * unit_y;
+            beams.irradiance[next] = beam.irradiance;
+            beams.u[next] = beam.direction.x;
+            beams.v[next] = beam.direction.y;
+            beams.w[next] = beam.direction.z;
+            beams.turn_x[next] = turn_x[i / 2];
+            beams.turn_y[next] = turn_y[i % 2];
+        }
+    }
+}
+
+// What was collected, to the light from near or from far.
+void LuminanceProbe::add_far(Place& place, bool nearby) const
+{
+    FarBeams& beams = place.beams[nearby];
+    find_views(beams);
+    for (std::size_t i = 0; i < beams.count; ++i) {
+        beams.by_radius[i] = m_tables.at_radius(static_cast<std::size_t>(beams.radius_step[i]));
+        beams.by_turn[i] = m_tables.over_turn(beams.turn[i]);
+        beams.by_angle[i] = m_tables.at_half_tangent(beams.half_tangent[i]);
+    }
+    add_far_beams(nearby ? place.near.data() : place.far.data(), beams, m_tables.blocks(), place.means.data(),
+                  m_tables.harmonics());
+    beams.count = 0;
 }
 
 void LuminanceProbe::add_near(Place& place, std::size_t y, std::size_t x) const
@@ -199,19 +233,12 @@ void LuminanceProbe::add_near(Place& place, std::size_t y, std::size_t x) const
 void LuminanceProbe::add_nearby(Place& place) const
 {
     constexpr std::size_t reach = ProbeTables::nearby_reach;
-    struct Span {
-        std::size_t first;
-        std::size_t end;
-    };
-    const auto window = [](std::size_t at, std::size_t texels) {
-        return Span{at - std::min(at, nearby_texels), std::min(texels, at + nearby_texels + 1)};
-    };
     // Squares whose middle lies that near.
     const auto sources = [](std::size_t at) {
         return Span{(at + 2 - std::min(at + 2, nearby_sources)) / nearby_side, (at + nearby_sources + 2) / nearby_side};
     };
-    const Span window_y = window(place.y, m_height);
-    const Span window_x = window(place.x, m_width);
+    const Span window_y = Span::around(place.y, m_height, nearby_texels);
+    const Span window_x = Span::around(place.x, m_width, nearby_texels);
     const double texels = static_cast<double>((window_y.end - window_y.first) * (window_x.end - window_x.first));
     for (std::size_t y = sources(place.y).first; y < sources(place.y).end; ++y)
         for (std::size_t x = sources(place.x).first; x < sources(place.x).end; ++x)

@@ -26,9 +26,12 @@ public:
 
 private:
     struct Place;
+    struct Span;
 
-    void add_square(Place& place, std::size_t level, std::size_t y, std::size_t x) const;
-    void add_far(Place& place, std::size_t level, std::size_t y, std::size_t x) const;
+    // Whether these squares are, and so all that they are made of.
+    bool dark(std::size_t level, const Span& rows, const Span& columns) const;
+    void add_quarters(Place& place, std::size_t level, std::size_t y, std::size_t x) const;
+    void add_far(Place& place, bool nearby) const;
     void add_near(Place& place, std::size_t y, std::size_t x) const;
     void add_nearby(Place& place) const;
 

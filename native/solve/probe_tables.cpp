@@ -2,7 +2,6 @@
 
 #include "base/threads.h"
 #include "ldf/texel_integral.h"
-#include "solve/loops.h"
 
 namespace beamspread {
 
@@ -64,11 +63,13 @@ void ProbeTables::tabulate_radii(const LowRankBasis& basis, double longest)
     double reach = 0.0;
     for (const std::vector<ScaledProfile>& profiles : basis.profiles)
         reach = std::max(reach, profiles.front().reach);
+    constexpr auto per_octave = static_cast<double>(radius_steps);
     const double octaves = std::log2(std::max(std::min(reach, longest) / m_unit, 1.0));
-    m_radii = static_cast<std::size_t>(std::ceil(octaves * static_cast<double>(radii_per_octave))) + 1;
-    m_by_radius.resize(m_radii * m_media * functions());
-    parallel_for(m_radii, [&](std::size_t step) {
-        const double r = m_unit * std::exp2((static_cast<double>(step) + 0.5) / static_cast<double>(radii_per_octave));
+    const std::size_t radii = static_cast<std::size_t>(std::ceil(octaves * per_octave)) + 1;
+    m_end_squared = static_cast<float>(std::exp2(2.0 * static_cast<double>(radii) / per_octave));
+    m_by_radius.resize(radii * m_media * functions());
+    parallel_for(radii, [&](std::size_t step) {
+        const double r = m_unit * std::exp2((static_cast<double>(step) + 0.5) / per_octave);
         for (std::size_t k = 0; k < m_media; ++k)
             for (std::size_t rank = 0; rank < m_ranks; ++rank) {
                 const ScaledProfile& scaled = basis.profiles[k][rank];

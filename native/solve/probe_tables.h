@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "base/vec.h"
 #include "solve/low_rank.h"
+#include "solve/probe_loops.h"
 
 namespace beamspread {
 
@@ -44,6 +46,7 @@ public:
     std::size_t start(std::size_t rank) const { return m_starts[rank]; }
     const std::vector<std::size_t>& places() const { return m_places; }
     const std::vector<std::size_t>& columns() const { return m_columns; }
+    RowBlocks blocks() const { return {m_columns.data(), m_columns.size(), m_media}; }
 
     // The unit of radii, metres: the shorter side of a texel.
     double unit() const { return m_unit; }
@@ -52,18 +55,19 @@ public:
     const float* at_angle(const Vec3f& direction) const
     {
         const float across = std::sqrt(direction.x * direction.x + direction.y * direction.y);
-        const float half_tangent = across / (1.0f - direction.z);
+        return at_half_tangent(across / (1.0f - direction.z));
+    }
+    const float* at_half_tangent(float half_tangent) const
+    {
         const auto step = static_cast<std::size_t>(std::max((half_tangent - m_first) * m_per_step, 0.0f));
         return m_by_angle.data() + std::min(step, angle_steps - 1) * functions();
     }
 
-    // Rows of the media: density times the area of a texel. Null beyond the reach of the kernels.
-    const float* at_radius_squared(float square) const
-    {
-        const float octave = 0.5f * std::log2(square);
-        const auto step = static_cast<std::size_t>(std::max(octave, 0.0f) * radii_per_octave);
-        return step < m_radii ? m_by_radius.data() + step * m_media * functions() : nullptr;
-    }
+    // Beyond the reach of the kernels, or farther than the plane has texels.
+    bool out_of_reach(float radius_squared) const { return radius_squared >= m_end_squared; }
+
+    // Rows of the media: density times the area of a texel.
+    const float* at_radius(std::size_t step) const { return m_by_radius.data() + step * m_media * functions(); }
 
     // What is left of each harmonic over a square from one side of which to the other it turns by so much, radians.
     const float* over_turn(float turn) const
@@ -100,7 +104,6 @@ public:
 
 private:
     static constexpr std::size_t angle_steps = 256;
-    static constexpr float radii_per_octave = 16.0f;
     static constexpr std::size_t turn_steps = 64;
     static constexpr float turn_steps_per_radian = 64.0f;
     static constexpr std::size_t most_nearby_ranks = 4;
@@ -124,7 +127,7 @@ private:
     float m_first;  // of the table of angles
     float m_per_step;
     std::vector<float> m_by_angle;  // [step]
-    std::size_t m_radii = 0;
+    float m_end_squared = 0.0f;  // of the table of radii
     std::vector<float> m_by_radius;  // [step][medium]
     std::vector<float> m_by_turn;    // [step][m]
     std::vector<float> m_near;       // [dy][dx][phase][medium], of a quadrant
