@@ -89,14 +89,20 @@ Choice leave_out(const Eigen::ArrayXXf& parts, const std::vector<float>& cost)
     auto& [kept, error] = choice;
     std::iota(kept.begin(), kept.end(), std::size_t{0});
     leave_out_least(parts, choice);
+    // The texel that each brings most to: it alone rules out most of those that are needed.
+    std::vector<Eigen::Index> most(cost.size());
+    parallel_for(most.size(), [&](std::size_t c) { parts.col(index(c)).abs().maxCoeff(&most[c]); });
     std::vector<float> growth;
     while (!kept.empty()) {
         const float now = error.square().square().sum();
-        growth.resize(kept.size());
+        growth.assign(kept.size(), std::numeric_limits<float>::infinity());
         parallel_for(growth.size(), [&](std::size_t i) {
-            const Eigen::ArrayXf next = choice.error + parts.col(index(choice.kept[i]));
-            growth[i] = next.abs().maxCoeff() > 1.0f ? std::numeric_limits<float>::infinity()
-                                                     : (next.square().square().sum() - now) / cost[choice.kept[i]];
+            const std::size_t c = choice.kept[i];
+            if (std::abs(choice.error(most[c]) + parts(most[c], index(c))) > 1.0f)
+                return;
+            const Eigen::ArrayXf next = choice.error + parts.col(index(c));
+            if (next.abs().maxCoeff() <= 1.0f)
+                growth[i] = (next.square().square().sum() - now) / cost[c];
         });
         const auto least = std::min_element(growth.begin(), growth.end());
         if (*least == std::numeric_limits<float>::infinity())

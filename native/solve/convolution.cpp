@@ -75,14 +75,10 @@ Convolution::Span Convolution::with_halo(const Span& tile, std::size_t halo, std
 void Convolution::solve_tile(const Tile& tile)
 {
     const std::size_t terms = m_terms.size();
-    std::vector<ColumnSpectrum> light;
-    for (std::size_t t = 0; t < std::min(terms, m_at_once); ++t)
-        light.emplace_back(m_plane.columns(), tile.window_y.count);
+    ColumnSpectra light(std::min(terms, m_at_once), m_plane.columns(), tile.window_y.count);
     for (std::size_t first = 0; first < m_media; first += m_at_once) {
         const std::size_t last = std::min(m_media, first + m_at_once);
-        std::vector<ColumnSpectrum> results;
-        for (std::size_t k = first; k < last; ++k)
-            results.emplace_back(m_plane.columns(), tile.y.count);
+        ColumnSpectra results(last - first, m_plane.columns(), tile.y.count);
         for (std::size_t t = 0; t < terms; t += m_at_once) {
             const std::size_t count = std::min(m_at_once, terms - t);
             if (first == 0 || terms > m_at_once)
@@ -90,13 +86,12 @@ void Convolution::solve_tile(const Tile& tile)
             convolve_columns(tile, t, count, light, first, results);
         }
         for (std::size_t k = first; k < last; ++k)
-            store_result(tile, k, results[k - first]);
+            store_result(tile, k, results, k - first);
     }
 }
 
 // The terms' light in the window, padded and transformed along x.
-void Convolution::transform_light(const Tile& tile, std::size_t first, std::size_t count,
-                                  std::vector<ColumnSpectrum>& light)
+void Convolution::transform_light(const Tile& tile, std::size_t first, std::size_t count, ColumnSpectra& light)
 {
     const std::size_t stride = m_plane.padded_width;
     const std::size_t columns = m_plane.columns();
@@ -120,7 +115,7 @@ void Convolution::transform_light(const Tile& tile, std::size_t first, std::size
             }
             real_to_half(scratch.lines.data(), scratch.half.data(), rows, stride);
             for (std::size_t x = 0; x < columns; ++x) {
-                Complex* column = light[t].column(x) + y0;
+                Complex* column = light.column(t, x) + y0;
                 for (std::size_t y = 0; y < rows; ++y)
                     column[y] = scratch.half[y * columns + x];
             }
@@ -130,9 +125,8 @@ void Convolution::transform_light(const Tile& tile, std::size_t first, std::size
 }
 
 // Transforms the light along y, multiplies it by the kernels' spectra, and transforms the sums back along y.
-void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std::size_t count,
-                                   std::vector<ColumnSpectrum>& light, std::size_t first_medium,
-                                   std::vector<ColumnSpectrum>& results)
+void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std::size_t count, ColumnSpectra& light,
+                                   std::size_t first_medium, ColumnSpectra& results)
 {
     const std::size_t height = m_plane.padded_height;
     const std::size_t columns = m_plane.columns();
@@ -142,7 +136,7 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
     std::vector<const KernelSpectra::Part*> parts;  // of all terms, and for each of all media
     std::vector<std::size_t> first_part;            // [term * media + medium]
     for (std::size_t t = 0; t < count; ++t)
-        for (std::size_t k = 0; k < results.size(); ++k) {
+        for (std::size_t k = 0; k < results.count(); ++k) {
             first_part.push_back(parts.size());
             for (const KernelSpectra::Part& part : m_kernels[first_term + t][first_medium + k])
                 parts.push_back(&part);
@@ -152,7 +146,7 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
         const auto lease = m_column_scratch.lend();
         ColumnScratch& scratch = *lease;
         scratch.lines.resize(terms_per_batch * height);
-        scratch.sums.resize(2 * results.size() * height);
+        scratch.sums.resize(2 * results.count() * height);
         scratch.kernel.resize(height);
         const std::size_t last = std::min(columns, (item + 1) * columns_per_item);
         m_spectra.start(item * columns_per_item, last - item * columns_per_item, parts, scratch.centres);
@@ -163,16 +157,16 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
                 const std::size_t batch = std::min(terms_per_batch, count - first);
                 for (std::size_t t = 0; t < batch; ++t) {
                     Complex* line = scratch.lines.data() + t * height;
-                    std::copy_n(light[first + t].column(x), tile.window_y.count, line);
+                    std::copy_n(light.column(first + t, x), tile.window_y.count, line);
                     std::fill(line + tile.window_y.count, line + height, Complex());
                 }
                 complex_in_place(scratch.lines.data(), batch, height, true);
-                const std::size_t begin = first_part[first * results.size()];
-                const std::size_t end = first_part[(first + batch) * results.size()];
+                const std::size_t begin = first_part[first * results.count()];
+                const std::size_t end = first_part[(first + batch) * results.count()];
                 m_spectra.select(x - item * columns_per_item, begin, end - begin, scratch.centres);
                 for (std::size_t t = 0; t < batch; ++t)
-                    for (std::size_t k = 0; k < results.size(); ++k) {
-                        const std::size_t pair = (first + t) * results.size() + k;
+                    for (std::size_t k = 0; k < results.count(); ++k) {
+                        const std::size_t pair = (first + t) * results.count() + k;
                         for (std::size_t i = first_part[pair]; i < first_part[pair + 1]; ++i) {
                             m_spectra.spectrum(scratch.column, scratch.centres, i, *parts[i], scratch.kernel.data());
                             add_product(scratch.sums.data() + (2 * k + (parts[i]->odd_m() ? 1 : 0)) * height,
@@ -180,13 +174,13 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
                         }
                     }
             }
-            for (std::size_t k = 0; k < results.size(); ++k) {
+            for (std::size_t k = 0; k < results.count(); ++k) {
                 Complex* even = scratch.sums.data() + 2 * k * height;
                 const Complex* odd = even + height;
                 for (std::size_t f = 0; f < height; ++f)  // -i times the odd ones
                     even[f] += Complex(odd[f].imag(), -odd[f].real());
                 complex_in_place(even, 1, height, false);
-                Complex* result = results[k].column(x);
+                Complex* result = results.column(k, x);
                 for (std::size_t y = 0; y < tile.y.count; ++y)
                     result[y] = (first_term > 0 ? result[y] : Complex()) + even[offset + y];
             }
@@ -196,7 +190,7 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
 }
 
 // Transforms a tile's result back along x.
-void Convolution::store_result(const Tile& tile, std::size_t medium, ColumnSpectrum& result)
+void Convolution::store_result(const Tile& tile, std::size_t medium, ColumnSpectra& results, std::size_t plane)
 {
     const std::size_t stride = m_plane.padded_width;
     const std::size_t columns = m_plane.columns();
@@ -211,7 +205,7 @@ void Convolution::store_result(const Tile& tile, std::size_t medium, ColumnSpect
         scratch.lines.resize(rows_per_item * stride);
         scratch.half.resize(rows_per_item * columns);
         for (std::size_t x = 0; x < columns; ++x) {
-            const Complex* column = result.column(x) + y0;
+            const Complex* column = results.column(plane, x) + y0;
             for (std::size_t y = 0; y < rows; ++y)
                 scratch.half[y * columns + x] = column[y];
         }

@@ -9,7 +9,7 @@
 
 #include "base/pool.h"
 #include "base/progress.h"
-#include "solve/column_spectrum.h"
+#include "solve/column_spectra.h"
 #include "solve/kernel_spectra.h"
 #include "solve/light_terms.h"
 
@@ -83,11 +83,10 @@ private:
     static std::vector<Span> tiles(std::size_t size, std::size_t tile);
     static Span with_halo(const Span& tile, std::size_t halo, std::size_t size);
     void solve_tile(const Tile& tile);
-    void transform_light(const Tile& tile, std::size_t first, std::size_t count, std::vector<ColumnSpectrum>& light);
-    void convolve_columns(const Tile& tile, std::size_t first_term, std::size_t count,
-                          std::vector<ColumnSpectrum>& light, std::size_t first_medium,
-                          std::vector<ColumnSpectrum>& results);
-    void store_result(const Tile& tile, std::size_t medium, ColumnSpectrum& result);
+    void transform_light(const Tile& tile, std::size_t first, std::size_t count, ColumnSpectra& light);
+    void convolve_columns(const Tile& tile, std::size_t first_term, std::size_t count, ColumnSpectra& light,
+                          std::size_t first_medium, ColumnSpectra& results);
+    void store_result(const Tile& tile, std::size_t medium, ColumnSpectra& results, std::size_t plane);
 
     const KernelSpectra& m_spectra;
     const PaddedPlane& m_plane;
