@@ -1,6 +1,8 @@
 """The fft solver where light spreads far: a coarse grid beside the texels, against texels alone and against direct."""
 
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -148,3 +150,23 @@ def test_bad_coarsening_is_named(ldf):
     for coarsening in (2, 5, 128):
         with pytest.raises(ValueError, match=f"'coarsening' is {coarsening}"):
             solve(ldf, (20, 20), sun, 1.0, coarsening=coarsening)
+
+
+MEMORY = """
+import numpy, resource
+from beamspread import Medium, _native, library
+
+y, x = numpy.mgrid[:180, :180] - 90.0
+field = numpy.stack([x, y, numpy.full_like(x, -20)], -1)
+direction = (field / numpy.linalg.norm(field, axis=-1, keepdims=True)).astype(numpy.float32)
+rest = [library(Medium(0.8, 1.4))], [0.9], [60.0], (1.0, 1.0), "fft", 1e-3, 0, None
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+_native.convolve([(numpy.ones((180, 180), numpy.float32), direction)], *rest, memory=32 << 20, coarsening=8)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+"""
+
+
+def test_hundreds_of_small_spectra_keep_to_the_memory_they_are_given():
+    """A huge page for each would take ten times as much."""
+    output = subprocess.run([sys.executable, "-c", MEMORY], check=True, capture_output=True, text=True).stdout
+    assert int(output) < 100 << 10  # KiB
