@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstring>
 
-#define BEAMSPREAD_CLONES __attribute__((target_clones("default", "avx2", "avx512f")))
+#include "solve/target_clones.h"
 
 namespace beamspread {
 

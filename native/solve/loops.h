@@ -1,5 +1,4 @@
-// Inner loops of the fft solver, compiled for several instruction sets, the best chosen at run time. Without
-// contraction to fused multiply-add the results are the same for all.
+// Inner loops of the fft solver, see solve/target_clones.h.
 #pragma once
 
 #include <cstddef>

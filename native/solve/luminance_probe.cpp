@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "solve/loops.h"
+#include "solve/probe_loops.h"
 
 namespace beamspread {
 

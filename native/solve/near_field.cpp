@@ -6,6 +6,7 @@
 
 #include "base/constants.h"
 #include "base/threads.h"
+#include "solve/target_clones.h"
 
 namespace beamspread {
 
@@ -26,10 +27,8 @@ struct LightRow {
 using Lanes = double __attribute__((vector_size(64), aligned(8), may_alias));
 static_assert(2 * sizeof(Lanes) == near_block * sizeof(double));
 
-// Adds the lights of many rows to the targets x .. x + near_block - 1. Compiled for several instruction sets, the
-// best chosen at run time; without contraction to fused multiply-add the results are the same for all.
-__attribute__((target_clones("default", "avx2", "avx512f"))) void add_rows(double* sum, std::ptrdiff_t x,
-                                                                           const LightRow* rows, std::size_t count)
+// Adds the lights of many rows to the targets x .. x + near_block - 1.
+BEAMSPREAD_CLONES void add_rows(double* sum, std::ptrdiff_t x, const LightRow* rows, std::size_t count)
 {
     auto* to = reinterpret_cast<Lanes*>(sum);
     Lanes left = to[0];

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <limits>
 
-#define BEAMSPREAD_CLONES __attribute__((target_clones("default", "avx2", "avx512f")))
+#include "solve/target_clones.h"
 
 namespace beamspread {
 

@@ -1,5 +1,4 @@
-// Inner loops of the luminance probe, compiled for several instruction sets, the best chosen at run time. Without
-// contraction to fused multiply-add the results are the same for all.
+// Inner loops of the luminance probe, see solve/target_clones.h.
 #pragma once
 
 #include <array>
