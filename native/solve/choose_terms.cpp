@@ -25,8 +25,10 @@ constexpr double share = 0.3;
 // Of what is allowed: errors that need no weighing.
 constexpr float negligible = 0.05f;
 
-// So often there is a closer look around the texels where errors are largest.
+// So often there is a closer look around the texels where errors are largest; one that changes neither the choice nor,
+// by more than this, the largest error is the last.
 constexpr std::size_t refinements = 2;
+constexpr float least_growth = 1.05f;
 constexpr std::size_t worst_count = 64;
 
 // Errors relative to the brightest texel that transforms in single precision make anyway.
@@ -148,6 +150,8 @@ std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const 
     const LuminanceProbe probe(lights, kernels.basis(candidates, rounding), pitch_x, pitch_y);
     std::vector<Texel> texels = probe_texels(lights, pitch_x, pitch_y);
     std::vector<LuminanceProbe::Reading> readings;
+    std::vector<std::size_t> kept;
+    float largest = 0.0f;
     for (std::size_t round = 0;; ++round) {
         const std::size_t known = readings.size();
         readings.resize(texels.size());
@@ -156,8 +160,11 @@ std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const 
             readings[known + i] = probe.read(y, x);
         });
         Choice choice = leave_out(relative_parts(readings, candidates.size(), tolerance), transforms);
-        if (round == refinements)
+        const float error = choice.error.abs().maxCoeff();
+        if (round == refinements || (round > 0 && choice.kept == kept && error <= least_growth * largest))
             return std::move(choice.kept);
+        kept = std::move(choice.kept);
+        largest = error;
         const std::vector<Texel> more = texels_around(worst_texels(texels, choice.error), height, width, round);
         texels.insert(texels.end(), more.begin(), more.end());
     }
