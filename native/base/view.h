@@ -1,6 +1,7 @@
 // Non-owning strided views of two-dimensional arrays; rows go up the plane unless said otherwise.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 
 namespace beamspread {
@@ -19,5 +20,17 @@ struct View2D {
     }
     T* row(std::size_t y) const { return data + static_cast<std::ptrdiff_t>(y) * row_stride; }
 };
+
+// Texels [x, x + count) of a row, one after the other.
+template <class T>
+void copy_row(const View2D<const T>& view, std::size_t y, std::size_t x, std::size_t count, T* values)
+{
+    const T* from = view.row(y) + static_cast<std::ptrdiff_t>(x) * view.column_stride;
+    if (view.column_stride == 1)
+        std::copy_n(from, count, values);
+    else
+        for (std::size_t i = 0; i < count; ++i)
+            values[i] = from[static_cast<std::ptrdiff_t>(i) * view.column_stride];
+}
 
 }  // namespace beamspread

@@ -119,48 +119,49 @@ void LightPyramid::add_texels(AngleCounts& angles, std::size_t y, std::size_t x)
 }
 
 // Squares [first, end) of a row. Every texel is read here: all that is needed of it is found at once.
-void LightPyramid::add_up_squares(std::size_t y, std::size_t first, std::size_t end, Level& level,
+void LightPyramid::add_up_squares(std::size_t row, std::size_t first, std::size_t end, Level& level,
                                   AngleCounts& angles) const
 {
     constexpr std::size_t side = std::size_t{1} << first_level;
+    static_assert(side == 4);
     using Columns = std::array<float, side * squares_at_once>;
     Columns irradiance;
     Columns half_tangents;
-    Columns power{};
-    Columns to_x{};
-    Columns to_y{};
-    Columns to_z{};
-    Columns texels{};
+    std::array<Columns, 5> sums{};  // of light, of its x, y, z, and of lit texels
+    auto& [power, to_x, to_y, to_z, texels] = sums;
     Columns least;
     Columns most{};
     least.fill(1.0f);
     const std::size_t texel = first * side;
     const std::size_t count = std::min(width(), end * side) - texel;
-    for (std::size_t row = y * side; row < std::min(height(), (y + 1) * side); ++row) {
-        for (std::size_t x = 0; x < count; ++x)
-            irradiance[x] = m_light.irradiance(row, texel + x);
+    for (std::size_t line = row * side; line < std::min(height(), (row + 1) * side); ++line) {
+        copy_row(m_light.irradiance, line, texel, count, irradiance.data());
         add_light(power.data(), to_x.data(), to_y.data(), to_z.data(), half_tangents.data(), irradiance.data(),
-                  m_light.directions.field + 3 * (row * width() + texel), count);
+                  m_light.directions.field + 3 * (line * width() + texel), count);
         add_lit(texels.data(), least.data(), most.data(), half_tangents.data(), irradiance.data(), count);
     }
     angles.include(*std::min_element(least.begin(), least.end()), *std::max_element(most.begin(), most.end()));
-    for (std::size_t x = first; x < end; ++x) {
-        const auto sum = [&](const Columns& values) {
-            const float* of = values.data() + (x - first) * side;
-            return (of[0] + of[1]) + (of[2] + of[3]);
-        };
-        SquareBeam beam{sum(power), Vec3f(sum(to_x), sum(to_y), sum(to_z))};
-        if (beam.irradiance == 0.0f)
+    using Squares = std::array<float, squares_at_once>;
+    std::array<Squares, 5> of_squares;
+    for (std::size_t i = 0; i < sums.size(); ++i)
+        add_fours(of_squares[i].data(), sums[i].data(), squares_at_once);
+    auto& [light, x, y, z, lit] = of_squares;
+    Squares length;
+    Squares half_tangent;
+    make_unit(x.data(), y.data(), z.data(), length.data(), half_tangent.data(), squares_at_once);
+    for (std::size_t i = 0; i < end - first; ++i) {
+        if (light[i] == 0.0f)
             continue;
-        if (normalize(beam, one_angle_length)) {
-            angles.add(half_tangent(beam.direction), static_cast<double>(beam.irradiance),
-                       static_cast<double>(sum(texels)));
-        } else {
-            add_texels(angles, y, x);
-            if (!normalize(beam, even_length))
-                beam = add_up<first_level>(m_light, y, x);
+        SquareBeam& beam = level.beams[row * level.width + first + i];
+        beam = {light[i], Vec3f(x[i], y[i], z[i])};
+        if (length[i] >= one_angle_length * light[i]) {
+            angles.add(static_cast<double>(half_tangent[i]), static_cast<double>(light[i]),
+                       static_cast<double>(lit[i]));
+            continue;
         }
-        level.beams[y * level.width + x] = beam;
+        add_texels(angles, row, first + i);
+        if (length[i] < even_length * light[i])
+            beam = add_up<first_level>(m_light, row, first + i);
     }
 }
 

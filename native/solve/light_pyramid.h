@@ -61,7 +61,7 @@ private:
     };
 
     void add_up_texels();
-    void add_up_squares(std::size_t y, std::size_t first, std::size_t end, Level& level, AngleCounts& angles) const;
+    void add_up_squares(std::size_t row, std::size_t first, std::size_t end, Level& level, AngleCounts& angles) const;
     void add_texels(AngleCounts& angles, std::size_t y, std::size_t x) const;  // of a square
 
     LightField m_light;

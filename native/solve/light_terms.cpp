@@ -10,6 +10,9 @@ namespace beamspread {
 
 namespace {
 
+// Texels of a row whose values stay in the cache from step to step.
+constexpr std::size_t texels_at_once = 512;
+
 // Every harmonic of a kernel whose beams travel toward azimuth beta.
 std::vector<KernelTerm> fixed_kernel(std::size_t profile, std::size_t harmonics, double beta)
 {
@@ -91,20 +94,22 @@ void TermRow::start(const LightTerms& terms, const RowSpan& span)
         const LightField& light = terms.changing[l];
         row.m = 0;
         row.function.reset();
-        row.u.resize(span.width);
-        for (auto* values : {&row.part, &row.cos_beta, &row.sin_beta, &row.cosine, &row.sine})
+        for (auto* values : {&row.part, &row.cos_beta, &row.sin_beta, &row.cosine, &row.sine, &row.u})
             values->resize(span.width);
         row.step.resize(span.width);
         const std::size_t steps = basis.functions.front().values.size() - 1;
         const double per_step =
             basis.last > basis.first ? static_cast<double>(steps) / (basis.last - basis.first) : 0.0;
-        for (std::size_t i = 0; i < span.width; ++i)
-            row.cosine[i] = light.irradiance(span.y, span.x + i);
-        std::fill(row.sine.begin(), row.sine.end(), 0.0f);
-        const float* directions = light.directions.field + 3 * (span.y * light.irradiance.width + span.x);
-        find_angles(directions, row.cosine.data(), row.cos_beta.data(), row.sin_beta.data(), row.u.data(), span.width);
-        find_steps(row.step.data(), row.part.data(), row.u.data(), static_cast<float>(basis.first),
-                   static_cast<float>(per_step), static_cast<std::uint32_t>(steps), span.width);
+        for (std::size_t x = 0; x < span.width; x += texels_at_once) {
+            const std::size_t count = std::min(texels_at_once, span.width - x);
+            copy_row(light.irradiance, span.y, span.x + x, count, row.cosine.data() + x);
+            std::fill_n(row.sine.data() + x, count, 0.0f);
+            const float* directions = light.directions.field + 3 * (span.y * light.irradiance.width + span.x + x);
+            find_angles(directions, row.cosine.data() + x, row.cos_beta.data() + x, row.sin_beta.data() + x,
+                        row.u.data() + x, count);
+            find_steps(row.step.data() + x, row.part.data() + x, row.u.data() + x, static_cast<float>(basis.first),
+                       static_cast<float>(per_step), static_cast<std::uint32_t>(steps), count);
+        }
     }
 }
 
@@ -112,21 +117,30 @@ void TermRow::evaluate(const LightTerms& terms, std::size_t t, float* values)
 {
     const LightTerm& term = terms.terms[t];
     if (term.fixed) {
-        const View2D<const float>& irradiance = terms.fixed[*term.fixed].irradiance;
-        for (std::size_t i = 0; i < m_span.width; ++i)
-            values[i] = irradiance(m_span.y, m_span.x + i);
+        copy_row(terms.fixed[*term.fixed].irradiance, m_span.y, m_span.x, m_span.width, values);
         return;
     }
     const LowRankBasis::AngleFunction& function = terms.basis.functions[term.function];
-    std::fill_n(values, m_span.width, 0.0f);
+    for (std::size_t x = 0; x < m_span.width; x += texels_at_once) {
+        const std::size_t count = std::min(texels_at_once, m_span.width - x);
+        for (Light& light : m_lights) {
+            float* cosine = light.cosine.data() + x;
+            float* sine = light.sine.data() + x;
+            float* u = light.u.data() + x;
+            for (std::size_t m = light.m; m < function.m; ++m)
+                turn(cosine, sine, light.cos_beta.data() + x, light.sin_beta.data() + x, count);
+            if (light.function != term.function)
+                look_up(u, function.values.data(), light.step.data() + x, light.part.data() + x, count);
+            const float* by_azimuth = term.phase == Phase::cosine ? cosine : sine;
+            if (&light == m_lights.data())
+                multiply(values + x, u, by_azimuth, count);
+            else
+                add_scaled_product(values + x, u, by_azimuth, 1.0f, count);
+        }
+    }
     for (Light& light : m_lights) {
-        for (; light.m < function.m; ++light.m)
-            turn(light.cosine.data(), light.sine.data(), light.cos_beta.data(), light.sin_beta.data(), m_span.width);
-        const std::vector<float>& by_azimuth = term.phase == Phase::cosine ? light.cosine : light.sine;
-        if (light.function != term.function)
-            look_up(light.u.data(), function.values.data(), light.step.data(), light.part.data(), m_span.width);
+        light.m = function.m;
         light.function = term.function;
-        add_scaled_product(values, light.u.data(), by_azimuth.data(), 1.0f, m_span.width);
     }
 }
 

@@ -3,7 +3,9 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
+#include "solve/problem.h"
 #include "solve/target_clones.h"
 
 namespace beamspread {
@@ -42,6 +44,12 @@ BEAMSPREAD_CLONES void scale(float* __restrict product, const float* values, flo
 {
     for (std::size_t i = 0; i < count; ++i)
         product[i] = factor * values[i];
+}
+
+BEAMSPREAD_CLONES void multiply(float* __restrict product, const float* a, const float* b, std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i)
+        product[i] = a[i] * b[i];
 }
 
 BEAMSPREAD_CLONES void add_scaled_product(float* __restrict sum, const float* a, const float* b, float factor,
@@ -113,6 +121,20 @@ BEAMSPREAD_CLONES void find_angles(const float* directions, const float* irradia
     }
 }
 
+BEAMSPREAD_CLONES bool are_beams(const float* irradiance, const float* directions, std::size_t count)
+{
+    std::uint32_t faults = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        const float x = directions[3 * i];
+        const float y = directions[3 * i + 1];
+        const float z = directions[3 * i + 2];
+        const bool finite = (irradiance[i] >= 0.0f) & (irradiance[i] <= std::numeric_limits<float>::max());
+        const bool unit = std::abs(x * x + y * y + z * z - 1.0f) < unit_tolerance;
+        faults |= (finite & ((irradiance[i] == 0.0f) | (unit & (z < 0.0f)))) ? 0u : 1u;
+    }
+    return faults == 0;
+}
+
 BEAMSPREAD_CLONES void add_light(float* __restrict sum, float* __restrict x, float* __restrict y, float* __restrict z,
                                  float* __restrict half_tangent, const float* irradiance, const float* directions,
                                  std::size_t count)
@@ -124,6 +146,25 @@ BEAMSPREAD_CLONES void add_light(float* __restrict sum, float* __restrict x, flo
         y[i] += irradiance[i] * v;
         z[i] += irradiance[i] * w;
         half_tangent[i] = std::sqrt(u * u + v * v) / (std::sqrt(u * u + v * v + w * w) - w);
+    }
+}
+
+BEAMSPREAD_CLONES void add_fours(float* __restrict sum, const float* values, std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i)
+        sum[i] = (values[4 * i] + values[4 * i + 1]) + (values[4 * i + 2] + values[4 * i + 3]);
+}
+
+BEAMSPREAD_CLONES void make_unit(float* __restrict x, float* __restrict y, float* __restrict z,
+                                 float* __restrict length, float* __restrict half_tangent, std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i) {
+        length[i] = std::sqrt(x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
+        const float per_length = 1.0f / (length[i] > 0.0f ? length[i] : 1.0f);
+        x[i] *= per_length;
+        y[i] *= per_length;
+        z[i] *= per_length;
+        half_tangent[i] = std::sqrt(x[i] * x[i] + y[i] * y[i]) / (1.0f - z[i]);
     }
 }
 

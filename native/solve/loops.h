@@ -1,4 +1,4 @@
-// Inner loops of the fft solver, see solve/target_clones.h.
+// Inner loops of the solvers, see solve/target_clones.h.
 #pragma once
 
 #include <cstddef>
@@ -22,6 +22,9 @@ void multiply_rows(float* product, const float* factors, const float* rows, std:
 // product[i] = factor * values[i]
 void scale(float* product, const float* values, float factor, std::size_t count);
 
+// product[i] = a[i] * b[i]
+void multiply(float* product, const float* a, const float* b, std::size_t count);
+
 // sum[i] += factor * a[i] * b[i]
 void add_scaled_product(float* sum, const float* a, const float* b, float factor, std::size_t count);
 
@@ -39,10 +42,19 @@ void turn(float* cosine, float* sine, const float* cos_beta, const float* sin_be
 void find_angles(const float* directions, const float* irradiance, float* cos_beta, float* sin_beta,
                  float* half_tangent, std::size_t count);
 
+// Whether these are beams: irradiance finite and >= 0, and where it is not zero a unit vector with z < 0.
+bool are_beams(const float* irradiance, const float* directions, std::size_t count);
+
 // Adds light that arrives along `directions`, (x, y, z) after (x, y, z): sum += irradiance, (x, y, z) += irradiance
 // times direction; sets tan(theta / 2). Where the irradiance is zero the direction may be anything.
 void add_light(float* sum, float* x, float* y, float* z, float* half_tangent, const float* irradiance,
                const float* directions, std::size_t count);
+
+// sum[i] = the sum of values[4 i] to values[4 i + 3]
+void add_fours(float* sum, const float* values, std::size_t count);
+
+// Makes unit vectors of (x, y, z), zero stays zero, and sets how long they were and tan(theta / 2).
+void make_unit(float* x, float* y, float* z, float* length, float* half_tangent, std::size_t count);
 
 // Counts lit texels and widens the ranges [first, last] of their tan(theta / 2).
 void add_lit(float* texels, float* first, float* last, const float* half_tangent, const float* irradiance,

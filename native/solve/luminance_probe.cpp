@@ -52,14 +52,14 @@ struct LuminanceProbe::Place {
 
     std::size_t y;
     std::size_t x;
-    std::vector<float> near;   // [medium][rank][m]: by light from up to `nearby_sources` away
-    std::vector<float> far;    // and from beyond
-    std::vector<float> light;  // of a texel by rank and harmonic
-    std::vector<float> cosine;
-    std::vector<float> sine;
+    AlignedVector<float> near;   // [medium][rank][m]: by light from up to `nearby_sources` away
+    AlignedVector<float> far;    // and from beyond
+    AlignedVector<float> light;  // of a texel by rank and harmonic
+    AlignedVector<float> cosine;
+    AlignedVector<float> sine;
     std::vector<double> nearby;
     std::array<FarBeams, 2> beams;  // to be added to `far`, to `near`
-    std::vector<float> means;       // [beam][m]: of cosines over squares
+    AlignedVector<float> means;       // [beam][m]: of cosines over squares
 };
 
 LuminanceProbe::LuminanceProbe(const std::vector<LightPyramid>& lights, const LowRankBasis& basis, double pitch_x,
@@ -219,7 +219,7 @@ void LuminanceProbe::add_near(Place& place, std::size_t y, std::size_t x) const
                         place.y < y ? -sine : sine, m_tables.harmonics());
         const float* kernels = m_tables.near(distance(place.y, y), distance(place.x, x));
         const float* by_angle = m_tables.at_angle(beam.direction);
-        for (const std::vector<float>* phase : {&place.cosine, &place.sine}) {
+        for (const AlignedVector<float>* phase : {&place.cosine, &place.sine}) {
             std::fill(place.light.begin(), place.light.end(), 0.0f);
             add_harmonics(place.light.data(), by_angle, phase->data(), m_tables.columns().data(),
                           m_tables.columns().size());

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/aligned.h"
 #include "base/vec.h"
 #include "solve/low_rank.h"
 #include "solve/probe_loops.h"
@@ -126,11 +127,11 @@ private:
     std::vector<std::size_t> m_places;
     float m_first;  // of the table of angles
     float m_per_step;
-    std::vector<float> m_by_angle;  // [step]
+    AlignedVector<float> m_by_angle;  // [step]
     float m_end_squared = 0.0f;  // of the table of radii
-    std::vector<float> m_by_radius;  // [step][medium]
-    std::vector<float> m_by_turn;    // [step][m]
-    std::vector<float> m_near;       // [dy][dx][phase][medium], of a quadrant
+    AlignedVector<float> m_by_radius;  // [step][medium]
+    AlignedVector<float> m_by_turn;    // [step][m]
+    AlignedVector<float> m_near;       // [dy][dx][phase][medium], of a quadrant
     std::vector<double> m_nearby;    // [medium][rank][y][x], summed from a corner
 };
 

@@ -1,12 +1,14 @@
 #include "solve/problem.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include "base/error.h"
 #include "base/threads.h"
 #include "ldf/library.h"
+#include "solve/loops.h"
 
 namespace beamspread {
 
@@ -17,10 +19,9 @@ bool is_irradiance(float irradiance)
     return irradiance >= 0.0f && irradiance <= std::numeric_limits<float>::max();
 }
 
-// Single-precision unit vectors are off by 1e-7; what is off by more was never normalized.
 bool is_unit(float x, float y, float z)
 {
-    return std::abs(x * x + y * y + z * z - 1.0f) < 2e-3f;
+    return std::abs(x * x + y * y + z * z - 1.0f) < unit_tolerance;
 }
 
 void check_direction(const Vec3& d)
@@ -33,15 +34,21 @@ void check_direction(const Vec3& d)
 
 bool is_row_fine(const View2D<const float>& irradiance, const float* directions, std::size_t y)
 {
-    bool fine = true;
-    for (std::size_t x = 0; x < irradiance.width; ++x)
-        fine &= is_irradiance(irradiance(y, x));
-    if (directions == nullptr)
+    if (directions == nullptr) {
+        bool fine = true;
+        for (std::size_t x = 0; x < irradiance.width; ++x)
+            fine &= is_irradiance(irradiance(y, x));
         return fine;
-    const float* d = directions + 3 * y * irradiance.width;
-    for (std::size_t x = 0; x < irradiance.width; ++x, d += 3)
-        fine &= irradiance(y, x) == 0.0f || (is_unit(d[0], d[1], d[2]) & (d[2] < 0.0f));
-    return fine;
+    }
+    constexpr std::size_t at_once = 256;
+    std::array<float, at_once> values;
+    for (std::size_t x = 0; x < irradiance.width; x += at_once) {
+        const std::size_t count = std::min(at_once, irradiance.width - x);
+        copy_row(irradiance, y, x, count, values.data());
+        if (!are_beams(values.data(), directions + 3 * (y * irradiance.width + x), count))
+            return false;
+    }
+    return true;
 }
 
 // Says what is wrong in a row that is not fine.
