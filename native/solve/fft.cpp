@@ -46,7 +46,12 @@ const FftTarget& fastest()
 
 std::size_t fast_even_size(std::size_t min_size)
 {
-    return 2 * fastest().good_size((min_size + 1) / 2);
+    // Lines whole pages apart share few lines of the cache, which takes a fifth to a third longer.
+    constexpr std::size_t page = 4096 / sizeof(Complex);
+    std::size_t half = fastest().good_size((min_size + 1) / 2);
+    while (2 * half % page == 0)
+        half = fastest().good_size(half + 1);
+    return 2 * half;
 }
 
 void real_to_half(const float* real, Complex* half, std::size_t count, std::size_t size)

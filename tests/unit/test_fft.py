@@ -75,10 +75,11 @@ def test_the_sets_are_those_of_the_processor():
     assert ("avx512" in SETS) == ({"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"} <= flags)
 
 
-@pytest.mark.parametrize("minimum", [1, 2, 97, 1009, 4099, 10007, 65537, 104729])
-def test_fast_sizes_have_small_factors(minimum):
+@pytest.mark.parametrize("minimum", [1, 2, 97, 512, 1009, 2048, 4099, 10007, 65537, 104729])
+def test_fast_sizes_have_small_factors_and_lines_are_not_whole_pages(minimum):
     size = native.fast_size(minimum)
     assert minimum <= size <= max(1.2 * minimum, minimum + 4)
+    assert size * np.dtype(np.complex64).itemsize % 4096 != 0
     rest = size
     for factor in (2, 3, 5, 7, 11):
         while rest % factor == 0:
