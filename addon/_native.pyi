@@ -389,7 +389,7 @@ def convolve(
     tolerance: float,
     threads: int,
     progress: typing.Any,
-    memory: int = 1073741824,
+    memory: int = 335544320,
     coarsening: int = 0,
 ) -> numpy.ndarray:
     """

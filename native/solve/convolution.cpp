@@ -36,8 +36,9 @@ Convolution::Convolution(const KernelSpectra& spectra, std::span<const LightTerm
       m_plane(spectra.plane()),
       m_terms(terms),
       m_media(media),
-      m_at_once(std::max<std::size_t>(budget / (m_plane.columns() * m_plane.rows() * sizeof(Complex)), 1))
+      m_at_once(spectra_at_once(m_plane, terms.size(), media, budget))
 {
+    m_at_once = {std::max<std::size_t>(m_at_once.terms, 1), std::max<std::size_t>(m_at_once.media, 1)};
     for (const LightTerm& term : terms) {
         m_kernels.emplace_back();
         for (const std::vector<KernelTerm>& kernel : term.kernels)
@@ -50,7 +51,7 @@ void Convolution::solve(const MakeLightRow& light, const StoreRow& store, Progre
     const std::vector<Span> across = tiles(m_plane.width, m_plane.tile_width);
     const std::vector<Span> up = tiles(m_plane.height, m_plane.tile_height);
     // Rows and columns of every round, and the rows of the results.
-    const std::size_t rounds = rounds_of(m_media, m_at_once) * rounds_of(m_terms.size(), m_at_once);
+    const std::size_t rounds = rounds_of(m_media, m_at_once.media) * rounds_of(m_terms.size(), m_at_once.terms);
     const double unit = work / ((static_cast<double>(rounds) + 1.0) * static_cast<double>(across.size() * up.size()));
     for (const Span& y : up)
         for (const Span& x : across)
@@ -75,13 +76,13 @@ Convolution::Span Convolution::with_halo(const Span& tile, std::size_t halo, std
 void Convolution::solve_tile(const Tile& tile)
 {
     const std::size_t terms = m_terms.size();
-    ColumnSpectra light(std::min(terms, m_at_once), m_plane.columns(), tile.window_y.count);
-    for (std::size_t first = 0; first < m_media; first += m_at_once) {
-        const std::size_t last = std::min(m_media, first + m_at_once);
+    ColumnSpectra light(m_at_once.terms, m_plane.columns(), tile.window_y.count);
+    for (std::size_t first = 0; first < m_media; first += m_at_once.media) {
+        const std::size_t last = std::min(m_media, first + m_at_once.media);
         ColumnSpectra results(last - first, m_plane.columns(), tile.y.count);
-        for (std::size_t t = 0; t < terms; t += m_at_once) {
-            const std::size_t count = std::min(m_at_once, terms - t);
-            if (first == 0 || terms > m_at_once)
+        for (std::size_t t = 0; t < terms; t += m_at_once.terms) {
+            const std::size_t count = std::min(m_at_once.terms, terms - t);
+            if (first == 0 || terms > m_at_once.terms)
                 transform_light(tile, t, count, light);
             convolve_columns(tile, t, count, light, first, results);
         }

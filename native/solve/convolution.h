@@ -38,8 +38,8 @@ using MakeLightRow = std::function<std::unique_ptr<LightRow>()>;
 // be changed.
 using StoreRow = std::function<void(std::size_t medium, const RowSpan& span, float* values, double factor)>;
 
-// Solves the plane of `spectra` tile by tile, never with more than `budget` bytes for the spectra of the light and as
-// many for those of the results, unless one does not fit.
+// Solves the plane of `spectra` tile by tile, never with more than `budget` bytes for the spectra of the light and of
+// the results, unless one of each does not fit.
 class Convolution {
 public:
     Convolution(const KernelSpectra& spectra, std::span<const LightTerm> terms, std::size_t media, std::size_t budget);
@@ -93,7 +93,7 @@ private:
     std::span<const LightTerm> m_terms;
     std::vector<std::vector<std::vector<KernelSpectra::Part>>> m_kernels;  // [term][medium]
     std::size_t m_media;
-    std::size_t m_at_once;  // spectra of terms, and of results
+    SpectraAtOnce m_at_once;
     Pool<RowScratch> m_row_scratch;
     Pool<ColumnScratch> m_column_scratch;
 };

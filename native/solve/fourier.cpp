@@ -75,10 +75,9 @@ public:
                               [&](const KernelDecomposition& kernels, const std::vector<LightPyramid>& lights) {
                                   return choose_terms(kernels, lights, plane.pitch_x, plane.pitch_y, plane.tolerance);
                               })),
-          m_levels(
-              choose_levels(plane.width, plane.height, plane.pitch_x, plane.pitch_y, m_terms.profiles,
-                            {centre_deviation, plane.memory / 2, std::min(m_terms.terms.size(), terms_per_batch / 2),
-                             group.media.size(), plane.coarsening}))
+          m_levels(choose_levels(
+              plane.width, plane.height, plane.pitch_x, plane.pitch_y, m_terms.profiles,
+              {centre_deviation, plane.memory, m_terms.terms.size(), group.media.size(), plane.coarsening}))
     {
     }
 
@@ -99,7 +98,7 @@ public:
             coarse.emplace(solve_coarse(*m_levels.coarse, 1.0 - share));
         }
         const KernelSpectra spectra(m_levels.texels, m_terms.profiles, m_levels.outside_centre);
-        Convolution convolution(spectra, m_terms.terms, m_group.media.size(), m_problem.memory / 2);
+        Convolution convolution(spectra, m_terms.terms, m_group.media.size(), m_problem.memory);
         const auto store = [&](std::size_t medium, const RowSpan& span, float* values, double factor) {
             if (coarse) {
                 const auto lease = m_scratch.lend();
@@ -140,7 +139,7 @@ private:
             const std::size_t count = std::min(at_once, terms - first);
             const double part = work * static_cast<double>(count) / static_cast<double>(terms);
             const auto light = grid.spread(texel_rows(), first, count, m_progress, 0.5 * part);
-            Convolution convolution(spectra, std::span(m_terms.terms).subspan(first, count), media, budget);
+            Convolution convolution(spectra, std::span(m_terms.terms).subspan(first, count), media, 2 * budget);
             const auto rows = [&] { return std::make_unique<NodeRow>(light, plane.width); };
             convolution.solve(rows, add, m_progress, 0.5 * part);
         }

@@ -50,10 +50,27 @@ double widened(double deviation, const std::vector<ScaledProfile>& profiles, dou
 
 struct Tiling {
     PaddedPlane plane;
-    double cost = 0.0;  // padded nodes of all tiles; infinite where no tiles fit into the budget
+    double cost = 0.0;  // nodes transformed; infinite where no tiles fit into the budget
 };
 
-Tiling with_tiles(PaddedPlane plane, std::size_t count)
+// What terms that are in memory at once cost together, beside a transform along one axis each: the angles of the light
+// are found, and turned to their harmonics.
+constexpr double angles_cost = 4.0;
+
+// How often a node of a tile is transformed, along x and along y half each, by `Convolution`: the light again for every
+// part of the media, the results for every part of the terms.
+double transforms(const LevelChoice& choice, const SpectraAtOnce& at_once)
+{
+    const auto rounds = [](std::size_t count, std::size_t at) { return static_cast<double>((count + at - 1) / at); };
+    const auto terms = static_cast<double>(choice.terms);
+    const auto media = static_cast<double>(choice.media);
+    const double of_terms = rounds(choice.terms, at_once.terms);
+    const double of_media = rounds(choice.media, at_once.media);
+    const double light_along_x = (terms + angles_cost * of_terms) * (of_terms > 1.0 ? of_media : 1.0);
+    return 0.5 * (light_along_x + media + terms * of_media + media * of_terms);
+}
+
+Tiling with_tiles(PaddedPlane plane, std::size_t count, const LevelChoice& choice)
 {
     // What wraps around falls into the halo, and on the whole plane beyond its end.
     const auto pad = [&](std::size_t size, std::size_t halo, std::size_t& tile) {
@@ -62,24 +79,21 @@ Tiling with_tiles(PaddedPlane plane, std::size_t count)
     };
     plane.padded_width = pad(plane.width, plane.halo_x, plane.tile_width);
     plane.padded_height = pad(plane.height, plane.halo_y, plane.tile_height);
-    return {plane, static_cast<double>(count * count * plane.padded_width * plane.padded_height)};
+    const SpectraAtOnce at_once = spectra_at_once(plane, choice.terms, choice.media, choice.budget);
+    const double nodes = static_cast<double>(count * count * plane.padded_width * plane.padded_height);
+    return {plane, at_once.terms > 0 ? nodes * transforms(choice, at_once) : std::numeric_limits<double>::infinity()};
 }
 
-// As few tiles as keep the spectra of `terms` at once within the budget, if that costs little, else of one.
 Tiling choose_tiles(const PaddedPlane& plane, const LevelChoice& choice)
 {
     constexpr std::size_t most_tiles = 16;  // along a side
-    constexpr double most_overlap = 1.25;   // that is worth having several light terms in memory at once
-    const Tiling whole = with_tiles(plane, 1);
-    for (const std::size_t allowed : {choice.budget / std::max<std::size_t>(choice.terms, 1), choice.budget}) {
-        for (std::size_t count = 1; count <= most_tiles; ++count) {
-            const Tiling tiling = with_tiles(plane, count);
-            if (tiling.plane.rows() * tiling.plane.columns() * sizeof(Complex) <= allowed &&
-                (allowed == choice.budget || tiling.cost <= most_overlap * whole.cost))
-                return tiling;
-        }
+    Tiling best = with_tiles(plane, 1, choice);
+    for (std::size_t count = 2; count <= most_tiles; ++count) {
+        const Tiling tiling = with_tiles(plane, count, choice);
+        if (tiling.cost < best.cost)
+            best = tiling;
     }
-    return {whole.plane, std::numeric_limits<double>::infinity()};
+    return best;
 }
 
 std::size_t texels_within(double length, double pitch)
@@ -123,6 +137,15 @@ Level coarse_level(const PaddedPlane& fine, const RadialWindow& ring, std::size_
 }
 
 }  // namespace
+
+SpectraAtOnce spectra_at_once(const PaddedPlane& plane, std::size_t terms, std::size_t media, std::size_t budget)
+{
+    const std::size_t all = budget / (plane.rows() * plane.columns() * sizeof(Complex));
+    if (all < 2)
+        return {};
+    const std::size_t results = std::min(media, std::max(all / 2, all - std::min(all, terms)));
+    return {std::min(terms, all - results), results};
+}
 
 Levels choose_levels(std::size_t width, std::size_t height, double pitch_x, double pitch_y,
                      const std::vector<ScaledProfile>& profiles, const LevelChoice& choice)
@@ -168,11 +191,10 @@ Levels choose_levels(std::size_t width, std::size_t height, double pitch_x, doub
         set_halo(fine);
         const Tiling tiling = choose_tiles(fine.plane, choice);
         Level coarse = coarse_level(one.plane, *one.ring, coarsening, deviation);
-        const Tiling coarse_tiling = with_tiles(coarse.plane, 1);
+        const Tiling coarse_tiling = with_tiles(coarse.plane, 1, choice);
         const PaddedPlane& nodes = coarse_tiling.plane;
         // The results of all media are kept; so are the texels' spectra, of which there are several in any case.
-        const bool fits = nodes.rows() * nodes.columns() * sizeof(Complex) <= choice.budget &&
-                          nodes.width * nodes.height * sizeof(float) * choice.media <= choice.budget / 4;
+        const bool fits = nodes.width * nodes.height * sizeof(float) * choice.media <= choice.budget / 6;
         const double cost = tiling.cost + coarse_tiling.cost;
         if (choice.coarsening == coarsening || (fits && cost < 0.9 * best.cost)) {
             best.cost = cost;

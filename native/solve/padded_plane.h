@@ -35,6 +35,16 @@ struct PaddedPlane {
     std::size_t rows() const { return std::min(height, tile_height + 2 * halo_y); }
 };
 
+// Half-transformed tiles in memory at once.
+struct SpectraAtOnce {
+    std::size_t terms = 0;  // of the light
+    std::size_t media = 0;  // results
+};
+
+// Results take no more than half of the budget, bytes, unless the light needs less, which has what is left; nothing if
+// not one of each fits.
+SpectraAtOnce spectra_at_once(const PaddedPlane& plane, std::size_t terms, std::size_t media, std::size_t budget);
+
 // The texels around the pole of a kernel, at offsets up to (x, y), that are integrated exactly.
 struct KernelCentre {
     std::size_t x = 0;
@@ -61,14 +71,14 @@ struct LevelChoice {
     // Width of the border of the kernels' centres, texels. The wider, the less detail beyond what texels resolve is
     // left outside, and the longer the sums.
     double centre_deviation = 3.0;
-    std::size_t budget = 0;      // bytes, for the spectra of the light and for those of the results each
-    std::size_t terms = 1;       // light terms that are worth having in memory at once
-    std::size_t media = 1;
+    std::size_t budget = 0;      // bytes, for spectra
+    std::size_t terms = 1;       // of the light
+    std::size_t media = 1;       // results
     std::size_t coarsening = 0;  // texels from node to node of the coarse grid; 1: no such grid; 0: what costs least
 };
 
-// The padding is the least where nothing that the kernels hold within reach comes back on the other side; tiles are as
-// few as keep rows() x columns() frequencies within the budget, if any do.
+// The padding is the least where nothing that the kernels hold within reach comes back on the other side; tiles are what
+// costs least within the budget, if any are.
 Levels choose_levels(std::size_t width, std::size_t height, double pitch_x, double pitch_y,
                      const std::vector<ScaledProfile>& profiles, const LevelChoice& choice);
 

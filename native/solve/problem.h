@@ -38,7 +38,7 @@ struct Problem {
     std::vector<Channel> channels;
     double tolerance = 1e-3;  // relative error of the luminance that an approximating solver may make
     int threads = 0;
-    std::size_t memory = std::size_t{1} << 30;  // bytes that spectra may take at once; beyond, in tiles
+    std::size_t memory = std::size_t{5} << 26;  // bytes that spectra may take at once; beyond, in tiles
     std::size_t coarsening = 0;  // of the grid that light spreads far on, texels; 1: none, 0: what costs least
 };
 
