@@ -61,7 +61,10 @@ constexpr double angles_cost = 4.0;
 // part of the media, the results for every part of the terms.
 double transforms(const LevelChoice& choice, const SpectraAtOnce& at_once)
 {
-    const auto rounds = [](std::size_t count, std::size_t at) { return static_cast<double>((count + at - 1) / at); };
+    const auto rounds = [](std::size_t count, std::size_t at) {
+        const std::size_t parts = (count + at - 1) / at;
+        return static_cast<double>(parts);
+    };
     const auto terms = static_cast<double>(choice.terms);
     const auto media = static_cast<double>(choice.media);
     const double of_terms = rounds(choice.terms, at_once.terms);
