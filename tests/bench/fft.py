@@ -167,9 +167,13 @@ def scipy_sun(size, library):
 
 
 def lamps(size, libraries):
-    """Errors against nearly all terms of the basis; the worst texel's relative to the 17 x 17 around."""
-    light = lamp(size)
-    two = [light, lamp(size, 0.2, -0.1)]  # the second is seen at more grazing angles, and may need more terms
+    """Errors against nearly all terms of the basis; the worst texel's relative to the 17 x 17 around.
+
+    Two lamps, each the mirror image of the other, need the same terms; beside one in the middle, whose light is less
+    grazing at the borders, each of them may need more.
+    """
+    light, aside, mirrored = lamp(size), lamp(size, 0.2, -0.1), lamp(size, -0.2, 0.1)
+    sets = {"middle": [light], "aside": [aside], "mirrored": [aside, mirrored], "both": [light, aside]}
     options = {"tolerance": 5e-3}
     print(f"\npoint lamp at a tenth of the width, {size} x {size} RGB, tolerance {options['tolerance']}")
     for ior, albedo in ((1.0, 0.9), (1.4, 0.99)):
@@ -179,16 +183,17 @@ def lamps(size, libraries):
             error = np.abs(beamspread.convolve(*light, *rest, **options) - exact)
             worst = (error / uniform_filter(exact, (17, 17, 0), mode="nearest")).max()
             unit = transform_seconds(size)
-            first, second, both = (math.inf,) * 3
+            cost = dict.fromkeys(sets, math.inf)
             for _ in range(5):  # turn by turn, for the same luck
-                first = min(first, seconds(1, beamspread.convolve, *light, *rest, **options))
-                second = min(second, seconds(1, beamspread.convolve, *two[1], *rest, **options))
-                both = min(both, seconds(1, beamspread.convolve_lights, two, *rest, **options))
+                for name, lights in sets.items():
+                    cost[name] = min(cost[name], seconds(1, beamspread.convolve_lights, lights, *rest, **options))
+            one = cost["middle"]
             print(
-                f"  ior {ior}, albedo {albedo}, paths {paths}: {first:6.2f} s = {first / unit:5.1f} T, "
-                f"L1 {error.sum() / exact.sum():.1e}, worst {worst:.1e}; a second lamp alone costs "
-                f"{second / first:.2f} times the first, both {both / first:.2f}, "
-                f"which is {both / second:.2f} times the second"
+                f"  ior {ior}, albedo {albedo}, paths {paths}: {one:6.2f} s = {one / unit:5.1f} T, "
+                f"L1 {error.sum() / exact.sum():.1e}, worst {worst:.1e}\n"
+                f"    a lamp aside costs {cost['aside'] / one:.2f} times that, it and its mirror image "
+                f"{cost['mirrored'] / cost['aside']:.2f} times one of them, it and the lamp in the middle "
+                f"{cost['both'] / cost['aside']:.2f} times the one, {cost['both'] / one:.2f} times the other"
             )
 
 
