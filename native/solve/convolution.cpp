@@ -13,6 +13,9 @@ namespace {
 constexpr std::size_t rows_per_item = 16;
 constexpr std::size_t columns_per_item = 8;
 
+// Light terms whose columns are in the cache at once; a multiple of what the transforms do side by side.
+constexpr std::size_t terms_per_batch = 16;
+
 std::size_t rounds_of(std::size_t count, std::size_t at_once)
 {
     return (count + at_once - 1) / at_once;

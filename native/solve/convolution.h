@@ -98,7 +98,4 @@ private:
     Pool<ColumnScratch> m_column_scratch;
 };
 
-// Light terms whose columns are in the cache at once; a multiple of what the transforms do side by side.
-inline constexpr std::size_t terms_per_batch = 16;
-
 }  // namespace beamspread

@@ -133,13 +133,15 @@ private:
                        span.width);
         };
         const std::size_t terms = m_terms.terms.size();
-        const std::size_t budget = m_problem.memory / 4;
-        const std::size_t at_once = std::clamp<std::size_t>(budget / (grid.nodes() * sizeof(float)), 1, terms);
+        // Beside the light on the nodes its spectra, which are as large, and those of the results.
+        const std::size_t for_light = m_problem.memory / 4;
+        const std::size_t for_spectra = m_problem.memory / 2;
+        const std::size_t at_once = std::clamp<std::size_t>(for_light / (grid.nodes() * sizeof(float)), 1, terms);
         for (std::size_t first = 0; first < terms; first += at_once) {
             const std::size_t count = std::min(at_once, terms - first);
             const double part = work * static_cast<double>(count) / static_cast<double>(terms);
             const auto light = grid.spread(texel_rows(), first, count, m_progress, 0.5 * part);
-            Convolution convolution(spectra, std::span(m_terms.terms).subspan(first, count), media, 2 * budget);
+            Convolution convolution(spectra, std::span(m_terms.terms).subspan(first, count), media, for_spectra);
             const auto rows = [&] { return std::make_unique<NodeRow>(light, plane.width); };
             convolution.solve(rows, add, m_progress, 0.5 * part);
         }

@@ -5,7 +5,6 @@
 #include <cstring>
 #include <limits>
 
-#include "solve/problem.h"
 #include "solve/target_clones.h"
 
 namespace beamspread {

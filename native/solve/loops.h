@@ -42,6 +42,10 @@ void turn(float* cosine, float* sine, const float* cos_beta, const float* sin_be
 void find_angles(const float* directions, const float* irradiance, float* cos_beta, float* sin_beta,
                  float* half_tangent, std::size_t count);
 
+// By how much the squared length of a direction may differ from 1: single-precision unit vectors are off by 1e-7; what
+// is off by more was never normalized.
+inline constexpr float unit_tolerance = 2e-3f;
+
 // Whether these are beams: irradiance finite and >= 0, and where it is not zero a unit vector with z < 0.
 bool are_beams(const float* irradiance, const float* directions, std::size_t count);
 

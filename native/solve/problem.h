@@ -25,10 +25,6 @@ struct Directions {
     const float* field = nullptr;  // (height, width, 3) row by row; null: uniform
 };
 
-// By how much the squared length of a direction may differ from 1: single-precision unit vectors are off by 1e-7; what
-// is off by more was never normalized.
-inline constexpr float unit_tolerance = 2e-3f;
-
 struct Problem {
     std::size_t width = 0;
     std::size_t height = 0;

@@ -1,4 +1,4 @@
-"""The fft solver, counted in padded real transforms of twice the plane's size (T), beside what else there is.
+"""The fft solver, counted in padded real transforms of about twice the plane's size (T), beside what else there is.
 
 PYTHONPATH=build/stage build/venv/bin/python tests/bench/fft.py [--quick]
 
@@ -34,7 +34,7 @@ def seconds(runs, function, *arguments, **options):
 
 
 def padded_size(size):
-    """Of twice the size, or what is faster: lines a power of two apart share few lines of the cache."""
+    """Of twice the size, or what is faster: lines whole pages apart share few lines of the cache."""
     return _native.fast_size(2 * size)
 
 

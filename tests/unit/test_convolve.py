@@ -316,6 +316,29 @@ def test_bad_arguments_are_named(library, change, message):
         convolve(**{**good, **change})
 
 
+@pytest.mark.parametrize("x", [0, 255, 300, 698])
+@pytest.mark.parametrize(
+    ("irradiance", "direction", "message"),
+    [
+        (np.nan, DOWN, "'irradiance' is nan"),
+        (np.inf, DOWN, "'irradiance' is inf"),
+        (-1e-9, DOWN, "'irradiance' is -1e-09"),
+        (1e-9, (0, 0, 1), "'direction' is with z = 1"),
+        (1e-9, (0, 0.1, -1), "'direction' is of length 1.00"),
+        (1e-9, (np.nan, 0, -1), "'direction' is of length -?nan"),
+    ],
+)
+def test_one_bad_texel_of_many_is_found(library, x, irradiance, direction, message):
+    beams = np.ones((2, 699, 3), np.float32)
+    directions = lamp_directions(2, 699)
+    beams[1, x, 2] = irradiance
+    directions[1, x] = direction
+    with pytest.raises(ValueError, match=message):
+        convolve(beams, directions, library, 0.5, 1.0, 1.0)
+    beams[1, x] = 0  # the direction of no light may be anything
+    assert np.isfinite(convolve(beams, directions, library, 0.5, 1.0, 1.0)).all()
+
+
 def test_an_angle_outside_the_library(library):
     narrow = simulate(Medium(0.8), [0, 30], 500)
     with pytest.raises(ValueError, match="'angle' is 4"):
