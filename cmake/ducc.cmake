@@ -9,7 +9,7 @@ set(ducc_src ${DUCC_SOURCE_DIR}/src)
 # (--force-group-allocation) and every symbol but the one that it is found by is local, which unique ones could not be.
 set(ducc_objects)
 function(ducc_target name)
-  add_library(ducc_${name} OBJECT ${CMAKE_SOURCE_DIR}/native/solve/targets/fft.cpp ${ducc_src}/ducc0/infra/mav.cc
+  add_library(ducc_${name} OBJECT ${CMAKE_SOURCE_DIR}/native/fft/targets/fft.cpp ${ducc_src}/ducc0/infra/mav.cc
               ${ducc_src}/ducc0/infra/string_utils.cc ${ducc_src}/ducc0/infra/threading.cc)
   target_include_directories(ducc_${name} PRIVATE ${CMAKE_SOURCE_DIR}/native)
   # Threads are ours (base/threads.h): a guest in another process brings no pool of its own. DUCC's own switch for

@@ -17,4 +17,10 @@ void validate(const Medium& medium)
         reject("thickness", medium.thickness, "thickness > 0 mean free paths, inf for a half-space");
 }
 
+void check_albedo(double albedo)
+{
+    if (!(albedo >= 0.0 && albedo < 1.0))
+        reject("albedo", albedo, "0 <= albedo < 1");
+}
+
 }  // namespace beamspread

@@ -8,7 +8,7 @@
 #include <pybind11/stl/filesystem.h>
 
 #include "base/progress.h"
-#include "transport/tally.h"
+#include "transport/tally/tally.h"
 
 namespace beamspread {
 

@@ -1,4 +1,4 @@
-#include "solve/fft.h"
+#include "fft/fft.h"
 
 #include "base/error.h"
 #include "python/casters.h"

@@ -2,9 +2,9 @@
 #include <filesystem>
 #include <memory>
 
-#include "ldf/calibration.h"
-#include "ldf/ldf_image.h"
-#include "ldf/library.h"
+#include "ldf/library/calibration.h"
+#include "ldf/library/ldf_image.h"
+#include "ldf/library/library.h"
 #include "python/casters.h"
 
 namespace beamspread {

@@ -1,11 +1,11 @@
 // Python names of angular space and interpolation: AngularSpace, interpolate, SampleSource.
-#include "ldf/interpolate.h"
+#include "ldf/samples/interpolate.h"
 
 #include <memory>
 
 #include "base/error.h"
-#include "ldf/angular_space.h"
-#include "ldf/sample_source.h"
+#include "ldf/samples/angular_space.h"
+#include "ldf/samples/sample_source.h"
 #include "python/casters.h"
 
 namespace beamspread {

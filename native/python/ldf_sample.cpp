@@ -1,13 +1,13 @@
 // Python names of LdfSample.
-#include "ldf/sample.h"
+#include "ldf/samples/sample.h"
 
 #include <algorithm>
 #include <filesystem>
 #include <memory>
 
 #include "base/error.h"
-#include "ldf/brightest.h"
-#include "ldf/ldf_image.h"
+#include "ldf/library/ldf_image.h"
+#include "ldf/samples/brightest.h"
 #include "python/casters.h"
 
 namespace beamspread {

@@ -7,8 +7,8 @@
 
 #include "base/error.h"
 #include "python/casters.h"
-#include "solve/mask_pyramid.h"
-#include "solve/problem.h"
+#include "solve/adaptive/mask_pyramid.h"
+#include "solve/problem/problem.h"
 
 namespace beamspread {
 

@@ -1,8 +1,8 @@
 #include <algorithm>
 
-#include "ldf/library.h"
+#include "ldf/library/library.h"
 #include "python/casters.h"
-#include "transport/adding_doubling.h"
+#include "transport/exact/adding_doubling.h"
 
 namespace beamspread {
 

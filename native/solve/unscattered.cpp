@@ -8,9 +8,10 @@
 
 #include "base/constants.h"
 #include "base/threads.h"
-#include "solve/beam_basis.h"
-#include "solve/loops.h"
-#include "solve/problem.h"
+#include "simd/loops.h"
+#include "solve/problem/beam_loops.h"
+#include "solve/problem/directions.h"
+#include "solve/problem/problem.h"
 
 namespace beamspread {
 

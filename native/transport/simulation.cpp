@@ -12,7 +12,7 @@
 #include "base/error.h"
 #include "base/threads.h"
 #include "medium/fresnel.h"
-#include "transport/harmonic_choice.h"
+#include "transport/tally/harmonic_choice.h"
 
 namespace beamspread {
 
@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::uint64_t enough_photons_per_job = 200'000;
 
-// Consecutive ones, see transport/map_scatter.h.
+// Consecutive ones, see transport/tally/map_scatter.h.
 constexpr std::size_t batches_per_group = batch_count / group_count;
 
 SideTallies empty_tallies(const Medium& medium, double theta_inside)

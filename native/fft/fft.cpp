@@ -1,0 +1,111 @@
+#include "fft/fft.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "base/error.h"
+#include "base/threads.h"
+
+namespace beamspread {
+
+namespace {
+
+struct Named {
+    const char* name;
+    const FftTarget* target;
+};
+
+// Fastest first.
+const std::vector<Named>& targets()
+{
+    static const std::vector<Named> runnable = [] {
+        std::vector<Named> found;
+#ifdef BEAMSPREAD_FFT_TARGETS
+        __builtin_cpu_init();
+        // What the compiler's levels x86-64-v4 and -v3 stand for.
+        if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+            __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
+            __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2"))
+            found.push_back({"avx512", beamspread_fft_avx512()});
+        if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2"))
+            found.push_back({"avx2", beamspread_fft_avx2()});
+#endif
+        found.push_back({"baseline", beamspread_fft_baseline()});
+        return found;
+    }();
+    return runnable;
+}
+
+const FftTarget& fastest()
+{
+    static const FftTarget& target = *targets().front().target;
+    return target;
+}
+
+}  // namespace
+
+std::size_t fast_even_size(std::size_t min_size)
+{
+    // Lines whole pages apart share few lines of the cache, which takes a fifth to a third longer.
+    constexpr std::size_t page = 4096 / sizeof(Complex);
+    std::size_t half = fastest().good_size((min_size + 1) / 2);
+    while (2 * half % page == 0)
+        half = fastest().good_size(half + 1);
+    return 2 * half;
+}
+
+void real_to_half(const float* real, Complex* half, std::size_t count, std::size_t size)
+{
+    fastest().real_to_half(real, half, count, size);
+}
+
+void half_to_real(const Complex* half, float* real, std::size_t count, std::size_t size)
+{
+    fastest().half_to_real(half, real, count, size);
+}
+
+void complex_in_place(Complex* lines, std::size_t count, std::size_t size, bool forward)
+{
+    fastest().complex_in_place(lines, count, size, forward);
+}
+
+void real_to_half_2d(const FftTarget& target, const float* real, Complex* half, std::size_t height, std::size_t width,
+                     int threads)
+{
+    const std::size_t columns = width / 2 + 1;
+    // Some hundred kilobytes, so that an item stays in the cache.
+    constexpr std::size_t lines = 16;
+    with_threads(threads, [&] {
+        parallel_for((height + lines - 1) / lines, [&](std::size_t item) {
+            const std::size_t first = item * lines;
+            const std::size_t count = std::min(lines, height - first);
+            target.real_to_half(real + first * width, half + first * columns, count, width);
+        });
+        parallel_for((columns + lines - 1) / lines, [&](std::size_t item) {
+            const std::size_t first = item * lines;
+            const std::size_t count = std::min(lines, columns - first);
+            target.complex_columns(half + first, count, height, columns);
+        });
+    });
+}
+
+std::vector<std::string> fft_instruction_sets()
+{
+    std::vector<std::string> names;
+    for (const Named& entry : targets())
+        names.emplace_back(entry.name);
+    return names;
+}
+
+const FftTarget& fft_target(const std::string& instruction_set)
+{
+    std::string allowed;
+    for (const Named& entry : targets()) {
+        if (instruction_set == entry.name)
+            return *entry.target;
+        allowed += (allowed.empty() ? "'" : ", '") + std::string(entry.name) + "'";
+    }
+    reject("instruction_set", "'" + instruction_set + "'", allowed + " on this processor");
+}
+
+}  // namespace beamspread

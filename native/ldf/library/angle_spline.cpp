@@ -1,0 +1,122 @@
+#include "ldf/library/angle_spline.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace beamspread {
+
+namespace {
+
+// Solves A X = B in place (X replaces B) by Gaussian elimination with row pivoting; both n x n.
+void solve_dense(std::vector<double>& a, std::vector<double>& b, std::size_t n)
+{
+    for (std::size_t column = 0; column < n; ++column) {
+        std::size_t pivot = column;
+        for (std::size_t row = column + 1; row < n; ++row)
+            if (std::abs(a[row * n + column]) > std::abs(a[pivot * n + column]))
+                pivot = row;
+        for (std::size_t k = 0; k < n; ++k) {
+            std::swap(a[pivot * n + k], a[column * n + k]);
+            std::swap(b[pivot * n + k], b[column * n + k]);
+        }
+        for (std::size_t row = 0; row < n; ++row) {
+            if (row == column)
+                continue;
+            const double factor = a[row * n + column] / a[column * n + column];
+            for (std::size_t k = 0; k < n; ++k) {
+                a[row * n + k] -= factor * a[column * n + k];
+                b[row * n + k] -= factor * b[column * n + k];
+            }
+        }
+    }
+    for (std::size_t row = 0; row < n; ++row)
+        for (std::size_t k = 0; k < n; ++k)
+            b[row * n + k] /= a[row * n + row];
+}
+
+// Second derivatives at the points of the splines that are 1 at one point and 0 at the others.
+std::vector<double> cardinal_second_derivatives(const std::vector<double>& x)
+{
+    const std::size_t n = x.size();
+    std::vector<double> a(n * n, 0.0);
+    std::vector<double> b(n * n, 0.0);
+    for (std::size_t i = 1; i + 1 < n; ++i) {
+        const double h0 = x[i] - x[i - 1];
+        const double h1 = x[i + 1] - x[i];
+        a[i * n + i - 1] = h0;
+        a[i * n + i] = 2.0 * (h0 + h1);
+        a[i * n + i + 1] = h1;
+        b[i * n + i - 1] = 6.0 / h0;
+        b[i * n + i] = -6.0 / h0 - 6.0 / h1;
+        b[i * n + i + 1] = 6.0 / h1;
+    }
+    // Not-a-knot: the third derivative does not jump at the last points but one.
+    const auto end_condition = [&](std::size_t row, std::size_t i) {
+        const double h0 = x[i] - x[i - 1];
+        const double h1 = x[i + 1] - x[i];
+        a[row * n + i - 1] = h1;
+        a[row * n + i] = -(h0 + h1);
+        a[row * n + i + 1] = h0;
+    };
+    end_condition(0, 1);
+    end_condition(n - 1, n - 2);
+    solve_dense(a, b, n);
+    return b;
+}
+
+}  // namespace
+
+AngleSpline::AngleSpline(std::vector<double> nodes) : m_nodes(std::move(nodes))
+{
+    for (auto node = m_nodes.rbegin(); node != m_nodes.rend(); ++node)
+        if (*node > 0.0)
+            m_points.push_back(-*node);
+    m_points.insert(m_points.end(), m_nodes.begin(), m_nodes.end());
+    if (m_points.size() > 4)
+        m_second_derivative = cardinal_second_derivatives(m_points);
+}
+
+std::vector<double> AngleSpline::weights(double x, Parity parity) const
+{
+    const std::size_t n = m_points.size();
+    std::vector<double> point_weight(n, 0.0);
+    if (n <= 4) {
+        // Lagrange's polynomial is the spline of so few points.
+        for (std::size_t i = 0; i < n; ++i) {
+            point_weight[i] = 1.0;
+            for (std::size_t k = 0; k < n; ++k)
+                if (k != i)
+                    point_weight[i] *= (x - m_points[k]) / (m_points[i] - m_points[k]);
+        }
+    } else {
+        const auto above = std::upper_bound(m_points.begin() + 1, m_points.end() - 1, x);
+        const auto hi = static_cast<std::size_t>(above - m_points.begin());
+        const std::size_t lo = hi - 1;
+        const double h = m_points[hi] - m_points[lo];
+        const double a = (m_points[hi] - x) / h;
+        const double b = 1.0 - a;
+        point_weight[lo] += a;
+        point_weight[hi] += b;
+        const double da = (a * a * a - a) * h * h / 6.0;
+        const double db = (b * b * b - b) * h * h / 6.0;
+        for (std::size_t k = 0; k < n; ++k)
+            point_weight[k] += da * m_second_derivative[lo * n + k] + db * m_second_derivative[hi * n + k];
+    }
+
+    const std::size_t count = m_nodes.size();
+    std::vector<double> result(count);
+    for (std::size_t j = 0; j < count; ++j) {
+        const double here = point_weight[n - count + j];
+        if (m_nodes[j] > 0.0) {
+            const double mirrored = point_weight[count - 1 - j];
+            result[j] = parity == Parity::even ? here + mirrored : here - mirrored;
+        } else {
+            // An odd function is zero at zero, whatever noise its sample there carries.
+            result[j] = parity == Parity::even ? here : 0.0;
+        }
+    }
+    return result;
+}
+
+}  // namespace beamspread

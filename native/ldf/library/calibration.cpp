@@ -1,0 +1,211 @@
+#include "ldf/library/calibration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Dense>
+
+#include "base/constants.h"
+#include "medium/fresnel.h"
+#include "transport/exact/adding_doubling.h"
+
+namespace beamspread {
+
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr auto bins = static_cast<Eigen::Index>(order_bin_count);
+constexpr auto batches = static_cast<Eigen::Index>(batch_count);
+constexpr Eigen::Index albedos = (compared_albedos.size() + 1) / 2;  // at which totals are made equal
+
+// No bin is scaled by more than this or by less than its inverse.
+constexpr double max_scale = 50.0;
+
+// Of Newton's method below. The last is in squares of tolerances.
+constexpr int max_rounds = 200;
+constexpr double least_damping = 1e-9;
+constexpr double settled = 1e-6;
+
+// Part of the light that enters. Simulations know nothing of less, and no picture shows it.
+constexpr double negligible_power = 1e-9;
+
+// Totals of the angles and of the middles between them, alternating: [angle][albedo].
+struct Exact {
+    std::vector<double> angles_deg;
+    ExactTotals totals;
+
+    double total(std::size_t angle, std::size_t albedo, Side side) const
+    {
+        const std::size_t place = angle * compared_albedos.size() + albedo;
+        return side == Side::reflected ? totals.reflectance[place] : totals.transmittance[place];
+    }
+};
+
+Exact solve_exactly(const LdfLibrary& library, int threads)
+{
+    Exact exact;
+    for (double angle : library.angles_deg()) {
+        if (!exact.angles_deg.empty())
+            exact.angles_deg.push_back(0.5 * (exact.angles_deg.back() + angle));
+        exact.angles_deg.push_back(angle);
+    }
+    exact.totals = exact_totals(library.medium(), exact.angles_deg, compared_albedos, threads);
+    return exact;
+}
+
+// Power of the bins in each batch, [bin][batch].
+MatrixXd batch_powers(const SideResult& side)
+{
+    return Eigen::Map<const Eigen::MatrixXf>(side.batch_totals.data(), bins, batches).cast<double>();
+}
+
+// Relative variance of the mean power of each bin. Deep orders are reached by ever fewer photons, a handful at last,
+// which says little of their own variance: none is taken for better known than a bin before it.
+VectorXd relative_variances(const MatrixXd& powers, const VectorXd& mean)
+{
+    const VectorXd variance = (powers.colwise() - mean).rowwise().squaredNorm() / (batches * (batches - 1));
+    VectorXd relative = VectorXd::Zero(bins);
+    double largest = 0.0;
+    for (Eigen::Index b = 0; b < bins; ++b)
+        if (mean(b) > 0.0) {
+            largest = std::max(largest, variance(b) / (mean(b) * mean(b)));
+            relative(b) = largest;
+        }
+    return relative;
+}
+
+// Linear totals of unknown powers, observed to within a tolerance.
+struct Observation {
+    MatrixXd weights;    // [albedo][bin]
+    VectorXd totals;     // [albedo]
+    VectorXd tolerance;  // [albedo]
+};
+
+// The likeliest scale of each bin's power, around 1 with this relative variance, given the totals and within the
+// limits: a quadratic programme with bounds. Its dual has a variable per total, is convex, smooth and piecewise
+// quadratic: solved by Newton's method, damped where bins meet or leave their limits (Levenberg, Marquardt) by the
+// Hessian for all bins free, than which the dual is nowhere more curved: so damped a step always goes down.
+VectorXd likeliest_scale(const VectorXd& power, const VectorXd& relative, const Observation& observed)
+{
+    const MatrixXd of_scale = observed.tolerance.cwiseInverse().asDiagonal() * observed.weights * power.asDiagonal();
+    const VectorXd totals = observed.totals.cwiseQuotient(observed.tolerance);
+    const auto scale_of = [&](const VectorXd& pull) -> VectorXd {
+        return (VectorXd::Ones(bins) + relative.cwiseProduct(of_scale.transpose() * pull))
+            .cwiseMax(1.0 / max_scale)
+            .cwiseMin(max_scale);
+    };
+    const auto dual = [&](const VectorXd& pull) {
+        const VectorXd force = of_scale.transpose() * pull;
+        const VectorXd scale = scale_of(pull);
+        double sum = 0.5 * pull.squaredNorm() - totals.dot(pull);
+        for (Eigen::Index b = 0; b < bins; ++b)
+            if (relative(b) > 0.0)
+                sum += scale(b) * force(b) - (scale(b) - 1.0) * (scale(b) - 1.0) / (2.0 * relative(b));
+        return sum;
+    };
+    const auto hessian = [&](const VectorXd& free) {
+        MatrixXd h = of_scale * free.asDiagonal() * of_scale.transpose();
+        h.diagonal().array() += 1.0;
+        return h;
+    };
+    const MatrixXd most_curved = hessian(relative);
+    double damping = 0.0;
+    VectorXd pull = VectorXd::Zero(albedos);
+    VectorXd scale = VectorXd::Ones(bins);
+    for (int round = 0; round < max_rounds; ++round) {
+        const VectorXd gradient = of_scale * scale + pull - totals;
+        VectorXd free = relative;
+        for (Eigen::Index b = 0; b < bins; ++b)
+            if (scale(b) <= 1.0 / max_scale || scale(b) >= max_scale)
+                free(b) = 0.0;
+        const MatrixXd curvature = hessian(free);
+        const auto damped_step = [&]() -> VectorXd {
+            return -(curvature + damping * most_curved).ldlt().solve(gradient);
+        };
+        if (!(gradient.dot(curvature.ldlt().solve(gradient)) > settled))
+            break;
+        const double here = dual(pull);
+        damping = damping > least_damping ? 0.1 * damping : 0.0;
+        VectorXd step = damped_step();
+        while (damping < 1.0 && !(dual(pull + step) < here + 1e-4 * gradient.dot(step))) {
+            damping = std::max(10.0 * damping, least_damping);
+            step = damped_step();
+        }
+        pull += step;
+        scale = scale_of(pull);
+    }
+    return scale;
+}
+
+// Scales the powers of a side, with their distributions, to what was observed of their totals.
+void calibrate(SideResult& side, const Observation& observed)
+{
+    MatrixXd powers = batch_powers(side);
+    const VectorXd before = powers.rowwise().mean();
+    const VectorXd relative = relative_variances(powers, before);
+    const VectorXd scale = likeliest_scale(before, relative, observed);
+    for (std::size_t row = 0; row < row_count; ++row) {
+        const double factor = scale(static_cast<Eigen::Index>(order_bin_of(row)));
+        float* power = side.power.data() + row * radius_bin_count;
+        std::transform(power, power + radius_bin_count, power,
+                       [factor](float x) { return static_cast<float>(factor * static_cast<double>(x)); });
+    }
+    // Had a batch been the whole simulation, it would have been led to the same totals; the mean of all stays.
+    powers = scale.asDiagonal() * powers;
+    const VectorXd variance = relative.cwiseProduct((scale.cwiseProduct(before)).cwiseAbs2());
+    const MatrixXd spread = variance.asDiagonal() * observed.weights.transpose();
+    MatrixXd innovation = observed.weights * spread;
+    innovation.diagonal() += observed.tolerance.cwiseAbs2();
+    const MatrixXd deviations = powers.colwise() - powers.rowwise().mean();
+    powers -= spread * innovation.ldlt().solve(observed.weights * deviations);
+    Eigen::Map<Eigen::MatrixXf>(side.batch_totals.data(), bins, batches) = powers.cast<float>();
+}
+
+}  // namespace
+
+LdfLibrary calibrated(const LdfLibrary& library, int threads)
+{
+    const Medium& medium = library.medium();
+    const Exact exact = solve_exactly(library, threads);
+    const double relative_error = exact_totals_error(medium);
+    std::vector<AngleResult> results = library.results();
+    for (std::size_t j = 0; j < results.size(); ++j) {
+        const double theta = results[j].angle_deg * radians_per_degree;
+        const double entering = 1.0 - fresnel(std::cos(theta), medium.ior);
+        for (const Side side : {Side::reflected, Side::transmitted}) {
+            SideResult& result = results[j].sides[static_cast<std::size_t>(side)];
+            if (result.power.empty())
+                continue;
+            const double ballistic = ballistic_total(medium, refracted_angle(theta, medium.ior), side);
+            Observation observed{MatrixXd(albedos, bins), VectorXd(albedos), VectorXd(albedos)};
+            for (Eigen::Index k = 0; k < albedos; ++k) {
+                const std::size_t compared = 2 * static_cast<std::size_t>(k);
+                const auto weights = order_weights(result, compared_albedos[compared]);
+                observed.weights.row(k) = Eigen::Map<const VectorXd>(weights.data(), bins);
+                const double total = exact.total(2 * j, compared, side) / entering;
+                observed.totals(k) = total - ballistic;
+                observed.tolerance(k) = relative_error * total + negligible_power;
+            }
+            calibrate(result, observed);
+        }
+    }
+
+    const LdfLibrary result(medium, library.photons(), library.seed(), results);
+    std::vector<SideResiduals> residuals(results.size(), SideResiduals{});
+    for (std::size_t angle = 0; angle < exact.angles_deg.size(); ++angle)
+        for (const Side side : {Side::reflected, Side::transmitted}) {
+            Residuals& node = residuals[angle / 2][static_cast<std::size_t>(side)];
+            auto& left = angle % 2 == 0 ? node.here : node.halfway;
+            for (std::size_t k = 0; k < left.size(); ++k)
+                if (const double total = exact.total(angle, k, side); total > 0.0)
+                    left[k] = static_cast<float>(
+                        std::abs(result.total(exact.angles_deg[angle], compared_albedos[k], side) / total - 1.0));
+        }
+    return LdfLibrary(medium, library.photons(), library.seed(), std::move(results), std::move(residuals));
+}
+
+}  // namespace beamspread

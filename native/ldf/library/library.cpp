@@ -1,0 +1,308 @@
+#include "ldf/library/library.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <utility>
+
+#include "base/constants.h"
+#include "base/error.h"
+#include "base/threads.h"
+#include "ldf/radial/fading.h"
+#include "ldf/radial/recentred.h"
+#include "medium/fresnel.h"
+#include "transport/exact/adding_doubling.h"
+
+namespace beamspread {
+
+namespace {
+
+// Beyond the last simulated angle, if that is at least this close to grazing, its distribution is
+// used with the exact Fresnel factor.
+constexpr double grazing_deg = 88.0;
+
+// Below this exponent a bin's weight is zero to any purpose, and the expansion in its variance no longer holds.
+constexpr double negligible_log_weight = -60.0;
+
+// Harmonics at the end of the row that move less than this part of a profile's power only cost time.
+constexpr double negligible_harmonics = 1e-4;
+
+// Sums over the rows of a pole, [harmonic][radius bin].
+std::vector<double> contract_orders(const SideResult& side, double albedo, std::size_t pole)
+{
+    const std::array<double, order_bin_count> weights = order_weights(side, albedo);
+    std::vector<double> sums(most_harmonics(side.harmonics, pole) * radius_bin_count, 0.0);
+    const float* ratios = side.ratios.data();
+    for (std::size_t row = 0; row < end_row(pole); ++row) {
+        const std::size_t harmonics = side.harmonics[row];
+        const double order_weight = weights[order_bin_of(row)];
+        if (row >= first_row(pole) && order_weight != 0.0) {
+            std::array<double, radius_bin_count> power;
+            for (std::size_t k = 0; k < radius_bin_count; ++k) {
+                power[k] = order_weight * static_cast<double>(side.power[row * radius_bin_count + k]);
+                sums[k] += power[k];
+            }
+            for (std::size_t m = 1; m < harmonics; ++m) {
+                const double weight = harmonics == harmonic_count ? fading_harmonics()[m] : 1.0;
+                for (std::size_t k = 0; k < radius_bin_count; ++k)
+                    sums[m * radius_bin_count + k] +=
+                        weight * power[k] * static_cast<double>(ratios[(m - 1) * radius_bin_count + k]);
+            }
+        }
+        ratios += (harmonics - 1) * radius_bin_count;
+    }
+    return sums;
+}
+
+// Relative deviations [harmonic][radius bin] of the powers of the rings, and of harmonics in parts of those.
+void deviate(std::vector<double>& sums, const std::vector<double>& deviations)
+{
+    const bool fades = deviations.size() == harmonic_count * radius_bin_count;
+    for (std::size_t i = sums.size(); i-- > 0;) {  // the powers, which come first, last
+        const double weight = fades ? fading_harmonics()[i / radius_bin_count] : 1.0;
+        sums[i] += weight * sums[i % radius_bin_count] * deviations[i];
+    }
+}
+
+std::size_t poles_of(const Medium& medium)
+{
+    return mirrored_orders(medium) == 0 ? 1 : pole_count;
+}
+
+}  // namespace
+
+std::array<double, order_bin_count> order_weights(const SideResult& side, double albedo)
+{
+    std::array<double, order_bin_count> weights{};
+    if (albedo <= 0.0)
+        return weights;
+    const double log_albedo = std::log(albedo);
+    for (std::size_t b = 1; b < order_bin_count; ++b) {
+        const double log_weight = log_albedo * static_cast<double>(side.mean_order[b]);
+        if (log_weight > negligible_log_weight)
+            weights[b] =
+                std::exp(log_weight + 0.5 * log_albedo * log_albedo * static_cast<double>(side.order_variance[b]));
+    }
+    return weights;
+}
+
+LdfLibrary::LdfLibrary(const Medium& medium, std::uint64_t photons, std::uint64_t seed,
+                       std::vector<AngleResult> results, std::vector<SideResiduals> residuals)
+    : m_medium(medium),
+      m_photons(photons),
+      m_seed(seed),
+      m_results(std::move(results)),
+      m_residuals(std::move(residuals))
+{
+    validate(medium);
+    if (m_results.empty())
+        reject("angles", "empty", "at least one angle");
+    std::sort(m_results.begin(), m_results.end(),
+              [](const AngleResult& a, const AngleResult& b) { return a.angle_deg < b.angle_deg; });
+    if (is_calibrated() && m_residuals.size() != m_results.size())
+        reject("residuals", static_cast<double>(m_residuals.size()), "as many as angles");
+    std::vector<double> angles;
+    for (const AngleResult& result : m_results)
+        angles.push_back(result.angle_deg);
+    m_simulated = AngleNodes(std::move(angles));
+    // Around one pole the images of a beam have to move from node to node.
+    m_nodes = poles_of(medium) > 1 ? m_simulated.refined() : m_simulated;
+}
+
+void LdfLibrary::check_angle(double angle_deg) const
+{
+    if (!(angle_deg >= 0.0 && angle_deg < 90.0))
+        reject("angle", angle_deg, "0 <= angle < 90 degrees");
+    constexpr double rounding = 1e-4;  // degrees: single-precision directions
+    const double first = m_results.front().angle_deg;
+    const double last = m_results.back().angle_deg;
+    if (angle_deg < first - rounding || (angle_deg > last + rounding && last < grazing_deg)) {
+        std::ostringstream span;
+        span << first << " <= angle <= " << last << " degrees, what this library was simulated for";
+        reject("angle", angle_deg, span.str());
+    }
+}
+
+double LdfLibrary::entry_transmittance(double angle_deg) const
+{
+    return 1.0 - fresnel(std::cos(angle_deg * radians_per_degree), m_medium.ior);
+}
+
+LdfLibrary::AngleWeights LdfLibrary::angle_weights(double angle_deg) const
+{
+    check_angle(angle_deg);
+    return m_nodes.weights(angle_deg, entry_transmittance(angle_deg));
+}
+
+LdfLibrary::AngleWeights LdfLibrary::simulated_weights(double angle_deg) const
+{
+    check_angle(angle_deg);
+    return m_simulated.weights(angle_deg, entry_transmittance(angle_deg));
+}
+
+double LdfLibrary::total(double angle_deg, double albedo, Side side) const
+{
+    check_albedo(albedo);
+    const AngleWeights weights = simulated_weights(angle_deg);
+    double sum = entry_transmittance(angle_deg) *
+                 ballistic_total(m_medium, refracted_angle(angle_deg * radians_per_degree, m_medium.ior), side);
+    for (std::size_t j = 0; j < m_results.size(); ++j) {
+        const SideResult& result = m_results[j].sides[static_cast<std::size_t>(side)];
+        if (result.power.empty())
+            continue;
+        const auto by_order = order_weights(result, albedo);
+        double scattered = 0.0;
+        for (std::size_t i = 0; i < result.batch_totals.size(); ++i)
+            scattered += by_order[i % order_bin_count] * static_cast<double>(result.batch_totals[i]);
+        sum += weights.even[j] * scattered / static_cast<double>(batch_count);
+    }
+    return sum;
+}
+
+double LdfLibrary::standard_error(double angle_deg, double albedo, Side side) const
+{
+    check_albedo(albedo);
+    const AngleWeights weights = simulated_weights(angle_deg);
+    double variance = 0.0;  // angles are simulated independently
+    for (std::size_t j = 0; j < m_results.size(); ++j) {
+        const SideResult& result = m_results[j].sides[static_cast<std::size_t>(side)];
+        if (result.power.empty())
+            continue;
+        const auto by_order = order_weights(result, albedo);
+        std::array<double, batch_count> totals{};
+        for (std::size_t i = 0; i < result.batch_totals.size(); ++i)
+            totals[i / order_bin_count] += by_order[i % order_bin_count] * static_cast<double>(result.batch_totals[i]);
+        double mean = 0.0;
+        for (double t : totals)
+            mean += t / static_cast<double>(batch_count);
+        double squares = 0.0;
+        for (double t : totals)
+            squares += (t - mean) * (t - mean);
+        variance += weights.even[j] * weights.even[j] * squares / static_cast<double>(batch_count * (batch_count - 1));
+    }
+    if (is_calibrated()) {
+        const double relative = std::hypot(exact_totals_error(m_medium), residual(angle_deg, albedo, side));
+        variance += std::pow(relative * total(angle_deg, albedo, side), 2);
+    }
+    return std::sqrt(variance);
+}
+
+// The largest of those at the compared angles and albedos around.
+double LdfLibrary::residual(double angle_deg, double albedo, Side side) const
+{
+    const double angle = m_simulated.clamped(angle_deg);
+    const auto s = static_cast<std::size_t>(side);
+    const auto above = std::upper_bound(compared_albedos.begin(), compared_albedos.end() - 1, albedo);
+    const auto k = static_cast<std::size_t>(above - compared_albedos.begin());
+    const auto at = [k](const auto& values) { return std::max(values[k == 0 ? 0 : k - 1], values[k]); };
+    std::size_t j = 0;
+    while (j + 1 < m_results.size() && angle >= m_results[j + 1].angle_deg)
+        ++j;
+    const Residuals& from = m_residuals[j][s];
+    if (angle == m_results[j].angle_deg || j + 1 == m_results.size())
+        return static_cast<double>(at(from.here));
+    const bool is_near = 2.0 * angle < m_results[j].angle_deg + m_results[j + 1].angle_deg;
+    return static_cast<double>(std::max(at(from.halfway), at(is_near ? from.here : m_residuals[j + 1][s].here)));
+}
+
+double LdfLibrary::diffuse_reflectance(double albedo) const
+{
+    // 2 integral of R(mu) mu dmu by midpoints, exact to 1e-4: in mu, because R may grow linearly with it at grazing.
+    constexpr int points = 64;
+    double sum = 0.0;
+    for (int i = 0; i < points; ++i) {
+        const double mu = (i + 0.5) / points;
+        sum += 2.0 * mu * total(std::acos(mu) / radians_per_degree, albedo, Side::reflected);
+    }
+    return sum / points;
+}
+
+std::vector<LdfLibrary::PoleProfiles> LdfLibrary::simulated_profiles(double albedo, Side side,
+                                                                     std::optional<std::size_t> group) const
+{
+    check_albedo(albedo);
+    std::vector<PoleProfiles> poles(poles_of(m_medium));
+    for (std::size_t pole = 0; pole < poles.size(); ++pole)
+        for (const AngleResult& result : m_results) {
+            RadialProfile& profile = poles[pole].emplace_back();
+            const SideResult& from = result.sides[static_cast<std::size_t>(side)];
+            if (from.power.empty())
+                continue;
+            std::vector<double> sums = contract_orders(from, albedo, pole);
+            if (group)
+                deviate(sums, deviations_at(from.deviations, from.harmonics, from.radii, *group, pole, albedo));
+            profile = RadialProfile(0.0, sums, RadialDetail::bins);
+            profile.drop_negligible(negligible_harmonics);
+        }
+    return poles;
+}
+
+RadialProfile LdfLibrary::interpolated(double angle_deg, Side side, std::size_t pole, const PoleProfiles& nodes,
+                                       const AngleWeights& weights) const
+{
+    RadialProfile sum;
+    for (std::size_t j = 0; j < nodes.size(); ++j)
+        sum.add(nodes[j], weights.even[j], weights.odd[j]);
+    const double theta = refracted_angle(m_simulated.clamped(angle_deg) * radians_per_degree, m_medium.ior);
+    sum.set_centre(pole_places(m_medium, theta)[static_cast<std::size_t>(side)][pole]);
+    sum.keep_harmonics(weights.harmonics(nodes));
+    sum.drop_negligible(negligible_harmonics);
+    return sum;
+}
+
+std::vector<RadialProfile> LdfLibrary::node_profiles(double albedo, Side side) const
+{
+    const std::vector<PoleProfiles> poles = simulated_profiles(albedo, side);
+    if (poles.size() == 1)
+        return poles.front();
+    std::vector<RadialProfile> profiles(m_nodes.count());
+    parallel_for(profiles.size(), [&](std::size_t j) {
+        const double angle = m_nodes.angles_deg()[j];
+        const AngleWeights weights = m_simulated.weights(angle, 1.0);
+        profiles[j] = interpolated(angle, side, 0, poles.front(), weights);
+        for (std::size_t pole = 1; pole < poles.size(); ++pole)
+            profiles[j].add(recentred(interpolated(angle, side, pole, poles[pole], weights), profiles[j].centre()), 1.0,
+                            1.0);
+        profiles[j].drop_negligible(negligible_harmonics);
+    });
+    return profiles;
+}
+
+RadialProfile LdfLibrary::profile(double angle_deg, double albedo, Side side) const
+{
+    return interpolated(angle_deg, side, 0, node_profiles(albedo, side), angle_weights(angle_deg));
+}
+
+std::vector<RadialProfile> LdfLibrary::pole_profiles(double angle_deg, double albedo, Side side,
+                                                     std::optional<std::size_t> group) const
+{
+    const AngleWeights weights = simulated_weights(angle_deg);
+    const std::vector<PoleProfiles> poles = simulated_profiles(albedo, side, group);
+    std::vector<RadialProfile> profiles;
+    for (std::size_t pole = 0; pole < poles.size(); ++pole)
+        profiles.push_back(interpolated(angle_deg, side, pole, poles[pole], weights));
+    return profiles;
+}
+
+std::vector<BallisticExit> LdfLibrary::ballistic(double angle_deg, Side side) const
+{
+    check_angle(angle_deg);
+    auto exits = ballistic_exits(m_medium, refracted_angle(angle_deg * radians_per_degree, m_medium.ior), side);
+    for (BallisticExit& exit : exits)
+        exit.power *= entry_transmittance(angle_deg);
+    return exits;
+}
+
+LdfLibrary simulate_library(const Medium& medium, const std::vector<double>& angles_deg, std::uint64_t photons,
+                            std::uint64_t seed, int threads, std::string_view kernel, Progress& progress)
+{
+    // Checked before the work, though the library checks again.
+    std::vector<double> sorted = angles_deg;
+    std::sort(sorted.begin(), sorted.end());
+    if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end())
+        reject("angles", *std::adjacent_find(sorted.begin(), sorted.end()), "distinct angles");
+    auto results = simulate(medium, sorted, photons, seed, threads, kernel, progress);
+    return LdfLibrary(medium, photons, seed, std::move(results));
+}
+
+}  // namespace beamspread

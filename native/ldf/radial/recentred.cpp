@@ -1,0 +1,119 @@
+#include "ldf/radial/recentred.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "base/constants.h"
+#include "ldf/radial/fading.h"
+
+namespace beamspread {
+
+namespace {
+
+// Rings around the old pole that cells are cut from, and the size of cells relative to the distance of the poles: below
+// what the finer edges and the last harmonics around the new pole tell apart.
+constexpr int rings_per_octave = 8;
+constexpr double cell_size = 0.01;
+constexpr double least_cells = 16.0;  // of half a ring
+constexpr double most_cells = 256.0;
+
+// Sums of weight * cos(m phi) around the new pole, [between edges][harmonic].
+class Moments {
+public:
+    // Light evenly between two radii, at cos(phi).
+    void add(double r0, double r1, double cos_phi, double weight)
+    {
+        std::array<double, harmonic_count> harmonics;
+        harmonics[0] = weight;
+        harmonics[1] = weight * cos_phi;
+        for (std::size_t m = 2; m < harmonic_count; ++m)
+            harmonics[m] = 2.0 * cos_phi * harmonics[m - 1] - harmonics[m - 2];
+        const std::size_t first = edge_beyond(static_cast<float>(r0));
+        const std::size_t last = edge_beyond(static_cast<float>(r1));
+        for (std::size_t k = first; k <= last; ++k) {
+            const double from = k == first ? r0 : radial_edge(k - 1);
+            const double to = k == last ? r1 : radial_edge(k);
+            const double share = first == last ? 1.0 : std::max(0.0, to - from) / (r1 - r0);
+            for (std::size_t m = 0; m < harmonic_count; ++m)
+                m_sums[k][m] += share * harmonics[m];
+        }
+    }
+
+    RadialProfile profile(double centre) const
+    {
+        std::vector<double> sums;
+        for (std::size_t m = 0; m < harmonic_count; ++m)
+            for (const auto& between : m_sums)
+                sums.push_back(fading_harmonics()[m] * between[m]);
+        return RadialProfile(centre, sums, RadialDetail::all);
+    }
+
+private:
+    std::vector<std::array<double, harmonic_count>> m_sums{edge_count, std::array<double, harmonic_count>{}};
+};
+
+// A place on a ring around the old pole, seen from the new one.
+struct Place {
+    Place(double shift, double rho, double psi)
+        : x(shift + rho * std::cos(psi)), y(rho * std::sin(psi)), r(std::hypot(x, y))
+    {
+    }
+    double cos_phi() const { return r > 0.0 ? x / r : 1.0; }
+    double x;
+    double y;
+    double r;
+};
+
+// Adds the light between two radii around the old pole.
+void add_ring(const RadialProfile& profile, double shift, double inner, double outer, Moments& moments)
+{
+    const Harmonics from = profile.remaining(inner);
+    const Harmonics to = profile.remaining(outer);
+    // Power between the azimuths 0 and psi, and as much on the other side.
+    const auto power_to = [&](double psi) {
+        const double twice_cosine = 2.0 * std::cos(psi);
+        double previous = 0.0;
+        double sine = std::sin(psi);
+        double sum = (from[0] - to[0]) * psi;
+        for (std::size_t m = 1; m < profile.harmonics(); ++m) {
+            sum += (from[m] - to[m]) * sine / static_cast<double>(m);
+            const double next = twice_cosine * sine - previous;
+            previous = sine;
+            sine = next;
+        }
+        return 2.0 * sum;
+    };
+    const double wanted = std::ceil(pi * outer / (cell_size * std::abs(shift)));
+    const auto cells = static_cast<int>(std::clamp(wanted, least_cells, most_cells));
+    double before = 0.0;
+    for (int i = 0; i < cells; ++i) {
+        const double psi0 = pi * i / cells;
+        const double psi1 = pi * (i + 1) / cells;
+        const double up_to_here = power_to(psi1);
+        const std::array corners = {Place(shift, inner, psi0).r, Place(shift, inner, psi1).r,
+                                    Place(shift, outer, psi0).r, Place(shift, outer, psi1).r};
+        const auto [nearest, farthest] = std::minmax_element(corners.begin(), corners.end());
+        const Place middle(shift, 0.5 * (inner + outer), 0.5 * (psi0 + psi1));
+        moments.add(*nearest, *farthest, middle.cos_phi(), up_to_here - before);
+        before = up_to_here;
+    }
+}
+
+}  // namespace
+
+RadialProfile recentred(const RadialProfile& profile, double centre)
+{
+    const double shift = profile.centre() - centre;
+    if (shift == 0.0 || profile.support() == 0.0)
+        return profile;
+    Moments moments;
+    double inner = 0.0;
+    for (double outer = radial_edge(0); inner < profile.support(); outer *= std::exp2(1.0 / rings_per_octave)) {
+        add_ring(profile, shift, inner, outer, moments);
+        inner = outer;
+    }
+    return moments.profile(centre);
+}
+
+}  // namespace beamspread

@@ -1,0 +1,40 @@
+#include "ldf/samples/angular_space.h"
+
+#include <cmath>
+
+#include "base/constants.h"
+#include "base/error.h"
+
+namespace beamspread {
+
+AngularSpace::AngularSpace(const Vec2& origin, const Vec2& brightest, double height)
+    : m_origin(origin), m_brightest(brightest), m_height(height)
+{
+    for (const double x : {origin.x, origin.y})
+        if (!std::isfinite(x))
+            reject("origin", x, "two finite numbers");
+    for (const double x : {brightest.x, brightest.y})
+        if (!std::isfinite(x))
+            reject("brightest", x, "two finite numbers");
+    if (!(height > 0.0 && std::isfinite(height)))
+        reject("height", height, "height > 0");
+}
+
+AngularCoordinates AngularSpace::to_angular(const Vec2& place) const
+{
+    const Vec2 offset = place - m_brightest;
+    const double phi = std::atan2(offset.y, offset.x);
+    const double turned = phi < 0.0 ? phi + 2.0 * pi : phi;
+    // A negative angle next to 0 is rounded to a whole turn.
+    return {turned < 2.0 * pi ? turned : 0.0, std::atan2(std::hypot(offset.x, offset.y), m_height)};
+}
+
+Vec2 AngularSpace::to_planar(const AngularCoordinates& at) const
+{
+    if (!(at.psi >= 0.0 && at.psi < 0.5 * pi))
+        reject("psi", at.psi, "0 <= psi < pi/2");
+    const double r = m_height * std::tan(at.psi);
+    return m_brightest + r * Vec2(std::cos(at.phi), std::sin(at.phi));
+}
+
+}  // namespace beamspread

@@ -1,0 +1,163 @@
+#include "ldf/samples/envelope.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/constants.h"
+#include "ldf/samples/blur.h"
+
+namespace beamspread {
+
+namespace {
+
+// Bias of the logarithm: half of its square.
+constexpr double allowed_noise = 0.1;
+
+// Of the radial means, for which texels far apart are joined.
+constexpr double allowed_ring_noise = 0.3;
+
+// The noise itself is estimated over some neighbours.
+constexpr double noise_sigma = 3.0;
+
+// Relative variance where too little light was seen to tell.
+constexpr double unknown = 1e6;
+
+// Black to any purpose; logarithms stay finite.
+constexpr double black = 1e-300;
+
+bool is_clear(double mean, double variance, double allowed = allowed_noise)
+{
+    return mean > black && variance <= allowed * allowed * mean * mean;
+}
+
+// Variance of each texel's noise.
+std::vector<double> noise_of(const LdfSample& sample)
+{
+    std::vector<double> variance(sample.image.size());
+    for (std::size_t y = 0; y < sample.height; ++y) {
+        for (std::size_t x = 0; x < sample.width; ++x) {
+            const double difference =
+                static_cast<double>(sample.at(y, x)) - static_cast<double>(sample.at(sample.height - 1 - y, x));
+            variance[y * sample.width + x] = 0.5 * difference * difference;
+        }
+    }
+    return variance;
+}
+
+struct Ring {
+    double count = 0.0;
+    double radius = 0.0;  // sums over its texels, then means
+    double value = 0.0;
+    double variance = 0.0;
+
+    void add(const Ring& other)
+    {
+        count += other.count;
+        radius += other.radius;
+        value += other.value;
+        variance += other.variance;
+    }
+};
+
+Ring mean_of(const Ring& sums)
+{
+    return {1.0, sums.radius / sums.count, sums.value / sums.count, 0.0};
+}
+
+// Rings around O of a texel's width, joined where they are too noisy alone; radii and means ascending from O.
+std::vector<Ring> rings_of(const LdfSample& sample, const std::vector<double>& variance)
+{
+    std::vector<Ring> narrow(sample.width + sample.height);
+    for (std::size_t y = 0; y < sample.height; ++y) {
+        for (std::size_t x = 0; x < sample.width; ++x) {
+            const double r = std::hypot(sample.u(x), sample.v(y));
+            narrow[static_cast<std::size_t>(r / sample.pitch)].add(
+                {1.0, r, static_cast<double>(sample.at(y, x)), variance[y * sample.width + x]});
+        }
+    }
+    std::vector<Ring> rings;
+    Ring joined;
+    for (const Ring& ring : narrow) {
+        joined.add(ring);
+        if (is_clear(joined.value, joined.variance, allowed_ring_noise)) {
+            rings.push_back(mean_of(joined));
+            joined = Ring();
+        }
+    }
+    return rings;
+}
+
+// Mean over rings around O at every texel: exponential between the rings, and beyond the last one, where it declines at
+// least as fast as on the whole.
+std::vector<double> ring_means(const LdfSample& sample, const std::vector<double>& variance)
+{
+    const std::vector<Ring> rings = rings_of(sample, variance);
+    if (rings.size() < 2) {
+        const double texels = static_cast<double>(sample.image.size());
+        return std::vector<double>(sample.image.size(),
+                                   std::max(black, sample.power() / (texels * sample.pitch * sample.pitch)));
+    }
+    const auto slope = [](const Ring& a, const Ring& b) { return std::log(b.value / a.value) / (b.radius - a.radius); };
+    const Ring& last = rings.back();
+    const double outer = std::min(0.0, std::min(slope(rings[rings.size() / 2], last), slope(rings.front(), last)));
+    std::vector<double> means(sample.image.size());
+    for (std::size_t y = 0; y < sample.height; ++y) {
+        for (std::size_t x = 0; x < sample.width; ++x) {
+            const double r = std::hypot(sample.u(x), sample.v(y));
+            const auto above =
+                std::find_if(rings.begin(), rings.end(), [r](const Ring& ring) { return ring.radius > r; });
+            double logarithm = 0.0;
+            if (above == rings.begin())
+                logarithm = std::log(rings.front().value);
+            else if (above == rings.end())
+                logarithm = std::log(last.value) + outer * (r - last.radius);
+            else
+                logarithm = std::log((above - 1)->value) + slope(*(above - 1), *above) * (r - (above - 1)->radius);
+            means[y * sample.width + x] = std::max(black, std::exp(logarithm));
+        }
+    }
+    return means;
+}
+
+}  // namespace
+
+Envelope envelope(const LdfSample& sample)
+{
+    const std::vector<double> image(sample.image.begin(), sample.image.end());
+    Envelope result{image, std::vector<double>(image.size(), unknown)};
+    const std::vector<double> variance = noise_of(sample);
+    std::vector<double> noise = blur(variance, sample.width, sample.height, noise_sigma);
+    std::vector<std::size_t> open;  // texels that are not clear yet
+    for (std::size_t i = 0; i < image.size(); ++i) {
+        if (is_clear(image[i], noise[i]))
+            result.variance[i] = noise[i] / (image[i] * image[i]);
+        else
+            open.push_back(i);
+    }
+    if (open.empty())
+        return result;
+
+    const std::vector<double> means = ring_means(sample, variance);
+    const double coarsest = static_cast<double>(std::min(sample.width, sample.height)) / 8.0;
+    double sigma = 1.0;
+    while (sigma <= coarsest && !open.empty()) {
+        const std::vector<double> blurred = blur(image, sample.width, sample.height, sigma);
+        const std::vector<double> blurred_means = blur(means, sample.width, sample.height, sigma);
+        noise = blur(variance, sample.width, sample.height, std::max(noise_sigma, sigma));
+        const double texels = 4.0 * pi * sigma * sigma;  // that count in an average
+        std::erase_if(open, [&](std::size_t i) {
+            const bool clear = is_clear(blurred[i], noise[i] / texels);
+            if (clear) {
+                result.value[i] = std::max(black, means[i] * blurred[i] / blurred_means[i]);
+                result.variance[i] = noise[i] / (blurred[i] * blurred[i]);
+            }
+            return clear;
+        });
+        sigma *= 2.0;
+    }
+    for (const std::size_t i : open)
+        result.value[i] = means[i];
+    return result;
+}
+
+}  // namespace beamspread

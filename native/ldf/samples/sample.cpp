@@ -1,0 +1,56 @@
+#include "ldf/samples/sample.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "base/error.h"
+#include "ldf/library/library.h"
+
+namespace beamspread {
+
+namespace {
+
+constexpr double allowed_undershoot = 0.1;  // of the brightest texel
+
+void check_image(const LdfSample& sample)
+{
+    if (sample.width < 1 || sample.height < 1 || sample.width > max_sample_side || sample.height > max_sample_side)
+        reject("image", "of " + std::to_string(sample.height) + " x " + std::to_string(sample.width) + " texels",
+               "sides of 1 to " + std::to_string(max_sample_side) + " texels");
+    double darkest = 0.0;
+    double brightest = 0.0;
+    for (const float texel : sample.image) {
+        const auto value = static_cast<double>(texel);
+        if (!std::isfinite(value))
+            reject("image", "with a texel of " + std::to_string(value), "finite exitance");
+        darkest = std::min(darkest, value);
+        brightest = std::max(brightest, value);
+    }
+    if (darkest < -allowed_undershoot * brightest)
+        reject("image", "with a texel of " + std::to_string(darkest),
+               "exitance >= 0, or undershoots of up to 10 % of the brightest texel");
+}
+
+}  // namespace
+
+double LdfSample::power() const
+{
+    return std::accumulate(image.begin(), image.end(), 0.0) * pitch * pitch;
+}
+
+void validate(const LdfSample& sample)
+{
+    check_image(sample);
+    if (!(sample.pitch > 0.0 && std::isfinite(sample.pitch)))
+        reject("pitch", sample.pitch, "pitch > 0 mean free paths");
+    if (!(sample.angle_deg >= 0.0 && sample.angle_deg < 90.0))
+        reject("angle", sample.angle_deg, "0 <= angle < 90 degrees");
+    check_albedo(sample.albedo);
+    if (!(sample.beam_diameter >= 0.0 && std::isfinite(sample.beam_diameter)))
+        reject("beam_diameter", sample.beam_diameter, "beam_diameter >= 0 mean free paths");
+    if (sample.g && !(std::abs(*sample.g) < 1.0))
+        reject("g", *sample.g, "-1 < g < 1");
+}
+
+}  // namespace beamspread

@@ -1,0 +1,67 @@
+#include "solve/direct/beam_basis.h"
+
+#include <cmath>
+
+#include "solve/problem/directions.h"
+
+namespace beamspread {
+
+BeamBasis BeamBasis::uniform(const Problem& problem)
+{
+    BeamBasis basis;
+    basis.m_node_count = 1;
+    const double angle = incidence_deg(problem.directions.uniform);
+    basis.m_profiles = [angle](const Channel& channel) {
+        return std::vector{channel.library->profile(angle, channel.albedo, Side::reflected)};
+    };
+    basis.m_weights = [](const Vec3&) { return Weights{{1.0}, {1.0}, {0, 0}}; };
+    return basis;
+}
+
+BeamBasis BeamBasis::library_nodes(const LdfSource& library)
+{
+    BeamBasis basis;
+    basis.m_node_count = library.node_count();
+    basis.m_profiles = [](const Channel& channel) {
+        return channel.library->node_profiles(channel.albedo, Side::reflected);
+    };
+    basis.m_weights = [&library](const Vec3& direction) { return library.angle_weights(incidence_deg(direction)); };
+    return basis;
+}
+
+QuadrantKernel::QuadrantKernel(const RadialProfile& profile, const Problem& problem, const Channel& channel)
+    : m_width(problem.width), m_texels(problem.width * problem.height)
+{
+    const double px = problem.pitch_x / channel.mean_free_path;
+    const double py = problem.pitch_y / channel.mean_free_path;
+    m_integrals = integrate_texels(profile, {-0.5 * px, -0.5 * py, px, py, problem.width, problem.height});
+}
+
+void QuadrantKernel::row(std::ptrdiff_t dy, const Harmonics& cosine, const Harmonics& sine,
+                         std::vector<double>& values) const
+{
+    values.assign(2 * m_width - 1, 0.0);
+    double* right = values.data() + (m_width - 1);
+    const std::size_t first = static_cast<std::size_t>(std::abs(dy)) * m_width;
+    for (std::size_t m = 0; m < m_integrals.harmonics; ++m) {
+        // phi -> -phi for dy < 0, and phi -> pi - phi for dx < 0.
+        const double by_sine = dy < 0 ? -sine[m] : sine[m];
+        const double mirrored = m % 2 == 0 ? 1.0 : -1.0;
+        if (cosine[m] != 0.0) {
+            const double* a = m_integrals.cosine.data() + m * m_texels + first;
+            for (std::size_t x = 0; x < m_width; ++x)
+                right[x] += cosine[m] * a[x];
+            for (std::size_t x = 1; x < m_width; ++x)
+                values[m_width - 1 - x] += mirrored * cosine[m] * a[x];
+        }
+        if (by_sine != 0.0) {
+            const double* b = m_integrals.sine.data() + m * m_texels + first;
+            for (std::size_t x = 0; x < m_width; ++x)
+                right[x] += by_sine * b[x];
+            for (std::size_t x = 1; x < m_width; ++x)
+                values[m_width - 1 - x] -= mirrored * by_sine * b[x];
+        }
+    }
+}
+
+}  // namespace beamspread

@@ -1,0 +1,60 @@
+// Kernels of all beams of a problem as combinations of a few.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "ldf/radial/texel_integral.h"
+#include "solve/problem/problem.h"
+
+namespace beamspread {
+
+// The kernel of a beam at (theta, beta) is the sum over nodes j and harmonics m of
+//   weight_j,m(theta) [cos(m beta) A_jm + sin(m beta) B_jm],
+// A_jm and B_jm being texel integrals of c_jm(r) cos(m phi) and c_jm(r) sin(m phi).
+class BeamBasis {
+public:
+    // Weights of the nodes for one angle of incidence; even and odd harmonics may differ.
+    using Weights = LdfSource::AngleWeights;
+
+    // One direction for the whole grid: one node.
+    static BeamBasis uniform(const Problem& problem);
+
+    // The library's own nodes: exact.
+    static BeamBasis library_nodes(const LdfSource& library);
+
+    std::size_t node_count() const { return m_node_count; }
+
+    // Radial profiles of the nodes for a channel.
+    std::vector<RadialProfile> profiles(const Channel& channel) const { return m_profiles(channel); }
+
+    // Weights of the nodes for the beam at a texel.
+    Weights weights(const Vec3& direction) const { return m_weights(direction); }
+
+private:
+    BeamBasis() = default;
+
+    std::size_t m_node_count = 0;
+    std::function<std::vector<RadialProfile>(const Channel&)> m_profiles;
+    std::function<Weights(const Vec3&)> m_weights;
+};
+
+// Texel integrals of one profile on the quadrant of offsets (0 .. height - 1, 0 .. width - 1) around the texel where
+// the beam enters; the other quadrants follow by symmetry.
+class QuadrantKernel {
+public:
+    QuadrantKernel(const RadialProfile& profile, const Problem& problem, const Channel& channel);
+
+    std::size_t harmonics() const { return m_integrals.harmonics; }
+
+    // The sum over m of cosine[m] A_m + sine[m] B_m for the row offset dy and dx = -(width - 1) .. width - 1.
+    void row(std::ptrdiff_t dy, const Harmonics& cosine, const Harmonics& sine, std::vector<double>& values) const;
+
+private:
+    std::size_t m_width;
+    std::size_t m_texels;
+    TexelIntegrals m_integrals;
+};
+
+}  // namespace beamspread

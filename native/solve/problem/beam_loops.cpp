@@ -1,0 +1,97 @@
+#include "solve/problem/beam_loops.h"
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "simd/target_clones.h"
+
+namespace beamspread {
+
+namespace {
+
+// Of a texel's light; straight down where there is none.
+struct Travel {
+    float x, y, z;
+};
+
+[[gnu::always_inline]] inline Travel travel(const float* direction, float irradiance)
+{
+    const bool lit = irradiance != 0.0f;
+    const float x = direction[0];
+    const float y = direction[1];
+    const float z = direction[2];
+    return {lit ? x : 0.0f, lit ? y : 0.0f, lit ? z : -1.0f};
+}
+
+}  // namespace
+
+BEAMSPREAD_CLONES void find_angles(const float* directions, const float* irradiance, float* __restrict cos_beta,
+                                   float* __restrict sin_beta, float* __restrict half_tangent, std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i) {
+        const auto [x, y, z] = travel(directions + 3 * i, irradiance[i]);
+        const float across = std::sqrt(x * x + y * y);
+        const float length = std::sqrt(x * x + y * y + z * z);
+        const bool slants = across > 0.0f;
+        const float per_across = 1.0f / (slants ? across : 1.0f);
+        cos_beta[i] = slants ? x * per_across : 1.0f;
+        sin_beta[i] = y * per_across;
+        half_tangent[i] = across / (length - z);
+    }
+}
+
+BEAMSPREAD_CLONES bool are_beams(const float* irradiance, const float* directions, std::size_t count)
+{
+    std::uint32_t faults = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        const float x = directions[3 * i];
+        const float y = directions[3 * i + 1];
+        const float z = directions[3 * i + 2];
+        const bool finite = (irradiance[i] >= 0.0f) & (irradiance[i] <= std::numeric_limits<float>::max());
+        const bool unit = std::abs(x * x + y * y + z * z - 1.0f) < unit_tolerance;
+        faults |= (finite & ((irradiance[i] == 0.0f) | (unit & (z < 0.0f)))) ? 0u : 1u;
+    }
+    return faults == 0;
+}
+
+BEAMSPREAD_CLONES void add_light(float* __restrict sum, float* __restrict x, float* __restrict y, float* __restrict z,
+                                 float* __restrict half_tangent, const float* irradiance, const float* directions,
+                                 std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i) {
+        const auto [u, v, w] = travel(directions + 3 * i, irradiance[i]);
+        sum[i] += irradiance[i];
+        x[i] += irradiance[i] * u;
+        y[i] += irradiance[i] * v;
+        z[i] += irradiance[i] * w;
+        half_tangent[i] = std::sqrt(u * u + v * v) / (std::sqrt(u * u + v * v + w * w) - w);
+    }
+}
+
+BEAMSPREAD_CLONES void make_unit(float* __restrict x, float* __restrict y, float* __restrict z,
+                                 float* __restrict length, float* __restrict half_tangent, std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i) {
+        length[i] = std::sqrt(x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
+        const float per_length = 1.0f / (length[i] > 0.0f ? length[i] : 1.0f);
+        x[i] *= per_length;
+        y[i] *= per_length;
+        z[i] *= per_length;
+        half_tangent[i] = std::sqrt(x[i] * x[i] + y[i] * y[i]) / (1.0f - z[i]);
+    }
+}
+
+BEAMSPREAD_CLONES void add_lit(float* __restrict texels, float* __restrict first, float* __restrict last,
+                               const float* half_tangent, const float* irradiance, std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i) {
+        const bool lit = irradiance[i] != 0.0f;
+        const float least = lit ? half_tangent[i] : 1.0f;
+        texels[i] += lit ? 1.0f : 0.0f;
+        first[i] = least < first[i] ? least : first[i];
+        last[i] = half_tangent[i] > last[i] ? half_tangent[i] : last[i];
+    }
+}
+
+}  // namespace beamspread

@@ -1,0 +1,73 @@
+// A few light terms in place of a beam per texel, for light whose direction changes from texel to texel.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "ldf/radial/ldf_source.h"
+#include "simd/loops.h"
+#include "solve/separable/kernel_term.h"
+#include "solve/separable/present_angles.h"
+
+namespace beamspread {
+
+// What decides a kernel, besides the direction.
+struct KernelMedium {
+    const LdfSource* library = nullptr;
+    double albedo = 0.0;
+    double mean_free_path = 1.0;
+
+    bool operator==(const KernelMedium&) const = default;
+};
+
+// The harmonic m of a kernel as sum over i of u_i(theta) e_i(r): u_i are tables over tan(theta / 2), which needs no
+// trigonometry and is smooth everywhere; e_i is the harmonic m of a profile per medium.
+struct LowRankBasis {
+    struct AngleFunction {
+        std::size_t m;
+        std::size_t rank;
+        std::vector<TableStep> values;
+    };
+    double first = 0.0;  // tan(theta / 2) of the first and last entries of the tables
+    double last = 0.0;
+    std::vector<AngleFunction> functions;              // ascending m, then rank
+    std::vector<std::vector<ScaledProfile>> profiles;  // [medium][rank]
+};
+
+// Kernels of all angles present, taken apart: for each harmonic the singular value decomposition of angles times
+// (medium, radius), by the chi-square distance to the mean kernel, which bounds the relative L1 error; mean square over
+// the media, the light, the lit texels and the angles present. The media share the functions of the angle.
+class KernelDecomposition {
+public:
+    // `texel` is the side of a texel in metres: detail inside the one where a beam enters does not count.
+    KernelDecomposition(const PresentAngles& present, const std::vector<KernelMedium>& media, double texel);
+    ~KernelDecomposition();
+
+    struct Term {
+        std::size_t m;
+        std::size_t rank;
+        double gain;  // square error that it takes away
+    };
+
+    // Ascending m, then rank.
+    const std::vector<Term>& terms() const { return m_terms; }
+
+    // The cheapest terms by which the kernels are off by no more than `tolerance`.
+    std::vector<std::size_t> within(double tolerance) const;
+
+    // Of some of the terms, in their order, without what the kernels hold beyond the radius that all but the fraction
+    // `beyond` of their power stays within.
+    LowRankBasis basis(const std::vector<std::size_t>& chosen, double beyond) const;
+
+private:
+    struct Angular;
+
+    std::vector<KernelMedium> m_media;
+    double m_first;
+    double m_last;
+    std::vector<Term> m_terms;
+    std::unique_ptr<Angular> m_angular;
+};
+
+}  // namespace beamspread

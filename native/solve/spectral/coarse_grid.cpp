@@ -1,0 +1,70 @@
+#include "solve/spectral/coarse_grid.h"
+
+#include <algorithm>
+
+#include "base/pool.h"
+#include "base/threads.h"
+#include "simd/loops.h"
+
+namespace beamspread {
+
+std::vector<std::vector<float>> CoarseGrid::spread(const MakeLightRow& light, std::size_t first, std::size_t count,
+                                                   Progress& progress, double work) const
+{
+    struct RowScratch {
+        std::unique_ptr<LightRow> light;
+        std::vector<float> texels;
+        std::vector<float> nodes;
+        std::vector<float> line;
+    };
+    Pool<RowScratch> pool;
+    const std::size_t stride = m_x.nodes();
+    const std::size_t step = m_y.step();
+    const std::size_t items = (m_height + step - 1) / step;
+    std::vector<std::vector<float>> result(count, std::vector<float>(nodes(), 0.0f));
+    // The texels of an item share the rows of nodes that their light goes to, [term][row][node].
+    const auto spread_rows = [&](std::size_t item) {
+        std::vector<float> rows(count * spline_order * stride, 0.0f);
+        const auto lease = pool.lend();
+        RowScratch& scratch = *lease;
+        if (!scratch.light)
+            scratch.light = light();
+        scratch.texels.resize(m_width);
+        scratch.nodes.resize(stride);
+        for (std::size_t y = item * step; y < std::min(m_height, (item + 1) * step); ++y) {
+            const float* weights = m_y.weights(y);
+            scratch.light->start({y, 0, m_width});
+            for (std::size_t t = 0; t < count; ++t) {
+                scratch.light->evaluate(first + t, scratch.texels.data());
+                m_x.spread(scratch.texels.data(), scratch.nodes.data(), scratch.line);
+                for (std::size_t row = 0; row < spline_order; ++row)
+                    add_scaled(rows.data() + (t * spline_order + row) * stride, scratch.nodes.data(), weights[row],
+                               stride);
+            }
+        }
+        progress.advance(work / static_cast<double>(items));
+        return rows;
+    };
+    const auto add = [&](std::size_t item, const std::vector<float>& rows) {
+        for (std::size_t t = 0; t < count; ++t)
+            add_scaled(result[t].data() + item * stride, rows.data() + t * spline_order * stride, 1.0f,
+                       spline_order * stride);
+    };
+    parallel_ordered<std::vector<float>>(items, spread_rows, add);
+    return result;
+}
+
+void CoarseGrid::add_interpolated(const std::vector<float>& nodes, const RowSpan& span, float* texels,
+                                  Scratch& scratch) const
+{
+    const std::size_t stride = m_x.nodes();
+    const float* weights = m_y.weights(span.y);
+    const float* rows = nodes.data() + span.y / m_y.step() * stride;
+    scratch.nodes.resize(stride);
+    scale(scratch.nodes.data(), rows, weights[0], stride);
+    for (std::size_t row = 1; row < spline_order; ++row)
+        add_scaled(scratch.nodes.data(), rows + row * stride, weights[row], stride);
+    m_x.add_interpolated(scratch.nodes.data(), span.x, span.width, texels, scratch.line);
+}
+
+}  // namespace beamspread

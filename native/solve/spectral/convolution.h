@@ -1,0 +1,101 @@
+// Sums of lights convolved with their kernels, on one grid.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "base/pool.h"
+#include "base/progress.h"
+#include "fft/column_spectra.h"
+#include "solve/separable/light_terms.h"
+#include "solve/spectral/kernel_spectra.h"
+
+namespace beamspread {
+
+// The light of a row of nodes, term after term.
+class LightRow {
+public:
+    virtual ~LightRow() = default;
+    virtual void start(const RowSpan& span) = 0;
+
+    // Values of term t; t may not go down.
+    virtual void evaluate(std::size_t t, float* values) = 0;
+
+protected:
+    LightRow() = default;
+    LightRow(const LightRow&) = default;
+    LightRow(LightRow&&) = default;
+    LightRow& operator=(const LightRow&) = default;
+    LightRow& operator=(LightRow&&) = default;
+};
+
+using MakeLightRow = std::function<std::unique_ptr<LightRow>()>;
+
+// Takes a row of the result for a medium: `values` times `factor`. Called from several threads at once. The values may
+// be changed.
+using StoreRow = std::function<void(std::size_t medium, const RowSpan& span, float* values, double factor)>;
+
+// Solves the plane of `spectra` tile by tile, never with more than `budget` bytes for the spectra of the light and of
+// the results, unless one of each does not fit.
+class Convolution {
+public:
+    Convolution(const KernelSpectra& spectra, std::span<const LightTerm> terms, std::size_t media, std::size_t budget);
+
+    // Advances the progress by `work`, or a little less.
+    void solve(const MakeLightRow& light, const StoreRow& store, Progress& progress, double work);
+
+private:
+    // Nodes [first, first + count) along one axis.
+    struct Span {
+        std::size_t first;
+        std::size_t count;
+    };
+
+    // What a tile's steps share.
+    struct Tile {
+        Span x;
+        Span y;
+        Span window_x;  // the nodes whose light reaches the tile
+        Span window_y;
+        const MakeLightRow& light;
+        const StoreRow& store;
+        Progress& progress;
+        double work;  // of each round and of the results
+    };
+
+    struct RowScratch {
+        std::vector<std::unique_ptr<LightRow>> rows;
+        std::vector<float> lines;
+        std::vector<Complex> half;
+    };
+
+    struct ColumnScratch {
+        std::vector<Complex> lines;
+        std::vector<Complex> sums;  // [medium][even, odd m][frequency]
+        std::vector<float> kernel;
+        KernelSpectra::Column column;
+        KernelSpectra::Centres centres;
+    };
+
+    static std::vector<Span> tiles(std::size_t size, std::size_t tile);
+    static Span with_halo(const Span& tile, std::size_t halo, std::size_t size);
+    void solve_tile(const Tile& tile);
+    void transform_light(const Tile& tile, std::size_t first, std::size_t count, ColumnSpectra& light);
+    void convolve_columns(const Tile& tile, std::size_t first_term, std::size_t count, ColumnSpectra& light,
+                          std::size_t first_medium, ColumnSpectra& results);
+    void store_result(const Tile& tile, std::size_t medium, ColumnSpectra& results, std::size_t plane);
+
+    const KernelSpectra& m_spectra;
+    const PaddedPlane& m_plane;
+    std::span<const LightTerm> m_terms;
+    std::vector<std::vector<std::vector<KernelSpectra::Part>>> m_kernels;  // [term][medium]
+    std::size_t m_media;
+    SpectraAtOnce m_at_once;
+    Pool<RowScratch> m_row_scratch;
+    Pool<ColumnScratch> m_column_scratch;
+};
+
+}  // namespace beamspread

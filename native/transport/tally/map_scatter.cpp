@@ -1,0 +1,130 @@
+#include "transport/tally/map_scatter.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace beamspread {
+
+namespace {
+
+// Albedos at which the groups are kept. A group's deviation from the mean, relative to the power of the ring, changes
+// slowly with the albedo: it is interpolated in log(1 - albedo). Around mirror images light has scattered so few times that
+// it hardly changes any more from the second one on.
+constexpr std::array<double, 4> first_albedos = {0.6, 0.95, 0.995, 0.9995};
+constexpr std::array<double, 2> image_albedos = {0.6, 0.995};
+
+std::span<const double> albedos_of(std::size_t pole)
+{
+    return pole == 0 ? std::span<const double>(first_albedos) : std::span<const double>(image_albedos);
+}
+
+// To what half precision holds exactly.
+float rounded_to_five_bits(double x)
+{
+    if (std::abs(x) < 0x1p-14)
+        return 0.0F;
+    int exponent = 0;
+    const double mantissa = std::frexp(x, &exponent);
+    return static_cast<float>(std::ldexp(std::round(mantissa * 32.0) / 32.0, exponent));
+}
+
+// Of the poles before this one.
+std::size_t count_before(std::span<const std::size_t> harmonics, std::size_t radii, std::size_t pole)
+{
+    std::size_t count = 0;
+    for (std::size_t before = 0; before < pole; ++before)
+        count += albedos_of(before).size() * most_harmonics(harmonics, before) * radii;
+    return count;
+}
+
+// Sums over the orders at an albedo, [harmonic][radius bin].
+std::vector<double> contracted(const Tally& tally, double albedo, std::span<const std::size_t> harmonics,
+                               std::size_t radii, std::size_t pole)
+{
+    std::vector<double> sums(most_harmonics(harmonics, pole) * radii, 0.0);
+    for (std::size_t row = first_row(pole); row < end_row(pole); ++row) {
+        const std::size_t b = order_bin_of(row);
+        if (b == 0 || tally.weight[b] == 0.0)
+            continue;
+        const double weight = std::pow(albedo, tally.weight_order[b] / tally.weight[b]);
+        for (std::size_t k = 0; k < radii; ++k) {
+            const double* ring = tally.ring(row, k);
+            for (std::size_t m = 0; m < harmonics[row]; ++m)
+                sums[m * radii + k] += weight * ring[m];
+        }
+    }
+    return sums;
+}
+
+// Of each group, [group][harmonic][radius bin].
+std::vector<std::vector<float>> deviations_of(std::span<const Tally* const> groups, double albedo,
+                                              std::span<const std::size_t> harmonics, std::size_t radii,
+                                              std::size_t pole)
+{
+    std::vector<std::vector<double>> sums;
+    for (const Tally* group : groups)
+        sums.push_back(contracted(*group, albedo, harmonics, radii, pole));
+    std::vector<double> mean(sums.front().size(), 0.0);
+    for (const std::vector<double>& of_group : sums)
+        for (std::size_t i = 0; i < mean.size(); ++i)
+            mean[i] += of_group[i] / static_cast<double>(groups.size());
+    std::vector<std::vector<float>> deviations;
+    for (const std::vector<double>& of_group : sums) {
+        std::vector<float>& to = deviations.emplace_back();
+        for (std::size_t i = 0; i < mean.size(); ++i) {
+            const double power = mean[i % radii];
+            to.push_back(power > 0.0 ? rounded_to_five_bits((of_group[i] - mean[i]) / power) : 0.0F);
+        }
+    }
+    return deviations;
+}
+
+}  // namespace
+
+std::size_t scatter_count(std::span<const std::size_t> harmonics, std::size_t radii)
+{
+    return count_before(harmonics, radii, pole_count);
+}
+
+std::vector<float> relative_deviations(std::span<const Tally* const> groups, std::span<const std::size_t> harmonics,
+                                       std::size_t radii)
+{
+    std::vector<std::vector<float>> by_group(groups.size());
+    for (std::size_t pole = 0; pole < pole_count; ++pole)
+        for (const double albedo : albedos_of(pole)) {
+            const auto deviations = deviations_of(groups, albedo, harmonics, radii, pole);
+            for (std::size_t group = 0; group < groups.size(); ++group)
+                by_group[group].insert(by_group[group].end(), deviations[group].begin(), deviations[group].end());
+        }
+    std::vector<float> all;
+    for (const std::vector<float>& of_group : by_group)
+        all.insert(all.end(), of_group.begin(), of_group.end());
+    return all;
+}
+
+std::vector<double> deviations_at(std::span<const float> deviations, std::span<const std::size_t> harmonics,
+                                  std::size_t radii, std::size_t group, std::size_t pole, double albedo)
+{
+    const std::span<const double> albedos = albedos_of(pole);
+    const auto place = [](double a) { return std::log1p(-a); };
+    const double x = std::clamp(place(albedo), place(albedos.back()), place(albedos.front()));
+    std::size_t high = 1;
+    while (high + 1 < albedos.size() && x < place(albedos[high]))
+        ++high;
+    const double t = (x - place(albedos[high - 1])) / (place(albedos[high]) - place(albedos[high - 1]));
+
+    const std::size_t rings = most_harmonics(harmonics, pole);
+    const float* kept =
+        deviations.data() + group * scatter_count(harmonics, radii) + count_before(harmonics, radii, pole);
+    std::vector<double> result(rings * radius_bin_count, 0.0);
+    for (const auto& [albedo_index, weight] : {std::pair(high - 1, 1.0 - t), std::pair(high, t)})
+        for (std::size_t m = 0; m < rings; ++m)
+            for (std::size_t k = 0; k < radii; ++k)
+                result[m * radius_bin_count + k] +=
+                    weight * static_cast<double>(kept[(albedo_index * rings + m) * radii + k]);
+    return result;
+}
+
+}  // namespace beamspread

@@ -1,0 +1,311 @@
+// The photon walk of walk.cpp for many photons at a time, one in each lane of a vector. As many as a vector holds start
+// together and make their early flights, whose exits are tallied at their expected values; those that are left join a
+// pool, from which vectors are filled for the flights that follow. The oldest instruction set runs the scalar walk.
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "transport/walk/walk_packets.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "hwy/contrib/math/math-inl.h"
+#include "transport/walk/packet_flight-inl.h"
+#include "transport/walk/packet_math-inl.h"
+#include "transport/walk/packet_optics-inl.h"
+#include "transport/walk/packet_tally-inl.h"
+#include "transport/walk/photon_pool-inl.h"
+#include "transport/walk/walk_plan.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace beamspread {
+namespace HWY_NAMESPACE {
+
+// Flights of the photons in the pool between two looks at which of them are left.
+constexpr int flights_per_sweep = 4;
+
+class PacketWalk {
+public:
+    explicit PacketWalk(const WalkJob& job) : m_job(job), m_medium(job.medium), m_plan(job.medium), m_tally(job)
+    {
+        Random random(job.seed, job.stream, job.first_batch);
+        PacketRandom::seed(random, m_random);
+    }
+
+    void run()
+    {
+        bool more = true;
+        while (more) {
+            while (more && m_pool.count() + late_walks * lane_count <= PhotonPool::capacity) {
+                more = next_batch();
+                if (more)
+                    walk_early();
+            }
+            walk_late();
+        }
+        while (m_pool.count() > 0)
+            walk_late();
+        m_tally.finish();
+        m_job.progress.advance(static_cast<double>(m_unreported));
+    }
+
+private:
+    // Whether a batch has photons left to start.
+    bool next_batch()
+    {
+        while (m_batch < m_job.photons.size() && m_started == m_job.photons[m_batch]) {
+            ++m_batch;
+            m_started = 0;
+        }
+        return m_batch < m_job.photons.size();
+    }
+
+    // As many photons of the batch as a vector holds.
+    HWY_INLINE FloatMask start(Photons& photons)
+    {
+        const std::uint64_t left = m_job.photons[m_batch] - m_started;
+        const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(left, lane_count));
+        m_started += count;
+        m_unreported += count;
+        if (m_unreported >= photons_per_progress) {
+            m_job.progress.advance(static_cast<double>(m_unreported));
+            m_unreported = 0;
+        }
+        const Floats zero = hn::Zero(floats);
+        photons = {{zero, zero, zero},
+                   {broadcast(std::sin(m_job.theta_inside)), zero, broadcast(std::cos(m_job.theta_inside))},
+                   broadcast(1.0),
+                   hn::Zero(words),
+                   hn::Set(words, m_plan.first_roulette),
+                   hn::Set(words, static_cast<std::uint32_t>(m_batch << batch_shift))};
+        return hn::FirstN(floats, count);
+    }
+
+    // From the entry to the scattering after `last_expected_order`.
+    HWY_NOINLINE void walk_early()
+    {
+        Photons photons;
+        FloatMask active = start(photons);
+        PacketRandom random(m_random);
+        Floats exit_weight = broadcast(1.0);  // of the exit along the walk, among the ways to sample it
+        while (!hn::AllFalse(floats, active)) {
+            const Photons from = photons;
+            const Flight flight = fly(m_medium, from, random);
+            const Floats to_boundary = hn::Div(flight.depth, flight.cosine);
+            const Floats reflectance = m_medium.boundary.reflectance(flight.cosine);
+            tally_expected(hn::And(hn::And(active, comes_close(flight)), greater(from.order, hn::Zero(words))), from,
+                           to_boundary, reflectance, exit_weight);
+
+            const Deflection deflection = m_medium.phase.sample(random.uniform());
+            scatter(photons, flight, deflection, random);
+            const FloatMask turns_back = hn::And(flight.hits, hn::Lt(random.uniform(), reflectance));
+            turn_back(photons, turns_back, from, to_boundary, m_medium.thickness);
+            active = hn::And(active, hn::Or(hn::Not(flight.hits), turns_back));
+
+            const FloatMask late = greater(photons.order, hn::Set(words, m_plan.last_expected_order));
+            const FloatMask connected = hn::AndNot(hn::Or(flight.hits, late), active);
+            exit_weight = broadcast(1.0);
+            if (!hn::AllFalse(floats, connected)) {
+                const FloatMask rivalled =
+                    m_medium.is_half_space ? hn::And(connected, hn::Lt(photons.w.z, hn::Zero(floats))) : connected;
+                const Floats balanced = hn::Div(deflection.pdf, hn::Add(deflection.pdf, connection_pdf(photons.w.z)));
+                exit_weight = hn::IfThenElse(rivalled, balanced, exit_weight);
+                connect(connected, photons, from.w, -1.0, random);
+                if (!m_medium.is_half_space)
+                    connect(connected, photons, from.w, 1.0, random);
+            }
+            if (const FloatMask leaving = hn::And(active, late); !hn::AllFalse(floats, leaving)) {
+                photons.weight = hn::Mul(photons.weight, broadcast(1.0 / late_walks));
+                for (std::size_t copy = 0; copy < late_walks; ++copy)
+                    m_pool.append(leaving, photons);
+                photons.weight = hn::Mul(photons.weight, broadcast(late_walks));
+                active = hn::AndNot(leaving, active);
+            }
+        }
+        random.store();
+    }
+
+    // Some more flights of all photons in the pool.
+    HWY_NOINLINE void walk_late()
+    {
+        PacketRandom random(m_random);
+        const std::size_t count = m_pool.count();
+        m_pool.clear();
+        for (std::size_t first = 0; first < count; first += lane_count) {
+            FloatMask active = hn::FirstN(floats, count - first);
+            Photons photons = m_pool.load(first);
+            for (int i = 0; i < flights_per_sweep; ++i)
+                active = step(photons, active, random);
+            photons.w = renormalized(photons.w);
+            m_pool.append(active, photons);
+        }
+        random.store();
+    }
+
+    // One flight, and the scattering or reflection at its end; returns who goes on.
+    HWY_INLINE FloatMask step(Photons& photons, FloatMask active, PacketRandom& random)
+    {
+        const Photons from = photons;
+        const Flight flight = fly(m_medium, from, random);
+        scatter(photons, flight, m_medium.phase.sample(random.uniform()), random);
+        if (const FloatMask hits = hn::And(active, flight.hits); !hn::AllFalse(floats, hits)) {
+            const Floats to_boundary = hn::Div(flight.depth, flight.cosine);
+            const FloatMask turns_back =
+                hn::And(hits, hn::Lt(random.uniform(), m_medium.boundary.reflectance(flight.cosine)));
+            turn_back(photons, turns_back, from, to_boundary, m_medium.thickness);
+            // Fresnel's transmittance is in the decision, and not in the tally.
+            const FloatMask leaves = hn::AndNot(turns_back, hits);
+            tally(leaves, from, from.w, to_boundary, from.weight);
+            active = hn::AndNot(leaves, active);
+        }
+        const FloatMask at_risk = hn::AndNot(greater(photons.next_roulette, photons.order), active);
+        if (!hn::AllFalse(floats, at_risk))
+            active = hn::And(active, play_roulette(photons, at_risk, random));
+        return active;
+    }
+
+    // Returns who survives.
+    HWY_INLINE FloatMask play_roulette(Photons& photons, FloatMask at_risk, PacketRandom& random) const
+    {
+        const FloatMask late = greater(photons.order, hn::Set(words, last_common_order));
+        const Floats survival = hn::IfThenElse(late, broadcast(late_roulette_survival), broadcast(roulette_survival));
+        photons.weight = hn::IfThenElse(at_risk, hn::Div(photons.weight, survival), photons.weight);
+        const Words next = hn::Min(hn::Add(photons.next_roulette, photons.next_roulette), hn::Set(words, max_order));
+        photons.next_roulette = hn::IfThenElse(hn::RebindMask(words, at_risk), next, photons.next_roulette);
+        const FloatMask ends =
+            hn::Or(hn::Ge(random.uniform(), survival), greater(photons.order, hn::Set(words, max_order - 1)));
+        return hn::Not(hn::And(at_risk, ends));
+    }
+
+    HWY_INLINE void tally(FloatMask mask, const Photons& from, const Vectors& w, Floats to_boundary, Floats weight)
+    {
+        const FloatMask up = hn::Lt(w.z, hn::Zero(floats));
+        const Words side = hn::IfThenZeroElse(hn::RebindMask(words, up), hn::Set(words, 1u << side_shift));
+        m_tally.add(mask, hn::MulAdd(to_boundary, w.x, from.x.x), hn::MulAdd(to_boundary, w.y, from.x.y), weight,
+                    hn::Or(hn::Or(from.order, from.batch), side));
+    }
+
+    // Far from the boundary the flight itself decides whether its exit is tallied: it comes this close with the
+    // probability exp(-to_boundary) / rare_exit.
+    static HWY_INLINE FloatMask comes_close(const Flight& flight)
+    {
+        return hn::Ge(hn::Mul(hn::Add(flight.length, broadcast(rare_exit_distance)), flight.cosine), flight.depth);
+    }
+
+    // The exits along flights that begin here, instead of waiting for one.
+    HWY_INLINE void tally_expected(FloatMask close, const Photons& from, Floats to_boundary, Floats reflectance,
+                                   Floats exit_weight)
+    {
+        const FloatMask tallied = hn::And(close, hn::Lt(reflectance, broadcast(1.0)));
+        if (hn::AllFalse(floats, tallied))
+            return;
+        const Floats escape = hn::Exp(floats, hn::Neg(hn::Min(to_boundary, broadcast(rare_exit_distance))));
+        const Floats transmittance = hn::Sub(broadcast(1.0), reflectance);
+        tally(tallied, from, from.w, to_boundary,
+              hn::Mul(hn::Mul(from.weight, transmittance), hn::Mul(escape, exit_weight)));
+    }
+
+    // Density per steradian of the connections below: proportional to the cosine, inside the cone that
+    // internal reflection lets out.
+    HWY_INLINE Floats connection_pdf(Floats wz) const
+    {
+        const FloatMask inside = hn::Gt(hn::Mul(wz, wz), broadcast(1.0 - m_plan.exit_cone));
+        return hn::IfThenElseZero(inside, hn::Mul(hn::Abs(wz), broadcast(inv_pi / m_plan.exit_cone)));
+    }
+
+    // An exit after a scattering, sampled by a direction that leaves: see Walk::connect.
+    HWY_INLINE void connect(FloatMask mask, const Photons& at, const Vectors& before, double side, PacketRandom& random)
+    {
+        const Floats depth = side < 0.0 ? at.x.z : hn::Sub(hn::Set(floats, m_medium.thickness), at.x.z);
+        const Floats beyond = hn::Max(hn::Sub(depth, broadcast(rare_exit_distance)), hn::Zero(floats));
+        const FloatMask chosen = hn::And(mask, hn::Lt(random.uniform(), hn::Exp(floats, hn::Neg(beyond))));
+        if (hn::AllFalse(floats, chosen))
+            return;
+        const Floats sin2 = hn::Mul(broadcast(m_plan.exit_cone), random.uniform());
+        const Floats cos_theta = hn::Sqrt(hn::Sub(broadcast(1.0), sin2));
+        const Floats sin_theta = hn::Sqrt(sin2);
+        const SinCos azimuth = random_azimuth(random);
+        const Vectors w{hn::Mul(sin_theta, azimuth.cosine), hn::Mul(sin_theta, azimuth.sine),
+                        hn::Mul(broadcast(side), cos_theta)};
+        const Floats phase = m_medium.phase.pdf(dot(before, w));
+        const Floats to_boundary = hn::Div(depth, cos_theta);
+        const Floats balanced = hn::Div(phase, hn::Add(phase, connection_pdf(w.z)));
+        const Floats probability = hn::Mul(balanced, hn::Exp(floats, hn::Sub(beyond, to_boundary)));
+        const Floats rare = broadcast(rare_exit);
+        const FloatMask tallied = hn::And(chosen, hn::Lt(hn::Mul(random.uniform(), rare), probability));
+        const Floats transmittance = hn::Sub(broadcast(1.0), m_medium.boundary.reflectance(cos_theta));
+        tally(tallied, at, w, to_boundary, hn::Mul(hn::Mul(at.weight, transmittance), hn::Max(probability, rare)));
+    }
+
+    const WalkJob& m_job;
+    PacketMedium m_medium;
+    WalkPlan m_plan;
+    PacketTally m_tally;
+    PhotonPool m_pool;
+    RandomState m_random{};
+    std::size_t m_batch = 0;
+    std::uint64_t m_started = 0;  // photons of the batch
+    std::uint64_t m_unreported = 0;  // photons
+};
+
+void walk_packets(const WalkJob& job)
+{
+    PacketWalk(job).run();
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace beamspread
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace beamspread {
+
+namespace {
+
+void walk_scalar(const WalkJob& job)
+{
+    for (std::size_t b = 0; b < job.photons.size(); ++b) {
+        Random random(job.seed, job.stream, job.first_batch + b);
+        SideTallies& tallies = job.tallies[b / job.batches_per_tally];
+        SideWeights before;
+        for (std::size_t side = 0; side < side_count; ++side)
+            before[side] = tallies[side].weight;
+        for (std::uint64_t done = 0; done < job.photons[b];) {
+            const std::uint64_t block = std::min(photons_per_progress, job.photons[b] - done);
+            for (std::uint64_t i = 0; i < block; ++i)
+                walk_photon(job.medium, job.theta_inside, random, tallies);
+            done += block;
+            job.progress.advance(static_cast<double>(block));
+        }
+        for (std::size_t side = 0; side < side_count; ++side)
+            std::transform(tallies[side].weight.begin(), tallies[side].weight.end(), before[side].begin(),
+                           job.weights[b][side].begin(), std::minus{});
+    }
+}
+
+}  // namespace
+
+std::vector<WalkKernel> walk_kernels()
+{
+    std::vector<WalkKernel> kernels;
+    [[maybe_unused]] const std::int64_t supported = hwy::SupportedTargets();
+#if HWY_TARGETS & HWY_AVX3
+    if (supported & HWY_AVX3)
+        kernels.push_back({"avx512", N_AVX3::walk_packets});
+#endif
+#if HWY_TARGETS & HWY_AVX2
+    if (supported & HWY_AVX2)
+        kernels.push_back({"avx2", N_AVX2::walk_packets});
+#endif
+#if HWY_TARGETS & HWY_SSE4
+    if (supported & HWY_SSE4)
+        kernels.push_back({"sse4", N_SSE4::walk_packets});
+#endif
+    kernels.push_back({"scalar", walk_scalar});
+    return kernels;
+}
+
+}  // namespace beamspread
+#endif

@@ -1,0 +1,52 @@
+// What every implementation of the photon walk agrees on: which exits are tallied how, and when a walk is given up.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+
+#include "medium/medium.h"
+#include "transport/tally/bins.h"
+
+namespace beamspread {
+
+struct WalkPlan {
+    explicit WalkPlan(const Medium& medium) : exit_cone(1.0 / (medium.ior * medium.ior))
+    {
+        // Scatterings that change the direction as much as one isotropic one.
+        const double transport = 1.0 / (1.0 - std::max(0.0, medium.g));
+        last_expected_order = 1 + static_cast<std::uint32_t>(0.2 * transport);
+        first_roulette = static_cast<std::uint32_t>(8.0 * medium.ior * medium.ior * transport);
+    }
+
+    // Squared sine of the half angle of the cone that can leave.
+    double exit_cone;
+
+    // Up to this order exits are tallied at their expected value at every flight, and sampled by connections too: a
+    // forward-peaked phase function seldom sends such light back to the surface. Beyond it the exits that happen are
+    // tallied, because the sum of the expected ones along a walk varies more than the one that ends it.
+    std::uint32_t last_expected_order;
+
+    // A walk that outlives 2^k first_roulette scatterings goes on with a certain probability at each k. Internal
+    // reflection keeps light inside for longer.
+    std::uint32_t first_roulette;
+};
+
+// Every photon goes on from its last expected exit as this many walks with an equal part of its weight: after so few
+// scatterings next to nothing is decided yet of where it will leave, and those are not walked again for each.
+inline constexpr std::size_t late_walks = 4;
+
+// In a half-space the chance to be still inside falls like order^-1/2. Giving up as many again makes each octave
+// of orders cost the same and add the same variance.
+inline constexpr double roulette_survival = 0.70710678118654752;
+
+// Orders beyond this matter to albedos above .9999 only, and would take most of the time if every octave took the same.
+inline constexpr std::uint32_t last_common_order = 1u << 13;
+inline constexpr double late_roulette_survival = 0.5;
+
+// Exits less likely than this are tallied at random with this weight: unbiased, and the many deep
+// flights that have next to no chance to leave cost one comparison.
+inline constexpr double rare_exit = 0.02;
+inline constexpr double rare_exit_distance = 3.912023005428146;  // exp of its negative is rare_exit
+
+}  // namespace beamspread
