@@ -3,7 +3,6 @@
 import numpy as np
 
 from .._load import native
-from .progress import stages
 
 
 def convolve(
@@ -89,8 +88,8 @@ def convolve_lights(
 ):
     """Luminance of several lights together.
 
-    The sum of what `convolve` gives for each; but `fft` spreads all lights of changing direction at once, so that
-    two lamps cost little more than one.
+    The sum of what `convolve` gives for each; but `fft` adds all lights up to the same moments of the direction, so that
+    it transforms hardly more for many lights than for one.
 
     Parameters
     ----------
@@ -102,14 +101,22 @@ def convolve_lights(
     float32, shape (H, W, 3)
         Luminance, radiance in W/(m^2 sr).
     """
-    arrays = [(_irradiance(irradiance), _float_array("direction", direction)) for irradiance, direction in lights]
-    sources = _sources(ldf, interpolation)
-    rest = sources, _rgb("albedo", albedo), _rgb("mean_free_path", mean_free_path), _pair("pitch", pitch)
-    numbers = float(tolerance), int(threads)
-    if solver == "fft" or len(arrays) < 2:
-        return native.convolve(arrays, *rest, solver, *numbers, progress)
-    parts = stages(progress, [1.0] * len(arrays))
-    return sum(native.convolve([light], *rest, solver, *numbers, part) for light, part in zip(arrays, parts))
+    beams = [
+        light
+        for irradiance, direction in lights
+        for light in native.Light.of_channels(_irradiance(irradiance), _float_array("direction", direction), 3)
+    ]
+    return native.convolve(
+        beams,
+        _sources(ldf, interpolation),
+        _rgb("albedo", albedo),
+        _rgb("mean_free_path", mean_free_path),
+        _pair("pitch", pitch),
+        solver,
+        float(tolerance),
+        int(threads),
+        progress,
+    )
 
 
 def _irradiance(values):
@@ -150,7 +157,8 @@ def adaptive_beams(irradiance, direction, pitch=1.0, tolerance=1e-3):
     if light.ndim != 2:
         raise ValueError(f"argument 'irradiance' is of shape {light.shape}; allowed: (H, W)")
     pitch_x, pitch_y = _pair("pitch", pitch)
-    squares, mean = native.adaptive_beams(light, _float_array("direction", direction), float(tolerance))
+    beams = native.Light(light, _float_array("direction", direction), (1.0,))
+    squares, mean = native.adaptive_beams(beams, float(tolerance))
     beams = np.empty(len(squares), BEAM)
     beams["row"], beams["column"], beams["size"] = squares.T
     beams["power"] = mean * beams["size"] ** 2 * pitch_x * pitch_y

@@ -1,6 +1,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -8,7 +9,7 @@
 #include "base/error.h"
 #include "python/casters.h"
 #include "solve/adaptive/mask_pyramid.h"
-#include "solve/problem/problem.h"
+#include "solve/solve.h"
 
 namespace beamspread {
 
@@ -19,50 +20,81 @@ std::string shape_text(const py::array& array)
     return "of shape " + py::str(array.attr("shape")).cast<std::string>();
 }
 
-Problem grid_problem(const Array<float>& irradiance, std::size_t channels)
+// Of any strides: channels of an array are looked at where they are.
+using Plane2D = py::array_t<float, 0>;
+
+// A light and the arrays that it looks at.
+struct HeldLight {
+    Light light;
+    std::vector<py::object> arrays;
+};
+
+std::size_t side(const py::array& array, py::ssize_t axis)
 {
-    const py::ssize_t rank = irradiance.ndim();
-    if (rank != 2 && !(rank == 3 && irradiance.shape(2) == static_cast<py::ssize_t>(channels)))
-        reject("irradiance", shape_text(irradiance), "(H, W) or (H, W, channels)");
-    Problem problem;
-    problem.height = static_cast<std::size_t>(irradiance.shape(0));
-    problem.width = static_cast<std::size_t>(irradiance.shape(1));
-    problem.channels.resize(channels);
-    const std::size_t stride = rank == 3 ? channels : 1;
-    for (std::size_t c = 0; c < channels; ++c)
-        problem.channels[c].irradiance = {irradiance.data() + (rank == 3 ? c : 0), problem.height, problem.width,
-                                          static_cast<std::ptrdiff_t>(stride * problem.width),
-                                          static_cast<std::ptrdiff_t>(stride)};
-    return problem;
+    return static_cast<std::size_t>(array.shape(axis));
 }
 
-Array<float> interleaved(const Luminance& luminance, std::size_t height, std::size_t width)
+View2D<const float> channel_view(const Plane2D& irradiance, py::ssize_t channel)
 {
-    const std::size_t channels = luminance.size();
-    Array<float> result({height, width, channels});
-    float* out = result.mutable_data();
-    for (std::size_t c = 0; c < channels; ++c)
-        for (std::size_t i = 0; i < luminance[c].size(); ++i)
-            out[i * channels + c] = luminance[c][i];
-    return result;
+    const auto stride = [&](py::ssize_t axis) {
+        return irradiance.strides(axis) / static_cast<py::ssize_t>(sizeof(float));
+    };
+    const py::ssize_t first = irradiance.ndim() == 3 ? channel * stride(2) : 0;
+    return {irradiance.data() + first, side(irradiance, 0), side(irradiance, 1), stride(0), stride(1)};
 }
 
-void set_directions(Problem& problem, const Array<float>& direction)
+Directions directions_of(const Array<float>& direction, const View2D<const float>& irradiance)
 {
-    const auto height = static_cast<py::ssize_t>(problem.height);
-    const auto width = static_cast<py::ssize_t>(problem.width);
     if (direction.ndim() == 1 && direction.shape(0) == 3)
-        problem.directions.uniform = Vec3(direction.at(0), direction.at(1), direction.at(2));
-    else if (direction.ndim() == 3 && direction.shape(0) == height && direction.shape(1) == width &&
-             direction.shape(2) == 3)
-        problem.directions.field = direction.data();
-    else
-        reject("direction", shape_text(direction), "(3,) or (H, W, 3) like irradiance");
+        return OneDirection{Vec3(direction.at(0), direction.at(1), direction.at(2))};
+    if (direction.ndim() == 3 && side(direction, 0) == irradiance.height && side(direction, 1) == irradiance.width &&
+        direction.shape(2) == 3)
+        return PerTexel{direction.data()};
+    reject("direction", shape_text(direction), "(3,) or (H, W, 3) like irradiance");
 }
 
-using Light = std::pair<Array<float>, Array<float>>;  // irradiance and direction
+Solver solver_named(const std::string& name)
+{
+    for (const auto& [known, solver] :
+         {std::pair{"fft", Solver::fft}, {"direct", Solver::direct}, {"adaptive", Solver::adaptive}})
+        if (name == known)
+            return solver;
+    reject("solver", "'" + name + "'", "'fft', 'direct', 'adaptive'");
+}
 
-Array<float> convolve(const std::vector<Light>& lights, const std::vector<std::shared_ptr<LdfSource>>& ldf,
+HeldLight point_light(const Plane2D& irradiance, std::array<double, 3> position, const std::vector<double>& color)
+{
+    if (irradiance.ndim() != 2)
+        reject("irradiance", shape_text(irradiance), "(H, W)");
+    const Vec3 from(position[0], position[1], position[2]);
+    return {{channel_view(irradiance, 0), FromPoint{from}, color}, {irradiance}};
+}
+
+HeldLight light_of(const Plane2D& irradiance, const Array<float>& direction, const std::vector<double>& color)
+{
+    if (irradiance.ndim() != 2)
+        reject("irradiance", shape_text(irradiance), "(H, W)");
+    const View2D<const float> view = channel_view(irradiance, 0);
+    return {{view, directions_of(direction, view), color}, {irradiance, direction}};
+}
+
+std::vector<HeldLight> lights_of(const Plane2D& irradiance, const Array<float>& direction, std::size_t channels)
+{
+    const bool apart = irradiance.ndim() == 3 && side(irradiance, 2) == channels;
+    if (irradiance.ndim() != 2 && !apart)
+        reject("irradiance", shape_text(irradiance), "(H, W) or (H, W, channels)");
+    std::vector<View2D<const float>> views;
+    for (std::size_t c = 0; c < (apart ? channels : 1); ++c)
+        views.push_back(channel_view(irradiance, static_cast<py::ssize_t>(c)));
+    std::vector<HeldLight> held;
+    for (Light& light : lights_of_channels(views, directions_of(direction, views.front()))) {
+        light.color.resize(channels, 1.0);
+        held.push_back({std::move(light), {irradiance, direction}});
+    }
+    return held;
+}
+
+Array<float> convolve(const std::vector<const HeldLight*>& lights, const std::vector<std::shared_ptr<LdfSource>>& ldf,
                       const std::vector<double>& albedo, const std::vector<double>& mean_free_path,
                       std::array<double, 2> pitch, const std::string& solver, double tolerance, int threads,
                       const py::object& progress, std::size_t memory, std::size_t coarsening)
@@ -70,99 +102,89 @@ Array<float> convolve(const std::vector<Light>& lights, const std::vector<std::s
     const std::size_t channels = albedo.size();
     if (ldf.size() != channels || mean_free_path.size() != channels)
         reject("ldf", "of another number of channels than albedo", "one per channel");
-    if (lights.empty())
-        reject("lights", "empty", "at least one light");
-    std::vector<Problem> problems;
-    for (const auto& [irradiance, direction] : lights) {
-        Problem& problem = problems.emplace_back(grid_problem(irradiance, channels));
-        if (problem.height != problems.front().height || problem.width != problems.front().width)
-            reject("irradiance", shape_text(irradiance), "the same shape for all lights");
-        set_directions(problem, direction);
-        problem.pitch_x = pitch[0];
-        problem.pitch_y = pitch[1];
-        problem.tolerance = tolerance;
-        problem.threads = threads;
-        problem.memory = memory;
-        problem.coarsening = coarsening;
-        for (std::size_t c = 0; c < channels; ++c) {
-            problem.channels[c].library = ldf[c].get();
-            problem.channels[c].albedo = albedo[c];
-            problem.channels[c].mean_free_path = mean_free_path[c];
-        }
-    }
-    const Problem& first = problems.front();
+    Problem problem;
+    problem.solver = solver_named(solver);
+    problem.tolerance = tolerance;
+    problem.threads = threads;
+    problem.memory = memory;
+    problem.coarsening = coarsening;
+    for (const HeldLight* held : lights)
+        problem.lights.push_back(held->light);
+    if (!lights.empty())
+        problem.plane = {lights.front()->light.irradiance.width, lights.front()->light.irradiance.height, pitch[0],
+                         pitch[1]};
+    for (std::size_t c = 0; c < channels; ++c)
+        problem.channels.push_back({ldf[c].get(), albedo[c], mean_free_path[c]});
     Progress report(progress_callback(progress));
-    if (solver == "fft") {
-        Array<float> luminance({first.height, first.width, channels});
-        float* data = luminance.mutable_data();
-        const py::gil_scoped_release release;
-        solve_fft(problems, report, data);
-        add_unscattered(problems, data);
-        return luminance;
-    }
-    if (solver != "direct" && solver != "adaptive")
-        reject("solver", "'" + solver + "'", "'fft', 'direct', 'adaptive'");
-    if (problems.size() > 1)
-        reject("lights", static_cast<double>(problems.size()), "one, except for the solver 'fft'");
-    Luminance planes;
-    {
-        const py::gil_scoped_release release;
-        planes = solver == "direct" ? solve_direct(first, report) : solve_adaptive(first, report);
-    }
-    Array<float> luminance = interleaved(planes, first.height, first.width);
+    Array<float> luminance({problem.plane.height, problem.plane.width, channels});
     float* data = luminance.mutable_data();
     const py::gil_scoped_release release;
-    add_unscattered(problems, data);
+    solve(problem, report, data);
     return luminance;
 }
 
 using Squares = std::tuple<Array<std::int64_t>, Array<double>>;
 
-Squares adaptive_beams(const Array<float>& irradiance, const Array<float>& direction, double tolerance)
+Squares adaptive_beams(const HeldLight& light, double tolerance)
 {
-    Problem problem = grid_problem(irradiance, 1);
-    problem.tolerance = tolerance;
-    set_directions(problem, direction);
+    const View2D<const float>& irradiance = light.light.irradiance;
+    const Plane plane{irradiance.width, irradiance.height};
     std::vector<Square> squares;
     {
         const py::gil_scoped_release release;
-        validate(problem);
-        squares = even_squares(problem, problem.channels[0].irradiance);
+        validate(Problem{
+            plane, std::vector<ChannelMedium>(light.light.color.size()), {light.light}, Solver::adaptive, tolerance});
+        squares = even_squares(plane, light.light, tolerance);
     }
     const auto count = static_cast<py::ssize_t>(squares.size());
     Array<std::int64_t> places({count, py::ssize_t{3}});
-    Array<double> light(count);
+    Array<double> power(count);
     std::int64_t* place = places.mutable_data();
-    double* mean = light.mutable_data();
+    double* mean = power.mutable_data();
     for (const Square& square : squares) {
         *place++ = static_cast<std::int64_t>(square.y);
         *place++ = static_cast<std::int64_t>(square.x);
         *place++ = static_cast<std::int64_t>(square.size);
         *mean++ = square.irradiance;
     }
-    return {places, light};
+    return {places, power};
 }
 
 }  // namespace
 
 void bind_solve(py::module_& m)
 {
+    py::class_<HeldLight>(m, "Light", R"(What arrives on a plane from one light, and what is known of where from.
+
+Parameters
+----------
+irradiance : ndarray, float32, shape (H, W)
+    W/m^2 where the colour is 1, cosine and visibility included; not copied.
+direction : ndarray, float32, shape (3,) or (H, W, 3)
+    Unit vectors of travel in the plane frame, z < 0: one for all texels, or one for each; not copied.
+color : sequence of float
+    Factor of the irradiance in each channel.
+)")
+        .def(py::init(&light_of), py::arg("irradiance"), py::arg("direction"), py::arg("color"))
+        .def_static("from_point", &point_light, py::arg("irradiance"), py::arg("position"), py::arg("color"),
+                    "All light comes from one position: x, y, z > 0 in metres from the outer corner of texel (0, 0).")
+        .def_static("of_channels", &lights_of, py::arg("irradiance"), py::arg("direction"), py::arg("channels"),
+                    "Lights for irradiance (H, W) or (H, W, channels): one where channels differ by a factor, else one "
+                    "for each.");
     m.def("convolve", &convolve, py::arg("lights"), py::arg("ldf"), py::arg("albedo"), py::arg("mean_free_path"),
           py::arg("pitch"), py::arg("solver"), py::arg("tolerance"), py::arg("threads"), py::arg("progress"),
           py::arg("memory") = Problem().memory, py::arg("coarsening") = Problem().coarsening,
-          R"(Luminance of beams on a grid; the engine behind `beamspread.convolve`.
+          R"(Luminance of lights on a grid; the engine behind `beamspread.convolve`.
 
-Lights are pairs of irradiance, float32 (H, W) or (H, W, C) in W/m^2, and direction, float32 (3,) or (H, W, 3); C
-libraries, albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr).
+C libraries, albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr).
 `memory`: bytes that the spectra of the solver 'fft' may take; where the whole plane needs more it is solved in tiles.
 `coarsening`: texels from node to node of the grid on which it spreads light far: 4, 8, 16, ... 64, 1 for no such grid,
 0 for what costs least.
 )");
-    m.def("adaptive_beams", &adaptive_beams, py::arg("irradiance"), py::arg("direction"), py::arg("tolerance"),
+    m.def("adaptive_beams", &adaptive_beams, py::arg("light"), py::arg("tolerance"),
           R"(Squares that the adaptive solver lights by one beam each; the engine behind `beamspread.adaptive_beams`.
 
-irradiance float32 (H, W), direction float32 (3,) or (H, W, 3); returns int64 (N, 3) of row, column and size, and
-float64 (N,) mean irradiance.
+Returns int64 (N, 3) of row, column and size, and float64 (N,) mean irradiance.
 )");
 }
 

@@ -80,12 +80,6 @@ BEAMSPREAD_CLONES void turn(float* __restrict cosine, float* __restrict sine, co
     }
 }
 
-BEAMSPREAD_CLONES void add_fours(float* __restrict sum, const float* values, std::size_t count)
-{
-    for (std::size_t i = 0; i < count; ++i)
-        sum[i] = (values[4 * i] + values[4 * i + 1]) + (values[4 * i + 2] + values[4 * i + 3]);
-}
-
 BEAMSPREAD_CLONES void find_steps(std::uint32_t* __restrict step, float* __restrict part, const float* half_tangent,
                                   float first, float per_step, std::uint32_t steps, std::size_t count)
 {

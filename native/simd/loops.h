@@ -34,9 +34,6 @@ void interpolate(float* result, const float* table, std::size_t stride, const fl
 // (cosine, sine)[i] turned by the angle of (cos_beta, sin_beta)[i]
 void turn(float* cosine, float* sine, const float* cos_beta, const float* sin_beta, std::size_t count);
 
-// sum[i] = the sum of values[4 i] to values[4 i + 3]
-void add_fours(float* sum, const float* values, std::size_t count);
-
 // Where the tables of a function of tan(theta / 2) have that value: after this step, by this part of the next.
 void find_steps(std::uint32_t* step, float* part, const float* half_tangent, float first, float per_step,
                 std::uint32_t steps, std::size_t count);

@@ -1,5 +1,5 @@
-// The adaptive solver: beams of different widths (Manabe et al. 2012, section 3.3), each seen as coarsely as its
-// distance allows.
+#include "solve/adaptive/adaptive.h"
+
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -162,13 +162,15 @@ bool has_power(const LightTerm& term)
 
 class ChannelSolver {
 public:
-    ChannelSolver(const Problem& problem, const Channel& channel, const std::vector<Square>& squares,
+    ChannelSolver(const Plane& plane, const Light& light, const ChannelMedium& medium, double tolerance,
                   Progress& progress)
-        : m_problem(problem),
-          m_channel(channel),
-          m_squares(squares),
+        : m_plane(plane),
+          m_light(light),
+          m_medium(medium),
+          m_tolerance(tolerance),
+          m_squares(even_squares(plane, light, tolerance)),
           m_progress(progress),
-          m_far(problem.height, problem.width)
+          m_far(plane.height, plane.width)
     {
     }
 
@@ -176,9 +178,9 @@ public:
     {
         if (m_squares.empty()) {
             m_progress.advance(1.0);
-            return std::vector<float>(m_problem.height * m_problem.width);
+            return std::vector<float>(m_plane.height * m_plane.width);
         }
-        Grid sum(m_problem.height, m_problem.width);
+        Grid sum(m_plane.height, m_plane.width);
         add_terms(sum);
         const Grid far = m_far.sum();
         std::vector<float> luminance(sum.values.size());
@@ -192,18 +194,18 @@ private:
     void add_terms(Grid& sum)
     {
         // Half a share for directions: what is left out is a root mean square, and a single texel may be farther off.
-        const double kernel_error = 0.5 * tolerance_share * m_problem.tolerance;
-        const LightTerms terms = light_terms({{m_channel.irradiance, m_problem.directions}},
-                                             {{m_channel.library, m_channel.albedo, m_channel.mean_free_path}},
-                                             std::max(m_problem.pitch_x, m_problem.pitch_y), 1e-3 * kernel_error,
-                                             [&](const KernelDecomposition& kernels, const std::vector<LightPyramid>&) {
-                                                 return kernels.within(kernel_error);
-                                             });
+        const double kernel_error = 0.5 * tolerance_share * m_tolerance;
+        Problem problem{m_plane, {m_medium}, {m_light}};
+        problem.lights.front().color = {1.0};
+        const LightTerms terms = light_terms(
+            problem, 1e-3 * kernel_error, [&](const KernelDecomposition& kernels, const Incidence&, const LightTerms&) {
+                return kernels.within(kernel_error);
+            });
         std::vector<TexelKernels> kernels;
         for (const ScaledProfile& profile : terms.profiles)
-            kernels.emplace_back(profile.profile, m_problem.pitch_x / m_channel.mean_free_path,
-                                 m_problem.pitch_y / m_channel.mean_free_path, m_far.reach_y(), m_far.reach_x(),
-                                 near_texels(tolerance_share * m_problem.tolerance));
+            kernels.emplace_back(profile.profile, m_plane.pitch_x / m_medium.mean_free_path,
+                                 m_plane.pitch_y / m_medium.mean_free_path, m_far.reach_y(), m_far.reach_x(),
+                                 near_texels(tolerance_share * m_tolerance));
         KernelTable kernel;
         std::optional<std::size_t> tabulated;  // the term whose kernel that is
         const auto tabulate = [&](std::size_t t) {
@@ -217,13 +219,13 @@ private:
         for (std::size_t t = 0; t < terms.terms.size(); ++t)
             if (has_power(terms.terms[t])) {
                 tabulate(t);
-                power += SummedKernel(kernel, m_problem.height, m_problem.width).power(light(terms, t));
+                power += SummedKernel(kernel, m_plane.height, m_plane.width).power(light(terms, t));
             }
         const auto count = static_cast<double>(terms.terms.size());
         // One direction leaves nothing out: its share goes to distance. The errors of many terms have nothing to do
         // with each other, so that their squares add up.
-        const double allowed = (m_problem.directions.field ? 1.0 : 2.0) * tolerance_share * m_problem.tolerance *
-                               std::max(power, 0.0) / std::sqrt(count);
+        const double allowed = (std::holds_alternative<OneDirection>(m_light.directions) ? 2.0 : 1.0) *
+                               tolerance_share * m_tolerance * std::max(power, 0.0) / std::sqrt(count);
         for (std::size_t t = 0; t < terms.terms.size(); ++t) {
             tabulate(t);
             add_term(sum, light(terms, t), kernel, allowed);
@@ -234,13 +236,11 @@ private:
     // Light of one term on the plane.
     Grid light(const LightTerms& terms, std::size_t index) const
     {
-        Grid grid(m_problem.height, m_problem.width);
+        Grid grid(m_plane.height, m_plane.width);
         parallel_for(grid.height, [&](std::size_t y) {
-            std::vector<float> row(grid.width);
             TermRow texels;
-            texels.start(terms, {y, 0, grid.width});
-            texels.evaluate(terms, index, row.data());
-            std::copy(row.begin(), row.end(), grid.row(y));
+            texels.start(terms, {y, 0, grid.width}, index, 1);
+            std::copy_n(texels.values(index), grid.width, grid.row(y));
         });
         return grid;
     }
@@ -260,37 +260,26 @@ private:
         m_far.add(kernel, std::move(light), share * allowed_error);
     }
 
-    const Problem& m_problem;
-    const Channel& m_channel;
-    const std::vector<Square>& m_squares;
+    const Plane& m_plane;
+    const Light& m_light;
+    const ChannelMedium& m_medium;
+    double m_tolerance;
+    std::vector<Square> m_squares;
     Progress& m_progress;
     FarField m_far;
 };
 
 }  // namespace
 
-std::vector<Square> even_squares(const Problem& problem, const View2D<const float>& irradiance)
+std::vector<Square> even_squares(const Plane& plane, const Light& light, double tolerance)
 {
-    return MaskPyramid(problem, irradiance).squares(tolerance_share * problem.tolerance);
+    return MaskPyramid(plane, light).squares(tolerance_share * tolerance);
 }
 
-Luminance solve_adaptive(const Problem& problem, Progress& progress)
+std::vector<float> solve_adaptive(const Plane& plane, const Light& light, const ChannelMedium& medium, double tolerance,
+                                  Progress& progress)
 {
-    validate(problem);
-    progress.set_total(static_cast<double>(problem.channels.size()));
-    Luminance luminance;
-    with_threads(problem.threads, [&] {
-        std::vector<Square> squares;
-        const float* searched = nullptr;
-        for (const Channel& channel : problem.channels) {
-            if (channel.irradiance.data != searched)
-                squares = even_squares(problem, channel.irradiance);
-            searched = channel.irradiance.data;
-            luminance.push_back(ChannelSolver(problem, channel, squares, progress).solve());
-        }
-    });
-    progress.finish();
-    return luminance;
+    return ChannelSolver(plane, light, medium, tolerance, progress).solve();
 }
 
 }  // namespace beamspread

@@ -2,18 +2,15 @@
 
 #include <algorithm>
 
-#include "solve/problem/directions.h"
-
 namespace beamspread {
 
-MaskPyramid::MaskPyramid(const Problem& problem, const View2D<const float>& irradiance)
-    : m_height(problem.height), m_width(problem.width)
+MaskPyramid::MaskPyramid(const Plane& plane, const Light& light) : m_height(plane.height), m_width(plane.width)
 {
     Level texels{m_height, m_width, std::vector<Cell>(m_height * m_width)};
     for (std::size_t y = 0; y < m_height; ++y)
         for (std::size_t x = 0; x < m_width; ++x) {
-            const float value = irradiance(y, x);
-            const Vec3f direction(direction_at(problem, y, x));
+            const float value = light.irradiance(y, x);
+            const Vec3f direction(value > 0.0f ? glm::normalize(travel_at(plane, light.directions, y, x)) : Vec3(0.0));
             texels.cells[y * m_width + x] = {value, value, static_cast<double>(value), direction, direction};
         }
     m_levels.push_back(std::move(texels));

@@ -20,7 +20,7 @@ struct Square {
 // plane's border it is dark, so that a square across the border is never wholly lit.
 class MaskPyramid {
 public:
-    MaskPyramid(const Problem& problem, const View2D<const float>& irradiance);
+    MaskPyramid(const Plane& plane, const Light& light);
 
     // The largest squares, searched from the top, that are wholly lit and even: no texel's irradiance is farther
     // from the square's mean than `tolerance` times its own, and no two directions in it differ by more than
@@ -51,7 +51,7 @@ private:
     std::vector<Level> m_levels;  // 0: texels
 };
 
-// The beams of the adaptive solver, which may use up a share of the problem's tolerance.
-std::vector<Square> even_squares(const Problem& problem, const View2D<const float>& irradiance);
+// The beams of the adaptive solver, which may use up a share of the tolerance.
+std::vector<Square> even_squares(const Plane& plane, const Light& light, double tolerance);
 
 }  // namespace beamspread

@@ -2,17 +2,15 @@
 
 #include <cmath>
 
-#include "solve/problem/directions.h"
-
 namespace beamspread {
 
-BeamBasis BeamBasis::uniform(const Problem& problem)
+BeamBasis BeamBasis::uniform(const Vec3& travel)
 {
     BeamBasis basis;
     basis.m_node_count = 1;
-    const double angle = incidence_deg(problem.directions.uniform);
-    basis.m_profiles = [angle](const Channel& channel) {
-        return std::vector{channel.library->profile(angle, channel.albedo, Side::reflected)};
+    const double angle = incidence_deg(travel);
+    basis.m_profiles = [angle](const ChannelMedium& medium) {
+        return std::vector{medium.ldf->profile(angle, medium.albedo, Side::reflected)};
     };
     basis.m_weights = [](const Vec3&) { return Weights{{1.0}, {1.0}, {0, 0}}; };
     return basis;
@@ -22,19 +20,19 @@ BeamBasis BeamBasis::library_nodes(const LdfSource& library)
 {
     BeamBasis basis;
     basis.m_node_count = library.node_count();
-    basis.m_profiles = [](const Channel& channel) {
-        return channel.library->node_profiles(channel.albedo, Side::reflected);
+    basis.m_profiles = [](const ChannelMedium& medium) {
+        return medium.ldf->node_profiles(medium.albedo, Side::reflected);
     };
     basis.m_weights = [&library](const Vec3& direction) { return library.angle_weights(incidence_deg(direction)); };
     return basis;
 }
 
-QuadrantKernel::QuadrantKernel(const RadialProfile& profile, const Problem& problem, const Channel& channel)
-    : m_width(problem.width), m_texels(problem.width * problem.height)
+QuadrantKernel::QuadrantKernel(const RadialProfile& profile, const Plane& plane, const ChannelMedium& medium)
+    : m_width(plane.width), m_texels(plane.width * plane.height)
 {
-    const double px = problem.pitch_x / channel.mean_free_path;
-    const double py = problem.pitch_y / channel.mean_free_path;
-    m_integrals = integrate_texels(profile, {-0.5 * px, -0.5 * py, px, py, problem.width, problem.height});
+    const double px = plane.pitch_x / medium.mean_free_path;
+    const double py = plane.pitch_y / medium.mean_free_path;
+    m_integrals = integrate_texels(profile, {-0.5 * px, -0.5 * py, px, py, plane.width, plane.height});
 }
 
 void QuadrantKernel::row(std::ptrdiff_t dy, const Harmonics& cosine, const Harmonics& sine,

@@ -19,15 +19,15 @@ public:
     using Weights = LdfSource::AngleWeights;
 
     // One direction for the whole grid: one node.
-    static BeamBasis uniform(const Problem& problem);
+    static BeamBasis uniform(const Vec3& travel);
 
     // The library's own nodes: exact.
     static BeamBasis library_nodes(const LdfSource& library);
 
     std::size_t node_count() const { return m_node_count; }
 
-    // Radial profiles of the nodes for a channel.
-    std::vector<RadialProfile> profiles(const Channel& channel) const { return m_profiles(channel); }
+    // Radial profiles of the nodes for a medium.
+    std::vector<RadialProfile> profiles(const ChannelMedium& medium) const { return m_profiles(medium); }
 
     // Weights of the nodes for the beam at a texel.
     Weights weights(const Vec3& direction) const { return m_weights(direction); }
@@ -36,7 +36,7 @@ private:
     BeamBasis() = default;
 
     std::size_t m_node_count = 0;
-    std::function<std::vector<RadialProfile>(const Channel&)> m_profiles;
+    std::function<std::vector<RadialProfile>(const ChannelMedium&)> m_profiles;
     std::function<Weights(const Vec3&)> m_weights;
 };
 
@@ -44,7 +44,7 @@ private:
 // the beam enters; the other quadrants follow by symmetry.
 class QuadrantKernel {
 public:
-    QuadrantKernel(const RadialProfile& profile, const Problem& problem, const Channel& channel);
+    QuadrantKernel(const RadialProfile& profile, const Plane& plane, const ChannelMedium& medium);
 
     std::size_t harmonics() const { return m_integrals.harmonics; }
 

@@ -1,4 +1,5 @@
-// The direct solver: one beam per lit texel, one kernel value per pair of texels.
+#include "solve/direct/direct.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -6,7 +7,6 @@
 #include "base/threads.h"
 #include "simd/loops.h"
 #include "solve/direct/beam_basis.h"
-#include "solve/problem/directions.h"
 
 namespace beamspread {
 
@@ -22,12 +22,13 @@ struct Term {
 };
 
 // The combinations of node, harmonic and phase whose kernels are kept apart: one for a uniform direction.
-std::vector<Term> basis_terms(const Problem& problem, const std::vector<QuadrantKernel>& kernels)
+std::vector<Term> basis_terms(const Light& light, const std::vector<QuadrantKernel>& kernels)
 {
     std::vector<Term> terms;
-    if (!problem.directions.field) {
+    const auto* one = std::get_if<OneDirection>(&light.directions);
+    if (one != nullptr) {
         Term term{0, {}, {}};
-        const double beta = azimuth(problem.directions.uniform);
+        const double beta = azimuth(one->travel);
         for (std::size_t m = 0; m < kernels[0].harmonics(); ++m) {
             term.cosine[m] = std::cos(static_cast<double>(m) * beta);
             term.sine[m] = std::sin(static_cast<double>(m) * beta);
@@ -50,10 +51,11 @@ std::vector<Term> basis_terms(const Problem& problem, const std::vector<Quadrant
 }
 
 // Factors of the terms for the beam at one texel, in the order of basis_terms.
-std::vector<double> beam_factors(const Problem& problem, const BeamBasis& basis,
-                                 const std::vector<RadialProfile>& profiles, const Vec3& direction)
+std::vector<double> beam_factors(const Light& light, const BeamBasis& basis, const std::vector<RadialProfile>& profiles,
+                                 const Vec3& direction)
 {
-    if (!problem.directions.field)
+    const auto* one = std::get_if<OneDirection>(&light.directions);
+    if (one != nullptr)
         return {1.0};
     const BeamBasis::Weights weights = basis.weights(direction);
     const std::size_t harmonics = weights.harmonics(profiles);
@@ -75,17 +77,19 @@ struct Beam {
     std::vector<double> factors;  // irradiance included
 };
 
-std::vector<float> solve_channel(const Problem& problem, const Channel& channel, Progress& progress)
+}  // namespace
+
+std::vector<float> solve_direct(const Plane& plane, const Light& light, const ChannelMedium& medium, Progress& progress)
 {
-    const BeamBasis basis =
-        problem.directions.field ? BeamBasis::library_nodes(*channel.library) : BeamBasis::uniform(problem);
-    const std::vector<RadialProfile> profiles = basis.profiles(channel);
+    const auto* one = std::get_if<OneDirection>(&light.directions);
+    const BeamBasis basis = one != nullptr ? BeamBasis::uniform(one->travel) : BeamBasis::library_nodes(*medium.ldf);
+    const std::vector<RadialProfile> profiles = basis.profiles(medium);
     std::vector<QuadrantKernel> kernels;
     for (const RadialProfile& profile : profiles)
-        kernels.emplace_back(profile, problem, channel);
-    const std::vector<Term> terms = basis_terms(problem, kernels);
+        kernels.emplace_back(profile, plane, medium);
+    const std::vector<Term> terms = basis_terms(light, kernels);
 
-    const auto height = static_cast<std::ptrdiff_t>(problem.height);
+    const auto height = static_cast<std::ptrdiff_t>(plane.height);
     // rows[(dy + height - 1) * terms + k][dx + width - 1]
     std::vector<KernelRow> rows(static_cast<std::size_t>(2 * height - 1) * terms.size());
     parallel_for(rows.size(), [&](std::size_t i) {
@@ -94,49 +98,34 @@ std::vector<float> solve_channel(const Problem& problem, const Channel& channel,
         kernels[term.node].row(dy, term.cosine, term.sine, rows[i]);
     });
 
-    std::vector<std::vector<Beam>> beams(problem.height);
-    parallel_for(problem.height, [&](std::size_t y) {
-        for (std::size_t x = 0; x < problem.width; ++x) {
-            const auto irradiance = static_cast<double>(channel.irradiance(y, x));
+    std::vector<std::vector<Beam>> beams(plane.height);
+    parallel_for(plane.height, [&](std::size_t y) {
+        for (std::size_t x = 0; x < plane.width; ++x) {
+            const auto irradiance = static_cast<double>(light.irradiance(y, x));
             if (irradiance == 0.0)
                 continue;
-            Beam beam{x, beam_factors(problem, basis, profiles, direction_at(problem, y, x))};
+            Beam beam{x, beam_factors(light, basis, profiles, travel_at(plane, light.directions, y, x))};
             for (double& factor : beam.factors)
                 factor *= irradiance;
             beams[y].push_back(std::move(beam));
         }
     });
 
-    std::vector<float> luminance(problem.width * problem.height);
-    parallel_for(problem.height, [&](std::size_t target) {
-        std::vector<double> sum(problem.width, 0.0);
-        for (std::size_t source = 0; source < problem.height; ++source) {
-            const std::size_t offset = (target + problem.height - 1 - source) * terms.size();
+    std::vector<float> luminance(plane.width * plane.height);
+    parallel_for(plane.height, [&](std::size_t target) {
+        std::vector<double> sum(plane.width, 0.0);
+        for (std::size_t source = 0; source < plane.height; ++source) {
+            const std::size_t offset = (target + plane.height - 1 - source) * terms.size();
             for (const Beam& beam : beams[source])
                 for (std::size_t k = 0; k < terms.size(); ++k)
                     if (beam.factors[k] != 0.0)
-                        add_scaled(sum.data(), rows[offset + k].data() + (problem.width - 1 - beam.x), beam.factors[k],
-                                   problem.width);
-            progress.advance(1.0 / static_cast<double>(problem.height));
+                        add_scaled(sum.data(), rows[offset + k].data() + (plane.width - 1 - beam.x), beam.factors[k],
+                                   plane.width);
+            progress.advance(1.0 / static_cast<double>(plane.height));
         }
-        for (std::size_t x = 0; x < problem.width; ++x)
-            luminance[target * problem.width + x] = static_cast<float>(inv_pi * sum[x]);
+        for (std::size_t x = 0; x < plane.width; ++x)
+            luminance[target * plane.width + x] = static_cast<float>(inv_pi * sum[x]);
     });
-    return luminance;
-}
-
-}  // namespace
-
-Luminance solve_direct(const Problem& problem, Progress& progress)
-{
-    validate(problem);
-    progress.set_total(static_cast<double>(problem.height * problem.channels.size()));
-    Luminance luminance;
-    with_threads(problem.threads, [&] {
-        for (const Channel& channel : problem.channels)
-            luminance.push_back(solve_channel(problem, channel, progress));
-    });
-    progress.finish();
     return luminance;
 }
 

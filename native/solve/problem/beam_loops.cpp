@@ -55,43 +55,4 @@ BEAMSPREAD_CLONES bool are_beams(const float* irradiance, const float* direction
     return faults == 0;
 }
 
-BEAMSPREAD_CLONES void add_light(float* __restrict sum, float* __restrict x, float* __restrict y, float* __restrict z,
-                                 float* __restrict half_tangent, const float* irradiance, const float* directions,
-                                 std::size_t count)
-{
-    for (std::size_t i = 0; i < count; ++i) {
-        const auto [u, v, w] = travel(directions + 3 * i, irradiance[i]);
-        sum[i] += irradiance[i];
-        x[i] += irradiance[i] * u;
-        y[i] += irradiance[i] * v;
-        z[i] += irradiance[i] * w;
-        half_tangent[i] = std::sqrt(u * u + v * v) / (std::sqrt(u * u + v * v + w * w) - w);
-    }
-}
-
-BEAMSPREAD_CLONES void make_unit(float* __restrict x, float* __restrict y, float* __restrict z,
-                                 float* __restrict length, float* __restrict half_tangent, std::size_t count)
-{
-    for (std::size_t i = 0; i < count; ++i) {
-        length[i] = std::sqrt(x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
-        const float per_length = 1.0f / (length[i] > 0.0f ? length[i] : 1.0f);
-        x[i] *= per_length;
-        y[i] *= per_length;
-        z[i] *= per_length;
-        half_tangent[i] = std::sqrt(x[i] * x[i] + y[i] * y[i]) / (1.0f - z[i]);
-    }
-}
-
-BEAMSPREAD_CLONES void add_lit(float* __restrict texels, float* __restrict first, float* __restrict last,
-                               const float* half_tangent, const float* irradiance, std::size_t count)
-{
-    for (std::size_t i = 0; i < count; ++i) {
-        const bool lit = irradiance[i] != 0.0f;
-        const float least = lit ? half_tangent[i] : 1.0f;
-        texels[i] += lit ? 1.0f : 0.0f;
-        first[i] = least < first[i] ? least : first[i];
-        last[i] = half_tangent[i] > last[i] ? half_tangent[i] : last[i];
-    }
-}
-
 }  // namespace beamspread

@@ -5,8 +5,8 @@
 
 namespace beamspread {
 
-// Azimuths beta and tan(theta / 2) of directions of travel, (x, y, z) after (x, y, z). Where the irradiance is
-// zero the direction may be anything.
+// Azimuths beta and tan(theta / 2) of directions of travel of any length, (x, y, z) after (x, y, z). Where the irradiance
+// is zero the direction may be anything.
 void find_angles(const float* directions, const float* irradiance, float* cos_beta, float* sin_beta,
                  float* half_tangent, std::size_t count);
 
@@ -16,17 +16,5 @@ inline constexpr float unit_tolerance = 2e-3f;
 
 // Whether these are beams: irradiance finite and >= 0, and where it is not zero a unit vector with z < 0.
 bool are_beams(const float* irradiance, const float* directions, std::size_t count);
-
-// Adds light that arrives along `directions`, (x, y, z) after (x, y, z): sum += irradiance, (x, y, z) += irradiance
-// times direction; sets tan(theta / 2). Where the irradiance is zero the direction may be anything.
-void add_light(float* sum, float* x, float* y, float* z, float* half_tangent, const float* irradiance,
-               const float* directions, std::size_t count);
-
-// Makes unit vectors of (x, y, z), zero stays zero, and sets how long they were and tan(theta / 2).
-void make_unit(float* x, float* y, float* z, float* length, float* half_tangent, std::size_t count);
-
-// Counts lit texels and widens the ranges [first, last] of their tan(theta / 2).
-void add_lit(float* texels, float* first, float* last, const float* half_tangent, const float* irradiance,
-             std::size_t count);
 
 }  // namespace beamspread

@@ -3,100 +3,125 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+#include <string>
 
 #include "base/error.h"
 #include "base/threads.h"
 #include "medium/medium.h"
-#include "simd/loops.h"
 #include "solve/problem/beam_loops.h"
 
 namespace beamspread {
 
 namespace {
 
+// Sums over 10^8 texels, and products with kernels, stay in single precision.
+constexpr float most_irradiance = 1e30f;
+
+// Beyond, light is even over any plane, and radii lie outside the tables.
+constexpr double most_paths_per_texel = 1e8;
+
+// Kernels are tabulated in units of the longer side, finely enough for the shorter one.
+constexpr double most_aspect = 1000.0;
+
 bool is_irradiance(float irradiance)
 {
-    return irradiance >= 0.0f && irradiance <= std::numeric_limits<float>::max();
-}
-
-bool is_unit(float x, float y, float z)
-{
-    return std::abs(x * x + y * y + z * z - 1.0f) < unit_tolerance;
+    return irradiance >= 0.0f && irradiance <= most_irradiance;
 }
 
 void check_direction(const Vec3& d)
 {
-    if (!is_unit(static_cast<float>(d.x), static_cast<float>(d.y), static_cast<float>(d.z)))
+    if (!(std::abs(glm::dot(d, d) - 1.0) < static_cast<double>(unit_tolerance)))
         reject("direction", "of length " + std::to_string(glm::length(d)), "unit vectors of travel");
     if (!(d.z < 0.0))
         reject("direction", "with z = " + std::to_string(d.z), "z < 0: light travels toward the surface");
 }
 
-bool is_row_fine(const View2D<const float>& irradiance, const float* directions, std::size_t y)
+// Per texel, or null.
+const float* field(const Light& light, std::size_t row)
 {
-    if (directions == nullptr) {
-        bool fine = true;
-        for (std::size_t x = 0; x < irradiance.width; ++x)
-            fine &= is_irradiance(irradiance(y, x));
-        return fine;
-    }
+    const auto* found = std::get_if<PerTexel>(&light.directions);
+    return found != nullptr ? found->travel + 3 * row * light.irradiance.width : nullptr;
+}
+
+bool is_row_fine(const Light& light, std::size_t y)
+{
+    const View2D<const float>& irradiance = light.irradiance;
+    const float* directions = field(light, y);
     constexpr std::size_t at_once = 256;
     std::array<float, at_once> values;
+    bool fine = true;
     for (std::size_t x = 0; x < irradiance.width; x += at_once) {
         const std::size_t count = std::min(at_once, irradiance.width - x);
         copy_row(irradiance, y, x, count, values.data());
-        if (!are_beams(values.data(), directions + 3 * (y * irradiance.width + x), count))
-            return false;
+        for (std::size_t i = 0; i < count; ++i)
+            fine &= is_irradiance(values[i]);
+        if (directions != nullptr)
+            fine &= are_beams(values.data(), directions + 3 * x, count);
     }
-    return true;
+    return fine;
 }
 
 // Says what is wrong in a row that is not fine.
-void check_row(const View2D<const float>& irradiance, const float* directions, std::size_t y)
+void check_row(const Light& light, std::size_t y)
 {
+    const View2D<const float>& irradiance = light.irradiance;
     for (std::size_t x = 0; x < irradiance.width; ++x)
         if (!is_irradiance(irradiance(y, x)))
-            reject("irradiance", static_cast<double>(irradiance(y, x)), "finite values >= 0 W/m^2");
-    const float* d = directions + 3 * y * irradiance.width;
-    for (std::size_t x = 0; x < irradiance.width; ++x, d += 3)
-        if (irradiance(y, x) > 0.0f)
-            check_direction(Vec3(d[0], d[1], d[2]));
+            reject("irradiance", static_cast<double>(irradiance(y, x)), "0 to 1e30 W/m^2");
+    if (const float* d = field(light, y); d != nullptr)
+        for (std::size_t x = 0; x < irradiance.width; ++x, d += 3)
+            if (irradiance(y, x) > 0.0f)
+                check_direction(Vec3(d[0], d[1], d[2]));
 }
 
-void check_light(const View2D<const float>& irradiance, const float* directions)
+void check_light(const Problem& problem, const Light& light)
 {
+    const View2D<const float>& irradiance = light.irradiance;
+    if (irradiance.width != problem.plane.width || irradiance.height != problem.plane.height)
+        reject("irradiance", std::to_string(irradiance.height) + " x " + std::to_string(irradiance.width) + " texels",
+               "as many for all lights");
+    if (light.color.size() != problem.channels.size())
+        reject("color", std::to_string(light.color.size()) + " channels", "as many as there are media");
+    for (const double part : light.color)
+        if (!(part >= 0.0 && part <= static_cast<double>(most_irradiance)))
+            reject("color", part, "0 to 1e30");
+    if (const auto* one = std::get_if<OneDirection>(&light.directions))
+        check_direction(one->travel);
+    if (const auto* point = std::get_if<FromPoint>(&light.directions); point != nullptr && !(point->position.z > 0.0))
+        reject("position", point->position.z, "above the plane");
     std::vector<char> fine(irradiance.height);
-    parallel_for(irradiance.height, [&](std::size_t y) { fine[y] = is_row_fine(irradiance, directions, y) ? 1 : 0; });
+    parallel_for(irradiance.height, [&](std::size_t y) { fine[y] = is_row_fine(light, y) ? 1 : 0; });
     for (std::size_t y = 0; y < irradiance.height; ++y)
         if (fine[y] == 0)
-            check_row(irradiance, directions, y);
+            check_row(light, y);
 }
 
 }  // namespace
 
 void validate(const Problem& problem)
 {
-    if (problem.width == 0 || problem.height == 0)
+    const Plane& plane = problem.plane;
+    if (plane.texels() == 0)
         reject("irradiance", "empty", "at least one texel");
-    for (double pitch : {problem.pitch_x, problem.pitch_y})
+    for (const double pitch : {plane.pitch_x, plane.pitch_y})
         if (!(pitch > 0.0 && std::isfinite(pitch)))
             reject("pitch", pitch, "pitch > 0 metres");
+    const auto [shorter, longer] = std::minmax(plane.pitch_x, plane.pitch_y);
+    if (problem.solver == Solver::fft && longer > most_aspect * shorter)
+        reject("pitch", longer / shorter, "sides of a ratio up to 1000 for the solver 'fft'");
     if (!(problem.tolerance > 0.0))
         reject("tolerance", problem.tolerance, "tolerance > 0");
     if (problem.coarsening > 64 || problem.coarsening == 2 || (problem.coarsening & (problem.coarsening - 1)) != 0)
         reject("coarsening", static_cast<double>(problem.coarsening), "0, 1, 4, 8, 16, 32, 64");
-    if (problem.directions.field == nullptr)
-        check_direction(problem.directions.uniform);
-    const float* checked = nullptr;
-    for (const Channel& channel : problem.channels) {
+    for (const ChannelMedium& channel : problem.channels) {
         check_albedo(channel.albedo);
-        if (!(channel.mean_free_path > 0.0 && std::isfinite(channel.mean_free_path)))
-            reject("mean_free_path", channel.mean_free_path, "mean_free_path > 0 metres");
-        if (channel.irradiance.data != checked)
-            with_threads(problem.threads, [&] { check_light(channel.irradiance, problem.directions.field); });
-        checked = channel.irradiance.data;
+        if (!(channel.mean_free_path > 0.0 && channel.mean_free_path <= most_paths_per_texel * shorter))
+            reject("mean_free_path", channel.mean_free_path, "above 0 metres, and up to 1e8 texels");
     }
+    if (problem.lights.empty())
+        reject("lights", "empty", "at least one light");
+    for (const Light& light : problem.lights)
+        check_light(problem, light);
 }
 
 }  // namespace beamspread

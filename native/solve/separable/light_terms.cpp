@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "simd/loops.h"
-#include "solve/problem/beam_loops.h"
-#include "solve/problem/directions.h"
 
 namespace beamspread {
 
@@ -14,8 +14,11 @@ namespace {
 // Texels of a row whose values stay in the cache from step to step.
 constexpr std::size_t texels_at_once = 512;
 
+// Directions that have a term each. A basis for more of them needs hardly more terms than these would be.
+constexpr std::size_t most_fixed_directions = 4;
+
 // Every harmonic of a kernel whose beams travel toward azimuth beta.
-std::vector<KernelTerm> fixed_kernel(std::size_t profile, std::size_t harmonics, double beta)
+std::vector<KernelTerm> fixed_kernel(std::size_t profile, std::size_t harmonics, double beta, double factor)
 {
     std::vector<KernelTerm> kernel;
     for (const std::size_t first : {std::size_t{0}, std::size_t{1}})
@@ -23,125 +26,160 @@ std::vector<KernelTerm> fixed_kernel(std::size_t profile, std::size_t harmonics,
             for (std::size_t m = first; m < harmonics; m += 2)
                 if (m > 0 || phase == Phase::cosine) {
                     const double turned = static_cast<double>(m) * beta;
-                    kernel.push_back({profile, m, phase, phase == Phase::cosine ? std::cos(turned) : std::sin(turned)});
+                    const double part = phase == Phase::cosine ? std::cos(turned) : std::sin(turned);
+                    kernel.push_back({profile, m, phase, factor * part});
                 }
     return kernel;
+}
+
+// The lights of each direction.
+std::vector<std::pair<Vec3, std::vector<std::size_t>>> by_direction(const std::vector<Light>& lights)
+{
+    std::vector<std::pair<Vec3, std::vector<std::size_t>>> groups;
+    for (std::size_t l = 0; l < lights.size(); ++l) {
+        const Vec3 travel = std::get<OneDirection>(lights[l].directions).travel;
+        const auto known =
+            std::find_if(groups.begin(), groups.end(), [&](const auto& group) { return group.first == travel; });
+        if (known == groups.end())
+            groups.push_back({travel, {l}});
+        else
+            known->second.push_back(l);
+    }
+    return groups;
+}
+
+// One direction's profile per medium; one light is transformed once for all its colours, several are added up first.
+void add_direction(LightTerms& terms, const Vec3& travel, const std::vector<std::size_t>& lights, double beyond)
+{
+    const std::size_t first_profile = terms.profiles.size();
+    for (const ChannelMedium& medium : terms.sets.media) {
+        ScaledProfile profile{medium.ldf->profile(incidence_deg(travel), medium.albedo, Side::reflected),
+                              medium.mean_free_path, 0.0};
+        profile.reach = reach(profile.profile, medium.mean_free_path, std::min(beyond, 1e-6));
+        terms.profiles.push_back(std::move(profile));
+    }
+    const bool alone = lights.size() == 1;
+    for (std::size_t set = 0; set < (alone ? 1 : terms.sets.count()); ++set) {
+        LightTerm term;
+        for (const std::size_t l : lights)
+            term.fixed.push_back({l, alone ? 1.0f : static_cast<float>(terms.sets.color(terms.fixed[l], set))});
+        for (const ChannelSets::Result& result : terms.sets.results) {
+            const double factor = alone               ? terms.sets.color(terms.fixed[lights.front()], result.set)
+                                  : result.set == set ? 1.0
+                                                      : 0.0;
+            const std::size_t profile = first_profile + result.medium;
+            term.kernels.emplace_back();
+            if (factor > 0.0)
+                term.kernels.back() =
+                    fixed_kernel(profile, terms.profiles[profile].profile.harmonics(), azimuth(travel), factor);
+        }
+        terms.terms.push_back(std::move(term));
+    }
 }
 
 void add_basis(LightTerms& terms, LowRankBasis basis)
 {
     terms.basis = std::move(basis);
-    std::vector<std::size_t> first_profile;
+    std::vector<std::size_t> first_profile;  // [medium]
     for (const std::vector<ScaledProfile>& profiles : terms.basis.profiles) {
         first_profile.push_back(terms.profiles.size());
         terms.profiles.insert(terms.profiles.end(), profiles.begin(), profiles.end());
     }
     for (std::size_t f = 0; f < terms.basis.functions.size(); ++f) {
         const auto& [m, rank, values] = terms.basis.functions[f];
-        for (const Phase phase : {Phase::cosine, Phase::sine}) {
-            if (m == 0 && phase == Phase::sine)
-                continue;
-            LightTerm term{std::nullopt, f, phase, {}};
-            for (const std::size_t profile : first_profile)
-                term.kernels.push_back({{profile + rank, m, phase, 1.0}});
-            terms.terms.push_back(std::move(term));
-        }
+        for (const Phase phase : {Phase::cosine, Phase::sine})
+            for (std::size_t set = 0; set < terms.sets.count() && (m > 0 || phase == Phase::cosine); ++set) {
+                LightTerm term{{}, f, phase, set, {}};
+                for (const ChannelSets::Result& result : terms.sets.results) {
+                    term.kernels.emplace_back();
+                    if (result.set == set)
+                        term.kernels.back() = {{first_profile[result.medium] + rank, m, phase, 1.0}};
+                }
+                terms.terms.push_back(std::move(term));
+            }
     }
 }
 
 }  // namespace
 
-LightTerms light_terms(const std::vector<LightField>& lights, const std::vector<KernelMedium>& media, double texel,
-                       double beyond, const TermChoice& choose)
+LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& choose)
 {
-    LightTerms result;
-    for (const LightField& light : lights)
-        (light.directions.field != nullptr ? result.changing : result.fixed).push_back(light);
-
-    for (std::size_t l = 0; l < result.fixed.size(); ++l) {
-        LightTerm term{l, 0, Phase::cosine, {}};
-        const Vec3& direction = result.fixed[l].directions.uniform;
-        for (const KernelMedium& medium : media) {
-            ScaledProfile profile{medium.library->profile(incidence_deg(direction), medium.albedo, Side::reflected),
-                                  medium.mean_free_path, 0.0};
-            profile.reach = reach(profile.profile, medium.mean_free_path, std::min(beyond, 1e-6));
-            term.kernels.push_back(
-                fixed_kernel(result.profiles.size(), profile.profile.harmonics(), azimuth(direction)));
-            result.profiles.push_back(std::move(profile));
-        }
-        result.terms.push_back(std::move(term));
+    LightTerms result{problem.plane, ChannelSets(problem), {}, {}, {}, {}, {}, {}};
+    for (const Light& light : problem.lights)
+        (std::holds_alternative<OneDirection>(light.directions) ? result.fixed : result.changing).push_back(light);
+    const auto directions = by_direction(result.fixed);
+    if (directions.size() > most_fixed_directions)
+        result.changing.insert(result.changing.end(), result.fixed.begin(), result.fixed.end());
+    else
+        for (const auto& [travel, lights] : directions)
+            add_direction(result, travel, lights, beyond);
+    for (const Light& light : result.changing) {
+        result.colors.emplace_back();
+        for (std::size_t set = 0; set < result.sets.count(); ++set)
+            result.colors.back().push_back(static_cast<float>(result.sets.color(light, set)));
     }
-    if (result.changing.empty())
+    const Incidence incidence(problem.plane, result.changing);
+    if (incidence.none())
         return result;
-    const std::vector<LightPyramid> pyramids(result.changing.begin(), result.changing.end());
-    AngleCounts angles;
-    for (const LightPyramid& pyramid : pyramids)
-        angles.add(pyramid.angles());
-    const PresentAngles present(angles);
-    if (present.none())
-        return result;
-    const KernelDecomposition kernels(present, media, texel);
-    add_basis(result, kernels.basis(choose(kernels, pyramids), beyond));
+    const KernelDecomposition kernels(incidence, result.sets.media,
+                                      std::max(problem.plane.pitch_x, problem.plane.pitch_y));
+    add_basis(result, kernels.basis(choose(kernels, incidence, result), beyond));
     return result;
 }
 
-void TermRow::start(const LightTerms& terms, const RowSpan& span)
+void TermRow::start(const LightTerms& terms, const RowSpan& span, std::size_t first, std::size_t count)
 {
-    m_span = span;
-    m_lights.resize(terms.basis.functions.empty() ? 0 : terms.changing.size());
-    const LowRankBasis& basis = terms.basis;
-    for (std::size_t l = 0; l < m_lights.size(); ++l) {
-        Light& row = m_lights[l];
-        const LightField& light = terms.changing[l];
-        row.m = 0;
-        row.function.reset();
-        for (auto* values : {&row.part, &row.cos_beta, &row.sin_beta, &row.cosine, &row.sine, &row.u})
-            values->resize(span.width);
-        row.step.resize(span.width);
-        const std::size_t steps = basis.functions.front().values.size() - 1;
-        const double per_step =
-            basis.last > basis.first ? static_cast<double>(steps) / (basis.last - basis.first) : 0.0;
-        for (std::size_t x = 0; x < span.width; x += texels_at_once) {
-            const std::size_t count = std::min(texels_at_once, span.width - x);
-            copy_row(light.irradiance, span.y, span.x + x, count, row.cosine.data() + x);
-            std::fill_n(row.sine.data() + x, count, 0.0f);
-            const float* directions = light.directions.field + 3 * (span.y * light.irradiance.width + span.x + x);
-            find_angles(directions, row.cosine.data() + x, row.cos_beta.data() + x, row.sin_beta.data() + x,
-                        row.u.data() + x, count);
-            find_steps(row.step.data() + x, row.part.data() + x, row.u.data() + x, static_cast<float>(basis.first),
-                       static_cast<float>(per_step), static_cast<std::uint32_t>(steps), count);
+    m_width = span.width;
+    m_first = first;
+    m_values.assign(count * span.width, 0.0f);
+    bool has_moments = false;
+    for (std::size_t t = first; t < first + count; ++t) {
+        has_moments |= terms.terms[t].fixed.empty();
+        for (const auto& [light, weight] : terms.terms[t].fixed) {
+            m_u.resize(span.width);
+            copy_row(terms.fixed[light].irradiance, span.y, span.x, span.width, m_u.data());
+            add_scaled(m_values.data() + (t - first) * m_width, m_u.data(), weight, span.width);
         }
+    }
+    if (!has_moments)
+        return;
+    for (std::size_t x = 0; x < span.width; x += texels_at_once) {
+        const RowSpan part{span.y, span.x + x, std::min(texels_at_once, span.width - x)};
+        for (std::size_t l = 0; l < terms.changing.size(); ++l)
+            if (m_beams.read(terms.plane, terms.changing[l], part))
+                add_moments(terms, {span.y, x, part.width}, terms.colors[l], first + count);
     }
 }
 
-void TermRow::evaluate(const LightTerms& terms, std::size_t t, float* values)
+// Of the beams of one light, to texels [span.x, ...) of the row.
+void TermRow::add_moments(const LightTerms& terms, const RowSpan& span, const std::vector<float>& colors,
+                          std::size_t end)
 {
-    const LightTerm& term = terms.terms[t];
-    if (term.fixed) {
-        copy_row(terms.fixed[*term.fixed].irradiance, m_span.y, m_span.x, m_span.width, values);
-        return;
-    }
-    const LowRankBasis::AngleFunction& function = terms.basis.functions[term.function];
-    for (std::size_t x = 0; x < m_span.width; x += texels_at_once) {
-        const std::size_t count = std::min(texels_at_once, m_span.width - x);
-        for (Light& light : m_lights) {
-            float* cosine = light.cosine.data() + x;
-            float* sine = light.sine.data() + x;
-            float* u = light.u.data() + x;
-            for (std::size_t m = light.m; m < function.m; ++m)
-                turn(cosine, sine, light.cos_beta.data() + x, light.sin_beta.data() + x, count);
-            if (light.function != term.function)
-                look_up(u, function.values.data(), light.step.data() + x, light.part.data() + x, count);
-            const float* by_azimuth = term.phase == Phase::cosine ? cosine : sine;
-            if (&light == m_lights.data())
-                multiply(values + x, u, by_azimuth, count);
-            else
-                add_scaled_product(values + x, u, by_azimuth, 1.0f, count);
-        }
-    }
-    for (Light& light : m_lights) {
-        light.m = function.m;
-        light.function = term.function;
+    const std::size_t count = span.width;
+    m_step.resize(count);
+    for (auto* values : {&m_part, &m_cosine, &m_sine, &m_u})
+        values->resize(count);
+    const LowRankBasis& basis = terms.basis;
+    const std::size_t steps = basis.functions.front().values.size() - 1;
+    const double per_step = basis.last > basis.first ? static_cast<double>(steps) / (basis.last - basis.first) : 0.0;
+    find_steps(m_step.data(), m_part.data(), m_beams.half_tangent.data(), static_cast<float>(basis.first),
+               static_cast<float>(per_step), static_cast<std::uint32_t>(steps), count);
+    std::copy_n(m_beams.irradiance.data(), count, m_cosine.data());
+    std::fill_n(m_sine.data(), count, 0.0f);
+    std::size_t m = 0;
+    std::optional<std::size_t> function;  // that m_u holds
+    for (std::size_t t = m_first; t < end; ++t) {
+        const LightTerm& term = terms.terms[t];
+        if (!term.fixed.empty() || colors[term.set] == 0.0f)
+            continue;
+        const LowRankBasis::AngleFunction& wanted = basis.functions[term.function];
+        for (; m < wanted.m; ++m)
+            turn(m_cosine.data(), m_sine.data(), m_beams.cos_beta.data(), m_beams.sin_beta.data(), count);
+        if (function != term.function)
+            look_up(m_u.data(), wanted.values.data(), m_step.data(), m_part.data(), count);
+        function = term.function;
+        add_scaled_product(m_values.data() + (t - m_first) * m_width + span.x, m_u.data(),
+                           (term.phase == Phase::cosine ? m_cosine : m_sine).data(), colors[term.set], count);
     }
 }
 

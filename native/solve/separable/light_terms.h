@@ -7,67 +7,68 @@
 #include <optional>
 #include <vector>
 
+#include "solve/problem/channel_sets.h"
 #include "solve/separable/kernel_term.h"
-#include "solve/separable/light_pyramid.h"
 #include "solve/separable/low_rank.h"
 
 namespace beamspread {
 
-// Light that one kernel per medium spreads.
+// Light that one kernel per result spreads.
 struct LightTerm {
-    std::optional<std::size_t> fixed;  // one light as it is; none: all lights of changing direction, times
-    std::size_t function = 0;          // this function u(theta) of the basis and cos or sin(m beta)
+    // The sum of some lights of one direction as they are; empty: of all lights of changing directions a moment, the
+    // sum of irradiance, colour in a set, a function u(theta) of the basis, and cos or sin(m beta).
+    struct Share {
+        std::size_t light;
+        float weight;
+    };
+    std::vector<Share> fixed;
+    std::size_t function = 0;
     Phase phase = Phase::cosine;
-    std::vector<std::vector<KernelTerm>> kernels;  // [medium]: sorted, see `KernelSpectra::parts`
+    std::size_t set = 0;
+    std::vector<std::vector<KernelTerm>> kernels;  // [result]: sorted, see `KernelSpectra::parts`; empty: none
 };
 
-// Lights of one group: those of one direction each have a term with all harmonics, the others share a basis.
+// Lights of few directions have a term with all harmonics for each; all others add up to moments of one basis, however
+// many they are.
 struct LightTerms {
-    std::vector<LightField> fixed;
-    std::vector<LightField> changing;
-    LowRankBasis basis;  // of `changing`
+    Plane plane;
+    ChannelSets sets;
+    std::vector<Light> fixed;
+    std::vector<Light> changing;
+    std::vector<std::vector<float>> colors;  // [changing][set]
+    LowRankBasis basis;                      // of `changing`
     std::vector<LightTerm> terms;
     std::vector<ScaledProfile> profiles;
 };
 
 // The terms of a decomposition that the lights of changing direction need.
 using TermChoice =
-    std::function<std::vector<std::size_t>(const KernelDecomposition&, const std::vector<LightPyramid>&)>;
+    std::function<std::vector<std::size_t>(const KernelDecomposition&, const Incidence&, const LightTerms&)>;
 
-// `texel`: its side in metres. Kernels end where all but the fraction `beyond` of their power lies inside; those of one
-// direction no earlier than for a millionth.
-LightTerms light_terms(const std::vector<LightField>& lights, const std::vector<KernelMedium>& media, double texel,
-                       double beyond, const TermChoice& choose);
+// Kernels end where all but the fraction `beyond` of their power lies inside; those of one direction no earlier than for
+// a millionth.
+LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& choose);
 
-// Part of a row of texels.
-struct RowSpan {
-    std::size_t y;
-    std::size_t x;
-    std::size_t width;
-};
-
-// The light of one row, from term to term in their order: what all terms of changing direction share is found once.
+// The light of one row of texels.
 class TermRow {
 public:
-    void start(const LightTerms& terms, const RowSpan& span);
+    // Finds the values of terms [first, first + count).
+    void start(const LightTerms& terms, const RowSpan& span, std::size_t first, std::size_t count);
 
-    // Values of term t; t may not go down.
-    void evaluate(const LightTerms& terms, std::size_t t, float* values);
+    const float* values(std::size_t term) const { return m_values.data() + (term - m_first) * m_width; }
 
 private:
-    struct Light {
-        std::vector<std::uint32_t> step;  // in the tables of the basis
-        std::vector<float> part;
-        std::vector<float> cos_beta;
-        std::vector<float> sin_beta;
-        std::vector<float> cosine;  // cos(m beta), sin(m beta) times irradiance
-        std::vector<float> sine;
-        std::vector<float> u;
-        std::optional<std::size_t> function;  // that u holds
-        std::size_t m = 0;
-    };
-    RowSpan m_span{};
-    std::vector<Light> m_lights;  // of changing direction
+    void add_moments(const LightTerms& terms, const RowSpan& span, const std::vector<float>& colors, std::size_t end);
+
+    std::size_t m_width = 0;
+    std::size_t m_first = 0;
+    std::vector<float> m_values;  // [term - first][texel]
+    BeamRow m_beams;              // of one light
+    std::vector<std::uint32_t> m_step;  // in the tables of the basis
+    std::vector<float> m_part;
+    std::vector<float> m_cosine;  // cos(m beta), sin(m beta) times irradiance
+    std::vector<float> m_sine;
+    std::vector<float> m_u;
 };
 
 }  // namespace beamspread

@@ -14,7 +14,7 @@ namespace beamspread {
 
 namespace {
 
-constexpr std::size_t angle_count = PresentAngles::count;
+constexpr std::size_t angle_count = Incidence::count;
 constexpr double least_gain = 1e-14;  // that is not rounding
 constexpr std::size_t table_steps = 4096;
 
@@ -86,14 +86,14 @@ struct AngularMedium {
     std::array<Matrix, harmonic_count> features;  // [node][radius bin]
 };
 
-AngularMedium describe(const KernelMedium& of, const PresentAngles& present, const std::vector<double>& angles,
+AngularMedium describe(const ChannelMedium& of, const Incidence& incidence, const std::vector<double>& angles,
                        double texel)
 {
     AngularMedium medium;
-    medium.nodes = of.library->node_profiles(of.albedo, Side::reflected);
+    medium.nodes = of.ldf->node_profiles(of.albedo, Side::reflected);
     const std::size_t nodes = medium.nodes.size();
-    medium.weights = NodeWeights(*of.library, angles);
-    const Vector share = Eigen::Map<const Vector>(present.share.data(), index(angle_count));
+    medium.weights = NodeWeights(*of.ldf, angles);
+    const Vector share = Eigen::Map<const Vector>(incidence.share.data(), index(angle_count));
     const Vector mean_weights = medium.weights.of(0, medium.nodes).transpose() * share;
     for (std::size_t j = 0; j < nodes; ++j)
         medium.mean.add(medium.nodes[j], mean_weights[index(j)], 0.0);
@@ -144,21 +144,21 @@ struct KernelDecomposition::Angular {
     std::map<const LdfSource*, NodeWeights> tables;
 };
 
-KernelDecomposition::KernelDecomposition(const PresentAngles& present, const std::vector<KernelMedium>& media,
+KernelDecomposition::KernelDecomposition(const Incidence& incidence, const std::vector<ChannelMedium>& media,
                                          double texel)
-    : m_media(media), m_first(present.first), m_last(present.last), m_angular(std::make_unique<Angular>())
+    : m_media(media), m_first(incidence.first), m_last(incidence.last), m_angular(std::make_unique<Angular>())
 {
-    for (const KernelMedium& medium : media) {
-        medium.library->check_angle(angle_deg(m_first));
-        medium.library->check_angle(angle_deg(m_last));
+    for (const ChannelMedium& medium : media) {
+        medium.ldf->check_angle(angle_deg(m_first));
+        medium.ldf->check_angle(angle_deg(m_last));
     }
     const std::vector<double> angles = evenly(m_first, m_last, angle_count);
-    for (const KernelMedium& medium : media) {
-        m_angular->media.push_back(describe(medium, present, angles, texel));
-        if (!m_angular->tables.contains(medium.library))
-            m_angular->tables[medium.library] = NodeWeights(*medium.library, evenly(m_first, m_last, table_steps + 1));
+    for (const ChannelMedium& medium : media) {
+        m_angular->media.push_back(describe(medium, incidence, angles, texel));
+        if (!m_angular->tables.contains(medium.ldf))
+            m_angular->tables[medium.ldf] = NodeWeights(*medium.ldf, evenly(m_first, m_last, table_steps + 1));
     }
-    const Vector root_share = Eigen::Map<const Vector>(present.share.data(), index(angle_count)).cwiseSqrt();
+    const Vector root_share = Eigen::Map<const Vector>(incidence.share.data(), index(angle_count)).cwiseSqrt();
     m_angular->root_share = root_share;
     for (std::size_t m = 0; m < harmonic_count; ++m) {
         Matrix gram = Matrix::Zero(index(angle_count), index(angle_count));
@@ -227,7 +227,7 @@ LowRankBasis KernelDecomposition::basis(const std::vector<std::size_t>& chosen, 
             for (std::size_t j = 0; j < medium.nodes.size(); ++j)
                 weights[k][rank][j][m] = by_node[index(j)];
             const Matrix& features = medium.features[m];
-            const NodeWeights& table = m_angular->tables.at(m_media[k].library);
+            const NodeWeights& table = m_angular->tables.at(m_media[k].ldf);
             values += table.interpolated(m, medium.nodes, features * (features.transpose() * by_node));
         }
         LowRankBasis::AngleFunction function{m, rank, {}};

@@ -5,21 +5,11 @@
 #include <memory>
 #include <vector>
 
-#include "ldf/radial/ldf_source.h"
 #include "simd/loops.h"
+#include "solve/separable/incidence.h"
 #include "solve/separable/kernel_term.h"
-#include "solve/separable/present_angles.h"
 
 namespace beamspread {
-
-// What decides a kernel, besides the direction.
-struct KernelMedium {
-    const LdfSource* library = nullptr;
-    double albedo = 0.0;
-    double mean_free_path = 1.0;
-
-    bool operator==(const KernelMedium&) const = default;
-};
 
 // The harmonic m of a kernel as sum over i of u_i(theta) e_i(r): u_i are tables over tan(theta / 2), which needs no
 // trigonometry and is smooth everywhere; e_i is the harmonic m of a profile per medium.
@@ -41,7 +31,7 @@ struct LowRankBasis {
 class KernelDecomposition {
 public:
     // `texel` is the side of a texel in metres: detail inside the one where a beam enters does not count.
-    KernelDecomposition(const PresentAngles& present, const std::vector<KernelMedium>& media, double texel);
+    KernelDecomposition(const Incidence& incidence, const std::vector<ChannelMedium>& media, double texel);
     ~KernelDecomposition();
 
     struct Term {
@@ -63,7 +53,7 @@ public:
 private:
     struct Angular;
 
-    std::vector<KernelMedium> m_media;
+    std::vector<ChannelMedium> m_media;
     double m_first;
     double m_last;
     std::vector<Term> m_terms;

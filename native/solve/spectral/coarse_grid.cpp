@@ -33,7 +33,7 @@ std::vector<std::vector<float>> CoarseGrid::spread(const MakeLightRow& light, st
         scratch.nodes.resize(stride);
         for (std::size_t y = item * step; y < std::min(m_height, (item + 1) * step); ++y) {
             const float* weights = m_y.weights(y);
-            scratch.light->start({y, 0, m_width});
+            scratch.light->start({y, 0, m_width}, first, count);
             for (std::size_t t = 0; t < count; ++t) {
                 scratch.light->evaluate(first + t, scratch.texels.data());
                 m_x.spread(scratch.texels.data(), scratch.nodes.data(), scratch.line);

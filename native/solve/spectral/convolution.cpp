@@ -111,7 +111,8 @@ void Convolution::transform_light(const Tile& tile, std::size_t first, std::size
         scratch.lines.resize(rows_per_item * stride);
         scratch.half.resize(rows_per_item * columns);
         for (std::size_t y = 0; y < rows; ++y)
-            scratch.rows[y]->start({tile.window_y.first + y0 + y, tile.window_x.first, tile.window_x.count});
+            scratch.rows[y]->start({tile.window_y.first + y0 + y, tile.window_x.first, tile.window_x.count}, first,
+                                   count);
         for (std::size_t t = 0; t < count; ++t) {
             for (std::size_t y = 0; y < rows; ++y) {
                 float* line = scratch.lines.data() + y * stride;

@@ -19,9 +19,10 @@ namespace beamspread {
 class LightRow {
 public:
     virtual ~LightRow() = default;
-    virtual void start(const RowSpan& span) = 0;
 
-    // Values of term t; t may not go down.
+    // Terms [first, first + count) will be asked for.
+    virtual void start(const RowSpan& span, std::size_t first, std::size_t count) = 0;
+
     virtual void evaluate(std::size_t t, float* values) = 0;
 
 protected:
@@ -34,9 +35,9 @@ protected:
 
 using MakeLightRow = std::function<std::unique_ptr<LightRow>()>;
 
-// Takes a row of the result for a medium: `values` times `factor`. Called from several threads at once. The values may
+// Takes a row of a result: `values` times `factor`. Called from several threads at once. The values may
 // be changed.
-using StoreRow = std::function<void(std::size_t medium, const RowSpan& span, float* values, double factor)>;
+using StoreRow = std::function<void(std::size_t result, const RowSpan& span, float* values, double factor)>;
 
 // Solves the plane of `spectra` tile by tile, never with more than `budget` bytes for the spectra of the light and of
 // the results, unless one of each does not fit.

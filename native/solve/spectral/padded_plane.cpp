@@ -150,9 +150,9 @@ SpectraAtOnce spectra_at_once(const PaddedPlane& plane, std::size_t terms, std::
     return {std::min(terms, all - results), results};
 }
 
-Levels choose_levels(std::size_t width, std::size_t height, double pitch_x, double pitch_y,
-                     const std::vector<ScaledProfile>& profiles, const LevelChoice& choice)
+Levels choose_levels(const Plane& plane, const std::vector<ScaledProfile>& profiles, const LevelChoice& choice)
 {
+    const auto [width, height, pitch_x, pitch_y] = plane;
     Level one{{width, height, pitch_x, pitch_y}, KernelCentre{}, std::nullopt};
     const double unit = one.plane.unit();
     double cut = 0.0;

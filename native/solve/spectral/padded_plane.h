@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "solve/problem/light.h"
 #include "solve/separable/kernel_term.h"
 #include "solve/spectral/radial_window.h"
 
@@ -79,7 +80,6 @@ struct LevelChoice {
 
 // The padding is the least where nothing that the kernels hold within reach comes back on the other side; tiles are what
 // costs least within the budget, if any are.
-Levels choose_levels(std::size_t width, std::size_t height, double pitch_x, double pitch_y,
-                     const std::vector<ScaledProfile>& profiles, const LevelChoice& choice);
+Levels choose_levels(const Plane& plane, const std::vector<ScaledProfile>& profiles, const LevelChoice& choice);
 
 }  // namespace beamspread

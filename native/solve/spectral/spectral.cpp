@@ -1,4 +1,5 @@
-// The fft solver: the direct solver's sums as products of spectra.
+#include "solve/spectral/spectral.h"
+
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -11,7 +12,6 @@
 #include "base/threads.h"
 #include "simd/loops.h"
 #include "solve/separable/light_terms.h"
-#include "solve/spectral/channel_groups.h"
 #include "solve/spectral/coarse_grid.h"
 #include "solve/spectral/convolution.h"
 #include "solve/spectral/padded_plane.h"
@@ -29,23 +29,31 @@ constexpr double centre_deviation = 3.0;
 // the brightest.
 constexpr double most_beyond = 1e-5;
 
+// Of the choice of terms, relative to the convolution: about the same for a lamp on 512 x 512 texels.
+constexpr double choice_work = 1.0;
+
 // Light on the texels themselves.
 class TexelRow final : public LightRow {
 public:
     explicit TexelRow(const LightTerms& terms) : m_terms(terms) {}
-    void start(const RowSpan& span) override { m_row.start(m_terms, span); }
-    void evaluate(std::size_t t, float* values) override { m_row.evaluate(m_terms, t, values); }
+    void start(const RowSpan& span, std::size_t first, std::size_t count) override
+    {
+        m_row.start(m_terms, span, first, count);
+        m_width = span.width;
+    }
+    void evaluate(std::size_t t, float* values) override { std::copy_n(m_row.values(t), m_width, values); }
 
 private:
     const LightTerms& m_terms;
     TermRow m_row;
+    std::size_t m_width = 0;
 };
 
 // Light on the nodes of a coarse grid.
 class NodeRow final : public LightRow {
 public:
     NodeRow(const std::vector<std::vector<float>>& terms, std::size_t width) : m_terms(terms), m_width(width) {}
-    void start(const RowSpan& span) override { m_span = span; }
+    void start(const RowSpan& span, std::size_t /*first*/, std::size_t /*count*/) override { m_span = span; }
     void evaluate(std::size_t t, float* values) override
     {
         std::copy_n(m_terms[t].data() + m_span.y * m_width + m_span.x, m_span.width, values);
@@ -60,34 +68,30 @@ private:
 // What light does beyond the reach of the texels' kernels, in the scale of the texels' sums before their own factor.
 struct CoarseLuminance {
     CoarseGrid grid;
-    std::vector<std::vector<float>> nodes;  // [medium]
+    std::vector<std::vector<float>> nodes;  // [result]
 };
 
-class GroupSolver {
+class SpectralSolver {
 public:
-    GroupSolver(const ChannelGroup& group, const Problem& plane, Progress& progress, float* luminance)
-        : m_group(group),
-          m_problem(plane),
+    SpectralSolver(const Problem& problem, Progress& progress, float* luminance)
+        : m_problem(problem),
           m_progress(progress),
           m_luminance(luminance),
-          m_terms(light_terms(group.lights, group.media, std::max(plane.pitch_x, plane.pitch_y),
-                              std::min(1e-2 * plane.tolerance, most_beyond),
-                              [&](const KernelDecomposition& kernels, const std::vector<LightPyramid>& lights) {
-                                  return choose_terms(kernels, lights, plane.pitch_x, plane.pitch_y, plane.tolerance);
-                              })),
-          m_levels(choose_levels(
-              plane.width, plane.height, plane.pitch_x, plane.pitch_y, m_terms.profiles,
-              {centre_deviation, plane.memory, m_terms.terms.size(), group.media.size(), plane.coarsening}))
+          m_terms(
+              light_terms(problem, std::min(1e-2 * problem.tolerance, most_beyond),
+                          [&](const KernelDecomposition& kernels, const Incidence& incidence, const LightTerms& light) {
+                              return choose_terms(kernels, incidence, light, problem.tolerance, progress, choice_work);
+                          })),
+          m_levels(choose_levels(problem.plane, m_terms.profiles,
+                                 {centre_deviation, problem.memory, m_terms.terms.size(), m_terms.sets.results.size(),
+                                  problem.coarsening}))
     {
     }
 
     void solve()
     {
-        const std::size_t channels = m_problem.channels.size();
         if (m_terms.terms.empty()) {  // nothing is lit
-            for (const ChannelGroup::Member& member : m_group.members)
-                for (std::size_t i = 0; i < m_problem.width * m_problem.height; ++i)
-                    m_luminance[i * channels + member.channel] = 0.0f;
+            std::fill_n(m_luminance, m_problem.plane.texels() * m_problem.channels.size(), 0.0f);
             return;
         }
         double share = 1.0;  // of the texels in the work
@@ -98,13 +102,13 @@ public:
             coarse.emplace(solve_coarse(*m_levels.coarse, 1.0 - share));
         }
         const KernelSpectra spectra(m_levels.texels, m_terms.profiles, m_levels.outside_centre);
-        Convolution convolution(spectra, m_terms.terms, m_group.media.size(), m_problem.memory);
-        const auto store = [&](std::size_t medium, const RowSpan& span, float* values, double factor) {
+        Convolution convolution(spectra, m_terms.terms, m_terms.sets.results.size(), m_problem.memory);
+        const auto store = [&](std::size_t result, const RowSpan& span, float* values, double factor) {
             if (coarse) {
                 const auto lease = m_scratch.lend();
-                coarse->grid.add_interpolated(coarse->nodes[medium], span, values, *lease);
+                coarse->grid.add_interpolated(coarse->nodes[result], span, values, *lease);
             }
-            store_row(medium, span, values, factor);
+            store_row(result, span, values, factor);
         };
         convolution.solve(texel_rows(), store, m_progress, share);
     }
@@ -123,13 +127,13 @@ private:
     CoarseLuminance solve_coarse(const Level& level, double work)
     {
         const PaddedPlane& plane = level.plane;
-        const CoarseGrid grid(plane, m_problem.width, m_problem.height);
-        const std::size_t media = m_group.media.size();
-        std::vector<std::vector<float>> result(media, std::vector<float>(grid.nodes(), 0.0f));
+        const CoarseGrid grid(plane, m_problem.plane.width, m_problem.plane.height);
+        const std::size_t results = m_terms.sets.results.size();
+        std::vector<std::vector<float>> sums(results, std::vector<float>(grid.nodes(), 0.0f));
         const KernelSpectra spectra(level, m_terms.profiles, std::nullopt);
         const double size = nodes(m_levels.texels.plane);
-        const auto add = [&](std::size_t medium, const RowSpan& span, const float* values, double factor) {
-            add_scaled(result[medium].data() + span.y * plane.width + span.x, values, static_cast<float>(factor * size),
+        const auto add = [&](std::size_t result, const RowSpan& span, const float* values, double factor) {
+            add_scaled(sums[result].data() + span.y * plane.width + span.x, values, static_cast<float>(factor * size),
                        span.width);
         };
         const std::size_t terms = m_terms.terms.size();
@@ -141,27 +145,24 @@ private:
             const std::size_t count = std::min(at_once, terms - first);
             const double part = work * static_cast<double>(count) / static_cast<double>(terms);
             const auto light = grid.spread(texel_rows(), first, count, m_progress, 0.5 * part);
-            Convolution convolution(spectra, std::span(m_terms.terms).subspan(first, count), media, for_spectra);
+            Convolution convolution(spectra, std::span(m_terms.terms).subspan(first, count), results, for_spectra);
             const auto rows = [&] { return std::make_unique<NodeRow>(light, plane.width); };
             convolution.solve(rows, add, m_progress, 0.5 * part);
         }
-        return {grid, std::move(result)};
+        return {grid, std::move(sums)};
     }
 
-    void store_row(std::size_t medium, const RowSpan& span, const float* values, double factor)
+    void store_row(std::size_t result, const RowSpan& span, const float* values, double factor)
     {
         const std::size_t channels = m_problem.channels.size();
-        for (const ChannelGroup::Member& member : m_group.members) {
-            if (member.medium != medium)
-                continue;
+        for (const ChannelSets::Member& member : m_terms.sets.results[result].members) {
             const auto scaled = static_cast<float>(factor * inv_pi * member.factor);
-            float* out = m_luminance + (span.y * m_problem.width + span.x) * channels + member.channel;
+            float* out = m_luminance + (span.y * m_problem.plane.width + span.x) * channels + member.channel;
             for (std::size_t x = 0; x < span.width; ++x)
                 out[x * channels] = scaled * values[x];
         }
     }
 
-    const ChannelGroup& m_group;
     const Problem& m_problem;
     Progress& m_progress;
     float* m_luminance;
@@ -172,17 +173,10 @@ private:
 
 }  // namespace
 
-void solve_fft(const std::vector<Problem>& lights, Progress& progress, float* luminance)
+void solve_spectral(const Problem& problem, Progress& progress, float* luminance)
 {
-    for (const Problem& light : lights)
-        validate(light);
-    with_threads(lights.front().threads, [&] {
-        const std::vector<ChannelGroup> groups = group_channels(lights);
-        progress.set_total(static_cast<double>(groups.size()));
-        for (const ChannelGroup& group : groups)
-            GroupSolver(group, lights.front(), progress, luminance).solve();
-    });
-    progress.finish();
+    progress.set_total(choice_work + 1.0);
+    SpectralSolver(problem, progress, luminance).solve();
 }
 
 }  // namespace beamspread

@@ -8,8 +8,8 @@
 #include <Eigen/Dense>
 
 #include "base/threads.h"
-#include "solve/term_choice/luminance_probe.h"
-#include "solve/term_choice/probe_texels.h"
+#include "solve/term_choice/probe_sites.h"
+#include "solve/term_choice/radiance_probe.h"
 
 namespace beamspread {
 
@@ -25,36 +25,66 @@ constexpr double share = 0.3;
 // Of what is allowed: errors that need no weighing.
 constexpr float negligible = 0.05f;
 
-// So often there is a closer look around the texels where errors are largest; one that changes neither the choice nor,
-// by more than this, the largest error is the last.
+// So often there is a closer look around the texels where errors are largest.
 constexpr std::size_t refinements = 2;
-constexpr float least_growth = 1.05f;
-constexpr std::size_t worst_count = 64;
+constexpr std::size_t worst_count = 12;
 
 // Errors relative to the brightest texel that transforms in single precision make anyway.
 constexpr double rounding = 5e-6;
+
+// The mean of a site relative to what harmonic 0 alone would bring: where light travels away from, sums of harmonics are
+// small, and off by about this.
+constexpr double least_asymmetry = 0.01;
+
+// Of many lights so many stand for all: the brightest, whose light changes most from texel to texel.
+constexpr std::size_t most_lights = 8;
+
+using Readings = std::vector<std::vector<float>>;  // [texel][result and function]
 
 Eigen::Index index(std::size_t i)
 {
     return static_cast<Eigen::Index>(i);
 }
 
-// What each candidate brings to the luminance of the texels looked at, [texel and medium][candidate], in units of the
+std::vector<std::size_t> representatives(const Incidence& incidence)
+{
+    std::vector<std::size_t> lights(incidence.extremes.size());
+    std::iota(lights.begin(), lights.end(), std::size_t{0});
+    std::stable_sort(lights.begin(), lights.end(), [&](std::size_t a, std::size_t b) {
+        return incidence.extremes[a].irradiance > incidence.extremes[b].irradiance;
+    });
+    lights.resize(std::min(lights.size(), most_lights));
+    return lights;
+}
+
+// What each candidate brings to the radiance of the texels looked at, [texel and result][candidate], in units of the
 // error allowed there.
-Eigen::ArrayXXf relative_parts(const std::vector<LuminanceProbe::Reading>& readings, std::size_t candidates,
+Eigen::ArrayXXf relative_parts(const Readings& readings, const std::vector<KernelDecomposition::Term>& terms,
                                double tolerance)
 {
-    const std::size_t media = readings.front().nearby.size();
-    Eigen::ArrayXXf parts = Eigen::ArrayXXf::Zero(index(readings.size() * media), index(candidates));
-    for (std::size_t k = 0; k < media; ++k) {
-        double brightest = 0.0;
-        for (const LuminanceProbe::Reading& reading : readings)
-            brightest = std::max(brightest, reading.nearby[k]);
+    const std::size_t candidates = terms.size();
+    const std::size_t results = readings.front().size() / candidates;
+    const std::size_t sites = readings.size() / texels_per_site;
+    Eigen::ArrayXXf parts = Eigen::ArrayXXf::Zero(index(readings.size() * results), index(candidates));
+    for (std::size_t r = 0; r < results; ++r) {
+        std::vector<double> nearby(sites);
+        for (std::size_t s = 0; s < sites; ++s) {
+            double all = 0.0;
+            double evenly = 0.0;  // by m = 0
+            for (std::size_t i = s * texels_per_site; i < (s + 1) * texels_per_site; ++i)
+                for (std::size_t c = 0; c < candidates; ++c) {
+                    const auto part = static_cast<double>(readings[i][r * candidates + c]);
+                    all += part;
+                    evenly += terms[c].m == 0 ? part : 0.0;
+                }
+            nearby[s] = std::max(all, least_asymmetry * evenly) / static_cast<double>(texels_per_site);
+        }
+        const double brightest = *std::max_element(nearby.begin(), nearby.end());
         for (std::size_t i = 0; i < readings.size(); ++i) {
-            const double allowed = share * tolerance * readings[i].nearby[k] + rounding * brightest;
+            const double allowed = share * tolerance * nearby[i / texels_per_site] + rounding * brightest;
             for (std::size_t c = 0; c < candidates && allowed > 0.0; ++c)
-                parts(index(i * media + k), index(c)) =
-                    static_cast<float>(static_cast<double>(readings[i].parts[k * candidates + c]) / allowed);
+                parts(index(i * results + r), index(c)) =
+                    static_cast<float>(static_cast<double>(readings[i][r * candidates + c]) / allowed);
         }
     }
     return parts;
@@ -62,7 +92,7 @@ Eigen::ArrayXXf relative_parts(const std::vector<LuminanceProbe::Reading>& readi
 
 struct Choice {
     std::vector<std::size_t> kept;
-    Eigen::ArrayXf error;  // [texel and medium]
+    Eigen::ArrayXf error;  // [texel and result]
 };
 
 // Leaves out the least, as many as bring no more than `negligible` together anywhere: looking for the best order among
@@ -116,56 +146,54 @@ Choice leave_out(const Eigen::ArrayXXf& parts, const std::vector<float>& cost)
     return choice;
 }
 
-// The texels with the largest errors.
+// The texels with the largest errors, one of a site.
 std::vector<Texel> worst_texels(const std::vector<Texel>& texels, const Eigen::ArrayXf& error)
 {
-    const auto media = error.size() / index(texels.size());
-    std::vector<float> worst;
-    for (std::size_t i = 0; i < texels.size(); ++i)
-        worst.push_back(error.segment(index(i) * media, media).abs().maxCoeff());
-    std::vector<std::size_t> order(texels.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return worst[a] > worst[b]; });
+    const auto results = error.size() / index(texels.size());
+    std::vector<std::pair<float, std::size_t>> worst;  // of each site
+    for (std::size_t i = 0; i < texels.size(); ++i) {
+        const float here = error.segment(index(i) * results, results).abs().maxCoeff();
+        if (i % texels_per_site == 0)
+            worst.emplace_back(here, i);
+        else if (here > worst.back().first)
+            worst.back() = {here, i};
+    }
+    std::stable_sort(worst.begin(), worst.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
     std::vector<Texel> found;
-    for (std::size_t i = 0; i < std::min(worst_count, order.size()); ++i)
-        found.push_back(texels[order[i]]);
+    for (std::size_t i = 0; i < std::min(worst_count, worst.size()); ++i)
+        found.push_back(texels[worst[i].second]);
     return found;
 }
 
 }  // namespace
 
-std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const std::vector<LightPyramid>& lights,
-                                      double pitch_x, double pitch_y, double tolerance)
+std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const Incidence& incidence,
+                                      const LightTerms& light, double tolerance, Progress& progress, double work)
 {
     std::vector<std::size_t> candidates(kernels.terms().size());
     std::iota(candidates.begin(), candidates.end(), std::size_t{0});
-    const std::size_t height = lights.front().height();
-    const std::size_t width = lights.front().width();
-    if (candidates.empty() || height * width <= small_plane * small_plane)
+    if (candidates.empty() || light.plane.texels() <= small_plane * small_plane)
         return candidates;
 
     std::vector<float> transforms;
     for (const KernelDecomposition::Term& term : kernels.terms())
         transforms.push_back(term.m > 0 ? 2.0f : 1.0f);
-    const LuminanceProbe probe(lights, kernels.basis(candidates, rounding), pitch_x, pitch_y);
-    std::vector<Texel> texels = probe_texels(lights, pitch_x, pitch_y);
-    std::vector<LuminanceProbe::Reading> readings;
-    std::vector<std::size_t> kept;
-    float largest = 0.0f;
+    const std::vector<std::size_t> lights = representatives(incidence);
+    const RadianceProbe probe(light, lights, kernels.basis(candidates, rounding));
+    std::vector<Texel> texels = probe_sites(light, lights, incidence);
+    Readings readings;
     for (std::size_t round = 0;; ++round) {
         const std::size_t known = readings.size();
         readings.resize(texels.size());
+        const double part = work / static_cast<double>((refinements + 1) * (texels.size() - known));
         parallel_for(texels.size() - known, [&](std::size_t i) {
-            const auto& [y, x] = texels[known + i];
-            readings[known + i] = probe.read(y, x);
+            readings[known + i] = probe.read(texels[known + i]);
+            progress.advance(part);
         });
-        Choice choice = leave_out(relative_parts(readings, candidates.size(), tolerance), transforms);
-        const float error = choice.error.abs().maxCoeff();
-        if (round == refinements || (round > 0 && choice.kept == kept && error <= least_growth * largest))
+        Choice choice = leave_out(relative_parts(readings, kernels.terms(), tolerance), transforms);
+        if (round == refinements)
             return std::move(choice.kept);
-        kept = std::move(choice.kept);
-        largest = error;
-        const std::vector<Texel> more = texels_around(worst_texels(texels, choice.error), height, width, round);
+        const std::vector<Texel> more = sites_around(worst_texels(texels, choice.error), light.plane, round);
         texels.insert(texels.end(), more.begin(), more.end());
     }
 }

@@ -1,0 +1,15 @@
+// The adaptive solver: beams of different widths (Manabe et al. 2012, section 3.3).
+#pragma once
+
+#include <vector>
+
+#include "base/progress.h"
+#include "solve/problem/problem.h"
+
+namespace beamspread {
+
+// Radiance that a light of colour 1 causes over one medium, W/(m^2 sr), row by row; advances the progress by 1.
+std::vector<float> solve_adaptive(const Plane& plane, const Light& light, const ChannelMedium& medium, double tolerance,
+                                  Progress& progress);
+
+}  // namespace beamspread

@@ -1,0 +1,15 @@
+// The direct solver: one beam per lit texel, one kernel value per pair of texels. The truth for the other solvers.
+#pragma once
+
+#include <vector>
+
+#include "base/progress.h"
+#include "solve/problem/problem.h"
+
+namespace beamspread {
+
+// Radiance that a light of colour 1 causes over one medium, W/(m^2 sr), row by row; advances the progress by 1.
+std::vector<float> solve_direct(const Plane& plane, const Light& light, const ChannelMedium& medium,
+                                Progress& progress);
+
+}  // namespace beamspread

@@ -1,0 +1,53 @@
+#include "solve/problem/channel_sets.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace beamspread {
+
+namespace {
+
+// Colours are given in single precision.
+constexpr double same_color = 1e-6;
+
+// The factor between the light of two channels, if that is all they differ by; else 0.
+double common_factor(const std::vector<Light>& lights, std::size_t channel, std::size_t reference)
+{
+    double factor = 0.0;
+    for (const Light& light : lights)
+        if (light.color[reference] > 0.0)
+            factor = std::max(factor, light.color[channel] / light.color[reference]);
+    for (const Light& light : lights)
+        if (std::abs(light.color[channel] - factor * light.color[reference]) > same_color * light.color[channel])
+            return 0.0;
+    return factor;
+}
+
+}  // namespace
+
+ChannelSets::ChannelSets(const Problem& problem)
+{
+    for (std::size_t c = 0; c < problem.channels.size(); ++c) {
+        std::size_t set = 0;
+        double factor = 0.0;
+        for (; set < m_reference.size() && factor == 0.0; set += factor == 0.0 ? 1 : 0)
+            factor = common_factor(problem.lights, c, m_reference[set]);
+        if (factor == 0.0) {
+            m_reference.push_back(c);
+            factor = 1.0;
+        }
+        const auto known = std::find(media.begin(), media.end(), problem.channels[c]);
+        const auto medium = static_cast<std::size_t>(known - media.begin());
+        if (known == media.end())
+            media.push_back(problem.channels[c]);
+        const auto shared = std::find_if(results.begin(), results.end(), [&](const Result& result) {
+            return result.set == set && result.medium == medium;
+        });
+        if (shared == results.end())
+            results.push_back({set, medium, {{c, factor}}});
+        else
+            shared->members.push_back({c, factor});
+    }
+}
+
+}  // namespace beamspread

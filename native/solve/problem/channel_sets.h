@@ -1,0 +1,38 @@
+// Channels that share their light, and channels that share their result.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "solve/problem/problem.h"
+
+namespace beamspread {
+
+// All light of a channel is a factor times that of its set: one set where all lights have the same colour, at most one
+// per channel where they differ. Channels of one set and medium share a result.
+struct ChannelSets {
+    struct Member {
+        std::size_t channel;
+        double factor;
+    };
+    struct Result {
+        std::size_t set;
+        std::size_t medium;
+        std::vector<Member> members;
+    };
+
+    explicit ChannelSets(const Problem& problem);
+
+    std::size_t count() const { return m_reference.size(); }
+
+    // The colour of a light in a set.
+    double color(const Light& light, std::size_t set) const { return light.color[m_reference[set]]; }
+
+    std::vector<ChannelMedium> media;
+    std::vector<Result> results;
+
+private:
+    std::vector<std::size_t> m_reference;  // [set]: the channel that stands for it
+};
+
+}  // namespace beamspread

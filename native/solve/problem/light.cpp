@@ -1,0 +1,118 @@
+#include "solve/problem/light.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/constants.h"
+#include "solve/problem/beam_loops.h"
+
+namespace beamspread {
+
+namespace {
+
+// Products of single-precision numbers are off by less.
+constexpr float same_light = 3e-7f;
+
+Texel brightest(const View2D<const float>& irradiance)
+{
+    Texel found{0, 0};
+    for (std::size_t y = 0; y < irradiance.height; ++y)
+        for (std::size_t x = 0; x < irradiance.width; ++x)
+            if (irradiance(y, x) > irradiance(found.y, found.x))
+                found = {y, x};
+    return found;
+}
+
+bool differ_by(float factor, const View2D<const float>& a, const View2D<const float>& b)
+{
+    for (std::size_t y = 0; y < a.height; ++y)
+        for (std::size_t x = 0; x < a.width; ++x)
+            if (std::abs(a(y, x) - factor * b(y, x)) > same_light * a(y, x))
+                return false;
+    return true;
+}
+
+}  // namespace
+
+std::vector<Light> lights_of_channels(const std::vector<View2D<const float>>& irradiance, const Directions& directions)
+{
+    const std::size_t channels = irradiance.size();
+    std::vector<float> most;
+    for (const View2D<const float>& channel : irradiance) {
+        const Texel at = brightest(channel);
+        most.push_back(channel.height * channel.width > 0 ? channel(at.y, at.x) : 0.0f);
+    }
+    const auto reference = static_cast<std::size_t>(std::max_element(most.begin(), most.end()) - most.begin());
+    Light one{irradiance[reference], directions, std::vector<double>(channels, 1.0)};
+    bool same = true;
+    for (std::size_t c = 0; c < channels && most[reference] > 0.0f; ++c) {
+        const float factor = most[c] / most[reference];
+        one.color[c] = static_cast<double>(factor);
+        same &= differ_by(factor, irradiance[c], irradiance[reference]);
+    }
+    if (same)
+        return {one};
+    std::vector<Light> lights;
+    for (std::size_t c = 0; c < channels; ++c) {
+        lights.push_back({irradiance[c], directions, std::vector<double>(channels, 0.0)});
+        lights.back().color[c] = 1.0;
+    }
+    return lights;
+}
+
+bool BeamRow::read(const Plane& plane, const Light& light, const RowSpan& span)
+{
+    const std::size_t count = span.width;
+    irradiance.resize(count);
+    copy_row(light.irradiance, span.y, span.x, count, irradiance.data());
+    if (std::all_of(irradiance.begin(), irradiance.end(), [](float value) { return value == 0.0f; }))
+        return false;
+    for (auto* values : {&cos_beta, &sin_beta, &half_tangent})
+        values->resize(count);
+    if (const auto* one = std::get_if<OneDirection>(&light.directions)) {
+        std::fill(cos_beta.begin(), cos_beta.end(), static_cast<float>(std::cos(azimuth(one->travel))));
+        std::fill(sin_beta.begin(), sin_beta.end(), static_cast<float>(std::sin(azimuth(one->travel))));
+        const double tangent = std::tan(0.5 * incidence_deg(one->travel) * radians_per_degree);
+        std::fill(half_tangent.begin(), half_tangent.end(), static_cast<float>(tangent));
+        return true;
+    }
+    const float* directions = nullptr;
+    if (const auto* field = std::get_if<PerTexel>(&light.directions)) {
+        directions = field->travel + 3 * (span.y * plane.width + span.x);
+    } else {
+        travel.resize(3 * count);
+        for (std::size_t x = 0; x < count; ++x) {
+            const Vec3 d = travel_at(plane, light.directions, span.y, span.x + x);
+            travel[3 * x] = static_cast<float>(d.x);
+            travel[3 * x + 1] = static_cast<float>(d.y);
+            travel[3 * x + 2] = static_cast<float>(d.z);
+        }
+        directions = travel.data();
+    }
+    find_angles(directions, irradiance.data(), cos_beta.data(), sin_beta.data(), half_tangent.data(), count);
+    return true;
+}
+
+Vec3 travel_at(const Plane& plane, const Directions& directions, std::size_t y, std::size_t x)
+{
+    if (const auto* one = std::get_if<OneDirection>(&directions))
+        return one->travel;
+    if (const auto* point = std::get_if<FromPoint>(&directions))
+        return Vec3((static_cast<double>(x) + 0.5) * plane.pitch_x, (static_cast<double>(y) + 0.5) * plane.pitch_y,
+                    0.0) -
+               point->position;
+    const float* d = std::get<PerTexel>(directions).travel + 3 * (y * plane.width + x);
+    return Vec3(d[0], d[1], d[2]);
+}
+
+double incidence_deg(const Vec3& travel)
+{
+    return std::atan2(std::hypot(travel.x, travel.y), -travel.z) / radians_per_degree;
+}
+
+double azimuth(const Vec3& travel)
+{
+    return std::atan2(travel.y, travel.x);
+}
+
+}  // namespace beamspread

@@ -1,0 +1,76 @@
+// Light that arrives on a plane of texels.
+#pragma once
+
+#include <cstddef>
+#include <variant>
+#include <vector>
+
+#include "base/vec.h"
+#include "base/view.h"
+
+namespace beamspread {
+
+// Texel (0, 0) lies at the origin of the plane frame: x runs along its rows, y from row to row, z outward.
+struct Plane {
+    std::size_t width = 0;
+    std::size_t height = 0;
+    double pitch_x = 1.0;  // metres
+    double pitch_y = 1.0;
+
+    std::size_t texels() const { return width * height; }
+};
+
+struct Texel {
+    std::size_t y;
+    std::size_t x;
+};
+
+// Part of a row of texels.
+struct RowSpan {
+    std::size_t y;
+    std::size_t x;
+    std::size_t width;
+};
+
+// What is known of the directions along which light travels: unit vectors of the plane frame with z < 0.
+struct OneDirection {
+    Vec3 travel{0.0, 0.0, -1.0};
+};
+struct FromPoint {
+    Vec3 position{};  // metres, z > 0: every texel's light travels from here to its middle
+};
+struct PerTexel {
+    const float* travel = nullptr;  // (height, width, 3) row by row
+};
+using Directions = std::variant<OneDirection, FromPoint, PerTexel>;
+
+// Lights add up.
+struct Light {
+    View2D<const float> irradiance;  // W/m^2 where the colour is 1
+    Directions directions;
+    std::vector<double> color;  // [channel], >= 0
+};
+
+// Light of some irradiance in each channel: one light where channels differ by a factor, else one for each of them.
+std::vector<Light> lights_of_channels(const std::vector<View2D<const float>>& irradiance, const Directions& directions);
+
+// The angles of a light in part of a row.
+struct BeamRow {
+    std::vector<float> irradiance;
+    std::vector<float> cos_beta;  // azimuth of travel
+    std::vector<float> sin_beta;
+    std::vector<float> half_tangent;  // tan(theta / 2): smooth everywhere, and found without trigonometry
+    std::vector<float> travel;        // scratch
+
+    // False where all of it is dark; the angles are not set then.
+    bool read(const Plane& plane, const Light& light, const RowSpan& span);
+};
+
+// Direction of the beam at a texel, of any length.
+Vec3 travel_at(const Plane& plane, const Directions& directions, std::size_t y, std::size_t x);
+
+// Angle of incidence in degrees and azimuth in radians of a direction of travel.
+double incidence_deg(const Vec3& travel);
+double azimuth(const Vec3& travel);
+
+}  // namespace beamspread
