@@ -174,7 +174,12 @@ def _float_array(name, values):
 
 def _numbers(name, values, count):
     """`count` floats from one number or a sequence of `count`."""
-    array = np.asarray(values, dtype=np.float64)
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.array(np.nan)
+    if np.isnan(array).any():
+        raise ValueError(f"argument {name!r} is {values!r}; allowed: a number or {count} numbers")
     if array.shape not in ((), (count,)):
         raise ValueError(f"argument {name!r} is of shape {array.shape}; allowed: a number or {count} numbers")
     return np.broadcast_to(array, count).tolist()

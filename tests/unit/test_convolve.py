@@ -120,8 +120,9 @@ def test_tiles_are_seamless(library, memory):
     beams = np.random.default_rng(11).random((150, 230), np.float32)
     rest = ([library] * 3, ALBEDO, [0.1, 0.2, 0.5], (1.0, 1.0), "fft", 1e-3, 0, None)
     for direction in (np.array(travel(40, 70), np.float32), lamp_directions(150, 230)):
-        whole = _native.convolve([(beams, direction)], *rest)
-        tiled = _native.convolve([(beams, direction)], *rest, memory=memory)
+        lights = _native.Light.of_channels(beams, direction, 3)
+        whole = _native.convolve(lights, *rest)
+        tiled = _native.convolve(lights, *rest, memory=memory)
         assert not np.array_equal(tiled, whole)
         assert tiled == pytest.approx(whole, rel=1e-5, abs=1e-5 * whole.max((0, 1)).min())
 

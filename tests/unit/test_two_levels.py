@@ -38,7 +38,7 @@ def light(height, width):
 
 def solve(ldf, shape, direction, mean_free_path, pitch=(1.0, 1.0), threads=0, progress=None, tolerance=1e-3, **options):
     paths = [mean_free_path, 0.7 * mean_free_path, 0.5 * mean_free_path]
-    lights = [(light(*shape), direction(*shape))]
+    lights = _native.Light.of_channels(light(*shape), direction(*shape), 3)
     return _native.convolve(
         lights, [ldf] * 3, list(ALBEDO), paths, pitch, "fft", tolerance, threads, progress, **options
     )
@@ -93,7 +93,7 @@ def test_two_levels_equal_direct(ldf, angle, mean_free_path):
     direction = (math.sin(theta) * 0.6, math.sin(theta) * 0.8, -math.cos(theta))
     beams = light(120, 180)
     direct = convolve(beams, direction, ldf, ALBEDO, mean_free_path, 1.0, solver="direct")
-    lights = [(beams, np.array(direction, np.float32))]
+    lights = _native.Light.of_channels(beams, np.array(direction, np.float32), 3)
     two = _native.convolve(
         lights, [ldf] * 3, list(ALBEDO), [mean_free_path] * 3, (1.0, 1.0), "fft", 1e-3, 0, None, coarsening=4
     )
@@ -142,7 +142,7 @@ def test_power_is_kept(ldf):
     beams = np.ones((size, size), np.float32)
     rest = ([ldf], [0.9], [path], (1.0, 1.0), "fft", 1e-3, 0, None)
     for coarsening in (4, 8):
-        result = _native.convolve([(beams, sun(0, 0))], *rest, coarsening=coarsening)
+        result = _native.convolve([_native.Light(beams, sun(0, 0), [1.0])], *rest, coarsening=coarsening)
         angle = math.degrees(math.acos(-sun(0, 0)[2]))
         assert result[size // 2, size // 2, 0] == pytest.approx(ldf.reflectance(angle, 0.9) / math.pi, rel=1e-4)
 
@@ -165,7 +165,8 @@ field = numpy.stack([x, y, numpy.full_like(x, -20)], -1)
 direction = (field / numpy.linalg.norm(field, axis=-1, keepdims=True)).astype(numpy.float32)
 rest = [library(Medium(0.8, 1.4))], [0.9], [60.0], (1.0, 1.0), "fft", 1e-3, 0, None
 before = peak()
-_native.convolve([(numpy.ones((180, 180), numpy.float32), direction)], *rest, memory=32 << 20, coarsening=8)
+light = _native.Light(numpy.ones((180, 180), numpy.float32), direction, [1.0])
+_native.convolve([light], *rest, memory=32 << 20, coarsening=8)
 print(peak() - before)
 """
 

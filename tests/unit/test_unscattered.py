@@ -77,4 +77,4 @@ def test_none_without_a_reflecting_boundary(medium):
 
 def test_what_is_displaced_beyond_the_plane_is_gone(slab):
     light = np.ones((3, 70), np.float32)
-    assert not convolve(light, travel(60, 90), slab, 0, 1e30, 1.0).any()
+    assert not convolve(light, travel(60, 90), slab, 0, 1e8, 1.0).any()

@@ -27,7 +27,7 @@ bool differ_by(float factor, const View2D<const float>& a, const View2D<const fl
 {
     for (std::size_t y = 0; y < a.height; ++y)
         for (std::size_t x = 0; x < a.width; ++x)
-            if (std::abs(a(y, x) - factor * b(y, x)) > same_light * a(y, x))
+            if (!(std::abs(a(y, x) - factor * b(y, x)) <= same_light * a(y, x)))  // also where it is no number
                 return false;
     return true;
 }
