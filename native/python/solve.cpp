@@ -10,6 +10,7 @@
 #include "python/casters.h"
 #include "solve/adaptive/mask_pyramid.h"
 #include "solve/solve.h"
+#include "solve/spectral/spectral.h"
 
 namespace beamspread {
 
@@ -94,20 +95,17 @@ std::vector<HeldLight> lights_of(const Plane2D& irradiance, const Array<float>& 
     return held;
 }
 
-Array<float> convolve(const std::vector<const HeldLight*>& lights, const std::vector<std::shared_ptr<LdfSource>>& ldf,
-                      const std::vector<double>& albedo, const std::vector<double>& mean_free_path,
-                      std::array<double, 2> pitch, const std::string& solver, double tolerance, int threads,
-                      const py::object& progress, std::size_t memory, std::size_t coarsening)
+using Lights = std::vector<const HeldLight*>;
+using Sources = std::vector<std::shared_ptr<LdfSource>>;
+
+Problem problem_of(const Lights& lights, const Sources& ldf, const std::vector<double>& albedo,
+                   const std::vector<double>& mean_free_path, std::array<double, 2> pitch, double tolerance)
 {
     const std::size_t channels = albedo.size();
     if (ldf.size() != channels || mean_free_path.size() != channels)
         reject("ldf", "of another number of channels than albedo", "one per channel");
     Problem problem;
-    problem.solver = solver_named(solver);
     problem.tolerance = tolerance;
-    problem.threads = threads;
-    problem.memory = memory;
-    problem.coarsening = coarsening;
     for (const HeldLight* held : lights)
         problem.lights.push_back(held->light);
     if (!lights.empty())
@@ -115,12 +113,35 @@ Array<float> convolve(const std::vector<const HeldLight*>& lights, const std::ve
                          pitch[1]};
     for (std::size_t c = 0; c < channels; ++c)
         problem.channels.push_back({ldf[c].get(), albedo[c], mean_free_path[c]});
+    return problem;
+}
+
+Array<float> convolve(const Lights& lights, const Sources& ldf, const std::vector<double>& albedo,
+                      const std::vector<double>& mean_free_path, std::array<double, 2> pitch, const std::string& solver,
+                      double tolerance, int threads, const py::object& progress, std::size_t memory,
+                      std::size_t coarsening)
+{
+    Problem problem = problem_of(lights, ldf, albedo, mean_free_path, pitch, tolerance);
+    problem.solver = solver_named(solver);
+    problem.threads = threads;
+    problem.memory = memory;
+    problem.coarsening = coarsening;
     Progress report(progress_callback(progress));
-    Array<float> luminance({problem.plane.height, problem.plane.width, channels});
+    Array<float> luminance({problem.plane.height, problem.plane.width, problem.channels.size()});
     float* data = luminance.mutable_data();
     const py::gil_scoped_release release;
     solve(problem, report, data);
     return luminance;
+}
+
+std::size_t transforms(const Lights& lights, const Sources& ldf, const std::vector<double>& albedo,
+                       const std::vector<double>& mean_free_path, std::array<double, 2> pitch, double tolerance)
+{
+    const Problem problem = problem_of(lights, ldf, albedo, mean_free_path, pitch, tolerance);
+    Progress unseen;
+    const py::gil_scoped_release release;
+    validate(problem);
+    return count_terms(problem, unseen);
 }
 
 using Squares = std::tuple<Array<std::int64_t>, Array<double>>;
@@ -181,6 +202,8 @@ C libraries, albedos and mean free paths (metres), pitch (x, y) in metres; retur
 `coarsening`: texels from node to node of the grid on which it spreads light far: 4, 8, 16, ... 64, 1 for no such grid,
 0 for what costs least.
 )");
+    m.def("transforms", &transforms, py::arg("lights"), py::arg("ldf"), py::arg("albedo"), py::arg("mean_free_path"),
+          py::arg("pitch"), py::arg("tolerance"), "How many transforms of light the solver 'fft' makes of `convolve`.");
     m.def("adaptive_beams", &adaptive_beams, py::arg("light"), py::arg("tolerance"),
           R"(Squares that the adaptive solver lights by one beam each; the engine behind `beamspread.adaptive_beams`.
 

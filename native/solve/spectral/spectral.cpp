@@ -71,17 +71,21 @@ struct CoarseLuminance {
     std::vector<std::vector<float>> nodes;  // [result]
 };
 
+LightTerms chosen_terms(const Problem& problem, Progress& progress)
+{
+    const auto choose = [&](const KernelDecomposition& kernels, const Incidence& incidence, const LightTerms& light) {
+        return choose_terms(kernels, incidence, light, problem.tolerance, progress, choice_work);
+    };
+    return light_terms(problem, std::min(1e-2 * problem.tolerance, most_beyond), choose);
+}
+
 class SpectralSolver {
 public:
     SpectralSolver(const Problem& problem, Progress& progress, float* luminance)
         : m_problem(problem),
           m_progress(progress),
           m_luminance(luminance),
-          m_terms(
-              light_terms(problem, std::min(1e-2 * problem.tolerance, most_beyond),
-                          [&](const KernelDecomposition& kernels, const Incidence& incidence, const LightTerms& light) {
-                              return choose_terms(kernels, incidence, light, problem.tolerance, progress, choice_work);
-                          })),
+          m_terms(chosen_terms(problem, progress)),
           m_levels(choose_levels(problem.plane, m_terms.profiles,
                                  {centre_deviation, problem.memory, m_terms.terms.size(), m_terms.sets.results.size(),
                                   problem.coarsening}))
@@ -177,6 +181,11 @@ void solve_spectral(const Problem& problem, Progress& progress, float* luminance
 {
     progress.set_total(choice_work + 1.0);
     SpectralSolver(problem, progress, luminance).solve();
+}
+
+std::size_t count_terms(const Problem& problem, Progress& progress)
+{
+    return chosen_terms(problem, progress).terms.size();
 }
 
 }  // namespace beamspread
