@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <numeric>
+#include <span>
 #include <utility>
 
 #include <Eigen/Dense>
@@ -185,9 +186,12 @@ std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const 
     for (std::size_t round = 0;; ++round) {
         const std::size_t known = readings.size();
         readings.resize(texels.size());
-        const double part = work / static_cast<double>((refinements + 1) * (texels.size() - known));
-        parallel_for(texels.size() - known, [&](std::size_t i) {
-            readings[known + i] = probe.read(texels[known + i]);
+        const std::size_t sites = (texels.size() - known) / texels_per_site;
+        const double part = work / static_cast<double>((refinements + 1) * sites);
+        parallel_for(sites, [&](std::size_t i) {
+            const std::size_t first = known + i * texels_per_site;
+            std::ranges::move(probe.read(std::span(texels).subspan(first, texels_per_site)),
+                              readings.begin() + static_cast<std::ptrdiff_t>(first));
             progress.advance(part);
         });
         Choice choice = leave_out(relative_parts(readings, kernels.terms(), tolerance), transforms);

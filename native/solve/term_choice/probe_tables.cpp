@@ -93,7 +93,9 @@ bool ProbeTables::out_of_reach(std::size_t size, std::size_t dy, std::size_t dx)
     const auto nearest = [&](std::size_t cells, double pitch) {
         return std::max(static_cast<double>(cells) - 0.5, 0.0) * cell_side(size) * pitch;
     };
-    return std::hypot(nearest(dx, m_pitch_x), nearest(dy, m_pitch_y)) > m_reach;
+    const double x = nearest(dx, m_pitch_x);
+    const double y = nearest(dy, m_pitch_y);
+    return x * x + y * y > m_reach * m_reach;
 }
 
 }  // namespace beamspread

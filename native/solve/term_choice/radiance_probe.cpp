@@ -13,6 +13,9 @@ namespace {
 // The light of a cell is that of one texel from each of its quarters.
 constexpr std::size_t quarters = 4;
 
+// Cells of 3^this texels, and larger ones, look the same from everywhere on a site.
+constexpr std::size_t far_size = 3;
+
 struct Beam {
     float irradiance = 0.0f;  // of its share of the cell
     Vec2 toward{1.0, 0.0};    // azimuth of travel, a unit vector
@@ -28,22 +31,25 @@ struct Beam {
 
 Vec2 unit(const Vec2& v)
 {
-    const double length = glm::length(v);
-    return length > 0.0 ? v / length : Vec2(1.0, 0.0);
+    const double square = glm::dot(v, v);
+    return square > 0.0 ? v / std::sqrt(square) : Vec2(1.0, 0.0);
 }
 
 }  // namespace
 
 // A square of texels as the texel that is looked at sees it.
 struct RadianceProbe::Cell {
-    Cell(const Plane& plane, const Texel& texel, std::size_t of_size, std::ptrdiff_t dy, std::ptrdiff_t dx)
+    Cell(const Plane& plane, const Texel& texel, std::size_t of_size, std::ptrdiff_t dy, std::ptrdiff_t dx,
+         Random& random)
         : size(of_size),
           cells_y(static_cast<std::size_t>(std::abs(dy))),
           cells_x(static_cast<std::size_t>(std::abs(dx))),
           above(dy > 0),
           right(dx > 0)
     {
-        const auto side = static_cast<std::ptrdiff_t>(std::lround(std::pow(3.0, static_cast<double>(size))));
+        std::ptrdiff_t side = 1;
+        for (std::size_t i = 0; i < size; ++i)
+            side *= 3;
         const std::ptrdiff_t y0 = static_cast<std::ptrdiff_t>(texel.y) + dy * side - (side - 1) / 2;
         const std::ptrdiff_t x0 = static_cast<std::ptrdiff_t>(texel.x) + dx * side - (side - 1) / 2;
         const auto height = static_cast<std::ptrdiff_t>(plane.height);
@@ -52,7 +58,6 @@ struct RadianceProbe::Cell {
             return;
         const std::size_t drawn = size == 0 ? 1 : quarters;
         weight = static_cast<float>(side * side) / static_cast<float>(drawn);
-        Random random(size, texel.y * plane.width + texel.x, static_cast<std::uint64_t>((dy + 8) * 32 + dx + 8));
         for (std::size_t i = 0; i < drawn; ++i) {
             const auto within = [&](std::size_t half) {
                 const double part = size == 0 ? 0.0 : 0.5 * (static_cast<double>(half) + random.uniform());
@@ -101,27 +106,44 @@ RadianceProbe::RadianceProbe(const LightTerms& light, std::vector<std::size_t> l
 {
 }
 
-std::vector<float> RadianceProbe::read(const Texel& at) const
+std::vector<std::vector<float>> RadianceProbe::read(std::span<const Texel> site) const
 {
     const std::size_t row = m_tables.row_size();
+    const std::size_t results = m_light.sets.results.size();
+    const std::size_t near = std::min(far_size, m_tables.sizes());
     Moments moments(m_light.sets.count(), m_tables);
-    AlignedVector<float> sums(m_light.sets.results.size() * row);
-    constexpr auto reach = static_cast<std::ptrdiff_t>(cell_reach);
-    for (std::size_t size = 0; size < m_tables.sizes(); ++size)
-        for (std::ptrdiff_t dy = -reach; dy <= reach; ++dy)
-            for (std::ptrdiff_t dx = -reach; dx <= reach; ++dx)
-                if (size == 0 || std::max(std::abs(dy), std::abs(dx)) > 1)
-                    add_cell(Cell(m_light.plane, at, size, dy, dx), moments, sums);
-    std::vector<float> parts;
-    for (std::size_t r = 0; r < m_light.sets.results.size(); ++r)
-        for (const std::size_t place : m_tables.places())
-            parts.push_back(sums[r * row + place]);
+    AlignedVector<float> far(results * row);
+    add_cells(site[site.size() / 2], near, m_tables.sizes(), moments, far);
+    std::vector<std::vector<float>> parts;
+    for (const Texel& texel : site) {
+        AlignedVector<float> sums = far;
+        add_cells(texel, 0, near, moments, sums);
+        parts.emplace_back();
+        for (std::size_t r = 0; r < results; ++r)
+            for (const std::size_t place : m_tables.places())
+                parts.back().push_back(sums[r * row + place]);
+    }
     return parts;
+}
+
+void RadianceProbe::add_cells(const Texel& texel, std::size_t first_size, std::size_t end_size, Moments& moments,
+                              AlignedVector<float>& sums) const
+{
+    constexpr auto reach = static_cast<std::ptrdiff_t>(cell_reach);
+    Random random(first_size, texel.y, texel.x);
+    for (std::size_t size = first_size; size < end_size; ++size)
+        for (std::ptrdiff_t dy = -reach; dy <= reach; ++dy)
+            for (std::ptrdiff_t dx = -reach; dx <= reach; ++dx) {
+                const auto cells_y = static_cast<std::size_t>(std::abs(dy));
+                const auto cells_x = static_cast<std::size_t>(std::abs(dx));
+                if ((size == 0 || std::max(cells_y, cells_x) > 1) && !m_tables.out_of_reach(size, cells_y, cells_x))
+                    add_cell(Cell(m_light.plane, texel, size, dy, dx, random), moments, sums);
+            }
 }
 
 void RadianceProbe::add_cell(const Cell& cell, Moments& moments, AlignedVector<float>& sums) const
 {
-    if (cell.count == 0 || m_tables.out_of_reach(cell.size, cell.cells_y, cell.cells_x))
+    if (cell.count == 0)
         return;
     for (std::size_t k = 0; k < moments.sums.size(); ++k)
         if (std::exchange(moments.is_lit[k], false))
@@ -152,7 +174,7 @@ void RadianceProbe::add_light(const Cell& cell, std::size_t number, Moments& mom
         if (irradiance == 0.0f)
             continue;
         const Vec3 travel = travel_at(m_light.plane, light.directions, y, x);
-        const double across = std::hypot(travel.x, travel.y);
+        const double across = std::sqrt(travel.x * travel.x + travel.y * travel.y);
         Beam& beam = beams[lit++];
         beam = {irradiance * cell.weight, unit(Vec2(travel)), unit(cell.ways[i]),
                 static_cast<float>(across / (glm::length(travel) - travel.z))};

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "solve/separable/light_terms.h"
@@ -17,15 +18,16 @@ public:
     // `lights`: which of those of changing direction are looked at. All must outlive the probe.
     RadianceProbe(const LightTerms& light, std::vector<std::size_t> lights, const LowRankBasis& basis);
 
-    std::size_t parts() const { return m_light.sets.results.size() * m_tables.places().size(); }
-
-    // [result][function], times pi.
-    std::vector<float> read(const Texel& at) const;
+    // [texel][result and function], times pi, of texels that lie near each other: what comes from far away is that of
+    // the middle one.
+    std::vector<std::vector<float>> read(std::span<const Texel> site) const;
 
 private:
     struct Cell;
     struct Moments;
 
+    void add_cells(const Texel& texel, std::size_t first_size, std::size_t end_size, Moments& moments,
+                   AlignedVector<float>& sums) const;
     void add_cell(const Cell& cell, Moments& moments, AlignedVector<float>& sums) const;
     void add_light(const Cell& cell, std::size_t light, Moments& moments) const;
 
