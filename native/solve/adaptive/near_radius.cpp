@@ -42,15 +42,18 @@ double interpolation_error(const SpreadLight& light, double near, double first, 
         const double r = first * std::exp((i + 0.5) * log_step);
         const double step = spacing * r / near;
         for (int j = 0; j < directions; ++j) {
-            const double phi = 2.0 * pi * (j + 0.5) / directions;
+            const double phi = 2.0 * pi * j / directions;
             const double x = r * std::cos(phi);
             const double y = r * std::sin(phi);
             const double exact = kernel_at(light, x, y);
-            const auto pair = [&](double k) {
-                return kernel_at(light, x + k * step, y) + kernel_at(light, x - k * step, y);
+            const auto error = [&](double dx, double dy) {
+                const auto pair = [&](double k) {
+                    return kernel_at(light, x + k * dx, y + k * dy) + kernel_at(light, x - k * dx, y - k * dy);
+                };
+                return std::abs((9.0 * pair(1.0) - pair(3.0)) / 16.0 - exact);
             };
-            // Along both axes, of the place that light comes from and of the one that it gets to.
-            sum += 4.0 * std::abs((9.0 * pair(1.0) - pair(3.0)) / 16.0 - exact) * r * r;
+            // Of the place that light comes from and of the one that it gets to.
+            sum += 2.0 * (error(step, 0.0) + error(0.0, step)) * r * r;
         }
     }
     return sum * log_step * 2.0 * pi / directions;
