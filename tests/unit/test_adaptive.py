@@ -122,6 +122,14 @@ def test_a_long_plane(library):
         compare(light, travel(70, 200), library, path, 1e-3)
 
 
+@pytest.mark.parametrize("azimuth", [0, 37])
+@pytest.mark.parametrize("tolerance", [1e-1, 1e-3])
+def test_narrow_kernels_on_several_levels(library, tolerance, azimuth):
+    """Grazing light's lobe is narrower than the points of coarse grids where these are taken too soon."""
+    light = np.random.default_rng(5).random((150, 260)) < 0.5
+    compare(light.astype(np.float32), travel(85, azimuth), library, 40.0, tolerance)
+
+
 def test_texels_need_not_be_square(library):
     for pitch in ((1.0, 0.2), (0.1, 1.0)):
         compare(fig9(90)[:, :70], travel(60, 30), library, 3.0, 1e-3, pitch)

@@ -1,5 +1,6 @@
 // The direct solver: one beam per lit texel, one kernel value per pair of texels.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "base/constants.h"
@@ -74,26 +75,25 @@ std::vector<std::vector<Beam>> beam_rows(const Problem& problem, const Channel& 
 }
 
 // Irradiance times the factors of the terms for one beam, in the order of basis_terms.
-void find_factors(const Beam& beam, const std::vector<RadialProfile>& profiles, bool uniform,
-                  std::vector<double>& factors)
+void find_factors(const Beam& beam, const std::vector<RadialProfile>& profiles, bool uniform, double* factor)
 {
-    factors.clear();
     if (uniform) {
-        factors.push_back(beam.irradiance);
+        *factor = beam.irradiance;
         return;
     }
     const std::size_t harmonics = beam.weights.harmonics(profiles);
+    Harmonics cosine{beam.irradiance};  // times cos(m beta), sin(m beta)
+    Harmonics sine{};
+    for (std::size_t m = 1; m < harmonics; ++m) {
+        cosine[m] = cosine[m - 1] * beam.cos_beta - sine[m - 1] * beam.sin_beta;
+        sine[m] = sine[m - 1] * beam.cos_beta + cosine[m - 1] * beam.sin_beta;
+    }
     for (std::size_t j = 0; j < profiles.size(); ++j) {
-        double cosine = beam.irradiance;  // times cos(m beta), sin(m beta)
-        double sine = 0.0;
+        const std::array<double, 2> weights{beam.weights.even[j], beam.weights.odd[j]};
         for (std::size_t m = 0; m < profiles[j].harmonics(); ++m) {
-            const double weight = m >= harmonics ? 0.0 : m % 2 == 0 ? beam.weights.even[j] : beam.weights.odd[j];
-            factors.push_back(weight * cosine);
+            *factor++ = weights[m % 2] * cosine[m];
             if (m > 0)
-                factors.push_back(weight * sine);
-            const double next = cosine * beam.cos_beta - sine * beam.sin_beta;
-            sine = sine * beam.cos_beta + cosine * beam.sin_beta;
-            cosine = next;
+                *factor++ = weights[m % 2] * sine[m];
         }
     }
 }
@@ -146,9 +146,9 @@ std::vector<float> solve_channel(const Problem& problem, const Channel& channel,
 
     std::vector<double> sum(problem.width * problem.height);
     const auto add_row = [&](std::size_t target, std::size_t source, const std::vector<double>* kernels) {
-        std::vector<double> factors;
+        std::vector<double> factors(terms.size());
         for (const Beam& beam : beams[source]) {
-            find_factors(beam, profiles, uniform, factors);
+            find_factors(beam, profiles, uniform, factors.data());
             for (std::size_t k = 0; k < factors.size(); ++k)
                 if (factors[k] != 0.0)
                     add_scaled(sum.data() + target * problem.width, kernels[k].data() + (problem.width - 1 - beam.x),
