@@ -156,6 +156,17 @@ def test_light_that_does_not_reach_is_zero(library):
     assert not dark.any()
 
 
+@pytest.mark.parametrize("exponent", [-100, 66, 96])
+def test_light_of_any_power(library, exponent):
+    """A power of two times the light is as much times the result, bit for bit."""
+    light, direction = lamp(20, 33, 0.3)
+    for d in (SLANTED, direction):
+        once, scaled = (
+            convolve(np.ldexp(light, e), d, library, ALBEDO, 4.0, 1.0, solver="adaptive") for e in (0, exponent)
+        )
+        assert np.array_equal(np.ldexp(once, exponent), scaled)
+
+
 def test_same_bits_for_any_number_of_threads(library):
     light = (np.random.default_rng(7).random((45, 67, 3)) * fig9(67)[:45, :, None]).astype(np.float32)
     for direction in (SLANTED, lamp(45, 67, 0.3)[1]):

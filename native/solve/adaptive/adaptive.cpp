@@ -110,7 +110,28 @@ private:
     std::map<std::size_t, MultilevelKernel> m_kernels;
 };
 
-std::vector<float> solve_channel(const Problem& problem, const Channel& channel, const std::vector<Square>& squares,
+// A channel's irradiance times a power of two that makes the largest value about 1, as sums over it may be counted in
+// single precision or in whole numbers.
+struct ScaledLight {
+    int exponent = 0;
+    std::vector<float> values;
+};
+
+ScaledLight scale_light(const View2D<const float>& irradiance)
+{
+    ScaledLight scaled;
+    float greatest = 0.0f;
+    for (std::size_t y = 0; y < irradiance.height; ++y)
+        for (std::size_t x = 0; x < irradiance.width; ++x)
+            greatest = std::max(greatest, irradiance(y, x));
+    std::frexp(greatest, &scaled.exponent);
+    for (std::size_t y = 0; y < irradiance.height; ++y)
+        for (std::size_t x = 0; x < irradiance.width; ++x)
+            scaled.values.push_back(std::ldexp(irradiance(y, x), -scaled.exponent));
+    return scaled;
+}
+
+std::vector<float> solve_channel(const Problem& problem, Channel channel, const std::vector<Square>& squares,
                                  Progress& progress)
 {
     const std::size_t height = problem.height;
@@ -122,6 +143,8 @@ std::vector<float> solve_channel(const Problem& problem, const Channel& channel,
         progress.advance(1.0);
         return luminance;
     }
+    const ScaledLight scaled = scale_light(channel.irradiance);
+    channel.irradiance = {scaled.values.data(), height, width, static_cast<std::ptrdiff_t>(width)};
     const LightTerms terms = choose_terms(problem, channel);
     const std::size_t count = terms.terms.size();
     const std::vector<Square> wide = wide_beams(squares, height * width);
@@ -164,7 +187,7 @@ std::vector<float> solve_channel(const Problem& problem, const Channel& channel,
     }
     for (std::size_t y = 0; y < height; ++y)
         std::transform(sum.row(y), sum.row(y) + width, luminance.data() + y * width,
-                       [](double value) { return static_cast<float>(inv_pi * value); });
+                       [&](double value) { return static_cast<float>(std::ldexp(inv_pi * value, scaled.exponent)); });
     return luminance;
 }
 

@@ -32,8 +32,9 @@ TexelIntegrals integrate_quadrant(const RadialProfile& profile, const GridLevel&
         return integrate_texels(profile, {x0, y0, texels.pitch_x, texels.pitch_y, width, height});
     TexelIntegrals out(profile.harmonics(), height * width);
     parallel_for(height * width, [&](std::size_t at) {
-        const double x = x0 + static_cast<double>(at % width) * level.pitch_x;
-        const double y = y0 + static_cast<double>(at / width) * level.pitch_y;
+        const std::size_t row = at / width;
+        const double x = x0 + static_cast<double>(at - row * width) * level.pitch_x;
+        const double y = y0 + static_cast<double>(row) * level.pitch_y;
         const TexelIntegrals one = integrate_texels(profile, {x, y, texels.pitch_x, texels.pitch_y, 1, 1});
         for (std::size_t m = 0; m < out.harmonics; ++m) {
             out.cosine[m * height * width + at] = one.cosine[m];

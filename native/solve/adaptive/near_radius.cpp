@@ -1,5 +1,6 @@
 #include "solve/adaptive/near_radius.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -69,8 +70,10 @@ double near_radius(const std::vector<SpreadLight>& lights, double pitch, double 
     double power = 0.0;
     for (const SpreadLight& light : lights)
         power += light.sum * light.kernel.cosine[0] * 2.0 * pi * light.profile->cumulative(distance)[0];
-    double near = least;
-    for (double first = 0.5 * near * pitch; first < distance; first = 0.5 * near * pitch) {
+    const auto expected = [&](double near) {
+        const double first = 0.5 * near * pitch;
+        if (first >= distance)
+            return 0.0;
         // The errors of many kernels have nothing to do with each other: their squares add up.
         double squares = 0.0;
         for (const SpreadLight& light : lights) {
@@ -78,10 +81,11 @@ double near_radius(const std::vector<SpreadLight>& lights, double pitch, double 
             squares += error * error;
             progress.advance(0.0);
         }
-        if (std::sqrt(squares) <= allowed * power)
-            break;
+        return std::sqrt(squares);
+    };
+    double near = least;
+    while (expected(near) > allowed * std::max(power, 0.0))
         near *= std::numbers::sqrt2;
-    }
     return near;
 }
 
