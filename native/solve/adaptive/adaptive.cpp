@@ -119,7 +119,7 @@ struct ScaledLight {
 
 ScaledLight scale_light(const View2D<const float>& irradiance)
 {
-    ScaledLight scaled;
+    ScaledLight scaled{0, std::vector<float>(irradiance.height * irradiance.width)};
     float greatest = 0.0f;
     for (std::size_t y = 0; y < irradiance.height; ++y)
         for (std::size_t x = 0; x < irradiance.width; ++x)
@@ -127,7 +127,7 @@ ScaledLight scale_light(const View2D<const float>& irradiance)
     std::frexp(greatest, &scaled.exponent);
     for (std::size_t y = 0; y < irradiance.height; ++y)
         for (std::size_t x = 0; x < irradiance.width; ++x)
-            scaled.values.push_back(std::ldexp(irradiance(y, x), -scaled.exponent));
+            scaled.values[y * irradiance.width + x] = std::ldexp(irradiance(y, x), -scaled.exponent);
     return scaled;
 }
 
@@ -205,11 +205,11 @@ Luminance solve_adaptive(const Problem& problem, Progress& progress)
     Luminance luminance;
     with_threads(problem.threads, [&] {
         std::vector<Square> squares;
-        const float* searched = nullptr;
+        const Channel* before = nullptr;
         for (const Channel& channel : problem.channels) {
-            if (channel.irradiance.data != searched)
+            if (before == nullptr || channel.irradiance.data != before->irradiance.data)
                 squares = even_squares(problem, channel.irradiance);
-            searched = channel.irradiance.data;
+            before = &channel;
             luminance.push_back(solve_channel(problem, channel, squares, progress));
         }
     });
