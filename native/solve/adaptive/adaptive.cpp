@@ -69,9 +69,9 @@ SpreadLight spread_light(const LightTerms& terms, std::size_t t, const Grid& lig
     return spread;
 }
 
-// Errors of an interpolated kernel have either sign, and cancel where many beams light each texel. Measured with light
-// of a random half of all texels, up to 85 degrees: what near_radius expects is 40 times the worst texel's error and
-// more, for any near radius; of it a safe half.
+// Errors of an interpolated kernel have either sign, and cancel where many beams light each texel. Measured on 1024 x 1024
+// texels, a random half of them lit, up to 88 degrees: the worst texel's error is at most a fifteenth of what near_radius
+// expects, which leaves a third of the tolerance.
 double cancellation(double lit_share)
 {
     return std::max(1.0, 20.0 * std::sqrt(2.0 * lit_share));
