@@ -122,6 +122,14 @@ def test_a_long_plane(library):
         compare(light, travel(70, 200), library, path, 1e-3)
 
 
+@pytest.mark.parametrize("azimuth", [0, 37])
+@pytest.mark.parametrize("tolerance", [1e-1, 1e-3])
+def test_narrow_kernels_on_several_levels(library, tolerance, azimuth):
+    """Grazing light's lobe is narrower than the points of coarse grids where these are taken too soon."""
+    light = np.random.default_rng(5).random((150, 260)) < 0.5
+    compare(light.astype(np.float32), travel(85, azimuth), library, 40.0, tolerance)
+
+
 def test_texels_need_not_be_square(library):
     for pitch in ((1.0, 0.2), (0.1, 1.0)):
         compare(fig9(90)[:, :70], travel(60, 30), library, 3.0, 1e-3, pitch)
@@ -146,6 +154,17 @@ def test_light_that_does_not_reach_is_zero(library):
     dark = convolve(np.zeros((9, 12), np.float32), SLANTED, library, ALBEDO, 1.0, 1.0, solver="adaptive")
     assert dark.shape == (9, 12, 3)
     assert not dark.any()
+
+
+@pytest.mark.parametrize("exponent", [-100, 66, 96])
+def test_light_of_any_power(library, exponent):
+    """A power of two times the light is as much times the result, bit for bit."""
+    light, direction = lamp(20, 33, 0.3)
+    for d in (SLANTED, direction):
+        once, scaled = (
+            convolve(np.ldexp(light, e), d, library, ALBEDO, 4.0, 1.0, solver="adaptive") for e in (0, exponent)
+        )
+        assert np.array_equal(np.ldexp(once, exponent), scaled)
 
 
 def test_same_bits_for_any_number_of_threads(library):

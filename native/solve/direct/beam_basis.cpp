@@ -27,20 +27,22 @@ BeamBasis BeamBasis::library_nodes(const LdfSource& library)
     return basis;
 }
 
-QuadrantKernel::QuadrantKernel(const RadialProfile& profile, const Plane& plane, const ChannelMedium& medium)
-    : m_width(plane.width), m_texels(plane.width * plane.height)
+QuadrantRows::QuadrantRows(const RadialProfile& profile, const Plane& plane, const ChannelMedium& medium,
+                           std::size_t first, std::size_t count)
+    : m_first(first), m_width(plane.width), m_texels(plane.width * count)
 {
     const double px = plane.pitch_x / medium.mean_free_path;
     const double py = plane.pitch_y / medium.mean_free_path;
-    m_integrals = integrate_texels(profile, {-0.5 * px, -0.5 * py, px, py, plane.width, plane.height});
+    const double y0 = (static_cast<double>(first) - 0.5) * py;
+    m_integrals = integrate_texels(profile, {-0.5 * px, y0, px, py, plane.width, count});
 }
 
-void QuadrantKernel::row(std::ptrdiff_t dy, const Harmonics& cosine, const Harmonics& sine,
-                         std::vector<double>& values) const
+void QuadrantRows::row(std::ptrdiff_t dy, const Harmonics& cosine, const Harmonics& sine,
+                       std::vector<double>& values) const
 {
     values.assign(2 * m_width - 1, 0.0);
     double* right = values.data() + (m_width - 1);
-    const std::size_t first = static_cast<std::size_t>(std::abs(dy)) * m_width;
+    const std::size_t first = (static_cast<std::size_t>(std::abs(dy)) - m_first) * m_width;
     for (std::size_t m = 0; m < m_integrals.harmonics; ++m) {
         // phi -> -phi for dy < 0, and phi -> pi - phi for dx < 0.
         const double by_sine = dy < 0 ? -sine[m] : sine[m];

@@ -40,20 +40,21 @@ private:
     std::function<Weights(const Vec3&)> m_weights;
 };
 
-// Texel integrals of one profile on the quadrant of offsets (0 .. height - 1, 0 .. width - 1) around the texel where
-// the beam enters; the other quadrants follow by symmetry.
-class QuadrantKernel {
+// Texel integrals of one profile for some rows of the quadrant of offsets (0 .. height - 1, 0 .. width - 1) around the
+// texel where the beam enters; the other quadrants follow by symmetry.
+class QuadrantRows {
 public:
-    QuadrantKernel(const RadialProfile& profile, const Plane& plane, const ChannelMedium& medium);
-
-    std::size_t harmonics() const { return m_integrals.harmonics; }
+    QuadrantRows() = default;
+    QuadrantRows(const RadialProfile& profile, const Plane& plane, const ChannelMedium& medium, std::size_t first,
+                 std::size_t count);
 
     // The sum over m of cosine[m] A_m + sine[m] B_m for the row offset dy and dx = -(width - 1) .. width - 1.
     void row(std::ptrdiff_t dy, const Harmonics& cosine, const Harmonics& sine, std::vector<double>& values) const;
 
 private:
-    std::size_t m_width;
-    std::size_t m_texels;
+    std::size_t m_first = 0;
+    std::size_t m_width = 0;
+    std::size_t m_texels = 0;
     TexelIntegrals m_integrals;
 };
 

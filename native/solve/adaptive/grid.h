@@ -1,0 +1,55 @@
+// Values on grids, and kernels as tables of offsets.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+namespace beamspread {
+
+// Targets that are summed at a time.
+inline constexpr std::ptrdiff_t targets_at_once = 16;
+
+// Values on a grid, row by row; rows are filled up with zeros to a multiple of the targets summed at a time.
+struct Grid {
+    std::size_t height;
+    std::size_t width;
+    std::size_t stride;
+    std::vector<double> values;
+
+    Grid(std::size_t grid_height, std::size_t grid_width)
+        : height(grid_height),
+          width(grid_width),
+          stride((width + targets_at_once - 1) / targets_at_once * targets_at_once),
+          values(height * stride)
+    {
+    }
+    double* row(std::size_t y) { return values.data() + y * stride; }
+    const double* row(std::size_t y) const { return values.data() + y * stride; }
+};
+
+// Values for offsets -reach .. reach from a beam, rows upward; zeros on either side of a row for targets beyond.
+class KernelTable {
+public:
+    KernelTable(std::size_t reach_y, std::size_t reach_x)
+        : m_reach_y(static_cast<std::ptrdiff_t>(reach_y)),
+          m_reach_x(static_cast<std::ptrdiff_t>(reach_x)),
+          m_values((2 * reach_y + 1) * static_cast<std::size_t>(stride()))
+    {
+    }
+
+    std::ptrdiff_t reach_y() const { return m_reach_y; }
+    std::ptrdiff_t reach_x() const { return m_reach_x; }
+
+    // The value at dx = 0; dx may be negative.
+    double* row(std::ptrdiff_t dy) { return m_values.data() + (dy + m_reach_y) * stride() + stride() / 2; }
+    const double* row(std::ptrdiff_t dy) const { return m_values.data() + (dy + m_reach_y) * stride() + stride() / 2; }
+
+private:
+    std::ptrdiff_t stride() const { return 2 * (m_reach_x + targets_at_once) + 1; }
+
+    std::ptrdiff_t m_reach_y;
+    std::ptrdiff_t m_reach_x;
+    std::vector<double> m_values;
+};
+
+}  // namespace beamspread

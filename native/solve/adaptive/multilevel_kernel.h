@@ -1,0 +1,57 @@
+// A kernel as a sum of kernels on coarser and coarser grids.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "ldf/radial/radial_profile.h"
+#include "ldf/radial/texel_integral.h"
+#include "solve/adaptive/grid.h"
+
+namespace beamspread {
+
+// A grid, the finest being that of the texels. The next coarser one has every other row or column or both. Lengths in
+// mean free paths.
+struct GridLevel {
+    std::size_t height = 0;
+    std::size_t width = 0;
+    double pitch_y = 1.0;
+    double pitch_x = 1.0;
+    bool halves_y = false;
+    bool halves_x = false;
+    double near_radius = 0.0;  // pairs of points farther apart are left to coarser grids
+};
+
+// `near` is the near radius of each level in points of its grid. An axis is halved where that leaves more points than
+// the near radius has, and the one with the finer pitch first, until texels are about square.
+std::vector<GridLevel> grid_levels(std::size_t height, std::size_t width, double pitch_y, double pitch_x, double near);
+
+// A combination of harmonics of one profile: the sum over m of c_m(r) (cosine[m] cos(m phi) + sine[m] sin(m phi)).
+struct HarmonicSum {
+    Harmonics cosine{};
+    Harmonics sine{};
+};
+
+// Kernels of one profile, the power that a texel's beam leaves in another texel, as the sum over levels k of
+//   K_k(r) = K(r) w_0(r) ... w_k-1(r) (1 - w_k(r)),
+// w_k rising smoothly from 0 at the beam to 1 at the near radius of level k, so that K_k is smooth enough for the grid of
+// level k and zero beyond its near radius (multilevel summation: Hardy et al. 2009, doi:10.1016/j.parco.2008.12.005).
+class MultilevelKernel {
+public:
+    MultilevelKernel(const RadialProfile& profile, const std::vector<GridLevel>& levels);
+
+    // K_k for each level.
+    std::vector<KernelTable> tables(const HarmonicSum& harmonics) const;
+
+private:
+    // Of the offsets (0 .. height - 1, 0 .. width - 1) of a level's grid; the other quadrants follow by symmetry.
+    struct Quadrant {
+        std::size_t height;
+        std::size_t width;
+        TexelIntegrals integrals;
+        std::vector<double> window;  // that K is multiplied by
+    };
+    std::vector<Quadrant> m_levels;
+};
+
+}  // namespace beamspread
