@@ -180,15 +180,15 @@ std::vector<float> solve_adaptive(const Plane& plane, const Light& light, const 
     Grid sum(height, width);
     for (std::size_t t = 0; t < count; ++t) {
         const double work = 1.0 / static_cast<double>(count);
-        Grid light = term_light(terms, t, height, width);
+        Grid beams = term_light(terms, t, height, width);
         if (!wide.empty()) {
             Grid texel(2 * height - 1, 2 * width - 1);
             texel.row(height - 1)[width - 1] = 1.0;
-            const Grid steps = take_steps(light, wide);
+            const Grid steps = take_steps(beams, wide);
             add_pairs(sum, steps, step_kernel(kernel_sums.sum(t, std::move(texel), progress, 0.0)), progress,
                       0.5 * work);
         }
-        const Grid part = texel_sums.sum(t, std::move(light), progress, wide.empty() ? work : 0.5 * work);
+        const Grid part = texel_sums.sum(t, std::move(beams), progress, wide.empty() ? work : 0.5 * work);
         for (std::size_t i = 0; i < part.values.size(); ++i)
             sum.values[i] += part.values[i];
     }
