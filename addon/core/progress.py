@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-# Takes the fraction done, 0..1; returning False stops the work, which then raises Cancelled.
-Progress = Callable[[float], bool]
+# Takes the fraction done, 0..1. Answering False (or NumPy's False_) stops the work, which then raises Cancelled; any
+# other answer goes on, also None and 0. The native module alone reads the answers: everything here passes them on.
+Progress = Callable[[float], object]
 
 
 def stages(progress: Progress | None, weights: list[float]) -> Iterator[Progress | None]:
@@ -17,5 +18,4 @@ def stages(progress: Progress | None, weights: list[float]) -> Iterator[Progress
 
 
 def _stage(progress: Progress, start: float, length: float) -> Progress:
-    # Native code takes anything but False for "go on"; so does this.
-    return lambda fraction: progress(min(1.0, start + length * fraction)) is not False
+    return lambda fraction: progress(min(1.0, start + length * fraction))
