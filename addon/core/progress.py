@@ -10,10 +10,12 @@ Progress = Callable[[float], object]
 
 
 def stages(progress: Progress | None, weights: list[float]) -> Iterator[Progress | None]:
-    """Yield one callback per weight; together they run from 0 to 1."""
+    """Yield one callback per weight; together they run from 0 to 1. Raises ValueError for what can't be called."""
+    if progress is not None and not callable(progress):
+        raise ValueError(f"argument 'progress' is {progress!r}; allowed: a function of the finished fraction, or None")
     total, done = sum(weights) or 1.0, 0.0
     for weight in weights:
-        yield _stage(progress, done / total, weight / total) if progress else None
+        yield _stage(progress, done / total, weight / total) if progress is not None else None
         done += weight
 
 
