@@ -1,5 +1,5 @@
-// Radiance averaged over the azimuth, on a quadrature of cosines inside the medium (van de Hulst 1980, Prahl et al.
-// 1993).
+// Radiance averaged over the azimuth, on a quadrature of cosines inside the medium (van de Hulst 1980,
+// doi:10.1016/B978-0-12-710701-1.X5001-0; Prahl, van Gemert, Welch 1993, doi:10.1364/AO.32.000559).
 //
 // By reciprocity the totals of a beam are the radiance that the medium returns toward it under uniform diffuse
 // light. That asks for one vector of incident light and, beside the quadrature's own nodes, for rows of the matrices at
@@ -24,9 +24,9 @@ using Eigen::ArrayXd;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Legendre coefficients of the phase function, g^l, are kept until they have fallen to this ...
+// Legendre coefficients of the phase function, g^l, are kept until they have fallen to this, but at least and at most
+// so many. `exact_totals_error` says what the others leave.
 constexpr double negligible_coefficient = 1.4e-3;
-// ... but at least and at most so many.
 constexpr int min_coefficients = 40;
 constexpr int max_coefficients = 192;
 
@@ -87,7 +87,8 @@ Angular angular_problem(const Medium& medium, std::span<const double> angles_deg
     a.reflectance = a.cosine.unaryExpr(from_inside);
     a.beam_reflectance = a.beam_cosine.unaryExpr(from_inside);
 
-    // Delta-M (Wiscombe 1977): what a forward peak has beyond the last coefficient goes straight on.
+    // Delta-M (Wiscombe 1977, doi:10.1175/1520-0469(1977)034<1408:TDMRYA>2.0.CO;2): what a forward peak has beyond the
+    // last coefficient goes straight on.
     a.peak = medium.g > 0.0 ? std::pow(medium.g, count) : 0.0;
     const MatrixXd p = legendre(count, a.cosine);
     const MatrixXd p_beams = legendre(count, a.beam_cosine);
@@ -104,7 +105,7 @@ Angular angular_problem(const Medium& medium, std::span<const double> angles_deg
     a.among = {kernel(p, even), kernel(p, odd)};
     a.to_beams = {kernel(p_beams, even), kernel(p_beams, odd)};
     // What the quadrature misses of the phase function's integral is taken for unscattered too, so that no energy is
-    // lost (Grant, Hunt 1969).
+    // lost (Grant, Hunt 1969, doi:10.1098/rspa.1969.0187).
     const VectorXd lost =
         VectorXd::Ones(a.cosine.size()) - a.among.forward.rowwise().sum() - a.among.backward.rowwise().sum();
     a.among.forward.diagonal() += lost;
@@ -113,12 +114,14 @@ Angular angular_problem(const Medium& medium, std::span<const double> angles_deg
 
 // A homogeneous layer without boundaries: radiance that leaves for radiance that arrives.
 struct Layer {
-    ArrayXd direct, beam_direct;  // unscattered, straight through
+    ArrayXd depth, beam_depth;  // optical, along each direction
+    ArrayXd direct, beam_direct;  // unscattered, straight through: exp(-depth)
     MatrixXd reflected, beam_reflected;  // from the quadrature's directions to them and to the beams
     MatrixXd scattered, beam_scattered;  // the same on the far side
 };
 
-// The diamond scheme: radiance inside is the mean of the two sides (Wiscombe 1976). Conserves energy exactly.
+// The diamond scheme, which conserves energy exactly: radiance inside is the mean of the two sides (Wiscombe 1976,
+// doi:10.1016/0022-4073(76)90056-X).
 Layer thin_layer(const Angular& a, double albedo, double thickness)
 {
     const Eigen::Index n = a.cosine.size();
@@ -133,6 +136,7 @@ Layer thin_layer(const Angular& a, double albedo, double thickness)
     const MatrixXd x = backward * across.inverse();
     const MatrixXd g = (across - x * backward).inverse();
     Layer layer;
+    layer.depth = m.log1p() - (-m).log1p();
     layer.direct = (1.0 - m) / (1.0 + m);
     layer.reflected = 2.0 * g * x;
     layer.scattered = (2.0 / (1.0 + m)).matrix().asDiagonal() * (forward + x * backward) * g;
@@ -141,6 +145,7 @@ Layer thin_layer(const Angular& a, double albedo, double thickness)
     down.diagonal() += 0.5 * layer.direct.matrix();
     const MatrixXd up = 0.5 * layer.reflected;
     const auto factor = (2.0 * albedo * m_beam / (1.0 + m_beam)).matrix().asDiagonal();
+    layer.beam_depth = m_beam.log1p() - (-m_beam).log1p();
     layer.beam_direct = (1.0 - m_beam) / (1.0 + m_beam);
     layer.beam_reflected = factor * (a.to_beams.forward * up + a.to_beams.backward * down);
     layer.beam_scattered = factor * (a.to_beams.forward * down + a.to_beams.backward * up);
@@ -164,8 +169,11 @@ Layer doubled(const Layer& layer)
     const MatrixXd beam_up = layer.beam_reflected * down + layer.beam_reflected * direct;
     const MatrixXd beam_down = layer.beam_scattered + layer.beam_reflected * up;
     Layer both;
-    both.direct = layer.direct.square();
-    both.beam_direct = layer.beam_direct.square();
+    // Near grazing a beam's first layer is so thin that squares of what it lets through would lose its depth.
+    both.depth = 2.0 * layer.depth;
+    both.beam_depth = 2.0 * layer.beam_depth;
+    both.direct = (-both.depth).exp();
+    both.beam_direct = (-both.beam_depth).exp();
     both.reflected = r + direct * up + t * up;
     both.scattered = direct * down + t * direct + t * down;
     both.beam_reflected = layer.beam_reflected + beam_direct * beam_up + layer.beam_scattered * up;
