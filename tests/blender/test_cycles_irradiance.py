@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scenes
 from beamspread import extract
-from beamspread._load import native
+from beamspread.core.native import native
 from beamspread.core.bake import BakeSettings, light_beams
 from beamspread.core.receiver import build_receiver, fit_uv_map
 from mathutils import Euler, Matrix

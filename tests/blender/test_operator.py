@@ -69,7 +69,7 @@ def test_an_artists_own_use_of_the_node_is_kept():
 
 def test_file_image_is_written_to_its_file(tmp_path):
     path = tmp_path / "target.exr"
-    from beamspread._load import native
+    from beamspread.core.native import native
 
     native.write_exr(str(path), np.zeros((20, 24, 3), np.float32), ["R", "G", "B"])
     image = bpy.data.images.load(str(path))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from beamspread import Medium, exact_totals, simulate
-from beamspread.core.library import angles_for
+from beamspread.core.ldf.library import angles_for
 
 from .plain_walk import fresnel
 

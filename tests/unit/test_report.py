@@ -2,7 +2,7 @@
 
 import json
 
-from beamspread.core.report import BakeRecord, Report, file_name
+from beamspread.core.batch.report import BakeRecord, Report, file_name
 
 KEYS = {"object", "material", "frame", "path", "width", "height", "seconds", "status", "message"}
 

@@ -6,7 +6,7 @@ import struct
 import numpy as np
 import pytest
 from beamspread import LdfLibrary, LdfSample, Medium, simulate
-from beamspread._load import native
+from beamspread.core.native import native
 from tests.unit.test_exr import attribute, plain_exr
 
 FLOAT = 2

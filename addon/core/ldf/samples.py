@@ -5,7 +5,8 @@ from __future__ import annotations
 from functools import lru_cache
 from pathlib import Path
 
-from .errors import BakeError
+from ..errors import BakeError
+from ..native import native
 
 
 def load_source(folder: str, method: str):
@@ -37,6 +38,4 @@ def load_source(folder: str, method: str):
 @lru_cache(maxsize=1)
 def _load(files: tuple[tuple[Path, int, int], ...], method: str):
     """The samples in files, which come with their times and sizes."""
-    from .._load import native
-
     return native.SampleSource([native.LdfSample.load(file) for file, _, _ in files], method)

@@ -1,20 +1,22 @@
-"""Bakes one receiver: beams of each light, spread by the material's LDF, summed to luminance."""
+"""Lights -> beams -> luminance: beams of each light, spread by the material's LDF and summed."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from .errors import BakeError
-from .margin import extend_margin
-from .material import Material, check_thickness
-from .progress import Progress, stages
-from .receiver import Receiver
-from .samples import load_source
-from .scene import Grid, Light, Mesh, PointLight, SpotLight, SunLight
+from ..errors import BakeError
+from ..ldf.library import library
+from ..ldf.samples import load_source
+from ..material.material import Material, check_thickness
+from ..native import native
+from ..progress import Progress, stages
+from ..scene.grid import Grid
+from ..scene.illumination import Illumination
+from ..scene.lights import Light
+from .convolve import convolve_lights
+from .settings import BakeSettings
 
 # Shares of the time that a bake takes, roughly: simulating an LDF not in the cache, beams and solving of one light.
 LIBRARY_WEIGHT, BEAMS_WEIGHT, SOLVE_WEIGHT = 2.0, 1.0, 3.0
@@ -27,35 +29,9 @@ TOLERANCE = 5e-3
 MOST_LIGHTS_AT_ONCE = 4
 
 
-@dataclass(frozen=True)
-class BakeSettings:
-    """How to bake.
-
-    Attributes
-    ----------
-    solver : "fft", "direct" or "adaptive".
-    samples : visibility is sampled at samples x samples points per texel.
-    margin : texels added around the chart.
-    quality : of the LDF, "final" or "preview".
-    distributions : "library", simulated from the material, or the method by which the samples in `sample_folder` are
-        interpolated: "angular", "adaptive" or "planar". Samples stand for anisotropy, index of refraction and
-        thickness of every material.
-    threads : 0 for all.
-    """
-
-    solver: str = "fft"
-    samples: int = 4
-    margin: int = 16
-    quality: str = "final"
-    distributions: str = "library"
-    sample_folder: str = ""
-    threads: int = 0
-
-
 def bake(
     grid: Grid,
-    lights: Sequence[Light],
-    occluders: Mesh,
+    illumination: Illumination,
     material: Material,
     thickness: float,
     settings: BakeSettings,
@@ -66,7 +42,6 @@ def bake(
     Parameters
     ----------
     grid : where light arrives, scene units.
-    occluders : triangles that throw shadows, world.
     material : with its mean free path in the units of the grid.
     thickness : in the units of the grid, 0 for a half-space.
     progress : called with 0..1, returns False to stop.
@@ -84,6 +59,7 @@ def bake(
     Cancelled
         `progress` returned False.
     """
+    lights = illumination.lights
     material.check()
     check_thickness(thickness)
     media_progress, *light_progress = stages(progress, [LIBRARY_WEIGHT] + [BEAMS_WEIGHT, SOLVE_WEIGHT] * len(lights))
@@ -97,7 +73,7 @@ def bake(
     for number, (light, beams_progress, solve_progress) in enumerate(
         zip(lights, light_progress[::2], light_progress[1::2]), 1
     ):
-        beams, direction, strength = unit_beams(grid, light, occluders.ray_caster, settings, beams_progress)
+        beams, direction, strength = unit_beams(grid, light, illumination.caster(), settings, beams_progress)
         if beams.any() and any(strength):
             beams *= strength.max()
             waiting.append((beams, direction))
@@ -116,72 +92,35 @@ def bake(
     return np.zeros((grid.height, grid.width, 3), np.float32) if luminance is None else luminance
 
 
-def bake_texture(
-    receiver: Receiver,
-    lights: Sequence[Light],
-    occluders: Mesh,
-    material: Material,
-    thickness: float,
-    settings: BakeSettings,
-    progress: Progress | None = None,
-) -> np.ndarray:
-    """`bake` on the receiver's grid, brought to the texture and extended into the margin: (height, width, 3)."""
-    luminance = bake(receiver.grid, lights, occluders, material, thickness, settings, progress)
-    if not np.isfinite(luminance).all():
-        raise BakeError("The bake produced values that are not numbers: check the strengths of the lights.")
-    return extend_margin(receiver.to_texels(luminance), receiver.coverage > 0, settings.margin)
-
-
 def light_beams(
-    grid: Grid, light: Light, occluders, settings: BakeSettings, progress: Progress | None = None
+    grid: Grid, light: Light, caster, settings: BakeSettings, progress: Progress | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Irradiance (H, W, 3) in W/m^2 with colour, cosine, visibility and coverage, and the direction of travel.
 
-    The direction is a unit vector in the plane frame: (3,) for a sun, (H, W, 3) otherwise. `occluders` is a native
+    The direction is a unit vector in the plane frame: (3,) for a sun, (H, W, 3) otherwise. `caster` is a native
     `Occluders` or None.
     """
-    beams, direction, strength = unit_beams(grid, light, occluders, settings, progress)
+    beams, direction, strength = unit_beams(grid, light, caster, settings, progress)
     return beams[..., None] * strength, direction
 
 
 def unit_beams(
-    grid: Grid, light: Light, occluders, settings: BakeSettings, progress: Progress | None = None
+    grid: Grid, light: Light, caster, settings: BakeSettings, progress: Progress | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Irradiance (H, W) of the light at strength 1, direction as `light_beams` says, and strength times colour (3,)."""
-    from .._load import native
-
-    numbers = (grid.origin, grid.x_axis, grid.y_axis, grid.normal, grid.pitch_x, grid.pitch_y, grid.width, grid.height)
-    caster = occluders if light.cast_shadow else None
     options = {
         "samples": settings.samples,
         "threads": settings.threads,
         "progress": progress,
         "clearance": grid.clearance,
     }
-    if isinstance(light, SunLight):
-        direction = grid.to_plane_frame(light.direction)
-        irradiance = native.sun_beams(*numbers, light.direction, caster, **options)
-        strength = light.irradiance
-    elif isinstance(light, SpotLight):
-        cone = light.frame, light.spot_size, light.blend
-        irradiance, direction = native.spot_beams(
-            *numbers, light.position, *cone, caster, falloff=light.falloff, **options
-        )
-        strength = light.power
-    elif isinstance(light, PointLight):
-        irradiance, direction = native.point_beams(*numbers, light.position, caster, **options)
-        strength = light.power
-    else:
-        raise TypeError(f"light is a {type(light).__name__}; it must be a SunLight, PointLight or SpotLight")
+    irradiance, direction = light.unit_beams(grid, caster if light.cast_shadow else None, **options)
     irradiance *= grid.coverage
-    return irradiance, direction, np.asarray(light.color, np.float32) * np.float32(strength)
+    return irradiance, direction, light.rgb()
 
 
 def _libraries(material: Material, thickness: float, quality: str, progress: Progress | None) -> list:
     """The LDF library of each channel; channels of the same medium share one."""
-    from .._load import native
-    from .library import library
-
     depths = [thickness / length if thickness else math.inf for length in material.mean_free_path]
     channels = list(zip(material.channel_anisotropy, depths))
     distinct = sorted(set(channels))
@@ -193,8 +132,6 @@ def _libraries(material: Material, thickness: float, quality: str, progress: Pro
 
 
 def _spread(lights, libraries, material: Material, grid: Grid, settings: BakeSettings, progress):
-    from .convolve import convolve_lights
-
     shared = all(library is libraries[0] for library in libraries)
     try:
         return convolve_lights(

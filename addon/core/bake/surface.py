@@ -1,29 +1,24 @@
-"""One bake as plain data: everything that `run` needs, nothing that knows the host."""
+"""A translucent surface as a node describes it, before its albedo is known."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from .bake import LIBRARY_WEIGHT, LIGHT_WEIGHT, BakeSettings, bake_texture
-from .color import albedo_from_color
-from .material import RGB, Material, check_base_color, check_thickness
-from .progress import Progress, stages
-from .receiver import Receiver
-from .scene import Light, Mesh
+from ..ldf.albedo import albedo_from_color
+from ..material.material import RGB, Material, check_base_color, check_thickness
+from ..native import native
+from ..progress import Progress, stages
 
 
 @dataclass(frozen=True)
 class Surface:
-    """A node's values.
+    """Values in scene units.
 
     Attributes
     ----------
-    material : with its mean free path in scene units.
-    thickness : scene units, 0 for a half-space.
+    material : with its mean free path.
+    thickness : 0 for a half-space.
     base_color : reflectance wanted under uniform diffuse light, or None where the material's albedo counts.
     """
 
@@ -44,8 +39,6 @@ class Surface:
         self.check()
         if self.base_color is None:
             return self.material
-        from .._load import native
-
         channels = zip(self.base_color, self.material.mean_free_path, self.material.channel_anisotropy)
         albedo = []
         for (color, length, g), stage in zip(channels, stages(progress, [1.0] * len(self.base_color))):
@@ -53,24 +46,3 @@ class Surface:
             medium = native.Medium(g=g, ior=self.material.ior, thickness=depth)
             albedo.append(albedo_from_color(color, medium, quality, stage)[0])
         return replace(self.material, albedo=tuple(albedo))
-
-
-@dataclass(frozen=True, eq=False)
-class BakeJob:
-    """A receiver with its light and its surface; `warnings` are sentences for the artist."""
-
-    receiver: Receiver
-    lights: Sequence[Light]
-    occluders: Mesh
-    surface: Surface
-    settings: BakeSettings
-    warnings: tuple[str, ...] = ()
-
-    def run(self, progress: Progress | None = None) -> np.ndarray:
-        """Bake: float32 (height, width, 3) luminance, margin included, row 0 at the bottom."""
-        needs_albedo = 0.0 if self.surface.base_color is None else LIBRARY_WEIGHT
-        resolving, baking = stages(progress, [needs_albedo, LIBRARY_WEIGHT + LIGHT_WEIGHT * len(self.lights)])
-        material = self.surface.resolve(self.settings.quality, resolving)
-        return bake_texture(
-            self.receiver, self.lights, self.occluders, material, self.surface.thickness, self.settings, baking
-        )

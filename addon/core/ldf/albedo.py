@@ -1,4 +1,4 @@
-"""Colours: from the one an artist picks to the albedo that transport needs, and from linear values to a screen."""
+"""The albedo that transport needs, from the colour that an artist picks."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .material import RGB
-from .progress import Progress
+from ..material.material import RGB
+from ..progress import Progress
+from .library import library
 
 HIGHEST_ALBEDO = 0.99999
 """What a colour too bright for its medium becomes: simulations follow light for enough scatterings up to here."""
@@ -37,8 +38,6 @@ def albedo_from_color(color, medium, quality: str = "final", progress: Progress 
     Cancelled
         `progress` returned False.
     """
-    from .library import library
-
     channels = _channels(color)
     reflectance = library(medium, quality=quality, progress=progress).diffuse_reflectance
     albedos = {value: albedo_from_reflectance(value, reflectance) for value in set(channels)}
@@ -85,9 +84,3 @@ def albedo_from_reflectance(value: float, reflectance: Callable[[float], float])
             bright, above = middle, error
             below, kept = (below / 2 if kept == -1 else below), -1
     return 1 - dark**2
-
-
-def to_srgb(linear: np.ndarray) -> np.ndarray:
-    """Encode linear values with the sRGB transfer function (IEC 61966-2-1), clipped to 0..1."""
-    clipped = np.clip(linear, 0, 1)
-    return np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055).astype(np.float32)

@@ -5,7 +5,7 @@ import os
 import sys
 from pathlib import Path
 
-from .._load import native
+from ..native import native
 
 PHOTONS = {"preview": 80_000, "final": 4_000_000}
 """Photons per angle for a medium with g .8 and ior 1; see `photons_for`."""
@@ -15,7 +15,7 @@ _MAX_PHOTONS = 4_000_000
 _FILE_VERSION = 9
 """Raised when the simulation changes, so that older cached files are made again."""
 
-SHIPPED_FOLDER = Path(__file__).resolve().parents[1] / "library"
+SHIPPED_FOLDER = Path(__file__).resolve().parents[2] / "library"
 """Libraries that came with the package, made by ``tools/make_library.py``."""
 
 

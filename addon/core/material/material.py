@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from .errors import MaterialError
+from ..errors import MaterialError
 
 CHANNELS = ("red", "green", "blue")
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .material import Material
 
-PRESET_FILE = Path(__file__).resolve().parent.parent / "data" / "materials.csv"
+PRESET_FILE = Path(__file__).resolve().parents[2] / "data" / "materials.csv"
 METRES_PER_MM = 1e-3
 # Jensen's table prints absorption to two decimals per mm; where it says 0, half its last digit is assumed, because an
 # albedo of 1 has no solution in an infinite medium.

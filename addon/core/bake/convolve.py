@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from .._load import native
-from .progress import stages
+from ..native import native
+from ..progress import stages
 
 
 def convolve(

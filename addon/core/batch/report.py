@@ -6,7 +6,7 @@ import re
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-WRITTEN, SKIPPED, FAILED, CANCELLED = "written", "skipped", "failed", "cancelled"
+from ..bake.runner import FAILED, WRITTEN, Bake
 
 
 @dataclass
@@ -22,6 +22,13 @@ class BakeRecord:
     seconds: float = 0.0
     status: str = FAILED
     message: str = ""
+
+    @classmethod
+    def of(cls, bake: Bake, frame: int) -> BakeRecord:
+        """What became of a bake."""
+        width, height = (bake.job.receiver.width, bake.job.receiver.height) if bake.job else (0, 0)
+        subject = bake.target.object_name, bake.target.material_name, frame, bake.path
+        return cls(*subject, width, height, round(bake.seconds, 3), bake.status, " ".join(bake.messages()))
 
     def __str__(self) -> str:
         subject = f"{self.object} / {self.material}" if self.material else self.object
