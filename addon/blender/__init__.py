@@ -1,17 +1,29 @@
-"""Registers the add-on's parts with Blender, in order; each part knows its classes."""
+"""Blender's half of the add-on: reads scenes into core's plain data, and shows what comes of it.
 
-from . import engine, nodes, operators, settings, ui
+Each part imports only core and those above it (tests/unit/test_layers.py reads this list):
 
-PARTS = (settings, nodes, engine, operators, ui)
+    compat      differences between Blender versions
+    settings    scene.beamspread
+    read        geometry, lights and what a render would show
+    node        the shader node, and where a scene has it
+    images      images of the scene, files, atlases
+    jobs        what becomes a job, and what runs it: operator, engine, batch; the state of a run
+    ui          panels
+"""
+
+from . import settings
+from .jobs import engine, operator, state
+from .node import menu, node
+from .ui import panels
+
+PARTS = (settings, node, menu, state, engine, operator, panels)
 
 
 def register() -> None:
-    """Add the add-on to Blender."""
     for part in PARTS:
         part.register()
 
 
 def unregister() -> None:
-    """Take it out again, in reverse."""
     for part in reversed(PARTS):
         part.unregister()

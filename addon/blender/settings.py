@@ -3,6 +3,7 @@
 import bpy
 from bpy.props import EnumProperty, IntProperty, PointerProperty, StringProperty
 
+from ..core.bake.settings import BakeSettings
 from . import compat
 
 
@@ -94,6 +95,17 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         ],
         default="EXR",
     )
+
+    def for_bake(self, solver: str | None = None) -> BakeSettings:
+        """What core needs of them; `solver` overrides the scene's."""
+        return BakeSettings(
+            solver=solver or self.solver,
+            samples=self.samples,
+            margin=self.margin,
+            quality=self.quality,
+            distributions=self.distributions.lower(),
+            sample_folder=bpy.path.abspath(self.sample_folder),
+        )
 
 
 def register() -> None:

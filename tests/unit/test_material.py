@@ -6,9 +6,9 @@ import beamspread
 import numpy as np
 import pytest
 from beamspread import Material, presets
-from beamspread.core.ldf.albedo import HIGHEST_ALBEDO, albedo_from_color, albedo_from_reflectance
 from beamspread.core.bake.surface import Surface
 from beamspread.core.errors import MaterialError
+from beamspread.core.ldf.albedo import HIGHEST_ALBEDO, albedo_from_color, albedo_from_reflectance
 from beamspread.core.material.material import check_thickness
 
 GOOD = {"albedo": (0.9, 0.5, 0.0), "mean_free_path": (1e-3, 2e-3, 3e-3)}

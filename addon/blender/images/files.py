@@ -1,4 +1,4 @@
-"""Where a bake goes: images of the scene and image files."""
+"""Images of the scene, and image files."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from .core.color import to_srgb
-from .core.errors import ImageError
+from ...core.errors import ImageError
+from ...core.native import native
 
 EXTENSIONS = {"EXR": ".exr", "PNG": ".png"}
 
@@ -50,8 +50,8 @@ def make_image(name: str, width: int, height: int):
     return bpy.data.images.new(name, width, height, alpha=False, float_buffer=True)
 
 
-def fill_image(image, texture: np.ndarray) -> None:
-    """Put linear RGB (height, width, 3) into an image and keep it: in its file, or packed into the .blend file.
+def fill_image(image, texture: np.ndarray) -> str:
+    """Put linear RGB (height, width, 3) into an image and keep it; the path of its file, "" where it is packed.
 
     Raises
     ------
@@ -65,17 +65,18 @@ def fill_image(image, texture: np.ndarray) -> None:
     if path is not None and path.suffix.lower() == ".exr":
         write_exr(path, texture)
         image.reload()
-        return
+        return str(path)
     encode = not image.is_float and not image.colorspace_settings.is_data
     set_pixels(image, to_srgb(texture) if encode else texture)
     if path is None:
         image.pack()
-        return
+        return ""
     try:
         image.save()
     except RuntimeError as error:
         image.reload()
         raise ImageError(f"The image '{image.name}' cannot be saved to {path}: {error}") from error
+    return str(path)
 
 
 def set_pixels(image, texture: np.ndarray) -> None:
@@ -110,8 +111,6 @@ def write_file(path: Path, texture: np.ndarray, file_format: str) -> None:
 
 def write_exr(path: Path, texture: np.ndarray) -> None:
     """Linear 32-bit float RGB, not packed, as Blender saves float images by itself."""
-    from ._load import native
-
     try:
         native.write_exr(str(path), np.ascontiguousarray(texture, np.float32), ["R", "G", "B"], compression="none")
     except OSError as error:
@@ -131,3 +130,9 @@ def write_png(path: Path, texture: np.ndarray) -> None:
         raise ImageError(f"The file {path} cannot be written: {error}") from error
     finally:
         bpy.data.images.remove(image)
+
+
+def to_srgb(linear: np.ndarray) -> np.ndarray:
+    """Encode linear values with the sRGB transfer function (IEC 61966-2-1), clipped to 0..1."""
+    clipped = np.clip(linear, 0, 1)
+    return np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055).astype(np.float32)

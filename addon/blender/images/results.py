@@ -5,13 +5,18 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from . import bakes, nodes, targets
-from .core.errors import BakeError
-from .core.job import BakeJob
-from .core.margin import extend_margin
+from ...core.bake.margin import extend_margin
+from ...core.bake.runner import Bake
+from ...core.bake.settings import COMBINED
+from ...core.errors import BakeError
+from ..node.find import find_node
+from ..node.node import link_result
+from . import files
 
 # Texels wholly inside two charts, as a part of one of them: more than rounding at a common border.
 OVERLAP_TOLERANCE = 0.01
+# Coverage of a texel wholly inside a chart, but for rounding.
+WHOLE = 0.99
 
 
 class Results:
@@ -20,38 +25,50 @@ class Results:
     def __init__(self) -> None:
         self._filled: dict[str, tuple[np.ndarray, np.ndarray]] = {}
 
-    def store(self, target: bakes.Target, job: BakeJob, texture: np.ndarray) -> None:
-        """Fill the image of the target's node, or a new one, and link it back.
+    def store(self, bake: Bake) -> str:
+        """Fill the image of the target's node, or a new one, and link it back; other layers have images beside it.
+
+        Returns
+        -------
+        The path of the image's file, "" where it is packed.
 
         Raises
         ------
         BakeError
             The image cannot be kept, or another object of this run has filled the same part of it.
         """
-        material = bpy.data.materials.get(target.material_name)
-        node = nodes.find_node(material)
+        node = find_node(bpy.data.materials.get(bake.target.material_name))
         if node is None:
             raise BakeError("The material or its Beamspread node was removed during the bake.")
-        covered = job.receiver.coverage > 0
-        image = node.image
-        if image is None:
-            height, width = texture.shape[:2]
-            image = targets.make_image(f"Beamspread {target.object_name}", width, height)
-        elif image.name in self._filled:
-            covered, texture = self._merge(image.name, job, texture)
-        targets.fill_image(image, texture)
-        self._filled[image.name] = (covered, texture)
-        nodes.link_result(material, image)
+        name = node.image.name if node.image else f"Beamspread {bake.target.object_name}"
+        paths = {}
+        for layer, texture in bake.layers.items():
+            image = node.image if layer == COMBINED else bpy.data.images.get(f"{name} {layer}")
+            if image is None:
+                image = files.make_image(name if layer == COMBINED else f"{name} {layer}", *texture.shape[1::-1])
+            paths[layer] = self._fill(image, bake, texture)
+            if layer == COMBINED:
+                link_result(node, image)
+        return paths.get(COMBINED, "")
 
-    def _merge(self, image_name: str, job: BakeJob, texture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _fill(self, image, bake: Bake, texture: np.ndarray) -> str:
+        covered = bake.job.receiver.inside()
+        if image.name in self._filled:
+            covered, texture = self._merge(image.name, bake, texture)
+        path = files.fill_image(image, texture)
+        self._filled[image.name] = (covered, texture)
+        return path
+
+    def _merge(self, image_name: str, bake: Bake, texture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         covered, merged = self._filled[image_name]
-        coverage = job.receiver.coverage
-        overlap = 1.0 if coverage.shape != covered.shape else ((coverage > 0.99) & covered).sum() / (coverage > 0).sum()
+        receiver, inside = bake.job.receiver, bake.job.receiver.inside()
+        overlap = 1.0
+        if inside.shape == covered.shape:
+            overlap = ((receiver.coverage > WHOLE) & covered).sum() / inside.sum()
         if overlap > OVERLAP_TOLERANCE:
             raise BakeError(
                 f"Another object is baked to the same part of the image '{image_name}': "
                 "give each object a material and an image of its own, or move its UVs."
             )
-        merged = np.where((coverage > 0)[..., None], texture, merged)
-        covered = covered | (coverage > 0)
-        return covered, extend_margin(merged, covered, job.settings.margin)
+        merged, covered = np.where(inside[..., None], texture, merged), covered | inside
+        return covered, extend_margin(merged, covered, bake.job.settings.margin)

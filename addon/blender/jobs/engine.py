@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import itertools
+import uuid
 
 import bpy
 import numpy as np
 
-from . import bakes, compat, extract
-from .core.errors import BakeError
-
-# By object and materials: an exception in `bake` reaches nobody, and Blender reports success all the same.
-_errors: dict[tuple[str, ...], str] = {}
-_calls = itertools.count()
+from ...core.bake.runner import WRITTEN, Bake, Target
+from ...core.bake.settings import COMBINED
+from ...core.errors import sentence
+from .. import compat
+from ..node.find import NOTHING_FOUND, find_misplaced, materials_of
+from .prepare import prepare
+from .state import state
 
 
 class BeamspreadEngine(bpy.types.RenderEngine):
@@ -40,46 +41,47 @@ def show_nothing(engine, depsgraph) -> None:
     engine.report({"WARNING"}, "Beamspread bakes textures: press Bake, then render with Cycles or EEVEE")
 
 
-def last_errors() -> list[str]:
-    """What kept images from being filled since they were last baked with success."""
-    return list(_errors.values())
-
-
 def bake_active_image(engine, depsgraph, obj, width: int, height: int) -> None:
-    """Fill the image that Blender bakes to; failures are reported and kept for `last_errors`."""
+    """Fill the image that Blender bakes to; if that fails, Blender reports success all the same, but panels say so."""
     # A layer name of its own per call: results of the same layer overwrite each other.
-    result = engine.begin_result(0, 0, width, height, layer=f"Beamspread {next(_calls)}")
-    passes = result.layers[0].passes
-    key, filled = (obj.name,), False
+    result = engine.begin_result(0, 0, width, height, layer=f"Beamspread {uuid.uuid4()}")
+    passes, filled = result.layers[0].passes, False
     try:
-        names = _materials_in(obj, passes, width, height)
-        key += tuple(names)
-        _errors.pop(key, None)
-        compat.write_pass(passes["Combined"], _bake_materials(engine, depsgraph, obj, names, width, height))
-        filled = True
+        pixels = np.zeros((height, width, 4), np.float32)
+        bakes = _prepare(depsgraph, obj, passes, (width, height))
+        for number, bake in enumerate(bakes):
+            bake.run(lambda fraction, done=number: _step(engine, (done + fraction) / len(bakes)))
+            bake.keep(lambda bake: _put(pixels, bake))
+            state.note(bake)
+        for bake in bakes:
+            for level, message in [("ERROR", bake.error), *(("WARNING", warning) for warning in bake.warnings)]:
+                if message:
+                    engine.report({level}, f"{bake.target}: {message}")
+        if all(bake.status == WRITTEN for bake in bakes):
+            compat.write_pass(passes["Combined"], pixels)
+            filled = True
     except Exception as error:  # noqa: BLE001 - Blender would swallow it
-        _errors[key] = f"{obj.name}: {bakes.sentence(error)}"
-        engine.report({"ERROR"}, _errors[key])
+        engine.report({"ERROR"}, sentence(error))
     finally:
         engine.end_result(result, cancel=not filled)
 
 
-def _bake_materials(engine, depsgraph, obj, names: list[str], width: int, height: int) -> np.ndarray:
-    """RGBA float32 (height, width, 4) of the object's materials, each on its own part of the image."""
-    if not names:
-        raise BakeError("No material of this object has a Beamspread node: add one in the Shader Editor.")
-    scene = depsgraph.scene
-    settings = bakes.core_settings(scene.beamspread)
-    light = extract.read_scene_light(depsgraph)
-    pixels = np.zeros((height, width, 4), np.float32)
-    for number, name in enumerate(names):
-        job = bakes.make_job(obj, name, light, settings, None, scene.beamspread.resolution, size=(width, height))
-        texture = job.run(lambda fraction, done=number: _step(engine, (done + fraction) / len(names)))
-        covered = job.receiver.coverage > 0
-        pixels[covered] = np.dstack([texture, np.ones((height, width), np.float32)])[covered]
-        for warning in job.warnings:
-            engine.report({"WARNING"}, warning)
-    return pixels
+def _prepare(depsgraph, obj, passes, size: tuple[int, int]) -> list[Bake]:
+    """A bake for each material of the object that has its node and that the image shows."""
+    try:
+        targets = [Target(obj.name, name) for name in _materials_in(obj, passes, *size)]
+        settings = depsgraph.scene.beamspread.for_bake()
+        bakes = prepare(depsgraph, targets, settings, size=size) or find_misplaced([obj])
+    except Exception as error:  # noqa: BLE001 - Blender would swallow it
+        return [Bake(Target(obj.name), error=sentence(error))]
+    return bakes or [Bake(Target(obj.name), error=NOTHING_FOUND)]
+
+
+def _put(pixels: np.ndarray, bake: Bake) -> str:
+    """Fill the bake's part of RGBA pixels."""
+    inside = bake.job.receiver.inside()
+    pixels[inside, :3], pixels[inside, 3] = bake.layers[COMBINED][inside], 1
+    return ""
 
 
 def _step(engine, fraction: float) -> bool:
@@ -89,7 +91,7 @@ def _step(engine, fraction: float) -> bool:
 
 def _materials_in(obj, passes, width: int, height: int) -> list[str]:
     """Beamspread materials of the triangles that this image shows (Blender bakes one image at a time)."""
-    wanted = {material.name for material in bakes.materials_of(obj)}
+    wanted = {material.name for material in materials_of(obj)}
     shown = compat.baked_triangles(passes, width, height)
     triangles = np.unique(shown[shown >= 0])
     mesh = obj.to_mesh()

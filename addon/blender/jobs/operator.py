@@ -7,32 +7,33 @@ import threading
 import bpy
 from bpy.props import EnumProperty
 
-from . import bakes, results, status
+from ...core import native
+from ...core.bake.runner import CANCELLED, WRITTEN, Bake
+from ..images.results import Results
+from ..node.find import NOTHING_FOUND, find_misplaced, find_targets
+from .prepare import prepare_scene
+from .state import redraw, state
 
 TIMER_SECONDS = 0.1
 
 
 class BakeThread(threading.Thread):
-    """Runs one job; poll `fraction` and, when it has ended, `texture`, `cancelled` and `error`."""
+    """Runs one bake; poll `fraction` until it has ended."""
 
-    def __init__(self, job) -> None:
+    def __init__(self, bake: Bake) -> None:
         super().__init__(daemon=True)
-        self.job = job
+        self.bake = bake
         self.fraction = 0.0
-        self.texture = None
-        self.cancelled = False
-        self.error = ""
         self._stop_asked = threading.Event()
 
     def run(self) -> None:
-        try:
-            self.texture = self.job.run(self._step)
-        except Exception as error:  # noqa: BLE001 - everything has to reach the artist as a sentence
-            self.cancelled = self._stop_asked.is_set()
-            self.error = bakes.sentence(error)
+        self.bake.run(self._step)
+        if self._stop_asked.is_set():
+            # Also where it ended just before it saw that it should.
+            self.bake.cancel()
 
     def cancel(self) -> None:
-        """Ask the job to stop; it ends soon after."""
+        """Ask the bake to stop; it ends soon after."""
         self._stop_asked.set()
 
     def _step(self, fraction: float) -> bool:
@@ -58,7 +59,7 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if status.is_running():
+        if state.is_running():
             cls.poll_message_set("A bake is running: Esc stops it")
             return False
         if context.mode != "OBJECT":
@@ -69,12 +70,9 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
     def execute(self, context):
         if not self._prepare(context):
             return {"CANCELLED"}
-        for prepared in self._queue:
-            try:
-                self._results.store(prepared.target, prepared.job, prepared.job.run())
-                self._written.append(prepared.target)
-            except Exception as error:  # noqa: BLE001 - the other objects are still to be baked
-                self._fail(prepared.target, bakes.sentence(error))
+        for bake in self._queue:
+            bake.run()
+            self._take(bake)
         return self._finish(context)
 
     def invoke(self, context, _event):
@@ -101,12 +99,9 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         if self._thread.is_alive():
             self._show_progress(context)
             return {"PASS_THROUGH"}
-        if self._thread.cancelled:
-            self.report({"WARNING"}, "Bake cancelled: the image keeps what it had")
-            self._end_modal(context)
-            return self._finish(context)
-        self._take_result()
-        if self._next < len(self._queue):
+        bake = self._thread.bake
+        self._take(bake)
+        if bake.status != CANCELLED and self._next < len(self._queue):
             self._start()
             return {"PASS_THROUGH"}
         self._end_modal(context)
@@ -119,65 +114,67 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         self._end_modal(context)
 
     def _prepare(self, context) -> bool:
-        """Make the queue of jobs; False if there is nothing to do at all."""
-        self._written, self._queue, self._results = [], [], results.Results()
-        problem = status.native_problem()
-        if problem:
-            self.report({"ERROR"}, problem)
+        """Make the queue of bakes; False if there is nothing to do at all."""
+        self._written, self._said, self._results = [], set(), Results()
+        if native.problem:
+            self.report({"ERROR"}, native.problem)
             return False
-        wanted = bakes.find_targets(context.selected_objects) if self.objects == "SELECTED" else []
-        wanted = wanted or bakes.find_targets(context.scene.objects)
-        if not wanted:
-            self.report({"ERROR"}, "No mesh has a material with a Beamspread node: add one in the Shader Editor")
+        for objects in (context.selected_objects if self.objects == "SELECTED" else (), context.scene.objects):
+            targets, misplaced = find_targets(objects), find_misplaced(objects)
+            if targets or misplaced:
+                break
+        else:
+            self.report({"ERROR"}, NOTHING_FOUND)
             return False
-        warnings = {}
-        for prepared in bakes.prepare(context, wanted, bakes.core_settings(context.scene.beamspread)):
-            if prepared.job is None:
-                self._fail(prepared.target, prepared.error)
-            else:
-                self._queue.append(prepared)
-                warnings.update(dict.fromkeys(prepared.job.warnings))
-        for warning in warnings:
-            self.report({"WARNING"}, warning)
+        bakes = misplaced + prepare_scene(context, targets, context.scene.beamspread.for_bake())
+        self._queue = [bake for bake in bakes if bake.job is not None]
+        for bake in bakes:
+            state.note(bake)
+            if bake.job is None:
+                self._take(bake)
         return True
 
     def _start(self) -> None:
-        prepared = self._queue[self._next]
-        self._thread = BakeThread(prepared.job)
+        bake = self._queue[self._next]
+        self._thread = BakeThread(bake)
         self._thread.start()
         self._next += 1
-        status.start(str(prepared.target))
+        state.start(bake.target)
 
     def _show_progress(self, context) -> None:
         done = (self._next - 1 + self._thread.fraction) / len(self._queue)
-        status.update(self._thread.fraction, done)
+        state.update(self._thread.fraction, done)
         context.window_manager.progress_update(int(100 * done))
-        context.workspace.status_text_set(": ".join(status.lines()))
-        status.redraw(context)
+        context.workspace.status_text_set(": ".join(state.progress()))
+        redraw(context)
 
-    def _take_result(self) -> None:
-        prepared, thread = self._queue[self._next - 1], self._thread
-        if thread.error:
-            self._fail(prepared.target, thread.error)
-            return
-        try:
-            self._results.store(prepared.target, prepared.job, thread.texture)
-            self._written.append(prepared.target)
-        except Exception as error:  # noqa: BLE001 - e.g. the material was deleted meanwhile
-            self._fail(prepared.target, bakes.sentence(error))
+    def _take(self, bake: Bake) -> None:
+        """Store what a bake has made, and say what there is to say."""
+        bake.keep(self._results.store)
+        state.note(bake)
+        if bake.status == WRITTEN:
+            self._written.append(bake.target)
+        elif bake.status == CANCELLED:
+            self._say("WARNING", "Bake cancelled: the image keeps what it had")
+        else:
+            self._say("ERROR", f"{bake.target}: {bake.error}")
+        for warning in bake.warnings:
+            self._say("WARNING", warning)
+
+    def _say(self, level: str, message: str) -> None:
+        if message not in self._said:
+            self.report({level}, message)
+            self._said.add(message)
 
     def _end_modal(self, context) -> None:
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()
         if context.workspace is not None:
             context.workspace.status_text_set(None)
-        status.stop()
-
-    def _fail(self, target, message: str) -> None:
-        self.report({"ERROR"}, f"{target}: {message}")
+        state.stop()
 
     def _finish(self, context):
-        status.redraw(context)
+        redraw(context)
         if not self._written:
             return {"CANCELLED"}
         self.report({"INFO"}, f"Baked {', '.join(map(str, self._written))}")

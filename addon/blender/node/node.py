@@ -3,8 +3,10 @@
 import bpy
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty
 
-from . import compat
-from .core.presets import presets
+from ...core.bake.surface import Surface
+from ...core.material.material import Material
+from ...core.material.presets import presets
+from .. import compat
 
 CUSTOM_PRESET = "CUSTOM"
 IMAGE, FRESNEL, COAT = "Image", "Fresnel", "Coat"
@@ -180,6 +182,17 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         if self.node_tree is not None and not _is_shared(self.node_tree):
             self.node_tree.use_fake_user = False
 
+    def surface(self) -> Surface:
+        """The values; lengths stay in scene units, as the geometry's."""
+        material = Material(
+            albedo=tuple(map(_decimal, self.albedo)),
+            mean_free_path=tuple(map(_decimal, self.mean_free_path)),
+            anisotropy=_decimal(self.anisotropy),
+            ior=_decimal(self.ior),
+        )
+        base_color = tuple(map(_decimal, self.base_color)) if self.color_mode == "BASE_COLOR" else None
+        return Surface(material, _decimal(self.thickness), base_color)
+
     def draw_buttons(self, _context, layout) -> None:
         draw_properties(self, layout)
 
@@ -208,23 +221,14 @@ def _draw_channels(layout, node, name: str, label: str) -> None:
         column.prop(node, name, index=index, text=channel if index else f"{label} {channel}")
 
 
-def find_node(material):
-    """The material's Beamspread node (one that is linked rather than one that is not), or None."""
-    if material is None or not compat.uses_nodes(material):
-        return None
-    nodes = [node for node in material.node_tree.nodes if node.bl_idname == BeamspreadNode.bl_idname]
-    linked = [node for node in nodes if is_linked(node)]
-    return next(iter(linked + nodes), None)
-
-
 def is_linked(node) -> bool:
     """Whether anything uses the node's outputs."""
     return any(socket.is_linked for socket in node.outputs)
 
 
-def link_result(material, image) -> None:
-    """Show `image` in the material: in its node, and the node at the output if nothing uses it yet."""
-    node, tree = find_node(material), material.node_tree
+def link_result(node, image) -> None:
+    """Show `image` in the node, and the node at its material's output if nothing uses it yet."""
+    tree = node.id_data
     if node.node_tree is None:
         node.node_tree = make_inner_tree()
     node.image = image
@@ -235,11 +239,9 @@ def link_result(material, image) -> None:
         tree.links.new(surface, node.outputs["BSDF"])
 
 
-def _draw_add_menu(self, context) -> None:
-    if getattr(context.space_data, "tree_type", "") == "ShaderNodeTree":
-        operator = self.layout.operator("node.add_node", text=BeamspreadNode.bl_label)
-        operator.type = BeamspreadNode.bl_idname
-        operator.use_transform = True
+def _decimal(value: float) -> float:
+    """The number typed, from Blender's 32-bit float: 0.8, not 0.800000012, which would be another medium."""
+    return float(f"{value:.7g}")
 
 
 def _is_used() -> bool:
@@ -251,11 +253,9 @@ def _is_used() -> bool:
 def register() -> None:
     if not BeamspreadNode.is_registered:
         bpy.utils.register_class(BeamspreadNode)
-    bpy.types.NODE_MT_add.append(_draw_add_menu)
 
 
 def unregister() -> None:
-    bpy.types.NODE_MT_add.remove(_draw_add_menu)
     # Blender 3.4 frees the type but not the evaluated copies of nodes that point to it, and crashes when those go, at
     # the latest on exit: there a class in use stays. In 4.5 a class that stays keeps the process from exiting.
     if bpy.app.version >= (4, 0, 0) or not _is_used():

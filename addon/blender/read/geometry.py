@@ -1,119 +1,17 @@
-"""Reads a Blender scene once, through its evaluated depsgraph, into the plain dataclasses of core."""
+"""Evaluated objects as triangles that throw shadows and as polygons that receive light."""
 
 from __future__ import annotations
 
-from contextlib import contextmanager
-from dataclasses import dataclass
-
 import numpy as np
 
-from . import compat
-from .core.errors import ReceiverError
-from .core.job import Surface
-from .core.material import Material
-from .core.receiver import Polygons
-from .core.scene import Light, Mesh, PointLight, SpotLight, SunLight
+from ...core.errors import ReceiverError
+from ...core.scene.illumination import Mesh
+from ...core.scene.uv_map import Polygons
 
 GEOMETRY_TYPES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 
 
-@dataclass(frozen=True, eq=False)
-class SceneLight:
-    """Lights and what they shine past; `warnings` name lights that are left out."""
-
-    lights: tuple[Light, ...]
-    occluders: Mesh
-    warnings: tuple[str, ...]
-
-
-def read_scene_light(depsgraph) -> SceneLight:
-    """Lights and shadow casters of all objects and instances that render."""
-    visible = render_visible_names(depsgraph.view_layer)
-    lights, parts, warnings, cache = [], [], [], {}
-    for instance in depsgraph.object_instances:
-        if not _renders(instance, visible):
-            continue
-        obj = instance.object
-        if obj.type == "LIGHT":
-            light = _read_light(obj, instance.matrix_world, warnings)
-            if light is not None:
-                lights.append(light)
-        elif obj.type in GEOMETRY_TYPES and getattr(obj, "visible_shadow", True):
-            part = _world_triangles(obj, instance.matrix_world, cache)
-            if part is not None:
-                parts.append(part)
-    return SceneLight(tuple(lights), Mesh.join(parts), tuple(dict.fromkeys(warnings)))
-
-
-def render_visible_names(view_layer) -> set[str]:
-    """Names of the objects that a render of the view layer shows (the depsgraph of the viewport shows others)."""
-    names: set[str] = set()
-
-    def visit(layer_collection) -> None:
-        if layer_collection.exclude or layer_collection.collection.hide_render:
-            return
-        names.update(obj.name for obj in layer_collection.collection.objects if not obj.hide_render)
-        for child in layer_collection.children:
-            visit(child)
-
-    visit(view_layer.layer_collection)
-    return names
-
-
-def _renders(instance, visible: set[str]) -> bool:
-    obj = instance.object
-    if instance.is_instance:
-        parent = instance.parent
-        return not obj.hide_render and parent is not None and parent.name in visible
-    if obj.name not in visible:
-        return False
-    # An instancer that hides itself still shows its instances.
-    return not obj.is_instancer or obj.show_instancer_for_render
-
-
-def _read_light(obj, matrix, warnings: list[str]) -> Light | None:
-    data = obj.data
-    strength, color = compat.light_strength(data), compat.light_color(data)
-    if data.use_nodes and data.node_tree is not None:
-        factor, node_color, understood = _light_nodes(data.node_tree)
-        if not understood:
-            warnings.append(f"The nodes of the light '{obj.name}' are not understood: only its plain light counts.")
-        strength *= factor
-        color = tuple(a * b for a, b in zip(color, node_color))
-    if strength == 0 or not any(color):
-        return None
-    axes = np.array(matrix, dtype=float)
-    position = tuple(axes[:3, 3].tolist())
-    shadow = compat.light_casts_shadow(data)
-    if data.type == "SUN":
-        travel = -axes[:3, 2] / np.linalg.norm(axes[:3, 2])
-        return SunLight(obj.name, tuple(travel.tolist()), strength, color, shadow)
-    if data.type == "POINT":
-        return PointLight(obj.name, position, strength, color, shadow)
-    if data.type == "SPOT":
-        frame = tuple(tuple(row) for row in axes[:3, :3].T.tolist())
-        cone = frame, data.spot_size, data.spot_blend, compat.spot_falloff()
-        return SpotLight(obj.name, position, strength, color, shadow, *cone)
-    warnings.append(f"The area light '{obj.name}' is left out: only sun, point and spot lights can be baked so far.")
-    return None
-
-
-def _light_nodes(tree) -> tuple[float, tuple[float, float, float], bool]:
-    """Strength and colour that a light's nodes multiply it with, and whether they were understood."""
-    plain = 1.0, (1.0, 1.0, 1.0), False
-    output = tree.get_output_node("ALL")
-    if output is None or not output.inputs["Surface"].is_linked:
-        return 0.0, (0.0, 0.0, 0.0), True
-    emission = output.inputs["Surface"].links[0].from_node
-    if emission.bl_idname != "ShaderNodeEmission":
-        return plain
-    color, strength = emission.inputs["Color"], emission.inputs["Strength"]
-    if color.is_linked or strength.is_linked:
-        return plain
-    return float(strength.default_value), tuple(color.default_value)[:3], True
-
-
-def _world_triangles(obj, matrix, cache: dict) -> Mesh | None:
+def world_triangles(obj, matrix, cache: dict) -> Mesh | None:
     """Triangles of an evaluated object in world space; `cache` shares the local ones among instances."""
     key = obj.data.as_pointer() if obj.data is not None else obj.as_pointer()
     if key not in cache:
@@ -214,66 +112,3 @@ def _has_material(obj, slots: np.ndarray, material_name: str) -> np.ndarray:
     names = [slot.material.name if slot.material else None for slot in obj.material_slots]
     matches = np.array([name == material_name for name in names] or [False])
     return matches[np.clip(slots, 0, len(matches) - 1)]
-
-
-def read_surface(node) -> Surface:
-    """A Beamspread node's values; lengths stay in scene units, as the geometry's."""
-    material = Material(
-        albedo=tuple(map(_decimal, node.albedo)),
-        mean_free_path=tuple(map(_decimal, node.mean_free_path)),
-        anisotropy=_decimal(node.anisotropy),
-        ior=_decimal(node.ior),
-    )
-    base_color = tuple(map(_decimal, node.base_color)) if node.color_mode == "BASE_COLOR" else None
-    return Surface(material, _decimal(node.thickness), base_color)
-
-
-def _decimal(value: float) -> float:
-    """The number typed, from Blender's 32-bit float: 0.8, not 0.800000012, which would be another medium."""
-    return float(f"{value:.7g}")
-
-
-@contextmanager
-def as_rendered(view_layer):
-    """Make the viewport's depsgraph hold what a render would, for the time of a `with` block.
-
-    Blender offers scripts no depsgraph in render mode outside a render engine, and its viewport's leaves out objects
-    and modifiers that are hidden there but render.
-    """
-    restore = []
-
-    def set_value(owner, name, value) -> None:
-        if getattr(owner, name) != value:
-            restore.append((owner, name, getattr(owner, name)))
-            setattr(owner, name, value)
-
-    def visit(layer_collection) -> None:
-        if layer_collection.exclude:
-            return
-        set_value(layer_collection, "hide_viewport", False)
-        if layer_collection.collection.library is None:
-            set_value(layer_collection.collection, "hide_viewport", False)
-        for child in layer_collection.children:
-            visit(child)
-
-    objects = list(view_layer.objects)
-    hidden = [obj for obj in objects if obj.hide_get(view_layer=view_layer)]
-    try:
-        visit(view_layer.layer_collection)
-        for obj in objects:
-            if obj.library is not None or obj.hide_render:
-                continue
-            set_value(obj, "hide_viewport", False)
-            obj.hide_set(False, view_layer=view_layer)
-            for modifier in obj.modifiers:
-                set_value(modifier, "show_viewport", modifier.show_render)
-                if modifier.type == "SUBSURF":
-                    set_value(modifier, "levels", modifier.render_levels)
-        view_layer.update()
-        yield
-    finally:
-        for owner, name, value in reversed(restore):
-            setattr(owner, name, value)
-        for obj in hidden:
-            obj.hide_set(True, view_layer=view_layer)
-        view_layer.update()

@@ -4,28 +4,38 @@ from __future__ import annotations
 
 import bpy
 
-from . import bakes, compat, engine, extract, nodes, status, targets
-from .core.errors import BakeError
+from ...core import native
+from ...core.errors import BakeError
+from .. import compat
+from ..images.files import check_image
+from ..jobs.engine import BeamspreadEngine
+from ..jobs.prepare import check_visible
+from ..jobs.state import state
+from ..node.find import find_misplaced, find_node, materials_of
+from ..node.node import draw_properties
+from ..read.visible import render_visible_names
 
-# Objects whose warnings a panel shows; it is drawn often.
+# Objects whose warnings, and messages of bakes, that a panel shows; it is drawn often.
 MOST_OBJECTS = 8
 
 
 def warnings_for(obj, visible: set[str]) -> list[str]:
     """What would keep the object from being baked, as far as it is known without baking."""
-    messages = []
-    try:
-        bakes.check_visible(obj.name, visible)
-    except BakeError as error:
-        messages.append(str(error))
-    if obj.type == "MESH" and not obj.data.uv_layers:
+    # A collection instance may show thousands of objects.
+    messages = [bake.error for bake in find_misplaced([obj] if obj.instance_type == "NONE" else [])]
+    materials = materials_of(obj)
+    if not materials:
+        return messages
+    if not obj.data.uv_layers:
         messages.append("The mesh has no UV map: unwrap it first.")
-    for material in bakes.materials_of(obj):
-        node = nodes.find_node(material)
+    checks = [lambda: check_visible(obj.name, visible)]
+    for node in map(find_node, materials):
+        checks.append(lambda node=node: node.surface().check())
+        if node.image is not None:
+            checks.append(lambda node=node: check_image(node.image))
+    for check in checks:
         try:
-            extract.read_surface(node).check()
-            if node.image is not None:
-                targets.check_image(node.image)
+            check()
         except BakeError as error:
             messages.append(str(error))
     return messages
@@ -55,25 +65,24 @@ def _wrap(text: str, width: int) -> list[str]:
 
 
 def draw_bake(layout, context) -> None:
-    """Problems of the selected objects, then the Bake buttons or the progress."""
-    problem = status.native_problem()
-    if problem:
-        draw_warnings(layout, context, [problem])
+    """The progress, or problems of the selected objects and the Bake buttons; then what the last bakes said."""
+    if native.problem:
+        draw_warnings(layout, context, [native.problem])
         return
-    if status.is_running():
+    if state.is_running():
         column = layout.column(align=True)
-        for line, icon in zip(status.lines(), ("RENDER_STILL", "BLANK1")):
+        for line, icon in zip(state.progress(), ("RENDER_STILL", "BLANK1")):
             column.label(text=line, icon=icon)
-        return
-    # `context.object` is empty in the render properties.
-    chosen = [obj for obj in context.view_layer.objects.selected if bakes.materials_of(obj)]
-    visible = extract.render_visible_names(context.view_layer) if chosen else set()
-    for obj in chosen[:MOST_OBJECTS]:
-        draw_warnings(layout, context, [f"{obj.name}: {message}" for message in warnings_for(obj, visible)])
-    row = layout.row(align=True)
-    row.scale_y = 1.4
-    row.operator("beamspread.bake", text="Bake", icon="RENDER_STILL").objects = "SELECTED"
-    row.operator("beamspread.bake", text="Bake All").objects = "ALL"
+    else:
+        # `context.object` is empty in the render properties.
+        chosen, visible = list(context.view_layer.objects.selected), render_visible_names(context.view_layer)
+        for obj in chosen[:MOST_OBJECTS]:
+            draw_warnings(layout, context, [f"{obj.name}: {message}" for message in warnings_for(obj, visible)])
+        row = layout.row(align=True)
+        row.scale_y = 1.4
+        row.operator("beamspread.bake", text="Bake", icon="RENDER_STILL").objects = "SELECTED"
+        row.operator("beamspread.bake", text="Bake All").objects = "ALL"
+    draw_warnings(layout, context, state.messages()[:MOST_OBJECTS])
 
 
 def _use_columns(layout) -> None:
@@ -114,12 +123,11 @@ class BEAMSPREAD_PT_active_image(RenderPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        return context.engine == engine.BeamspreadEngine.bl_idname
+        return context.engine == BeamspreadEngine.bl_idname
 
     def draw(self, context):
         layout = self.layout
         _use_columns(layout)
-        draw_warnings(layout, context, engine.last_errors())
         layout.operator("object.bake", text="Bake Active Image", icon="RENDER_STILL")
         layout.prop(context.scene.render.bake, "margin")
         layout.prop(context.scene.render.bake, "use_clear", text="Clear Image")
@@ -147,12 +155,12 @@ class MaterialPanel:
     @classmethod
     def poll(cls, context):
         material = _active_material(context)
-        return material is not None and compat.uses_nodes(material) and nodes.find_node(material) is not None
+        return material is not None and compat.uses_nodes(material) and find_node(material) is not None
 
     def draw(self, context):
         layout = self.layout
         _use_columns(layout)
-        nodes.draw_properties(nodes.find_node(_active_material(context)), layout)
+        draw_properties(find_node(_active_material(context)), layout)
         draw_bake(layout, context)
 
 

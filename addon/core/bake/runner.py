@@ -57,10 +57,14 @@ class Bake:
             self.layers = self.job.run(progress)
             self.warnings += self.job.warnings_after(self.layers)
         except (KeyboardInterrupt, native.Cancelled):
-            self.status, self.error = CANCELLED, "The bake was cancelled."
+            self.cancel()
         except Exception as error:  # noqa: BLE001 - the others are still to be baked
             self.error = sentence(error)
         self.seconds += time.monotonic() - start
+
+    def cancel(self) -> None:
+        """Drop what it has made, so that nothing is kept."""
+        self.layers, self.status, self.error = {}, CANCELLED, "The bake was cancelled."
 
     def keep(self, store: Callable[[Bake], str]) -> None:
         """Have `store` put the layers where they belong; it returns the path of the file written, if one was."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -60,9 +61,9 @@ class Report:
         temporary.replace(target)
 
 
-def file_name(object_name: str, material_name: str, frame: int | None, extension: str, taken: set[str]) -> str:
+def file_name(names: Sequence[str], frame: int | None, extension: str, taken: set[str]) -> str:
     """A file name of letters that every file system takes, distinct from those in `taken` (which it joins)."""
-    parts = [object_name, material_name] + ([] if frame is None else [f"{frame:04d}"])
+    parts = [*names, *([] if frame is None else [f"{frame:04d}"])]
     stem = "_".join(re.sub(r"[^\w.-]+", "_", part).strip("._") or "unnamed" for part in parts)
     name, number = f"{stem}{extension}", 1
     while name.lower() in taken:
