@@ -13,7 +13,7 @@ bl_info = {
     "author": "Beamspread developers",
     "version": (0, 1, 0),
     "blender": (3, 4, 0),
-    "location": "Properties > Render > Beamspread; Shader Editor > Add > Beamspread",
+    "location": "Properties > Render > Beamspread; Shader Editor > Add > Shader > Beamspread",
     "category": "Render",
 }
 

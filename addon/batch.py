@@ -5,7 +5,6 @@ Works with the add-on installed or not, and as `python batch.py scene.blend [opt
 
 from __future__ import annotations
 
-import gc
 import importlib
 import importlib.util
 import sys
@@ -100,9 +99,6 @@ def main() -> int:
 
         traceback.print_exc()
         return 1
-    finally:
-        # The process ends here: don't let Python search everything that Blender and numpy hold for cycles once more.
-        gc.freeze()
 
 
 if __name__ == "__main__":
