@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 import scenes
 from beamspread.blender.read.geometry import read_polygons
-from beamspread.blender.read.scene import read_illumination
+from beamspread.blender.read.lights import read_illumination
 from beamspread.core.bake.luminance import light_beams
 from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.native import native
-from beamspread.core.scene.receiver import build_receiver, flat_parts
+from beamspread.core.scene.receiver import build_receiver
+from beamspread.core.scene.uv_map import fit_uv_maps
 from mathutils import Euler, Matrix
 
 TEXELS = 64
@@ -108,7 +109,7 @@ def our_irradiance(plane):
     depsgraph = bpy.context.evaluated_depsgraph_get()
     illumination = read_illumination(depsgraph)
     polygons = read_polygons(plane.evaluated_get(depsgraph), "White")
-    receiver = build_receiver(flat_parts(polygons), TEXELS, TEXELS)
+    receiver = build_receiver(fit_uv_maps(polygons), TEXELS, TEXELS)
     grid = receiver.charts[0].grid
     total = np.zeros((grid.height, grid.width, 3), np.float32)
     for lamp in illumination.lights:

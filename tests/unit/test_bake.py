@@ -17,8 +17,8 @@ from beamspread.core.material.material import Material
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination, Mesh
 from beamspread.core.scene.lights import Light, PointLight, SpotLight, SunLight
-from beamspread.core.scene.receiver import Chart, Receiver, build_receiver, flat_parts
-from beamspread.core.scene.uv_map import Polygons
+from beamspread.core.scene.receiver import Chart, Receiver, build_receiver
+from beamspread.core.scene.uv_map import Polygons, fit_uv_maps
 
 SETTINGS = BakeSettings(quality="preview", samples=2, margin=0)
 MATERIAL = Material(albedo=(0.9, 0.9, 0.9), mean_free_path=(0.01, 0.01, 0.01), anisotropy=0.0)
@@ -75,7 +75,7 @@ def test_an_uneven_receiver_does_not_shadow_itself():
     corners = np.array([(-0.5, -0.5, bump), (0.5, -0.5, -bump), (0.5, 0.5, bump), (-0.5, 0.5, -bump)])
     uvs = corners[:, :2] + 0.5
     polygons = Polygons(corners, uvs, np.array([0, 4]), np.array([(0.0, 0.0, 1.0)]))
-    target = build_receiver(flat_parts(polygons), 32, 32).charts[0].grid
+    target = build_receiver(fit_uv_maps(polygons), 32, 32).charts[0].grid
     mesh = Mesh(corners.astype(np.float32), np.array([(0, 1, 2), (0, 2, 3)], np.uint32))
     low_sun = replace(SUN, direction=(math.sin(1.5), 0.0, -math.cos(1.5)))
     irradiance, _ = light_beams(target, low_sun, Illumination([low_sun], mesh).caster(), SETTINGS)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from beamspread.core.errors import ReceiverError
-from beamspread.core.scene.receiver import build_receiver, flat_parts, texture_size
-from beamspread.core.scene.uv_map import Polygons, fit_uv_map
+from beamspread.core.scene.receiver import build_receiver, texture_size
+from beamspread.core.scene.uv_map import Polygons, fit_uv_maps
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -22,7 +22,7 @@ def quad(p_u, p_v, p_0=(0, 0, 0), uvs=SQUARE, flip=False):
 
 
 def receiver_of(polygons, width, height):
-    return build_receiver(flat_parts(polygons), width, height)
+    return build_receiver(fit_uv_maps(polygons), width, height)
 
 
 def texel_position(grid, column, row):
@@ -68,7 +68,7 @@ def test_turned_and_mirrored_uvs(turn, mirror):
     uvs = uvs * [-1, 1] + [1, 0] if mirror else uvs
     corners = np.column_stack([positions, np.full(4, 3.0)])
     polygons = Polygons(corners, uvs, np.array([0, 4]), np.array([[0.0, 0, 1]]))
-    width, height = texture_size(flat_parts(polygons), 12)
+    width, height = texture_size(fit_uv_maps(polygons), 12)
     assert (width, height) == ((12, 6) if turn % 2 == 0 else (6, 12))
     grid = receiver_of(polygons, width, height).charts[0].grid
     check_frame(grid)
@@ -103,7 +103,7 @@ def test_parts_become_charts_of_one_texture():
     """Two squares at right angles, side by side in the image, in texels of different sizes."""
     floor = quad((8, 0, 0), (0, 8, 0), uvs=SQUARE * 0.5)
     wall = quad((0, 4, 0), (0, 0, 4), uvs=SQUARE * 0.5 + [0.5, 0])
-    parts = flat_parts(floor) + flat_parts(wall)
+    parts = fit_uv_maps(floor) + fit_uv_maps(wall)
     assert texture_size(parts, 32) == (32, 32)
     receiver = build_receiver(parts, 16, 16)
     assert [chart.offset for chart in receiver.charts] == [(0, 0), (8, 0)]
@@ -158,8 +158,8 @@ def test_sheared_uvs_are_resampled(shear):
 
 
 def test_texture_size_keeps_texels_square():
-    assert texture_size(flat_parts(quad((4, 0, 0), (0, 1, 0))), 1024) == (1024, 256)
-    assert texture_size(flat_parts(quad((1, 0, 0), (0, 1000, 0))), 100) == (1, 100)
+    assert texture_size(fit_uv_maps(quad((4, 0, 0), (0, 1, 0))), 1024) == (1024, 256)
+    assert texture_size(fit_uv_maps(quad((1, 0, 0), (0, 1000, 0))), 100) == (1, 100)
 
 
 BENT = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.2], [0, 1, 0]], float)
@@ -191,16 +191,16 @@ def replaced(**changes):
 )
 def test_what_cannot_be_baked_says_why(polygons, words):
     with pytest.raises(ReceiverError, match=words):
-        fit_uv_map(polygons)
+        fit_uv_maps(polygons)
 
 
 def test_a_chart_smaller_than_rounding_is_refused():
     polygons = quad((1, 0, 0), (0, 1, 0), uvs=SQUARE * 1e-12 + 0.5)
     with pytest.raises(ReceiverError, match="no area"):
-        fit_uv_map(polygons)
+        fit_uv_maps(polygons)
 
 
 def test_non_planar_within_rounding_is_accepted():
     rng = np.random.default_rng(3)
     polygons = quad((1, 0, 0), (0, 1, 0))
-    fit_uv_map(replaced(corners=polygons.corners + rng.normal(scale=1e-7, size=(4, 3))))
+    fit_uv_maps(replaced(corners=polygons.corners + rng.normal(scale=1e-7, size=(4, 3))))

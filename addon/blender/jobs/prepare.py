@@ -9,11 +9,12 @@ from ...core.bake.runner import Bake, Target
 from ...core.bake.settings import BakeSettings
 from ...core.errors import BakeError, sentence
 from ...core.scene.illumination import Illumination
-from ...core.scene.receiver import build_receiver, flat_parts, texture_size
+from ...core.scene.receiver import build_receiver, texture_size
+from ...core.scene.uv_map import fit_uv_maps
 from ..images.files import check_image
 from ..node.find import find_node, materials_of
 from ..read.geometry import read_polygons
-from ..read.scene import read_illumination
+from ..read.lights import read_illumination
 from ..read.visible import as_rendered, render_visible_names
 
 
@@ -76,6 +77,6 @@ def _make_job(
     if size is None and node.image is not None:
         check_image(node.image.original)
         size = tuple(node.image.original.size) if resolution is None else None
-    parts = flat_parts(read_polygons(obj, target.material_name))
-    size = size or texture_size(parts, resolution or depsgraph.scene.beamspread.resolution)
-    return BakeJob(obj.name, build_receiver(parts, *size), illumination, surface, settings)
+    maps = fit_uv_maps(read_polygons(obj, target.material_name))
+    size = size or texture_size(maps, resolution or depsgraph.scene.beamspread.resolution)
+    return BakeJob(obj.name, build_receiver(maps, *size), illumination, surface, settings)

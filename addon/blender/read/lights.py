@@ -1,11 +1,14 @@
-"""Blender's lights as core's. A new kind is a function here, its line in `READERS`, and its class in core."""
+"""The light of a scene. A new kind is a function here, its line in `READERS`, and its class in core."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from ...core.scene.illumination import Illumination, Mesh
 from ...core.scene.lights import Light, PointLight, SpotLight, SunLight
 from .. import compat
+from .geometry import GEOMETRY_TYPES, world_triangles
+from .visible import render_visible_names, renders
 
 
 def _sun(_data, axes: np.ndarray, common: tuple) -> SunLight:
@@ -28,7 +31,23 @@ def _spot(data, axes: np.ndarray, common: tuple) -> SpotLight:
 READERS = {"SUN": _sun, "POINT": _point, "SPOT": _spot}
 
 
-def read_light(obj, matrix, warnings: list[str]) -> Light | None:
+def read_illumination(depsgraph) -> Illumination:
+    """Lights and shadow casters of all objects and instances that render."""
+    visible = render_visible_names(depsgraph.view_layer)
+    lights, parts, warnings, cache = [], [], [], {}
+    for instance in depsgraph.object_instances:
+        if not renders(instance, visible):
+            continue
+        obj = instance.object
+        if obj.type == "LIGHT":
+            lights.append(_read_light(obj, instance.matrix_world, warnings))
+        elif obj.type in GEOMETRY_TYPES and getattr(obj, "visible_shadow", True):
+            parts.append(world_triangles(obj, instance.matrix_world, cache))
+    occluders = Mesh.join([part for part in parts if part is not None])
+    return Illumination([light for light in lights if light is not None], occluders, tuple(dict.fromkeys(warnings)))
+
+
+def _read_light(obj, matrix, warnings: list[str]) -> Light | None:
     """The light, or None if it is dark or left out; `warnings` then has a sentence that says so."""
     data = obj.data
     strength, color = compat.light_strength(data), compat.light_color(data)

@@ -25,16 +25,10 @@ class Mesh:
     @classmethod
     def join(cls, parts: list[Mesh]) -> Mesh:
         """One mesh out of many."""
-        if not parts:
-            return cls.empty()
-        offsets = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
-        return cls(
-            np.ascontiguousarray(np.concatenate([part.vertices for part in parts]), np.float32),
-            np.ascontiguousarray(
-                np.concatenate([part.triangles.astype(np.int64) + offset for part, offset in zip(parts, offsets)]),
-                np.uint32,
-            ),
-        )
+        parts = [cls.empty(), *parts]
+        offsets = np.cumsum([0] + [len(part.vertices) for part in parts], dtype=np.uint32)
+        triangles = [part.triangles + offset for part, offset in zip(parts, offsets)]
+        return cls(np.concatenate([part.vertices for part in parts]), np.concatenate(triangles))
 
 
 class Illumination:

@@ -31,17 +31,10 @@ class Light(ABC):
 
     @abstractmethod
     def unit_beams(self, grid: Grid, caster, **options) -> tuple[np.ndarray, np.ndarray]:
-        """What arrives of a white light of strength 1.
+        """Irradiance (H, W) of a white light of strength 1, and its direction of travel in the plane's frame.
 
-        Parameters
-        ----------
-        caster : native `Occluders`, or None.
-        options : what all native functions of beams take: `samples`, `threads`, `progress`, `clearance`.
-
-        Returns
-        -------
-        irradiance : float32 (H, W), cosine and visibility included.
-        direction : of travel, unit vectors in the plane's frame: (3,), or float32 (H, W, 3) where it changes.
+        The direction is (3,), or (H, W, 3) where it changes; `caster` a native `Occluders`, or None; `options` what
+        all native functions of beams take.
         """
 
     @abstractmethod

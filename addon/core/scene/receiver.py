@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import ReceiverError
 from ..native import native
 from .grid import Grid
-from .uv_map import Polygons, UvMap, fit_uv_map
+from .uv_map import UvMap
 
 # Texels that a chart enters by less than this fraction are left out of the grid (rounding of float32 UVs).
 EDGE_TOLERANCE = 1e-3
@@ -93,43 +93,15 @@ class Receiver:
         return texture
 
 
-@dataclass(frozen=True, eq=False)
-class FlatPart:
-    """Polygons on one plane with one affine UV map."""
-
-    polygons: Polygons
-    uv_map: UvMap
-
-
-def flat_parts(polygons: Polygons) -> list[FlatPart]:
-    """The flat parts of a mesh, each of which becomes a chart; today all polygons have to be one.
-
-    Raises
-    ------
-    ReceiverError
-        See `fit_uv_map`.
-    """
-    return [FlatPart(polygons, fit_uv_map(polygons))]
-
-
-def texture_size(parts: Sequence[FlatPart], resolution: int) -> tuple[int, int]:
+def texture_size(maps: Sequence[UvMap], resolution: int) -> tuple[int, int]:
     """Width and height of a texture with `resolution` texels along the longer side, nearly square where finest."""
-    lengths = [
-        max(np.linalg.norm(axis) for axis in axes)
-        for axes in zip(*((part.uv_map.p_u, part.uv_map.p_v) for part in parts))
-    ]
+    lengths = np.max([(np.linalg.norm(one.p_u), np.linalg.norm(one.p_v)) for one in maps], axis=0).tolist()
     return tuple(max(1, round(resolution * length / max(lengths))) for length in lengths)
 
 
-def build_receiver(parts: Sequence[FlatPart], width: int, height: int) -> Receiver:
-    """Lay the grids of a texture of `width` x `height` texels over the parts.
-
-    Raises
-    ------
-    ReceiverError
-        The charts cover no texel.
-    """
-    charts = tuple(_chart(part, width, height) for part in parts)
+def build_receiver(maps: Sequence[UvMap], width: int, height: int) -> Receiver:
+    """Lay the grids of a texture of `width` x `height` texels over flat parts; ReceiverError where that has none."""
+    charts = tuple(_chart(one, width, height) for one in maps)
     coverage = np.zeros((height, width), np.float32)
     for chart in charts:
         covered = chart.part_of(coverage)
@@ -139,56 +111,35 @@ def build_receiver(parts: Sequence[FlatPart], width: int, height: int) -> Receiv
     return Receiver(coverage, charts)
 
 
-def _chart(part: FlatPart, width: int, height: int) -> Chart:
-    p_u, p_v = part.uv_map.p_u, part.uv_map.p_v
+def _chart(uv_map: UvMap, width: int, height: int) -> Chart:
+    p_u, p_v, polygons = uv_map.p_u, uv_map.p_v, uv_map.polygons
     x_axis = p_u / np.linalg.norm(p_u)
     across = p_v - (p_v @ x_axis) * x_axis
-    y_axis = across / np.linalg.norm(across)
+    frame = np.stack([x_axis, across / np.linalg.norm(across)])
     pitch = np.array([np.linalg.norm(p_u) / width, np.linalg.norm(across) / height])
-    texels = part.polygons.uvs * [width, height]
+    texels = polygons.uvs * [width, height]
     first = np.clip(np.floor(texels.min(axis=0) + EDGE_TOLERANCE), 0, [width - 1, height - 1]).astype(int)
     last = np.clip(np.ceil(texels.max(axis=0) - EDGE_TOLERANCE), first + 1, [width, height]).astype(int)
-    coverage = _coverage(part.polygons.split(texels), width, height)
+    coverage = _coverage(polygons.split(texels), width, height)
     own = np.ascontiguousarray(coverage[first[1] : last[1], first[0] : last[0]])
     offset = int(first[0]), int(first[1])
-    if part.uv_map.is_orthogonal():
-        origin = part.uv_map.p_0 + first[0] / width * p_u + first[1] / height * p_v
-        return Chart(_grid(origin, (x_axis, y_axis), part.uv_map, pitch, own), own, offset)
-    return _sheared_chart(part, own, offset, (x_axis, y_axis), pitch, coverage.shape)
-
-
-def _sheared_chart(part: FlatPart, own: np.ndarray, offset, axes, pitch: np.ndarray, shape) -> Chart:
-    """The grid is a rectangle around the polygons with its rows along the texture's."""
-    polygons, uv_map, (height, width) = part.polygons, part.uv_map, shape
-    frame = np.stack(axes)
+    if uv_map.is_orthogonal():
+        origin = uv_map.p_0 + first[0] / width * p_u + first[1] / height * p_v
+        return Chart(_grid(origin, frame, uv_map, pitch, own), own, offset)
+    # A rectangle around the polygons with its rows along the texture's.
     points = polygons.corners @ frame.T / pitch
-    first = points.min(axis=0)
-    size = np.maximum(np.ceil(points.max(axis=0) - first - EDGE_TOLERANCE), 1).astype(int)
-    grid_coverage = _coverage(polygons.split(points - first), int(size[0]), int(size[1]))
-    centre = polygons.corners.mean(axis=0)
-    origin = (first * pitch) @ frame + (centre @ uv_map.normal) * uv_map.normal
-    grid = _grid(origin, axes, uv_map, pitch, grid_coverage)
-    columns = [(frame @ uv_map.p_u) / pitch / width, (frame @ uv_map.p_v) / pitch / height]
-    return Chart(grid, own, offset, np.column_stack([*columns, frame @ uv_map.p_0 / pitch - first]))
+    corner = points.min(axis=0)
+    columns, rows = np.maximum(np.ceil(points.max(axis=0) - corner - EDGE_TOLERANCE), 1).astype(int).tolist()
+    origin = (corner * pitch) @ frame + (polygons.corners.mean(axis=0) @ uv_map.normal) * uv_map.normal
+    grid = _grid(origin, frame, uv_map, pitch, _coverage(polygons.split(points - corner), columns, rows))
+    slopes = [(frame @ p_u) / pitch / width, (frame @ p_v) / pitch / height]
+    return Chart(grid, own, offset, np.column_stack([*slopes, frame @ uv_map.p_0 / pitch - corner]))
 
 
-def _grid(origin: np.ndarray, axes, uv_map: UvMap, pitch: np.ndarray, coverage: np.ndarray) -> Grid:
-    def vector(values):
-        return tuple(float(value) for value in values)
-
-    height, width = coverage.shape
-    return Grid(
-        origin=vector(origin),
-        x_axis=vector(axes[0]),
-        y_axis=vector(axes[1]),
-        normal=vector(uv_map.normal),
-        pitch_x=float(pitch[0]),
-        pitch_y=float(pitch[1]),
-        width=width,
-        height=height,
-        coverage=coverage,
-        clearance=uv_map.deviation,
-    )
+def _grid(origin: np.ndarray, frame: np.ndarray, uv_map: UvMap, pitch: np.ndarray, coverage: np.ndarray) -> Grid:
+    origin, x_axis, y_axis, normal = (tuple(vector.tolist()) for vector in (origin, *frame, uv_map.normal))
+    pitches, (height, width) = map(float, pitch), coverage.shape
+    return Grid(origin, x_axis, y_axis, normal, *pitches, width, height, coverage, clearance=uv_map.deviation)
 
 
 def _coverage(faces: list[np.ndarray], width: int, height: int) -> np.ndarray:

@@ -36,10 +36,11 @@ class Polygons:
         return [points[begin:end] for begin, end in zip(self.starts[:-1], self.starts[1:])]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class UvMap:
     """P(u, v) = p_0 + u p_u + v p_v on the plane with the outward unit `normal`; corners depart by `deviation`."""
 
+    polygons: Polygons
     p_0: np.ndarray
     p_u: np.ndarray
     p_v: np.ndarray
@@ -52,14 +53,14 @@ class UvMap:
         return abs(cosine) < FLATNESS_TOLERANCE
 
 
-def fit_uv_map(polygons: Polygons) -> UvMap:
-    """Fit the plane and the affine UV map, and verify both on every corner.
+def fit_uv_maps(polygons: Polygons) -> list[UvMap]:
+    """The flat parts of a mesh, each of which becomes a chart: today all polygons have to be one.
 
     Raises
     ------
     ReceiverError
         No faces, no area, not flat, faces of both orientations, or UVs that are missing, outside 0..1, degenerate or
-        not affine.
+        not affine: plane and map are verified on every corner.
     """
     corners, uvs = polygons.corners, polygons.uvs
     if len(polygons.starts) < 2:
@@ -80,7 +81,7 @@ def fit_uv_map(polygons: Polygons) -> UvMap:
             "only flat surfaces can be baked, so flatten them or split the object."
         )
     _check_uvs(uvs)
-    return _fit_affine(corners, uvs, normal, size)
+    return [_fit_affine(polygons, normal, size)]
 
 
 def _common_normal(normals: np.ndarray) -> np.ndarray:
@@ -108,7 +109,8 @@ def _check_uvs(uvs: np.ndarray | None) -> None:
         )
 
 
-def _fit_affine(corners: np.ndarray, uvs: np.ndarray, normal: np.ndarray, size: float) -> UvMap:
+def _fit_affine(polygons: Polygons, normal: np.ndarray, size: float) -> UvMap:
+    corners, uvs = polygons.corners, polygons.uvs
     uv_centre, centre = uvs.mean(axis=0), corners.mean(axis=0)
     if np.linalg.svd(uvs - uv_centre, compute_uv=False)[1] < 1e-6 * np.sqrt(len(uvs)):
         raise ReceiverError("The UV map has no area: unwrap the mesh again.")
@@ -124,4 +126,4 @@ def _fit_affine(corners: np.ndarray, uvs: np.ndarray, normal: np.ndarray, size: 
     if np.linalg.norm(np.cross(p_u, p_v)) < 1e-9 * np.linalg.norm(p_u) * np.linalg.norm(p_v):
         raise ReceiverError("The UV map has no area: unwrap the mesh again.")
     deviation = float(np.abs((corners - centre) @ normal).max())
-    return UvMap(centre - uv_centre @ slopes, p_u, p_v, normal, deviation)
+    return UvMap(polygons, centre - uv_centre @ slopes, p_u, p_v, normal, deviation)
