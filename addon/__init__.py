@@ -5,33 +5,29 @@ Outside Blender this package is the Python interface of the native module; insid
 
 import sys
 
+from .core.native import native, problem
+
 bl_info = {
     "name": "Beamspread",
     "description": "Bakes light inside translucent surfaces, depending on where it comes from",
     "author": "Beamspread developers",
     "version": (0, 1, 0),
     "blender": (3, 4, 0),
-    "location": "Properties > Render > Beamspread; Shader Editor > Add > Beamspread",
+    "location": "Properties > Render > Beamspread; Shader Editor > Add > Shader > Beamspread",
     "category": "Render",
 }
 
-NATIVE_PROBLEM = ""
-"""Why the native module is missing, in one sentence; empty when all is well."""
-
-try:
-    from ._load import native
-except ImportError as error:
+if problem:
     # Inside Blender an add-on that vanishes with a traceback helps nobody: it registers and its panel says this.
     if "bpy" not in sys.modules:
-        raise
-    NATIVE_PROBLEM = str(error)
+        raise ImportError(problem)
     __all__ = ["register", "unregister"]
 else:
-    from .core.color import albedo_from_color
-    from .core.convolve import adaptive_beams, convolve, convolve_lights
-    from .core.library import library
-    from .core.material import Material
-    from .core.presets import presets
+    from .core.bake.convolve import adaptive_beams, convolve, convolve_lights
+    from .core.ldf.albedo import albedo_from_color
+    from .core.ldf.library import library
+    from .core.material.material import Material
+    from .core.material.presets import presets
 
     AngularSpace = native.AngularSpace
     Cancelled = native.Cancelled
@@ -66,13 +62,13 @@ else:
 
 def register():
     """Add the add-on to Blender."""
-    from . import registration
+    from . import blender
 
-    registration.register()
+    blender.register()
 
 
 def unregister():
     """Take the add-on out of Blender."""
-    from . import registration
+    from . import blender
 
-    registration.unregister()
+    blender.unregister()

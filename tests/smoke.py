@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from beamspread import Cancelled, Medium, exact_totals, simulate
-from beamspread._load import native
+from beamspread.core.native import native
 
 THREADS = 2
 SIZE = 24

@@ -15,7 +15,7 @@ import time
 from pathlib import Path
 
 from beamspread import Medium
-from beamspread.core.library import PHOTONS, file_name, make
+from beamspread.core.ldf.library import PHOTONS, file_name, make
 
 GRID = [Medium(g, ior, math.inf) for g, ior in itertools.product((0.0, 0.8, 0.9), (1.0, 1.3, 1.4, 1.5))]
 """Half-spaces of the materials that are asked for most: presets of unknown g (0), and what forward scattering does."""

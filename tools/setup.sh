@@ -14,8 +14,10 @@ done
 
 packages=(g++ cmake ninja-build ccache pybind11-dev libembree-dev libtbb-dev libopenexr-dev libglm-dev libeigen3-dev libhwy-dev
           python3 python3-dev python3-venv python3-numpy blender)
-# The X libraries are what the official bpy wheel links to; it never opens a window here.
-test_packages=(binutils libegl1 libgl1 libgomp1 libsm6 libx11-6 libxfixes3 libxi6 libxkbcommon0 libxrender1 libxxf86vm1)
+# The X libraries are what the official bpy wheel links to; it never opens a window here. Debian's Blender opens one, for
+# tests/blender/test_window.py, on a screen in memory.
+test_packages=(binutils libegl1 libgl1 libgomp1 libsm6 libx11-6 libxfixes3 libxi6 libxkbcommon0 libxrender1 libxxf86vm1
+               xvfb xauth libgl1-mesa-dri)
 ducc_version=0.42.0
 ducc_sha256=4e11c59b53a43355b053aebb2a62ee16eebeed026575f7d216cf09d437ce52ef
 debian_python=/usr/bin/python3

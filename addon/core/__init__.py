@@ -1,1 +1,14 @@
-"""Host-independent part of the add-on: plain dataclasses and numpy arrays, no bpy."""
+"""The part that knows no host: plain dataclasses and numpy arrays, no bpy.
+
+Each package imports only those above it (tests/unit/test_layers.py reads this list):
+
+    native      the compiled module, and why it is missing if it is
+    errors      sentences for the artist
+    progress    progress of a job made of stages
+    scene       receivers (charts on planes), lights, triangles that throw shadows
+    material    optical properties, measured presets
+    ldf         libraries, samples, the albedo behind a colour
+    bake        from a job to its layers, margin included, and what became of it
+    batch       command line and report of many bakes
+    cli         `python3 -m beamspread`
+"""

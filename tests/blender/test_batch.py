@@ -10,7 +10,7 @@ import beamspread
 import bpy
 import numpy as np
 import pytest
-from beamspread._load import native
+from beamspread.core.native import native
 from mathutils import Matrix
 from scenes import add_material, add_plane, add_sun, bake, node_of, pixels
 

@@ -6,10 +6,13 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from beamspread import extract
-from beamspread._load import native
-from beamspread.core.bake import BakeSettings, light_beams
-from beamspread.core.receiver import build_receiver, fit_uv_map
+from beamspread.blender.read.geometry import read_polygons
+from beamspread.blender.read.lights import read_illumination
+from beamspread.core.bake.luminance import light_beams
+from beamspread.core.bake.settings import BakeSettings
+from beamspread.core.native import native
+from beamspread.core.scene.receiver import build_receiver
+from beamspread.core.scene.uv_map import fit_uv_maps
 from mathutils import Euler, Matrix
 
 TEXELS = 64
@@ -104,14 +107,14 @@ def cycles_irradiance(plane, image, samples=CYCLES_SAMPLES):
 def our_irradiance(plane):
     """The same by the add-on, and the coverage of the texels."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    light = extract.read_scene_light(depsgraph)
-    polygons = extract.read_polygons(plane.evaluated_get(depsgraph), "White")
-    receiver = build_receiver(polygons, fit_uv_map(polygons), TEXELS, TEXELS)
-    caster = native.Occluders(light.occluders.vertices, light.occluders.triangles)
-    total = np.zeros((receiver.grid.height, receiver.grid.width, 3), np.float32)
-    for lamp in light.lights:
-        total += light_beams(receiver.grid, lamp, caster, BakeSettings(samples=8))[0]
-    return receiver.to_texels(total), receiver.coverage
+    illumination = read_illumination(depsgraph)
+    polygons = read_polygons(plane.evaluated_get(depsgraph), "White")
+    receiver = build_receiver(fit_uv_maps(polygons), TEXELS, TEXELS)
+    grid = receiver.charts[0].grid
+    total = np.zeros((grid.height, grid.width, 3), np.float32)
+    for lamp in illumination.lights:
+        total += light_beams(grid, lamp, illumination.caster(), BakeSettings(samples=8))[0]
+    return receiver.to_texture([total]), receiver.coverage
 
 
 def around(values):

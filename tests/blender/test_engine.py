@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 import pytest
-from beamspread import engine
+from beamspread.blender.jobs.state import state
 from mathutils import Matrix
 from scenes import add_material, add_mesh, add_plane, add_sun, bake, messages_of, node_of, pixels, select
 
@@ -14,7 +14,7 @@ def beamspread_engine():
     scene.render.engine = "BEAMSPREAD"
     scene.beamspread.resolution = 32
     scene.render.bake.margin = 0
-    engine._errors.clear()
+    state.forget()
 
 
 def add_active_image(material, name="Active", size=(32, 32)):
@@ -31,7 +31,7 @@ def test_same_as_the_operator():
     image = add_active_image(plane.data.materials[0])
     select(plane)
     assert bpy.ops.object.bake(type="COMBINED") == {"FINISHED"}
-    assert engine.last_errors() == []
+    assert state.messages() == []
     filled = pixels(image)
     assert filled.any()
     assert filled == pytest.approx(bake(plane)[0], abs=1e-6)
@@ -58,7 +58,7 @@ def test_two_materials_of_one_object_fill_their_images():
     images = [add_active_image(material, material.name) for material in corner.data.materials]
     select(corner)
     assert bpy.ops.object.bake(type="COMBINED") == {"FINISHED"}
-    assert engine.last_errors() == []
+    assert state.messages() == []
     floor, wall = (pixels(image)[16, 16, 0] for image in images)
     assert 0 < wall < floor
     assert sun.data.energy == 1
@@ -70,11 +70,11 @@ def test_failure_is_reported_and_does_not_touch_the_rest():
     add_active_image(plane.data.materials[0])
     select(plane)
     messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
-    assert len(engine.last_errors()) == 1
-    assert "albedo's red is 1" in engine.last_errors()[0]
+    assert len(state.messages()) == 1
+    assert "albedo's red is 1" in state.messages()[0]
     node_of(plane.data.materials[0]).albedo = (0.5, 0.5, 0.5)
     bpy.ops.object.bake(type="COMBINED")
-    assert engine.last_errors() == []
+    assert state.messages() == []
 
 
 def test_plain_material_is_refused():
@@ -83,7 +83,7 @@ def test_plain_material_is_refused():
     add_active_image(plane.data.materials[0])
     select(plane)
     messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
-    assert "Beamspread node" in engine.last_errors()[-1]
+    assert "Beamspread node" in state.messages()[-1]
 
 
 def test_viewport_hidden_caster_and_modifiers_render():

@@ -6,7 +6,8 @@ import beamspread
 import bpy
 import numpy as np
 import pytest
-from beamspread import operators
+from beamspread.blender.jobs.operator import BakeThread
+from beamspread.core.bake.runner import CANCELLED, Bake, Target
 from mathutils import Matrix
 from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
 
@@ -69,7 +70,7 @@ def test_an_artists_own_use_of_the_node_is_kept():
 
 def test_file_image_is_written_to_its_file(tmp_path):
     path = tmp_path / "target.exr"
-    from beamspread._load import native
+    from beamspread.core.native import native
 
     native.write_exr(str(path), np.zeros((20, 24, 3), np.float32), ["R", "G", "B"])
     image = bpy.data.images.load(str(path))
@@ -300,20 +301,22 @@ def test_samples_of_a_folder(tmp_path):
     assert "There is no folder of LDF samples" in messages_of(bpy.ops.beamspread.bake)
 
 
-class FakeJob:
-    """Asks whether to go on until it is told not to."""
+class EndlessJob:
+    """Goes on until it is told to stop; `BakeJob` in all that a thread asks of it."""
+
+    def warnings(self):
+        return []
 
     def run(self, progress):
         while progress(0.5):
             pass
-        raise RuntimeError("stopped")
+        raise beamspread.Cancelled
 
 
 def test_thread_stops_when_asked():
-    thread = operators.BakeThread(FakeJob())
+    thread = BakeThread(Bake(Target("Plane"), EndlessJob()))
     thread.start()
     thread.cancel()
     thread.join(timeout=10)
     assert not thread.is_alive()
-    assert thread.cancelled
-    assert thread.texture is None
+    assert (thread.bake.status, thread.bake.layers) == (CANCELLED, {})

@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 import pytest
-from beamspread._load import native
+from beamspread.core.native import native
 from scenes import add_blocker, add_material, add_plane, add_sun, bake, node_of
 
 

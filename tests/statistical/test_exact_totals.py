@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from beamspread import Medium, exact_totals, simulate
-from beamspread.core.library import angles_for
+from beamspread.core.ldf.library import angles_for
 
 from helpers import adding_doubling_table
 from plain_walk import fresnel

@@ -5,7 +5,7 @@ import functools
 import numpy as np
 import pytest
 from beamspread import Medium, convolve, exact_totals, simulate
-from beamspread.core.library import angles_for
+from beamspread.core.ldf.library import angles_for
 
 from helpers import travel
 from plain_walk import plain_walk

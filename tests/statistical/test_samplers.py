@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from beamspread._load import native
+from beamspread.core.native import native
 
 # Quantile of chi-square with 39 degrees of freedom at 1 - .01 / 7 (Sidak, seven values of g).
 CHI2_LIMIT = 70.9

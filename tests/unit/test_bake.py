@@ -6,16 +6,23 @@ from dataclasses import replace
 import beamspread
 import numpy as np
 import pytest
-from beamspread.core.bake import BakeSettings, bake, light_beams
+from beamspread.core.bake.job import BakeJob
+from beamspread.core.bake.layers import LAYERS
+from beamspread.core.bake.luminance import bake, light_beams
+from beamspread.core.bake.runner import Bake, Target
+from beamspread.core.bake.settings import COMBINED, BakeSettings
+from beamspread.core.bake.surface import Surface
 from beamspread.core.errors import MaterialError
-from beamspread.core.job import BakeJob, Surface
-from beamspread.core.material import Material
-from beamspread.core.receiver import Polygons, Receiver, build_receiver, fit_uv_map
-from beamspread.core.scene import Grid, Mesh, PointLight, SpotLight, SunLight
+from beamspread.core.material.material import Material
+from beamspread.core.scene.grid import Grid
+from beamspread.core.scene.illumination import Illumination, Mesh
+from beamspread.core.scene.lights import Light, PointLight, SpotLight, SunLight
+from beamspread.core.scene.receiver import Chart, Receiver, build_receiver
+from beamspread.core.scene.uv_map import Polygons, fit_uv_maps
 
 SETTINGS = BakeSettings(quality="preview", samples=2, margin=0)
 MATERIAL = Material(albedo=(0.9, 0.9, 0.9), mean_free_path=(0.01, 0.01, 0.01), anisotropy=0.0)
-SUN = SunLight("Sun", (0.0, 0.0, -1.0), 2.0, (1.0, 1.0, 1.0))
+SUN = SunLight("Sun", 2.0, (1.0, 1.0, 1.0), True, (0.0, 0.0, -1.0))
 
 
 def grid(size=24, side=1.0):
@@ -33,13 +40,20 @@ def grid(size=24, side=1.0):
     )
 
 
+def job(lights, occluders=None, surface=None, settings=SETTINGS, **frame):
+    """A bake of `grid` with its frame changed."""
+    plane = replace(grid(), **frame)
+    receiver = Receiver(plane.coverage, (Chart(plane, plane.coverage),))
+    return BakeJob("Plane", receiver, Illumination(lights, occluders), surface or Surface(MATERIAL), settings)
+
+
 def reflectance(angle, albedo=0.9, thickness=math.inf):
     medium = beamspread.Medium(g=0.0, ior=1.0, thickness=thickness)
     return beamspread.library(medium, quality="preview").reflectance(angle, albedo)
 
 
 def test_interior_under_a_sun():
-    luminance = bake(grid(), [SUN], Mesh.empty(), MATERIAL, 0.0, SETTINGS)
+    luminance = bake(grid(), Illumination([SUN]), MATERIAL, 0.0, SETTINGS)
     assert luminance.shape == (24, 24, 3)
     assert luminance.dtype == np.float32
     assert luminance[12, 12] == pytest.approx(reflectance(0) * 2 / math.pi, rel=2e-3)
@@ -48,8 +62,8 @@ def test_interior_under_a_sun():
 def test_lights_add_up_and_colours_stay_apart():
     red = replace(SUN, color=(1.0, 0.0, 0.0))
     blue = replace(SUN, color=(0.0, 0.0, 1.0), direction=(math.sin(0.5), 0.0, -math.cos(0.5)))
-    both = bake(grid(), [red, blue], Mesh.empty(), MATERIAL, 0.0, SETTINGS)
-    apart = sum(bake(grid(), [light], Mesh.empty(), MATERIAL, 0.0, SETTINGS) for light in (red, blue))
+    both = bake(grid(), Illumination([red, blue]), MATERIAL, 0.0, SETTINGS)
+    apart = sum(bake(grid(), Illumination([light]), MATERIAL, 0.0, SETTINGS) for light in (red, blue))
     assert both == pytest.approx(apart)
     assert not both[..., 1].any()
     assert both[12, 12, 0] > both[12, 12, 2] > 0
@@ -61,66 +75,68 @@ def test_an_uneven_receiver_does_not_shadow_itself():
     corners = np.array([(-0.5, -0.5, bump), (0.5, -0.5, -bump), (0.5, 0.5, bump), (-0.5, 0.5, -bump)])
     uvs = corners[:, :2] + 0.5
     polygons = Polygons(corners, uvs, np.array([0, 4]), np.array([(0.0, 0.0, 1.0)]))
-    receiver = build_receiver(polygons, fit_uv_map(polygons), 32, 32)
+    target = build_receiver(fit_uv_maps(polygons), 32, 32).charts[0].grid
     mesh = Mesh(corners.astype(np.float32), np.array([(0, 1, 2), (0, 2, 3)], np.uint32))
     low_sun = replace(SUN, direction=(math.sin(1.5), 0.0, -math.cos(1.5)))
-    irradiance, _ = light_beams(receiver.grid, low_sun, mesh.ray_caster, SETTINGS)
+    irradiance, _ = light_beams(target, low_sun, Illumination([low_sun], mesh).caster(), SETTINGS)
     assert irradiance == pytest.approx(np.full((32, 32, 3), 2 * math.cos(1.5)), rel=1e-3)
 
 
-def test_objects_under_the_same_light_share_its_shadows():
-    roof = Mesh(np.array([[-9, -9, 1], [9, -9, 1], [0, 18, 1]], np.float32), np.array([[0, 1, 2]], np.uint32))
-    assert roof.ray_caster is roof.ray_caster
-    assert roof.ray_caster.triangle_count == 1
-    assert Mesh.empty().ray_caster is None
+ROOF = Mesh(np.array([[-9, -9, 1], [9, -9, 1], [0, 18, 1]], np.float32), np.array([[0, 1, 2]], np.uint32))
+
+
+def test_bakes_of_the_same_scene_share_its_shadows():
+    under_roof = Illumination([SUN], ROOF)
+    assert under_roof.caster() is under_roof.caster()
+    assert under_roof.caster().triangle_count == 1
+    assert Illumination([SUN]).caster() is None
 
 
 def test_no_light():
-    assert not bake(grid(), [], Mesh.empty(), MATERIAL, 0.0, SETTINGS).any()
+    assert not bake(grid(), Illumination([]), MATERIAL, 0.0, SETTINGS).any()
 
 
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_lamp_above_the_centre(kind):
     """P / (4 pi r^2) below the lamp; a cone wider than the plane changes nothing there."""
-    place = ("Lamp", (0.0, 0.0, 2.0), 100.0, (1.0, 1.0, 1.0), True)
+    place = ("Lamp", 100.0, (1.0, 1.0, 1.0), True, (0.0, 0.0, 2.0))
     axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     lamp = PointLight(*place) if kind == "point" else SpotLight(*place, axes, math.radians(120), 0.0)
-    luminance = bake(grid(), [lamp], Mesh.empty(), MATERIAL, 0.0, SETTINGS)
+    luminance = bake(grid(), Illumination([lamp]), MATERIAL, 0.0, SETTINGS)
     irradiance = 100 / (4 * math.pi * 2**2)
     assert luminance[12, 12] == pytest.approx(reflectance(0) * irradiance / math.pi, rel=0.01)
     assert luminance[12, 4] == pytest.approx(luminance[12, 19], rel=0.01)
 
 
 def test_occluder_and_lamps_without_shadow():
-    roof = Mesh(np.array([[-9, -9, 1], [9, -9, 1], [0, 18, 1]], np.float32), np.array([[0, 1, 2]], np.uint32))
-    assert not bake(grid(), [SUN], roof, MATERIAL, 0.0, SETTINGS).any()
-    free = bake(grid(), [replace(SUN, cast_shadow=False)], roof, MATERIAL, 0.0, SETTINGS)
-    assert free == pytest.approx(bake(grid(), [SUN], Mesh.empty(), MATERIAL, 0.0, SETTINGS))
+    assert not bake(grid(), Illumination([SUN], ROOF), MATERIAL, 0.0, SETTINGS).any()
+    free = bake(grid(), Illumination([replace(SUN, cast_shadow=False)], ROOF), MATERIAL, 0.0, SETTINGS)
+    assert free == pytest.approx(bake(grid(), Illumination([SUN]), MATERIAL, 0.0, SETTINGS))
 
 
 def test_thickness_counts_in_mean_free_paths_of_each_channel():
     material = replace(MATERIAL, mean_free_path=(0.01, 0.02, 0.04))
-    luminance = bake(grid(), [SUN], Mesh.empty(), material, 0.04, SETTINGS)
+    luminance = bake(grid(), Illumination([SUN]), material, 0.04, SETTINGS)
     expected = [reflectance(0, thickness=depth) * 2 / math.pi for depth in (4, 2, 1)]
     assert luminance[12, 12] == pytest.approx(expected, rel=0.01)
 
 
 def test_properties_are_checked_before_anything_runs():
     with pytest.raises(MaterialError, match="albedo"):
-        bake(grid(), [SUN], Mesh.empty(), replace(MATERIAL, albedo=(1.0, 0.5, 0.5)), 0.0, SETTINGS)
+        bake(grid(), Illumination([SUN]), replace(MATERIAL, albedo=(1.0, 0.5, 0.5)), 0.0, SETTINGS)
     with pytest.raises(MaterialError, match="thickness"):
-        bake(grid(), [SUN], Mesh.empty(), MATERIAL, -1.0, SETTINGS)
+        bake(grid(), Illumination([SUN]), MATERIAL, -1.0, SETTINGS)
 
 
 def test_progress_rises_to_one_and_can_stop_at_any_time():
     seen = []
-    sun = bake(grid(), [SUN, SUN], Mesh.empty(), MATERIAL, 0.0, SETTINGS, lambda done: seen.append(done) or True)
+    sun = bake(grid(), Illumination([SUN, SUN]), MATERIAL, 0.0, SETTINGS, lambda done: seen.append(done) or True)
     assert (np.diff(seen) > -1e-9).all()
     assert 0 <= seen[0] <= seen[-1] <= 1
     for moment in (0.0, 0.6, 0.95):
         with pytest.raises(beamspread.Cancelled):
-            bake(grid(), [SUN, SUN], Mesh.empty(), MATERIAL, 0.0, SETTINGS, lambda done, m=moment: done < m)
-    assert np.array_equal(bake(grid(), [SUN, SUN], Mesh.empty(), MATERIAL, 0.0, SETTINGS), sun)
+            bake(grid(), Illumination([SUN, SUN]), MATERIAL, 0.0, SETTINGS, lambda done, m=moment: done < m)
+    assert np.array_equal(bake(grid(), Illumination([SUN, SUN]), MATERIAL, 0.0, SETTINGS), sun)
 
 
 def test_job_works_out_the_albedo_of_a_base_colour():
@@ -128,15 +144,14 @@ def test_job_works_out_the_albedo_of_a_base_colour():
     albedo = surface.resolve("preview").albedo
     library = beamspread.library(beamspread.Medium(g=0.0, ior=1.0), quality="preview")
     assert [library.diffuse_reflectance(value) for value in albedo] == pytest.approx([0.5, 0.3, 0.1], abs=1e-6)
-    receiver = Receiver(grid(), 24, 24, grid().coverage)
-    texture = BakeJob(receiver, [SUN], Mesh.empty(), surface, SETTINGS).run()
+    texture = job([SUN], surface=surface).run()[COMBINED]
     expected = [reflectance(0, value) * 2 / math.pi for value in albedo]
     assert texture[12, 12] == pytest.approx(expected, rel=5e-3)
 
 
 def test_a_bake_uses_the_anisotropy_of_each_channel():
     material = replace(MATERIAL, anisotropy=0.5, anisotropy_rgb=(0.0, 0.7, 0.0))
-    luminance = bake(grid(), [SUN], Mesh.empty(), material, 0.0, SETTINGS)
+    luminance = bake(grid(), Illumination([SUN]), material, 0.0, SETTINGS)
     forward = beamspread.library(beamspread.Medium(g=0.7, ior=1.0), quality="preview").reflectance(0, 0.9)
     expected = [value * 2 / math.pi for value in (reflectance(0), forward, reflectance(0))]
     assert luminance[12, 12] == pytest.approx(expected, rel=0.01)
@@ -148,6 +163,155 @@ def test_base_color_is_met_with_an_anisotropy_per_channel():
     assert albedo[0] == albedo[2] < albedo[1]
     library = beamspread.library(beamspread.Medium(g=0.7, ior=1.0), quality="preview")
     assert library.diffuse_reflectance(albedo[1]) == pytest.approx(0.3, abs=1e-9)
+
+
+LAMP = PointLight("Lamp", 10.0, (1.0, 1.0, 1.0), True, (0.0, 0.0, 2.0))
+DOWN = {"normal": (0.0, 0.0, -1.0), "x_axis": (-1.0, 0.0, 0.0), "origin": (0.5, -0.5, 0.0)}
+BEHIND = "All lights are behind 'Plane'"
+
+
+def test_a_plane_lit_from_the_back_alone_says_so_before_it_is_baked():
+    assert job([SUN, LAMP]).warnings() == []
+    for lights in ([SUN], [LAMP], [SUN, LAMP]):
+        (warning,) = job(lights, **DOWN).warnings()
+        assert warning.startswith(BEHIND)
+        assert "Flip" in warning
+    in_front = replace(LAMP, position=(0.0, 0.0, -2.0))
+    assert job([SUN, in_front], **DOWN).warnings() == []
+    (none_at_all,) = job([]).warnings()
+    assert "No light of the scene can be baked" in none_at_all
+
+
+def test_a_bake_that_no_light_reached_says_so_once():
+    def said(one):
+        bake = Bake(Target("Plane"), one)
+        bake.run()
+        return bake.warnings
+
+    (shadow,) = said(job([SUN], ROOF))
+    assert "No light reaches 'Plane'" in shadow
+    assert said(job([SUN])) == []
+    assert [BEHIND in warning for warning in said(job([SUN], **DOWN))] == [True]
+    # What absorbs everything is black in any light.
+    assert said(job([SUN], surface=Surface(replace(MATERIAL, albedo=(0.0, 0.0, 0.0))))) == []
+
+
+@pytest.mark.parametrize(
+    ("light", "words"),
+    [
+        (replace(SUN, strength=math.nan), "its power is nan"),
+        (replace(SUN, strength=math.inf), "its power is inf"),
+        (replace(LAMP, strength=-5.0), "its power is -5, and a bake can't take light away"),
+        (replace(LAMP, color=(1.0, -0.5, 0.0)), "its color is 1, -0.5, 0"),
+        (replace(LAMP, color=(1.0, math.nan, 0.0)), "its color is 1, nan, 0"),
+        (replace(SUN, direction=(math.nan,) * 3), "its place or direction is not a number"),
+        (replace(LAMP, position=(0.0, 0.0, math.inf)), "its place or direction is not a number"),
+        (SUN, ""),
+        (LAMP, ""),
+    ],
+)
+def test_what_keeps_a_light_from_being_baked(light, words):
+    assert light.fault() == words
+
+
+def test_a_new_kind_of_light_and_a_new_layer_need_nothing_but_themselves(monkeypatch):
+    """Even light from above, and a layer that shows the irradiance of all lights."""
+
+    class Sky(Light):
+        def unit_beams(self, target, caster, **options):
+            return np.ones((target.height, target.width), np.float32), np.array([0.0, 0.0, -1.0])
+
+        def is_behind(self, target):
+            return False
+
+    def irradiance(one, target, _material, _progress):
+        lights = one.illumination.lights
+        return sum(light_beams(target, light, one.illumination.caster(), one.settings)[0] for light in lights)
+
+    monkeypatch.setitem(LAYERS, "Irradiance", irradiance)
+    sky = Sky("Sky", 3.0, (1.0, 0.5, 0.0), True)
+    layers = job([sky], settings=replace(SETTINGS, layers=(COMBINED, "Irradiance"))).run()
+    assert list(layers) == [COMBINED, "Irradiance"]
+    assert layers["Irradiance"][12, 12] == pytest.approx([3, 1.5, 0])
+    assert layers[COMBINED][12, 12] == pytest.approx(reflectance(0) / math.pi * np.array([3, 1.5, 0]), rel=2e-3)
+
+
+def test_charts_are_baked_apart_on_planes_of_their_own():
+    """The left half lies under the sun; the right half is turned by 60 degrees and takes half as much."""
+    turned = {"normal": (math.sin(math.pi / 3), 0.0, 0.5), "x_axis": (0.5, 0.0, -math.sin(math.pi / 3))}
+    coverage = np.zeros((24, 60), np.float32)
+    planes = [grid(), replace(grid(), **turned, coverage=grid().coverage * np.float32(0.5))]
+    charts = tuple(Chart(plane, plane.coverage, (36 * place, 0)) for place, plane in enumerate(planes))
+    for chart in charts:
+        chart.part_of(coverage)[:] = chart.coverage
+    whole = BakeJob("Plane", Receiver(coverage, charts), Illumination([SUN]), Surface(MATERIAL), SETTINGS)
+    texture = whole.run()[COMBINED]
+    for chart, plane in zip(charts, planes):
+        alone = bake(plane, Illumination([SUN]), MATERIAL, 0.0, SETTINGS)
+        assert np.array_equal(chart.part_of(texture), alone)
+    assert not texture[:, 24:36].any()
+    assert texture[12, 48] == pytest.approx(0.25 * reflectance(60) * 2 / math.pi, rel=2e-3)
+
+
+class FailingJob:
+    """Stands for a `BakeJob`, to see what a `Bake` makes of what happens in it."""
+
+    def __init__(self, outcome):
+        self.outcome = outcome
+
+    def warnings(self):
+        return ["Careful."]
+
+    def warnings_after(self, layers):
+        return []
+
+    def run(self, progress):
+        if isinstance(self.outcome, BaseException):
+            raise self.outcome
+        return self.outcome
+
+
+LAYER = {COMBINED: np.ones((2, 2, 3), np.float32)}
+
+
+@pytest.mark.parametrize(
+    ("outcome", "status", "error"),
+    [
+        (LAYER, "written", ""),
+        (ValueError("No."), "failed", "No."),
+        (MemoryError(), "failed", "There is not enough memory: lower the resolution."),
+        (KeyboardInterrupt(), "cancelled", "The bake was cancelled."),
+        (beamspread.Cancelled(), "cancelled", "The bake was cancelled."),
+    ],
+)
+def test_a_bake_notes_what_became_of_it(outcome, status, error):
+    stored = []
+    one = Bake(Target("Plane", "Stone"), FailingJob(outcome))
+    one.run()
+    one.keep(lambda done: stored.append(dict(done.layers)) or "plane.exr")
+    assert (one.status, one.error) == (status, error)
+    assert stored == ([LAYER] if status == "written" else [])
+    assert one.path == ("plane.exr" if status == "written" else "")
+    assert one.messages() == [*([error] if error else []), "Careful."]
+    assert one.layers == {}
+
+
+def test_a_bake_that_cannot_be_stored_has_failed():
+    def full_disk(_bake):
+        raise OSError("no space left")
+
+    one = Bake(Target("Plane"), FailingJob(LAYER))
+    one.run()
+    one.keep(full_disk)
+    assert (one.status, one.error, one.layers) == ("failed", "no space left", {})
+
+
+def test_a_bake_that_ended_before_it_was_cancelled_keeps_nothing():
+    one = Bake(Target("Plane"), FailingJob(LAYER))
+    one.run()
+    one.cancel()
+    one.keep(lambda _bake: pytest.fail("stored"))
+    assert one.status == "cancelled"
 
 
 def test_albedo_from_color_is_public():

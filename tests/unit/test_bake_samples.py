@@ -6,11 +6,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from beamspread import LdfSample, Medium, simulate
-from beamspread.core.bake import BakeSettings, bake
+from beamspread.core.bake.luminance import bake
+from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.errors import BakeError
-from beamspread.core.samples import load_source
-from beamspread.core.scene import Mesh
-from tests.unit.test_bake import MATERIAL, SUN, grid
+from beamspread.core.ldf.samples import load_source
+from beamspread.core.material.material import Material
+from beamspread.core.scene.grid import Grid
+from beamspread.core.scene.illumination import Illumination
+from beamspread.core.scene.lights import SunLight
+
+MATERIAL = Material(albedo=(0.9, 0.9, 0.9), mean_free_path=(0.01, 0.01, 0.01), anisotropy=0.0)
+SUN = SunLight("Sun", 2.0, (1.0, 1.0, 1.0), True, (0.0, 0.0, -1.0))
+AXES = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+SQUARE = Grid((0.0, 0.0, 0.0), *AXES, 1 / 24, 1 / 24, 24, 24, np.ones((24, 24), np.float32))
 
 
 @pytest.fixture(scope="module")
@@ -32,14 +40,14 @@ def test_interior_under_a_sun(folder, method):
     """Far from the border exitance is the power of the sample."""
     sample = LdfSample.load(folder / "30_0.9.exr")
     sun = replace(SUN, direction=(math.sin(math.radians(30)), 0.0, -math.cos(math.radians(30))))
-    luminance = bake(grid(), [sun], Mesh.empty(), MATERIAL, 0.0, settings(folder, method))
+    luminance = bake(SQUARE, Illumination([sun]), MATERIAL, 0.0, settings(folder, method))
     irradiance = 2 * math.cos(math.radians(30))
     assert luminance[12, 12] == pytest.approx(sample.power * irradiance / math.pi, rel=1e-3)
 
 
 def test_what_the_artist_is_told(folder, tmp_path):
     def baked(where, sun=SUN, material=MATERIAL):
-        return bake(grid(), [sun], Mesh.empty(), material, 0.0, settings(where))
+        return bake(SQUARE, Illumination([sun]), material, 0.0, settings(where))
 
     with pytest.raises(BakeError, match="no folder of LDF samples at ''"):
         baked("")

@@ -5,7 +5,7 @@ import struct
 
 import numpy as np
 import pytest
-from beamspread._load import native
+from beamspread.core.native import native
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 

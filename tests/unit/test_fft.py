@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from beamspread._load import native
+from beamspread.core.native import native
 
 SETS = native.fft_instruction_sets()
 ROUNDING = 2.0**-24

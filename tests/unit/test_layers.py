@@ -1,10 +1,12 @@
-"""Folders include only what stands above them; CMakeLists.txt says which those are."""
+"""Folders include only what stands above them: CMakeLists.txt says which those are, docstrings say it of addon/."""
 
+import ast
 import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 NATIVE = ROOT / "native"
+ADDON = ROOT / "addon"
 
 
 def native_folders():
@@ -26,4 +28,47 @@ def test_native_includes_point_upwards():
         if (NATIVE / header).exists()
         and str(Path(header).parent) not in may_include[str(path.relative_to(NATIVE).parent)] | {"fft/targets"}
     ]
+    assert not wrong
+
+
+def listed(package):
+    """Parts of a package in the order that its docstring lists them."""
+    docstring = ast.get_docstring(ast.parse((ADDON / package / "__init__.py").read_text()))
+    return [*re.findall(r"^    (\w+) {2,}", docstring, re.MULTILINE)]
+
+
+def imports(path):
+    """Absolute names of what a module of addon/ imports of the package, and top names of what else."""
+    package = path.relative_to(ADDON).parent.parts
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (name.name.split(".")[0] for name in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level:
+            home = [*package[: len(package) - node.level + 1], *filter(None, [node.module])]
+            yield from (".".join([*home, name.name]) for name in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module.split(".")[0]
+
+
+def test_every_part_of_addon_is_listed():
+    for package in ("core", "blender"):
+        there = {path.stem for path in (ADDON / package).iterdir() if path.name[0] != "_"}
+        assert there == set(listed(package))
+
+
+def test_python_imports_point_upwards():
+    wrong = []
+    for package in ("core", "blender"):
+        order = listed(package)
+        for path in (ADDON / package).rglob("*.py"):
+            part = path.relative_to(ADDON / package).parts[0].removesuffix(".py")
+            if part == "__init__":
+                continue
+            above = {f"{package}.{name}" for name in order[: order.index(part) + 1]}
+            for name in imports(path):
+                home = ".".join(name.split(".")[:2])
+                inside = name.split(".")[0] in ("core", "blender", "batch", "_native")
+                allowed = home in above or (package == "blender" and home.split(".")[0] == "core")
+                if (inside and not allowed) or (package == "core" and name in ("bpy", "mathutils")):
+                    wrong.append(f"{path.relative_to(ADDON)} imports {name}")
     assert not wrong

@@ -123,7 +123,7 @@ def test_files_of_another_version_are_refused(fixture, request, tmp_path):
 
 def test_shipped_files_are_saved_as_they_are(tmp_path):
     """A change of the layout that forgets to make them again would show."""
-    from beamspread.core import library as module
+    from beamspread.core.ldf import library as module
 
     shipped = sorted(module.SHIPPED_FOLDER.glob("*.exr"))
     assert len(shipped) == 12
@@ -133,7 +133,7 @@ def test_shipped_files_are_saved_as_they_are(tmp_path):
 
 
 def test_files_that_are_no_library(tmp_path):
-    from beamspread._load import native
+    from beamspread.core.native import native
 
     path = tmp_path / "picture.exr"
     native.write_exr(str(path), np.zeros((4, 4, 3), np.float32), channels=["R", "G", "B"])
@@ -299,7 +299,7 @@ def simulated_slab_once():
 
 def test_shipped_files_are_made_again_bit_by_bit(tmp_path):
     """The command that makes them, for a small one, by the kernel that every processor has."""
-    from beamspread.core import library as module
+    from beamspread.core.ldf import library as module
 
     medium = Medium(0.9, 1.5, 0.5)
     choice = ["--medium", "0.9", "1.5", "0.5", "--quality", "preview", "--kernel", "scalar"]
@@ -316,7 +316,7 @@ def test_shipped_files_are_made_again_bit_by_bit(tmp_path):
 class TestCache:
     @pytest.fixture(autouse=True)
     def folder(self, tmp_path, monkeypatch):
-        from beamspread.core import library as module
+        from beamspread.core.ldf import library as module
 
         monkeypatch.setenv("BEAMSPREAD_CACHE", str(tmp_path / "cache"))
         monkeypatch.setattr(module, "SHIPPED_FOLDER", tmp_path / "shipped")
@@ -327,7 +327,7 @@ class TestCache:
         module._loaded.clear()
 
     def forget(self):
-        from beamspread.core import library as module
+        from beamspread.core.ldf import library as module
 
         module._loaded.clear()
 
@@ -385,7 +385,7 @@ class TestCache:
         assert sorted(path.suffix for path in folder.iterdir()) == [".exr", ".exr"]
 
     def test_shipped_libraries_come_first(self, folder, tmp_path):
-        from beamspread.core import library as module
+        from beamspread.core.ldf import library as module
 
         medium = Medium(0.3, 1.1, 2.0)
         shipped = module.make(medium, "final")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from beamspread.core.margin import extend_margin
+from beamspread.core.bake.margin import extend_margin
 
 
 def test_constant_extends_as_constant():

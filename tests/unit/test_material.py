@@ -6,10 +6,10 @@ import beamspread
 import numpy as np
 import pytest
 from beamspread import Material, presets
-from beamspread.core.color import HIGHEST_ALBEDO, albedo_from_color, albedo_from_reflectance
+from beamspread.core.bake.surface import Surface
 from beamspread.core.errors import MaterialError
-from beamspread.core.job import Surface
-from beamspread.core.material import check_thickness
+from beamspread.core.ldf.albedo import HIGHEST_ALBEDO, albedo_from_color, albedo_from_reflectance
+from beamspread.core.material.material import check_thickness
 
 GOOD = {"albedo": (0.9, 0.5, 0.0), "mean_free_path": (1e-3, 2e-3, 3e-3)}
 
@@ -132,7 +132,7 @@ def noisy(request, monkeypatch):
     """A medium and its library, of few photons: the inversion has to be exact for a noisy one as well."""
     medium = beamspread.Medium(*request.param)
     simulated = beamspread.simulate(medium, [0, 25, 50, 70, 80, 88], 500)
-    monkeypatch.setattr("beamspread.core.library.library", lambda *_arguments, **_options: simulated)
+    monkeypatch.setattr("beamspread.core.ldf.albedo.library", lambda *_arguments, **_options: simulated)
     return medium, simulated
 
 

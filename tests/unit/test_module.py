@@ -7,7 +7,7 @@ from pathlib import Path
 
 import beamspread
 import pytest
-from beamspread._load import native
+from beamspread.core.native import native
 
 ROOT = Path(__file__).resolve().parents[2]
 STAGE = Path(beamspread.__file__).resolve().parent.parent
@@ -15,7 +15,7 @@ WHEEL_EMBREE = ROOT / "build/bpy-4.5/bpy/lib/libembree4.so.4"
 
 # rtcGetDeviceProperty(RTC_DEVICE_PROPERTY_VERSION) is 10000 major + 100 minor + patch.
 ASK_EMBREE = """
-from beamspread._load import native
+from beamspread.core.native import native
 import numpy as np
 occluders = native.Occluders(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.uint32))
 print(native.embree_version())
@@ -34,7 +34,7 @@ def mode():
 
 EVERY_KIND_OF_CALL = """
 from beamspread import Medium, convolve, simulate
-from beamspread._load import native
+from beamspread.core.native import native
 library = simulate(Medium(), angles=[0, 30], photons=256)
 for solver in ("fft", "direct", "adaptive"):
     convolve(np.ones((8, 8), np.float32), (0.0, 0.0, -1.0), library, 0.5, 1.0, 1.0, solver=solver)
@@ -115,5 +115,5 @@ def test_embree_4_of_the_host_does_not_win_when_loaded_globally():
 
 def test_embree_4_of_the_host_would_win_without_deepbind():
     """Shows that the two tests above can fail."""
-    code = "from beamspread._load import native; print(native.embree_version())"
+    code = "from beamspread.core.native import native; print(native.embree_version())"
     assert run_python(code, LD_PRELOAD=str(WHEEL_EMBREE), BEAMSPREAD_NO_DEEPBIND="1").startswith("4")

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from beamspread.core.errors import ReceiverError
-from beamspread.core.receiver import Polygons, build_receiver, fit_uv_map, texture_size
+from beamspread.core.scene.receiver import build_receiver, texture_size
+from beamspread.core.scene.uv_map import Polygons, fit_uv_maps
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -21,7 +22,7 @@ def quad(p_u, p_v, p_0=(0, 0, 0), uvs=SQUARE, flip=False):
 
 
 def receiver_of(polygons, width, height):
-    return build_receiver(polygons, fit_uv_map(polygons), width, height)
+    return build_receiver(fit_uv_maps(polygons), width, height)
 
 
 def texel_position(grid, column, row):
@@ -48,7 +49,8 @@ def test_any_rotation_mirroring_and_scale(axis, other, origin, scale_u, scale_v,
     p_u = scale_u * axis / np.linalg.norm(axis)
     p_v = scale_v * across / np.linalg.norm(across)
     polygons = quad(p_u, p_v, 10 * origin, flip=flip)
-    grid = receiver_of(polygons, 8, 5).grid
+    (chart,) = receiver_of(polygons, 8, 5).charts
+    grid = chart.grid
     check_frame(grid)
     assert (grid.width, grid.height) == (8, 5)
     assert (grid.pitch_x, grid.pitch_y) == pytest.approx((scale_u / 8, scale_v / 5))
@@ -66,9 +68,9 @@ def test_turned_and_mirrored_uvs(turn, mirror):
     uvs = uvs * [-1, 1] + [1, 0] if mirror else uvs
     corners = np.column_stack([positions, np.full(4, 3.0)])
     polygons = Polygons(corners, uvs, np.array([0, 4]), np.array([[0.0, 0, 1]]))
-    width, height = texture_size(fit_uv_map(polygons), 12)
+    width, height = texture_size(fit_uv_maps(polygons), 12)
     assert (width, height) == ((12, 6) if turn % 2 == 0 else (6, 12))
-    grid = receiver_of(polygons, width, height).grid
+    grid = receiver_of(polygons, width, height).charts[0].grid
     check_frame(grid)
     for uv, corner in zip(uvs, corners):
         assert texel_position(grid, uv[0] * width, uv[1] * height) == pytest.approx(corner, abs=1e-9)
@@ -78,18 +80,44 @@ def test_grid_is_the_chart_alone():
     """A chart in a corner of an atlas: the grid is cut to it and lands back in its place."""
     uvs = SQUARE * [0.25, 0.5] + [0.5, 0.25]
     receiver = receiver_of(quad((8, 0, 0), (0, 8, 0), uvs=uvs), 16, 16)
-    assert (receiver.grid.width, receiver.grid.height, receiver.offset) == (4, 8, (8, 4))
-    assert np.array(receiver.grid.origin) == pytest.approx([4, 2, 0])
+    (chart,) = receiver.charts
+    assert (chart.grid.width, chart.grid.height, chart.offset) == (4, 8, (8, 4))
+    assert np.array(chart.grid.origin) == pytest.approx([4, 2, 0])
     values = np.arange(32, dtype=np.float32).reshape(8, 4, 1)
-    texture = receiver.to_texels(values)
+    texture = receiver.to_texture([values])
     assert np.array_equal(texture[4:12, 8:12], values)
     assert texture.sum() == values.sum()
-    assert (receiver.coverage > 0).sum() == 32
+    assert receiver.inside().sum() == 32
+
+
+def test_no_texel_is_inside_that_no_grid_fills():
+    """A chart that enters the next column and row by rounding of its UVs alone does not own them."""
+    uvs = SQUARE * (0.5 + 1e-6)
+    receiver = receiver_of(quad((8, 0, 0), (0, 8, 0), uvs=uvs), 16, 16)
+    filled = receiver.to_texture([np.ones((8, 8, 1), np.float32)])[..., 0] > 0
+    assert filled.sum() == 64
+    assert np.array_equal(receiver.inside(), filled)
+
+
+def test_parts_become_charts_of_one_texture():
+    """Two squares at right angles, side by side in the image, in texels of different sizes."""
+    floor = quad((8, 0, 0), (0, 8, 0), uvs=SQUARE * 0.5)
+    wall = quad((0, 4, 0), (0, 0, 4), uvs=SQUARE * 0.5 + [0.5, 0])
+    parts = fit_uv_maps(floor) + fit_uv_maps(wall)
+    assert texture_size(parts, 32) == (32, 32)
+    receiver = build_receiver(parts, 16, 16)
+    assert [chart.offset for chart in receiver.charts] == [(0, 0), (8, 0)]
+    assert np.array([chart.grid.normal for chart in receiver.charts]) == pytest.approx(np.eye(3)[[2, 0]], abs=1e-12)
+    assert [chart.grid.pitch_x for chart in receiver.charts] == pytest.approx([0.5, 0.25])
+    texture = receiver.to_texture([np.full((8, 8, 1), value, np.float32) for value in (1, 2)])[..., 0]
+    assert np.array_equal(texture[:8], np.repeat([[1, 2]], 8, axis=1).repeat(8, axis=0))
+    assert not texture[8:].any()
+    assert np.array_equal(receiver.inside(), texture > 0)
 
 
 def test_partial_coverage_at_the_border():
     receiver = receiver_of(quad((1, 0, 0), (0, 1, 0), uvs=SQUARE * 0.625), 4, 4)
-    assert receiver.grid.coverage == pytest.approx(np.outer([1, 1, 0.5], [1, 1, 0.5]))
+    assert receiver.charts[0].grid.coverage == pytest.approx(np.outer([1, 1, 0.5], [1, 1, 0.5]))
 
 
 def test_faces_that_join_to_one_plane():
@@ -103,7 +131,7 @@ def test_faces_that_join_to_one_plane():
         np.array([0, 4, 8]),
         np.concatenate([left.normals, right.normals]),
     )
-    assert receiver_of(both, 6, 6).grid.coverage == pytest.approx(np.ones((6, 6)))
+    assert receiver_of(both, 6, 6).charts[0].grid.coverage == pytest.approx(np.ones((6, 6)))
 
 
 @pytest.mark.parametrize("shear", [-0.7, 0.3, 2.0])
@@ -111,7 +139,7 @@ def test_sheared_uvs_are_resampled(shear):
     """A field that is linear on the plane comes back linear in the texture."""
     p_u, p_v = np.array([3.0, 0, 0]), np.array([shear, 2.0, 0])
     receiver = receiver_of(quad(p_u, p_v, (1, 1, 0)), 30, 20)
-    grid = receiver.grid
+    grid = receiver.charts[0].grid
     check_frame(grid)
     assert (grid.pitch_x, grid.pitch_y) == pytest.approx((0.1, 0.1))
     assert grid.coverage.sum() * grid.pitch_x * grid.pitch_y == pytest.approx(6.0, rel=1e-4)
@@ -122,7 +150,7 @@ def test_sheared_uvs_are_resampled(shear):
         + rows[..., None] * 0.1 * np.array(grid.y_axis)
     )
     slope = np.array([2.0, -1.0, 0.5])
-    texture = receiver.to_texels((points @ slope)[..., None].astype(np.float32))[..., 0]
+    texture = receiver.to_texture([(points @ slope)[..., None].astype(np.float32)])[..., 0]
     v, u = (np.mgrid[:20, :30] + 0.5) / [[[20]], [[30]]]
     expected = (np.array([1, 1, 0]) + u[..., None] * p_u + v[..., None] * p_v) @ slope
     inside = (slice(1, -1), slice(1, -1))
@@ -130,8 +158,8 @@ def test_sheared_uvs_are_resampled(shear):
 
 
 def test_texture_size_keeps_texels_square():
-    assert texture_size(fit_uv_map(quad((4, 0, 0), (0, 1, 0))), 1024) == (1024, 256)
-    assert texture_size(fit_uv_map(quad((1, 0, 0), (0, 1000, 0))), 100) == (1, 100)
+    assert texture_size(fit_uv_maps(quad((4, 0, 0), (0, 1, 0))), 1024) == (1024, 256)
+    assert texture_size(fit_uv_maps(quad((1, 0, 0), (0, 1000, 0))), 100) == (1, 100)
 
 
 BENT = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.2], [0, 1, 0]], float)
@@ -163,16 +191,16 @@ def replaced(**changes):
 )
 def test_what_cannot_be_baked_says_why(polygons, words):
     with pytest.raises(ReceiverError, match=words):
-        fit_uv_map(polygons)
+        fit_uv_maps(polygons)
 
 
 def test_a_chart_smaller_than_rounding_is_refused():
     polygons = quad((1, 0, 0), (0, 1, 0), uvs=SQUARE * 1e-12 + 0.5)
     with pytest.raises(ReceiverError, match="no area"):
-        fit_uv_map(polygons)
+        fit_uv_maps(polygons)
 
 
 def test_non_planar_within_rounding_is_accepted():
     rng = np.random.default_rng(3)
     polygons = quad((1, 0, 0), (0, 1, 0))
-    fit_uv_map(replaced(corners=polygons.corners + rng.normal(scale=1e-7, size=(4, 3))))
+    fit_uv_maps(replaced(corners=polygons.corners + rng.normal(scale=1e-7, size=(4, 3))))

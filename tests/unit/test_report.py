@@ -2,7 +2,7 @@
 
 import json
 
-from beamspread.core.report import BakeRecord, Report, file_name
+from beamspread.core.batch.report import BakeRecord, Report, file_name
 
 KEYS = {"object", "material", "frame", "path", "width", "height", "seconds", "status", "message"}
 
@@ -32,7 +32,7 @@ def test_a_record_reads_as_a_line():
 
 def test_file_names_are_safe_and_distinct():
     taken = set()
-    assert file_name("Floor", "Marble", None, ".exr", taken) == "Floor_Marble.exr"
-    assert file_name("floor", "marble", None, ".exr", taken) == "floor_marble_2.exr"
-    assert file_name("../a/b", "c:d", 12, ".png", taken) == "a_b_c_d_0012.png"
-    assert file_name("..", "Größe", None, ".exr", taken) == "unnamed_Größe.exr"
+    assert file_name(["Floor", "Marble"], None, ".exr", taken) == "Floor_Marble.exr"
+    assert file_name(["floor", "marble"], None, ".exr", taken) == "floor_marble_2.exr"
+    assert file_name(["../a/b", "c:d"], 12, ".png", taken) == "a_b_c_d_0012.png"
+    assert file_name(["..", "Größe"], None, ".exr", taken) == "unnamed_Größe.exr"

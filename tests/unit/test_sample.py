@@ -6,7 +6,7 @@ import struct
 import numpy as np
 import pytest
 from beamspread import LdfLibrary, LdfSample, Medium, simulate
-from beamspread._load import native
+from beamspread.core.native import native
 
 from plain_exr import FLOAT, attribute, plain_exr
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from beamspread._load import native
+from beamspread.core.native import native
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

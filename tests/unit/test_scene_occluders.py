@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from beamspread._load import native
+from beamspread.core.native import native
 
 GRID = ((-1, -1, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 0.5, 0.5, 4, 4)
 SQUARE = np.array([[-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], np.float32)

@@ -6,10 +6,10 @@ import math
 import time
 from pathlib import Path
 
-from ..._load import native
-from ..color import albedo_from_color
-from ..library import angles_for, library, photons_for
-from ..presets import presets
+from ..ldf.albedo import albedo_from_color
+from ..ldf.library import angles_for, library, photons_for
+from ..material.presets import presets
+from ..native import native
 from .bar import ProgressBar
 from .options import MOST_MAPS
 from .totals import describe, specular, text_table, totals_table

@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from ..._load import native
+from ..native import native
 from .commands import COMMANDS, CommandError
 from .options import PROGRAM, make_parser
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ..._load import native
+from ..native import native
 
 
 def describe(medium) -> str:

@@ -63,20 +63,22 @@ def phases(folder):
         setattr(owner, function, timed(name, getattr(owner, function)))
 
     def import_all():
-        from beamspread import bakes, batch, registration, targets
-        from beamspread.core import bake
+        from beamspread import batch, blender
+        from beamspread.blender.images import files
+        from beamspread.blender.jobs import batch as bakes
+        from beamspread.core.bake import job, luminance
 
-        return bakes, batch, registration, targets, bake
+        return batch, blender, files, bakes, job, luminance
 
-    bakes, batch, registration, targets, bake = timed("import", import_all)()
-    time_calls("register", registration, "register")
-    time_calls("extract", bakes, "prepare")
-    time_calls("library from the cache", bake, "_libraries")
-    time_calls("beams and visibility", bake, "unit_beams")
-    time_calls("solve", bake, "_spread")
-    time_calls("margin", bake, "extend_margin")
-    time_calls("image file", targets, "write_file")
-    time_calls("unregister", registration, "unregister")
+    batch, blender, files, bakes, job, luminance = timed("import", import_all)()
+    time_calls("register", blender, "register")
+    time_calls("extract", bakes, "prepare_scene")
+    time_calls("library from the cache", luminance, "_libraries")
+    time_calls("beams and visibility", luminance, "unit_beams")
+    time_calls("solve", luminance, "_spread")
+    time_calls("margin", job, "extend_margin")
+    time_calls("image file", files, "write_file")
+    time_calls("unregister", blender, "unregister")
     batch.run(["--output", folder, "--report", str(Path(folder) / "report.json")])
     rest = [
         now - begin - sum(row[i] for row in rows)

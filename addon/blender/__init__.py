@@ -1,0 +1,29 @@
+"""Blender's half of the add-on: reads scenes into core's plain data, and shows what comes of it.
+
+Each part imports only core and those above it (tests/unit/test_layers.py reads this list):
+
+    compat      differences between Blender versions
+    settings    scene.beamspread
+    read        geometry, lights and what a render would show
+    node        the shader node, and where a scene has it
+    images      images of the scene, files, atlases
+    jobs        what becomes a job, and what runs it: operator, engine, batch; the state of a run
+    ui          panels
+"""
+
+from . import settings
+from .jobs import engine, operator, state
+from .node import menu, node
+from .ui import panels
+
+PARTS = (settings, node, menu, state, engine, operator, panels)
+
+
+def register() -> None:
+    for part in PARTS:
+        part.register()
+
+
+def unregister() -> None:
+    for part in reversed(PARTS):
+        part.unregister()

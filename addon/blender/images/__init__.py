@@ -1,0 +1,1 @@
+"""Where bakes are kept."""

@@ -1,0 +1,74 @@
+"""Puts finished bakes into the images of their nodes and shows them in the materials."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...core.bake.margin import extend_margin
+from ...core.bake.runner import Bake
+from ...core.bake.settings import COMBINED
+from ...core.errors import BakeError
+from ..node.find import find_node
+from ..node.node import link_result
+from . import files
+
+# Texels wholly inside two charts, as a part of one of them: more than rounding at a common border.
+OVERLAP_TOLERANCE = 0.01
+# Coverage of a texel wholly inside a chart, but for rounding.
+WHOLE = 0.99
+
+
+class Results:
+    """The images filled in one run; objects that share an image each fill their own part of it."""
+
+    def __init__(self) -> None:
+        self._filled: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+
+    def store(self, bake: Bake) -> str:
+        """Fill the image of the target's node, or a new one, and link it back; other layers have images beside it.
+
+        Returns
+        -------
+        The path of the image's file, "" where it is packed.
+
+        Raises
+        ------
+        BakeError
+            The image cannot be kept, or another object of this run has filled the same part of it.
+        """
+        node = find_node(bpy.data.materials.get(bake.target.material_name))
+        if node is None:
+            raise BakeError("The material or its Beamspread node was removed during the bake.")
+        name = node.image.name if node.image else f"Beamspread {bake.target.object_name}"
+        paths = {}
+        for layer, texture in bake.layers.items():
+            image = node.image if layer == COMBINED else bpy.data.images.get(f"{name} {layer}")
+            if image is None:
+                image = files.make_image(name if layer == COMBINED else f"{name} {layer}", *texture.shape[1::-1])
+            paths[layer] = self._fill(image, bake, texture)
+            if layer == COMBINED:
+                link_result(node, image)
+        return paths.get(COMBINED, "")
+
+    def _fill(self, image, bake: Bake, texture: np.ndarray) -> str:
+        covered = bake.job.receiver.inside()
+        if image.name in self._filled:
+            covered, texture = self._merge(image.name, bake, texture)
+        path = files.fill_image(image, texture)
+        self._filled[image.name] = (covered, texture)
+        return path
+
+    def _merge(self, image_name: str, bake: Bake, texture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        covered, merged = self._filled[image_name]
+        receiver, inside = bake.job.receiver, bake.job.receiver.inside()
+        overlap = 1.0
+        if inside.shape == covered.shape:
+            overlap = ((receiver.coverage > WHOLE) & covered).sum() / inside.sum()
+        if overlap > OVERLAP_TOLERANCE:
+            raise BakeError(
+                f"Another object is baked to the same part of the image '{image_name}': "
+                "give each object a material and an image of its own, or move its UVs."
+            )
+        merged, covered = np.where(inside[..., None], texture, merged), covered | inside
+        return covered, extend_margin(merged, covered, bake.job.settings.margin)

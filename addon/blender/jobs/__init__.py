@@ -1,0 +1,1 @@
+"""From targets to jobs, and the ways to run them."""

@@ -1,0 +1,141 @@
+"""The render engine: Blender's own Bake fills the active image through it."""
+
+from __future__ import annotations
+
+import uuid
+
+import bpy
+import numpy as np
+
+from ...core.bake.runner import WRITTEN, Bake, Target
+from ...core.bake.settings import COMBINED
+from ...core.errors import sentence
+from .. import compat
+from ..node.find import NOTHING_FOUND, find_misplaced, materials_of
+from .prepare import prepare
+from .state import state
+
+
+class BeamspreadEngine(bpy.types.RenderEngine):
+    """Bakes translucent surfaces; pictures are for Cycles and EEVEE."""
+
+    bl_idname = "BEAMSPREAD"
+    bl_label = "Beamspread"
+    bl_use_preview = False
+    bl_use_eevee_viewport = True
+    bl_use_shading_nodes_custom = False
+
+    def render(self, depsgraph) -> None:
+        show_nothing(self, depsgraph)
+
+    def bake(self, depsgraph, obj, _pass_type, _pass_filter, width, height) -> None:
+        bake_active_image(self, depsgraph, obj, width, height)
+
+
+def show_nothing(engine, depsgraph) -> None:
+    """F12: an empty picture and a sentence that says what to do."""
+    scene = depsgraph.scene
+    scale = scene.render.resolution_percentage / 100
+    size = (max(1, int(scene.render.resolution_x * scale)), max(1, int(scene.render.resolution_y * scale)))
+    engine.end_result(engine.begin_result(0, 0, *size))
+    engine.report({"WARNING"}, "Beamspread bakes textures: press Bake, then render with Cycles or EEVEE")
+
+
+def bake_active_image(engine, depsgraph, obj, width: int, height: int) -> None:
+    """Fill the image that Blender bakes to; if that fails, Blender reports success all the same, but panels say so."""
+    # A layer name of its own per call: results of the same layer overwrite each other.
+    result = engine.begin_result(0, 0, width, height, layer=f"Beamspread {uuid.uuid4()}")
+    passes, filled = result.layers[0].passes, False
+    try:
+        pixels = np.zeros((height, width, 4), np.float32)
+        bakes = _prepare(depsgraph, obj, passes, (width, height))
+        for number, bake in enumerate(bakes):
+            bake.run(lambda fraction, done=number: _step(engine, (done + fraction) / len(bakes)))
+            bake.keep(lambda bake: _put(pixels, bake))
+            state.note(bake)
+        for bake in bakes:
+            for level, message in [("ERROR", bake.error), *(("WARNING", warning) for warning in bake.warnings)]:
+                if message:
+                    engine.report({level}, f"{bake.target}: {message}")
+        if all(bake.status == WRITTEN for bake in bakes):
+            compat.write_pass(passes["Combined"], pixels)
+            filled = True
+    except Exception as error:  # noqa: BLE001 - Blender would swallow it
+        engine.report({"ERROR"}, sentence(error))
+    finally:
+        engine.end_result(result, cancel=not filled)
+
+
+def _prepare(depsgraph, obj, passes, size: tuple[int, int]) -> list[Bake]:
+    """A bake for each material of the object that has its node and that the image shows."""
+    try:
+        targets = [Target(obj.name, name) for name in _materials_in(obj, passes, *size)]
+        settings = depsgraph.scene.beamspread.for_bake()
+        bakes = prepare(depsgraph, targets, settings, size=size) or find_misplaced([obj])
+    except Exception as error:  # noqa: BLE001 - Blender would swallow it
+        return [Bake(Target(obj.name), error=sentence(error))]
+    return bakes or [Bake(Target(obj.name), error=NOTHING_FOUND)]
+
+
+def _put(pixels: np.ndarray, bake: Bake) -> str:
+    """Fill the bake's part of RGBA pixels."""
+    inside = bake.job.receiver.inside()
+    pixels[inside, :3], pixels[inside, 3] = bake.layers[COMBINED][inside], 1
+    return ""
+
+
+def _step(engine, fraction: float) -> bool:
+    engine.update_progress(fraction)
+    return not engine.test_break()
+
+
+def _materials_in(obj, passes, width: int, height: int) -> list[str]:
+    """Beamspread materials of the triangles that this image shows (Blender bakes one image at a time)."""
+    wanted = {material.name for material in materials_of(obj)}
+    shown = compat.baked_triangles(passes, width, height)
+    triangles = np.unique(shown[shown >= 0])
+    mesh = obj.to_mesh()
+    try:
+        mesh.calc_loop_triangles()
+        slots = np.empty(len(mesh.loop_triangles), np.int32)
+        mesh.loop_triangles.foreach_get("material_index", slots)
+    finally:
+        obj.to_mesh_clear()
+    used = {int(slot) for slot in np.unique(slots[triangles[triangles < len(slots)]])}
+    names = [slot.material.name for index, slot in enumerate(obj.material_slots) if index in used and slot.material]
+    return [name for name in dict.fromkeys(names) if name in wanted]
+
+
+# Panels of Blender that make sense with this engine: those for any engine, and EEVEE's for what any engine has.
+HIDDEN_PANEL_PREFIXES = ("RENDER_PT_", "VIEWLAYER_PT_layer_passes", "WORLD_PT_viewport")
+EEVEE_PANELS = {
+    "DATA_PT_EEVEE_light",
+    "EEVEE_MATERIAL_PT_context_material",
+    "EEVEE_MATERIAL_PT_surface",
+    "EEVEE_WORLD_PT_surface",
+    "MATERIAL_PT_preview",
+}
+
+
+def _compatible_panels() -> list:
+    return [panel for panel in bpy.types.Panel.__subclasses__() if _is_compatible(panel)]
+
+
+def _is_compatible(panel) -> bool:
+    if panel.__name__ in EEVEE_PANELS:
+        return hasattr(panel, "COMPAT_ENGINES")
+    any_engine = "BLENDER_RENDER" in getattr(panel, "COMPAT_ENGINES", ())
+    return any_engine and not panel.__name__.startswith(HIDDEN_PANEL_PREFIXES)
+
+
+def register() -> None:
+    bpy.utils.register_class(BeamspreadEngine)
+    for panel in _compatible_panels():
+        panel.COMPAT_ENGINES.add(BeamspreadEngine.bl_idname)
+
+
+def unregister() -> None:
+    for panel in bpy.types.Panel.__subclasses__():
+        if BeamspreadEngine.bl_idname in getattr(panel, "COMPAT_ENGINES", ()):
+            panel.COMPAT_ENGINES.remove(BeamspreadEngine.bl_idname)
+    bpy.utils.unregister_class(BeamspreadEngine)

@@ -1,0 +1,1 @@
+"""Blender data as the plain dataclasses of core."""

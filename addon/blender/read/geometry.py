@@ -1,0 +1,114 @@
+"""Evaluated objects as triangles that throw shadows and as polygons that receive light."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...core.errors import ReceiverError
+from ...core.scene.illumination import Mesh
+from ...core.scene.uv_map import Polygons
+
+GEOMETRY_TYPES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+
+
+def world_triangles(obj, matrix, cache: dict) -> Mesh | None:
+    """Triangles of an evaluated object in world space; `cache` shares the local ones among instances."""
+    key = obj.data.as_pointer() if obj.data is not None else obj.as_pointer()
+    if key not in cache:
+        cache[key] = _local_triangles(obj)
+    local = cache[key]
+    if local is None:
+        return None
+    return Mesh(_transform(local.vertices, matrix).astype(np.float32), local.triangles)
+
+
+def _local_triangles(obj) -> Mesh | None:
+    mesh = obj.to_mesh()
+    if mesh is None:
+        return None
+    try:
+        mesh.calc_loop_triangles()
+        if not mesh.loop_triangles:
+            return None
+        triangles = np.empty(len(mesh.loop_triangles) * 3, np.int32)
+        mesh.loop_triangles.foreach_get("vertices", triangles)
+        return Mesh(_vertices(mesh), triangles.astype(np.uint32).reshape(-1, 3))
+    finally:
+        obj.to_mesh_clear()
+
+
+def _vertices(mesh) -> np.ndarray:
+    vertices = np.empty(len(mesh.vertices) * 3, np.float32)
+    mesh.vertices.foreach_get("co", vertices)
+    return vertices.reshape(-1, 3)
+
+
+def _transform(points: np.ndarray, matrix) -> np.ndarray:
+    world = np.array(matrix, dtype=float)
+    return points.astype(float) @ world[:3, :3].T + world[:3, 3]
+
+
+def read_polygons(obj, material_name: str) -> Polygons:
+    """The faces of an evaluated mesh object that carry the material, in world space.
+
+    Raises
+    ------
+    ReceiverError
+        A scale of zero.
+    """
+    mesh = obj.to_mesh()
+    try:
+        totals, starts, slots = (np.empty(len(mesh.polygons), np.int32) for _ in range(3))
+        mesh.polygons.foreach_get("loop_total", totals)
+        mesh.polygons.foreach_get("loop_start", starts)
+        mesh.polygons.foreach_get("material_index", slots)
+        normals = np.empty(len(mesh.polygons) * 3, np.float32)
+        mesh.polygons.foreach_get("normal", normals)
+        corners = np.empty(len(mesh.loops), np.int32)
+        mesh.loops.foreach_get("vertex_index", corners)
+        uvs, vertices = _active_uvs(mesh), _vertices(mesh)
+    finally:
+        obj.to_mesh_clear()
+    chosen = np.flatnonzero(_has_material(obj, slots, material_name))
+    sizes = totals[chosen]
+    new_starts = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
+    loops = np.repeat(starts[chosen] - new_starts[:-1], sizes) + np.arange(new_starts[-1])
+    world = np.array(obj.matrix_world, dtype=float)[:3, :3]
+    if abs(np.linalg.det(world)) < 1e-30:
+        world = _flat_scale(world)
+    # Normals transform with the inverse transpose, which also keeps them outward under mirroring.
+    world_normals = normals.reshape(-1, 3)[chosen] @ np.linalg.inv(world)
+    lengths = np.linalg.norm(world_normals, axis=1, keepdims=True)
+    return Polygons(
+        corners=_transform(vertices[corners[loops]], obj.matrix_world),
+        uvs=None if uvs is None else uvs[loops].astype(float),
+        starts=new_starts,
+        normals=world_normals / np.where(lengths > 0, lengths, 1),
+    )
+
+
+def _flat_scale(world: np.ndarray) -> np.ndarray:
+    """A plane may well have scale 0 along its normal: give that axis a length, which its normal alone needs."""
+    scales = np.linalg.norm(world, axis=0)
+    if (scales == 0).sum() != 1:
+        raise ReceiverError("The object's scale is zero along more than one axis: reset it (Alt+S).")
+    flat = int(np.argmin(scales))
+    world = world.copy()
+    world[:, flat] = np.cross(world[:, (flat + 1) % 3], world[:, (flat + 2) % 3])
+    return world
+
+
+def _active_uvs(mesh) -> np.ndarray | None:
+    layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
+    if layer is None:
+        return None
+    uvs = np.empty(len(mesh.loops) * 2, np.float32)
+    layer.data.foreach_get("uv", uvs)
+    return uvs.reshape(-1, 2)
+
+
+def _has_material(obj, slots: np.ndarray, material_name: str) -> np.ndarray:
+    """Which faces carry the material; Blender gives faces with a slot too high the last one."""
+    names = [slot.material.name if slot.material else None for slot in obj.material_slots]
+    matches = np.array([name == material_name for name in names] or [False])
+    return matches[np.clip(slots, 0, len(matches) - 1)]

@@ -1,0 +1,118 @@
+"""Settings of a scene: `scene.beamspread`."""
+
+import bpy
+from bpy.props import EnumProperty, IntProperty, PointerProperty, StringProperty
+
+from ..core.bake.settings import BakeSettings
+from . import compat
+
+
+class BeamspreadSettings(bpy.types.PropertyGroup):
+    """How and where to bake."""
+
+    resolution: IntProperty(
+        name="Resolution",
+        description="Texels along the longer side of the images that are made where a node has none",
+        default=1024,
+        min=1,
+        soft_min=64,
+        soft_max=8192,
+        max=65536,
+        subtype="PIXEL",
+    )
+    solver: EnumProperty(
+        name="Solver",
+        items=[
+            ("fft", "FFT", "Fast convolution", 0),
+            ("direct", "Direct", "Adds up every beam at every texel: slow, the reference for the others", 1),
+            ("adaptive", "Adaptive", "Lights evenly lit squares by one beam each, as Manabe et al. 2012", 2),
+        ],
+        default="fft",
+    )
+    quality: EnumProperty(
+        name="Quality",
+        description="Of the light transport simulation, which is made once per material and then kept",
+        items=[
+            ("preview", "Preview", "A few seconds, slightly noisy", 0),
+            ("final", "Final", "Up to a minute", 1),
+        ],
+        default="final",
+    )
+    distributions: EnumProperty(
+        name="Distributions",
+        description="Where the luminance distribution functions come from",
+        items=[
+            ("LIBRARY", "Library", "Simulated for each material: every angle and albedo", 0),
+            ("ANGULAR", "Samples, Angular", "Your own samples, interpolated as Manabe et al. 2012", 1),
+            (
+                "ADAPTIVE",
+                "Samples, Adaptive",
+                "Your own samples, their logarithms interpolated: more exact",
+                2,
+            ),
+            ("PLANAR", "Samples, Planar", "Your own samples, blended in place: for comparison", 3),
+        ],
+        default="LIBRARY",
+    )
+    sample_folder: StringProperty(
+        name="LDF Samples",
+        description="Folder of EXR files, one LDF sample each. They replace anisotropy, index of refraction and "
+        "thickness of all materials; albedos and angles of light must lie between theirs",
+        default="",
+        subtype="DIR_PATH",
+        options=compat.PATH_OPTIONS,
+    )
+    samples: IntProperty(
+        name="Samples",
+        description="Light and shadow are sampled at this number squared of points in every texel",
+        default=4,
+        min=1,
+        soft_max=16,
+        max=64,
+    )
+    margin: IntProperty(
+        name="Margin",
+        description="Extends the result beyond the border of the UV map by this many texels",
+        default=16,
+        min=0,
+        soft_max=64,
+        max=1024,
+        subtype="PIXEL",
+    )
+    output_dir: StringProperty(
+        name="Output",
+        description="Folder that a batch writes to",
+        default="//beamspread/",
+        subtype="DIR_PATH",
+        options=compat.PATH_OPTIONS,
+    )
+    format: EnumProperty(
+        name="Format",
+        description="File format that a batch writes",
+        items=[
+            ("EXR", "OpenEXR", "Linear, 32-bit float, W/(m^2 sr)", 0),
+            ("PNG", "PNG", "For looking at: values above 1 are clipped", 1),
+        ],
+        default="EXR",
+    )
+
+    def for_bake(self, solver: str | None = None) -> BakeSettings:
+        """What core needs of them; `solver` overrides the scene's."""
+        return BakeSettings(
+            solver=solver or self.solver,
+            samples=self.samples,
+            margin=self.margin,
+            quality=self.quality,
+            distributions=self.distributions.lower(),
+            sample_folder=bpy.path.abspath(self.sample_folder),
+        )
+
+
+def register() -> None:
+    bpy.utils.register_class(BeamspreadSettings)
+    bpy.types.Scene.beamspread = PointerProperty(type=BeamspreadSettings)
+
+
+def unregister() -> None:
+    del bpy.types.Scene.beamspread
+    bpy.utils.unregister_class(BeamspreadSettings)

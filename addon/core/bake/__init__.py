@@ -1,0 +1,1 @@
+"""From one receiver under its light to the layers of a texture."""

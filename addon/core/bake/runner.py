@@ -1,0 +1,85 @@
+"""Runs jobs and notes what became of each; the window, the engine and the batch all bake through this."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import sentence
+from ..native import native
+from ..progress import Progress
+from .job import BakeJob
+
+WRITTEN, SKIPPED, FAILED, CANCELLED = "written", "skipped", "failed", "cancelled"
+
+
+@dataclass(frozen=True)
+class Target:
+    """One material of one object, by name: the host's data may move while a bake runs."""
+
+    object_name: str
+    material_name: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.object_name} / {self.material_name}" if self.material_name else self.object_name
+
+
+class Bake:
+    """One target, from its job to what became of it.
+
+    Attributes
+    ----------
+    job : None where there can be none; `error` says why.
+    layers : once it has run; see `BakeJob.run`.
+    path : the file that `keep` has written, if it has.
+    seconds : that run and keep took.
+    error : one sentence unless `status` is "written".
+    warnings : sentences that hold whatever the status.
+    """
+
+    def __init__(self, target: Target, job: BakeJob | None = None, error: str = "") -> None:
+        self.target, self.job, self.error = target, job, error
+        self.status = FAILED
+        self.layers: dict[str, np.ndarray] = {}
+        self.path = ""
+        self.seconds = 0.0
+        self.warnings = job.warnings() if job else []
+
+    def run(self, progress: Progress | None = None) -> None:
+        """Make the layers. Touches nothing of the host's, so that it may run in any thread."""
+        if self.job is None:
+            return
+        start = time.monotonic()
+        try:
+            self.layers = self.job.run(progress)
+            self.warnings += self.job.warnings_after(self.layers)
+        except (KeyboardInterrupt, native.Cancelled):
+            self.cancel()
+        except Exception as error:  # noqa: BLE001 - the others are still to be baked
+            self.error = sentence(error)
+        self.seconds += time.monotonic() - start
+
+    def cancel(self) -> None:
+        """Drop what it has made, so that nothing is kept."""
+        self.layers, self.status, self.error = {}, CANCELLED, "The bake was cancelled."
+
+    def keep(self, store: Callable[[Bake], str]) -> None:
+        """Have `store` put the layers where they belong; it returns the path of the file written, if one was."""
+        if not self.layers:
+            return
+        start = time.monotonic()
+        try:
+            self.path = store(self)
+            self.status, self.error = WRITTEN, ""
+        except Exception as error:  # noqa: BLE001 - e.g. the material was deleted meanwhile
+            self.error = sentence(error)
+        finally:
+            self.layers = {}  # large
+        self.seconds += time.monotonic() - start
+
+    def messages(self) -> list[str]:
+        """The error, if there is one, and the warnings."""
+        return [*filter(None, [self.error]), *self.warnings]

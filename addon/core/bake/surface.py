@@ -1,0 +1,48 @@
+"""A translucent surface as a node describes it, before its albedo is known."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from ..ldf.albedo import albedo_from_color
+from ..material.material import RGB, Material, check_base_color, check_thickness
+from ..native import native
+from ..progress import Progress, stages
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Values in scene units.
+
+    Attributes
+    ----------
+    material : with its mean free path.
+    thickness : 0 for a half-space.
+    base_color : reflectance wanted under uniform diffuse light, or None where the material's albedo counts.
+    """
+
+    material: Material
+    thickness: float = 0.0
+    base_color: RGB | None = None
+
+    def check(self) -> None:
+        """Raise MaterialError for values outside their range."""
+        material = self.material if self.base_color is None else replace(self.material, albedo=(0.0, 0.0, 0.0))
+        material.check()
+        check_thickness(self.thickness)
+        if self.base_color is not None:
+            check_base_color(self.base_color)
+
+    def resolve(self, quality: str, progress: Progress | None = None) -> Material:
+        """The material, its albedo worked out from the base colour if there is one."""
+        self.check()
+        if self.base_color is None:
+            return self.material
+        channels = zip(self.base_color, self.material.mean_free_path, self.material.channel_anisotropy)
+        albedo = []
+        for (color, length, g), stage in zip(channels, stages(progress, [1.0] * len(self.base_color))):
+            depth = self.thickness / length if self.thickness else math.inf
+            medium = native.Medium(g=g, ior=self.material.ior, thickness=depth)
+            albedo.append(albedo_from_color(color, medium, quality, stage)[0])
+        return replace(self.material, albedo=tuple(albedo))

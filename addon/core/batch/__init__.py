@@ -1,0 +1,1 @@
+"""Many bakes without a window."""

@@ -1,0 +1,73 @@
+"""What became of each bake, and the JSON report of a batch."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from ..bake.runner import FAILED, WRITTEN, Bake
+
+
+@dataclass
+class BakeRecord:
+    """One bake of one material of one object at one frame; `seconds` is wall-clock time, `path` the file written."""
+
+    object: str
+    material: str = ""
+    frame: int = 0
+    path: str = ""
+    width: int = 0
+    height: int = 0
+    seconds: float = 0.0
+    status: str = FAILED
+    message: str = ""
+
+    @classmethod
+    def of(cls, bake: Bake, frame: int) -> BakeRecord:
+        """What became of a bake."""
+        width, height = (bake.job.receiver.width, bake.job.receiver.height) if bake.job else (0, 0)
+        subject = bake.target.object_name, bake.target.material_name, frame, bake.path
+        return cls(*subject, width, height, round(bake.seconds, 3), bake.status, " ".join(bake.messages()))
+
+    def __str__(self) -> str:
+        subject = f"{self.object} / {self.material}" if self.material else self.object
+        text = f"{subject}, frame {self.frame}: {self.status}"
+        if self.path and self.status == WRITTEN:
+            text += f" {self.path} ({self.width} x {self.height}, {self.seconds:.1f} s)"
+        return f"{text}: {self.message}" if self.message else text
+
+
+@dataclass
+class Report:
+    """All bakes of a run, in order."""
+
+    bakes: list[BakeRecord] = field(default_factory=list)
+
+    def all_written(self) -> bool:
+        """Whether there was something to bake and every bake was written."""
+        return bool(self.bakes) and all(bake.status == WRITTEN for bake in self.bakes)
+
+    def save(self, path: str) -> None:
+        """Write {"bakes": [...]} as JSON, whole or not at all."""
+        import json
+
+        target = Path(path)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        temporary = target.with_name(target.name + ".part")
+        text = json.dumps({"bakes": [asdict(bake) for bake in self.bakes]}, indent=2, ensure_ascii=False)
+        temporary.write_text(text + "\n", encoding="utf-8")
+        temporary.replace(target)
+
+
+def file_name(names: Sequence[str], frame: int | None, extension: str, taken: set[str]) -> str:
+    """A file name of letters that every file system takes, distinct from those in `taken` (which it joins)."""
+    parts = [*names, *([] if frame is None else [f"{frame:04d}"])]
+    stem = "_".join(re.sub(r"[^\w.-]+", "_", part).strip("._") or "unnamed" for part in parts)
+    name, number = f"{stem}{extension}", 1
+    while name.lower() in taken:
+        number += 1
+        name = f"{stem}_{number}{extension}"
+    taken.add(name.lower())
+    return name

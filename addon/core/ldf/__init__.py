@@ -1,0 +1,1 @@
+"""Luminance distribution functions: simulated, cached, shipped or an artist's own."""

@@ -1,0 +1,41 @@
+"""LDF samples of an artist's own: a folder of EXR files in place of a simulated library."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from ..errors import BakeError
+from ..native import native
+
+
+def load_source(folder: str, method: str):
+    """What `convolve` takes for the samples of a folder: one per ``.exr`` file, in the order of their names.
+
+    The folder's files are read again only when they have changed.
+
+    Raises
+    ------
+    BakeError
+        The folder is missing or holds no EXR file, or one of them is no sample; the samples don't form a grid, or are
+        of several media. Says which.
+    """
+    path = Path(folder)
+    if not folder or not path.is_dir():
+        raise BakeError(f"There is no folder of LDF samples at '{folder}': choose one in the Beamspread settings.")
+    files = sorted(file for file in path.iterdir() if file.suffix.lower() == ".exr")
+    if not files:
+        raise BakeError(f"The folder of LDF samples '{folder}' holds no EXR file.")
+    try:
+        stats = [file.stat() for file in files]
+        return _load(tuple((file, stat.st_mtime_ns, stat.st_size) for file, stat in zip(files, stats)), method)
+    except OSError as error:
+        raise BakeError(f"{error}.") from error
+    except ValueError as error:
+        raise BakeError(f"The LDF samples in '{folder}' can't be interpolated: {error}.") from error
+
+
+@lru_cache(maxsize=1)
+def _load(files: tuple[tuple[Path, int, int], ...], method: str):
+    """The samples in files, which come with their times and sizes."""
+    return native.SampleSource([native.LdfSample.load(file) for file, _, _ in files], method)

@@ -1,0 +1,1 @@
+"""Where light arrives, where it comes from, and what stands in between."""

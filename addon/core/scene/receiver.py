@@ -1,0 +1,161 @@
+"""From flat, UV-mapped sets of polygons to the texel grids that light is gathered on.
+
+When the axes p_u and p_v of a chart's UV map are orthogonal, its grid consists of the texels themselves; otherwise it
+is a rectangular grid of the same density, and `Chart.write` resamples it bilinearly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import ReceiverError
+from ..native import native
+from .grid import Grid
+from .uv_map import UvMap
+
+# Texels that a chart enters by less than this fraction are left out of the grid (rounding of float32 UVs).
+EDGE_TOLERANCE = 1e-3
+
+
+def in_chart(coverage: np.ndarray) -> np.ndarray:
+    """Which texels belong to a chart, of the part of each that lies inside: those that it touches at all."""
+    return coverage > 0
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """A flat part of a receiver: a grid on its plane and its place in the texture.
+
+    Attributes
+    ----------
+    grid : where light arrives.
+    coverage : float32 (rows, columns), part of each texel inside the chart, of the texture's part from `offset` on.
+    offset : (column, row) of that part's first texel in the texture.
+    texel_to_grid : (2, 3), maps (column, row, 1) of a texel's centre to grid coordinates, both in texels with centres
+        at half-integers; None when the grid is that part of the texture itself.
+    """
+
+    grid: Grid
+    coverage: np.ndarray
+    offset: tuple[int, int] = (0, 0)
+    texel_to_grid: np.ndarray | None = None
+
+    def part_of(self, texture: np.ndarray) -> np.ndarray:
+        """The part of the texture around the chart, a view."""
+        (column, row), (rows, columns) = self.offset, self.coverage.shape
+        return texture[row : row + rows, column : column + columns]
+
+    def write(self, texture: np.ndarray, values: np.ndarray) -> None:
+        """Put grid values (grid height, grid width, C) where the chart lies in the texture (height, width, C)."""
+        part, inside = self.part_of(texture), in_chart(self.coverage)
+        if self.texel_to_grid is None:
+            np.copyto(part, values, where=inside[..., None])
+            return
+        rows, columns = np.nonzero(inside)
+        centres = columns + self.offset[0] + 0.5, rows + self.offset[1] + 0.5, np.ones(len(rows))
+        x, y = self.texel_to_grid @ np.stack(centres)
+        part[rows, columns] = _bilinear(values, x - 0.5, y - 0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class Receiver:
+    """What one bake fills of a texture.
+
+    Attributes
+    ----------
+    coverage : float32 (height, width), part of each texel of the texture inside the charts.
+    charts : flat parts, today always one.
+    """
+
+    coverage: np.ndarray
+    charts: tuple[Chart, ...]
+
+    @property
+    def height(self) -> int:
+        return self.coverage.shape[0]
+
+    @property
+    def width(self) -> int:
+        return self.coverage.shape[1]
+
+    def inside(self) -> np.ndarray:
+        """Bool (height, width): texels that belong to a chart."""
+        return in_chart(self.coverage)
+
+    def to_texture(self, values: Sequence[np.ndarray]) -> np.ndarray:
+        """Float32 (height, width, C) from grid values (grid height, grid width, C) of each chart, 0 outside of them."""
+        texture = np.zeros((self.height, self.width, values[0].shape[2]), np.float32)
+        for chart, on_grid in zip(self.charts, values):
+            chart.write(texture, on_grid)
+        return texture
+
+
+def texture_size(maps: Sequence[UvMap], resolution: int) -> tuple[int, int]:
+    """Width and height of a texture with `resolution` texels along the longer side, nearly square where finest."""
+    lengths = np.max([(np.linalg.norm(one.p_u), np.linalg.norm(one.p_v)) for one in maps], axis=0).tolist()
+    return tuple(max(1, round(resolution * length / max(lengths))) for length in lengths)
+
+
+def build_receiver(maps: Sequence[UvMap], width: int, height: int) -> Receiver:
+    """Lay the grids of a texture of `width` x `height` texels over flat parts; ReceiverError where that has none."""
+    charts = tuple(_chart(one, width, height) for one in maps)
+    coverage = np.zeros((height, width), np.float32)
+    for chart in charts:
+        covered = chart.part_of(coverage)
+        np.minimum(covered + chart.coverage, 1, out=covered)
+    if not in_chart(coverage).any():
+        raise ReceiverError("The UV map covers no texel of the image: enlarge it or the image.")
+    return Receiver(coverage, charts)
+
+
+def _chart(uv_map: UvMap, width: int, height: int) -> Chart:
+    p_u, p_v, polygons = uv_map.p_u, uv_map.p_v, uv_map.polygons
+    x_axis = p_u / np.linalg.norm(p_u)
+    across = p_v - (p_v @ x_axis) * x_axis
+    frame = np.stack([x_axis, across / np.linalg.norm(across)])
+    pitch = np.array([np.linalg.norm(p_u) / width, np.linalg.norm(across) / height])
+    texels = polygons.uvs * [width, height]
+    first = np.clip(np.floor(texels.min(axis=0) + EDGE_TOLERANCE), 0, [width - 1, height - 1]).astype(int)
+    last = np.clip(np.ceil(texels.max(axis=0) - EDGE_TOLERANCE), first + 1, [width, height]).astype(int)
+    coverage = _coverage(polygons.split(texels), width, height)
+    own = np.ascontiguousarray(coverage[first[1] : last[1], first[0] : last[0]])
+    offset = int(first[0]), int(first[1])
+    if uv_map.is_orthogonal():
+        origin = uv_map.p_0 + first[0] / width * p_u + first[1] / height * p_v
+        return Chart(_grid(origin, frame, uv_map, pitch, own), own, offset)
+    # A rectangle around the polygons with its rows along the texture's.
+    points = polygons.corners @ frame.T / pitch
+    corner = points.min(axis=0)
+    columns, rows = np.maximum(np.ceil(points.max(axis=0) - corner - EDGE_TOLERANCE), 1).astype(int).tolist()
+    origin = (corner * pitch) @ frame + (polygons.corners.mean(axis=0) @ uv_map.normal) * uv_map.normal
+    grid = _grid(origin, frame, uv_map, pitch, _coverage(polygons.split(points - corner), columns, rows))
+    slopes = [(frame @ p_u) / pitch / width, (frame @ p_v) / pitch / height]
+    return Chart(grid, own, offset, np.column_stack([*slopes, frame @ uv_map.p_0 / pitch - corner]))
+
+
+def _grid(origin: np.ndarray, frame: np.ndarray, uv_map: UvMap, pitch: np.ndarray, coverage: np.ndarray) -> Grid:
+    origin, x_axis, y_axis, normal = (tuple(vector.tolist()) for vector in (origin, *frame, uv_map.normal))
+    pitches, (height, width) = map(float, pitch), coverage.shape
+    return Grid(origin, x_axis, y_axis, normal, *pitches, width, height, coverage, clearance=uv_map.deviation)
+
+
+def _coverage(faces: list[np.ndarray], width: int, height: int) -> np.ndarray:
+    """Part of each texel inside the faces; `faces` hold (x, y) in texels."""
+    corners = np.ascontiguousarray(np.concatenate(faces), np.float64)
+    counts = np.array([len(face) for face in faces], np.uint32)
+    return native.coverage(corners, counts, width, height)
+
+
+def _bilinear(values: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Values (H, W, C) at fractional columns x and rows y, held constant beyond the border."""
+    height, width = values.shape[:2]
+    x, y = np.clip(x, 0, width - 1), np.clip(y, 0, height - 1)
+    column, row = np.minimum(x.astype(int), max(width - 2, 0)), np.minimum(y.astype(int), max(height - 2, 0))
+    next_column, next_row = np.minimum(column + 1, width - 1), np.minimum(row + 1, height - 1)
+    weight_x, weight_y = (x - column)[:, None], (y - row)[:, None]
+    bottom = values[row, column] * (1 - weight_x) + values[row, next_column] * weight_x
+    top = values[next_row, column] * (1 - weight_x) + values[next_row, next_column] * weight_x
+    return bottom * (1 - weight_y) + top * weight_y

@@ -1,0 +1,155 @@
+"""Whatever a bake leaves out or can't light is named: in the window, in the batch's report, and by the engine."""
+
+import bpy
+import pytest
+from beamspread.blender.jobs.batch import bake_all
+from beamspread.blender.jobs.state import state
+from beamspread.core.batch import options
+from mathutils import Matrix
+from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
+
+
+@pytest.fixture(autouse=True)
+def small():
+    bpy.context.scene.beamspread.resolution = 16
+    state.forget()
+
+
+def add_group_material():
+    """A material whose Beamspread node sits in a group within a group."""
+    groups = [bpy.data.node_groups.new(name, "ShaderNodeTree") for name in ("Outer", "Inner")]
+    material = bpy.data.materials.new("Grouped")
+    material.use_nodes = True
+    for tree, group in zip((material.node_tree, groups[0]), groups):
+        tree.nodes.new("ShaderNodeGroup").node_tree = group
+    groups[1].nodes.new("BeamspreadNode")
+    return material
+
+
+def add_grouped():
+    return add_plane("Grouped", material=add_group_material())
+
+
+def add_instance():
+    """A plane that the scene has only as an instance of an instanced collection."""
+    plane = add_plane("Shown", material=add_material())
+    inner, outer = bpy.data.collections.new("Inner"), bpy.data.collections.new("Outer")
+    bpy.context.scene.collection.objects.unlink(plane)
+    inner.objects.link(plane)
+    holders = []
+    for collection in (inner, outer):
+        holder = bpy.data.objects.new(f"Instance of {collection.name}", None)
+        holder.instance_type, holder.instance_collection = "COLLECTION", collection
+        holders.append(holder)
+    outer.objects.link(holders[0])
+    bpy.context.scene.collection.objects.link(holders[1])
+    return holders[1]
+
+
+def add_curve():
+    curve = bpy.data.objects.new("Spline", bpy.data.curves.new("Spline", "CURVE"))
+    curve.data.materials.append(add_material())
+    bpy.context.scene.collection.objects.link(curve)
+    return curve
+
+
+MISPLACED = [
+    (add_grouped, "Grouped", ["'Grouped' can't be baked inside the node group 'Inner'", "Ctrl Alt G"]),
+    (add_instance, "Instance of Outer", ["'Shown'", "instance", "'Outer'", "Make Instances Real"]),
+    (add_curve, "Spline", ["'Spline' is no mesh", "Convert"]),
+]
+
+
+@pytest.mark.parametrize(("add", "name", "words"), MISPLACED, ids=[name for _, name, _ in MISPLACED])
+def test_a_node_where_no_bake_can_use_it_is_named(add, name, words, tmp_path):
+    obj = add()
+    add_sun(0)
+    select(obj)
+    message = messages_of(bpy.ops.beamspread.bake)
+    assert "No mesh has a material" not in message
+    assert all(word in message for word in words)
+    assert all(word in state.messages()[0] for word in words)
+    for arguments in ([], ["--object", name]):
+        report = bake_all(options.parse([*arguments, "--output", str(tmp_path)]))
+        assert [(one.object, one.status) for one in report.bakes] == [(name, "failed")]
+        assert all(word in report.bakes[0].message for word in words)
+
+
+@pytest.mark.parametrize("add", [add for add, _, _ in MISPLACED], ids=[name for _, name, _ in MISPLACED])
+def test_the_others_are_baked(add):
+    add()
+    plane = add_plane("Sound", matrix=Matrix.Translation((5, 0, 0)), material=add_material("Sound"))
+    add_sun(0)
+    assert messages_of(lambda: bpy.ops.beamspread.bake(objects="ALL")).count("Error") == 1
+    assert pixels(node_of(plane.data.materials[0]).image).any()
+
+
+def test_an_instance_of_what_was_baked_is_no_mistake():
+    holder = add_instance()
+    node_of(bpy.data.materials["Medium"]).image = bpy.data.images.new("Baked", 4, 4)
+    select(holder)
+    assert "No mesh has a material with a Beamspread node" in messages_of(bpy.ops.beamspread.bake)
+
+
+def baked_with_messages(plane):
+    """Pixels of the plane, and what the window says of the bake."""
+    (texture,) = bake(plane)
+    return texture, state.messages()
+
+
+@pytest.mark.parametrize(
+    ("power", "words"),
+    [(float("nan"), "its power is nan"), (-3.0, "its power is -3, and a bake can't take light away")],
+)
+def test_a_light_of_impossible_power_is_named_and_left_out(power, words, tmp_path, capfd):
+    plane = add_plane(material=add_material())
+    add_sun(0)
+    expected, messages = baked_with_messages(plane)
+    assert messages == []
+    broken = bpy.data.objects.new("Broken", bpy.data.lights.new("Broken", "POINT"))
+    broken.data.energy, broken.location.z = power, 1
+    bpy.context.scene.collection.objects.link(broken)
+    texture, messages = baked_with_messages(plane)
+    assert texture == pytest.approx(expected)
+    assert messages == [f"The light 'Broken' is left out: {words}."]
+    assert f"The light 'Broken' is left out: {words}." in capfd.readouterr().out
+    (record,) = bake_all(options.parse(["--output", str(tmp_path)])).bakes
+    assert (record.status, record.message) == ("written", messages[0])
+
+
+def flipped():
+    return add_plane(matrix=Matrix.Diagonal((1, 1, -1, 1)), material=add_material())
+
+
+def in_shadow():
+    add_plane("Roof", size=(9, 9), matrix=Matrix.Translation((0, 0, 1)))
+    return add_plane(material=add_material())
+
+
+@pytest.mark.parametrize(
+    ("add", "words"),
+    [(flipped, ["behind 'Plane'", "Flip"]), (in_shadow, ["No light reaches 'Plane'"])],
+)
+def test_a_black_bake_says_why(add, words, tmp_path):
+    plane = add()
+    add_sun(0)
+    texture, (message,) = baked_with_messages(plane)
+    assert not texture.any()
+    assert all(word in message for word in words)
+    (record,) = bake_all(options.parse(["--output", str(tmp_path), "--object", "Plane"])).bakes
+    assert (record.status, record.message) == ("written", message)
+    node_of(plane.data.materials[0]).image = None
+    bpy.context.scene.render.engine = "BEAMSPREAD"
+    active = plane.data.materials[0].node_tree.nodes.new("ShaderNodeTexImage")
+    active.image = bpy.data.images.new("Active", 16, 16)
+    plane.data.materials[0].node_tree.nodes.active = active
+    state.forget()
+    bpy.ops.object.bake(type="COMBINED")
+    assert state.messages() == [message]
+
+
+def test_messages_go_with_the_file():
+    baked_with_messages(flipped())
+    assert state.messages()
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    assert state.messages() == []

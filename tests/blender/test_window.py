@@ -1,0 +1,81 @@
+"""The operator and the panels in a window: started, watched, cancelled and undone by events, drawn for real."""
+
+import json
+import subprocess
+from pathlib import Path
+
+import bpy
+import pytest
+from beamspread.blender.node import menu
+from beamspread.blender.ui import panels
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory):
+    """What window.py noted."""
+    if not bpy.app.binary_path:
+        pytest.skip("the bpy module opens no window")
+    path = tmp_path_factory.mktemp("window") / "results.json"
+    screen = ["xvfb-run", "-a", "-s", "-screen 0 1600x1000x24 +extension GLX"]
+    options = ["--factory-startup", "--enable-event-simulate", "--window-geometry", "0", "0", "1600", "1000"]
+    script = ["--python-exit-code", "1", "--python", str(Path(__file__).with_name("window.py")), "--", str(path)]
+    command = [*screen, bpy.app.binary_path, *options, *script]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert path.exists(), done.stdout + done.stderr
+    results = json.loads(path.read_text())
+    assert "error" not in results, results["error"]
+    assert results["complete"]
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stdout + done.stderr
+    return results
+
+
+def test_every_panel_the_node_and_its_menu_are_drawn(seen):
+    assert set(seen["drawn"]) == {panel.__name__ for panel in panels._classes} | {"node", "menu"}
+
+
+def test_a_bake_runs_beside_the_user_and_one_at_a_time(seen):
+    assert seen["returned"] == ["RUNNING_MODAL"]
+    assert seen["running"] == "Baking First / First"
+    assert not seen["can start another"]
+    first, second = seen["baked"]
+    # The same plane under the same sun twice.
+    assert first == second > 0
+
+
+def test_a_bake_is_one_step_of_undo(seen):
+    assert seen["after undo"] == [-1, -1]
+    assert seen["after redo"] == seen["baked"]
+
+
+def test_escape_ends_a_bake_of_minutes_and_keeps_the_images(seen):
+    own, everything = (int(part.split("%")[0].split()[-1]) for part in seen["progress"].split(","))
+    assert 0 < own < 100
+    # Of two bakes, rounded apart.
+    assert everything == pytest.approx(own / 2, abs=1)
+    assert seen["seconds to cancel"] < 60
+    assert seen["kept by cancel"]
+    assert seen["messages of cancel"] == ["First / First: The bake was cancelled."]
+
+
+def test_what_fails_meanwhile_is_said_in_the_panels_and_the_others_are_baked(seen):
+    sentence = "First / First: The material or its Beamspread node was removed during the bake."
+    assert sentence in seen["messages of removal"]
+    assert sentence in seen["shown"]
+    # The sun became 100 times as strong; 512 instead of 32 texels see the border a little differently.
+    assert seen["baked after removal"] == pytest.approx(100, rel=0.05)
+
+
+def test_what_cannot_start_is_an_error(seen):
+    assert "albedo's red is 1" in seen["refused"]
+
+
+def test_loading_another_file_ends_the_bake(seen):
+    assert not seen["runs on in the next file"]
+
+
+def test_the_node_is_added_under_shader():
+    shader_menu = menu._menu()
+    assert shader_menu.__name__ in menu.SHADER_MENUS
+    assert menu._draw in shader_menu.draw._draw_funcs
+    assert menu._draw not in getattr(bpy.types.NODE_MT_add.draw, "_draw_funcs", [])

@@ -1,0 +1,217 @@
+"""What test_window.py runs inside a Blender with a window: events, timers and panels that are drawn for real.
+
+    xvfb-run blender --factory-startup --enable-event-simulate --python THIS -- RESULTS.json
+
+Each step of the scenario waits for what it yields, and notes what it saw.
+"""
+
+import json
+import sys
+import time
+import traceback
+from pathlib import Path
+
+import bpy
+
+FOLDER = Path(__file__).resolve().parent
+sys.path[:0] = [str(FOLDER), str(FOLDER.parent.parent / "build" / "stage")]
+
+import beamspread  # noqa: E402
+import scenes  # noqa: E402
+from beamspread.blender.jobs.state import state  # noqa: E402
+from beamspread.blender.node import menu, node  # noqa: E402
+from beamspread.blender.ui import panels  # noqa: E402
+
+# The slowest step takes a second or two on an idle machine.
+PATIENCE_SECONDS = 60
+results = {"drawn": {}, "shown": []}
+
+
+def count_draws(owner, name: str) -> None:
+    """Have calls of a function that draws counted under the name of its owner; what it raises is kept."""
+    function, label = getattr(owner, name), owner.__name__.rpartition(".")[2]
+
+    def draw(first, second):  # Blender counts the arguments
+        results["drawn"][label] = results["drawn"].get(label, 0) + 1
+        try:
+            function(first, second)
+        except Exception:
+            results["error"] = traceback.format_exc()
+            raise
+
+    setattr(owner, name, draw)
+
+
+def prepare_panels() -> None:
+    """Count what is drawn, and have closed panels and those in another tab of the side bar be drawn as well."""
+    for panel in panels._classes:
+        count_draws(panel, "draw")
+        panel.bl_options = set()
+    panels.BEAMSPREAD_PT_node_editor.bl_category = "Node"
+    count_draws(node, "draw_properties")
+    count_draws(menu, "_draw")
+    draw_warnings = panels.draw_warnings
+
+    def record(layout, context, messages):
+        results["shown"].extend(message for message in messages if message not in results["shown"])
+        draw_warnings(layout, context, messages)
+
+    panels.draw_warnings = record
+
+
+def areas() -> list:
+    return list(bpy.context.window_manager.windows[0].screen.areas)
+
+
+def lay_out(material) -> None:
+    """Give every panel a place: two areas of properties and the Shader Editor with its side bar."""
+    by_type = {area.type: area for area in areas()}
+    by_type["OUTLINER"].ui_type = "PROPERTIES"
+    by_type["VIEW_3D"].ui_type = "ShaderNodeTree"
+    by_type["VIEW_3D"].spaces.active.show_region_ui = True
+    material.node_tree.nodes.active = scenes.node_of(material)
+
+
+def show_tabs() -> bool:
+    """Turn the properties to render and material, which Blender allows once it has drawn them."""
+    try:
+        for area, tab in zip((area for area in areas() if area.type == "PROPERTIES"), ("RENDER", "MATERIAL")):
+            area.spaces.active.context = tab
+    except TypeError:
+        return False
+    return True
+
+
+def started(**options) -> set[str]:
+    """Start the operator as a button does."""
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        return bpy.ops.beamspread.bake("INVOKE_DEFAULT", **options)
+
+
+def can_start() -> bool:
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        return bpy.ops.beamspread.bake.poll()
+
+
+def press_escape() -> None:
+    window = bpy.context.window_manager.windows[0]
+    for value in ("PRESS", "RELEASE"):
+        window.event_simulate(type="ESC", value=value, x=window.width // 2, y=window.height // 2)
+
+
+def ended() -> bool:
+    return not state.is_running()
+
+
+def image_of(name: str):
+    return scenes.node_of(bpy.data.materials[name]).image
+
+
+def brightness(name: str) -> float:
+    """Mean of the image that the material shows; -1 without one."""
+    image = image_of(name)
+    return -1.0 if image is None else float(scenes.pixels(image).mean())
+
+
+def scenario():
+    bpy.ops.wm.read_homefile(use_empty=False, use_factory_startup=True, load_ui=True)
+    yield lambda: True
+    scene, settings = bpy.context.scene, bpy.context.scene.beamspread
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    settings.quality, settings.resolution = "preview", 32
+    sun = scenes.add_sun(0)
+    planes = [scenes.add_plane(name, material=scenes.add_material(name)) for name in ("First", "Second")]
+    planes[1].location.x = 5
+    scene.render.engine = beamspread.blender.jobs.engine.BeamspreadEngine.bl_idname
+    scenes.select(*planes)
+    lay_out(planes[0].data.materials[0])
+    yield show_tabs
+    yield lambda: len(results["drawn"]) >= len(panels._classes)
+
+    editor = next(area for area in areas() if area.type == "NODE_EDITOR")
+    region = next(region for region in editor.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=editor, region=region):
+        bpy.ops.wm.call_menu(name=menu._menu().__name__)
+    yield lambda: "menu" in results["drawn"]
+    press_escape()
+
+    bpy.ops.ed.undo_push(message="before")
+    results["returned"] = sorted(started(objects="ALL"))
+    results["can start another"] = can_start()
+    results["running"] = state.progress()[0]
+    yield ended
+    results["baked"] = [brightness(name) for name in ("First", "Second")]
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        bpy.ops.ed.undo()
+        results["after undo"] = [brightness(name) for name in ("First", "Second")]
+        bpy.ops.ed.redo()
+        results["after redo"] = [brightness(name) for name in ("First", "Second")]
+
+    # A solver and a size that take minutes, under another light: only Esc ends that.
+    settings, sun = bpy.context.scene.beamspread, bpy.data.objects["Sun"]
+    settings.solver, sun.data.energy = "direct", 100.0
+    for name in ("First", "Second"):
+        image_of(name).scale(512, 512)
+    before = [brightness(name) for name in ("First", "Second")]
+    began = time.monotonic()
+    started(objects="ALL")
+    yield lambda: not state.progress()[1].startswith("0%")
+    results["progress"] = state.progress()[1]
+    press_escape()
+    yield ended
+    results["seconds to cancel"] = time.monotonic() - began
+    results["kept by cancel"] = [brightness(name) for name in ("First", "Second")] == before
+    results["messages of cancel"] = state.messages()
+
+    settings.solver = "fft"
+    started(objects="ALL")
+    bpy.data.materials.remove(bpy.data.materials["First"])
+    yield ended
+    results["messages of removal"] = state.messages()
+    results["baked after removal"] = brightness("Second") / before[1]
+    yield lambda: state.messages()[0] in results["shown"]
+
+    try:
+        scenes.node_of(bpy.data.materials["Second"]).albedo = (1, 1, 1)
+        started()
+    except RuntimeError as error:
+        results["refused"] = str(error)
+    scenes.node_of(bpy.data.materials["Second"]).albedo = (0.5, 0.5, 0.5)
+
+    settings.solver = "direct"
+    started()
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    results["runs on in the next file"] = state.is_running()
+    # Blender crashes if it quits before it has drawn the new file.
+    loaded = time.monotonic()
+    yield lambda: time.monotonic() > loaded + 1
+
+
+def main() -> None:
+    prepare_panels()
+    beamspread.register()
+    steps = scenario()
+    waiting = {"for": lambda: True, "since": time.monotonic()}
+
+    def step():
+        """Go on if what the scenario waits for has come; called by a timer."""
+        try:
+            if not waiting["for"]():
+                if time.monotonic() - waiting["since"] < PATIENCE_SECONDS:
+                    return 0.05
+                raise TimeoutError(f"line {steps.gi_frame.f_lineno} waited in vain")
+            waiting.update({"for": next(steps), "since": time.monotonic()})
+            return 0.05
+        except StopIteration:
+            results["complete"] = True
+        except BaseException:  # noqa: BLE001 - the test shows it
+            results["error"] = traceback.format_exc()
+        Path(sys.argv[-1]).write_text(json.dumps(results))
+        bpy.ops.wm.quit_blender()
+        return None
+
+    bpy.app.timers.register(step, first_interval=0.1, persistent=True)
+
+
+main()
