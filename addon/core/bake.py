@@ -14,7 +14,7 @@ from .material import Material, check_thickness
 from .progress import Progress, stages
 from .receiver import Receiver
 from .samples import load_source
-from .scene import Grid, Light, Mesh, PointLight, SpotLight, SunLight
+from .scene import Grid, Light, Mesh
 
 # Shares of the time that a bake takes, roughly: simulating an LDF not in the cache, beams and solving of one light.
 LIBRARY_WEIGHT, BEAMS_WEIGHT, SOLVE_WEIGHT = 2.0, 1.0, 3.0
@@ -97,7 +97,7 @@ def bake(
     for number, (light, beams_progress, solve_progress) in enumerate(
         zip(lights, light_progress[::2], light_progress[1::2]), 1
     ):
-        beams, direction, strength = unit_beams(grid, light, occluders.ray_caster, settings, beams_progress)
+        beams, direction, strength = unit_beams(grid, light, occluders.ray_caster(grid), settings, beams_progress)
         if beams.any() and any(strength):
             beams *= strength.max()
             waiting.append((beams, direction))
@@ -150,31 +150,17 @@ def unit_beams(
     """Irradiance (H, W) of the light at strength 1, direction as `light_beams` says, and strength times colour (3,)."""
     from .._load import native
 
-    numbers = (grid.origin, grid.x_axis, grid.y_axis, grid.normal, grid.pitch_x, grid.pitch_y, grid.width, grid.height)
-    caster = occluders if light.cast_shadow else None
-    options = {
-        "samples": settings.samples,
-        "threads": settings.threads,
-        "progress": progress,
-        "clearance": grid.clearance,
-    }
-    if isinstance(light, SunLight):
-        direction = grid.to_plane_frame(light.direction)
-        irradiance = native.sun_beams(*numbers, light.direction, caster, **options)
-        strength = light.irradiance
-    elif isinstance(light, SpotLight):
-        cone = light.frame, light.spot_size, light.blend
-        irradiance, direction = native.spot_beams(
-            *numbers, light.position, *cone, caster, falloff=light.falloff, **options
-        )
-        strength = light.power
-    elif isinstance(light, PointLight):
-        irradiance, direction = native.point_beams(*numbers, light.position, caster, **options)
-        strength = light.power
-    else:
-        raise TypeError(f"light is a {type(light).__name__}; it must be a SunLight, PointLight or SpotLight")
+    irradiance, direction = native.gather_beams(
+        grid.native_grid(),
+        light.unit_light(),
+        occluders if light.cast_shadow else None,
+        samples=settings.samples,
+        threads=settings.threads,
+        progress=progress,
+        clearance=grid.clearance,
+    )
     irradiance *= grid.coverage
-    return irradiance, direction, np.asarray(light.color, np.float32) * np.float32(strength)
+    return irradiance, direction, np.asarray(light.color, np.float32) * np.float32(light.strength)
 
 
 def _libraries(material: Material, thickness: float, quality: str, progress: Progress | None) -> list:

@@ -6,12 +6,15 @@ Rows of every array run up the plane: row 0 is the bottom (v = 0), as Blender st
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 
 import numpy as np
 
 Vector = tuple[float, float, float]
+
+# Shadows are traced in single precision from an origin near the receiver. A receiver's vertices this many texels from
+# that origin are off by at most 2^-24 of it: a sixteenth of a texel.
+MOST_TEXELS_TO_ORIGIN = 2**20
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +44,18 @@ class Grid:
     coverage: np.ndarray
     clearance: float = 0.0
 
-    def to_plane_frame(self, direction: Vector) -> np.ndarray:
-        """Turn a world direction into the plane frame (x along columns, y up the rows, z outward)."""
-        return np.array([self.x_axis, self.y_axis, self.normal], dtype=float) @ np.asarray(direction, dtype=float)
+    def native_grid(self):
+        """The native `ReceiverGrid`."""
+        from .._load import native
+
+        axes = self.x_axis, self.y_axis, self.normal
+        return native.ReceiverGrid(self.origin, *axes, self.pitch_x, self.pitch_y, self.width, self.height)
+
+    @property
+    def centre(self) -> np.ndarray:
+        """World position."""
+        across = 0.5 * self.width * self.pitch_x * np.array(self.x_axis)
+        return self.origin + across + 0.5 * self.height * self.pitch_y * np.array(self.y_axis)
 
 
 @dataclass(frozen=True)
@@ -63,6 +75,17 @@ class SunLight:
     color: Vector
     cast_shadow: bool = True
 
+    @property
+    def strength(self) -> float:
+        """What the beams of the unit light are multiplied by."""
+        return self.irradiance
+
+    def unit_light(self):
+        """The native light of strength 1."""
+        from .._load import native
+
+        return native.SunLight(self.direction)
+
 
 @dataclass(frozen=True)
 class PointLight:
@@ -73,6 +96,17 @@ class PointLight:
     power: float
     color: Vector
     cast_shadow: bool = True
+
+    @property
+    def strength(self) -> float:
+        """What the beams of the unit light are multiplied by."""
+        return self.power
+
+    def unit_light(self):
+        """The native light of strength 1."""
+        from .._load import native
+
+        return native.PointLight(self.position)
 
 
 @dataclass(frozen=True)
@@ -97,28 +131,49 @@ class SpotLight:
     blend: float
     falloff: str = "scaled"
 
+    @property
+    def strength(self) -> float:
+        """What the beams of the unit light are multiplied by."""
+        return self.power
+
+    def unit_light(self):
+        """The native light of strength 1."""
+        from .._load import native
+
+        return native.SpotLight(self.position, self.frame, self.spot_size, self.blend, self.falloff)
+
 
 Light = SunLight | PointLight | SpotLight
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles in world space: vertices float32 (N, 3), triangles uint32 (M, 3)."""
+    """Triangles in world space: vertices float64 (N, 3), triangles uint32 (M, 3)."""
 
     vertices: np.ndarray
     triangles: np.ndarray
+    _casters: list = field(default_factory=list, init=False, repr=False)  # the last one made, with its origin
 
-    @cached_property
-    def ray_caster(self):
-        """The native `Occluders`, None without triangles; made once for all bakes under the same light."""
+    def ray_caster(self, grid: Grid):
+        """The native `Occluders` for a receiver, None without triangles; receivers near each other share one.
+
+        It is exact to single precision relative to its origin: within `MOST_TEXELS_TO_ORIGIN`.
+        """
         from .._load import native
 
-        return native.Occluders(self.vertices, self.triangles) if len(self.triangles) else None
+        if not len(self.triangles):
+            return None
+        reach = MOST_TEXELS_TO_ORIGIN * min(grid.pitch_x, grid.pitch_y)
+        if not self._casters or np.linalg.norm(self._casters[0][0] - grid.centre) > reach:
+            self._casters[:] = []  # before another is made: each may take gigabytes
+            vertices = np.ascontiguousarray(self.vertices, float)
+            self._casters.append((grid.centre, native.Occluders(vertices, self.triangles, grid.centre)))
+        return self._casters[0][1]
 
     @classmethod
     def empty(cls) -> Mesh:
         """A mesh without triangles."""
-        return cls(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32))
+        return cls(np.zeros((0, 3)), np.zeros((0, 3), np.uint32))
 
     @classmethod
     def join(cls, parts: list[Mesh]) -> Mesh:
@@ -127,7 +182,7 @@ class Mesh:
             return cls.empty()
         offsets = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
         return cls(
-            np.ascontiguousarray(np.concatenate([part.vertices for part in parts]), np.float32),
+            np.ascontiguousarray(np.concatenate([part.vertices for part in parts]), float),
             np.ascontiguousarray(
                 np.concatenate([part.triangles.astype(np.int64) + offset for part, offset in zip(parts, offsets)]),
                 np.uint32,

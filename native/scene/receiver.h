@@ -28,8 +28,8 @@ struct ReceiverGrid {
         return {glm::dot(direction, x_axis), glm::dot(direction, y_axis), glm::dot(direction, normal)};
     }
 
-    // The largest absolute coordinate: what the rounding of its world positions scales with.
-    double reach() const;
+    // The largest absolute coordinate relative to `centre`: what the rounding of positions relative to it scales with.
+    double reach(const Vec3& centre) const;
 
     // Throws InvalidArgument naming the first field that is out of range.
     void check() const;

@@ -164,11 +164,12 @@ void shade_row(const Shadow& shadow, std::size_t row, std::size_t width, Shade* 
 
 }  // namespace
 
-Shadows::Shadows(const ReceiverGrid& grid, const LightSource& source, const Occluders* occluders, const RayStart& start)
-    : m_grid(grid), m_source(source), m_occluders(occluders), m_start(start)
+Shadows::Shadows(const ReceiverGrid& grid, const LightSource& source, const Occluders* occluders, const RayStart& start,
+                 bool find)
+    : m_grid(grid), m_source(source), m_occluders(occluders), m_start(start), m_is_unknown(occluders && !find)
 {
     const Projection projection(grid, source, start);
-    if (!occluders || !projection.is_lit())
+    if (!occluders || !find || !projection.is_lit())
         return;
     m_leaves = std::bit_ceil(bands());
     m_nodes.resize(2 * m_leaves);

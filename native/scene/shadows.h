@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "scene/lights.h"
+#include "scene/light.h"
 #include "scene/occluders.h"
 #include "scene/receiver.h"
 
@@ -30,8 +30,9 @@ class Shadows {
 public:
     static constexpr std::size_t rows_per_band = 8;
 
-    // `occluders` may be null: no shade anywhere.
-    Shadows(const ReceiverGrid& grid, const LightSource& source, const Occluders* occluders, const RayStart& start);
+    // `occluders` may be null: no shade anywhere. Without `find` no texel's shade is known.
+    Shadows(const ReceiverGrid& grid, const LightSource& source, const Occluders* occluders, const RayStart& start,
+            bool find);
 
     std::size_t bands() const { return (m_grid.height + rows_per_band - 1) / rows_per_band; }
 

@@ -107,7 +107,7 @@ def our_irradiance(plane):
     light = extract.read_scene_light(depsgraph)
     polygons = extract.read_polygons(plane.evaluated_get(depsgraph), "White")
     receiver = build_receiver(polygons, fit_uv_map(polygons), TEXELS, TEXELS)
-    caster = native.Occluders(light.occluders.vertices, light.occluders.triangles)
+    caster = light.occluders.ray_caster(receiver.grid)
     total = np.zeros((receiver.grid.height, receiver.grid.width, 3), np.float32)
     for lamp in light.lights:
         total += light_beams(receiver.grid, lamp, caster, BakeSettings(samples=8))[0]

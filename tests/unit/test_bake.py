@@ -33,6 +33,11 @@ def grid(size=24, side=1.0):
     )
 
 
+def shifted(receiver, distance):
+    """The same grid elsewhere."""
+    return replace(receiver, origin=tuple(np.array(receiver.origin) + distance))
+
+
 def reflectance(angle, albedo=0.9, thickness=math.inf):
     medium = beamspread.Medium(g=0.0, ior=1.0, thickness=thickness)
     return beamspread.library(medium, quality="preview").reflectance(angle, albedo)
@@ -62,17 +67,79 @@ def test_an_uneven_receiver_does_not_shadow_itself():
     uvs = corners[:, :2] + 0.5
     polygons = Polygons(corners, uvs, np.array([0, 4]), np.array([(0.0, 0.0, 1.0)]))
     receiver = build_receiver(polygons, fit_uv_map(polygons), 32, 32)
-    mesh = Mesh(corners.astype(np.float32), np.array([(0, 1, 2), (0, 2, 3)], np.uint32))
+    mesh = Mesh(corners, np.array([(0, 1, 2), (0, 2, 3)], np.uint32))
     low_sun = replace(SUN, direction=(math.sin(1.5), 0.0, -math.cos(1.5)))
-    irradiance, _ = light_beams(receiver.grid, low_sun, mesh.ray_caster, SETTINGS)
+    irradiance, _ = light_beams(receiver.grid, low_sun, mesh.ray_caster(receiver.grid), SETTINGS)
     assert irradiance == pytest.approx(np.full((32, 32, 3), 2 * math.cos(1.5)), rel=1e-3)
 
 
 def test_objects_under_the_same_light_share_its_shadows():
-    roof = Mesh(np.array([[-9, -9, 1], [9, -9, 1], [0, 18, 1]], np.float32), np.array([[0, 1, 2]], np.uint32))
-    assert roof.ray_caster is roof.ray_caster
-    assert roof.ray_caster.triangle_count == 1
-    assert Mesh.empty().ray_caster is None
+    roof = Mesh(np.array([[-9, -9, 1], [9, -9, 1], [0, 18, 1]], float), np.array([[0, 1, 2]], np.uint32))
+    near = roof.ray_caster(grid())
+    assert near.triangle_count == 1
+    assert roof.ray_caster(shifted(grid(), 3.0)) is near
+    assert roof.ray_caster(shifted(grid(), 1e6)) is not near
+    assert Mesh.empty().ray_caster(grid()) is None
+
+
+@pytest.mark.parametrize("distance", [1e4, 1e6])
+def test_shadows_do_not_drift_far_from_the_world_origin(distance):
+    """Positions in double precision are known to 1e-10 m at 1000 km, a thousandth of what rays know of this metre.
+
+    So shadows stay where they are but for single rays, of 16 per texel, that pass an edge within rounding.
+    """
+    card = np.array([(-0.31, -0.17, 0.23), (0.23, -0.29, 0.11), (0.07, 0.37, 0.31)])
+    lamp = PointLight("Lamp", (0.13, 0.21, 0.83), 1.0, (1.0, 1.0, 1.0))
+    offset = np.array([0.6, -0.64, 0.48]) * distance
+
+    def beams(offset):
+        mesh = Mesh(card + offset, np.array([(0, 1, 2)], np.uint32))
+        there = replace(lamp, position=tuple(np.array(lamp.position) + offset))
+        receiver = shifted(grid(256), offset)
+        return light_beams(receiver, there, mesh.ray_caster(receiver), replace(SETTINGS, samples=4))
+
+    (here, direction), (there, direction_there) = beams(np.zeros(3)), beams(offset)
+    dark = (here[..., 0] == 0).sum()
+    assert 5000 < dark < 20000
+    flips = np.abs(there - here)[..., 0] > 1e-6 * here.max()
+    assert flips.sum() < 5
+    assert (np.abs(there - here)[..., 0] < 0.1 * here.max()).all()
+    assert direction_there[~flips] == pytest.approx(direction[~flips], abs=1e-6)
+
+
+def turned_grid(turn):
+    """A grid around the origin in a random plane, with its axes as rows."""
+    axes, _ = np.linalg.qr(np.random.default_rng(turn).normal(size=(3, 3)))
+    x_axis, y_axis, normal = (tuple(axis) for axis in axes)
+    origin = tuple(-0.5 * (axes[0] + axes[1]))
+    return replace(grid(), origin=origin, x_axis=x_axis, y_axis=y_axis, normal=normal), axes
+
+
+@pytest.mark.parametrize("height", [0.0, 1e-30, 1e-17, 1e-16, 1e-12])
+def test_a_lamp_in_the_plane_adds_nothing(height):
+    lamp = PointLight("Lamp", (0.013, 0.21, height), 100.0, (1.0, 1.0, 1.0))
+    sun = bake(grid(), [SUN], Mesh.empty(), MATERIAL, 0.0, SETTINGS)
+    assert np.array_equal(bake(grid(), [lamp, SUN], Mesh.empty(), MATERIAL, 0.0, SETTINGS), sun)
+
+
+@pytest.mark.parametrize("kind", ["point", "sun"])
+def test_light_along_a_turned_plane_adds_nothing(kind):
+    """By rounding it comes from above or from below."""
+    for turn in range(60):
+        receiver, axes = turned_grid(turn)
+        within = np.array([0.013, 0.21, 0.0]) @ axes
+        if kind == "point":
+            light = PointLight("Lamp", tuple(within), 100.0, (1.0, 1.0, 1.0))
+        else:
+            light = replace(SUN, direction=tuple(within / np.linalg.norm(within)))
+        irradiance, direction = light_beams(receiver, light, None, SETTINGS)
+        assert not irradiance.any()
+        assert (direction == (0, 0, -1)).all()
+        sun = replace(SUN, direction=tuple(-axes[2]))
+        alone, both = (
+            bake(receiver, lights, Mesh.empty(), MATERIAL, 0.0, SETTINGS) for lights in ([sun], [light, sun])
+        )
+        assert np.array_equal(alone, both)
 
 
 def test_no_light():
@@ -92,7 +159,7 @@ def test_lamp_above_the_centre(kind):
 
 
 def test_occluder_and_lamps_without_shadow():
-    roof = Mesh(np.array([[-9, -9, 1], [9, -9, 1], [0, 18, 1]], np.float32), np.array([[0, 1, 2]], np.uint32))
+    roof = Mesh(np.array([[-9, -9, 1], [9, -9, 1], [0, 18, 1]], float), np.array([[0, 1, 2]], np.uint32))
     assert not bake(grid(), [SUN], roof, MATERIAL, 0.0, SETTINGS).any()
     free = bake(grid(), [replace(SUN, cast_shadow=False)], roof, MATERIAL, 0.0, SETTINGS)
     assert free == pytest.approx(bake(grid(), [SUN], Mesh.empty(), MATERIAL, 0.0, SETTINGS))
