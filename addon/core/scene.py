@@ -12,9 +12,9 @@ import numpy as np
 
 Vector = tuple[float, float, float]
 
-# Shadows are traced in single precision from an origin near the receiver. A receiver's vertices this many texels from
-# that origin are off by at most 2^-24 of it: a sixteenth of a texel.
-MOST_TEXELS_TO_ORIGIN = 2**20
+# Shadows are traced in single precision relative to an origin. For a receiver this many texels from it vertices are off
+# by 2^-24 of that, a 256th of a texel, and rays start 16 times 2^-23 of it off the plane: an eighth of a texel.
+MOST_TEXELS_TO_ORIGIN = 2**16
 
 
 @dataclass(frozen=True, eq=False)

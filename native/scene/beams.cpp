@@ -10,29 +10,12 @@
 #include "base/error.h"
 #include "base/pool.h"
 #include "base/threads.h"
+#include "scene/ray_start.h"
 #include "scene/shadows.h"
 
 namespace beamspread {
 
 namespace {
-
-// Rounding of a vertex, of a texel's position and of the ray's origin moves each by up to half a unit in the last place
-// of the largest coordinate; Embree's robust test adds a few. Starting this many units off the plane keeps a ray clear
-// of the receiver's own triangles, and is far below what can be seen: 2 micrometres in a scene of 1 metre.
-constexpr double offset_ulps = 16.0;
-
-// The largest coordinates in the frame that rays are traced in, and in the world, where positions are in double
-// precision.
-RayStart ray_start(const ReceiverGrid& grid, const Occluders* occluders, double clearance)
-{
-    if (!occluders)
-        return {.clearance = clearance};
-    const double reach = std::max(grid.reach(occluders->origin()), occluders->reach());
-    const double world_reach = grid.reach(Vec3(0.0)) + reach;
-    return {.rounding = offset_ulps * (static_cast<double>(std::numeric_limits<float>::epsilon()) * reach +
-                                       std::numeric_limits<double>::epsilon() * world_reach),
-            .clearance = clearance};
-}
 
 // Sub-texel points in texels, n x n: one in each cell of an n x n grid and one in each of n^2 columns and n^2 rows, so
 // that a shadow's border along the texels is resolved as finely as an oblique one (Chiu, Shirley, Wang 1994,

@@ -85,10 +85,7 @@ Occluders::Occluders(std::span<const Vec3> vertices, std::span<const Triangle> t
     const std::span corners =
         make_buffer<Vec3f>(geometry.get(), RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, vertices.size());
     for (std::size_t i = 0; i < vertices.size(); ++i) {
-        const Vec3 offset = vertices[i] - origin;
-        const Vec3 size = glm::abs(offset);
-        m_reach = std::max({m_reach, size.x, size.y, size.z});
-        corners[i] = Vec3f(offset);
+        corners[i] = Vec3f(vertices[i] - origin);
     }
     const std::span indices =
         make_buffer<Triangle>(geometry.get(), RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, triangles.size());

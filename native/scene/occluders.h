@@ -45,15 +45,11 @@ public:
 
     const Vec3& origin() const { return m_origin; }
 
-    // The largest absolute coordinate of a vertex relative to the origin: what the rounding of hits scales with.
-    double reach() const { return m_reach; }
-
 private:
     struct Hierarchy;
     std::unique_ptr<Hierarchy> m_hierarchy;  // null without triangles
     std::size_t m_triangle_count = 0;
     Vec3 m_origin;
-    double m_reach = 0.0;
 };
 
 // 10000 major + 100 minor + patch of the Embree that is called, which a host's own could have taken the place of.

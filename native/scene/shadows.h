@@ -6,17 +6,10 @@
 
 #include "scene/light.h"
 #include "scene/occluders.h"
+#include "scene/ray_start.h"
 #include "scene/receiver.h"
 
 namespace beamspread {
-
-// Shadow rays start this far off the plane.
-struct RayStart {
-    double rounding = 0.0;  // bound of the rounding of a ray and of what it meets, metres
-    double clearance = 0.0;
-
-    double height() const { return rounding + clearance; }
-};
 
 enum class Shade : std::uint8_t {
     none,     // the texel is out of reach of all shadows: no ray from it is blocked

@@ -78,7 +78,7 @@ def test_objects_under_the_same_light_share_its_shadows():
     near = roof.ray_caster(grid())
     assert near.triangle_count == 1
     assert roof.ray_caster(shifted(grid(), 3.0)) is near
-    assert roof.ray_caster(shifted(grid(), 1e6)) is not near
+    assert roof.ray_caster(shifted(grid(), 1e4)) is not near
     assert Mesh.empty().ray_caster(grid()) is None
 
 
@@ -105,6 +105,19 @@ def test_shadows_do_not_drift_far_from_the_world_origin(distance):
     assert flips.sum() < 5
     assert (np.abs(there - here)[..., 0] < 0.1 * here.max()).all()
     assert direction_there[~flips] == pytest.approx(direction[~flips], abs=1e-6)
+
+
+@pytest.mark.parametrize("distance", [1e3, 1e6])
+def test_what_is_far_away_does_not_change_shadows_nearby(distance):
+    """Where rays start depends on what they might meet there, not on the largest coordinate of the scene."""
+    card = np.array([(-0.31, -0.17, 0.0), (0.23, -0.29, 0.0), (0.07, 0.37, 0.031)])
+    far = np.array([(0, 0, -10), (1, 0, -10), (0, 1, -10)]) + (distance, 0, 0)
+    sun = replace(SUN, direction=(0.3, 0.2, -1.0))
+    alone = Mesh(card, np.array([(0, 1, 2)], np.uint32))
+    both = Mesh.join([alone, Mesh(far, np.array([(0, 1, 2)], np.uint32))])
+    near, wide = (light_beams(grid(256), sun, mesh.ray_caster(grid(256)), SETTINGS)[0] for mesh in (alone, both))
+    assert (near == 0).any()
+    assert np.array_equal(near, wide)
 
 
 def turned_grid(turn):
