@@ -1,5 +1,6 @@
 // Python names of native/scene but its lights: Occluders, ReceiverGrid, gather_beams, coverage.
 #include <memory>
+#include <utility>
 
 #include "python/vectors.h"
 #include "scene/beams.h"
@@ -52,7 +53,7 @@ py::tuple gather_beams(const ReceiverGrid& grid, const Light& light, const Occlu
         Array<float> directions({height, width, py::ssize_t{3}});
         static_assert(sizeof(Vec3f) == 3 * sizeof(float));
         beams.direction = {reinterpret_cast<Vec3f*>(directions.mutable_data()), grid.height, grid.width, width};
-        direction = directions;
+        direction = std::move(directions);
     }
     Progress progress(progress_callback(callback));
     {

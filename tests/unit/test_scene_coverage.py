@@ -6,7 +6,6 @@ from beamspread._load import native
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-
 # Texels. An edge that enters a texel by less adds less than half of what coverage counts in, 2^-31: nothing.
 ENTERED = 3e-10
 
