@@ -17,15 +17,15 @@ namespace beamspread {
 
 namespace {
 
-// Sub-texel points in texels, n x n: one in each cell of an n x n grid and one in each of n^2 columns and n^2 rows, so
-// that a shadow's border along the texels is resolved as finely as an oblique one (Chiu, Shirley, Wang 1994,
-// "Multi-jittered sampling", without the jitter).
-std::vector<Vec2> sub_texel_points(int samples)
+// Points of a texel relative to its corner in the world, n x n: one in each cell of an n x n grid and one in each of n^2
+// columns and n^2 rows, so that a shadow's border along the texels is resolved as finely as an oblique one (Chiu,
+// Shirley, Wang 1994, "Multi-jittered sampling", without the jitter).
+std::vector<Vec3> sub_texel_points(const ReceiverGrid& grid, int samples)
 {
-    std::vector<Vec2> points;
+    std::vector<Vec3> points;
     for (int j = 0; j < samples; ++j) {
         for (int i = 0; i < samples; ++i)
-            points.emplace_back((i + (j + 0.5) / samples) / samples, (j + (i + 0.5) / samples) / samples);
+            points.push_back(grid.step((i + (j + 0.5) / samples) / samples, (j + (i + 0.5) / samples) / samples));
     }
     return points;
 }
@@ -38,7 +38,7 @@ public:
           m_light(light),
           m_is_far(light.source().is_far),
           m_occluders(occluders),
-          m_points(sub_texel_points(settings.samples)),
+          m_points(sub_texel_points(grid, settings.samples)),
           m_position_rounding(std::numeric_limits<double>::epsilon() * grid.reach(Vec3(0.0))),
           m_start(ray_start(grid, occluders, settings.clearance)),
           m_shadows(grid, light.source(), occluders, m_start, settings.find_shadows),
@@ -89,9 +89,10 @@ private:
     Texel gather_texel(double x, double y, const Occluders* occluders) const
     {
         Texel sum{};
-        for (std::span<const Vec2> rest = m_points; !rest.empty();) {
-            const std::span<const Vec2> packet = rest.first(std::min(rest.size(), Occluders::packet_size));
-            gather_points(x, y, packet, occluders, sum);
+        const Vec3 corner = m_grid.point(x, y);
+        for (std::span<const Vec3> rest = m_points; !rest.empty();) {
+            const std::span<const Vec3> packet = rest.first(std::min(rest.size(), Occluders::packet_size));
+            sum = gather_points(corner, packet, occluders, sum);
             rest = rest.subspan(packet.size());
         }
         sum.irradiance /= static_cast<double>(m_points.size());
@@ -99,12 +100,12 @@ private:
     }
 
     // Adds the light of at most as many points as make a packet of rays.
-    void gather_points(double x, double y, std::span<const Vec2> subs, const Occluders* occluders, Texel& sum) const
+    Texel gather_points(const Vec3& corner, std::span<const Vec3> subs, const Occluders* occluders, Texel sum) const
     {
         std::array<Vec3, Occluders::packet_size> points;
         std::array<Arrival, Occluders::packet_size> arrivals;
         for (std::size_t i = 0; i < subs.size(); ++i)
-            points[i] = m_grid.point(x + subs[i].x, y + subs[i].y);
+            points[i] = corner + subs[i];
         m_light.arrive(std::span(points).first(subs.size()), arrivals.data());
 
         std::array<Vec3, Occluders::packet_size> travel;
@@ -129,6 +130,7 @@ private:
             sum.irradiance += irradiance[i];
             sum.flow += irradiance[i] * travel[i];
         }
+        return sum;
     }
 
     ShadowRay shadow_ray(const Vec3& point, const Arrival& arrival) const
@@ -154,7 +156,7 @@ private:
     const Light& m_light;
     bool m_is_far;
     const Occluders* m_occluders;
-    std::vector<Vec2> m_points;
+    std::vector<Vec3> m_points;
     double m_position_rounding;  // a lamp within this of a point is in it: light there has neither direction nor bound
     RayStart m_start;
     Shadows m_shadows;

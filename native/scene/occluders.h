@@ -13,9 +13,9 @@ namespace beamspread {
 // Towards a light: what lies in (0, distance) from `origin` along the unit vector `direction` shades `origin`. The
 // distance may be infinite; nothing lies within one that is not > 0.
 struct ShadowRay {
-    Vec3 origin{};
-    Vec3 direction{};
-    double distance = 0.0;
+    Vec3 origin;
+    Vec3 direction;
+    double distance;
 };
 
 // An immutable set of triangles with a bounding volume hierarchy; both sides of a triangle block. Its queries may run

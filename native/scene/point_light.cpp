@@ -17,7 +17,8 @@ void PointLight::arrive(std::span<const Vec3> points, Arrival* arrivals) const
     for (const Vec3& point : points) {
         const Vec3 way = point - m_position;
         const double distance = glm::length(way);
-        *arrivals++ = {.travel = way / distance, .flux = 1.0 / (4.0 * pi * distance * distance), .distance = distance};
+        const double inverse = 1.0 / distance;
+        *arrivals++ = {.travel = way * inverse, .flux = 0.25 * inv_pi * inverse * inverse, .distance = distance};
     }
 }
 

@@ -19,8 +19,9 @@ struct ReceiverGrid {
     std::size_t width = 0;
     std::size_t height = 0;
 
-    // World position of (x, y) in texels.
-    Vec3 point(double x, double y) const { return origin + x_axis * (x * pitch_x) + y_axis * (y * pitch_y); }
+    // From texel (0, 0) to (x, y) in the world, and the world position there; x and y in texels.
+    Vec3 step(double x, double y) const { return x_axis * (x * pitch_x) + y_axis * (y * pitch_y); }
+    Vec3 point(double x, double y) const { return origin + step(x, y); }
 
     // A world direction in the plane frame.
     Vec3 to_plane(const Vec3& direction) const

@@ -1,4 +1,8 @@
 // Which texels of a receiver no occluder can shade, and which one occluder shades all of, found without rays.
+//
+// Beams need this many times as long if rays are traced from every texel, 16 a texel, on 512^2 to 1024^2 texels
+// (tests/bench/gather.py): one card 2.2 for a lamp and some 100 for a sun, a sphere of 1000 triangles 2.3 and 20 to 46,
+// 1000 loose leaves 3.5 to 4.6 and 5 to 9, a sphere of 1e5 triangles 1.2 to 1.4 and 2.3 to 4, 1e5 leaves 1.
 #pragma once
 
 #include <cstdint>
@@ -12,9 +16,9 @@
 namespace beamspread {
 
 enum class Shade : std::uint8_t {
-    none,     // the texel is out of reach of all shadows: no ray from it is blocked
+    none,  // the texel is out of reach of all shadows: no ray from it is blocked
     unknown,  // some of its rays may be blocked
-    full,     // the shadow of one triangle covers it: every ray from it is blocked
+    full,  // the shadow of one triangle covers it: every ray from it is blocked
 };
 
 // The triangles' shadows on the plane, by bands of rows. Both bounds allow for the rounding of rays, so that tracing

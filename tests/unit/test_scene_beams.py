@@ -152,17 +152,21 @@ def test_point_equals_brute_force(seed, samples, count, mirrored):
     lamp_height=st.sampled_from([None, 0.1, 1.0, 5.0]),
     clearance=st.sampled_from([0.0, 0.05]),
     samples=st.sampled_from([1, 4]),
-    origin=st.sampled_from([(0, 0, 0), (30, -20, 10)]),
+    at_origin=st.booleans(),
+    far=st.sampled_from([1, 1e4]),
 )
-def test_texels_that_need_no_rays_are_as_if_traced(seed, count, size, slant, lamp_height, clearance, samples, origin):
-    axes, centre, rng = rotation(seed), np.array([30.0, -20.0, 10.0]), np.random.default_rng(seed)
+def test_texels_that_need_no_rays_are_as_if_traced(
+    seed, count, size, slant, lamp_height, clearance, samples, at_origin, far
+):
+    axes, centre, rng = rotation(seed), far * np.array([30.0, -20.0, 10.0]), np.random.default_rng(seed)
+    origin = (0, 0, 0) if at_origin else centre
     grid = make_grid(width=150, height=110, axes=axes, centre=centre)
     # Also through the plane, behind it, and beyond the lamp.
     middle = rng.uniform([-1.5, -1.2, -0.3], [1.5, 1.2, 1.5], (count, 1, 3))
     local = (middle + rng.normal(0, size, (count, 3, 3))).reshape(-1, 3)
     # Rounded by more than the grid's own triangles: its shadow's border is known less well.
-    far = 3000 * (np.array([slant, 0.3, 1.0]) + [(0, 0, 0), (0.0003, 0, 0), (0, 0.0003, 0)])
-    vertices = np.concatenate([local, far]) @ axes + centre
+    beyond = 3000 * (np.array([slant, 0.3, 1.0]) + [(0, 0, 0), (0.0003, 0, 0), (0, 0.0003, 0)])
+    vertices = np.concatenate([local, beyond]) @ axes + centre
     occluders = native.Occluders(vertices, np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3), origin)
     if lamp_height is None:
         light = native.SunLight(np.array([-slant, -0.3, -1.0]) @ axes)
@@ -196,6 +200,19 @@ def test_rays_keep_clear_of_the_plane_and_of_the_lamp(sun):
     assert (doubt > 1e-3).mean() > 0.95
     assert 0.05 < blocked.mean() < 0.5
     np.testing.assert_array_equal((got == 0)[doubt > 1e-3], blocked[doubt > 1e-3])
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10**6), mirrored=st.booleans())
+def test_lamps_know_their_place_in_the_plane(seed, mirrored):
+    axes, centre = rotation(seed), np.array([0.3, -0.2, 0.1])
+    axes[0] *= -1 if mirrored else 1
+    place = np.random.default_rng(seed).normal(size=3)
+    grid = native.ReceiverGrid(**make_grid(size=(2.0, 1.5), axes=axes, centre=centre))
+    world = place @ axes + centre
+    for lamp in (native.PointLight(world), native.SpotLight(world, np.eye(3), 1.0, 0.0)):
+        np.testing.assert_allclose(lamp.position_in(grid), place + (1.0, 0.75, 0.0), atol=1e-14)
+    assert native.SunLight(world).position_in(grid) is None
 
 
 def spot_falloff(travel, frame, size, blend, falloff):
