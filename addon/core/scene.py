@@ -155,9 +155,9 @@ class Mesh:
     _casters: list = field(default_factory=list, init=False, repr=False)  # the last one made, with its origin
 
     def ray_caster(self, grid: Grid):
-        """The native `Occluders` for a receiver, None without triangles; receivers near each other share one.
+        """The native `Occluders` with its origin near the receiver; None without triangles.
 
-        It is exact to single precision relative to its origin: within `MOST_TEXELS_TO_ORIGIN`.
+        The last one made serves all receivers within `MOST_TEXELS_TO_ORIGIN` of its origin.
         """
         from .._load import native
 

@@ -20,7 +20,7 @@ struct BeamSettings {
     // How far off the plane shadow rays start, in metres, besides what rounding needs: as far as the receiver's own
     // faces, where they are among the occluders, depart from the plane.
     double clearance = 0.0;
-    // Whether texels that need no rays are found beforehand; the result is the same, later.
+    // Without, rays are traced from every texel; the result is the same.
     bool find_shadows = true;
 };
 

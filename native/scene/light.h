@@ -32,7 +32,7 @@ public:
     virtual ~Light() = default;
 
     // Writes what arrives at each of the points; in the lamp itself, at distance 0, that need not be numbers. Many
-    // points at once: a call for each would cost a point lamp a quarter of its time.
+    // points at once: a call for each would cost a point lamp a quarter more time.
     virtual void arrive(std::span<const Vec3> points, Arrival* arrivals) const = 0;
     virtual LightSource source() const = 0;
 };

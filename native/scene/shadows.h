@@ -1,8 +1,8 @@
 // Which texels of a receiver no occluder can shade, and which one occluder shades all of, found without rays.
 //
 // Beams need this many times as long if rays are traced from every texel, 16 a texel, on 512^2 to 1024^2 texels
-// (tests/bench/gather.py): one card 2.2 for a lamp and some 100 for a sun, a sphere of 1000 triangles 2.3 and 20 to 46,
-// 1000 loose leaves 3.5 to 4.6 and 5 to 9, a sphere of 1e5 triangles 1.2 to 1.4 and 2.3 to 4, 1e5 leaves 1.
+// (tests/bench/gather.py): one card 3 for a lamp and some 100 for a sun, a sphere of 1000 triangles 3 and 19 to 45, 1000
+// loose leaves 4 to 5 and 5 to 8, a sphere of 1e5 triangles 1.2 to 1.5 and 2 to 4, 1e5 leaves 1 and 0.9.
 #pragma once
 
 #include <cstdint>
