@@ -6,15 +6,17 @@ Rows of every array run up the plane: row 0 is the bottom (v = 0), as Blender st
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
 Vector = tuple[float, float, float]
 
-# Shadows are traced in single precision relative to an origin. For a receiver this many texels from it vertices are off
-# by 2^-24 of that, a 256th of a texel, and rays start 16 times 2^-23 of it off the plane: an eighth of a texel.
-MOST_TEXELS_TO_ORIGIN = 2**16
+# Shadows are traced in single precision relative to an origin, on a lattice this many texels wide or up to twice that:
+# vertices near a receiver are off by at most 2^-24 of it, and rays start 16 times 2^-23 of it off the plane, which is a
+# 32nd of a texel. Wider, more receivers share a hierarchy.
+TEXELS_BETWEEN_ORIGINS = 2**13
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,17 +159,19 @@ class Mesh:
     def ray_caster(self, grid: Grid):
         """The native `Occluders` with its origin near the receiver; None without triangles.
 
-        The last one made serves all receivers within `MOST_TEXELS_TO_ORIGIN` of its origin.
+        The origin follows from the receiver alone, so that a bake does not depend on those before it. The last one made
+        serves all receivers with the same origin.
         """
         from .._load import native
 
         if not len(self.triangles):
             return None
-        reach = MOST_TEXELS_TO_ORIGIN * min(grid.pitch_x, grid.pitch_y)
-        if not self._casters or np.linalg.norm(self._casters[0][0] - grid.centre) > reach:
-            self._casters[:] = []  # before another is made: each may take gigabytes
+        step = TEXELS_BETWEEN_ORIGINS * 2.0 ** math.ceil(math.log2(min(grid.pitch_x, grid.pitch_y)))
+        origin = tuple(step * np.round(grid.centre / step))
+        if not self._casters or self._casters[0][0] != origin:
+            self._casters.clear()  # before another is made: each may take gigabytes
             vertices = np.ascontiguousarray(self.vertices, float)
-            self._casters.append((grid.centre, native.Occluders(vertices, self.triangles, grid.centre)))
+            self._casters.append((origin, native.Occluders(vertices, self.triangles, origin)))
         return self._casters[0][1]
 
     @classmethod

@@ -256,6 +256,6 @@ def test_shadows_do_not_drift_far_from_the_world_origin(distance):
     bpy.context.view_layer.update()
     there, _ = our_irradiance(plane)
     assert (here.max(axis=2) == 0).sum() > 100
-    # Of 64 rays per texel single ones pass an edge within rounding.
+    # Of 64 rays per texel single ones pass an edge within rounding, 2^-11 of a texel: in 3 % of the texels along edges.
     np.testing.assert_allclose(there, here, rtol=1e-5, atol=0.02 * here.max())
-    assert np.abs(there - here).sum() < 1e-5 * here.sum()
+    assert np.abs(there - here).sum() < 2e-4 * here.sum()

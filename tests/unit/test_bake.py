@@ -84,9 +84,10 @@ def test_objects_under_the_same_light_share_its_shadows():
 
 @pytest.mark.parametrize("distance", [1e4, 1e6])
 def test_shadows_do_not_drift_far_from_the_world_origin(distance):
-    """Positions in double precision are known to 1e-10 m at 1000 km, a thousandth of what rays know of this metre.
+    """Rays are traced relative to an origin within 2^13 texels, in single precision: known to 2^-11 of a texel.
 
-    So shadows stay where they are but for single rays, of 16 per texel, that pass an edge within rounding.
+    So shadows stay where they are but for single rays, of 16 per texel, that pass an edge within rounding: with 400
+    texels along edges and rays a 16th of a texel apart some 400 * 16 / 2^11 = 3 for each rounding that moves them.
     """
     card = np.array([(-0.31, -0.17, 0.23), (0.23, -0.29, 0.11), (0.07, 0.37, 0.31)])
     lamp = PointLight("Lamp", (0.13, 0.21, 0.83), 1.0, (1.0, 1.0, 1.0))
@@ -102,8 +103,8 @@ def test_shadows_do_not_drift_far_from_the_world_origin(distance):
     dark = (here[..., 0] == 0).sum()
     assert 5000 < dark < 20000
     flips = np.abs(there - here)[..., 0] > 1e-6 * here.max()
-    assert flips.sum() < 5
-    assert (np.abs(there - here)[..., 0] < 0.1 * here.max()).all()
+    assert flips.sum() < 40
+    assert np.abs(there - here).sum() < 1e-4 * here.sum()
     assert direction_there[~flips] == pytest.approx(direction[~flips], abs=1e-6)
 
 
