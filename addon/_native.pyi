@@ -13,9 +13,14 @@ __all__: list[str] = [
     "LdfLibrary",
     "LdfSample",
     "LdfSource",
+    "Light",
     "Medium",
     "Occluders",
+    "PointLight",
+    "ReceiverGrid",
     "SampleSource",
+    "SpotLight",
+    "SunLight",
     "adaptive_beams",
     "complex_lines",
     "convolve",
@@ -25,17 +30,15 @@ __all__: list[str] = [
     "fast_size",
     "fft_instruction_sets",
     "fresnel",
+    "gather_beams",
     "half_lines",
     "henyey_greenstein_pdf",
     "henyey_greenstein_sample",
     "interpolate",
-    "point_beams",
     "read_exr",
     "real_lines",
     "real_transform",
     "simulate",
-    "spot_beams",
-    "sun_beams",
     "walk_kernels",
     "write_exr",
 ]
@@ -357,22 +360,138 @@ class Occluders:
 
     Parameters
     ----------
-    vertices : ndarray, float32, shape (N, 3), C-contiguous
+    vertices : ndarray, float64, shape (N, 3), C-contiguous
         World positions in metres. Copied.
     triangles : ndarray, uint32, shape (M, 3), C-contiguous
         Vertex indices. Copied. M = 0 is allowed: nothing is blocked.
+    origin : 3 floats
+        World position near the receivers, metres: rays are traced in single precision relative to it.
 
     Raises
     ------
     ValueError
         Wrong dtype or shape, a position that is not finite, an index that is out of range.
     """
-    def __init__(self, vertices: numpy.ndarray, triangles: numpy.ndarray) -> None: ...
+    def __init__(
+        self, vertices: numpy.ndarray, triangles: numpy.ndarray, origin: numpy.ndarray = (0.0, 0.0, 0.0)
+    ) -> None: ...
     @property
     def triangle_count(self) -> int:
         """
         int: number of triangles.
         """
+
+class ReceiverGrid:
+    """
+    The plane that receives light, divided into texels.
+
+    Parameters
+    ----------
+    origin : 3 floats
+        World position, in metres, of the outer corner of texel (0, 0).
+    x_axis, y_axis, normal : 3 floats each
+        Unit vectors at right angles in the world: along a row of texels, from row to row, and out of the lit side. They may
+        be left-handed (a mirrored texture).
+    pitch_x, pitch_y : float
+        Size of a texel in metres.
+    width, height : int
+        Texels, 1 to 65536.
+
+    Raises
+    ------
+    ValueError
+        An argument is out of range; the message names it.
+    """
+    def __init__(
+        self,
+        origin: numpy.ndarray,
+        x_axis: numpy.ndarray,
+        y_axis: numpy.ndarray,
+        normal: numpy.ndarray,
+        pitch_x: float,
+        pitch_y: float,
+        width: int,
+        height: int,
+    ) -> None: ...
+
+class Light:
+    """
+    A light of strength 1 without colour; its kinds are SunLight, PointLight, SpotLight.
+    """
+    def position_in(self, grid: ReceiverGrid) -> tuple | None:
+        """
+        Where all of the light comes from.
+
+        Parameters
+        ----------
+        grid : ReceiverGrid
+
+        Returns
+        -------
+        tuple of 3 floats or None
+            Metres along the grid's x_axis, y_axis and normal from the outer corner of texel (0, 0); None: a light infinitely
+            far away.
+        """
+
+class SunLight(Light):
+    """
+    Parallel light of 1 W/m^2 at normal incidence.
+
+    Parameters
+    ----------
+    direction : 3 floats
+        Of travel in the world, any length but 0.
+
+    Raises
+    ------
+    ValueError
+        An argument is out of range; the message names it.
+    """
+    def __init__(self, direction: numpy.ndarray) -> None: ...
+
+class PointLight(Light):
+    """
+    A point lamp of 1 W.
+
+    Parameters
+    ----------
+    position : 3 floats
+        In the world, metres.
+
+    Raises
+    ------
+    ValueError
+        An argument is out of range; the message names it.
+    """
+    def __init__(self, position: numpy.ndarray) -> None: ...
+
+class SpotLight(Light):
+    """
+    A spot lamp of 1 W over the whole sphere, as Blender counts it.
+
+    Parameters
+    ----------
+    position : 3 floats
+        In the world, metres.
+    frame : (3, 3) floats
+        Rows: the lamp's x, y and z axes in the world with their scale (the columns of its 3 x 3 world matrix). It shines
+        along -z.
+    spot_size : float
+        Full angle of the cone in radians, 0 < spot_size <= pi.
+    blend : float
+        Soft part of the cone, 0 to 1.
+    falloff : str
+        "scaled": as Cycles in Blender 4.2, 4.5 and 5.0, where the lamp's scale shapes the cone. "legacy": as in 3.4, where
+        it does not, and light falls off with the cosine to the axis besides.
+
+    Raises
+    ------
+    ValueError
+        An argument is out of range; the message names it.
+    """
+    def __init__(
+        self, position: numpy.ndarray, frame: numpy.ndarray, spot_size: float, blend: float, falloff: str = "scaled"
+    ) -> None: ...
 
 def adaptive_beams(
     irradiance: numpy.ndarray, direction: numpy.ndarray, tolerance: float
@@ -492,6 +611,54 @@ def fresnel(cos_theta_i: numpy.ndarray, eta: numpy.ndarray) -> typing.Any:
     Reflectance of unpolarized light; eta is the index behind the boundary over the one before it.
     """
 
+def gather_beams(
+    grid: ReceiverGrid,
+    light: Light,
+    occluders: Occluders = None,
+    samples: int = 4,
+    threads: int = 0,
+    progress: typing.Any = None,
+    clearance: float = 0.0,
+    find_shadows: bool = True,
+) -> tuple:
+    """
+    Irradiance of a plane by a light of strength 1, and where it comes from.
+
+    Parameters
+    ----------
+    grid : ReceiverGrid
+    light : Light
+    occluders : Occluders, optional
+        What casts shadows; None: nothing does.
+    samples : int
+        samples x samples points in each texel, each with its own visibility; 1 to 64.
+    threads : int
+        0: all. The result is the same, bit for bit, for any number.
+    progress : callable, optional
+        progress(fraction) returns False to stop.
+    clearance : float
+        How far off the plane shadow rays start, in metres, besides what rounding needs: as far as the receiver's own faces,
+        where they are among the occluders, depart from the plane.
+    find_shadows : bool
+        False: rays are traced from every texel, also where none can be blocked or one triangle blocks them all. The result
+        is the same; for measurements.
+
+    Returns
+    -------
+    irradiance : ndarray, float32, shape (height, width)
+        W/m^2: cosine and visible part included, 0 if the light is behind the plane or in it. Row 0 is the lowest row.
+    direction : ndarray, float32, shape (height, width, 3), or float64, shape (3,) of a light infinitely far away
+        Unit vectors of travel in the plane frame (x_axis, y_axis, normal), z < 0. Where no light arrives: that of the
+        unblocked light, or (0, 0, -1) if the light is behind the plane or in it.
+
+    Raises
+    ------
+    ValueError
+        An argument is out of range; the message names it.
+    Cancelled
+        `progress` returned False.
+    """
+
 def half_lines(half: numpy.ndarray, size: int, instruction_set: str = "") -> numpy.ndarray:
     """
     Inverse of `real_lines` but for a factor: complex64 (N, size // 2 + 1) to `size` times float32 (N, size).
@@ -545,66 +712,6 @@ def interpolate(
     ------
     ValueError
         Names the argument, its value and what is allowed: outside of the samples, their span.
-    """
-
-def point_beams(
-    origin: numpy.ndarray,
-    x_axis: numpy.ndarray,
-    y_axis: numpy.ndarray,
-    normal: numpy.ndarray,
-    pitch_x: float,
-    pitch_y: float,
-    width: int,
-    height: int,
-    position: numpy.ndarray,
-    occluders: Occluders = None,
-    samples: int = 4,
-    threads: int = 0,
-    progress: typing.Any = None,
-    clearance: float = 0.0,
-) -> tuple:
-    """
-    Irradiance of a plane by a point lamp of 1 W, and where it comes from.
-
-    Parameters
-    ----------
-    origin : 3 floats
-        World position, in metres, of the outer corner of texel (0, 0).
-    x_axis, y_axis, normal : 3 floats each
-        Unit vectors at right angles in the world: along a row of texels, from row to row, and out of the lit side. They may
-        be left-handed (a mirrored texture).
-    pitch_x, pitch_y : float
-        Size of a texel in metres.
-    width, height : int
-        Texels, 1 to 65536.
-    position : 3 floats
-        Of the lamp in the world, metres.
-    occluders : Occluders, optional
-        What casts shadows; None: nothing does.
-    samples : int
-        samples x samples points in each texel, each with its own visibility; 1 to 64.
-    threads : int
-        0: all. The result is the same, bit for bit, for any number.
-    progress : callable, optional
-        progress(fraction) returns False to stop.
-    clearance : float
-        How far off the plane shadow rays start, in metres, besides what rounding needs: as far as the receiver's own faces,
-        where they are among the occluders, depart from the plane.
-
-    Returns
-    -------
-    irradiance : ndarray, float32, shape (height, width)
-        W/m^2 for a lamp of 1 W: cosine and visible part included. Row 0 is the lowest row of the plane.
-    direction : ndarray, float32, shape (height, width, 3)
-        Unit vectors of travel in the plane frame (x_axis, y_axis, normal), z < 0. Where no light arrives: that of the
-        unblocked light, or (0, 0, -1) if the lamp is behind the plane.
-
-    Raises
-    ------
-    ValueError
-        An argument is out of range; the message names it.
-    Cancelled
-        `progress` returned False.
     """
 
 def read_exr(path: str, part: str | None = None) -> tuple:
@@ -682,137 +789,6 @@ def simulate(
     ------
     ValueError
         Names the argument, its value and what is allowed.
-    Cancelled
-        `progress` returned False.
-    """
-
-def spot_beams(
-    origin: numpy.ndarray,
-    x_axis: numpy.ndarray,
-    y_axis: numpy.ndarray,
-    normal: numpy.ndarray,
-    pitch_x: float,
-    pitch_y: float,
-    width: int,
-    height: int,
-    position: numpy.ndarray,
-    frame: numpy.ndarray,
-    spot_size: float,
-    blend: float,
-    occluders: Occluders = None,
-    samples: int = 4,
-    threads: int = 0,
-    progress: typing.Any = None,
-    falloff: str = "scaled",
-    clearance: float = 0.0,
-) -> tuple:
-    """
-    Irradiance of a plane by a spot lamp of 1 W (over the whole sphere, as Blender counts it), and where it comes from.
-
-    Parameters
-    ----------
-    origin : 3 floats
-        World position, in metres, of the outer corner of texel (0, 0).
-    x_axis, y_axis, normal : 3 floats each
-        Unit vectors at right angles in the world: along a row of texels, from row to row, and out of the lit side. They may
-        be left-handed (a mirrored texture).
-    pitch_x, pitch_y : float
-        Size of a texel in metres.
-    width, height : int
-        Texels, 1 to 65536.
-    position : 3 floats
-        Of the lamp in the world, metres.
-    frame : (3, 3) floats
-        Rows: the lamp's x, y and z axes in the world with their scale (the columns of its 3 x 3 world matrix). It shines
-        along -z.
-    spot_size : float
-        Full angle of the cone in radians, 0 < spot_size <= pi.
-    blend : float
-        Soft part of the cone, 0 to 1.
-    occluders : Occluders, optional
-        What casts shadows; None: nothing does.
-    samples : int
-        samples x samples points in each texel, each with its own visibility; 1 to 64.
-    threads : int
-        0: all. The result is the same, bit for bit, for any number.
-    progress : callable, optional
-        progress(fraction) returns False to stop.
-    clearance : float
-        How far off the plane shadow rays start, in metres, besides what rounding needs: as far as the receiver's own faces,
-        where they are among the occluders, depart from the plane.
-    falloff : str
-        "scaled": as Cycles in Blender 4.2, 4.5 and 5.0, where the lamp's scale shapes the cone. "legacy": as in 3.4, where
-        it does not, and light falls off with the cosine to the axis besides.
-
-    Returns
-    -------
-    irradiance : ndarray, float32, shape (height, width)
-        W/m^2 for a lamp of 1 W: cosine and visible part included. Row 0 is the lowest row of the plane.
-    direction : ndarray, float32, shape (height, width, 3)
-        Unit vectors of travel in the plane frame (x_axis, y_axis, normal), z < 0. Where no light arrives: that of the
-        unblocked light, or (0, 0, -1) if the lamp is behind the plane.
-
-    Raises
-    ------
-    ValueError
-        An argument is out of range; the message names it.
-    Cancelled
-        `progress` returned False.
-    """
-
-def sun_beams(
-    origin: numpy.ndarray,
-    x_axis: numpy.ndarray,
-    y_axis: numpy.ndarray,
-    normal: numpy.ndarray,
-    pitch_x: float,
-    pitch_y: float,
-    width: int,
-    height: int,
-    direction: numpy.ndarray,
-    occluders: Occluders = None,
-    samples: int = 4,
-    threads: int = 0,
-    progress: typing.Any = None,
-    clearance: float = 0.0,
-) -> numpy.ndarray:
-    """
-    Irradiance of a plane by parallel light of 1 W/m^2 at normal incidence.
-
-    Parameters
-    ----------
-    origin : 3 floats
-        World position, in metres, of the outer corner of texel (0, 0).
-    x_axis, y_axis, normal : 3 floats each
-        Unit vectors at right angles in the world: along a row of texels, from row to row, and out of the lit side. They may
-        be left-handed (a mirrored texture).
-    pitch_x, pitch_y : float
-        Size of a texel in metres.
-    width, height : int
-        Texels, 1 to 65536.
-    direction : 3 floats
-        Direction of travel in the world, any length but 0.
-    occluders : Occluders, optional
-        What casts shadows; None: nothing does.
-    samples : int
-        samples x samples points in each texel, each with its own visibility; 1 to 64.
-    threads : int
-        0: all. The result is the same, bit for bit, for any number.
-    progress : callable, optional
-        progress(fraction) returns False to stop.
-    clearance : float
-        How far off the plane shadow rays start, in metres, besides what rounding needs: as far as the receiver's own faces,
-        where they are among the occluders, depart from the plane.
-
-    Returns
-    -------
-    irradiance : ndarray, float32, shape (height, width)
-        W/m^2: cosine times visible part of the texel; 0 everywhere if the light comes from behind. Row 0 is the lowest row.
-
-    Raises
-    ------
-    ValueError
-        An argument is out of range; the message names it.
     Cancelled
         `progress` returned False.
     """

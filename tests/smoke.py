@@ -79,31 +79,22 @@ def fuzz(whole, path, library, cases=150):
 
 
 def beams():
-    grid = {
-        "origin": (-1, -1, 0),
-        "x_axis": (1, 0, 0),
-        "y_axis": (0, 1, 0),
-        "normal": (0, 0, 1),
-        "pitch_x": 2 / SIZE,
-        "pitch_y": 2 / SIZE,
-        "width": SIZE,
-        "height": SIZE,
-    }
-    corners = np.array([[0, -1, 0.5], [0.5, -1, 0.5], [0.5, 1, 0.5], [0, 1, 0.5]], np.float32)
-    settings = {
-        "occluders": native.Occluders(corners, np.array([[0, 1, 2], [0, 2, 3]], np.uint32)),
-        "samples": 3,
-        "threads": THREADS,
-    }
-    sun = native.sun_beams(**grid, direction=(0.3, 0, -1), **settings)
+    grid = native.ReceiverGrid((-1, -1, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 2 / SIZE, 2 / SIZE, SIZE, SIZE)
+    corners = np.array([[0, -1, 0.5], [0.5, -1, 0.5], [0.5, 1, 0.5], [0, 1, 0.5]])
+    occluders = native.Occluders(corners, np.array([[0, 1, 2], [0, 2, 3]], np.uint32), (0, 0, 0))
+
+    def gather(light, progress=None):
+        return native.gather_beams(grid, light, occluders, samples=3, threads=THREADS, progress=progress)
+
+    sun, _ = gather(native.SunLight((0.3, 0, -1)))
     assert sun.min() == 0 < sun.max()
-    point, point_direction = native.point_beams(**grid, position=(0.2, 0, 1), **settings)
-    spot, _ = native.spot_beams(
-        **grid, position=(0.2, 0, 1), frame=np.eye(3), spot_size=1.0, blend=0.2, progress=lambda f: True, **settings
-    )
+    lamp = native.PointLight((0.2, 0, 1))
+    assert lamp.position_in(grid) == (1.2, 1, 1)
+    point, point_direction = gather(lamp)
+    spot, _ = gather(native.SpotLight((0.2, 0, 1), np.eye(3), 1.0, 0.2), lambda fraction: True)
     assert point.max() > 0
     assert spot.max() > 0
-    cancelled_at(0, lambda progress: native.sun_beams(**grid, direction=(0, 0, -1), progress=progress, **settings))
+    cancelled_at(0, lambda progress: gather(native.SunLight((0, 0, -1)), progress))
     covered = native.coverage(np.array([[1.5, 1], [9, 1], [9, 8]], np.float64), np.array([3], np.uint32), SIZE, SIZE)
     assert 0 < covered.sum() < SIZE * SIZE
     return sun, point, point_direction

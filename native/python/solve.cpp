@@ -26,7 +26,7 @@ using Plane2D = py::array_t<float, 0>;
 
 // A light and the arrays that it looks at.
 struct HeldLight {
-    Light light;
+    PlaneLight light;
     std::vector<py::object> arrays;
 };
 
@@ -88,7 +88,7 @@ std::vector<HeldLight> lights_of(const Plane2D& irradiance, const Array<float>& 
     for (std::size_t c = 0; c < (apart ? channels : 1); ++c)
         views.push_back(channel_view(irradiance, static_cast<py::ssize_t>(c)));
     std::vector<HeldLight> held;
-    for (Light& light : lights_of_channels(views, directions_of(direction, views.front()))) {
+    for (PlaneLight& light : lights_of_channels(views, directions_of(direction, views.front()))) {
         light.color.resize(channels, 1.0);
         held.push_back({std::move(light), {irradiance, direction}});
     }
@@ -175,7 +175,7 @@ Squares adaptive_beams(const HeldLight& light, double tolerance)
 
 void bind_solve(py::module_& m)
 {
-    py::class_<HeldLight>(m, "Light", R"(What arrives on a plane from one light, and what is known of where from.
+    py::class_<HeldLight>(m, "PlaneLight", R"(What arrives on a plane from one light, and what is known of where from.
 
 Parameters
 ----------

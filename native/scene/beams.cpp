@@ -5,54 +5,43 @@
 #include <cmath>
 #include <limits>
 #include <span>
-#include <type_traits>
 #include <vector>
 
 #include "base/error.h"
 #include "base/pool.h"
 #include "base/threads.h"
+#include "scene/ray_start.h"
 #include "scene/shadows.h"
 
 namespace beamspread {
 
 namespace {
 
-// Rounding of a vertex, of a texel's position and of the ray's origin moves each by up to half a unit in the last place
-// of the largest coordinate; Embree's robust test adds a few. Starting this many units off the plane keeps a ray clear
-// of the receiver's own triangles, and is far below what can be seen: 2 micrometres in a scene of 1 metre.
-constexpr double offset_ulps = 16.0;
-
-RayStart ray_start(const ReceiverGrid& grid, const Occluders* occluders, double clearance)
+// Points of a texel relative to its corner in the world, n x n: one in each cell of an n x n grid and one in each of n^2
+// columns and n^2 rows, so that a shadow's border along the texels is resolved as finely as an oblique one (Chiu,
+// Shirley, Wang 1994, "Multi-jittered sampling", without the jitter).
+std::vector<Vec3> sub_texel_points(const ReceiverGrid& grid, int samples)
 {
-    const double reach = std::max(grid.reach(), occluders ? occluders->reach() : 0.0);
-    return {.rounding = offset_ulps * static_cast<double>(std::numeric_limits<float>::epsilon()) * reach,
-            .clearance = clearance};
-}
-
-// Sub-texel points in texels, n x n: one in each cell of an n x n grid and one in each of n^2 columns and n^2 rows, so
-// that a shadow's border along the texels is resolved as finely as an oblique one (Chiu, Shirley, Wang 1994,
-// "Multi-jittered sampling", without the jitter).
-std::vector<Vec2> sub_texel_points(int samples)
-{
-    std::vector<Vec2> points;
+    std::vector<Vec3> points;
     for (int j = 0; j < samples; ++j) {
         for (int i = 0; i < samples; ++i)
-            points.emplace_back((i + (j + 0.5) / samples) / samples, (j + (i + 0.5) / samples) / samples);
+            points.push_back(grid.step((i + (j + 0.5) / samples) / samples, (j + (i + 0.5) / samples) / samples));
     }
     return points;
 }
 
 // One light's beams on one grid.
-template <class AnyLight>
 class Gatherer {
 public:
-    Gatherer(const ReceiverGrid& grid, const AnyLight& light, const Occluders* occluders, const BeamSettings& settings)
+    Gatherer(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, const BeamSettings& settings)
         : m_grid(grid),
           m_light(light),
+          m_is_far(light.source().is_far),
           m_occluders(occluders),
-          m_points(sub_texel_points(settings.samples)),
+          m_points(sub_texel_points(grid, settings.samples)),
+          m_position_rounding(std::numeric_limits<double>::epsilon() * grid.reach(Vec3(0.0))),
           m_start(ray_start(grid, occluders, settings.clearance)),
-          m_shadows(grid, light.source(), occluders, m_start),
+          m_shadows(grid, light.source(), occluders, m_start, settings.find_shadows),
           m_open_texel(gather_texel(0.0, 0.0, nullptr))
     {
     }
@@ -94,36 +83,44 @@ private:
             return {};
         if (shade == Shade::unknown)
             return gather_texel(x, y, m_occluders);
-        // A sun is the same everywhere.
-        return std::is_same_v<AnyLight, SunLight> ? m_open_texel : gather_texel(x, y, nullptr);
+        return m_is_far ? m_open_texel : gather_texel(x, y, nullptr);
     }
 
     Texel gather_texel(double x, double y, const Occluders* occluders) const
     {
         Texel sum{};
-        for (std::size_t first = 0; first < m_points.size(); first += Occluders::packet_size)
-            gather_points(x, y, std::span(m_points).subspan(first), occluders, sum);
+        const Vec3 corner = m_grid.point(x, y);
+        for (std::span<const Vec3> rest = m_points; !rest.empty();) {
+            const std::span<const Vec3> packet = rest.first(std::min(rest.size(), Occluders::packet_size));
+            sum = gather_points(corner, packet, occluders, sum);
+            rest = rest.subspan(packet.size());
+        }
         sum.irradiance /= static_cast<double>(m_points.size());
         return sum;
     }
 
-    // Adds the light of as many of the points as make a packet of rays.
-    void gather_points(double x, double y, std::span<const Vec2> points, const Occluders* occluders, Texel& sum) const
+    // Adds the light of at most as many points as make a packet of rays.
+    Texel gather_points(const Vec3& corner, std::span<const Vec3> subs, const Occluders* occluders, Texel sum) const
     {
+        std::array<Vec3, Occluders::packet_size> points;
+        std::array<Arrival, Occluders::packet_size> arrivals;
+        for (std::size_t i = 0; i < subs.size(); ++i)
+            points[i] = corner + subs[i];
+        m_light.arrive(std::span(points).first(subs.size()), arrivals.data());
+
         std::array<Vec3, Occluders::packet_size> travel;
         std::array<double, Occluders::packet_size> irradiance;
         std::array<ShadowRay, Occluders::packet_size> rays;
         std::size_t count = 0;
-        for (const Vec2& sub : points.first(std::min(points.size(), Occluders::packet_size))) {
-            const Vec3 point = m_grid.point(x + sub.x, y + sub.y);
-            const Arrival arrival = m_light.at(point);
+        for (std::size_t i = 0; i < subs.size(); ++i) {
+            const Arrival& arrival = arrivals[i];
             const double cos_theta = -glm::dot(arrival.travel, m_grid.normal);
-            if (!(cos_theta > 0.0) || arrival.flux == 0.0)
+            if (!(cos_theta > min_cos_theta) || arrival.flux == 0.0 || arrival.distance <= m_position_rounding)
                 continue;
             travel[count] = arrival.travel;
             irradiance[count] = arrival.flux * cos_theta;
             if (occluders)
-                rays[count] = shadow_ray(point, arrival);
+                rays[count] = shadow_ray(points[i], arrival);
             ++count;
         }
         const std::uint32_t blocked = occluders ? occluders->blocked(std::span(rays).first(count)) : 0;
@@ -133,6 +130,7 @@ private:
             sum.irradiance += irradiance[i];
             sum.flow += irradiance[i] * travel[i];
         }
+        return sum;
     }
 
     ShadowRay shadow_ray(const Vec3& point, const Arrival& arrival) const
@@ -150,14 +148,16 @@ private:
     Vec3 mean_direction(const Vec3& flow, double x, double y) const
     {
         const bool is_lit = glm::dot(flow, flow) > 0.0;
-        const Vec3 direction = m_grid.to_plane(is_lit ? flow : m_light.at(m_grid.point(x + 0.5, y + 0.5)).travel);
-        return direction.z < 0.0 ? glm::normalize(direction) : Vec3(0.0, 0.0, -1.0);
+        return is_lit ? glm::normalize(m_grid.to_plane(flow))
+                      : unblocked_direction(m_grid, m_light, m_grid.point(x + 0.5, y + 0.5));
     }
 
     const ReceiverGrid& m_grid;
-    const AnyLight& m_light;
+    const Light& m_light;
+    bool m_is_far;
     const Occluders* m_occluders;
-    std::vector<Vec2> m_points;
+    std::vector<Vec3> m_points;
+    double m_position_rounding;  // a lamp within this of a point is in it: light there has neither direction nor bound
     RayStart m_start;
     Shadows m_shadows;
     Pool<std::vector<Shade>> m_shades;
@@ -165,6 +165,14 @@ private:
 };
 
 }  // namespace
+
+Vec3 unblocked_direction(const ReceiverGrid& grid, const Light& light, const Vec3& point)
+{
+    Arrival arrival;
+    light.arrive({&point, 1}, &arrival);
+    const Vec3 direction = glm::normalize(grid.to_plane(arrival.travel));
+    return -direction.z > min_cos_theta ? direction : Vec3(0.0, 0.0, -1.0);
+}
 
 void compute_beams(const ReceiverGrid& grid, const Light& light, const Occluders* occluders,
                    const BeamSettings& settings, const BeamArrays& beams, Progress& progress)
@@ -176,15 +184,11 @@ void compute_beams(const ReceiverGrid& grid, const Light& light, const Occluders
         reject("clearance", settings.clearance, "a finite length >= 0 in metres");
 
     progress.set_total(static_cast<double>(grid.height));
-    std::visit(
-        [&](const auto& any_light) {
-            Gatherer gatherer(grid, any_light, occluders, settings);
-            const auto gather_band = [&](std::size_t band) {
-                progress.advance(static_cast<double>(gatherer.gather_band(band, beams)));
-            };
-            with_threads(settings.threads, [&] { parallel_for(gatherer.bands(), gather_band); });
-        },
-        light);
+    Gatherer gatherer(grid, light, occluders, settings);
+    const auto gather_band = [&](std::size_t band) {
+        progress.advance(static_cast<double>(gatherer.gather_band(band, beams)));
+    };
+    with_threads(settings.threads, [&] { parallel_for(gatherer.bands(), gather_band); });
     progress.finish();
 }
 

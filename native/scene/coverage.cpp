@@ -15,6 +15,17 @@ namespace {
 // Rows that are worked on together; also the unit of work of a thread.
 constexpr std::size_t rows_per_band = 64;
 
+// Heights and areas are counted in whole multiples of this many per texel: the heights of edges that meet add up
+// exactly, so nothing is left in texels that no edge passes through. The positions where an edge enters a texel are
+// rounded by at most 5 * 2^-53 of the largest coordinate, 0.04 of a multiple in a grid of 65536 texels: what enters a
+// texel by rounding alone counts as 0. A texel's part is off by less than one multiple for each edge through it.
+constexpr double per_texel = 0x1p30;
+
+std::int64_t counted(double part)
+{
+    return std::llrint(part * per_texel);
+}
+
 // Signed area by Green's theorem: each edge adds, to every texel right of it, the height by which it crosses the
 // texel's row. Stored as differences along the row, so that an edge touches only the texels that it passes through and
 // one running sum at the end gives the covered part.
@@ -25,12 +36,12 @@ public:
           m_rows(static_cast<double>(rows)),
           m_width(static_cast<double>(width)),
           m_stride(width + 1),
-          m_difference(rows * m_stride, 0.0)
+          m_difference(rows * m_stride, 0)
     {
     }
 
     // An edge in texels of the grid.
-    void add_edge(Vec2 from, Vec2 to, double sign)
+    void add_edge(Vec2 from, Vec2 to, int sign)
     {
         from.y -= m_bottom;
         to.y -= m_bottom;
@@ -47,68 +58,72 @@ public:
         for (double y = begin; y < end;) {
             const double row = std::floor(y);
             const double next = std::min(row + 1.0, end);
-            add_in_row(static_cast<std::size_t>(row), x_at(y), x_at(next), sign * (next - y));
+            add_in_row(static_cast<std::size_t>(row), x_at(y), x_at(next), sign * (counted(next) - counted(y)));
             y = next;
         }
     }
 
     void sum_row(std::size_t row, float* coverage) const
     {
-        const double* difference = &m_difference[row * m_stride];
-        double covered = 0.0;
+        const std::int64_t* difference = &m_difference[row * m_stride];
+        std::int64_t covered = 0;
         for (std::size_t x = 0; x + 1 < m_stride; ++x) {
             covered += difference[x];
-            coverage[x] = static_cast<float>(std::clamp(covered, 0.0, 1.0));
+            coverage[x] = static_cast<float>(std::clamp(static_cast<double>(covered) / per_texel, 0.0, 1.0));
         }
     }
 
 private:
     // A piece of an edge within one row, from x0 to x1 while it rises by `height`, cut at the borders of texels.
-    void add_in_row(std::size_t row, double x0, double x1, double height)
+    void add_in_row(std::size_t row, double x0, double x1, std::int64_t height)
     {
         if (x0 > x1)
             std::swap(x0, x1);  // only where it passes counts, not which way it leans
-        double* difference = &m_difference[row * m_stride];
-        const double width = x1 - x0;
-        const auto share = [&](double a, double b) { return width > 0.0 ? height * ((b - a) / width) : height; };
+        std::int64_t* difference = &m_difference[row * m_stride];
+        // How high it has risen at x.
+        const auto height_at = [&](double x) {
+            return x < x1 ? std::llrint(static_cast<double>(height) * ((x - x0) / (x1 - x0))) : height;
+        };
 
         // Left of the grid: all of the row is to its right. Right of it: nothing is.
-        if (x0 < 0.0)
-            difference[0] += share(x0, std::min(x1, 0.0));
-        const double begin = std::clamp(x0, 0.0, m_width);
-        const double end = std::clamp(x1, 0.0, m_width);
-        if (width == 0.0) {
-            if (x0 >= 0.0 && x0 < m_width)
-                add_in_texel(difference, begin, begin, height);
+        std::int64_t risen = 0;
+        if (x0 < 0.0) {
+            risen = height_at(0.0);
+            difference[0] += risen;
+        }
+        if (x0 >= m_width || x1 < 0.0)
             return;
-        }
-        for (double x = begin; x < end;) {
+        const double end = std::min(x1, m_width);
+        double x = std::max(x0, 0.0);
+        do {
             const double next = std::min(std::floor(x) + 1.0, end);
-            add_in_texel(difference, x, next, share(x, next));
+            const std::int64_t there = height_at(next);
+            add_in_texel(difference, x, next, there - risen);
+            risen = there;
             x = next;
-        }
+        } while (x < end);
     }
 
     // Of the texel itself the part right of the edge is covered, of all further ones the whole.
-    static void add_in_texel(double* difference, double x0, double x1, double height)
+    static void add_in_texel(std::int64_t* difference, double x0, double x1, std::int64_t height)
     {
         const double left = std::floor(x0);
-        const double part_left = 0.5 * (x0 + x1) - left;
+        const auto part_left = std::llrint(static_cast<double>(height) * (0.5 * (x0 + x1) - left));
         const auto texel = static_cast<std::size_t>(left);
-        difference[texel] += height * (1.0 - part_left);
-        difference[texel + 1] += height * part_left;
+        difference[texel] += height - part_left;
+        difference[texel + 1] += part_left;
     }
 
     double m_bottom;
     double m_rows;
     double m_width;
     std::size_t m_stride;
-    std::vector<double> m_difference;
+    std::vector<std::int64_t> m_difference;
 };
 
 struct Polygon {
     std::span<const Vec2> corners;
-    double sign;  // makes its covered area positive
+    int sign;  // makes its covered area positive
     double bottom;
     double top;
 };
@@ -140,7 +155,7 @@ std::vector<Polygon> split(std::span<const Vec2> corners, std::span<const std::u
         const auto [low, high] =
             std::minmax_element(own.begin(), own.end(), [](const Vec2& a, const Vec2& b) { return a.y < b.y; });
         // An edge that rises has the inside on its left where corners run anticlockwise, and on its right it counts.
-        polygons.push_back({own, signed_area(own) > 0.0 ? -1.0 : 1.0, low->y, high->y});
+        polygons.push_back({own, signed_area(own) > 0.0 ? -1 : 1, low->y, high->y});
         first += count;
     }
     if (first != corners.size())

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "scene/checks.h"
 #include "scene/embree.h"
 
 namespace beamspread {
@@ -23,36 +24,34 @@ void check(RTCDevice device)
 namespace {
 
 // Embree's hits are undefined beyond this: products of coordinates overflow single precision.
-constexpr float max_coordinate = 1e18f;
+constexpr double max_coordinate = 1e18;
 
-void check_arrays(std::span<const float> vertices, std::span<const std::uint32_t> triangles)
+void check_arguments(std::span<const Vec3> vertices, std::span<const Occluders::Triangle> triangles, const Vec3& origin)
 {
-    if (vertices.size() % 3 != 0)
-        reject("vertices", std::to_string(vertices.size()) + " numbers", "three per vertex");
-    if (triangles.size() % 3 != 0)
-        reject("triangles", std::to_string(triangles.size()) + " indices", "three per triangle");
-    for (const float coordinate : vertices) {
-        if (!(std::abs(coordinate) < max_coordinate))
-            reject("vertices", static_cast<double>(coordinate), "finite coordinates below 1e18 m");
+    if (!detail::is_finite(origin))
+        reject("origin", detail::to_text(origin), "finite coordinates in metres");
+    for (const Vec3& vertex : vertices) {
+        const Vec3 size = glm::abs(vertex - origin);
+        if (!(size.x < max_coordinate && size.y < max_coordinate && size.z < max_coordinate))
+            reject("vertices", detail::to_text(vertex), "finite coordinates within 1e18 m of the origin");
     }
-    const std::size_t count = vertices.size() / 3;
-    for (const std::uint32_t index : triangles) {
-        if (index >= count)
-            reject("triangles", std::to_string(index),
-                   "indices below the number of vertices, " + std::to_string(count));
+    for (const auto& triangle : triangles) {
+        for (const std::uint32_t index : triangle) {
+            if (index >= vertices.size())
+                reject("triangles", std::to_string(index),
+                       "indices below the number of vertices, " + std::to_string(vertices.size()));
+        }
     }
 }
 
-// Copies `values` into a new buffer of Embree's, which pads it as its vector loads need; it lives as long as the
-// geometry.
+// A new buffer of Embree's, padded as its vector loads need; it lives as long as the geometry.
 template <class T>
-const T* set_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::span<const T> values)
+std::span<T> make_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::size_t count)
 {
-    void* buffer = rtcSetNewGeometryBuffer(geometry, type, 0, format, 3 * sizeof(T), values.size() / 3);
+    void* buffer = rtcSetNewGeometryBuffer(geometry, type, 0, format, sizeof(T), count);
     if (!buffer)
         throw std::bad_alloc();
-    std::copy(values.begin(), values.end(), static_cast<T*>(buffer));
-    return static_cast<const T*>(buffer);
+    return {static_cast<T*>(buffer), count};
 }
 
 }  // namespace
@@ -60,16 +59,14 @@ const T* set_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, 
 struct Occluders::Hierarchy {
     embree::Device device;
     embree::Scene scene;
-    const float* vertices = nullptr;  // in buffers of the scene
-    const std::uint32_t* triangles = nullptr;
+    std::span<const Vec3f> vertices;  // in buffers of the scene; relative to the origin
+    std::span<const Triangle> triangles;
 };
 
-Occluders::Occluders(std::span<const float> vertices, std::span<const std::uint32_t> triangles)
-    : m_triangle_count(triangles.size() / 3)
+Occluders::Occluders(std::span<const Vec3> vertices, std::span<const Triangle> triangles, const Vec3& origin)
+    : m_triangle_count(triangles.size()), m_origin(origin)
 {
-    check_arrays(vertices, triangles);
-    for (const float coordinate : vertices)
-        m_reach = std::max(m_reach, static_cast<double>(std::abs(coordinate)));
+    check_arguments(vertices, triangles, origin);
     if (triangles.empty())
         return;
 
@@ -84,8 +81,17 @@ Occluders::Occluders(std::span<const float> vertices, std::span<const std::uint3
     // Robust: no light leaks through the shared edges of triangles.
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
     const embree::Geometry geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
-    m_hierarchy->vertices = set_buffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, vertices);
-    m_hierarchy->triangles = set_buffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, triangles);
+    static_assert(sizeof(Vec3f) == 3 * sizeof(float) && sizeof(Triangle) == 3 * sizeof(std::uint32_t));
+    const std::span corners =
+        make_buffer<Vec3f>(geometry.get(), RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, vertices.size());
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+        corners[i] = Vec3f(vertices[i] - origin);
+    }
+    const std::span indices =
+        make_buffer<Triangle>(geometry.get(), RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, triangles.size());
+    std::ranges::copy(triangles, indices.begin());
+    m_hierarchy->vertices = corners;
+    m_hierarchy->triangles = indices;
     rtcCommitGeometry(geometry.get());
     rtcAttachGeometry(scene, geometry.get());
     rtcCommitScene(scene);
@@ -97,8 +103,7 @@ Occluders::~Occluders() = default;
 std::array<Vec3, 3> Occluders::triangle(std::size_t index) const
 {
     const auto corner = [this, index](std::size_t i) {
-        const float* vertex = m_hierarchy->vertices + std::size_t{3} * m_hierarchy->triangles[3 * index + i];
-        return Vec3(vertex[0], vertex[1], vertex[2]);
+        return m_origin + Vec3(m_hierarchy->vertices[m_hierarchy->triangles[index][i]]);
     };
     return {corner(0), corner(1), corner(2)};
 }
@@ -110,7 +115,9 @@ std::uint32_t Occluders::blocked(std::span<const ShadowRay> rays) const
     alignas(64) std::array<int, packet_size> valid{};  // -1: a ray
     RTCRay16 packet{};
     for (std::size_t i = 0; i < rays.size(); ++i) {
-        const Vec3f from(rays[i].origin);
+        if (!(rays[i].distance > 0.0))
+            continue;
+        const Vec3f from(rays[i].origin - m_origin);
         const Vec3f along(rays[i].direction);
         valid[i] = -1;
         packet.org_x[i] = from.x;

@@ -47,13 +47,15 @@ void check_side(const std::string& name, std::size_t side)
 
 }  // namespace
 
-double ReceiverGrid::reach() const
+double ReceiverGrid::reach(const Vec3& centre) const
 {
     const double w = static_cast<double>(width);
     const double h = static_cast<double>(height);
     double largest = 0.0;
-    for (const Vec3& corner : {point(0, 0), point(w, 0), point(0, h), point(w, h)})
-        largest = std::max({largest, std::abs(corner.x), std::abs(corner.y), std::abs(corner.z)});
+    for (const Vec3& corner : {point(0, 0), point(w, 0), point(0, h), point(w, h)}) {
+        const Vec3 offset = glm::abs(corner - centre);
+        largest = std::max({largest, offset.x, offset.y, offset.z});
+    }
     return largest;
 }
 

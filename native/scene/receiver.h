@@ -19,8 +19,9 @@ struct ReceiverGrid {
     std::size_t width = 0;
     std::size_t height = 0;
 
-    // World position of (x, y) in texels.
-    Vec3 point(double x, double y) const { return origin + x_axis * (x * pitch_x) + y_axis * (y * pitch_y); }
+    // From texel (0, 0) to (x, y) in the world, and the world position there; x and y in texels.
+    Vec3 step(double x, double y) const { return x_axis * (x * pitch_x) + y_axis * (y * pitch_y); }
+    Vec3 point(double x, double y) const { return origin + step(x, y); }
 
     // A world direction in the plane frame.
     Vec3 to_plane(const Vec3& direction) const
@@ -28,8 +29,8 @@ struct ReceiverGrid {
         return {glm::dot(direction, x_axis), glm::dot(direction, y_axis), glm::dot(direction, normal)};
     }
 
-    // The largest absolute coordinate: what the rounding of its world positions scales with.
-    double reach() const;
+    // The largest absolute coordinate relative to `centre`: what the rounding of positions relative to it scales with.
+    double reach(const Vec3& centre) const;
 
     // Throws InvalidArgument naming the first field that is out of range.
     void check() const;

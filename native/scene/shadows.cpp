@@ -59,8 +59,9 @@ struct Shadow {
 // Central projection from the light onto the plane.
 class Projection {
 public:
-    Projection(const ReceiverGrid& grid, const LightSource& source, const RayStart& start)
+    Projection(const ReceiverGrid& grid, const LightSource& source, const Vec3& origin, const RayStart& start)
         : m_grid(grid),
+          m_origin(origin),
           m_source(source.position - (source.is_far ? Vec3(0.0) : grid.origin)),
           m_is_near(source.is_far ? 0.0 : 1.0),
           m_source_height(glm::dot(m_source, grid.normal)),
@@ -74,6 +75,7 @@ public:
         std::array<double, 3> corners;
         double lowest;
         double highest;
+        double rounding;  // of a ray and of the triangle
     };
 
     Heights heights(const std::array<Vec3, 3>& triangle) const
@@ -81,14 +83,15 @@ public:
         const auto height = [this](const Vec3& corner) { return glm::dot(corner - m_grid.origin, m_grid.normal); };
         const std::array<double, 3> all = {height(triangle[0]), height(triangle[1]), height(triangle[2])};
         const auto [lowest, highest] = std::minmax({all[0], all[1], all[2]});
-        return {all, lowest, highest};
+        return {all, lowest, highest, std::max(m_start.rounding, rounding_of(triangle, m_origin))};
     }
 
     // Whether the triangle lies behind where rays start, or beyond the lamp where they end.
     bool is_off_the_way(const Heights& heights) const
     {
-        return heights.highest <= m_start.height() - 0.5 * m_start.rounding ||
-               (m_is_near > 0.0 && heights.lowest >= m_source_height + m_start.rounding);
+        const double lowest_start = m_start.clearance + 0.5 * m_start.rounding;
+        return heights.highest + (heights.rounding - m_start.rounding) <= lowest_start ||
+               (m_is_near > 0.0 && heights.lowest >= m_source_height + heights.rounding);
     }
 
     // Whether the shadow has an end, not too far away.
@@ -102,14 +105,14 @@ public:
     {
         Shadow shadow{};
         for (std::size_t i = 0; i < 3; ++i)
-            project(triangle[i], heights.corners[i], shadow.corners[i], shadow.reach);
-        const double margin = m_start.height() + m_start.rounding;
+            project(triangle[i], heights.corners[i], heights.rounding, shadow.corners[i], shadow.reach);
+        const double margin = m_start.height() + heights.rounding;
         shadow.is_whole = heights.lowest >= margin && (m_is_near == 0.0 || heights.highest <= m_source_height - margin);
         return shadow;
     }
 
 private:
-    void project(const Vec3& vertex, double height, Vec2& corner, Vec2& reach) const
+    void project(const Vec3& vertex, double height, double rounding, Vec2& corner, Vec2& reach) const
     {
         // With heights h above the plane: p = (h_s v - h_v s) / (h_s - h_v) for a lamp at s, and for a sun in the
         // direction s p = v - (h_v / h_s) s.
@@ -118,13 +121,14 @@ private:
         // A step of 1 at the vertex or at the ray's start moves the shadow by up to this: 1 / cos for a sun, for a lamp
         // magnified besides.
         const double magnification = glm::length(m_source - m_is_near * point) / weight(height);
-        const double step = 2.0 * m_start.height() * magnification;
+        const double step = 2.0 * (m_start.clearance + rounding) * magnification;
         reach = glm::max(reach, Vec2(step / m_grid.pitch_x, step / m_grid.pitch_y) + own_rounding);
     }
 
     double weight(double height) const { return m_source_height - m_is_near * height; }
 
     const ReceiverGrid& m_grid;
+    Vec3 m_origin;  // of the rays' single precision
     Vec3 m_source;  // from the grid's origin to a lamp; the unit vector towards a sun
     double m_is_near;
     double m_source_height;
@@ -164,11 +168,14 @@ void shade_row(const Shadow& shadow, std::size_t row, std::size_t width, Shade* 
 
 }  // namespace
 
-Shadows::Shadows(const ReceiverGrid& grid, const LightSource& source, const Occluders* occluders, const RayStart& start)
-    : m_grid(grid), m_source(source), m_occluders(occluders), m_start(start)
+Shadows::Shadows(const ReceiverGrid& grid, const LightSource& source, const Occluders* occluders, const RayStart& start,
+                 bool find)
+    : m_grid(grid), m_source(source), m_occluders(occluders), m_start(start), m_is_unknown(occluders && !find)
 {
-    const Projection projection(grid, source, start);
-    if (!occluders || !projection.is_lit())
+    if (!occluders || !find)
+        return;
+    const Projection projection(grid, source, occluders->origin(), start);
+    if (!projection.is_lit())
         return;
     m_leaves = std::bit_ceil(bands());
     m_nodes.resize(2 * m_leaves);
@@ -203,7 +210,7 @@ void Shadows::shade_band(std::size_t band, std::vector<Shade>& texels) const
     texels.assign((end - begin) * m_grid.width, m_is_unknown ? Shade::unknown : Shade::none);
     if (m_nodes.empty())
         return;
-    const Projection projection(m_grid, m_source, m_start);
+    const Projection projection(m_grid, m_source, m_occluders->origin(), m_start);
     for (std::size_t node = m_leaves + band; node > 0; node /= 2) {
         for (const std::uint32_t i : m_nodes[node]) {
             const std::array<Vec3, 3> triangle = m_occluders->triangle(i);

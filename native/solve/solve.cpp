@@ -22,7 +22,7 @@ void solve_apart(const Problem& problem, Progress& progress, float* luminance, c
     const std::vector<ChannelMedium> media = ChannelSets(problem).media;
     std::fill_n(luminance, problem.plane.texels() * channels, 0.0f);
     progress.set_total(static_cast<double>(problem.lights.size() * media.size()));
-    for (const Light& light : problem.lights)
+    for (const PlaneLight& light : problem.lights)
         for (const ChannelMedium& medium : media) {
             const std::vector<float> radiance = solve_light(light, medium);
             for (std::size_t c = 0; c < channels; ++c)
@@ -42,12 +42,12 @@ void solve(const Problem& problem, Progress& progress, float* luminance)
                 solve_spectral(problem, progress, luminance);
                 break;
             case Solver::direct:
-                solve_apart(problem, progress, luminance, [&](const Light& light, const ChannelMedium& medium) {
+                solve_apart(problem, progress, luminance, [&](const PlaneLight& light, const ChannelMedium& medium) {
                     return solve_direct(problem.plane, light, medium, progress);
                 });
                 break;
             case Solver::adaptive:
-                solve_apart(problem, progress, luminance, [&](const Light& light, const ChannelMedium& medium) {
+                solve_apart(problem, progress, luminance, [&](const PlaneLight& light, const ChannelMedium& medium) {
                     return solve_adaptive(problem.plane, light, medium, problem.tolerance, progress);
                 });
                 break;

@@ -24,7 +24,7 @@ constexpr double negligible_power = 1e-6;
 // Distance and power of each exit over tan(theta / 2), which is smooth in both.
 class ExitTable {
 public:
-    ExitTable(const Plane& plane, const Light& light, const ChannelMedium& medium)
+    ExitTable(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium)
     {
         const auto [first, last] = present(plane, light);
         if (first > last || medium.ldf->ballistic(angle_deg(first), Side::reflected).empty())
@@ -74,7 +74,7 @@ public:
 
 private:
     // The least and the largest tan(theta / 2) of lit texels.
-    static std::pair<float, float> present(const Plane& plane, const Light& light)
+    static std::pair<float, float> present(const Plane& plane, const PlaneLight& light)
     {
         std::pair<float, float> range{1.0f, 0.0f};
         BeamRow row;
@@ -106,7 +106,7 @@ struct Strip {
 
 class LightPass {
 public:
-    LightPass(const Plane& plane, const Light& light, const ChannelMedium& medium)
+    LightPass(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium)
         : m_plane(plane), m_light(light), m_exits(plane, light, medium)
     {
     }
@@ -175,7 +175,7 @@ private:
     }
 
     const Plane& m_plane;
-    const Light& m_light;
+    const PlaneLight& m_light;
     ExitTable m_exits;
 };
 
@@ -184,7 +184,7 @@ private:
 void add_unscattered(const Problem& problem, float* luminance)
 {
     const std::size_t channels = problem.channels.size();
-    for (const Light& light : problem.lights)
+    for (const PlaneLight& light : problem.lights)
         for (std::size_t c = 0; c < channels; ++c)
             LightPass(problem.plane, light, problem.channels[c]).add(luminance + c, channels, light.color[c]);
 }

@@ -92,7 +92,7 @@ def far(size, library):
     light, arguments = shadows(size), ((0.999, 0.998, 0.997), (40.0, 28.0, 20.0))
     unit = transform_seconds(size)
     print(f"\nsun, {size} x {size} RGB, ior 1.4, albedo .999, mean free path 40 texels")
-    lights = _native.Light.of_channels(light, np.array(SUN, np.float32), 3)
+    lights = _native.PlaneLight.of_channels(light, np.array(SUN, np.float32), 3)
     for name, coarsening in (("padded by all of the reach", 1), ("as the solver chooses", 0)):
         rest = [library] * 3, *map(list, arguments), (1.0, 1.0), "fft", 1e-3, 0, None
         cost = seconds(2, _native.convolve, lights, *rest, coarsening=coarsening)

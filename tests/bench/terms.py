@@ -99,7 +99,7 @@ def main():
     for ior, albedo, kind, shadows, path in CASES:
         rng = np.random.default_rng(31)
         lit = mask(shadows, rng)
-        lights = [_native.Light(irradiance * lit, way, [1, 1, 1]) for irradiance, way in beams(kind, rng)]
+        lights = [_native.PlaneLight(irradiance * lit, way, [1, 1, 1]) for irradiance, way in beams(kind, rng)]
         rest = [libraries[ior]] * 3, list(albedo), [path, 0.7 * path, 0.5 * path], (1.0, 1.0)
         exact = _native.convolve(lights, *rest, "fft", 1e-7, 0, None)
         nearby = uniform_filter(exact, (17, 17, 0), mode="nearest")

@@ -47,6 +47,11 @@ def job(lights, occluders=None, surface=None, settings=SETTINGS, **frame):
     return BakeJob("Plane", receiver, Illumination(lights, occluders), surface or Surface(MATERIAL), settings)
 
 
+def shifted(receiver, distance):
+    """The same grid elsewhere."""
+    return replace(receiver, origin=tuple(np.array(receiver.origin) + distance))
+
+
 def reflectance(angle, albedo=0.9, thickness=math.inf):
     medium = beamspread.Medium(g=0.0, ior=1.0, thickness=thickness)
     return beamspread.library(medium, quality="preview").reflectance(angle, albedo)
@@ -76,20 +81,98 @@ def test_an_uneven_receiver_does_not_shadow_itself():
     uvs = corners[:, :2] + 0.5
     polygons = Polygons(corners, uvs, np.array([0, 4]), np.array([(0.0, 0.0, 1.0)]))
     target = build_receiver(fit_uv_maps(polygons), 32, 32).charts[0].grid
-    mesh = Mesh(corners.astype(np.float32), np.array([(0, 1, 2), (0, 2, 3)], np.uint32))
+    mesh = Mesh(corners, np.array([(0, 1, 2), (0, 2, 3)], np.uint32))
     low_sun = replace(SUN, direction=(math.sin(1.5), 0.0, -math.cos(1.5)))
-    irradiance, _ = light_beams(target, low_sun, Illumination([low_sun], mesh).caster(), SETTINGS)
+    irradiance, _ = light_beams(target, low_sun, Illumination([low_sun], mesh).caster(target), SETTINGS)
     assert irradiance == pytest.approx(np.full((32, 32, 3), 2 * math.cos(1.5)), rel=1e-3)
 
 
-ROOF = Mesh(np.array([[-9, -9, 1], [9, -9, 1], [0, 18, 1]], np.float32), np.array([[0, 1, 2]], np.uint32))
+ROOF = Mesh(np.array([[-9, -9, 1], [9, -9, 1], [0, 18, 1]], float), np.array([[0, 1, 2]], np.uint32))
 
 
-def test_bakes_of_the_same_scene_share_its_shadows():
+def test_receivers_near_each_other_share_the_shadows_of_their_scene():
     under_roof = Illumination([SUN], ROOF)
-    assert under_roof.caster() is under_roof.caster()
-    assert under_roof.caster().triangle_count == 1
-    assert Illumination([SUN]).caster() is None
+    near = under_roof.caster(grid())
+    assert near.triangle_count == 1
+    assert under_roof.caster(shifted(grid(), 3.0)) is near
+    assert under_roof.caster(shifted(grid(), 1e4)) is not near
+    assert Illumination([SUN]).caster(grid()) is None
+
+
+@pytest.mark.parametrize("distance", [1e4, 1e6])
+def test_shadows_do_not_drift_far_from_the_world_origin(distance):
+    """Rays are traced relative to an origin within 2^13 texels, in single precision: known to 2^-11 of a texel.
+
+    So shadows stay where they are but for single rays, of 16 per texel, that pass an edge within rounding: with 400
+    texels along edges and rays a 16th of a texel apart some 400 * 16 / 2^11 = 3 for each rounding that moves them.
+    """
+    card = np.array([(-0.31, -0.17, 0.23), (0.23, -0.29, 0.11), (0.07, 0.37, 0.31)])
+    lamp = PointLight("Lamp", 1.0, (1.0, 1.0, 1.0), True, (0.13, 0.21, 0.83))
+    offset = np.array([0.6, -0.64, 0.48]) * distance
+
+    def beams(offset):
+        mesh = Mesh(card + offset, np.array([(0, 1, 2)], np.uint32))
+        there = replace(lamp, position=tuple(np.array(lamp.position) + offset))
+        receiver = shifted(grid(256), offset)
+        return light_beams(receiver, there, Illumination([there], mesh).caster(receiver), replace(SETTINGS, samples=4))
+
+    (here, direction), (there, direction_there) = beams(np.zeros(3)), beams(offset)
+    dark = (here[..., 0] == 0).sum()
+    assert 5000 < dark < 20000
+    flips = np.abs(there - here)[..., 0] > 1e-6 * here.max()
+    assert flips.sum() < 40
+    assert np.abs(there - here).sum() < 1e-4 * here.sum()
+    assert direction_there[~flips] == pytest.approx(direction[~flips], abs=1e-6)
+
+
+@pytest.mark.parametrize("distance", [1e3, 1e6])
+def test_what_is_far_away_does_not_change_shadows_nearby(distance):
+    """Where rays start depends on what they might meet there, not on the largest coordinate of the scene."""
+    card = np.array([(-0.31, -0.17, 0.0), (0.23, -0.29, 0.0), (0.07, 0.37, 0.031)])
+    far = np.array([(0, 0, -10), (1, 0, -10), (0, 1, -10)]) + (distance, 0, 0)
+    sun = replace(SUN, direction=(0.3, 0.2, -1.0))
+    alone = Mesh(card, np.array([(0, 1, 2)], np.uint32))
+    both = Mesh.join([alone, Mesh(far, np.array([(0, 1, 2)], np.uint32))])
+    near, wide = (
+        light_beams(grid(256), sun, Illumination([sun], mesh).caster(grid(256)), SETTINGS)[0] for mesh in (alone, both)
+    )
+    assert (near == 0).any()
+    assert np.array_equal(near, wide)
+
+
+def turned_grid(turn):
+    """A grid around the origin in a random plane, with its axes as rows."""
+    axes, _ = np.linalg.qr(np.random.default_rng(turn).normal(size=(3, 3)))
+    x_axis, y_axis, normal = (tuple(axis) for axis in axes)
+    origin = tuple(-0.5 * (axes[0] + axes[1]))
+    return replace(grid(), origin=origin, x_axis=x_axis, y_axis=y_axis, normal=normal), axes
+
+
+@pytest.mark.parametrize("height", [0.0, 1e-30, 1e-17, 1e-16, 1e-12])
+def test_a_lamp_in_the_plane_adds_nothing(height):
+    lamp = PointLight("Lamp", 100.0, (1.0, 1.0, 1.0), True, (0.013, 0.21, height))
+    sun = bake(grid(), Illumination([SUN]), MATERIAL, 0.0, SETTINGS)
+    assert np.array_equal(bake(grid(), Illumination([lamp, SUN]), MATERIAL, 0.0, SETTINGS), sun)
+
+
+@pytest.mark.parametrize("kind", ["point", "sun"])
+def test_light_along_a_turned_plane_adds_nothing(kind):
+    """By rounding it comes from above or from below."""
+    for turn in range(60):
+        receiver, axes = turned_grid(turn)
+        within = np.array([0.013, 0.21, 0.0]) @ axes
+        if kind == "point":
+            light = PointLight("Lamp", 100.0, (1.0, 1.0, 1.0), True, tuple(within))
+        else:
+            light = replace(SUN, direction=tuple(within / np.linalg.norm(within)))
+        irradiance, direction = light_beams(receiver, light, None, SETTINGS)
+        assert not irradiance.any()
+        assert (direction == (0, 0, -1)).all()
+        sun = replace(SUN, direction=tuple(-axes[2]))
+        alone, both = (
+            bake(receiver, Illumination(lights), MATERIAL, 0.0, SETTINGS) for lights in ([sun], [light, sun])
+        )
+        assert np.array_equal(alone, both)
 
 
 def test_no_light():

@@ -114,7 +114,7 @@ def test_tiles_are_seamless(library, memory):
     beams = np.random.default_rng(11).random((150, 230), np.float32)
     rest = ([library] * 3, ALBEDO, [0.1, 0.2, 0.5], (1.0, 1.0), "fft", 1e-3, 0, None)
     for direction in (travel(40, 70).astype(np.float32), lamp_directions(150, 230)):
-        lights = _native.Light.of_channels(beams, direction, 3)
+        lights = _native.PlaneLight.of_channels(beams, direction, 3)
         whole = _native.convolve(lights, *rest)
         tiled = _native.convolve(lights, *rest, memory=memory)
         assert not np.array_equal(tiled, whole)

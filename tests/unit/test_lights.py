@@ -43,24 +43,24 @@ def assert_within(tolerance, result, expected):
 
 
 def test_many_lamps_of_any_colour_are_the_sum_of_each(ldf):
-    lights = [_native.Light(beams, travel, color.tolist()) for _, color, beams, travel in lamps(20)]
+    lights = [_native.PlaneLight(beams, travel, color.tolist()) for _, color, beams, travel in lamps(20)]
     apart = sum(solve([light], ldf, 1e-5) for light in lights)
     assert_within(TOLERANCE, solve(lights, ldf), apart)
 
 
 def test_light_from_a_point_is_light_with_a_direction_per_texel(ldf):
     for place, color, beams, travel in lamps(2):
-        point = solve([_native.Light.from_point(beams, place, color.tolist())], ldf)
+        point = solve([_native.PlaneLight.from_point(beams, place, color.tolist())], ldf)
         # Directions per texel are rounded to single precision.
-        assert point == pytest.approx(solve([_native.Light(beams, travel, color.tolist())], ldf), rel=1e-4)
+        assert point == pytest.approx(solve([_native.PlaneLight(beams, travel, color.tolist())], ldf), rel=1e-4)
 
 
 @pytest.mark.parametrize("solver", ["direct", "adaptive"])
 def test_other_solvers_take_the_same_lights(ldf, solver):
     size = 40
-    lights = [_native.Light.from_point(beams, place, color.tolist()) for place, color, beams, _ in lamps(3, size)] + [
-        _native.Light(np.ones((size, size), np.float32), np.array((0.6, 0, -0.8), np.float32), [0.2, 0.0, 1.0])
-    ]
+    lights = [
+        _native.PlaneLight.from_point(beams, place, color.tolist()) for place, color, beams, _ in lamps(3, size)
+    ] + [_native.PlaneLight(np.ones((size, size), np.float32), np.array((0.6, 0, -0.8), np.float32), [0.2, 0.0, 1.0])]
     result = solve(lights, ldf, 1e-3, solver)
     expected = solve(lights, ldf, 1e-5)
     assert np.abs(result - expected).sum() <= 2e-3 * expected.sum()
@@ -76,7 +76,7 @@ def test_suns_of_many_directions_share_a_basis(ldf):
         beams = np.zeros((SIZE, SIZE), np.float32)
         y, x = rng.integers(0, SIZE // 2, 2)
         beams[y : y + SIZE // 2, x : x + SIZE // 2] = rng.uniform(0.1, 1)
-        lights.append(_native.Light(beams, travel, rng.uniform(0.1, 1, 3).tolist()))
+        lights.append(_native.PlaneLight(beams, travel, rng.uniform(0.1, 1, 3).tolist()))
     apart = sum(solve([light], ldf) for light in lights)  # one direction is exact
     assert_within(TOLERANCE, solve(lights, ldf), apart)
 
@@ -85,7 +85,7 @@ def test_suns_of_one_direction_and_several_colours(ldf):
     rng = np.random.default_rng(7)
     travel = np.array((0.6, 0, -0.8), np.float32)
     red, blue = rng.random((2, 60, 60), np.float32)
-    together = solve([_native.Light(red, travel, [1, 0, 0.5]), _native.Light(blue, travel, [0, 0.3, 1])], ldf)
+    together = solve([_native.PlaneLight(red, travel, [1, 0, 0.5]), _native.PlaneLight(blue, travel, [0, 0.3, 1])], ldf)
     channels = np.stack([red, 0.3 * blue, 0.5 * red + blue], -1)
     assert together == pytest.approx(convolve(channels, travel, ldf, ALBEDO, PATHS, 1.0), rel=1e-4)
 
@@ -94,15 +94,15 @@ def test_channels_of_an_array_that_differ_by_a_factor_are_one_light():
     beams = np.random.default_rng(8).random((5, 7), np.float32)
     travel = np.array((0, 0, -1), np.float32)
     factors = np.array((0.25, 1, 0.5), np.float32)
-    assert len(_native.Light.of_channels(beams, travel, 3)) == 1
-    assert len(_native.Light.of_channels(beams[..., None] * factors, travel, 3)) == 1
+    assert len(_native.PlaneLight.of_channels(beams, travel, 3)) == 1
+    assert len(_native.PlaneLight.of_channels(beams[..., None] * factors, travel, 3)) == 1
     mixed = beams[..., None] * factors
     mixed[2, 3, 0] *= 1.001
-    assert len(_native.Light.of_channels(mixed, travel, 3)) == 3
+    assert len(_native.PlaneLight.of_channels(mixed, travel, 3)) == 3
 
 
 def test_lights_without_end_are_the_same_for_any_number_of_threads(ldf):
-    lights = [_native.Light(beams, travel, color.tolist()) for _, color, beams, travel in lamps(3)]
+    lights = [_native.PlaneLight(beams, travel, color.tolist()) for _, color, beams, travel in lamps(3)]
     rest = [ldf] * 3, list(ALBEDO), list(PATHS), (1.0, 1.0), "fft", TOLERANCE
     one, three = (_native.convolve(lights, *rest, threads, None) for threads in (1, 3))
     assert one.tobytes() == three.tobytes()

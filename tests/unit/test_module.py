@@ -17,7 +17,7 @@ WHEEL_EMBREE = ROOT / "build/bpy-4.5/bpy/lib/libembree4.so.4"
 ASK_EMBREE = """
 from beamspread.core.native import native
 import numpy as np
-occluders = native.Occluders(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.uint32))
+occluders = native.Occluders(np.eye(3), np.array([[0, 1, 2]], np.uint32))
 print(native.embree_version())
 """
 
@@ -38,9 +38,9 @@ from beamspread.core.native import native
 library = simulate(Medium(), angles=[0, 30], photons=256)
 for solver in ("fft", "direct", "adaptive"):
     convolve(np.ones((8, 8), np.float32), (0.0, 0.0, -1.0), library, 0.5, 1.0, 1.0, solver=solver)
-occluders = native.Occluders(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.uint32))
-native.sun_beams(origin=(0, 0, 0), x_axis=(1, 0, 0), y_axis=(0, 1, 0), normal=(0, 0, 1), pitch_x=1, pitch_y=1,
-                 width=4, height=4, direction=(0, 0, -1), occluders=occluders)
+occluders = native.Occluders(np.eye(3), np.array([[0, 1, 2]], np.uint32))
+grid = native.ReceiverGrid((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), pitch_x=1, pitch_y=1, width=4, height=4)
+native.gather_beams(grid, native.SunLight((0, 0, -1)), occluders)
 """
 
 

@@ -6,6 +6,9 @@ from beamspread.core.native import native
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+# Texels. An edge that enters a texel by less adds less than half of what coverage counts in, 2^-31: nothing.
+ENTERED = 3e-10
+
 
 def area(polygon):
     """Signed, by the shoelace formula."""
@@ -62,6 +65,62 @@ def test_equals_clipping(seed, width, height, corners):
     if abs(area(polygons[0])) < 1e-9:
         return
     np.testing.assert_allclose(coverage(polygons, width, height), clipped_coverage(polygons, width, height), atol=2e-6)
+
+
+def crossed_and_inside(polygon, width, height):
+    """Which texels an edge enters, by separating axes, and which have their centre inside, by counting crossings."""
+    x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    crossed, inside = np.zeros((height, width), bool), np.zeros((height, width), bool)
+    for (ax, ay), (bx, by) in zip(polygon, np.roll(polygon, -1, axis=0)):
+        normal = np.array([ay - by, bx - ax]) / np.hypot(bx - ax, by - ay)
+        gap = np.abs((x - ax) * normal[0] + (y - ay) * normal[1]) - 0.5 * np.abs(normal).sum()
+        gap = np.maximum(gap, np.maximum(x - 0.5 - max(ax, bx), min(ax, bx) - x - 0.5))
+        gap = np.maximum(gap, np.maximum(y - 0.5 - max(ay, by), min(ay, by) - y - 0.5))
+        crossed |= gap < -ENTERED
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inside ^= ((ay > y) != (by > y)) & (x < ax + (y - ay) / (by - ay) * (bx - ax))
+    return crossed, inside
+
+
+def disk(corners, middle, radius):
+    """A regular polygon."""
+    angles = 2 * np.pi * np.arange(corners) / corners
+    return middle + radius * np.stack([np.cos(angles), np.sin(angles)], 1)
+
+
+@pytest.mark.parametrize("polygon", [disk(4, 128, 115.2), disk(64, 128, 115.2), disk(64, 128, 115.2)[::-1]])
+@pytest.mark.parametrize("bits", [24, 53])
+def test_a_turned_square_and_a_disk_cover_nothing_outside_and_all_inside(polygon, bits):
+    polygon = (polygon / 256).astype(np.float32).astype(float) * 256 if bits == 24 else polygon
+    covered, (crossed, inside) = coverage([polygon], 256, 256), crossed_and_inside(polygon, 256, 256)
+    assert 500 < crossed.sum() < 1100
+    np.testing.assert_array_equal(covered[~crossed], inside[~crossed])
+
+
+@settings(max_examples=100, deadline=None)
+@given(seed=st.integers(0, 10**6), width=st.integers(1, 40), height=st.integers(1, 40), corners=st.integers(3, 12))
+def test_texels_that_no_edge_enters_are_exactly_in_or_out(seed, width, height, corners):
+    rng = np.random.default_rng(seed)
+    polygon = star(rng, width, height, corners)
+    crossed, inside = crossed_and_inside(polygon, width, height)
+    covered = coverage([polygon], width, height)
+    np.testing.assert_array_equal(covered[~crossed], inside[~crossed])
+
+
+@settings(max_examples=100, deadline=None)
+@given(seed=st.integers(0, 10**6), size=st.sampled_from([7, 40, 90]), corners=st.integers(3, 12))
+def test_triangles_of_a_polygon_cover_its_inside_exactly(seed, size, corners):
+    rng = np.random.default_rng(seed)
+    middle = rng.uniform(0.3, 0.7, 2) * size
+    angles = 2 * np.pi * (np.arange(corners) + rng.uniform(0, 0.9, corners)) / corners
+    radii = rng.uniform(0.2, 0.9, corners) * size
+    polygon = middle + radii[:, None] * np.stack([np.cos(angles), np.sin(angles)], 1)
+    # Only with all angles below 180 degrees do the triangles around the middle not overlap.
+    if corners == 3 and (np.diff(angles, append=angles[0] + 2 * np.pi) > 3.1).any():
+        return
+    fan = [(a, b, middle) for a, b in zip(polygon, np.roll(polygon, -1, axis=0))]
+    covered, (crossed, inside) = coverage(fan, size, size), crossed_and_inside(polygon, size, size)
+    np.testing.assert_array_equal(covered[~crossed], inside[~crossed])
 
 
 @settings(max_examples=40, deadline=None)

@@ -40,7 +40,7 @@ def light(height, width):
 
 def solve(ldf, shape, direction, mean_free_path, pitch=(1.0, 1.0), threads=0, progress=None, tolerance=1e-3, **options):
     paths = [mean_free_path, 0.7 * mean_free_path, 0.5 * mean_free_path]
-    lights = _native.Light.of_channels(light(*shape), direction(*shape), 3)
+    lights = _native.PlaneLight.of_channels(light(*shape), direction(*shape), 3)
     return _native.convolve(
         lights, [ldf] * 3, list(ALBEDO), paths, pitch, "fft", tolerance, threads, progress, **options
     )
@@ -94,7 +94,7 @@ def test_two_levels_equal_direct(ldf, angle, mean_free_path):
     direction = travel(angle, 53)
     beams = light(120, 180)
     direct = convolve(beams, direction, ldf, ALBEDO, mean_free_path, 1.0, solver="direct")
-    lights = _native.Light.of_channels(beams, direction.astype(np.float32), 3)
+    lights = _native.PlaneLight.of_channels(beams, direction.astype(np.float32), 3)
     two = _native.convolve(
         lights, [ldf] * 3, list(ALBEDO), [mean_free_path] * 3, (1.0, 1.0), "fft", 1e-3, 0, None, coarsening=4
     )
@@ -143,7 +143,7 @@ def test_power_is_kept(ldf):
     beams = np.ones((size, size), np.float32)
     rest = ([ldf], [0.9], [path], (1.0, 1.0), "fft", 1e-3, 0, None)
     for coarsening in (4, 8):
-        result = _native.convolve([_native.Light(beams, sun(0, 0), [1.0])], *rest, coarsening=coarsening)
+        result = _native.convolve([_native.PlaneLight(beams, sun(0, 0), [1.0])], *rest, coarsening=coarsening)
         angle = math.degrees(math.acos(-sun(0, 0)[2]))
         assert result[size // 2, size // 2, 0] == pytest.approx(ldf.reflectance(angle, 0.9) / math.pi, rel=1e-4)
 
@@ -166,7 +166,7 @@ field = numpy.stack([x, y, numpy.full_like(x, -20)], -1)
 direction = (field / numpy.linalg.norm(field, axis=-1, keepdims=True)).astype(numpy.float32)
 rest = [library(Medium(0.8, 1.4))], [0.9], [60.0], (1.0, 1.0), "fft", 1e-3, 0, None
 before = peak()
-light = _native.Light(numpy.ones((180, 180), numpy.float32), direction, [1.0])
+light = _native.PlaneLight(numpy.ones((180, 180), numpy.float32), direction, [1.0])
 _native.convolve([light], *rest, memory=32 << 20, coarsening=8)
 print(peak() - before)
 """

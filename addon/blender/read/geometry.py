@@ -19,7 +19,7 @@ def world_triangles(obj, matrix, cache: dict) -> Mesh | None:
     local = cache[key]
     if local is None:
         return None
-    return Mesh(_transform(local.vertices, matrix).astype(np.float32), local.triangles)
+    return Mesh(_transform(local.vertices, matrix), local.triangles)
 
 
 def _local_triangles(obj) -> Mesh | None:

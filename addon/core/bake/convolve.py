@@ -89,8 +89,8 @@ def convolve_lights(
 ):
     """Luminance of several lights together.
 
-    The sum of what `convolve` gives for each; but `fft` adds all lights up to the same moments of the direction, so that
-    it transforms hardly more for many lights than for one.
+    The sum of what `convolve` gives for each; but `fft` adds all lights up to the same moments of the direction, and
+    transforms hardly more for many lights than for one.
 
     Parameters
     ----------
@@ -102,13 +102,20 @@ def convolve_lights(
     float32, shape (H, W, 3)
         Luminance, radiance in W/(m^2 sr).
     """
-    beams = [
+    arriving = [
         light
         for irradiance, direction in lights
-        for light in native.Light.of_channels(_irradiance(irradiance), float_array("direction", direction), 3)
+        for light in native.PlaneLight.of_channels(_irradiance(irradiance), float_array("direction", direction), 3)
     ]
+    return solve(arriving, ldf, albedo, mean_free_path, pitch, solver, tolerance, threads, progress, interpolation)
+
+
+def solve(
+    lights, ldf, albedo, mean_free_path, pitch, solver, tolerance, threads=0, progress=None, interpolation="angular"
+):
+    """`convolve_lights` of native `PlaneLight`s, which know their color and what is known of their directions."""
     return native.convolve(
-        beams,
+        lights,
         _sources(ldf, interpolation),
         _rgb("albedo", albedo),
         _rgb("mean_free_path", mean_free_path),
@@ -158,7 +165,7 @@ def adaptive_beams(irradiance, direction, pitch=1.0, tolerance=1e-3):
     if light.ndim != 2:
         raise ValueError(f"argument 'irradiance' is of shape {light.shape}; allowed: (H, W)")
     pitch_x, pitch_y = _pair("pitch", pitch)
-    beams = native.Light(light, float_array("direction", direction), (1.0,))
+    beams = native.PlaneLight(light, float_array("direction", direction), (1.0,))
     squares, mean = native.adaptive_beams(beams, float(tolerance))
     beams = np.empty(len(squares), BEAM)
     beams["row"], beams["column"], beams["size"] = squares.T

@@ -11,7 +11,7 @@ from ..progress import Progress, stages
 from ..scene.illumination import Illumination
 from ..scene.receiver import Receiver
 from .layers import LAYERS
-from .luminance import LIBRARY_WEIGHT, LIGHT_WEIGHT
+from .luminance import LIBRARY_WEIGHT, LIGHT_WEIGHT, SOLVE_WEIGHT
 from .margin import extend_margin
 from .settings import COMBINED, BakeSettings
 from .surface import Surface
@@ -30,7 +30,7 @@ class BakeJob:
     def run(self, progress: Progress | None = None) -> dict[str, np.ndarray]:
         """The layers: name -> float32 (height, width, 3), margin included, row 0 at the bottom."""
         needs_albedo = 0.0 if self.surface.base_color is None else LIBRARY_WEIGHT
-        one = LIBRARY_WEIGHT + LIGHT_WEIGHT * len(self.illumination.lights)
+        one = LIBRARY_WEIGHT + SOLVE_WEIGHT + LIGHT_WEIGHT * len(self.illumination.lights)
         parts = len(self.settings.layers) * len(self.receiver.charts)
         resolving, *baking = stages(progress, [needs_albedo] + [one] * parts)
         material, steps = self.surface.resolve(self.settings.quality, resolving), iter(baking)

@@ -1,8 +1,9 @@
-"""Lights -> beams -> luminance: beams of each light, spread by the material's LDF and summed."""
+"""Lights -> what arrives on a chart -> luminance."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,18 +16,17 @@ from ..progress import Progress, stages
 from ..scene.grid import Grid
 from ..scene.illumination import Illumination
 from ..scene.lights import Light
-from .convolve import convolve_lights
+from .convolve import solve
 from .settings import BakeSettings
 
-# Shares of the time that a bake takes, roughly: simulating an LDF not in the cache, beams and solving of one light.
-LIBRARY_WEIGHT, BEAMS_WEIGHT, SOLVE_WEIGHT = 2.0, 1.0, 3.0
-LIGHT_WEIGHT = BEAMS_WEIGHT + SOLVE_WEIGHT
+# Shares of the time that a bake takes, roughly: simulating an LDF not in the cache, gathering a light, solving for all.
+LIBRARY_WEIGHT, LIGHT_WEIGHT, SOLVE_WEIGHT = 2.0, 1.0, 3.0
 
 # Of the solvers, see `convolve`: half a per cent in the worst texel is not seen, and below the noise of libraries.
 TOLERANCE = 5e-3
 
-# Lights solved together; each keeps its irradiance and directions in memory until then.
-MOST_LIGHTS_AT_ONCE = 4
+# Bytes of irradiance that wait for the solver at once, 256 lights on 1024 x 1024 texels; more lights take another solve.
+MOST_WAITING = 1 << 30
 
 
 def bake(
@@ -62,61 +62,66 @@ def bake(
     lights = illumination.lights
     material.check()
     check_thickness(thickness)
-    media_progress, *light_progress = stages(progress, [LIBRARY_WEIGHT] + [BEAMS_WEIGHT, SOLVE_WEIGHT] * len(lights))
+    at_once = max(1, MOST_WAITING // (4 * grid.width * grid.height))
+    together = [lights[first : first + at_once] for first in range(0, len(lights), at_once)]
+    weights = [LIBRARY_WEIGHT] + [weight for some in together for weight in (LIGHT_WEIGHT * len(some), SOLVE_WEIGHT)]
+    media_progress, *steps = stages(progress, weights)
     if settings.distributions == "library":
-        libraries = _libraries(material, thickness, settings.quality, media_progress)
+        sources = _libraries(material, thickness, settings.quality, media_progress)
     else:
-        libraries = [load_source(settings.sample_folder, settings.distributions)] * 3
-    luminance = None
-    # Lights of one colour, which comes last, so that the channels share the work on their beams.
-    waiting, waiting_color = [], None
-    for number, (light, beams_progress, solve_progress) in enumerate(
-        zip(lights, light_progress[::2], light_progress[1::2]), 1
-    ):
-        beams, direction, strength = unit_beams(grid, light, illumination.caster(), settings, beams_progress)
-        if beams.any() and any(strength):
-            beams *= strength.max()
-            waiting.append((beams, direction))
-            waiting_color = strength / strength.max()
-        next_color = np.asarray(lights[number].color, np.float32) if number < len(lights) else None
-        if waiting and (
-            next_color is None
-            or len(waiting) == MOST_LIGHTS_AT_ONCE
-            or not np.allclose(next_color, waiting_color * next_color.max(), rtol=1e-5)
-        ):
-            spread = _spread(waiting, libraries, material, grid, settings, solve_progress)
-            if (waiting_color != 1).any():
-                spread *= waiting_color
-            luminance = spread if luminance is None else np.add(luminance, spread, out=luminance)
-            waiting = []
-    return np.zeros((grid.height, grid.width, 3), np.float32) if luminance is None else luminance
+        sources = [load_source(settings.sample_folder, settings.distributions)] * 3
+    luminance = np.zeros((grid.height, grid.width, 3), np.float32)
+    for some, gathering, solving in zip(together, steps[::2], steps[1::2]):
+        arriving = _gather(grid, some, illumination.caster(grid), settings, gathering)
+        if arriving:
+            luminance += _spread(arriving, sources, material, grid, settings, solving)
+    return luminance
+
+
+def _gather(grid: Grid, lights: Sequence[Light], caster, settings: BakeSettings, progress) -> list:
+    """What arrives from each light that reaches the chart, as native `PlaneLight`s."""
+    arriving = []
+    for light, step in zip(lights, stages(progress, [1.0] * len(lights))):
+        irradiance, direction = gather_unit(grid, light, caster, settings, step, directions=False)
+        color = light.rgb()
+        if not (irradiance.any() and color.any()):
+            continue
+        position = light.native().position_in(grid.native())
+        if position is None:
+            arriving.append(native.PlaneLight(irradiance, direction.astype(np.float32), color.tolist()))
+        else:
+            arriving.append(native.PlaneLight.from_point(irradiance, position, color.tolist()))
+    return arriving
+
+
+def gather_unit(
+    grid: Grid, light: Light, caster, settings: BakeSettings, progress: Progress | None = None, directions: bool = True
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Irradiance (H, W) of the light at strength 1 and color 1, W/m^2 with cosine, visibility and coverage.
+
+    And the direction of travel, unit vectors in the plane's frame: (3,) for a sun, else (H, W, 3), or None if no
+    `directions` are wanted. `caster` is a native `Occluders` or None.
+    """
+    irradiance, direction = native.gather_beams(
+        grid.native(),
+        light.native(),
+        caster if light.cast_shadow else None,
+        samples=settings.samples,
+        threads=settings.threads,
+        progress=progress,
+        clearance=grid.clearance,
+        directions=directions,
+    )
+    irradiance *= grid.coverage
+    return irradiance, direction
 
 
 def light_beams(
     grid: Grid, light: Light, caster, settings: BakeSettings, progress: Progress | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Irradiance (H, W, 3) in W/m^2 with colour, cosine, visibility and coverage, and the direction of travel.
-
-    The direction is a unit vector in the plane frame: (3,) for a sun, (H, W, 3) otherwise. `caster` is a native
-    `Occluders` or None.
-    """
-    beams, direction, strength = unit_beams(grid, light, caster, settings, progress)
-    return beams[..., None] * strength, direction
-
-
-def unit_beams(
-    grid: Grid, light: Light, caster, settings: BakeSettings, progress: Progress | None = None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Irradiance (H, W) of the light at strength 1, direction as `light_beams` says, and strength times colour (3,)."""
-    options = {
-        "samples": settings.samples,
-        "threads": settings.threads,
-        "progress": progress,
-        "clearance": grid.clearance,
-    }
-    irradiance, direction = light.unit_beams(grid, caster if light.cast_shadow else None, **options)
-    irradiance *= grid.coverage
-    return irradiance, direction, light.rgb()
+    """Irradiance (H, W, 3) of the light as it is, and its direction; see `gather_unit`."""
+    irradiance, direction = gather_unit(grid, light, caster, settings, progress)
+    return irradiance[..., None] * light.rgb(), direction
 
 
 def _libraries(material: Material, thickness: float, quality: str, progress: Progress | None) -> list:
@@ -131,12 +136,11 @@ def _libraries(material: Material, thickness: float, quality: str, progress: Pro
     return [by_channel[channel] for channel in channels]
 
 
-def _spread(lights, libraries, material: Material, grid: Grid, settings: BakeSettings, progress):
-    shared = all(library is libraries[0] for library in libraries)
+def _spread(arriving: list, sources: list, material: Material, grid: Grid, settings: BakeSettings, progress):
     try:
-        return convolve_lights(
-            lights,
-            libraries[0] if shared else libraries,
+        return solve(
+            arriving,
+            sources,
             material.albedo,
             material.mean_free_path,
             (grid.pitch_x, grid.pitch_y),

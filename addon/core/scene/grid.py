@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..native import native
+
 Vector = tuple[float, float, float]
 
 
@@ -40,15 +42,17 @@ class Grid:
     coverage: np.ndarray
     clearance: float = 0.0
 
-    def to_plane_frame(self, direction: Vector) -> np.ndarray:
-        """Turn a world direction into the plane frame."""
-        return np.array([self.x_axis, self.y_axis, self.normal], dtype=float) @ np.asarray(direction, dtype=float)
+    @property
+    def centre(self) -> np.ndarray:
+        """World position."""
+        across = 0.5 * self.width * self.pitch_x * np.array(self.x_axis)
+        return self.origin + across + 0.5 * self.height * self.pitch_y * np.array(self.y_axis)
 
     def height_of(self, point: Vector) -> float:
         """How far a world point lies outward of the plane; negative behind it."""
         return float(np.dot(np.subtract(point, self.origin), self.normal))
 
-    def numbers(self) -> tuple:
-        """What the native functions take of a grid, in their order."""
-        pitch = self.pitch_x, self.pitch_y
-        return self.origin, self.x_axis, self.y_axis, self.normal, *pitch, self.width, self.height
+    def native(self):
+        """The native `ReceiverGrid`."""
+        axes = self.x_axis, self.y_axis, self.normal
+        return native.ReceiverGrid(self.origin, *axes, self.pitch_x, self.pitch_y, self.width, self.height)

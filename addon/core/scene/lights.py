@@ -30,12 +30,8 @@ class Light(ABC):
     cast_shadow: bool
 
     @abstractmethod
-    def unit_beams(self, grid: Grid, caster, **options) -> tuple[np.ndarray, np.ndarray]:
-        """Irradiance (H, W) of a white light of strength 1, and its direction of travel in the plane's frame.
-
-        The direction is (3,), or (H, W, 3) where it changes; `caster` a native `Occluders`, or None; `options` what
-        all native functions of beams take.
-        """
+    def native(self):
+        """The native light, white and of strength 1."""
 
     @abstractmethod
     def is_behind(self, grid: Grid) -> bool:
@@ -70,9 +66,8 @@ class SunLight(Light):
 
     direction: Vector
 
-    def unit_beams(self, grid, caster, **options):
-        irradiance = native.sun_beams(*grid.numbers(), self.direction, caster, **options)
-        return irradiance, grid.to_plane_frame(self.direction)
+    def native(self):
+        return native.SunLight(self.direction)
 
     def is_behind(self, grid):
         return bool(np.dot(self.direction, grid.normal) >= 0)
@@ -84,8 +79,8 @@ class PointLight(Light):
 
     position: Vector
 
-    def unit_beams(self, grid, caster, **options):
-        return native.point_beams(*grid.numbers(), self.position, caster, **options)
+    def native(self):
+        return native.PointLight(self.position)
 
     def is_behind(self, grid):
         return grid.height_of(self.position) <= 0
@@ -108,6 +103,5 @@ class SpotLight(PointLight):
     blend: float
     falloff: str = "scaled"
 
-    def unit_beams(self, grid, caster, **options):
-        cone = self.frame, self.spot_size, self.blend
-        return native.spot_beams(*grid.numbers(), self.position, *cone, caster, falloff=self.falloff, **options)
+    def native(self):
+        return native.SpotLight(self.position, self.frame, self.spot_size, self.blend, self.falloff)

@@ -22,7 +22,7 @@ namespace {
 constexpr double tolerance_share = 0.25;
 
 // Each beam's kernel is a sum over terms, of a factor that depends on the beam times a kernel that does not.
-LightTerms choose_terms(const Plane& plane, Light light, const ChannelMedium& medium, double tolerance)
+LightTerms choose_terms(const Plane& plane, PlaneLight light, const ChannelMedium& medium, double tolerance)
 {
     // Half a share: what is left out is a root mean square, and a single texel may be farther off.
     const double allowed = 0.5 * tolerance_share * tolerance;
@@ -132,13 +132,13 @@ ScaledLight scale_light(const View2D<const float>& irradiance)
 
 }  // namespace
 
-std::vector<Square> even_squares(const Plane& plane, const Light& light, double tolerance)
+std::vector<Square> even_squares(const Plane& plane, const PlaneLight& light, double tolerance)
 {
     return MaskPyramid(plane, light).squares(tolerance_share * tolerance);
 }
 
-std::vector<float> solve_adaptive(const Plane& plane, const Light& light, const ChannelMedium& medium, double tolerance,
-                                  Progress& progress)
+std::vector<float> solve_adaptive(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium,
+                                  double tolerance, Progress& progress)
 {
     const auto [width, height, metres_x, metres_y] = plane;
     const double pitch_y = metres_y / medium.mean_free_path;
@@ -150,7 +150,7 @@ std::vector<float> solve_adaptive(const Plane& plane, const Light& light, const 
         return radiance;
     }
     const ScaledLight scaled = scale_light(light.irradiance);
-    Light even = light;
+    PlaneLight even = light;
     even.irradiance = {scaled.values.data(), height, width, static_cast<std::ptrdiff_t>(width)};
     const LightTerms terms = choose_terms(plane, even, medium, tolerance);
     const std::size_t count = terms.terms.size();

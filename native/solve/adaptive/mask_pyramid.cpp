@@ -4,7 +4,7 @@
 
 namespace beamspread {
 
-MaskPyramid::MaskPyramid(const Plane& plane, const Light& light) : m_height(plane.height), m_width(plane.width)
+MaskPyramid::MaskPyramid(const Plane& plane, const PlaneLight& light) : m_height(plane.height), m_width(plane.width)
 {
     Level texels{m_height, m_width, std::vector<Cell>(m_height * m_width)};
     for (std::size_t y = 0; y < m_height; ++y)

@@ -20,7 +20,7 @@ struct Square {
 // plane's border it is dark, so that a square across the border is never wholly lit.
 class MaskPyramid {
 public:
-    MaskPyramid(const Plane& plane, const Light& light);
+    MaskPyramid(const Plane& plane, const PlaneLight& light);
 
     // The largest squares, searched from the top, that are wholly lit and even: no texel's irradiance is farther
     // from the square's mean than `tolerance` times its own, and no two directions in it differ by more than
@@ -52,6 +52,6 @@ private:
 };
 
 // The beams of the adaptive solver, which may use up a share of the tolerance.
-std::vector<Square> even_squares(const Plane& plane, const Light& light, double tolerance);
+std::vector<Square> even_squares(const Plane& plane, const PlaneLight& light, double tolerance);
 
 }  // namespace beamspread

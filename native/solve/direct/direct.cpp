@@ -56,7 +56,7 @@ struct Beam {
 };
 
 // The lit texels of each row.
-std::vector<std::vector<Beam>> beam_rows(const Plane& plane, const Light& light, const BeamBasis& basis,
+std::vector<std::vector<Beam>> beam_rows(const Plane& plane, const PlaneLight& light, const BeamBasis& basis,
                                          Progress& progress)
 {
     std::vector<std::vector<Beam>> rows(plane.height);
@@ -138,7 +138,8 @@ std::size_t rows_at_once(std::size_t terms, std::size_t width)
 
 }  // namespace
 
-std::vector<float> solve_direct(const Plane& plane, const Light& light, const ChannelMedium& medium, Progress& progress)
+std::vector<float> solve_direct(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium,
+                                Progress& progress)
 {
     const auto* one = std::get_if<OneDirection>(&light.directions);
     const BeamBasis basis = one != nullptr ? BeamBasis::uniform(one->travel) : BeamBasis::library_nodes(*medium.ldf);

@@ -9,7 +9,7 @@
 namespace beamspread {
 
 // Radiance that a light of colour 1 causes over one medium, W/(m^2 sr), row by row; advances the progress by 1.
-std::vector<float> solve_direct(const Plane& plane, const Light& light, const ChannelMedium& medium,
+std::vector<float> solve_direct(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium,
                                 Progress& progress);
 
 }  // namespace beamspread

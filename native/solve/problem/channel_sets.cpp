@@ -11,13 +11,13 @@ namespace {
 constexpr double same_color = 1e-6;
 
 // The factor between the light of two channels, if that is all they differ by; else 0.
-double common_factor(const std::vector<Light>& lights, std::size_t channel, std::size_t reference)
+double common_factor(const std::vector<PlaneLight>& lights, std::size_t channel, std::size_t reference)
 {
     double factor = 0.0;
-    for (const Light& light : lights)
+    for (const PlaneLight& light : lights)
         if (light.color[reference] > 0.0)
             factor = std::max(factor, light.color[channel] / light.color[reference]);
-    for (const Light& light : lights)
+    for (const PlaneLight& light : lights)
         if (std::abs(light.color[channel] - factor * light.color[reference]) > same_color * light.color[channel])
             return 0.0;
     return factor;

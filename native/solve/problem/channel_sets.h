@@ -26,7 +26,7 @@ struct ChannelSets {
     std::size_t count() const { return m_reference.size(); }
 
     // The colour of a light in a set.
-    double color(const Light& light, std::size_t set) const { return light.color[m_reference[set]]; }
+    double color(const PlaneLight& light, std::size_t set) const { return light.color[m_reference[set]]; }
 
     std::vector<ChannelMedium> media;
     std::vector<Result> results;

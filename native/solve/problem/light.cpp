@@ -34,7 +34,8 @@ bool differ_by(float factor, const View2D<const float>& a, const View2D<const fl
 
 }  // namespace
 
-std::vector<Light> lights_of_channels(const std::vector<View2D<const float>>& irradiance, const Directions& directions)
+std::vector<PlaneLight> lights_of_channels(const std::vector<View2D<const float>>& irradiance,
+                                           const Directions& directions)
 {
     const std::size_t channels = irradiance.size();
     std::vector<float> most;
@@ -43,7 +44,7 @@ std::vector<Light> lights_of_channels(const std::vector<View2D<const float>>& ir
         most.push_back(channel.height * channel.width > 0 ? channel(at.y, at.x) : 0.0f);
     }
     const auto reference = static_cast<std::size_t>(std::max_element(most.begin(), most.end()) - most.begin());
-    Light one{irradiance[reference], directions, std::vector<double>(channels, 1.0)};
+    PlaneLight one{irradiance[reference], directions, std::vector<double>(channels, 1.0)};
     bool same = true;
     for (std::size_t c = 0; c < channels && most[reference] > 0.0f; ++c) {
         const float factor = most[c] / most[reference];
@@ -52,7 +53,7 @@ std::vector<Light> lights_of_channels(const std::vector<View2D<const float>>& ir
     }
     if (same)
         return {one};
-    std::vector<Light> lights;
+    std::vector<PlaneLight> lights;
     for (std::size_t c = 0; c < channels; ++c) {
         lights.push_back({irradiance[c], directions, std::vector<double>(channels, 0.0)});
         lights.back().color[c] = 1.0;
@@ -60,7 +61,7 @@ std::vector<Light> lights_of_channels(const std::vector<View2D<const float>>& ir
     return lights;
 }
 
-bool BeamRow::read(const Plane& plane, const Light& light, const RowSpan& span)
+bool BeamRow::read(const Plane& plane, const PlaneLight& light, const RowSpan& span)
 {
     const std::size_t count = span.width;
     irradiance.resize(count);

@@ -45,14 +45,15 @@ struct PerTexel {
 using Directions = std::variant<OneDirection, FromPoint, PerTexel>;
 
 // Lights add up.
-struct Light {
+struct PlaneLight {
     View2D<const float> irradiance;  // W/m^2 where the colour is 1
     Directions directions;
     std::vector<double> color;  // [channel], >= 0
 };
 
 // Light of some irradiance in each channel: one light where channels differ by a factor, else one for each of them.
-std::vector<Light> lights_of_channels(const std::vector<View2D<const float>>& irradiance, const Directions& directions);
+std::vector<PlaneLight> lights_of_channels(const std::vector<View2D<const float>>& irradiance,
+                                           const Directions& directions);
 
 // The angles of a light in part of a row.
 struct BeamRow {
@@ -63,7 +64,7 @@ struct BeamRow {
     std::vector<float> travel;        // scratch
 
     // False where all of it is dark; the angles are not set then.
-    bool read(const Plane& plane, const Light& light, const RowSpan& span);
+    bool read(const Plane& plane, const PlaneLight& light, const RowSpan& span);
 };
 
 // Direction of the beam at a texel, of any length.

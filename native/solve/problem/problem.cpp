@@ -37,13 +37,13 @@ void check_direction(const Vec3& d)
 }
 
 // Per texel, or null.
-const float* field(const Light& light, std::size_t row)
+const float* field(const PlaneLight& light, std::size_t row)
 {
     const auto* found = std::get_if<PerTexel>(&light.directions);
     return found != nullptr ? found->travel + 3 * row * light.irradiance.width : nullptr;
 }
 
-bool is_row_fine(const Light& light, std::size_t y)
+bool is_row_fine(const PlaneLight& light, std::size_t y)
 {
     const View2D<const float>& irradiance = light.irradiance;
     const float* directions = field(light, y);
@@ -62,7 +62,7 @@ bool is_row_fine(const Light& light, std::size_t y)
 }
 
 // Says what is wrong in a row that is not fine.
-void check_row(const Light& light, std::size_t y)
+void check_row(const PlaneLight& light, std::size_t y)
 {
     const View2D<const float>& irradiance = light.irradiance;
     for (std::size_t x = 0; x < irradiance.width; ++x)
@@ -74,7 +74,7 @@ void check_row(const Light& light, std::size_t y)
                 check_direction(Vec3(d[0], d[1], d[2]));
 }
 
-void check_light(const Problem& problem, const Light& light)
+void check_light(const Problem& problem, const PlaneLight& light)
 {
     const View2D<const float>& irradiance = light.irradiance;
     if (irradiance.width != problem.plane.width || irradiance.height != problem.plane.height)
@@ -120,7 +120,7 @@ void validate(const Problem& problem)
     }
     if (problem.lights.empty())
         reject("lights", "empty", "at least one light");
-    for (const Light& light : problem.lights)
+    for (const PlaneLight& light : problem.lights)
         check_light(problem, light);
 }
 

@@ -23,7 +23,7 @@ enum class Solver { fft, direct, adaptive };
 struct Problem {
     Plane plane;
     std::vector<ChannelMedium> channels;
-    std::vector<Light> lights;
+    std::vector<PlaneLight> lights;
     Solver solver = Solver::fft;
     double tolerance = 1e-3;  // relative error of the radiance that an approximating solver may make
     int threads = 0;

@@ -64,7 +64,7 @@ void merge(const Incidence::Extremes& from, Incidence::Extremes& to)
     }
 }
 
-Histogram histogram_of(const Plane& plane, const std::vector<Light>& lights)
+Histogram histogram_of(const Plane& plane, const std::vector<PlaneLight>& lights)
 {
     Histogram sum;
     sum.extremes.resize(lights.size());
@@ -109,7 +109,7 @@ double angle_deg(double half_tangent)
     return 2.0 * std::atan(half_tangent) / radians_per_degree;
 }
 
-Incidence::Incidence(const Plane& plane, const std::vector<Light>& lights)
+Incidence::Incidence(const Plane& plane, const std::vector<PlaneLight>& lights)
 {
     const Histogram histogram = histogram_of(plane, lights);
     extremes = histogram.extremes;

@@ -29,7 +29,7 @@ struct Incidence {
     std::array<double, count> share{};
     std::vector<Extremes> extremes;  // [light]
 
-    Incidence(const Plane& plane, const std::vector<Light>& lights);
+    Incidence(const Plane& plane, const std::vector<PlaneLight>& lights);
 
     bool none() const { return first > last; }
 };

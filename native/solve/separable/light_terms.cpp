@@ -33,7 +33,7 @@ std::vector<KernelTerm> fixed_kernel(std::size_t profile, std::size_t harmonics,
 }
 
 // The lights of each direction.
-std::vector<std::pair<Vec3, std::vector<std::size_t>>> by_direction(const std::vector<Light>& lights)
+std::vector<std::pair<Vec3, std::vector<std::size_t>>> by_direction(const std::vector<PlaneLight>& lights)
 {
     std::vector<std::pair<Vec3, std::vector<std::size_t>>> groups;
     for (std::size_t l = 0; l < lights.size(); ++l) {
@@ -105,7 +105,7 @@ void add_basis(LightTerms& terms, LowRankBasis basis)
 LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& choose)
 {
     LightTerms result{problem.plane, ChannelSets(problem), {}, {}, {}, {}, {}, {}};
-    for (const Light& light : problem.lights)
+    for (const PlaneLight& light : problem.lights)
         (std::holds_alternative<OneDirection>(light.directions) ? result.fixed : result.changing).push_back(light);
     const auto directions = by_direction(result.fixed);
     if (directions.size() > most_fixed_directions)
@@ -113,7 +113,7 @@ LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& 
     else
         for (const auto& [travel, lights] : directions)
             add_direction(result, travel, lights, beyond);
-    for (const Light& light : result.changing) {
+    for (const PlaneLight& light : result.changing) {
         result.colors.emplace_back();
         for (std::size_t set = 0; set < result.sets.count(); ++set)
             result.colors.back().push_back(static_cast<float>(result.sets.color(light, set)));

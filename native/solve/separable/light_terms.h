@@ -33,8 +33,8 @@ struct LightTerm {
 struct LightTerms {
     Plane plane;
     ChannelSets sets;
-    std::vector<Light> fixed;
-    std::vector<Light> changing;
+    std::vector<PlaneLight> fixed;
+    std::vector<PlaneLight> changing;
     std::vector<std::vector<float>> colors;  // [changing][set]
     LowRankBasis basis;                      // of `changing`
     std::vector<LightTerm> terms;

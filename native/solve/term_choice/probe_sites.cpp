@@ -94,7 +94,7 @@ float change(const LightTerms& light, const std::vector<std::size_t>& lights, co
 }
 
 // The place nearest to the lines that the beams at some texels travel along, in texels; none if they are parallel.
-std::optional<Vec2> common_origin(const Plane& plane, const Light& light, const std::vector<Texel>& texels)
+std::optional<Vec2> common_origin(const Plane& plane, const PlaneLight& light, const std::vector<Texel>& texels)
 {
     // Sums of I - d d^T and of its product with the place, d along the plane.
     double xx = 0.0;
@@ -125,7 +125,7 @@ std::optional<Vec2> common_origin(const Plane& plane, const Light& light, const 
 
 // The texel that all beams of a lamp travel away from: around it harmonics of any order add up with the same sign, also
 // where it is dark.
-std::optional<Texel> origin(const Plane& plane, const Light& light, const std::vector<Texel>& texels)
+std::optional<Texel> origin(const Plane& plane, const PlaneLight& light, const std::vector<Texel>& texels)
 {
     const auto* point = std::get_if<FromPoint>(&light.directions);
     const std::optional<Vec2> place = point != nullptr

@@ -163,7 +163,7 @@ void RadianceProbe::add_cell(const Cell& cell, Moments& moments, AlignedVector<f
 
 void RadianceProbe::add_light(const Cell& cell, std::size_t number, Moments& moments) const
 {
-    const Light& light = m_light.changing[number];
+    const PlaneLight& light = m_light.changing[number];
     std::array<Beam, quarters> beams;
     std::size_t lit = 0;
     Vec2 toward(0.0);  // sums over the beams, weighed by irradiance

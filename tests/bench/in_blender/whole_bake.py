@@ -74,7 +74,7 @@ def phases(folder):
     time_calls("register", blender, "register")
     time_calls("extract", bakes, "prepare_scene")
     time_calls("library from the cache", luminance, "_libraries")
-    time_calls("beams and visibility", luminance, "unit_beams")
+    time_calls("beams and visibility", luminance, "gather_unit")
     time_calls("solve", luminance, "_spread")
     time_calls("margin", job, "extend_margin")
     time_calls("image file", files, "write_file")

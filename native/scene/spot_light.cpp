@@ -1,17 +1,13 @@
-#include "scene/lights.h"
+#include "scene/spot_light.h"
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 #include "base/constants.h"
 #include "base/error.h"
 #include "scene/checks.h"
 
 namespace beamspread {
-
-using detail::is_finite;
-using detail::to_text;
 
 namespace {
 
@@ -26,33 +22,6 @@ double smoothstep(double t)
 
 }  // namespace
 
-SunLight::SunLight(const Vec3& direction) : m_travel(glm::normalize(direction))
-{
-    if (!is_finite(m_travel))
-        reject("direction", to_text(direction), "a finite vector that is not 0");
-}
-
-Arrival SunLight::at(const Vec3&) const
-{
-    return {.travel = m_travel, .flux = 1.0};
-}
-
-PointLight::PointLight(const Vec3& position) : m_position(position)
-{
-    if (!is_finite(position))
-        reject("position", to_text(position), "finite coordinates in metres");
-}
-
-Arrival PointLight::at(const Vec3& point) const
-{
-    const Vec3 way = point - m_position;
-    const double distance = glm::length(way);
-    // In the lamp itself light has no direction: none arrives.
-    if (distance == 0.0)
-        return {};
-    return {.travel = way / distance, .flux = 1.0 / (4.0 * pi * distance * distance), .distance = distance};
-}
-
 SpotLight::SpotLight(const Vec3& position, const Mat3& lamp_to_world, double spot_size, double blend,
                      SpotFalloff falloff)
     : m_point(position),
@@ -66,7 +35,7 @@ SpotLight::SpotLight(const Vec3& position, const Mat3& lamp_to_world, double spo
     if (!(blend >= 0.0 && blend <= 1.0))
         reject("blend", blend, "0 to 1");
     for (int i = 0; i < 3; ++i) {
-        if (!is_finite(m_world_to_lamp[i]))
+        if (!detail::is_finite(m_world_to_lamp[i]))
             reject("frame", "singular or not finite", "three axes that span space");
     }
     if (falloff == SpotFalloff::legacy) {
@@ -76,11 +45,11 @@ SpotLight::SpotLight(const Vec3& position, const Mat3& lamp_to_world, double spo
     }
 }
 
-Arrival SpotLight::at(const Vec3& point) const
+void SpotLight::arrive(std::span<const Vec3> points, Arrival* arrivals) const
 {
-    Arrival arrival = m_point.at(point);
-    arrival.flux *= falloff(arrival.travel);
-    return arrival;
+    m_point.arrive(points, arrivals);
+    for (Arrival& arrival : std::span(arrivals, points.size()))
+        arrival.flux *= falloff(arrival.travel);
 }
 
 double SpotLight::falloff(const Vec3& travel) const

@@ -1,0 +1,134 @@
+// Python names of the lights in native/scene: Light, SunLight, PointLight, SpotLight.
+#include <memory>
+#include <optional>
+
+#include "python/vectors.h"
+#include "scene/point_light.h"
+#include "scene/receiver.h"
+#include "scene/spot_light.h"
+#include "scene/sun_light.h"
+
+namespace beamspread {
+
+namespace {
+
+// Rows of the array become columns of the matrix: both are the lamp's axes.
+Mat3 to_axes(const std::string& name, const Numbers& numbers)
+{
+    if (numbers.ndim() != 2 || numbers.shape(0) != 3 || numbers.shape(1) != 3)
+        reject(name, shape_text(numbers), "3 x 3 numbers");
+    Mat3 axes;
+    for (int i = 0; i < 3; ++i)
+        axes[i] = {numbers.at(i, 0), numbers.at(i, 1), numbers.at(i, 2)};
+    return axes;
+}
+
+SpotFalloff to_falloff(const std::string& name)
+{
+    if (name == "scaled")
+        return SpotFalloff::scaled;
+    if (name == "legacy")
+        return SpotFalloff::legacy;
+    reject("falloff", "'" + name + "'", "'scaled' or 'legacy'");
+}
+
+std::unique_ptr<SunLight> make_sun(const Numbers& direction)
+{
+    return std::make_unique<SunLight>(to_vec3("direction", direction));
+}
+
+std::unique_ptr<PointLight> make_point(const Numbers& position)
+{
+    return std::make_unique<PointLight>(to_vec3("position", position));
+}
+
+std::unique_ptr<SpotLight> make_spot(const Numbers& position, const Numbers& frame, double spot_size, double blend,
+                                     const std::string& falloff)
+{
+    return std::make_unique<SpotLight>(to_vec3("position", position), to_axes("frame", frame), spot_size, blend,
+                                       to_falloff(falloff));
+}
+
+std::optional<py::tuple> position_in(const Light& light, const ReceiverGrid& grid)
+{
+    const LightSource source = light.source();
+    if (source.is_far)
+        return std::nullopt;
+    const Vec3 position = grid.to_plane(source.position - grid.origin);
+    return py::make_tuple(position.x, position.y, position.z);
+}
+
+}  // namespace
+
+void bind_lights(py::module_& m)
+{
+    py::class_<Light>(m, "Light",
+                      "A light of strength 1 without colour; its kinds are SunLight, PointLight, SpotLight.")
+        .def("position_in", &position_in, py::arg("grid"), R"(Where all of the light comes from.
+
+Parameters
+----------
+grid : ReceiverGrid
+
+Returns
+-------
+tuple of 3 floats or None
+    Metres along the grid's x_axis, y_axis and normal from the outer corner of texel (0, 0); None: a light infinitely
+    far away.
+)");
+
+    py::class_<SunLight, Light>(m, "SunLight", R"(Parallel light of 1 W/m^2 at normal incidence.
+
+Parameters
+----------
+direction : 3 floats
+    Of travel in the world, any length but 0.
+
+Raises
+------
+ValueError
+    An argument is out of range; the message names it.
+)")
+        .def(py::init(&make_sun), py::arg("direction"));
+
+    py::class_<PointLight, Light>(m, "PointLight", R"(A point lamp of 1 W.
+
+Parameters
+----------
+position : 3 floats
+    In the world, metres.
+
+Raises
+------
+ValueError
+    An argument is out of range; the message names it.
+)")
+        .def(py::init(&make_point), py::arg("position"));
+
+    py::class_<SpotLight, Light>(m, "SpotLight", R"(A spot lamp of 1 W over the whole sphere, as Blender counts it.
+
+Parameters
+----------
+position : 3 floats
+    In the world, metres.
+frame : (3, 3) floats
+    Rows: the lamp's x, y and z axes in the world with their scale (the columns of its 3 x 3 world matrix). It shines
+    along -z.
+spot_size : float
+    Full angle of the cone in radians, 0 < spot_size <= pi.
+blend : float
+    Soft part of the cone, 0 to 1.
+falloff : str
+    "scaled": as Cycles in Blender 4.2, 4.5 and 5.0, where the lamp's scale shapes the cone. "legacy": as in 3.4, where
+    it does not, and light falls off with the cosine to the axis besides.
+
+Raises
+------
+ValueError
+    An argument is out of range; the message names it.
+)")
+        .def(py::init(&make_spot), py::arg("position"), py::arg("frame"), py::arg("spot_size"), py::arg("blend"),
+             py::arg("falloff") = "scaled");
+}
+
+}  // namespace beamspread

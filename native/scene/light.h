@@ -1,0 +1,40 @@
+// What every kind of light answers; each kind has a file of its own beside this one.
+//
+// Lights are in Cycles' units and follow Cycles' formulas, measured in Blender 3.4.1, 4.2, 4.5 and 5.0
+// (tests/blender/test_cycles_irradiance.py): a white diffuse plane baked with DIFFUSE / DIRECT shows E / pi. They have
+// strength 1, W/m^2 or W, and no colour: light is linear in both.
+#pragma once
+
+#include <span>
+
+#include "base/vec.h"
+
+namespace beamspread {
+
+// Light at one point of the scene.
+struct Arrival {
+    Vec3 travel;  // unit vector along which it travels
+    double flux;  // on a square metre that faces it, W/m^2
+    double distance;  // to the lamp, metres; may be infinite
+};
+
+// Where all light of a lamp comes from.
+struct LightSource {
+    Vec3 position{};  // of the lamp; of a light infinitely far away the unit vector towards it
+    bool is_far = false;  // then light is the same everywhere
+};
+
+class Light {
+public:
+    Light() = default;
+    Light(const Light&) = delete;
+    Light& operator=(const Light&) = delete;
+    virtual ~Light() = default;
+
+    // Writes what arrives at each of the points; in the lamp itself, at distance 0, that need not be numbers. Many
+    // points at once: a call for each would cost a point lamp a quarter more time.
+    virtual void arrive(std::span<const Vec3> points, Arrival* arrivals) const = 0;
+    virtual LightSource source() const = 0;
+};
+
+}  // namespace beamspread
