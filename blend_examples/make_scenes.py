@@ -1,4 +1,4 @@
-"""Makes the example scenes: laser_beams.blend, obstacle.blend and marble_floor.blend, beside this file.
+"""Makes the example scenes: laser_beams, obstacle, marble_floor and low_sun, each a .blend beside this file.
 
     tools/build.sh && blender -b --factory-startup --python-exit-code 1 --python blend_examples/make_scenes.py
 
@@ -16,6 +16,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "build" / "stage")]
 
 import beamspread  # noqa: E402
+import low_sun  # noqa: E402
 import marble_floor  # noqa: E402
 import scene_parts as parts  # noqa: E402
 
@@ -81,8 +82,16 @@ def obstacle():
 
 def main():
     beamspread.register()
-    for name, build in (("laser_beams", laser_beams), ("obstacle", obstacle), ("marble_floor", marble_floor.build)):
-        build()
+    scenes = {
+        "laser_beams": laser_beams,
+        "obstacle": obstacle,
+        "marble_floor": marble_floor.build,
+        "low_sun": low_sun.build,
+    }
+    # Names after the `--` choose.
+    chosen = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    for name in chosen or scenes:
+        scenes[name]()
         parts.save(str(HERE / f"{name}.blend"))
     bpy.ops.wm.read_factory_settings(use_empty=True)
 

@@ -301,7 +301,7 @@ def test_a_new_kind_of_light_and_a_new_layer_need_nothing_but_themselves(monkeyp
     """Even light from above, and a layer that shows the irradiance of all lights."""
 
     class Sky(Light):
-        def unit_beams(self, target, caster, **options):
+        def gather(self, target, caster, **options):
             return np.ones((target.height, target.width), np.float32), np.array([0.0, 0.0, -1.0])
 
         def is_behind(self, target):
@@ -309,7 +309,7 @@ def test_a_new_kind_of_light_and_a_new_layer_need_nothing_but_themselves(monkeyp
 
     def irradiance(one, target, _material, _progress):
         lights = one.illumination.lights
-        return sum(light_beams(target, light, one.illumination.caster(), one.settings)[0] for light in lights)
+        return sum(light_beams(target, light, one.illumination.caster(target), one.settings)[0] for light in lights)
 
     monkeypatch.setitem(LAYERS, "Irradiance", irradiance)
     sky = Sky("Sky", 3.0, (1.0, 0.5, 0.0), True)

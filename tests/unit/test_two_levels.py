@@ -90,7 +90,7 @@ def test_tiles_on_two_levels_are_seamless(ldf, direction, memory):
 @pytest.mark.parametrize("mean_free_path", [20.0, 500.0])
 @pytest.mark.parametrize("angle", [20, 75])
 def test_two_levels_equal_direct(ldf, angle, mean_free_path):
-    """What README says of one direction."""
+    """What docs/accuracy.md says of one direction."""
     direction = travel(angle, 53)
     beams = light(120, 180)
     direct = convolve(beams, direction, ldf, ALBEDO, mean_free_path, 1.0, solver="direct")

@@ -25,7 +25,7 @@ LIBRARY_WEIGHT, LIGHT_WEIGHT, SOLVE_WEIGHT = 2.0, 1.0, 3.0
 # Of the solvers, see `convolve`: half a per cent in the worst texel is not seen, and below the noise of libraries.
 TOLERANCE = 5e-3
 
-# Bytes of irradiance that wait for the solver at once, 256 lights on 1024 x 1024 texels; more lights take another solve.
+# Bytes of irradiance that wait for the solver at once: 256 lights on 1024 x 1024 texels, beyond which it solves again.
 MOST_WAITING = 1 << 30
 
 
@@ -86,7 +86,7 @@ def _gather(grid: Grid, lights: Sequence[Light], caster, settings: BakeSettings,
         color = light.rgb()
         if not (irradiance.any() and color.any()):
             continue
-        position = light.native().position_in(grid.native())
+        position = light.position_in(grid)
         if position is None:
             arriving.append(native.PlaneLight(irradiance, direction.astype(np.float32), color.tolist()))
         else:
@@ -102,9 +102,8 @@ def gather_unit(
     And the direction of travel, unit vectors in the plane's frame: (3,) for a sun, else (H, W, 3), or None if no
     `directions` are wanted. `caster` is a native `Occluders` or None.
     """
-    irradiance, direction = native.gather_beams(
-        grid.native(),
-        light.native(),
+    irradiance, direction = light.gather(
+        grid,
         caster if light.cast_shadow else None,
         samples=settings.samples,
         threads=settings.threads,

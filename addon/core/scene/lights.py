@@ -30,8 +30,16 @@ class Light(ABC):
     cast_shadow: bool
 
     @abstractmethod
-    def native(self):
-        """The native light, white and of strength 1."""
+    def gather(self, grid: Grid, caster, **options) -> tuple[np.ndarray, np.ndarray | None]:
+        """Irradiance (H, W) of a white light of strength 1, and its direction of travel in the plane's frame.
+
+        The direction is (3,), or (H, W, 3) where it changes, or None if no `directions` are wanted of a light from a
+        point; `caster` a native `Occluders`, or None; `options` what native `gather_beams` takes.
+        """
+
+    def position_in(self, _grid: Grid) -> tuple[float, float, float] | None:
+        """Where all of it comes from, metres from the outer corner of texel (0, 0) in the plane's frame, if it does."""
+        return None
 
     @abstractmethod
     def is_behind(self, grid: Grid) -> bool:
@@ -55,8 +63,22 @@ class Light(ABC):
         return ""
 
 
+class TracedLight(Light):
+    """A light that native code knows."""
+
+    @abstractmethod
+    def native(self):
+        """The native light, white and of strength 1."""
+
+    def gather(self, grid, caster, **options):
+        return native.gather_beams(grid.native(), self.native(), caster, **options)
+
+    def position_in(self, grid):
+        return self.native().position_in(grid.native())
+
+
 @dataclass(frozen=True)
-class SunLight(Light):
+class SunLight(TracedLight):
     """Parallel light; `strength` is the irradiance at normal incidence, W/m^2.
 
     Attributes
@@ -74,7 +96,7 @@ class SunLight(Light):
 
 
 @dataclass(frozen=True)
-class PointLight(Light):
+class PointLight(TracedLight):
     """Light from one point into all directions; `strength` is Cycles' watts."""
 
     position: Vector
