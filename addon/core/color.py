@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from .arrays import float_array
 from .material import RGB
 from .progress import Progress
 
@@ -46,13 +47,10 @@ def albedo_from_color(color, medium, quality: str = "final", progress: Progress 
 
 
 def _channels(color) -> list[float]:
-    allowed = "allowed: one number or three (red, green, blue), each 0 to 1"
-    try:
-        values = np.asarray(color, dtype=float)
-    except (TypeError, ValueError):
-        raise ValueError(f"argument 'color' is {color!r}; {allowed}") from None
+    allowed = "one number or three (red, green, blue), each 0 to 1"
+    values = float_array("color", color, np.float64, allowed)
     if values.shape not in ((), (3,)) or not ((values >= 0) & (values <= 1)).all():
-        raise ValueError(f"argument 'color' is {values.tolist()}; {allowed}")
+        raise ValueError(f"argument 'color' is {values.tolist()}; allowed: {allowed}")
     return np.broadcast_to(values, 3).tolist()
 
 

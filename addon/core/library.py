@@ -12,7 +12,7 @@ PHOTONS = {"preview": 80_000, "final": 4_000_000}
 
 _MAX_PHOTONS = 4_000_000
 
-_FILE_VERSION = 9
+_FILE_VERSION = 10
 """Raised when the simulation changes, so that older cached files are made again."""
 
 SHIPPED_FOLDER = Path(__file__).resolve().parents[1] / "library"
@@ -135,7 +135,7 @@ def library(medium, quality="final", progress=None):
         Totals are exact either way, as `LdfLibrary.calibrated` has it; what differs is the noise of the maps, see
         `LdfLibrary.image_standard_error`.
     progress : callable, optional
-        Called with the finished fraction while a simulation runs; returning False stops.
+        Called with the finished fraction while a simulation runs; only the answer False (or NumPy's) stops.
 
     Returns
     -------
@@ -145,10 +145,12 @@ def library(medium, quality="final", progress=None):
     Raises
     ------
     ValueError
-        Unknown quality.
+        Names the argument that is no Medium, quality or function.
     Cancelled
         `progress` returned False.
     """
+    if not isinstance(medium, native.Medium):
+        raise ValueError(f"argument 'medium' is {medium!r}; allowed: a Medium")
     if quality not in PHOTONS:
         raise ValueError(f"argument 'quality' is {quality!r}; allowed: 'final', 'preview'")
     path = _cache_path(medium, quality)

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-# Takes the fraction done, 0..1; returning False stops the work, which then raises Cancelled.
-Progress = Callable[[float], bool]
+# Takes the fraction done, 0..1. Answering False (or NumPy's False_) stops the work, which then raises Cancelled; any
+# other answer goes on, also None and 0. The native module alone reads the answers: everything here passes them on.
+Progress = Callable[[float], object]
 
 
 def stages(progress: Progress | None, weights: list[float]) -> Iterator[Progress | None]:
-    """Yield one callback per weight; together they run from 0 to 1."""
+    """Yield one callback per weight; together they run from 0 to 1. Raises ValueError for what can't be called."""
+    if progress is not None and not callable(progress):
+        raise ValueError(f"argument 'progress' is {progress!r}; allowed: a function of the finished fraction, or None")
     total, done = sum(weights) or 1.0, 0.0
     for weight in weights:
-        yield _stage(progress, done / total, weight / total) if progress else None
+        yield _stage(progress, done / total, weight / total) if progress is not None else None
         done += weight
 
 
 def _stage(progress: Progress, start: float, length: float) -> Progress:
-    # Native code takes anything but False for "go on"; so does this.
-    return lambda fraction: progress(min(1.0, start + length * fraction)) is not False
+    return lambda fraction: progress(min(1.0, start + length * fraction))

@@ -6,6 +6,8 @@ namespace beamspread {
 
 Progress::Callback progress_callback(const py::object& progress)
 {
+    if (!progress.is_none() && PyCallable_Check(progress.ptr()) == 0)
+        reject("progress", std::string(py::repr(progress)), "a function of the finished fraction, or None");
     return [&progress](double fraction) {
         const py::gil_scoped_acquire gil;
         if (PyErr_CheckSignals() != 0)
@@ -13,10 +15,29 @@ Progress::Callback progress_callback(const py::object& progress)
         if (progress.is_none())
             return true;
         const py::object answer = progress(fraction);
-        // A callback without a return statement does not mean to stop.
-        return answer.is_none() || answer.cast<bool>();
+        py::detail::make_caster<bool> boolean;
+        constexpr bool convert = false;
+        return !boolean.load(answer, convert) || static_cast<bool>(boolean);
     };
 }
+
+template <class T>
+Array<T> real_array(const std::string& name, const py::object& values)
+{
+    const auto array = py::array::ensure(values);
+    if (!array)
+        reject(name, "no array", "real numbers");
+    const std::string kind(1, array.dtype().kind());
+    if (std::string("fiub").find(kind) == std::string::npos)
+        reject(name, std::string(py::str(array.dtype())) + " of " + std::to_string(array.ndim()) + " dimensions",
+               "real numbers");
+    if (py::module_::import("numpy.ma").attr("is_masked")(values).cast<bool>())
+        reject(name, "an array with masked values", "real numbers, none of them masked");
+    return py::array_t<T, py::array::c_style | py::array::forcecast>::ensure(array);
+}
+
+template Array<float> real_array(const std::string&, const py::object&);
+template Array<double> real_array(const std::string&, const py::object&);
 
 Side side_from_name(const std::string& name)
 {

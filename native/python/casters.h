@@ -18,9 +18,16 @@ namespace py = pybind11;
 template <class T>
 using Array = py::array_t<T, py::array::c_style>;
 
-// A callback for Progress that calls `progress(fraction)` with the GIL held and lets Ctrl-C through;
-// with None nothing is reported. `progress` must outlive it.
+// A callback for Progress that calls `progress(fraction)` with the GIL held and lets Ctrl-C through; with None nothing
+// is reported. Only an answer of False or of NumPy's False_ stops: a callback without a return statement, or one that
+// returns what a method happened to, does not mean to. `progress` must outlive the callback; throws InvalidArgument
+// unless it can be called.
 Progress::Callback progress_callback(const py::object& progress);
+
+// Values of an array argument as C-contiguous doubles or floats. Throws InvalidArgument for what would lose something
+// on the way: masks, imaginary parts, and what is no number.
+template <class T>
+Array<T> real_array(const std::string& name, const py::object& values);
 
 // "reflected" or "transmitted"; throws InvalidArgument.
 Side side_from_name(const std::string& name);

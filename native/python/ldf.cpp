@@ -98,7 +98,8 @@ calibrated library does: the error halfway between simulated angles is known fro
 The light of each scattering order, with the distribution it was simulated with, is scaled: by as little as makes the
 totals right at 16 albedos from .01 to .99999, least squares weighted by statistical variance. Albedos in between, and
 the totals of every map, follow. `standard_error` then includes what `exact_totals` and the interpolation between angles
-leave; `image_standard_error` stays that of the simulation, an upper bound.
+leave; `image_standard_error` stays that of the simulation, an upper bound. Measured over twelve media: totals of 100
+photons are within 3 % of the incident power, of 1000 within .5 %; for albedos beyond .99999 they may be 1.5 % too large.
 
 Parameters
 ----------
@@ -108,6 +109,11 @@ threads : int
 Returns
 -------
 LdfLibrary
+
+Raises
+------
+ValueError
+    The library was simulated with fewer than 100 photons per angle.
 )")
         .def("diffuse_reflectance", &LdfLibrary::diffuse_reflectance, py::arg("albedo"),
              "Reflectance under uniform diffuse light; needs a library from 0 to at least 88 degrees.");
@@ -127,10 +133,11 @@ angle, albedo : float
 size : int
     Texels along each side, 1 to 16384.
 pitch : float
-    Side of a texel, mean free paths.
+    Side of a texel, mean free paths, 1e-6 to 1e18; at least 1e-4 for a beam with a diameter.
 side : {"reflected", "transmitted"}
 beam_diameter : float
-    Of the disk around O that the beam evenly lights on the surface, mean free paths; 0: a pencil beam.
+    Of the disk around O that the beam evenly lights on the surface, mean free paths, up to 1e6 and 1e4 texels; 0: a
+    pencil beam.
 
 Returns
 -------

@@ -12,17 +12,20 @@ namespace beamspread {
 
 namespace {
 
-using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
+// An argument and its name.
+struct Named {
+    const char* name;
+    const py::object& values;
+};
 
 // Applies a map of two numbers to two, elementwise to arrays that broadcast; numbers give numbers.
 template <class Map>
-py::tuple apply(const py::object& first, const py::object& second, const Map& map)
+py::tuple apply(const Named& first, const Named& second, const Map& map)
 {
-    const py::module_ numpy = py::module_::import("numpy");
-    const py::tuple both = numpy.attr("broadcast_arrays")(numpy.attr("asarray")(first, py::dtype::of<double>()),
-                                                          numpy.attr("asarray")(second, py::dtype::of<double>()));
-    const auto a = both[0].cast<Doubles>();
-    const auto b = both[1].cast<Doubles>();
+    const py::tuple both = py::module_::import("numpy").attr("broadcast_arrays")(
+        real_array<double>(first.name, first.values), real_array<double>(second.name, second.values));
+    const auto a = real_array<double>(first.name, both[0]);
+    const auto b = real_array<double>(second.name, both[1]);
     const std::vector<py::ssize_t> shape(a.shape(), a.shape() + a.ndim());
     py::array_t<double> x(shape);
     py::array_t<double> y(shape);
@@ -35,7 +38,7 @@ py::tuple apply(const py::object& first, const py::object& second, const Map& ma
 
 py::tuple to_angular(const AngularSpace& space, const py::object& u, const py::object& v)
 {
-    return apply(u, v, [&](double x, double y, double& phi, double& psi) {
+    return apply({"u", u}, {"v", v}, [&](double x, double y, double& phi, double& psi) {
         const AngularCoordinates at = space.to_angular(Vec2(x, y));
         phi = at.phi;
         psi = at.psi;
@@ -44,7 +47,7 @@ py::tuple to_angular(const AngularSpace& space, const py::object& u, const py::o
 
 py::tuple to_planar(const AngularSpace& space, const py::object& phi, const py::object& psi)
 {
-    return apply(phi, psi, [&](double azimuth, double zenith, double& u, double& v) {
+    return apply({"phi", phi}, {"psi", psi}, [&](double azimuth, double zenith, double& u, double& v) {
         const Vec2 place = space.to_planar({azimuth, zenith});
         u = place.x;
         v = place.y;

@@ -18,14 +18,12 @@ namespace {
 LdfSample sample_of(const py::object& image, double pitch, double angle, double albedo, double beam_diameter,
                     std::optional<double> g)
 {
-    const auto array = py::array::ensure(image);
-    if (!array)
-        reject("image", "no array", "real numbers, (N, M)");
-    const char kind = array.dtype().kind();
-    if (array.ndim() != 2 || (kind != 'f' && kind != 'i' && kind != 'u' && kind != 'b'))
-        reject("image", std::string(py::str(array.dtype())) + " of " + std::to_string(array.ndim()) + " dimensions",
+    const Array<float> pixels = real_array<float>("image", image);
+    if (pixels.ndim() != 2)
+        reject("image",
+               std::string(py::str(py::array::ensure(image).dtype())) + " of " + std::to_string(pixels.ndim()) +
+                   " dimensions",
                "real numbers, (N, M)");
-    const auto pixels = py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(array);
     LdfSample sample;
     sample.height = static_cast<std::size_t>(pixels.shape(0));
     sample.width = static_cast<std::size_t>(pixels.shape(1));
@@ -53,6 +51,7 @@ LdfSample from_library(const LdfLibrary& library, double angle, double albedo, s
     sample.albedo = albedo;
     sample.beam_diameter = beam_diameter;
     sample.g = library.medium().g;
+    validate(sample);
     return sample;
 }
 
@@ -76,9 +75,11 @@ Parameters
 image : array_like, float32, shape (N, M)
     Mean exitance of each texel per unit incident power, 1/mfp^2 (the paper's luminance, times pi); rows v upward,
     columns u; O, where the beam's axis enters, at the centre; the beam travels toward +u, to the right.
-    Undershoots of up to 10 % of the brightest texel are taken for noise, other negative values are refused.
+    Undershoots of up to 10 % of the brightest texel are taken for noise, other negative values are refused; so is a
+    power, the integral, that is negative or larger than 1.05: no medium returns more than arrives, and 5 % is what a
+    simulation of a thousand photons may be off.
 pitch : float
-    Side of a texel, mean free paths.
+    Side of a texel, mean free paths, 1e-6 to 1e18.
 angle : float
     Of incidence, degrees from the surface normal, [0, 90).
 albedo : float

@@ -35,7 +35,9 @@ ValueError
         .def_readonly("g", &Medium::g)
         .def_readonly("ior", &Medium::ior)
         .def_readonly("thickness", &Medium::thickness)
-        .def("__eq__", [](const Medium& a, const Medium& b) { return a == b; })
+        // With anything else Python goes on to compare identities, as for its own types.
+        .def(
+            "__eq__", [](const Medium& a, const Medium& b) { return a == b; }, py::is_operator())
         .def("__hash__", [](const Medium& a) { return py::hash(py::make_tuple(a.g, a.ior, a.thickness)); })
         .def("__repr__",
              [](const Medium& a) {

@@ -55,7 +55,7 @@ seed : int
 threads : int
     0: all.
 progress : callable, optional
-    Called with the finished fraction; returning False stops.
+    Called with the finished fraction. The answer False (or NumPy's) stops, any other goes on; an error passes through.
 kernel : str
     One of `walk_kernels()`; empty: the fastest. They agree up to the simulation's noise.
 

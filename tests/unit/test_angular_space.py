@@ -73,6 +73,14 @@ def test_arrays_broadcast_and_numbers_give_numbers():
         (lambda: AngularSpace((0, 0), (0, 0), 0), "'height' is 0"),
         (lambda: AngularSpace((0, 0), (0, 0), -1), "'height' is -1"),
         (lambda: AngularSpace((0, 0), (0, 0), math.inf), "'height' is inf"),
+        (lambda: space().to_angular(1e16, 0), "'u, v' is 1e\\+16; allowed: places within 1e15 heights"),
+        (lambda: space().to_angular(0, math.inf), "'u, v' is inf"),
+        (lambda: space().to_angular(math.nan, 0), "'u, v' is nan"),
+        (lambda: space().to_angular(1j, 0), "'u' is complex128"),
+        (lambda: space().to_angular("a", 0), "'u' is <U1"),
+        (lambda: space().to_angular(0, np.ma.masked_less([0.0, 1.0], 0.5)), "'v' is an array with masked values"),
+        (lambda: space().to_planar([1j], 0), "'phi' is complex128"),
+        (lambda: space().to_planar(math.inf, 0.1), "'phi' is inf"),
         (lambda: space().to_planar(0, math.pi / 2), "'psi' is 1.57"),
         (lambda: space().to_planar(0, -0.1), "'psi' is -0.1"),
         (lambda: space().to_planar(0, [0.1, math.nan]), "'psi' is nan"),
@@ -89,8 +97,8 @@ def test_bad_arguments(call, message):
 def peak(u0, width, size=61, pitch=0.1, noise=0.0, seed=0):
     """A Gaussian around (u0, 0); noise: standard deviation relative to the peak."""
     x = (np.arange(size) + 0.5 - size / 2) * pitch
-    image = np.exp(-((x[None, :] - u0) ** 2 + x[:, None] ** 2) / (2 * width**2))
-    image += noise * np.random.default_rng(seed).normal(size=image.shape) * np.sqrt(image)
+    image = 0.02 * np.exp(-((x[None, :] - u0) ** 2 + x[:, None] ** 2) / (2 * width**2))
+    image += noise * np.random.default_rng(seed).normal(size=image.shape) * np.sqrt(0.02 * image)
     return LdfSample(np.maximum(image, 0), pitch, 30, 0.9)
 
 
@@ -113,7 +121,7 @@ def test_brightest_point_of_a_pencil_beam(size):
     """1 / r ahead brighter than behind: its top is one texel, or the four around O."""
     x = np.arange(size) + 0.5 - size / 2
     r = np.maximum(np.hypot(x[None, :], x[:, None]), 0.3)
-    image = (1 + 0.5 * x[None, :] / r) / r
+    image = 0.005 * (1 + 0.5 * x[None, :] / r) / r
     assert LdfSample(image, 1.0, 45, 0.9).brightest == (0, 0)
 
 

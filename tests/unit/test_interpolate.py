@@ -17,7 +17,7 @@ def places(size=41):
 
 def random_samples(angles=(0, 30), albedos=(0.5, 0.9), gs=(None,), shape=(6, 9)):
     rng = np.random.default_rng(3)
-    return [LdfSample(rng.random(shape), PITCH, *at[:2], 1.0, at[2]) for at in product(angles, albedos, gs)]
+    return [LdfSample(rng.random(shape) / 40, PITCH, *at[:2], 1.0, at[2]) for at in product(angles, albedos, gs)]
 
 
 def made_of(law, angles=(0.0,), albedos=(0.9,), gs=(0.8,), diameter=0.0):
@@ -110,7 +110,7 @@ def test_bad_arguments_are_named(call, message):
 def shifted_peak(theta, albedo, g):
     """A Gaussian whose brightest point moves in proportion to the angle, .8 at 30 degrees."""
     u, v = places()
-    return albedo * np.exp(-((u - 0.8 * theta / math.radians(30)) ** 2 + v**2) / 2)
+    return 0.05 * albedo * np.exp(-((u - 0.8 * theta / math.radians(30)) ** 2 + v**2) / 2)
 
 
 def test_angular_moves_the_brightest_point():
@@ -161,7 +161,7 @@ def test_adaptive_is_exact_between_albedos_of_a_pencil_beam(g):
 
     def law(theta, albedo, g):
         r = np.hypot(*places()) + 0.01
-        return albedo * np.exp(-math.sqrt(3 * (1 - albedo) * (1 - g * albedo)) * r) / r
+        return 0.02 * albedo * np.exp(-math.sqrt(3 * (1 - albedo) * (1 - g * albedo)) * r) / r
 
     samples = made_of(law, albedos=(0.2, 0.999), gs=(g,))
     for albedo in (0.3, 0.6, 0.95):
@@ -174,7 +174,7 @@ def test_adaptive_is_exact_between_albedos_inside_a_wide_beam():
 
     def law(theta, albedo, g):
         s = math.sqrt((1 - albedo) / (1 - g * albedo))
-        return np.full((9, 9), (1 - s) * (1 - 0.139 * s) / (1 + 1.17 * s))
+        return np.full((9, 9), 0.3 * (1 - s) * (1 - 0.139 * s) / (1 + 1.17 * s))
 
     samples = made_of(law, albedos=(0.2, 0.99), diameter=1e3)
     assert interpolate(samples, 0, 0.7, method="adaptive").image == pytest.approx(law(0, 0.7, 0.8), rel=1e-5)
@@ -185,7 +185,7 @@ def test_adaptive_scales_between_anisotropies():
 
     def law(theta, albedo, g):
         u, v = places(81)
-        return (1 - g) ** 2 * np.exp(-(((1 - g) * np.hypot(u, v)) ** 2) / 0.5)
+        return 0.5 * (1 - g) ** 2 * np.exp(-(((1 - g) * np.hypot(u, v)) ** 2) / 0.5)
 
     samples = made_of(law, gs=(0.5, 0.75))
     g = 1 - math.sqrt(0.5 * 0.25)
@@ -196,7 +196,7 @@ def test_adaptive_scales_between_anisotropies():
 
 
 def test_adaptive_with_a_black_sample():
-    shape = np.exp(-np.hypot(*places()))
+    shape = 0.1 * np.exp(-np.hypot(*places()))
     samples = [LdfSample(a * shape, PITCH, 0, a, 0, 0.8) for a in (0.0, 0.5)]
     assert interpolate(samples, 0, 0.25, method="adaptive").image == pytest.approx(0.25 * shape, rel=1e-5)
     black = [LdfSample(np.zeros((5, 5)), PITCH, t, 0.5) for t in (0, 30)]

@@ -176,6 +176,15 @@ def test_bad_simulations_name_the_argument(call, message):
         (lambda lib: lib.transmittance(90, 0.5), "'angle' is 90"),
         (lambda lib: lib.image(30, 0.5, 0, 1.0), "'size' is 0"),
         (lambda lib: lib.image(30, 0.5, 9, 0.0), "'pitch' is 0"),
+        (lambda lib: lib.image(30, 0.5, 9, 1e-30), "'pitch' is 1e-30; allowed: 1e-6 <= pitch <= 1e18"),
+        (lambda lib: lib.image(30, 0.5, 9, 1e30), "'pitch' is 1e.30; allowed: 1e-6 <= pitch <= 1e18"),
+        (lambda lib: lib.image(30, 0.5, 9, 1e-5, beam_diameter=1e-3), "'pitch' is 1e-05; allowed: pitch >= 1e-4"),
+        (
+            lambda lib: lib.image(30, 0.5, 9, 1.0, beam_diameter=2e4),
+            "'beam_diameter' is 20000; allowed: up to 1e6 .* 1e4",
+        ),
+        (lambda lib: lib.image(30, 0.5, 9, 1e9, beam_diameter=1e7), "'beam_diameter' is 1e.07; allowed: up to 1e6"),
+        (lambda lib: lib.image_standard_error(30, 0.5, 9, math.nan), "'pitch' is nan"),
         (lambda lib: lib.image(30, 0.5, 9, 1.0, side="up"), "'side' is 'up'"),
         (lambda lib: lib.image(30, 0.5, 9, 1.0, beam_diameter=-2.0), "'beam_diameter' is -2"),
     ],
@@ -183,6 +192,41 @@ def test_bad_simulations_name_the_argument(call, message):
 def test_bad_questions_name_the_argument(small, call, message):
     with pytest.raises(ValueError, match=message):
         call(small)
+
+
+def test_media_compare_with_anything():
+    assert Medium(0.5) == Medium(0.5)
+    assert Medium(0.5) != Medium(0.6)
+    for other in (5, None, "Medium", (0.5, 1.0, math.inf)):
+        assert (Medium(0.5) == other) is False
+        assert (Medium(0.5) != other) is True
+
+
+@pytest.mark.parametrize("nearly", [5e-324, 1e-60, 0.01])
+def test_an_angle_next_to_0(nearly):
+    """Its mirror image is as near: the spline takes both for one at 0, whose odd harmonics are noise."""
+    angles = [10, 20, 30, 40]
+    straight, library = (simulate(Medium(0.8, 1.4), [first, *angles], 2000) for first in (0.0, nearly))
+    assert library.angles == [nearly, *angles]
+    for angle in (nearly, 5):
+        error = math.hypot(straight.standard_error(angle, 0.9), library.standard_error(angle, 0.9))
+        assert abs(library.reflectance(angle, 0.9) - straight.reflectance(angle, 0.9)) < 5 * error
+        errors = [run.image_standard_error(angle, 0.9, 9, 0.5).max() for run in (straight, library)]
+        assert 0.25 < errors[1] / errors[0] < 4  # each known to a quarter
+
+
+@pytest.mark.parametrize("which", ["reflected", "transmitted"])
+def test_image_at_the_ends_of_what_is_allowed(small, slab, which):
+    """Power per area: around O the same seen from ever nearer (a pencil's as 1 / pitch), evenly in a huge disk."""
+    library = small if which == "reflected" else slab
+    total = library.reflectance(30, 0.9) if which == "reflected" else library.transmittance(30, 0.9)
+    far = library.image(30, 0.9, 8, 1e18, side=which).sum(dtype=np.float64) * 1e36
+    assert far == pytest.approx(total, rel=1e-5)
+    near = [library.image(30, 0.9, 8, pitch, side=which) for pitch in (1e-5, 1e-6)]
+    assert near[1].mean() / near[0].mean() == pytest.approx(10 if which == "reflected" else 1, rel=1e-4)
+    for pitch, diameter in ((1.0, 1e4), (100.0, 1e6)):
+        disk = library.image(30, 0.9, 8, pitch, side=which, beam_diameter=diameter)
+        assert disk == pytest.approx(np.full((8, 8), total / (math.pi / 4 * diameter**2)), rel=1e-3)
 
 
 @pytest.mark.parametrize("stop_at", [0.0, 0.3, 0.9])
@@ -366,6 +410,11 @@ class TestCache:
         with pytest.raises(Cancelled):
             beamspread.library(Medium(0.3), progress=lambda f: False)
         assert beamspread.library(Medium(0.3)).angles == [0.0, 45.0, 88.0]
+
+    @pytest.mark.parametrize("medium", [None, 0.8, (0.8, 1.0, 2.0)])
+    def test_no_medium(self, medium):
+        with pytest.raises(ValueError, match="'medium' is .*; allowed: a Medium"):
+            beamspread.library(medium)
 
     def test_unknown_quality(self):
         with pytest.raises(ValueError, match="'quality' is 'best'"):

@@ -165,10 +165,17 @@ def test_colors_may_be_numbers_or_arrays(noisy):
     assert [type(value) for value in grey] == [float] * 3
 
 
-@pytest.mark.parametrize("color", [(0.1, 1.01, 0.1), -0.5, math.nan, (0.5, 0.5), "red", [[0.5, 0.5, 0.5]], None])
+@pytest.mark.parametrize(
+    "color", [(0.1, 1.01, 0.1), -0.5, math.nan, (0.5, 0.5), "red", [[0.5, 0.5, 0.5]], None, 0.5 + 0.1j]
+)
 def test_what_is_no_color_is_refused(color):
     with pytest.raises(ValueError, match=r"argument 'color' is .*; allowed: .* 0 to 1"):
         albedo_from_color(color, beamspread.Medium())
+
+
+def test_masked_colors_are_refused():
+    with pytest.raises(ValueError, match="'color' is an array with masked values"):
+        albedo_from_color(np.ma.masked_less([0.1, 0.5, 0.5], 0.2), beamspread.Medium())
 
 
 def test_base_color_makes_the_albedo_irrelevant():

@@ -1,6 +1,8 @@
 """Progress of stages."""
 
+import numpy as np
 import pytest
+from beamspread import Cancelled, Medium, simulate
 from beamspread.core.progress import stages
 
 
@@ -12,9 +14,26 @@ def test_stages_join_to_one_range():
     assert seen == pytest.approx([0, 0.25, 0.25, 1])
 
 
-def test_stop_passes_through_and_anything_else_goes_on():
-    assert next(stages(lambda fraction: False, [1]))(0.5) is False
-    assert next(stages(lambda fraction: None, [1]))(0.5) is True
+STOPS = [False, np.False_]
+GOES_ON = [None, 0, True, 1, np.True_, np.array(False), np.array([0, 0]), "", "no", []]
+
+
+@pytest.mark.parametrize("answer", STOPS + GOES_ON, ids=repr)
+def test_false_stops_and_any_other_answer_goes_on(answer):
+    """The same where the callback is called straight and where it is one of several stages."""
+    for progress in (lambda fraction: answer, next(stages(lambda fraction: answer, [1, 2]))):
+        if any(answer is stop for stop in STOPS):
+            with pytest.raises(Cancelled):
+                simulate(Medium(), [0], 1, progress=progress)
+        else:
+            assert simulate(Medium(), [0], 1, progress=progress).photons == 1
+
+
+@pytest.mark.parametrize("progress", [5, "bar", False])
+def test_what_is_no_function_is_named(progress):
+    for call in (lambda: simulate(Medium(), [0], 1, progress=progress), lambda: next(stages(progress, [1]))):
+        with pytest.raises(ValueError, match=f"'progress' is {progress!r}; allowed: a function"):
+            call()
 
 
 def test_no_progress_wanted():

@@ -18,7 +18,7 @@ def library():
 
 
 def picture(height=4, width=6):
-    return np.random.default_rng(1).random((height, width), np.float32)
+    return np.random.default_rng(1).random((height, width), np.float32) / 10
 
 
 def sample(**changes):
@@ -47,6 +47,12 @@ def test_takes_any_real_array():
     for made in (picture().astype(np.float64), picture().tolist(), np.asfortranarray(picture()), picture()[:]):
         assert np.array_equal(sample(image=made).image, picture())
     assert sample(image=np.eye(3, dtype=int)).image[1, 1] == 1
+    assert np.array_equal(sample(image=np.ma.array(picture())).image, picture())  # no value is masked
+
+
+def test_noise_of_a_power_is_allowed():
+    """5 %: three standard errors of a total that a thousand photons tell."""
+    assert sample(image=np.full((2, 2), 1.0499)).power == pytest.approx(1.0499)
 
 
 @pytest.mark.parametrize(
@@ -55,6 +61,10 @@ def test_takes_any_real_array():
         ({"image": np.zeros((2, 2, 3))}, "'image' is float64 of 3 dimensions"),
         ({"image": np.zeros((0, 4))}, "'image' is of 0 x 4"),
         ({"image": np.zeros((2, 2), complex)}, "'image' is complex128"),
+        ({"image": np.ma.masked_less([[0.1, 0.2]], 0.15)}, "'image' is an array with masked values"),
+        ({"image": np.full((2, 2), 1.06)}, "'image' is of power 1.06.*; allowed: 0 to 1.05"),
+        ({"image": np.full((2, 2), 1e30), "pitch": 1e18}, "'image' is of power"),
+        ({"image": [[10.0] + 20 * [-0.9]], "pitch": 0.1}, "'image' is of power -0.08"),
         ({"image": [["a"]]}, "'image' is <U1"),
         ({"image": [[1.0, math.nan]]}, "'image' is with a texel of nan"),
         ({"image": [[1.0, math.inf]]}, "'image' is with a texel of inf"),
@@ -62,6 +72,7 @@ def test_takes_any_real_array():
         ({"image": [[1.0, 2.0], [3.0]]}, "'image' is no array"),
         ({"pitch": 0}, "'pitch' is 0"),
         ({"pitch": math.inf}, "'pitch' is inf"),
+        ({"pitch": 1e-30}, "'pitch' is 1e-30; allowed: 1e-6 <= pitch <= 1e18"),
         ({"angle": 90}, "'angle' is 90"),
         ({"angle": -1}, "'angle' is -1"),
         ({"albedo": 1}, "'albedo' is 1"),
@@ -178,7 +189,7 @@ def test_other_files(tmp_path, library):
 
 def test_damaged_files_are_refused(tmp_path):
     path = tmp_path / "a.exr"
-    sample(image=np.random.default_rng(2).random((40, 30))).save(path)
+    sample(image=np.random.default_rng(2).random((40, 30)) / 200).save(path)
     whole = path.read_bytes()
     rng = np.random.default_rng(1)
     refused = 0

@@ -8,16 +8,22 @@
 
 namespace beamspread {
 
+namespace {
+
+// Closer nodes would only amplify the simulation's noise.
+constexpr double closest_deg = 0.06;
+
+}  // namespace
+
 AngleNodes::AngleNodes(std::vector<double> angles_deg) : m_angles_deg(std::move(angles_deg))
 {
+    for (std::size_t j = 1; j < count(); ++j)
+        if (!(m_angles_deg[j] - m_angles_deg[j - 1] > closest_deg))
+            reject("angles", m_angles_deg[j], "distinct angles, more than 0.06 degrees apart");
     std::vector<double> nodes;
-    for (const double angle : m_angles_deg) {
-        const double node = angle * radians_per_degree;
-        // Closer nodes would only amplify the simulation's noise.
-        if (!nodes.empty() && !(node - nodes.back() > 1e-3))
-            reject("angles", angle, "distinct angles, at least 0.1 degrees apart");
-        nodes.push_back(node);
-    }
+    for (const double angle : m_angles_deg)
+        // A node's mirror image is a node as well: one that is as close as that stands for both, at 0.
+        nodes.push_back(angle < 0.5 * closest_deg ? 0.0 : angle * radians_per_degree);
     m_spline = AngleSpline(std::move(nodes));
 }
 

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include <Eigen/Dense>
 
 #include "base/constants.h"
+#include "base/error.h"
 #include "medium/fresnel.h"
 #include "transport/exact/adding_doubling.h"
 
@@ -20,27 +22,41 @@ using Eigen::VectorXd;
 
 constexpr auto bins = static_cast<Eigen::Index>(order_bin_count);
 constexpr auto batches = static_cast<Eigen::Index>(batch_count);
-constexpr Eigen::Index albedos = (compared_albedos.size() + 1) / 2;  // at which totals are made equal
+
+// Totals are made equal at every other of the compared albedos, and led to what is known of them at an albedo of 1.
+constexpr std::size_t compared_count = compared_albedos.size();
+constexpr Eigen::Index albedos = (compared_count + 1) / 2 + 1;
+
+// Nothing is absorbed here; the exact solution needs an albedo below 1, and this one's differs by less than its error.
+constexpr double next_to_one = 1.0 - 1e-12;
+
+// An albedo at which light of orders that walks are given up at has lost as much as it has left.
+constexpr double deepest = 1.0 - 1.0 / max_order;
 
 // No bin is scaled by more than this or by less than its inverse.
 constexpr double max_scale = 50.0;
 
-// Of Newton's method below. The last is in squares of tolerances.
-constexpr int max_rounds = 200;
+// Fewer leave so many orders empty that totals can be 10 % off; measured over twelve media, 100 are within 3 %.
+constexpr std::uint64_t fewest_photons = 100;
+
+// Of Newton's method below. The last is in squares of tolerances. Twelve media of 1 to 10,000 photons took at most 400
+// rounds; to stop before the end may leave totals far from exact.
+constexpr int max_rounds = 10'000;
 constexpr double least_damping = 1e-9;
 constexpr double settled = 1e-6;
 
 // Part of the light that enters. Simulations know nothing of less, and no picture shows it.
 constexpr double negligible_power = 1e-9;
 
-// Totals of the angles and of the middles between them, alternating: [angle][albedo].
+// Totals of the angles and of the middles between them, alternating: [angle][albedo], the compared albedos and then
+// `deepest` and `next_to_one`.
 struct Exact {
     std::vector<double> angles_deg;
     ExactTotals totals;
 
     double total(std::size_t angle, std::size_t albedo, Side side) const
     {
-        const std::size_t place = angle * compared_albedos.size() + albedo;
+        const std::size_t place = angle * (compared_count + 2) + albedo;
         return side == Side::reflected ? totals.reflectance[place] : totals.transmittance[place];
     }
 };
@@ -53,7 +69,9 @@ Exact solve_exactly(const LdfLibrary& library, int threads)
             exact.angles_deg.push_back(0.5 * (exact.angles_deg.back() + angle));
         exact.angles_deg.push_back(angle);
     }
-    exact.totals = exact_totals(library.medium(), exact.angles_deg, compared_albedos, threads);
+    std::vector<double> solved(compared_albedos.begin(), compared_albedos.end());
+    solved.insert(solved.end(), {deepest, next_to_one});
+    exact.totals = exact_totals(library.medium(), exact.angles_deg, solved, threads);
     return exact;
 }
 
@@ -170,6 +188,9 @@ void calibrate(SideResult& side, const Observation& observed)
 LdfLibrary calibrated(const LdfLibrary& library, int threads)
 {
     const Medium& medium = library.medium();
+    if (library.photons() < fewest_photons)
+        reject("photons", static_cast<double>(library.photons()),
+               "at least " + std::to_string(fewest_photons) + " per angle, or totals can't be made right");
     const Exact exact = solve_exactly(library, threads);
     const double relative_error = exact_totals_error(medium);
     std::vector<AngleResult> results = library.results();
@@ -182,14 +203,21 @@ LdfLibrary calibrated(const LdfLibrary& library, int threads)
                 continue;
             const double ballistic = ballistic_total(medium, refracted_angle(theta, medium.ior), side);
             Observation observed{MatrixXd(albedos, bins), VectorXd(albedos), VectorXd(albedos)};
-            for (Eigen::Index k = 0; k < albedos; ++k) {
-                const std::size_t compared = 2 * static_cast<std::size_t>(k);
-                const auto weights = order_weights(result, compared_albedos[compared]);
-                observed.weights.row(k) = Eigen::Map<const VectorXd>(weights.data(), bins);
-                const double total = exact.total(2 * j, compared, side) / entering;
-                observed.totals(k) = total - ballistic;
-                observed.tolerance(k) = relative_error * total + negligible_power;
-            }
+            const auto observe = [&](Eigen::Index row, double albedo, double total, double tolerance) {
+                const auto weights = order_weights(result, albedo);
+                observed.weights.row(row) = Eigen::Map<const VectorXd>(weights.data(), bins);
+                observed.totals(row) = total - ballistic;
+                observed.tolerance(row) = relative_error * total + negligible_power + tolerance;
+            };
+            for (std::size_t k = 0; k < compared_count; k += 2)
+                observe(static_cast<Eigen::Index>(k / 2), compared_albedos[k], exact.total(2 * j, k, side) / entering,
+                        0.0);
+            // The power of all orders lies below that of an albedo of 1 by what leaves later than any walk, and above
+            // that at `deepest`. Without this the last orders, of which a few photons tell, might return more than
+            // arrives.
+            const double most = exact.total(2 * j, compared_count + 1, side) / entering;
+            const double least = exact.total(2 * j, compared_count, side) / entering;
+            observe(albedos - 1, 1.0, 0.5 * (most + least), 0.25 * (most - least));
             calibrate(result, observed);
         }
     }

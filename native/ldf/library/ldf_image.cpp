@@ -12,6 +12,17 @@ namespace beamspread {
 
 namespace {
 
+// Where the light of a disk loses .1 % of a texel to rounding: it is a difference of integrals over what is far larger.
+constexpr double smallest_pitch_of_disk = 1e-4;
+constexpr double largest_disk = 1e6;
+constexpr double largest_disk_texels = 1e4;
+
+// A disk so much smaller than a texel is a point: what it spreads over a texel's border is lost in rounding.
+bool is_point(double beam_diameter, double pitch)
+{
+    return beam_diameter < 1e-5 * pitch;
+}
+
 // Adds a delta function at (u, 0), shared by the texels whose border it lies on.
 void add_delta(std::vector<double>& texels, std::size_t size, double pitch, const BallisticExit& delta)
 {
@@ -35,10 +46,15 @@ void check_grid(std::size_t size, double pitch, double beam_diameter)
 {
     if (size < 1 || size > 16384)
         reject("size", static_cast<double>(size), "1 <= size <= 16384 texels");
-    if (!(pitch > 0.0 && std::isfinite(pitch)))
-        reject("pitch", pitch, "pitch > 0 mean free paths");
+    check_pitch(pitch);
     if (!(beam_diameter >= 0.0 && std::isfinite(beam_diameter)))
         reject("beam_diameter", beam_diameter, "beam_diameter >= 0 mean free paths");
+    if (is_point(beam_diameter, pitch))
+        return;
+    if (pitch < smallest_pitch_of_disk)
+        reject("pitch", pitch, "pitch >= 1e-4 mean free paths for a beam with a diameter");
+    if (beam_diameter > std::min(largest_disk, largest_disk_texels * pitch))
+        reject("beam_diameter", beam_diameter, "up to 1e6 mean free paths and 1e4 texels");
 }
 
 // Adds what a disk of light around (u, 0) leaves in each texel.
@@ -56,12 +72,6 @@ void add_disk(std::vector<double>& texels, std::size_t size, double pitch, const
                 texels[row * size + column] += density * disk_overlap(radius, x, x + pitch, y, y + pitch);
         }
     }
-}
-
-// A disk so much smaller than a texel is a point: what it spreads over a texel's border is lost in rounding.
-bool is_point(double beam_diameter, double pitch)
-{
-    return beam_diameter < 1e-5 * pitch;
 }
 
 // Power of the scattered light in each texel.

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/error.h"
 #include "base/gauss_rule.h"
 #include "base/threads.h"
 
@@ -125,6 +126,12 @@ BorderIntegral vertical(const RadialFunction& profile, Radial radial, double x, 
 }
 
 }  // namespace
+
+void check_pitch(double pitch)
+{
+    if (!(pitch >= 1e-6 && pitch <= 1e18))
+        reject("pitch", pitch, "1e-6 <= pitch <= 1e18 mean free paths");
+}
 
 TexelIntegrals integrate_texels(const RadialFunction& profile, const TexelGrid& grid)
 {

@@ -33,6 +33,11 @@ struct TexelIntegrals {
     }
 };
 
+// Throws InvalidArgument for a pitch whose texels double and single precision can't resolve: below 1e-6 mean free paths
+// differences between the borders of a texel lose more than 1e-5 of it, and beyond 1e18 exitance per texel is no normal
+// float.
+void check_pitch(double pitch);
+
 // By Green's theorem the integral over a texel is that of C_m(r) cos(m phi) d phi around its border.
 // Every border is shared by two texels, so the sum over texels telescopes: no energy is lost or
 // doubled for any ratio of mean free path and pitch.

@@ -32,7 +32,7 @@ struct LdfSample {
 };
 
 // Throws InvalidArgument. Exitance is finite and not negative, but for undershoots of up to 10 % of the brightest
-// texel: few harmonics (ldf_image.h) and denoised simulations have them.
+// texel: few harmonics (ldf_image.h) and denoised simulations have them. Its integral lies in [0, 1.05].
 void validate(const LdfSample& sample);
 
 // One-part OpenEXR file; see sample_file.cpp for the layout. Throw IoError.

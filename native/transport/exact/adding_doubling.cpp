@@ -113,7 +113,8 @@ Angular angular_problem(const Medium& medium, std::span<const double> angles_deg
 
 // A homogeneous layer without boundaries: radiance that leaves for radiance that arrives.
 struct Layer {
-    ArrayXd direct, beam_direct;  // unscattered, straight through
+    ArrayXd depth, beam_depth;  // optical, along each direction
+    ArrayXd direct, beam_direct;  // unscattered, straight through: exp(-depth)
     MatrixXd reflected, beam_reflected;  // from the quadrature's directions to them and to the beams
     MatrixXd scattered, beam_scattered;  // the same on the far side
 };
@@ -133,6 +134,7 @@ Layer thin_layer(const Angular& a, double albedo, double thickness)
     const MatrixXd x = backward * across.inverse();
     const MatrixXd g = (across - x * backward).inverse();
     Layer layer;
+    layer.depth = m.log1p() - (-m).log1p();
     layer.direct = (1.0 - m) / (1.0 + m);
     layer.reflected = 2.0 * g * x;
     layer.scattered = (2.0 / (1.0 + m)).matrix().asDiagonal() * (forward + x * backward) * g;
@@ -141,6 +143,7 @@ Layer thin_layer(const Angular& a, double albedo, double thickness)
     down.diagonal() += 0.5 * layer.direct.matrix();
     const MatrixXd up = 0.5 * layer.reflected;
     const auto factor = (2.0 * albedo * m_beam / (1.0 + m_beam)).matrix().asDiagonal();
+    layer.beam_depth = m_beam.log1p() - (-m_beam).log1p();
     layer.beam_direct = (1.0 - m_beam) / (1.0 + m_beam);
     layer.beam_reflected = factor * (a.to_beams.forward * up + a.to_beams.backward * down);
     layer.beam_scattered = factor * (a.to_beams.forward * down + a.to_beams.backward * up);
@@ -164,8 +167,11 @@ Layer doubled(const Layer& layer)
     const MatrixXd beam_up = layer.beam_reflected * down + layer.beam_reflected * direct;
     const MatrixXd beam_down = layer.beam_scattered + layer.beam_reflected * up;
     Layer both;
-    both.direct = layer.direct.square();
-    both.beam_direct = layer.beam_direct.square();
+    // Near grazing a beam's first layer is so thin that squares of what it lets through would lose its depth.
+    both.depth = 2.0 * layer.depth;
+    both.beam_depth = 2.0 * layer.beam_depth;
+    both.direct = (-both.depth).exp();
+    both.beam_direct = (-both.beam_depth).exp();
     both.reflected = r + direct * up + t * up;
     both.scattered = direct * down + t * direct + t * down;
     both.beam_reflected = layer.beam_reflected + beam_direct * beam_up + layer.beam_scattered * up;

@@ -1,0 +1,24 @@
+"""Array arguments: converted only where nothing is lost on the way."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def float_array(name: str, values, dtype=np.float32, allowed="real numbers, none of them masked") -> np.ndarray:
+    """Real numbers as a C-contiguous array of `dtype`.
+
+    Raises
+    ------
+    ValueError
+        Names the argument that is no array of real numbers: a ragged one, text, complex numbers, masked values.
+    """
+    if np.ma.is_masked(values):
+        raise ValueError(f"argument {name!r} is an array with masked values; allowed: {allowed}")
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind in "biufO":
+            return np.ascontiguousarray(array, dtype=dtype).reshape(array.shape)
+    except (TypeError, ValueError):
+        raise ValueError(f"argument {name!r} is {values!r}; allowed: {allowed}") from None
+    raise ValueError(f"argument {name!r} is {array.dtype} of shape {array.shape}; allowed: {allowed}")
