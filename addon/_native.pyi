@@ -101,7 +101,8 @@ class LdfLibrary(LdfSource):
         The light of each scattering order, with the distribution it was simulated with, is scaled: by as little as makes the
         totals right at 16 albedos from .01 to .99999, least squares weighted by statistical variance. Albedos in between, and
         the totals of every map, follow. `standard_error` then includes what `exact_totals` and the interpolation between angles
-        leave; `image_standard_error` stays that of the simulation, an upper bound.
+        leave; `image_standard_error` stays that of the simulation, an upper bound. Measured over twelve media: totals of 100
+        photons are within 3 % of the incident power, of 1000 within .5 %; for albedos beyond .99999 they may be 1.5 % too large.
 
         Parameters
         ----------
@@ -111,6 +112,11 @@ class LdfLibrary(LdfSource):
         Returns
         -------
         LdfLibrary
+
+        Raises
+        ------
+        ValueError
+            The library was simulated with fewer than 100 photons per angle.
         """
     def diffuse_reflectance(self, albedo: float) -> float:
         """
@@ -128,10 +134,11 @@ class LdfLibrary(LdfSource):
         size : int
             Texels along each side, 1 to 16384.
         pitch : float
-            Side of a texel, mean free paths.
+            Side of a texel, mean free paths, 1e-6 to 1e18; at least 1e-4 for a beam with a diameter.
         side : {"reflected", "transmitted"}
         beam_diameter : float
-            Of the disk around O that the beam evenly lights on the surface, mean free paths; 0: a pencil beam.
+            Of the disk around O that the beam evenly lights on the surface, mean free paths, up to 1e6 and 1e4 texels; 0: a
+            pencil beam.
 
         Returns
         -------
@@ -206,9 +213,11 @@ class LdfSample:
     image : array_like, float32, shape (N, M)
         Mean exitance of each texel per unit incident power, 1/mfp^2 (the paper's luminance, times pi); rows v upward,
         columns u; O, where the beam's axis enters, at the centre; the beam travels toward +u, to the right.
-        Undershoots of up to 10 % of the brightest texel are taken for noise, other negative values are refused.
+        Undershoots of up to 10 % of the brightest texel are taken for noise, other negative values are refused; so is a
+        power, the integral, that is negative or larger than 1.05: no medium returns more than arrives, and 5 % is what a
+        simulation of a thousand photons may be off.
     pitch : float
-        Side of a texel, mean free paths.
+        Side of a texel, mean free paths, 1e-6 to 1e18.
     angle : float
         Of incidence, degrees from the surface normal, [0, 90).
     albedo : float
@@ -660,7 +669,7 @@ def simulate(
     threads : int
         0: all.
     progress : callable, optional
-        Called with the finished fraction; returning False stops.
+        Called with the finished fraction. The answer False (or NumPy's) stops, any other goes on; an error passes through.
     kernel : str
         One of `walk_kernels()`; empty: the fastest. They agree up to the simulation's noise.
 
