@@ -8,6 +8,8 @@ import beamspread
 import numpy as np
 import pytest
 
+from helpers import travel
+
 CSV = Path(__file__).resolve().parents[2] / "blend_examples" / "cycles_edge.csv"
 ANGLE_DEG = 55.0
 ALBEDO = np.array((0.6, 0.9, 0.3))
@@ -48,8 +50,7 @@ def edge(library, side, u, solver="fft"):
     width, height, pitch_v = round(2 * HALF_WIDTH / BIN), 32, 4.0
     lit = np.arange(width) < width // 2
     irradiance = np.broadcast_to(lit if side == "toward" else ~lit, (height, width)).astype(np.float32)
-    direction = (math.sin(math.radians(ANGLE_DEG)), 0.0, -math.cos(math.radians(ANGLE_DEG)))
-    luminance = beamspread.convolve(irradiance, direction, library, ALBEDO, 1.0, (BIN, pitch_v), solver=solver)
+    luminance = beamspread.convolve(irradiance, travel(ANGLE_DEG), library, ALBEDO, 1.0, (BIN, pitch_v), solver=solver)
     columns = np.round((u + HALF_WIDTH) / BIN - 0.5).astype(int)
     return luminance[height // 2, columns].astype(float)
 

@@ -7,7 +7,8 @@ import pytest
 from beamspread import Medium, convolve, exact_totals, simulate
 from beamspread.core.library import angles_for
 
-from .plain_walk import plain_walk
+from helpers import travel
+from plain_walk import plain_walk
 
 PHOTONS = 100_000
 SIZE = 15
@@ -225,11 +226,10 @@ def test_solvers_show_mirror_images(medium, angle):
     size = 21
     irradiance = np.zeros((size, size), np.float32)
     irradiance[size // 2, size // 2] = 1
-    direction = (np.sin(np.radians(angle)), 0, -np.cos(np.radians(angle)))
     library = library_of(medium)
     for pitch in (0.5, 1.0):
         solved = [
-            np.pi * convolve(irradiance, direction, library, (albedo,) * 3, 1.0, pitch, solver="direct")[..., 0]
+            np.pi * convolve(irradiance, travel(angle), library, (albedo,) * 3, 1.0, pitch, solver="direct")[..., 0]
             for albedo in (0.9, 0.0)
         ]
         image = [library.image(angle, albedo, size, pitch) * pitch**2 for albedo in (0.9, 0.0)]
@@ -247,8 +247,7 @@ def test_a_bake_keeps_energy(medium):
     """What a large plane gives off is the exact reflectance times the power it receives, to .1 %."""
     irradiance = np.zeros((96, 96), np.float32)
     irradiance[40:56, 44:52] = np.random.default_rng(1).random((16, 8)) + 0.5
-    angle = np.radians(52)
     albedo = (0.5, 0.97, 0.9995)
-    luminance = convolve(irradiance, (np.sin(angle), 0, -np.cos(angle)), library_of(medium), albedo, 1e-3, 0.1)
+    luminance = convolve(irradiance, travel(52), library_of(medium), albedo, 1e-3, 0.1)
     reflected = np.pi * luminance.sum((0, 1), dtype=np.float64) / irradiance.sum(dtype=np.float64)
     assert reflected == pytest.approx(exact_totals(medium, [52], albedo)[0][0], rel=1e-3)

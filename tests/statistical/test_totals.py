@@ -1,29 +1,19 @@
 """Totals against exact values that this project did not compute."""
 
-import csv
 import functools
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from beamspread import Medium, simulate
 
-from .plain_walk import fresnel
+from helpers import adding_doubling_table
+from plain_walk import fresnel
 
-TABLE = Path(__file__).parents[1] / "reference" / "adding_doubling.csv"
 ROUNDING = 1.2e-5  # of the table, its README says
 
 
-def rows():
-    with TABLE.open() as file:
-        return [
-            {key: float(value) for key, value in row.items()}
-            for row in csv.DictReader(line for line in file if not line.startswith("#"))
-        ]
-
-
-MEDIA = sorted({(row["g"], row["ior"], row["thickness_mfp"]) for row in rows()})
+MEDIA = sorted({(row["g"], row["ior"], row["thickness_mfp"]) for row in adding_doubling_table()})
 
 
 def photons_for(g, ior, thickness):
@@ -48,7 +38,7 @@ def test_exact_totals(medium, side):
         assert library_of(medium).transmittance(0, 0.5) == 0
         return
     library = library_of(medium)
-    for row in rows():
+    for row in adding_doubling_table():
         if (row["g"], row["ior"], row["thickness_mfp"]) != medium:
             continue
         angle, albedo = row["angle_deg"], row["albedo"]

@@ -8,8 +8,10 @@ from beamspread import Cancelled, Medium, adaptive_beams, convolve, simulate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from helpers import travel
+
 ALBEDO = (0.6, 0.9, 0.3)
-SLANTED = (math.sin(math.radians(55)), 0.0, -math.cos(math.radians(55)))
+SLANTED = travel(55)
 PATHS = [0.01, 0.3, 1.0, 5.0, 40.0, 400.0]  # mean free paths in texels
 
 # What `tolerance` promises, for the sum over texels and for the worst one. Single-precision results are off by 1e-7.
@@ -27,12 +29,6 @@ def others():
         simulate(Medium(0.0, ior=1.4), [0, 30, 60, 85], 5000),
         simulate(Medium(0.5, thickness=4), [0, 30, 60], 5000),
     ]
-
-
-def travel(angle, azimuth):
-    """Unit direction of travel in the plane frame, degrees."""
-    theta, beta = math.radians(angle), math.radians(azimuth)
-    return (math.sin(theta) * math.cos(beta), math.sin(theta) * math.sin(beta), -math.cos(theta))
 
 
 def lamp(height, width, h):

@@ -10,18 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import uniform_filter
 
+from helpers import travel
+
 ALBEDO = (0.6, 0.9, 0.3)
 
 
 @pytest.fixture(scope="module")
 def library():
     return simulate(Medium(0.8), [0, 15, 30, 45, 60, 75, 88], 20_000)
-
-
-def travel(angle, azimuth):
-    """Unit direction of travel in the plane frame, degrees."""
-    theta, beta = math.radians(angle), math.radians(azimuth)
-    return (math.sin(theta) * math.cos(beta), math.sin(theta) * math.sin(beta), -math.cos(theta))
 
 
 def lamp_directions(height, width, h=0.3):
@@ -91,9 +87,7 @@ def test_fft_equals_direct_on_thin_slabs_where_directions_change(thin):
 
 def random_directions(height, width):
     rng = np.random.default_rng(12)
-    theta, beta = np.radians(rng.uniform(0, 89, (height, width))), rng.uniform(0, 2 * np.pi, (height, width))
-    field = [np.sin(theta) * np.cos(beta), np.sin(theta) * np.sin(beta), -np.cos(theta)]
-    return np.stack(field, -1).astype(np.float32)
+    return travel(rng.uniform(0, 89, (height, width)), rng.uniform(0, 360, (height, width))).astype(np.float32)
 
 
 @pytest.mark.parametrize("field", [random_directions, lamp_directions, "near", "grazing"])
@@ -119,7 +113,7 @@ def test_tiles_are_seamless(library, memory):
     """What tiles leave out lies beyond the reach of the kernels: a millionth of their power."""
     beams = np.random.default_rng(11).random((150, 230), np.float32)
     rest = ([library] * 3, ALBEDO, [0.1, 0.2, 0.5], (1.0, 1.0), "fft", 1e-3, 0, None)
-    for direction in (np.array(travel(40, 70), np.float32), lamp_directions(150, 230)):
+    for direction in (travel(40, 70).astype(np.float32), lamp_directions(150, 230)):
         whole = _native.convolve([(beams, direction)], *rest)
         tiled = _native.convolve([(beams, direction)], *rest, memory=memory)
         assert not np.array_equal(tiled, whole)
@@ -151,7 +145,7 @@ def test_fft_equals_direct_for_a_lamp(library):
 
 def assert_a_field_is_its_direction(library, angle, mean_free_path, solver, allowed):
     beams = np.random.default_rng(3).random((12, 17), np.float32)
-    direction = np.array(travel(angle, 130), np.float32)
+    direction = travel(angle, 130).astype(np.float32)
     field = np.broadcast_to(direction, (12, 17, 3))
     one, same = (
         convolve(beams, directions, library, ALBEDO, mean_free_path, 1.0, solver=solver)

@@ -11,7 +11,7 @@ def native_folders():
     """Each folder of native/ and the folders that it may include."""
     known = {}
     for folder, *direct in map(
-        str.split, re.findall(r"^beamspread_folder\((.*)\)$", (ROOT / "CMakeLists.txt").read_text(), re.M)
+        str.split, re.findall(r"^beamspread_folder\((.*)\)$", (ROOT / "CMakeLists.txt").read_text(), re.MULTILINE)
     ):
         known[folder] = {folder, *direct}.union(*(known[name] for name in direct))
     return known | {"python": {"python", *known}, "fft/targets": {"fft/targets"}}
@@ -22,7 +22,7 @@ def test_native_includes_point_upwards():
     wrong = [
         f"{path.relative_to(NATIVE)} includes {header}"
         for path in [*NATIVE.rglob("*.cpp"), *NATIVE.rglob("*.h")]
-        for header in re.findall(r'^#include "([^"]+)"', path.read_text(), re.M)
+        for header in re.findall(r'^#include "([^"]+)"', path.read_text(), re.MULTILINE)
         if (NATIVE / header).exists()
         and str(Path(header).parent) not in may_include[str(path.relative_to(NATIVE).parent)] | {"fft/targets"}
     ]

@@ -413,7 +413,7 @@ class TestCache:
 
     @pytest.mark.parametrize("medium", [None, 0.8, (0.8, 1.0, 2.0)])
     def test_no_medium(self, medium):
-        with pytest.raises(ValueError, match="'medium' is .*; allowed: a Medium"):
+        with pytest.raises(ValueError, match=r"'medium' is .*; allowed: a Medium"):
             beamspread.library(medium)
 
     def test_unknown_quality(self):

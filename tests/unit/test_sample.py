@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from beamspread import LdfLibrary, LdfSample, Medium, simulate
 from beamspread._load import native
-from tests.unit.test_exr import attribute, plain_exr
 
-FLOAT = 2
+from plain_exr import FLOAT, attribute, plain_exr
 
 
 @pytest.fixture(scope="module")

@@ -8,6 +8,8 @@ from beamspread._load import native
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from helpers import travel
+
 PI = math.pi
 
 
@@ -297,12 +299,10 @@ def test_a_plane_does_not_shadow_itself(seed, size, distance, angle, margin):
     centre = distance * size * np.random.default_rng(seed).normal(size=3)
     grid = make_grid(16, 16, (size, 0.7 * size), axes, centre)
     occluders = native.Occluders(*plane_triangles(grid, margin))
-    angle = math.radians(angle)
-    azimuth = seed % 360
-    local = [math.sin(angle) * math.cos(azimuth), math.sin(angle) * math.sin(azimuth), -math.cos(angle)]
+    local = travel(angle, seed % 360)
     lit = native.sun_beams(**grid, direction=local @ axes, occluders=occluders, samples=2)
-    np.testing.assert_allclose(lit, math.cos(angle), rtol=1e-6)
-    position = centre - np.array(local) @ axes * 3 * size
+    np.testing.assert_allclose(lit, -local[2], rtol=1e-6)
+    position = centre - local @ axes * 3 * size
     _, flux, _ = lamp_at(points_of(grid, 2), position)
     got, _ = native.point_beams(**grid, position=position, occluders=occluders, samples=2)
     unblocked, _ = native.point_beams(**grid, position=position, samples=2)

@@ -5,6 +5,8 @@ import pytest
 from beamspread import Medium, convolve, convolve_lights, library, simulate
 from scipy.ndimage import uniform_filter
 
+from helpers import travel
+
 # Planes up to 192 x 192 texels keep all terms.
 SIZE = 200
 
@@ -21,11 +23,6 @@ MEDIA = {
 @pytest.fixture(scope="module")
 def media():
     return {name: make() for name, make in MEDIA.items()}
-
-
-def travel(theta, beta):
-    field = [np.sin(theta) * np.cos(beta), np.sin(theta) * np.sin(beta), -np.cos(theta)]
-    return np.stack(field, -1).astype(np.float32)
 
 
 def lamp(x, y, height):
@@ -47,12 +44,11 @@ def noise(rng, waves):
 def field(kind, rng):
     """Lights of some kind: irradiance and directions of each."""
     if kind == "smooth":  # few texels have extreme angles
-        directions = travel(np.radians(np.clip(45 + 20 * noise(rng, 3), 0, 89)), 2 * noise(rng, 3))
+        directions = travel(np.clip(45 + 20 * noise(rng, 3), 0, 89), np.degrees(2 * noise(rng, 3)))
     elif kind in ("texels", "blocks"):
         side = {"texels": 1, "blocks": 8}[kind]
         shape = SIZE // side, SIZE // side
-        theta, beta = np.radians(rng.uniform(0, 89, shape)), rng.uniform(0, 2 * np.pi, shape)
-        directions = np.kron(travel(theta, beta), np.ones((side, side, 1), np.float32))
+        directions = np.kron(travel(rng.uniform(0, 89, shape), rng.uniform(0, 360, shape)), np.ones((side, side, 1)))
     else:
         return {
             "lamp": [lamp(0.1, -0.2, 0.1)],
@@ -148,7 +144,7 @@ def test_grazing_light_against_direct(media):
     """All terms are kept; kernels bend at the library's last angle, which a table of angles smooths over."""
     rng = np.random.default_rng(33)
     theta = np.where(rng.random((48, 48)) < 0.5, rng.uniform(0, 89, (48, 48)), rng.uniform(88, 89.99, (48, 48)))
-    directions = travel(np.radians(theta), rng.uniform(0, 2 * np.pi, (48, 48)))
+    directions = travel(theta, rng.uniform(0, 360, (48, 48)))
     beams = (rng.random((48, 48)) < 0.1).astype(np.float32)
     for mean_free_path in (0.3, 5.0):
         arguments = beams, directions, media["ior 1"], (0.6, 0.9, 0.3), mean_free_path, 1.0

@@ -10,6 +10,8 @@ import pytest
 from beamspread import Cancelled, Medium, _native, convolve, library
 from scipy.ndimage import uniform_filter
 
+from helpers import travel
+
 ALBEDO = (0.999, 0.9, 0.99)
 SUN = (math.sin(1), 0.3 * math.sin(1), -math.cos(1))
 
@@ -89,11 +91,10 @@ def test_tiles_on_two_levels_are_seamless(ldf, direction, memory):
 @pytest.mark.parametrize("angle", [20, 75])
 def test_two_levels_equal_direct(ldf, angle, mean_free_path):
     """What README says of one direction."""
-    theta = math.radians(angle)
-    direction = (math.sin(theta) * 0.6, math.sin(theta) * 0.8, -math.cos(theta))
+    direction = travel(angle, 53)
     beams = light(120, 180)
     direct = convolve(beams, direction, ldf, ALBEDO, mean_free_path, 1.0, solver="direct")
-    lights = [(beams, np.array(direction, np.float32))]
+    lights = [(beams, direction.astype(np.float32))]
     two = _native.convolve(
         lights, [ldf] * 3, list(ALBEDO), [mean_free_path] * 3, (1.0, 1.0), "fft", 1e-3, 0, None, coarsening=4
     )

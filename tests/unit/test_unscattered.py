@@ -6,17 +6,14 @@ import numpy as np
 import pytest
 from beamspread import Medium, convolve, simulate
 
+from helpers import travel
+
 THICKNESS, IOR = 0.5, 1.4
 
 
 @pytest.fixture(scope="module")
 def slab():
     return simulate(Medium(0.8, IOR, THICKNESS), [0, 20, 40, 60, 80, 88], 1000)
-
-
-def travel(angle, azimuth):
-    theta, beta = math.radians(angle), math.radians(azimuth)
-    return (math.sin(theta) * math.cos(beta), math.sin(theta) * math.sin(beta), -math.cos(theta))
 
 
 def exits(angle, count=4):
