@@ -1,4 +1,5 @@
-// Reflection and refraction of unpolarized light at a smooth dielectric boundary.
+// Reflection and refraction of unpolarized light at a smooth dielectric boundary (Born, Wolf 1999, Sec. 1.5.2,
+// doi:10.1017/CBO9781139644181).
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Henyey-Greenstein phase function (Henyey, Greenstein 1941).
+// Henyey-Greenstein phase function (Henyey, Greenstein 1941, doi:10.1086/144246).
 #pragma once
 
 #include <algorithm>

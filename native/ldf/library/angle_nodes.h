@@ -11,7 +11,7 @@
 namespace beamspread {
 
 // Splines over the angle outside the medium, where both the refracted angle and the Fresnel factor of light that comes back
-// from a slab's other boundary are smooth; inside, the latter turns up infinitely fast toward grazing.
+// from a slab's other boundary are smooth; inside, the latter rises infinitely fast toward grazing.
 class AngleNodes {
 public:
     AngleNodes() = default;

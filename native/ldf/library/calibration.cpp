@@ -105,7 +105,8 @@ struct Observation {
 
 // The likeliest scale of each bin's power, around 1 with this relative variance, given the totals and within the
 // limits: a quadratic programme with bounds. Its dual has a variable per total, is convex, smooth and piecewise
-// quadratic: solved by Newton's method, damped where bins meet or leave their limits (Levenberg, Marquardt) by the
+// quadratic: solved by Newton's method, damped where bins meet or leave their limits (Levenberg, Marquardt 1963,
+// doi:10.1137/0111030) by the
 // Hessian for all bins free, than which the dual is nowhere more curved: so damped a step always goes down.
 VectorXd likeliest_scale(const VectorXd& power, const VectorXd& relative, const Observation& observed)
 {

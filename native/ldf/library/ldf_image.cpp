@@ -117,7 +117,8 @@ std::vector<float> ldf_image_standard_error(const LdfLibrary& library, double an
                                             std::size_t size, double pitch, Side side, double beam_diameter)
 {
     check_grid(size, pitch, beam_diameter);
-    // Mean and sum of squared differences from it, one group after the other (Welford 1962).
+    // Mean and sum of squared differences from it, one group after the other (Welford 1962,
+    // doi:10.1080/00401706.1962.10490022).
     std::vector<double> mean(size * size, 0.0);
     std::vector<double> squares(size * size, 0.0);
     for (std::size_t group = 0; group < group_count; ++group) {

@@ -54,8 +54,8 @@ Harmonics disk_mean(const RadialFunction& point, double radius, double s)
             if (r == 0.0)
                 continue;
             // d phi / d tau, times d tau / dx; twice for both halves of the border.
-            const double turn = radius * (radius - s + 2.0 * s * sine * sine) / r2;
-            const double weight = 2.0 * gauss_weight[q] * half * a * std::cosh(x) * turn;
+            const double phi_slope = radius * (radius - s + 2.0 * s * sine * sine) / r2;
+            const double weight = 2.0 * gauss_weight[q] * half * a * std::cosh(x) * phi_slope;
             const double cos_phi = (s - radius * std::cos(tau)) / r;
             const Harmonics radial = near ? point.cumulative(r) : point.remaining(r);
             double previous = cos_phi;

@@ -92,7 +92,7 @@ RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments,
     m_centre = centre;
     const std::vector<std::size_t>& knot = knots(detail).edge;
     m_harmonics = bin_moments.size() / knot.size();
-    // integral of cos^2(m phi) over a turn: 2 pi for m = 0, pi above.
+    // integral of cos^2(m phi) over the circle: 2 pi for m = 0, pi above.
     const auto norm = [](std::size_t m) { return m == 0 ? inv_pi / 2.0 : inv_pi; };
     // From outside in, so that what remains far out is not the difference of large sums.
     Harmonics sum{};
@@ -107,7 +107,7 @@ RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments,
         const std::size_t k = knot[i];
         m_slope[k] = slope_at(i, detail);
         // A monotone C_0 keeps the azimuthal mean of g positive: slopes at most three times those of the
-        // chords beside them (Fritsch, Carlson 1980).
+        // chords beside them (Fritsch, Carlson 1980, doi:10.1137/0717021).
         const auto chord = [&](std::size_t end) {
             return end == 0 ? (m_total[0] - m_remaining[0][0]) / radial_edge(0)
                             : (m_remaining[knot[end - 1]][0] - m_remaining[knot[end]][0]) /
@@ -204,7 +204,7 @@ std::size_t RadialProfile::harmonics_beyond(double r, double power) const
         for (std::size_t k = 0; k < edge_count; ++k)
             if (radial_edge(k) > r)
                 moved += std::abs((k == 0 ? m_total[m] : m_remaining[k - 1][m]) - m_remaining[k][m]);
-        if (4.0 * moved > power)  // |cos(m phi)| integrates to 4 over a turn
+        if (4.0 * moved > power)  // |cos(m phi)| integrates to 4 over the circle
             break;
     }
     return count;

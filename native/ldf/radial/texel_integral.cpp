@@ -51,10 +51,10 @@ struct BorderIntegral {
 enum class Radial { remaining, cumulative };
 
 // Integral over a straight border of F_m(r) (cos, sin)(m phi) d phi. The border runs from s0 to s1
-// along a unit vector at `distance` (>= 0) to the pole's left or right; place(s) gives (x, y).
+// along a unit vector at `distance` (>= 0) from the pole, which lies on its left (sense 1) or right (-1); place(s) gives (x, y).
 template <class Place>
 BorderIntegral integrate_piece(const RadialFunction& profile, Radial radial, double distance, double s0, double s1,
-                               double turn, const Place& place)
+                               double sense, const Place& place)
 {
     BorderIntegral sum(profile.harmonics());
     if (distance == 0.0)
@@ -73,7 +73,7 @@ BorderIntegral integrate_piece(const RadialFunction& profile, Radial radial, dou
         for (std::size_t q = 0; q < gauss_node.size(); ++q) {
             const double s = 0.5 * (s0 + s1) + half * gauss_node[q];
             const double r2 = s * s + distance * distance;
-            add(s, r2, gauss_weight[q] * half * turn * distance / r2);
+            add(s, r2, gauss_weight[q] * half * sense * distance / r2);
         }
         return sum;
     }
@@ -87,7 +87,7 @@ BorderIntegral integrate_piece(const RadialFunction& profile, Radial radial, dou
         for (std::size_t q = 0; q < gauss_node.size(); ++q) {
             const double t = t0 + half * (2 * i + 1 + gauss_node[q]);
             const double c = std::cosh(t);
-            add(distance * std::sinh(t), distance * distance * c * c, gauss_weight[q] * half * turn / c);
+            add(distance * std::sinh(t), distance * distance * c * c, gauss_weight[q] * half * sense / c);
         }
     }
     return sum;
@@ -96,16 +96,16 @@ BorderIntegral integrate_piece(const RadialFunction& profile, Radial radial, dou
 // The same, cut where the border crosses the radius at which the profile may change abruptly.
 template <class Place>
 BorderIntegral integrate_border(const RadialFunction& profile, Radial radial, double distance, double s0, double s1,
-                                double turn, const Place& place)
+                                double sense, const Place& place)
 {
     if (!(distance < profile.edge()))
-        return integrate_piece(profile, radial, distance, s0, s1, turn, place);
+        return integrate_piece(profile, radial, distance, s0, s1, sense, place);
     const double chord = std::sqrt(profile.edge() * profile.edge() - distance * distance);
     BorderIntegral sum(profile.harmonics());
     double from = s0;
     for (const double to : {std::clamp(-chord, s0, s1), std::clamp(chord, s0, s1), s1}) {
         if (to > from)
-            sum.add(integrate_piece(profile, radial, distance, from, to, turn, place), 1.0);
+            sum.add(integrate_piece(profile, radial, distance, from, to, sense, place), 1.0);
         from = to;
     }
     return sum;

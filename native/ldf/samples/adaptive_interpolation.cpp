@@ -15,7 +15,8 @@
 //    nothing changes. Deep inside a wide beam exitance goes like the reflectance R: there log(g / albedo) is linear in
 //    log(R / albedo) by van de Hulst's approximation. Near the border of the beam one goes over into the other within
 //    `interior_depth`. Q's height stays out of it: not a unit of length changes but an exponent.
-// 4. Anisotropy. What is far out scales with the transport mean free path: Q stands above O at a height of the root
+// 4. Anisotropy. What is far out scales with the transport mean free path (similarity: Wyman, Patterson, Wilson 1989,
+//    doi:10.1364/AO.28.005243): Q stands above O at a height of the root
 //    mean square radius of each sample, that of the result is their geometric mean, and g height^2 is blended, which
 //    keeps the power. log g is linear in log(1 - g). Along the other axes one height does for all, and cancels out.
 #include "ldf/samples/adaptive_interpolation.h"

@@ -33,9 +33,9 @@ AngularCoordinates AngularSpace::to_angular(const Vec2& place) const
     if (const double distance = std::hypot(offset.x, offset.y); !(distance <= farthest * m_height))
         reject("u, v", distance, "places within 1e15 heights of the brightest point");
     const double phi = std::atan2(offset.y, offset.x);
-    const double turned = phi < 0.0 ? phi + 2.0 * pi : phi;
+    const double positive = phi < 0.0 ? phi + 2.0 * pi : phi;
     // A negative angle next to 0 is rounded to 2 pi.
-    return {turned < 2.0 * pi ? turned : 0.0, std::atan2(std::hypot(offset.x, offset.y), m_height)};
+    return {positive < 2.0 * pi ? positive : 0.0, std::atan2(std::hypot(offset.x, offset.y), m_height)};
 }
 
 Vec2 AngularSpace::to_planar(const AngularCoordinates& at) const

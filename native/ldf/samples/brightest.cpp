@@ -10,7 +10,7 @@ namespace beamspread {
 namespace {
 
 constexpr double allowed_noise = 0.01;  // of the peak: a fifth of what the top of the peak spans
-constexpr double top_level = 0.95;
+constexpr double top_fraction = 0.95;
 constexpr double resolved = 4.0;  // texels across the top
 
 struct Parts {
@@ -74,7 +74,7 @@ std::vector<double> denoised(const LdfSample& sample)
 std::vector<std::size_t> top_of(const std::vector<double>& values, const LdfSample& sample)
 {
     std::vector<std::size_t> top{brightest_texel(values)};
-    const double least = top_level * values[top.front()];
+    const double least = top_fraction * values[top.front()];
     std::vector<bool> seen(values.size(), false);
     seen[top.front()] = true;
     for (std::size_t k = 0; k < top.size(); ++k) {

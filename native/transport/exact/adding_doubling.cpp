@@ -1,5 +1,5 @@
-// Radiance averaged over the azimuth, on a quadrature of cosines inside the medium (van de Hulst 1980, Prahl et al.
-// 1993).
+// Radiance averaged over the azimuth, on a quadrature of cosines inside the medium (van de Hulst 1980,
+// doi:10.1016/B978-0-12-710701-1.X5001-0; Prahl, van Gemert, Welch 1993, doi:10.1364/AO.32.000559).
 //
 // By reciprocity the totals of a beam are the radiance that the medium returns toward it under uniform diffuse
 // light. That asks for one vector of incident light and, beside the quadrature's own nodes, for rows of the matrices at
@@ -24,9 +24,9 @@ using Eigen::ArrayXd;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Legendre coefficients of the phase function, g^l, are kept until they have fallen to this ...
+// Legendre coefficients of the phase function, g^l, are kept until they have fallen to this, but at least and at most so
+// many. `exact_totals_error` says what the others leave.
 constexpr double negligible_coefficient = 1.4e-3;
-// ... but at least and at most so many.
 constexpr int min_coefficients = 40;
 constexpr int max_coefficients = 192;
 
@@ -87,7 +87,7 @@ Angular angular_problem(const Medium& medium, std::span<const double> angles_deg
     a.reflectance = a.cosine.unaryExpr(from_inside);
     a.beam_reflectance = a.beam_cosine.unaryExpr(from_inside);
 
-    // Delta-M (Wiscombe 1977): what a forward peak has beyond the last coefficient goes straight on.
+    // Delta-M (Wiscombe 1977, doi:10.1175/1520-0469(1977)034<1408:TDMRYA>2.0.CO;2): what a forward peak has beyond the last coefficient goes straight on.
     a.peak = medium.g > 0.0 ? std::pow(medium.g, count) : 0.0;
     const MatrixXd p = legendre(count, a.cosine);
     const MatrixXd p_beams = legendre(count, a.beam_cosine);
@@ -104,7 +104,7 @@ Angular angular_problem(const Medium& medium, std::span<const double> angles_deg
     a.among = {kernel(p, even), kernel(p, odd)};
     a.to_beams = {kernel(p_beams, even), kernel(p_beams, odd)};
     // What the quadrature misses of the phase function's integral is taken for unscattered too, so that no energy is
-    // lost (Grant, Hunt 1969).
+    // lost (Grant, Hunt 1969, doi:10.1098/rspa.1969.0187).
     const VectorXd lost =
         VectorXd::Ones(a.cosine.size()) - a.among.forward.rowwise().sum() - a.among.backward.rowwise().sum();
     a.among.forward.diagonal() += lost;
@@ -119,7 +119,8 @@ struct Layer {
     MatrixXd scattered, beam_scattered;  // the same on the far side
 };
 
-// The diamond scheme: radiance inside is the mean of the two sides (Wiscombe 1976). Conserves energy exactly.
+// The diamond scheme, which conserves energy exactly: radiance inside is the mean of the two sides (Wiscombe 1976,
+// doi:10.1016/0022-4073(76)90056-X).
 Layer thin_layer(const Angular& a, double albedo, double thickness)
 {
     const Eigen::Index n = a.cosine.size();

@@ -7,6 +7,8 @@
 namespace beamspread {
 
 namespace {
+
+// Beer's law along the slanted path, and Fresnel's reflectance at its end.
 struct Pass {
     double transmission;  // of one crossing
     double reflectance;   // at either boundary, from inside
@@ -17,6 +19,7 @@ Pass single_pass(const Medium& medium, double theta_inside)
     const double cos_theta = std::cos(theta_inside);
     return {std::exp(-medium.thickness / cos_theta), fresnel(cos_theta, 1.0 / medium.ior)};
 }
+
 }  // namespace
 
 std::vector<BallisticExit> ballistic_exits(const Medium& medium, double theta_inside, Side side)

@@ -18,7 +18,8 @@ int node_count(int degree, double angle)
     return static_cast<int>(std::ceil(degree * angle / pi)) + spare_nodes;
 }
 
-// Gauss-Legendre rule on [0, 1], from the eigenvectors of Jacobi's matrix (Golub, Welsch 1969).
+// Gauss-Legendre rule on [0, 1], from the eigenvectors of Jacobi's matrix (Golub, Welsch 1969,
+// doi:10.1090/S0025-5718-69-99647-1).
 Quadrature gauss_legendre(int count)
 {
     Eigen::VectorXd off_diagonal(count - 1);

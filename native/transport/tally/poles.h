@@ -19,19 +19,19 @@ inline constexpr std::size_t side_count = 2;
 // where it enters, or leaves the far side first, and where it leaves next and after that.
 
 // How far along the beam light has come, be it scattered or not: of the boundaries that the beam is reflected by, the far
-// one first, how many it has been turned back from in their order. More than this many are not told apart.
-inline constexpr std::uint32_t most_turns = 2 * (pole_count - 1);
+// one first, how many have reflected it in their order. More than this many are not told apart.
+inline constexpr std::uint32_t most_reflections = 2 * (pole_count - 1);
 
-inline constexpr std::uint32_t turned_back(std::uint32_t turns, bool at_far_boundary)
+inline constexpr std::uint32_t reflections_after(std::uint32_t reflections, bool at_far_boundary)
 {
-    const bool as_the_beam = at_far_boundary == (turns % 2 == 0);
-    return as_the_beam && turns < most_turns ? turns + 1 : turns;
+    const bool as_the_beam = at_far_boundary == (reflections % 2 == 0);
+    return as_the_beam && reflections < most_reflections ? reflections + 1 : reflections;
 }
 
-// The last exit of the beam that light after these turns may be around. Before it there is nothing sharp.
-inline constexpr std::size_t pole_of(std::uint32_t turns, Side side)
+// The last exit of the beam that light after these reflections may be around. Before it there is nothing sharp.
+inline constexpr std::size_t pole_of(std::uint32_t reflections, Side side)
 {
-    return (turns + (side == Side::reflected ? 1 : 0)) / 2;
+    return (reflections + (side == Side::reflected ? 1 : 0)) / 2;
 }
 
 // u of the poles of both sides, [side][pole], mean free paths.

@@ -39,24 +39,24 @@ HWY_INLINE void scatter(Photons& photons, const Flight& flight, const Deflection
     photons.x = {hn::MulAdd(flight.length, photons.w.x, photons.x.x),
                  hn::MulAdd(flight.length, photons.w.y, photons.x.y),
                  hn::MulAdd(flight.length, photons.w.z, photons.x.z)};
-    photons.w = turn(photons.w, deflection.cos_theta, deflection.sin_theta, random_azimuth(random));
+    photons.w = deflect(photons.w, deflection.cos_theta, deflection.sin_theta, random_azimuth(random));
     photons.order = hn::Add(photons.order, hn::IfThenElseZero(scatters, hn::Set(words, 1u)));
 }
 
 // Inner reflection of some photons, given where they came from.
-HWY_INLINE void turn_back(Photons& photons, FloatMask mask, const Photons& from, Floats to_boundary, float thickness)
+HWY_INLINE void reflect(Photons& photons, FloatMask mask, const Photons& from, Floats to_boundary, float thickness)
 {
     const auto choose = [mask](Floats value, Floats& to) { to = hn::IfThenElse(mask, value, to); };
     const FloatMask up = hn::Lt(from.w.z, hn::Zero(floats));
     choose(hn::MulAdd(to_boundary, from.w.x, from.x.x), photons.x.x);
     choose(hn::MulAdd(to_boundary, from.w.y, from.x.y), photons.x.y);
     choose(hn::IfThenElse(up, hn::Zero(floats), hn::Set(floats, thickness)), photons.x.z);
-    // See transport/poles.h.
-    const Words meets =
-        hn::IfThenElse(hn::RebindMask(words, up), hn::Set(words, far_turn_bits << 1), hn::Set(words, far_turn_bits));
-    const Words next = hn::Or(hn::Add(photons.batch, photons.batch), hn::Set(words, turn_bit(0)));
-    const Words turned = hn::IfThenElseZero(hn::RebindMask(words, mask), hn::And(next, meets));
-    photons.batch = hn::Or(photons.batch, turned);
+    // See transport/tally/poles.h.
+    const Words meets = hn::IfThenElse(hn::RebindMask(words, up), hn::Set(words, far_reflection_bits << 1),
+                                       hn::Set(words, far_reflection_bits));
+    const Words next = hn::Or(hn::Add(photons.batch, photons.batch), hn::Set(words, reflection_bit(0)));
+    const Words reflected = hn::IfThenElseZero(hn::RebindMask(words, mask), hn::And(next, meets));
+    photons.batch = hn::Or(photons.batch, reflected);
     choose(from.w.x, photons.w.x);
     choose(from.w.y, photons.w.y);
     choose(hn::Neg(from.w.z), photons.w.z);

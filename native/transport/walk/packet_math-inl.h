@@ -117,7 +117,7 @@ struct RandomState {
     HWY_ALIGN std::uint32_t word[4][lane_count];
 };
 
-// xoshiro128+ (Blackman, Vigna 2021), one generator per lane. Its lowest bits are weak and are not used.
+// xoshiro128+ (Blackman, Vigna 2021, doi:10.1145/3460772), one generator per lane. Its lowest bits are weak and are not used.
 class PacketRandom {
 public:
     static void seed(Random& random, RandomState& state)
@@ -181,7 +181,7 @@ struct SinCos {
 };
 
 // Sine and cosine of a uniform angle: of one in [-pi/4, pi/4) by their Taylor series, whose remainders are below
-// 2e-9 and 3e-8 there, turned by a random multiple of pi/2.
+// 2e-9 and 3e-8 there, rotated by a random multiple of pi/2.
 HWY_INLINE SinCos random_azimuth(PacketRandom& random)
 {
     const hn::RebindToSigned<FloatTag> integers;
@@ -200,13 +200,13 @@ HWY_INLINE SinCos random_azimuth(PacketRandom& random)
     cosine = hn::MulAdd(cosine, x2, broadcast(-0.5));
     cosine = hn::MulAdd(cosine, x2, broadcast(1.0));
 
-    // Bit 8 exchanges them, bit 7 turns by pi.
+    // Bit 8 exchanges them, bit 7 rotates by pi.
     const FloatMask exchanged = float_mask(hn::TestBit(bits, hn::Set(words, 1u << 8)));
     const Words sign_bit = hn::And(hn::ShiftLeft<24>(bits), hn::Set(words, 1u << 31));
     const Floats sign = hn::BitCast(floats, sign_bit);
-    const Floats turned_sine = hn::IfThenElse(exchanged, cosine, sine);
-    const Floats turned_cosine = hn::IfThenElse(exchanged, hn::Neg(sine), cosine);
-    return {hn::Xor(turned_sine, sign), hn::Xor(turned_cosine, sign)};
+    const Floats rotated_sine = hn::IfThenElse(exchanged, cosine, sine);
+    const Floats rotated_cosine = hn::IfThenElse(exchanged, hn::Neg(sine), cosine);
+    return {hn::Xor(rotated_sine, sign), hn::Xor(rotated_cosine, sign)};
 }
 
 struct Vectors {
@@ -220,8 +220,8 @@ HWY_INLINE Floats dot(const Vectors& a, const Vectors& b)
     return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
 }
 
-// Turns w by a polar angle and an azimuth (Duff et al. 2017, JCGT 6(1)).
-HWY_INLINE Vectors turn(const Vectors& w, Floats cos_theta, Floats sin_theta, const SinCos& azimuth)
+// Deflects w by a polar angle and an azimuth (Duff et al. 2017, JCGT 6(1)).
+HWY_INLINE Vectors deflect(const Vectors& w, Floats cos_theta, Floats sin_theta, const SinCos& azimuth)
 {
     const Floats one = broadcast(1.0);
     const Floats sign_bit = hn::And(w.z, hn::SignBit(floats));

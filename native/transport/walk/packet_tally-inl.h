@@ -19,24 +19,25 @@ HWY_BEFORE_NAMESPACE();
 namespace beamspread {
 namespace HWY_NAMESPACE {
 
-// Order, side, batch and turns (transport/tally/poles.h) of an exit in one word. Turns are as many bits set from `turns_shift` on.
+// Order, side, batch and reflections (transport/tally/poles.h) of an exit in one word. Reflections are as many bits, set
+// from `reflections_shift` on.
 constexpr int side_shift = 20;
 constexpr int batch_shift = 21;
-constexpr int turns_shift = 28;
+constexpr int reflections_shift = 28;
 constexpr std::uint32_t order_bits = max_order - 1;
-constexpr std::uint32_t batch_bits = (1u << turns_shift) - (1u << batch_shift);
+constexpr std::uint32_t batch_bits = (1u << reflections_shift) - (1u << batch_shift);
 static_assert(max_order <= 1u << side_shift);
-static_assert(most_turns <= 32 - turns_shift);
+static_assert(most_reflections <= 32 - reflections_shift);
 
-// The bit of turn number i, from 0 on, and those of all turns at the far boundary.
-constexpr std::uint32_t turn_bit(std::uint32_t i)
+// The bit of reflection number i, from 0 on, and those of all reflections at the far boundary.
+constexpr std::uint32_t reflection_bit(std::uint32_t i)
 {
-    return 1u << (static_cast<std::uint32_t>(turns_shift) + i);
+    return 1u << (static_cast<std::uint32_t>(reflections_shift) + i);
 }
-constexpr std::uint32_t far_turn_bits = [] {
+constexpr std::uint32_t far_reflection_bits = [] {
     std::uint32_t bits = 0;
-    for (std::uint32_t i = 0; i < most_turns; i += 2)
-        bits |= turn_bit(i);
+    for (std::uint32_t i = 0; i < most_reflections; i += 2)
+        bits |= reflection_bit(i);
     return bits;
 }();
 
@@ -150,10 +151,11 @@ private:
         Floats u = hn::IfThenElse(transmitted, broadcast(far.poles[0]), broadcast(near.poles[0]));
         auto rows_before = hn::Zero(integers);
         for (std::size_t pole = 1; pole < pole_count; ++pole) {
-            // Turns of light on the near side are odd, see pole_of.
-            const auto turn = static_cast<std::uint32_t>(2 * (pole - 1));
-            const Words bit = hn::IfThenElse(hn::RebindMask(words, transmitted), hn::Set(words, turn_bit(turn + 1)),
-                                             hn::Set(words, turn_bit(turn)));
+            // Light on the near side had an odd number, see pole_of.
+            const auto reflection = static_cast<std::uint32_t>(2 * (pole - 1));
+            const Words bit =
+                hn::IfThenElse(hn::RebindMask(words, transmitted), hn::Set(words, reflection_bit(reflection + 1)),
+                               hn::Set(words, reflection_bit(reflection)));
             const auto here = hn::And(mirrored, hn::RebindMask(integers, hn::TestBit(what, bit)));
             u = hn::IfThenElse(hn::RebindMask(floats, here),
                                hn::IfThenElse(transmitted, broadcast(far.poles[pole]), broadcast(near.poles[pole])), u);

@@ -21,7 +21,7 @@ struct Photons {
     Floats weight;
     Words order;
     Words next_roulette;  // order
-    Words batch;          // and turns, shifted into place, see transport/walk/packet_tally-inl.h
+    Words batch;          // and reflections, shifted into place, see transport/walk/packet_tally-inl.h
 };
 
 // Photons that wait for their next flights, without gaps.

@@ -80,7 +80,7 @@ private:
             tally_expected(flight, to_boundary);
         m_exit_weight = 1.0;
         if (flight >= to_boundary)
-            return turn_back(to_boundary);
+            return reflect(to_boundary);
         const Vec3 before = m_w;
         scatter_after(flight);
         if (m_order <= m_plan.last_expected_order)
@@ -94,7 +94,7 @@ private:
         const double to_boundary = distance_to_boundary(m_w);
         const double flight = -std::log(m_random.uniform_positive());
         if (flight >= to_boundary) {
-            if (turn_back(to_boundary))
+            if (reflect(to_boundary))
                 return true;
             // Fresnel's transmittance is in the decision, and not in the tally.
             tally(m_w, to_boundary, 1.0);
@@ -120,13 +120,13 @@ private:
     }
 
     // Fresnel's decision at the boundary; false: the photon leaves.
-    bool turn_back(double to_boundary)
+    bool reflect(double to_boundary)
     {
         if (m_random.uniform() >= fresnel(std::abs(m_w.z), 1.0 / m_medium.ior))
             return false;
         m_x += to_boundary * m_w;
         m_x.z = m_w.z < 0.0 ? 0.0 : m_medium.thickness;
-        m_turns = turned_back(m_turns, m_w.z > 0.0);
+        m_reflections = reflections_after(m_reflections, m_w.z > 0.0);
         m_w.z = -m_w.z;
         return true;
     }
@@ -161,7 +161,7 @@ private:
     {
         const Side side = w.z < 0.0 ? Side::reflected : Side::transmitted;
         m_tallies[static_cast<std::size_t>(side)].add(m_x.x + to_boundary * w.x, m_x.y + to_boundary * w.y, m_order,
-                                                      pole_of(m_turns, side), m_weight * probability);
+                                                      pole_of(m_reflections, side), m_weight * probability);
     }
 
     // Density per steradian of the connections below: proportional to the cosine, inside the cone that
@@ -172,7 +172,7 @@ private:
     }
 
     // An exit of low order is sampled in two ways, by the phase function (the walk itself) and by a direction chosen
-    // among those that leave, weighted by the balance heuristic (Veach, Guibas 1995).
+    // among those that leave, weighted by the balance heuristic (Veach, Guibas 1995, doi:10.1145/218380.218498).
     void tally_connections(const Vec3& before)
     {
         const double phase = henyey_greenstein_pdf(glm::dot(before, m_w), m_medium.g);
@@ -212,7 +212,7 @@ private:
     double m_weight = 1.0;
     double m_exit_weight = 1.0;  // of the exit along the walk, among the ways to sample it
     std::uint32_t m_order = 0;
-    std::uint32_t m_turns = 0;  // see transport/tally/poles.h
+    std::uint32_t m_reflections = 0;  // see transport/tally/poles.h
     std::uint32_t m_next_roulette;
 };
 

@@ -100,9 +100,9 @@ private:
 
             const Deflection deflection = m_medium.phase.sample(random.uniform());
             scatter(photons, flight, deflection, random);
-            const FloatMask turns_back = hn::And(flight.hits, hn::Lt(random.uniform(), reflectance));
-            turn_back(photons, turns_back, from, to_boundary, m_medium.thickness);
-            active = hn::And(active, hn::Or(hn::Not(flight.hits), turns_back));
+            const FloatMask is_reflected = hn::And(flight.hits, hn::Lt(random.uniform(), reflectance));
+            reflect(photons, is_reflected, from, to_boundary, m_medium.thickness);
+            active = hn::And(active, hn::Or(hn::Not(flight.hits), is_reflected));
 
             const FloatMask late = greater(photons.order, hn::Set(words, m_plan.last_expected_order));
             const FloatMask connected = hn::AndNot(hn::Or(flight.hits, late), active);
@@ -152,11 +152,11 @@ private:
         scatter(photons, flight, m_medium.phase.sample(random.uniform()), random);
         if (const FloatMask hits = hn::And(active, flight.hits); !hn::AllFalse(floats, hits)) {
             const Floats to_boundary = hn::Div(flight.depth, flight.cosine);
-            const FloatMask turns_back =
+            const FloatMask is_reflected =
                 hn::And(hits, hn::Lt(random.uniform(), m_medium.boundary.reflectance(flight.cosine)));
-            turn_back(photons, turns_back, from, to_boundary, m_medium.thickness);
+            reflect(photons, is_reflected, from, to_boundary, m_medium.thickness);
             // Fresnel's transmittance is in the decision, and not in the tally.
-            const FloatMask leaves = hn::AndNot(turns_back, hits);
+            const FloatMask leaves = hn::AndNot(is_reflected, hits);
             tally(leaves, from, from.w, to_boundary, from.weight);
             active = hn::AndNot(leaves, active);
         }
