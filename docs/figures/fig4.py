@@ -63,7 +63,7 @@ def make():
     draw_angles()
     # As in Fig. 7.
     image = paper.laser_image(bs.library(fig7.SLAB), ANGLE, ALBEDO, SIZE, fig7.UNIT, fig7.DIAMETER)
-    sample = bs.LdfSample(image, 1.0, ANGLE, ALBEDO, fig7.DIAMETER)  # lengths in units
+    sample = bs.LdfSample(image * fig7.UNIT**2, 1.0, ANGLE, ALBEDO, fig7.DIAMETER)  # lengths in units
     space = bs.AngularSpace((0, 0), sample.brightest, HEIGHT)
     phi, psi = np.meshgrid(np.linspace(0, 2 * np.pi, 721), np.radians(np.linspace(0, 60, 241)))
     angular = resampled(sample, space, phi, psi)
