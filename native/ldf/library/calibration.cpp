@@ -30,7 +30,7 @@ constexpr Eigen::Index albedos = (compared_count + 1) / 2 + 1;
 // Nothing is absorbed here; the exact solution needs an albedo below 1, and this one's differs by less than its error.
 constexpr double next_to_one = 1.0 - 1e-12;
 
-// An albedo at which light of orders that walks are given up at has lost as much as it has left.
+// At this albedo light has decayed to 1/e where walks are given up.
 constexpr double deepest = 1.0 - 1.0 / max_order;
 
 // No bin is scaled by more than this or by less than its inverse.
@@ -106,8 +106,8 @@ struct Observation {
 // The likeliest scale of each bin's power, around 1 with this relative variance, given the totals and within the
 // limits: a quadratic programme with bounds. Its dual has a variable per total, is convex, smooth and piecewise
 // quadratic: solved by Newton's method, damped where bins meet or leave their limits (Levenberg, Marquardt 1963,
-// doi:10.1137/0111030) by the
-// Hessian for all bins free, than which the dual is nowhere more curved: so damped a step always goes down.
+// doi:10.1137/0111030) by the Hessian for all bins free, than which the dual is nowhere more curved: so damped a step
+// always goes down.
 VectorXd likeliest_scale(const VectorXd& power, const VectorXd& relative, const Observation& observed)
 {
     const MatrixXd of_scale = observed.tolerance.cwiseInverse().asDiagonal() * observed.weights * power.asDiagonal();
@@ -214,8 +214,9 @@ LdfLibrary calibrated(const LdfLibrary& library, int threads)
                 observe(static_cast<Eigen::Index>(k / 2), compared_albedos[k], exact.total(2 * j, k, side) / entering,
                         0.0);
             // The power of all orders lies below that of an albedo of 1 by what leaves later than any walk, and above
-            // that at `deepest`. Without this the last orders, of which a few photons tell, might return more than
-            // arrives.
+            // that at `deepest`: a half-space, of which n^-1/2 is left inside after n orders, leaves .56 of the
+            // difference. Half of the way to either bound is the tolerance. Without this the last orders, of which a few
+            // photons tell, might return more than arrives.
             const double most = exact.total(2 * j, compared_count + 1, side) / entering;
             const double least = exact.total(2 * j, compared_count, side) / entering;
             observe(albedos - 1, 1.0, 0.5 * (most + least), 0.25 * (most - least));
