@@ -99,7 +99,8 @@ The light of each scattering order, with the distribution it was simulated with,
 totals right at 16 albedos from .01 to .99999, least squares weighted by statistical variance. Albedos in between, and
 the totals of every map, follow. `standard_error` then includes what `exact_totals` and the interpolation between angles
 leave; `image_standard_error` stays that of the simulation, an upper bound. Measured over twelve media: totals of 100
-photons are within 3 % of the incident power, of 1000 within .5 %; for albedos beyond .99999 they may be 1.5 % too large.
+photons are within 3 % of the incident power, of 1000 within .5 %; for albedos beyond .99999 they may be 1.5 % too
+large.
 
 Parameters
 ----------

@@ -10,8 +10,8 @@
 
 namespace beamspread {
 
-// Splines over the angle outside the medium, where both the refracted angle and the Fresnel factor of light that comes back
-// from a slab's other boundary are smooth; inside, the latter rises infinitely fast toward grazing.
+// Splines over the angle outside the medium, where both the refracted angle and the Fresnel factor of light that comes
+// back from a slab's other boundary are smooth; inside, the latter rises infinitely fast toward grazing.
 class AngleNodes {
 public:
     AngleNodes() = default;

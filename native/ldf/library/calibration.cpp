@@ -215,8 +215,8 @@ LdfLibrary calibrated(const LdfLibrary& library, int threads)
                         0.0);
             // The power of all orders lies below that of an albedo of 1 by what leaves later than any walk, and above
             // that at `deepest`: a half-space, of which n^-1/2 is left inside after n orders, leaves .56 of the
-            // difference. Half of the way to either bound is the tolerance. Without this the last orders, of which a few
-            // photons tell, might return more than arrives.
+            // difference. Half of the way to either bound is the tolerance. Without this the last orders, of which a
+            // few photons tell, might return more than arrives.
             const double most = exact.total(2 * j, compared_count + 1, side) / entering;
             const double least = exact.total(2 * j, compared_count, side) / entering;
             observe(albedos - 1, 1.0, 0.5 * (most + least), 0.25 * (most - least));

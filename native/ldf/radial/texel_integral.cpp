@@ -50,8 +50,8 @@ struct BorderIntegral {
 
 enum class Radial { remaining, cumulative };
 
-// Integral over a straight border of F_m(r) (cos, sin)(m phi) d phi. The border runs from s0 to s1
-// along a unit vector at `distance` (>= 0) from the pole, which lies on its left (sense 1) or right (-1); place(s) gives (x, y).
+// Integral over a straight border of F_m(r) (cos, sin)(m phi) d phi. The border runs from s0 to s1 along a unit vector
+// at `distance` (>= 0) from the pole, which lies on its left (sense 1) or right (-1); place(s) gives (x, y).
 template <class Place>
 BorderIntegral integrate_piece(const RadialFunction& profile, Radial radial, double distance, double s0, double s1,
                                double sense, const Place& place)

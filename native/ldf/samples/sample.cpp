@@ -14,8 +14,8 @@ namespace {
 
 constexpr double allowed_undershoot = 0.1;  // of the brightest texel
 
-// No medium returns more than arrives. A simulation knows a total to within .5 / sqrt(photons) (binomial), of which this
-// leaves three for a thousand photons.
+// No medium returns more than arrives. A simulation knows a total to within .5 / sqrt(photons) (binomial), of which
+// this leaves three for a thousand photons.
 constexpr double most_power = 1.05;
 
 void check_image(const LdfSample& sample)

@@ -24,8 +24,8 @@ using Eigen::ArrayXd;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Legendre coefficients of the phase function, g^l, are kept until they have fallen to this, but at least and at most so
-// many. `exact_totals_error` says what the others leave.
+// Legendre coefficients of the phase function, g^l, are kept until they have fallen to this, but at least and at most
+// so many. `exact_totals_error` says what the others leave.
 constexpr double negligible_coefficient = 1.4e-3;
 constexpr int min_coefficients = 40;
 constexpr int max_coefficients = 192;
@@ -87,7 +87,8 @@ Angular angular_problem(const Medium& medium, std::span<const double> angles_deg
     a.reflectance = a.cosine.unaryExpr(from_inside);
     a.beam_reflectance = a.beam_cosine.unaryExpr(from_inside);
 
-    // Delta-M (Wiscombe 1977, doi:10.1175/1520-0469(1977)034<1408:TDMRYA>2.0.CO;2): what a forward peak has beyond the last coefficient goes straight on.
+    // Delta-M (Wiscombe 1977, doi:10.1175/1520-0469(1977)034<1408:TDMRYA>2.0.CO;2): what a forward peak has beyond the
+    // last coefficient goes straight on.
     a.peak = medium.g > 0.0 ? std::pow(medium.g, count) : 0.0;
     const MatrixXd p = legendre(count, a.cosine);
     const MatrixXd p_beams = legendre(count, a.beam_cosine);
