@@ -117,7 +117,8 @@ struct RandomState {
     HWY_ALIGN std::uint32_t word[4][lane_count];
 };
 
-// xoshiro128+ (Blackman, Vigna 2021, doi:10.1145/3460772), one generator per lane. Its lowest bits are weak and are not used.
+// xoshiro128+ (Blackman, Vigna 2021, doi:10.1145/3460772), one generator per lane. Its lowest bits are weak and are not
+// used.
 class PacketRandom {
 public:
     static void seed(Random& random, RandomState& state)

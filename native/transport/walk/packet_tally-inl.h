@@ -19,8 +19,8 @@ HWY_BEFORE_NAMESPACE();
 namespace beamspread {
 namespace HWY_NAMESPACE {
 
-// Order, side, batch and reflections (transport/tally/poles.h) of an exit in one word. Reflections are as many bits, set
-// from `reflections_shift` on.
+// Order, side, batch and reflections (transport/tally/poles.h) of an exit in one word. Reflections are as many bits,
+// set from `reflections_shift` on.
 constexpr int side_shift = 20;
 constexpr int batch_shift = 21;
 constexpr int reflections_shift = 28;
