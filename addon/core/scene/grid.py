@@ -41,7 +41,6 @@ class Grid:
     clearance: float = 0.0
 
     def to_plane_frame(self, direction: Vector) -> np.ndarray:
-        """Turn a world direction into the plane frame."""
         return np.array([self.x_axis, self.y_axis, self.normal], dtype=float) @ np.asarray(direction, dtype=float)
 
     def height_of(self, point: Vector) -> float:
