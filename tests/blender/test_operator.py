@@ -344,3 +344,21 @@ def test_thread_stops_when_asked():
     thread.join(timeout=10)
     assert not thread.is_alive()
     assert (thread.bake.status, thread.bake.layers) == (CANCELLED, {})
+
+
+class DeafJob(EndlessJob):
+    """Ends without having asked whether to go on."""
+
+    def run(self, progress):
+        return {COMBINED: np.ones((2, 2, 3), np.float32)}
+
+    def warnings_after(self, layers):
+        return []
+
+
+def test_what_ends_after_escape_is_not_kept_either():
+    thread = BakeThread(Bake(Target("Plane"), DeafJob()))
+    thread.cancel()
+    thread.start()
+    thread.join(timeout=10)
+    assert (thread.bake.status, thread.bake.layers) == (CANCELLED, {})
