@@ -61,14 +61,12 @@ else:
 
 
 def register():
-    """Add the add-on to Blender."""
     from . import blender
 
     blender.register()
 
 
 def unregister():
-    """Take the add-on out of Blender."""
     from . import blender
 
     blender.unregister()

@@ -7,7 +7,7 @@ import argparse
 import time
 
 import numpy as np
-from beamspread._load import native
+from beamspread.core.native import native
 
 LIGHTS = {
     "lamp": native.PointLight((0.3, 0.2, 1.5)),

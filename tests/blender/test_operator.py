@@ -1,13 +1,21 @@
 """The Bake operator: fills and links images, says in one sentence what it cannot bake, and bakes the others."""
 
 import stat
+from dataclasses import replace
+from pathlib import Path
 
 import beamspread
 import bpy
 import numpy as np
 import pytest
+from beamspread.blender.jobs.batch import bake_all
 from beamspread.blender.jobs.operator import BakeThread
+from beamspread.blender.settings import BeamspreadSettings
+from beamspread.core.bake.layers import LAYERS
 from beamspread.core.bake.runner import CANCELLED, Bake, Target
+from beamspread.core.bake.settings import COMBINED
+from beamspread.core.batch import options
+from beamspread.core.native import native
 from mathutils import Matrix
 from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
 
@@ -70,8 +78,6 @@ def test_an_artists_own_use_of_the_node_is_kept():
 
 def test_file_image_is_written_to_its_file(tmp_path):
     path = tmp_path / "target.exr"
-    from beamspread.core.native import native
-
     native.write_exr(str(path), np.zeros((20, 24, 3), np.float32), ["R", "G", "B"])
     image = bpy.data.images.load(str(path))
     plane = add_plane(material=add_material(image=image, albedo=(0.99, 0.9, 0.0)))
@@ -301,6 +307,24 @@ def test_samples_of_a_folder(tmp_path):
     assert "There is no folder of LDF samples" in messages_of(bpy.ops.beamspread.bake)
 
 
+def test_other_layers_have_images_and_files_beside_the_combined_one(monkeypatch, tmp_path):
+    plain = BeamspreadSettings.for_bake
+    wanted = lambda self, solver=None: replace(plain(self, solver), layers=(COMBINED, "Half"))  # noqa: E731
+    monkeypatch.setattr(BeamspreadSettings, "for_bake", wanted)
+    monkeypatch.setitem(LAYERS, "Half", lambda *arguments: LAYERS[COMBINED](*arguments) / 2)
+    plane = add_plane(material=add_material())
+    add_sun(0)
+    (combined,) = bake(plane)
+    assert combined.max() > 0
+    image = node_of(plane.data.materials[0]).image
+    assert pixels(bpy.data.images[f"{image.name} Half"]) == pytest.approx(combined / 2)
+    bake(plane)
+    assert sorted(one.name for one in bpy.data.images) == ["Beamspread Plane", "Beamspread Plane Half"]
+    report = bake_all(options.parse(["--output", str(tmp_path)]))
+    assert [Path(one.path).name for one in report.bakes] == ["Plane_Medium.exr"]
+    assert native.read_exr(str(tmp_path / "Plane_Medium_Half.exr"))[0] == pytest.approx(combined / 2)
+
+
 class EndlessJob:
     """Goes on until it is told to stop; `BakeJob` in all that a thread asks of it."""
 
@@ -319,4 +343,22 @@ def test_thread_stops_when_asked():
     thread.cancel()
     thread.join(timeout=10)
     assert not thread.is_alive()
+    assert (thread.bake.status, thread.bake.layers) == (CANCELLED, {})
+
+
+class DeafJob(EndlessJob):
+    """Ends without having asked whether to go on."""
+
+    def run(self, progress):
+        return {COMBINED: np.ones((2, 2, 3), np.float32)}
+
+    def warnings_after(self, layers):
+        return []
+
+
+def test_what_ends_after_escape_is_not_kept_either():
+    thread = BakeThread(Bake(Target("Plane"), DeafJob()))
+    thread.cancel()
+    thread.start()
+    thread.join(timeout=10)
     assert (thread.bake.status, thread.bake.layers) == (CANCELLED, {})

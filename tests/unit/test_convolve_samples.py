@@ -123,3 +123,20 @@ def test_samples_of_several_media_are_refused(samples):
     others = [LdfSample(s.image, s.pitch, s.angle, s.albedo, 0, 0.5) for s in samples]
     with pytest.raises(ValueError, match="'g' is None"):
         convolve(one_texel(), travel(20, 0), samples + others, 0.9, 1.0, 1.0)
+
+
+def test_samples_that_return_more_than_arrives_are_named():
+    """5 % are noise: three standard errors of a total that a thousand photons tell."""
+
+    def solve(image, pitch=1.0):
+        sample = LdfSample(image, pitch, 0, 0.5)
+        return convolve(np.ones((3, 3)), (0, 0, -1), sample, 0.5, 1.0, 1.0)
+
+    assert solve(np.full((2, 2), 1.0499 / 4)).max() > 0.1
+    for image, pitch, power in (
+        (np.full((2, 2), 0.2651), 1.0, "1.06"),
+        (np.full((2, 2), 1e30), 1e18, ""),
+        (np.array([[10.0] + 20 * [-0.9]]), 0.1, "-0.08"),
+    ):
+        with pytest.raises(ValueError, match=f"'ldf' is a sample of power {power}.*allowed: 0 to 1.05"):
+            solve(image, pitch)

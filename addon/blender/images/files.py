@@ -53,10 +53,7 @@ def make_image(name: str, width: int, height: int):
 def fill_image(image, texture: np.ndarray) -> str:
     """Put linear RGB (height, width, 3) into an image and keep it; the path of its file, "" where it is packed.
 
-    Raises
-    ------
-    ImageError
-        The image's file cannot be written; the old pixels remain.
+    Where the file can't be written (ImageError), the old pixels remain.
     """
     check_image(image)
     if tuple(image.size) != texture.shape[1::-1]:
@@ -88,13 +85,7 @@ def set_pixels(image, texture: np.ndarray) -> None:
 
 
 def write_file(path: Path, texture: np.ndarray, file_format: str) -> None:
-    """Write linear RGB (height, width, 3), row 0 at the bottom, as EXR or PNG.
-
-    Raises
-    ------
-    ImageError
-        The file cannot be written.
-    """
+    """Write linear RGB (height, width, 3), row 0 at the bottom, as EXR or PNG."""
     folder = path.parent
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -28,14 +28,8 @@ class Results:
     def store(self, bake: Bake) -> str:
         """Fill the image of the target's node, or a new one, and link it back; other layers have images beside it.
 
-        Returns
-        -------
-        The path of the image's file, "" where it is packed.
-
-        Raises
-        ------
-        BakeError
-            The image cannot be kept, or another object of this run has filled the same part of it.
+        The path of the image's file, "" where it is packed; BakeError if it can't be kept, or if another object of
+        this run has filled the same part of it.
         """
         node = find_node(bpy.data.materials.get(bake.target.material_name))
         if node is None:

@@ -49,13 +49,7 @@ def _transform(points: np.ndarray, matrix) -> np.ndarray:
 
 
 def read_polygons(obj, material_name: str) -> Polygons:
-    """The faces of an evaluated mesh object that carry the material, in world space.
-
-    Raises
-    ------
-    ReceiverError
-        A scale of zero.
-    """
+    """The faces of an evaluated mesh object that carry the material, in world space."""
     mesh = obj.to_mesh()
     try:
         totals, starts, slots = (np.empty(len(mesh.polygons), np.int32) for _ in range(3))

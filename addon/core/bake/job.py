@@ -40,6 +40,7 @@ class BakeJob:
             if not all(np.isfinite(on_grid).all() for on_grid in values):
                 raise BakeError("The bake produced values that are not numbers: check the strengths of the lights.")
             texture = self.receiver.to_texture(values)
+            del values  # large
             layers[name] = extend_margin(texture, self.receiver.inside(), self.settings.margin)
         return layers
 

@@ -37,16 +37,9 @@ def parse(arguments: Sequence[str]) -> BatchOptions:
     values = parser.parse_args(list(arguments))
     if values.resume:
         parser.error("--resume is not supported yet: run without it to bake everything again")
-    return BatchOptions(
-        scene=values.scene,
-        objects=tuple(dict.fromkeys(name for group in values.object for name in group)),
-        frames=values.frames,
-        resolution=values.resolution,
-        solver=values.solver,
-        output=values.output,
-        format=values.format,
-        report=values.report,
-    )
+    values.objects = tuple(dict.fromkeys(name for group in values.objects for name in group))
+    del values.resume
+    return BatchOptions(**vars(values))
 
 
 class _Help(argparse.HelpFormatter):
@@ -67,6 +60,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("scene", nargs="?", help="the .blend file, if Blender has not opened it already")
     parser.add_argument(
         "--object",
+        dest="objects",
         action="append",
         nargs="+",
         default=[],

@@ -35,7 +35,6 @@ class Material:
 
     @property
     def channel_anisotropy(self) -> RGB:
-        """Henyey-Greenstein g of each channel."""
         return self.anisotropy_rgb or (self.anisotropy,) * 3
 
     def with_one_anisotropy(self) -> Material:

@@ -31,7 +31,6 @@ class Mesh:
 
     @classmethod
     def join(cls, parts: list[Mesh]) -> Mesh:
-        """One mesh out of many."""
         parts = [cls.empty(), *parts]
         offsets = np.cumsum([0] + [len(part.vertices) for part in parts], dtype=np.uint32)
         triangles = [part.triangles + offset for part, offset in zip(parts, offsets)]

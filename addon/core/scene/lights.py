@@ -46,7 +46,6 @@ class Light(ABC):
         """Whether none of it can reach the lit side of the grid's plane, whatever stands in between."""
 
     def rgb(self) -> np.ndarray:
-        """Strength times colour, float32 (3,)."""
         return np.asarray(self.color, np.float32) * np.float32(self.strength)
 
     def fault(self) -> str:

@@ -102,10 +102,12 @@ def texture_size(maps: Sequence[UvMap], resolution: int) -> tuple[int, int]:
 def build_receiver(maps: Sequence[UvMap], width: int, height: int) -> Receiver:
     """Lay the grids of a texture of `width` x `height` texels over flat parts; ReceiverError where that has none."""
     charts = tuple(_chart(one, width, height) for one in maps)
-    coverage = np.zeros((height, width), np.float32)
-    for chart in charts:
-        covered = chart.part_of(coverage)
-        np.minimum(covered + chart.coverage, 1, out=covered)
+    coverage = charts[0].coverage
+    if len(charts) > 1 or coverage.shape != (height, width):
+        coverage = np.zeros((height, width), np.float32)
+        for chart in charts:
+            covered = chart.part_of(coverage)
+            np.minimum(covered + chart.coverage, 1, out=covered)
     if not in_chart(coverage).any():
         raise ReceiverError("The UV map covers no texel of the image: enlarge it or the image.")
     return Receiver(coverage, charts)

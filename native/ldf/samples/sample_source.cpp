@@ -85,6 +85,18 @@ std::vector<double> node_angles(const std::vector<LdfSample>& samples)
     return angles;
 }
 
+// No medium returns more than arrives. A simulation knows a total to within .5 / sqrt(photons) (binomial), of which
+// this leaves three for a thousand photons.
+constexpr double most_power = 1.05;
+
+// Any image may be interpolated, but none returns more light than comes in.
+void check_power(const LdfSample& sample)
+{
+    if (const double power = sample.power(); !(power >= 0.0 && power <= most_power))
+        reject("ldf", "a sample of power " + std::to_string(power),
+               "0 to 1.05, of which .05 are noise: the integral of exitance per unit incident power");
+}
+
 }  // namespace
 
 RadialProfile sample_profile(const LdfSample& sample)
@@ -113,8 +125,10 @@ SampleSource::SampleSource(std::vector<LdfSample> samples, Interpolation method)
     : m_samples(std::move(samples)), m_method(method)
 {
     std::vector<const LdfSample*> pointers;
-    for (const LdfSample& sample : m_samples)
+    for (const LdfSample& sample : m_samples) {
+        check_power(sample);
         pointers.push_back(&sample);
+    }
     const SampleGrid checked(pointers);
     checked.cell(m_samples.front().angle_deg, m_samples.front().albedo, std::nullopt);  // of one g
     m_angles = node_angles(m_samples);
