@@ -16,6 +16,7 @@ __all__: list[str] = [
     "Light",
     "Medium",
     "Occluders",
+    "PlaneLight",
     "PointLight",
     "ReceiverGrid",
     "SampleSource",
@@ -39,6 +40,7 @@ __all__: list[str] = [
     "real_lines",
     "real_transform",
     "simulate",
+    "transforms",
     "walk_kernels",
     "write_exr",
 ]
@@ -493,14 +495,36 @@ class SpotLight(Light):
         self, position: numpy.ndarray, frame: numpy.ndarray, spot_size: float, blend: float, falloff: str = "scaled"
     ) -> None: ...
 
-def adaptive_beams(
-    irradiance: numpy.ndarray, direction: numpy.ndarray, tolerance: float
-) -> tuple[numpy.ndarray, numpy.ndarray]:
+class PlaneLight:
+    """
+    What arrives on a plane from one light, and what is known of where from.
+
+    Parameters
+    ----------
+    irradiance : ndarray, float32, shape (H, W)
+        W/m^2 where the colour is 1, cosine and visibility included; not copied.
+    direction : ndarray, float32, shape (3,) or (H, W, 3)
+        Unit vectors of travel in the plane frame, z < 0: one for all texels, or one for each; not copied.
+    color : sequence of float
+        Factor of the irradiance in each channel.
+    """
+    @staticmethod
+    def from_point(irradiance: numpy.ndarray, position: typing.Sequence[float], color: list[float]) -> PlaneLight:
+        """
+        All light comes from one position: x, y, z > 0 in metres from the outer corner of texel (0, 0).
+        """
+    @staticmethod
+    def of_channels(irradiance: numpy.ndarray, direction: numpy.ndarray, channels: int) -> list[PlaneLight]:
+        """
+        Lights for irradiance (H, W) or (H, W, channels): one where channels differ by a factor, else one for each.
+        """
+    def __init__(self, irradiance: numpy.ndarray, direction: numpy.ndarray, color: list[float]) -> None: ...
+
+def adaptive_beams(light: PlaneLight, tolerance: float) -> tuple[numpy.ndarray, numpy.ndarray]:
     """
     Squares that the adaptive solver lights by one beam each; the engine behind `beamspread.adaptive_beams`.
 
-    irradiance float32 (H, W), direction float32 (3,) or (H, W, 3); returns int64 (N, 3) of row, column and size, and
-    float64 (N,) mean irradiance.
+    Returns int64 (N, 3) of row, column and size, and float64 (N,) mean irradiance.
     """
 
 def complex_lines(values: numpy.ndarray, forward: bool, instruction_set: str = "") -> numpy.ndarray:
@@ -509,7 +533,7 @@ def complex_lines(values: numpy.ndarray, forward: bool, instruction_set: str = "
     """
 
 def convolve(
-    lights: list[tuple[numpy.ndarray, numpy.ndarray]],
+    lights: list[PlaneLight],
     ldf: list[LdfSource],
     albedo: list[float],
     mean_free_path: list[float],
@@ -522,10 +546,9 @@ def convolve(
     coarsening: int = 0,
 ) -> numpy.ndarray:
     """
-    Luminance of beams on a grid; the engine behind `beamspread.convolve`.
+    Luminance of lights on a grid; the engine behind `beamspread.convolve`.
 
-    Lights are pairs of irradiance, float32 (H, W) or (H, W, C) in W/m^2, and direction, float32 (3,) or (H, W, 3); C
-    libraries, albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr).
+    C libraries, albedos and mean free paths (metres), pitch (x, y) in metres; returns float32 (H, W, C) in W/(m^2 sr).
     `memory`: bytes that the spectra of the solver 'fft' may take; where the whole plane needs more it is solved in tiles.
     `coarsening`: texels from node to node of the grid on which it spreads light far: 4, 8, 16, ... 64, 1 for no such grid,
     0 for what costs least.
@@ -620,6 +643,7 @@ def gather_beams(
     progress: typing.Any = None,
     clearance: float = 0.0,
     find_shadows: bool = True,
+    directions: bool = True,
 ) -> tuple:
     """
     Irradiance of a plane by a light of strength 1, and where it comes from.
@@ -791,6 +815,18 @@ def simulate(
         Names the argument, its value and what is allowed.
     Cancelled
         `progress` returned False.
+    """
+
+def transforms(
+    lights: list[PlaneLight],
+    ldf: list[LdfSource],
+    albedo: list[float],
+    mean_free_path: list[float],
+    pitch: typing.Sequence[float],
+    tolerance: float,
+) -> int:
+    """
+    How many transforms of light the solver 'fft' makes of `convolve`.
     """
 
 def walk_kernels() -> list[str]:

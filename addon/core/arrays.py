@@ -21,4 +21,5 @@ def float_array(name: str, values, dtype=np.float32, allowed="real numbers, none
             return np.ascontiguousarray(array, dtype=dtype).reshape(array.shape)
     except (TypeError, ValueError):
         raise ValueError(f"argument {name!r} is {values!r}; allowed: {allowed}") from None
-    raise ValueError(f"argument {name!r} is {array.dtype} of shape {array.shape}; allowed: {allowed}")
+    given = repr(values) if array.ndim == 0 else f"{array.dtype} of shape {array.shape}"
+    raise ValueError(f"argument {name!r} is {given}; allowed: {allowed}")

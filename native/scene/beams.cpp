@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <span>
 #include <vector>
 
@@ -30,19 +31,35 @@ std::vector<Vec3> sub_texel_points(const ReceiverGrid& grid, int samples)
     return points;
 }
 
+// Points of the Gauss rule, two along each axis: from so many texels away on, they know the mean of a point lamp's light
+// within a texel to 2e-6.
+constexpr double texels_to_smooth_lamp = 16.0;
+
+std::vector<Vec3> gauss_points(const ReceiverGrid& grid)
+{
+    const double offset = 0.5 / std::numbers::sqrt3;
+    std::vector<Vec3> points;
+    for (const double y : {0.5 - offset, 0.5 + offset})
+        for (const double x : {0.5 - offset, 0.5 + offset})
+            points.push_back(grid.step(x, y));
+    return points;
+}
+
 // One light's beams on one grid.
 class Gatherer {
 public:
     Gatherer(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, const BeamSettings& settings)
         : m_grid(grid),
           m_light(light),
-          m_is_far(light.source().is_far),
+          m_source(light.source()),
           m_occluders(occluders),
           m_points(sub_texel_points(grid, settings.samples)),
+          m_smooth_points(gauss_points(grid)),
+          m_smooth_from(texels_to_smooth_lamp * std::max(grid.pitch_x, grid.pitch_y)),
           m_position_rounding(std::numeric_limits<double>::epsilon() * grid.reach(Vec3(0.0))),
           m_start(ray_start(grid, occluders, settings.clearance)),
           m_shadows(grid, light.source(), occluders, m_start, settings.find_shadows),
-          m_open_texel(gather_texel(0.0, 0.0, nullptr))
+          m_open_texel(gather_texel(0.0, 0.0, m_points, nullptr))
     {
     }
 
@@ -65,15 +82,17 @@ private:
     struct Texel {
         double irradiance;  // W/m^2
         Vec3 flow;          // sum over the points of irradiance times direction of travel
+        bool is_shaded = false;  // at any point
     };
 
     void gather_row(std::size_t y, const Shade* shades, const BeamArrays& beams) const
     {
         for (std::size_t x = 0; x < m_grid.width; ++x) {
-            const auto [irradiance, flow] = texel(static_cast<double>(x), static_cast<double>(y), shades[x]);
-            beams.irradiance(y, x) = static_cast<float>(irradiance);
+            const Texel found = texel(static_cast<double>(x), static_cast<double>(y), shades[x]);
+            beams.irradiance(y, x) = static_cast<float>(found.irradiance);
             if (beams.direction.data)
-                beams.direction(y, x) = Vec3f(mean_direction(flow, static_cast<double>(x), static_cast<double>(y)));
+                beams.direction(y, x) =
+                    Vec3f(mean_direction(found.flow, static_cast<double>(x), static_cast<double>(y)));
         }
     }
 
@@ -81,21 +100,33 @@ private:
     {
         if (shade == Shade::full)
             return {};
-        if (shade == Shade::unknown)
-            return gather_texel(x, y, m_occluders);
-        return m_is_far ? m_open_texel : gather_texel(x, y, nullptr);
+        if (shade == Shade::unknown) {
+            const Texel traced = gather_texel(x, y, m_points, m_occluders);
+            return traced.is_shaded || !is_smooth(x, y) ? traced : gather_texel(x, y, m_smooth_points, nullptr);
+        }
+        if (m_source.is_far)
+            return m_open_texel;
+        return gather_texel(x, y, is_smooth(x, y) ? m_smooth_points : m_points, nullptr);
     }
 
-    Texel gather_texel(double x, double y, const Occluders* occluders) const
+    // Whether unblocked light is so even within a texel that few points tell its mean.
+    bool is_smooth(double x, double y) const
+    {
+        const Vec3 away = m_source.position - m_grid.point(x, y);
+        return m_source.is_smooth && m_points.size() > m_smooth_points.size() &&
+               glm::dot(away, away) > m_smooth_from * m_smooth_from;
+    }
+
+    Texel gather_texel(double x, double y, std::span<const Vec3> points, const Occluders* occluders) const
     {
         Texel sum{};
         const Vec3 corner = m_grid.point(x, y);
-        for (std::span<const Vec3> rest = m_points; !rest.empty();) {
+        for (std::span<const Vec3> rest = points; !rest.empty();) {
             const std::span<const Vec3> packet = rest.first(std::min(rest.size(), Occluders::packet_size));
             sum = gather_points(corner, packet, occluders, sum);
             rest = rest.subspan(packet.size());
         }
-        sum.irradiance /= static_cast<double>(m_points.size());
+        sum.irradiance /= static_cast<double>(points.size());
         return sum;
     }
 
@@ -123,10 +154,13 @@ private:
                 rays[count] = shadow_ray(points[i], arrival);
             ++count;
         }
+        sum.is_shaded |= count < subs.size();
         const std::uint32_t blocked = occluders ? occluders->blocked(std::span(rays).first(count)) : 0;
         for (std::size_t i = 0; i < count; ++i) {
-            if (blocked >> i & 1u)
+            if (blocked >> i & 1u) {
+                sum.is_shaded = true;
                 continue;
+            }
             sum.irradiance += irradiance[i];
             sum.flow += irradiance[i] * travel[i];
         }
@@ -154,9 +188,11 @@ private:
 
     const ReceiverGrid& m_grid;
     const Light& m_light;
-    bool m_is_far;
+    LightSource m_source;
     const Occluders* m_occluders;
     std::vector<Vec3> m_points;
+    std::vector<Vec3> m_smooth_points;
+    double m_smooth_from;  // metres from the lamp
     double m_position_rounding;  // a lamp within this of a point is in it: light there has neither direction nor bound
     RayStart m_start;
     Shadows m_shadows;

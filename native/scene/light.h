@@ -22,6 +22,7 @@ struct Arrival {
 struct LightSource {
     Vec3 position{};  // of the lamp; of a light infinitely far away the unit vector towards it
     bool is_far = false;  // then light is the same everywhere
+    bool is_smooth = false;  // but for the falloff with distance and cosine, light is even in all directions
 };
 
 class Light {

@@ -10,7 +10,7 @@ public:
     // Throws InvalidArgument.
     explicit PointLight(const Vec3& position);
     void arrive(std::span<const Vec3> points, Arrival* arrivals) const override;
-    LightSource source() const override { return {.position = m_position}; }
+    LightSource source() const override { return {.position = m_position, .is_smooth = true}; }
 
 private:
     Vec3 m_position;

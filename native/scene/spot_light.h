@@ -22,7 +22,7 @@ public:
     // `spot_size` is the full angle of the cone in (0, pi], `blend` in [0, 1]. Throws InvalidArgument.
     SpotLight(const Vec3& position, const Mat3& lamp_to_world, double spot_size, double blend, SpotFalloff falloff);
     void arrive(std::span<const Vec3> points, Arrival* arrivals) const override;
-    LightSource source() const override { return m_point.source(); }
+    LightSource source() const override { return {.position = m_point.source().position}; }
 
 private:
     double falloff(const Vec3& travel) const;

@@ -28,11 +28,15 @@ double common_factor(const std::vector<PlaneLight>& lights, std::size_t channel,
 ChannelSets::ChannelSets(const Problem& problem)
 {
     for (std::size_t c = 0; c < problem.channels.size(); ++c) {
-        std::size_t set = 0;
         double factor = 0.0;
-        for (; set < m_reference.size() && factor == 0.0; set += factor == 0.0 ? 1 : 0)
+        std::size_t set = 0;
+        while (set < m_reference.size()) {
             factor = common_factor(problem.lights, c, m_reference[set]);
-        if (factor == 0.0) {
+            if (factor != 0.0)
+                break;
+            ++set;
+        }
+        if (set == m_reference.size()) {
             m_reference.push_back(c);
             factor = 1.0;
         }

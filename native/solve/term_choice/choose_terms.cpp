@@ -38,7 +38,7 @@ constexpr double rounding = 5e-6;
 constexpr double least_asymmetry = 0.01;
 
 // Of many lights so many stand for all: the brightest, whose light changes most from texel to texel.
-constexpr std::size_t most_lights = 8;
+constexpr std::size_t most_lights = 4;
 
 using Readings = std::vector<std::vector<float>>;  // [texel][result and function]
 

@@ -76,9 +76,10 @@ void ProbeTables::integrate(const LowRankBasis& basis, const Plane& plane)
         for (std::size_t cell = 0; cell < cells; ++cell) {
             float* row = m_kernels.data() + ((size * cells + cell) * m_media + medium) * kernels * m_row_size;
             row += m_starts[rank];
-            const double x = static_cast<double>(cell % cells_along) * px;
-            const double y = static_cast<double>(cell / cells_along) * py;
-            const Harmonics density = cell > 0 ? scaled.profile.density(std::hypot(x, y)) : Harmonics{};
+            const std::size_t y = cell / cells_along;
+            const std::size_t x = cell % cells_along;
+            const double r = std::hypot(static_cast<double>(x) * px, static_cast<double>(y) * py);
+            const Harmonics density = cell > 0 ? scaled.profile.density(r) : Harmonics{};
             for (std::size_t m = 0; m < harmonics; ++m) {
                 row[cosine * m_row_size + m] = static_cast<float>(integrals.cosine[m * cells + cell] / (side * side));
                 row[sine * m_row_size + m] = static_cast<float>(integrals.sine[m * cells + cell] / (side * side));

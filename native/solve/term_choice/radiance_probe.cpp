@@ -10,11 +10,12 @@ namespace beamspread {
 
 namespace {
 
-// The light of a cell is that of one texel from each of its quarters.
-constexpr std::size_t quarters = 4;
-
 // Cells of 3^this texels, and larger ones, look the same from everywhere on a site.
 constexpr std::size_t far_size = 3;
+
+// The light of a cell is that of one texel from each of so many parts along its sides.
+constexpr std::size_t near_parts = 2;
+constexpr std::size_t far_parts = 4;
 
 struct Beam {
     float irradiance = 0.0f;  // of its share of the cell
@@ -56,15 +57,15 @@ struct RadianceProbe::Cell {
         const auto width = static_cast<std::ptrdiff_t>(plane.width);
         if (y0 >= height || x0 >= width || y0 + side <= 0 || x0 + side <= 0)
             return;
-        const std::size_t drawn = size == 0 ? 1 : quarters;
-        weight = static_cast<float>(side * side) / static_cast<float>(drawn);
-        for (std::size_t i = 0; i < drawn; ++i) {
-            const auto within = [&](std::size_t half) {
-                const double part = size == 0 ? 0.0 : 0.5 * (static_cast<double>(half) + random.uniform());
-                return static_cast<std::ptrdiff_t>(part * static_cast<double>(side));
+        const std::size_t parts = size == 0 ? 1 : size < far_size ? near_parts : far_parts;
+        weight = static_cast<float>(side * side) / static_cast<float>(parts * parts);
+        for (std::size_t i = 0; i < parts * parts; ++i) {
+            const auto within = [&](std::size_t part) {
+                const double place = (static_cast<double>(part) + random.uniform()) / static_cast<double>(parts);
+                return static_cast<std::ptrdiff_t>(place * static_cast<double>(side));
             };
-            const std::ptrdiff_t y = y0 + within(i / 2);
-            const std::ptrdiff_t x = x0 + within(i % 2);
+            const std::ptrdiff_t y = y0 + within(i / parts);
+            const std::ptrdiff_t x = x0 + within(i % parts);
             if (y < 0 || x < 0 || y >= height || x >= width)
                 continue;
             ways[count] = {static_cast<double>(static_cast<std::ptrdiff_t>(texel.x) - x) * plane.pitch_x,
@@ -80,8 +81,8 @@ struct RadianceProbe::Cell {
     bool right;
     float weight = 0.0f;  // of each texel
     std::size_t count = 0;
-    std::array<Texel, quarters> texels{};
-    std::array<Vec2, quarters> ways{};  // from them
+    std::array<Texel, far_parts * far_parts> texels{};
+    std::array<Vec2, far_parts * far_parts> ways{};  // from them
 };
 
 // Sums over the light of a cell, rows of a set: irradiance times u(theta), times cos(m beta), sin(m beta), or for light
@@ -164,7 +165,7 @@ void RadianceProbe::add_cell(const Cell& cell, Moments& moments, AlignedVector<f
 void RadianceProbe::add_light(const Cell& cell, std::size_t number, Moments& moments) const
 {
     const PlaneLight& light = m_light.changing[number];
-    std::array<Beam, quarters> beams;
+    std::array<Beam, far_parts * far_parts> beams;
     std::size_t lit = 0;
     Vec2 toward(0.0);  // sums over the beams, weighed by irradiance
     Vec2 between(0.0);
