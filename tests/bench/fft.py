@@ -197,6 +197,18 @@ def lamps(size, libraries):
             )
 
 
+def budgets(size, libraries):
+    """The less memory, the more tiles, and the more often their borders are transformed."""
+    print(
+        f"\npoint lamp, {size} x {size} RGB, mean free paths 4, 2.8 and 2 texels: CPU seconds with less and less memory"
+    )
+    for ior, albedo in ((1.0, 0.9), (1.4, 0.999)):
+        lights = _native.PlaneLight.of_channels(*lamp(size), 3)
+        rest = [libraries[ior]] * 3, [albedo] * 3, [4.0, 2.8, 2.0], (1.0, 1.0), "fft", 5e-3, 0, None
+        costs = [seconds(2, _native.convolve, lights, *rest, memory=size**2 * per_texel) for per_texel in (320, 80, 20)]
+        print(f"  ior {ior}: " + ", ".join(f"{cost:.2f} s" for cost in costs) + " with 320, 80, 20 bytes per texel")
+
+
 def check(size, library):
     """Full rank is as good as direct, where that is feasible."""
     arguments = *lamp(size), library, (0.6, 0.9, 0.3), 1.0, 1.0
@@ -230,6 +242,7 @@ def main():
     scipy_sun(2048 // smaller, libraries[1.0])
     check(96, libraries[1.0])
     lamps(2048 // smaller, libraries)
+    budgets(2048 // smaller, libraries)
     growth([n // smaller for n in (512, 1024, 2048, 4096, 8192)], libraries[1.0])
 
 

@@ -38,6 +38,8 @@ std::vector<PlaneLight> lights_of_channels(const std::vector<View2D<const float>
                                            const Directions& directions)
 {
     const std::size_t channels = irradiance.size();
+    if (channels == 1)
+        return {{irradiance.front(), directions, {1.0}}};
     std::vector<float> most;
     for (const View2D<const float>& channel : irradiance) {
         const Texel at = brightest(channel);

@@ -25,9 +25,11 @@ struct LowRankBasis {
     std::vector<std::vector<ScaledProfile>> profiles;  // [medium][rank]
 };
 
-// Kernels of all angles present, taken apart: for each harmonic the singular value decomposition of angles times
-// (medium, radius), by the chi-square distance to the mean kernel, which bounds the relative L1 error; mean square over
-// the media, the light, the lit texels and the angles present. The media share the functions of the angle.
+// Kernels of all angles present, taken apart: for each harmonic m the singular value decomposition of the matrix
+// sqrt(share of the angle) c_m(theta, r) / sqrt(mean c_0(r)), of angles times (medium, radius). By the theorem of Eckart
+// and Young (1936, doi:10.1007/BF02288367) no other functions leave less of its square norm out, which is the
+// chi-square distance to the kernels, bounds their relative L1 error, and is a mean over the media, the light, the lit
+// beams and the angles present. The media share the functions of the angle.
 class KernelDecomposition {
 public:
     // `texel` is the side of a texel in metres: detail inside the one where a beam enters does not count.

@@ -21,7 +21,7 @@ constexpr std::size_t small_plane = 192;
 
 // What the texels looked at may use up of the tolerance. The rest is for those between, and for what the probe is off
 // by.
-constexpr double share = 0.3;
+constexpr double share = 0.2;
 
 // Of what is allowed: errors that need no weighing.
 constexpr float negligible = 0.05f;

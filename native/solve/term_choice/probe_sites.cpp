@@ -15,8 +15,10 @@ namespace {
 constexpr std::size_t pairs = 4096;
 constexpr std::array<std::size_t, 3> pair_reach = {1, 8, 32};
 
-// Sites anywhere, at lit texels, and where light changes from one texel of a pair to the other.
+// Sites anywhere, along the sides of the plane and at its corners, beyond which all is dark, at lit texels, and where
+// light changes from one texel of a pair to the other.
 constexpr std::size_t anywhere = 16;
+constexpr std::size_t per_side = 4;
 constexpr std::size_t lit = 16;
 constexpr std::size_t changing = 32;
 
@@ -145,6 +147,14 @@ std::vector<Texel> probe_sites(const LightTerms& light, const std::vector<std::s
     Sites sites(light.plane, 0);
     for (std::size_t i = 0; i < anywhere; ++i)
         sites.add(sites.anywhere());
+    const Texel last{light.plane.height - 1, light.plane.width - 1};
+    for (const Texel& corner : {Texel{0, 0}, Texel{0, last.x}, Texel{last.y, 0}, last}) {
+        sites.add(corner);
+        for (std::size_t i = 0; i < per_side / 2; ++i) {
+            sites.add({corner.y, sites.below(light.plane.width)});
+            sites.add({sites.below(light.plane.height), corner.x});
+        }
+    }
 
     std::vector<Texel> drawn;
     std::vector<float> sums(1, 0.0f);  // of changes
@@ -165,17 +175,27 @@ std::vector<Texel> probe_sites(const LightTerms& light, const std::vector<std::s
         const auto above = std::upper_bound(sums.begin(), sums.end(), place);
         sites.add(drawn[std::min(static_cast<std::size_t>(above - sums.begin()), drawn.size()) - 1]);
     }
+    std::vector<Texel> places;
+    const auto add_place = [&](const Texel& place) {
+        const auto is_near = [&](const Texel& other) {
+            return std::max(place.y, other.y) - std::min(place.y, other.y) <= site_reach &&
+                   std::max(place.x, other.x) - std::min(place.x, other.x) <= site_reach;
+        };
+        if (std::none_of(places.begin(), places.end(), is_near))
+            places.push_back(place);
+    };
     for (const std::size_t l : lights) {
         const Incidence::Extremes& extremes = incidence.extremes[l];
         if (extremes.irradiance == 0.0f)
             continue;
-        std::vector<Texel> places = {extremes.brightest, extremes.steepest, extremes.most_grazing};
+        for (const Texel& place : {extremes.brightest, extremes.steepest, extremes.most_grazing})
+            add_place(place);
         if (const std::optional<Texel> from = origin(light.plane, light.changing[l], drawn))
-            places.push_back(*from);
-        for (const Texel& place : places)
-            for (const std::size_t reach : extreme_reach)
-                sites.add(sites.near(place, reach));
+            add_place(*from);
     }
+    for (const Texel& place : places)
+        for (const std::size_t reach : extreme_reach)
+            sites.add(sites.near(place, reach));
     return sites.take();
 }
 

@@ -13,8 +13,9 @@ namespace {
 // Cells of 3^this texels, and larger ones, look the same from everywhere on a site.
 constexpr std::size_t far_size = 3;
 
-// The light of a cell is that of one texel from each of so many parts along its sides.
-constexpr std::size_t near_parts = 2;
+// The light of a cell is that of one texel from each of so many parts along its sides: of near cells the one in the
+// middle of the part, which makes those of 3 x 3 texels exact; of far ones any, as patterns may repeat from part to part.
+constexpr std::size_t near_parts = 3;
 constexpr std::size_t far_parts = 4;
 
 struct Beam {
@@ -61,7 +62,8 @@ struct RadianceProbe::Cell {
         weight = static_cast<float>(side * side) / static_cast<float>(parts * parts);
         for (std::size_t i = 0; i < parts * parts; ++i) {
             const auto within = [&](std::size_t part) {
-                const double place = (static_cast<double>(part) + random.uniform()) / static_cast<double>(parts);
+                const double offset = size < far_size ? 0.5 : random.uniform();
+                const double place = (static_cast<double>(part) + offset) / static_cast<double>(parts);
                 return static_cast<std::ptrdiff_t>(place * static_cast<double>(side));
             };
             const std::ptrdiff_t y = y0 + within(i / parts);
