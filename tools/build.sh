@@ -16,4 +16,6 @@ if [ ! -f "build/$preset/build.ninja" ] || [ "$(cat "$stamp" 2>/dev/null)" != "$
     cmake --preset "$preset" >&2
     echo "$key" >"$stamp"
 fi
+# Objects are the same wherever the clone lies.
+export CCACHE_BASEDIR=$PWD CCACHE_NOHASHDIR=1
 exec cmake --build "build/$preset" >&2

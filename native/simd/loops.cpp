@@ -70,8 +70,8 @@ BEAMSPREAD_CLONES void interpolate(float* __restrict result, const float* table,
                     weight[3] * table[3 * stride + i];
 }
 
-BEAMSPREAD_CLONES void turn(float* __restrict cosine, float* __restrict sine, const float* cos_beta,
-                            const float* sin_beta, std::size_t count)
+BEAMSPREAD_CLONES void rotate(float* __restrict cosine, float* __restrict sine, const float* cos_beta,
+                              const float* sin_beta, std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i) {
         const float next = cosine[i] * cos_beta[i] - sine[i] * sin_beta[i];

@@ -32,7 +32,7 @@ void add_scaled_product(float* sum, const float* a, const float* b, float factor
 void interpolate(float* result, const float* table, std::size_t stride, const float* weight, std::size_t count);
 
 // (cosine, sine)[i] turned by the angle of (cos_beta, sin_beta)[i]
-void turn(float* cosine, float* sine, const float* cos_beta, const float* sin_beta, std::size_t count);
+void rotate(float* cosine, float* sine, const float* cos_beta, const float* sin_beta, std::size_t count);
 
 // Where the tables of a function of tan(theta / 2) have that value: after this step, by this part of the next.
 void find_steps(std::uint32_t* step, float* part, const float* half_tangent, float first, float per_step,

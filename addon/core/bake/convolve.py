@@ -46,10 +46,11 @@ def convolve(
         `fft`: the sum over all texels of the absolute error stays below `tolerance` times the sum of the luminance,
         and the error of each texel below `tolerance` times the mean of the 17 x 17 texels around. Whatever the
         tolerance, `fft` is besides off by some 1e-5 of the brightest texel: with beams of one direction 4e-5 at most,
-        1e-4 to 3e-4 beyond 80 degrees with ior 1, up to 8e-4 for thin slabs with an ior above 1.
-        Beyond 192 x 192 texels the bound rests on a look at some thousand texels, which may use up .3 of it; over
-        random lights, shadows and media the worst of all texels used up .2 to .6. `adaptive`: the sum as for `fft`,
-        and the error of each texel below `tolerance` times the brightest one.
+        7e-5 beyond 80 degrees with ior 1, up to 4e-4 for thin slabs with an ior above 1.
+        Beyond 192 x 192 texels the bound rests on a look at some thousand texels, which may use up .2 of it; over
+        lights, shadows and media that are hard for it the worst of all texels uses up .1 to .9
+        (tests/bench/terms.py). `adaptive`: the sum as for `fft`, and the error of each texel below `tolerance` times
+        the brightest one.
     threads : int
         0: all. The result does not depend on it.
     progress : callable, optional

@@ -84,11 +84,11 @@ bool BeamRow::read(const Plane& plane, const PlaneLight& light, const RowSpan& s
         directions = field->travel + 3 * (span.y * plane.width + span.x);
     } else {
         travel.resize(3 * count);
+        const Vec3 first = travel_at(plane, light.directions, span.y, span.x);
         for (std::size_t x = 0; x < count; ++x) {
-            const Vec3 d = travel_at(plane, light.directions, span.y, span.x + x);
-            travel[3 * x] = static_cast<float>(d.x);
-            travel[3 * x + 1] = static_cast<float>(d.y);
-            travel[3 * x + 2] = static_cast<float>(d.z);
+            travel[3 * x] = static_cast<float>(first.x + static_cast<double>(x) * plane.pitch_x);
+            travel[3 * x + 1] = static_cast<float>(first.y);
+            travel[3 * x + 2] = static_cast<float>(first.z);
         }
         directions = travel.data();
     }

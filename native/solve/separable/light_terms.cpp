@@ -174,7 +174,7 @@ void TermRow::add_moments(const LightTerms& terms, const RowSpan& span, const st
             continue;
         const LowRankBasis::AngleFunction& wanted = basis.functions[term.function];
         for (; m < wanted.m; ++m)
-            turn(m_cosine.data(), m_sine.data(), m_beams.cos_beta.data(), m_beams.sin_beta.data(), count);
+            rotate(m_cosine.data(), m_sine.data(), m_beams.cos_beta.data(), m_beams.sin_beta.data(), count);
         if (function != term.function)
             look_up(m_u.data(), wanted.values.data(), m_step.data(), m_part.data(), count);
         function = term.function;

@@ -20,7 +20,7 @@ constexpr std::size_t most_summed_rows = 40;
 constexpr std::size_t lines_at_once = 16;
 
 // 2 pi steps / size; whole turns are left out before they cost digits.
-double turn_angle(std::size_t steps, std::size_t size)
+double phase_of(std::size_t steps, std::size_t size)
 {
     return 2.0 * pi * static_cast<double>(steps % size) / static_cast<double>(size);
 }
@@ -80,7 +80,7 @@ CentreSpectrum::CentreSpectrum(const PaddedPlane& plane, const KernelCentre& hal
         float* sine = cosine + m_height * m_frequencies;
         const double twice = y == 0 ? 1.0 : 2.0;
         for (std::size_t f = 0; f < m_frequencies; ++f) {
-            const double angle = turn_angle(y * f, m_padded_height);
+            const double angle = phase_of(y * f, m_padded_height);
             cosine[f] = static_cast<float>(twice * std::cos(angle));
             sine[f] = static_cast<float>(twice * std::sin(angle));
         }
@@ -138,7 +138,7 @@ void CentreSpectrum::start(std::size_t first_frequency, std::size_t count, Colum
     for (std::size_t i = 0; i < count * m_width; ++i) {
         const std::size_t x = i % m_width;
         const double twice = x == 0 ? 1.0 : 2.0;
-        const double angle = turn_angle(x * (first_frequency + i / m_width), m_padded_width);
+        const double angle = phase_of(x * (first_frequency + i / m_width), m_padded_width);
         columns.cosine[i] = static_cast<float>(twice * std::cos(angle));
         columns.sine[i] = static_cast<float>(twice * std::sin(angle));
     }

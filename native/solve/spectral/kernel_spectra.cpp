@@ -73,7 +73,7 @@ void KernelSpectra::start(std::size_t frequency, const HarmonicRange& harmonics,
         column.sine[f] = 0.0f;
     }
     const auto next = [&] {
-        turn(column.cosine.data(), column.sine.data(), column.cos_psi.data(), column.sin_psi.data(), frequencies);
+        rotate(column.cosine.data(), column.sine.data(), column.cos_psi.data(), column.sin_psi.data(), frequencies);
     };
     for (std::size_t m = 0; m < harmonics.first; ++m)
         next();

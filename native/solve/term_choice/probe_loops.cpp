@@ -11,7 +11,7 @@ namespace {
 
 using Block = float __attribute__((vector_size(harmonics_per_block * sizeof(float))));
 
-[[gnu::always_inline]] inline void turn(Block& cosine, Block& sine, const Block& by_cos, const Block& by_sin)
+[[gnu::always_inline]] inline void rotate(Block& cosine, Block& sine, const Block& by_cos, const Block& by_sin)
 {
     const Block next = cosine * by_cos - sine * by_sin;
     sine = sine * by_cos + cosine * by_sin;
@@ -29,7 +29,7 @@ BEAMSPREAD_CLONES void multiple_angles(float* __restrict cosine, float* __restri
     Block cos_m = Block{} + factor;
     Block sin_m{};
     for (const Block& bit : bits) {
-        turn(cos_m, sin_m, 1.0f + bit * (cos_angle - 1.0f), bit * sin_angle);
+        rotate(cos_m, sin_m, 1.0f + bit * (cos_angle - 1.0f), bit * sin_angle);
         const float twice = 2.0f * cos_angle * sin_angle;
         cos_angle = cos_angle * cos_angle - sin_angle * sin_angle;
         sin_angle = twice;
@@ -39,7 +39,7 @@ BEAMSPREAD_CLONES void multiple_angles(float* __restrict cosine, float* __restri
     for (std::size_t m = 0; m < count; m += harmonics_per_block) {
         std::memcpy(cosine + m, &cos_m, sizeof(cos_m));
         std::memcpy(sine + m, &sin_m, sizeof(sin_m));
-        turn(cos_m, sin_m, cos_block, sin_block);
+        rotate(cos_m, sin_m, cos_block, sin_block);
     }
 }
 

@@ -108,15 +108,15 @@ std::optional<Vec2> common_origin(const Plane& plane, const PlaneLight& light, c
             continue;
         const Vec3 travel = travel_at(plane, light.directions, y, x);
         const Vec2 d(travel.x / plane.pitch_x, travel.y / plane.pitch_y);
-        const double square = glm::dot(d, d);
-        if (square == 0.0)
+        const double length_squared = glm::dot(d, d);
+        if (length_squared == 0.0)
             continue;
         const Vec2 across(d.y, -d.x);
         const double offset = glm::dot(across, Vec2(x, y));
-        xx += d.y * d.y / square;
-        xy -= d.x * d.y / square;
-        yy += d.x * d.x / square;
-        sum += across * offset / square;
+        xx += d.y * d.y / length_squared;
+        xy -= d.x * d.y / length_squared;
+        yy += d.x * d.x / length_squared;
+        sum += across * offset / length_squared;
     }
     constexpr double parallel = 1e-6;
     const double determinant = xx * yy - xy * xy;

@@ -33,8 +33,8 @@ struct Beam {
 
 Vec2 unit(const Vec2& v)
 {
-    const double square = glm::dot(v, v);
-    return square > 0.0 ? v / std::sqrt(square) : Vec2(1.0, 0.0);
+    const double length_squared = glm::dot(v, v);
+    return length_squared > 0.0 ? v / std::sqrt(length_squared) : Vec2(1.0, 0.0);
 }
 
 }  // namespace
