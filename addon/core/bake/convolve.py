@@ -48,7 +48,7 @@ def convolve(
         tolerance, `fft` is besides off by some 1e-5 of the brightest texel: with beams of one direction 4e-5 at most,
         7e-5 beyond 80 degrees with ior 1, up to 4e-4 for thin slabs with an ior above 1.
         Beyond 192 x 192 texels the bound rests on a look at some thousand texels, which may use up .2 of it; over
-        lights, shadows and media that are hard for it the worst of all texels uses up .1 to .9
+        lights, shadows and media that are hard for it the worst of all texels uses up .1 to .7
         (tests/bench/terms.py). `adaptive`: the sum as for `fft`, and the error of each texel below `tolerance` times
         the brightest one.
     threads : int

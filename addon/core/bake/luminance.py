@@ -25,7 +25,7 @@ LIBRARY_WEIGHT, LIGHT_WEIGHT, SOLVE_WEIGHT = 2.0, 1.0, 3.0
 # Of the solvers, see `convolve`: half a per cent in the worst texel is not seen, and below the noise of libraries.
 TOLERANCE = 5e-3
 
-# Bytes of irradiance that wait for the solver at once, so that memory is bounded for any number of lights: 128 lights on
+# Bytes of irradiance that wait for the solver at once, which bounds the memory for any number of lights: 128 of them on
 # 1024 x 1024 texels. Beyond, it solves again.
 MOST_WAITING = 512 << 20
 
