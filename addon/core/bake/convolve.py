@@ -45,12 +45,12 @@ def convolve(
     tolerance : float
         `fft`: the sum over all texels of the absolute error stays below `tolerance` times the sum of the luminance,
         and the error of each texel below `tolerance` times the mean of the 17 x 17 texels around. Whatever the
-        tolerance, `fft` is besides off by some 1e-5 of the brightest texel: with beams of one direction 4e-5 at most,
-        7e-5 beyond 80 degrees with ior 1, up to 4e-4 for thin slabs with an ior above 1.
-        Beyond 192 x 192 texels the bound rests on a look at some thousand texels, which may use up .2 of it; over
-        lights, shadows and media that are hard for it the worst of all texels uses up .1 to .7
-        (tests/bench/terms.py). `adaptive`: the sum as for `fft`, and the error of each texel below `tolerance` times
-        the brightest one.
+        tolerance, `fft` is besides off by some 1e-5 of the brightest texel: by 4e-5 at most, by 7e-5 beyond 80 degrees
+        with ior 1, and for thin slabs with an ior above 1 by up to 1e-3, beyond 80 degrees 2e-3. Beyond 192 x 192
+        texels the bound rests on a look at 1000 to 1500 texels, and of more than four lights at the four brightest,
+        which may use up .2 of it; over lights, shadows and media that are hard for it the worst of all texels uses up
+        .1 to 1 (tests/bench/terms.py). `adaptive`: the sum as for `fft`, and the error of each texel below `tolerance`
+        times the brightest one.
     threads : int
         0: all. The result does not depend on it.
     progress : callable, optional

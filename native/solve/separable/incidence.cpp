@@ -31,10 +31,11 @@ void add_row(const BeamRow& row, std::size_t y, double strength, Histogram& hist
             continue;
         const float angle = row.half_tangent[x];
         const auto bin = std::min(static_cast<std::size_t>(angle * static_cast<float>(bin_count)), bin_count - 1);
-        histogram.light[bin] += strength * static_cast<double>(irradiance);
+        const double power = strength * static_cast<double>(irradiance);
+        histogram.light[bin] += power;
         histogram.beams[bin] += 1.0;
-        if (irradiance > extremes.irradiance) {
-            extremes.irradiance = irradiance;
+        if (power > extremes.irradiance) {
+            extremes.irradiance = power;
             extremes.brightest = {y, x};
         }
         if (angle < extremes.least) {

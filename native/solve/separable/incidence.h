@@ -16,7 +16,7 @@ struct Incidence {
         Texel brightest{};
         Texel steepest{};
         Texel most_grazing{};
-        float irradiance = 0.0f;  // of the brightest; 0: all is dark
+        double irradiance = 0.0;  // of the brightest, over all channels; 0: all is dark
         float least = 1.0f;
         float greatest = 0.0f;
     };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "base/random.h"
@@ -82,8 +83,9 @@ float change(const LightTerms& light, const std::vector<std::size_t>& lights, co
     float sum = 0.0f;
     float difference = 0.0f;
     for (const std::size_t l : lights) {
+        const float strength = std::accumulate(light.colors[l].begin(), light.colors[l].end(), 0.0f);
         const auto flow = [&](const Texel& texel) {
-            const float irradiance = light.changing[l].irradiance(texel.y, texel.x);
+            const float irradiance = strength * light.changing[l].irradiance(texel.y, texel.x);
             sum += irradiance;
             if (irradiance == 0.0f)
                 return Vec3f(0.0f);
@@ -186,7 +188,7 @@ std::vector<Texel> probe_sites(const LightTerms& light, const std::vector<std::s
     };
     for (const std::size_t l : lights) {
         const Incidence::Extremes& extremes = incidence.extremes[l];
-        if (extremes.irradiance == 0.0f)
+        if (extremes.irradiance == 0.0)
             continue;
         for (const Texel& place : {extremes.brightest, extremes.steepest, extremes.most_grazing})
             add_place(place);
