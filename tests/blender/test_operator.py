@@ -17,7 +17,7 @@ from beamspread.core.bake.settings import COMBINED
 from beamspread.core.batch import options
 from beamspread.core.native import native
 from mathutils import Matrix
-from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
+from scenes import add_material, add_mesh, add_plane, add_sun, bake, messages_of, node_of, pixels, select
 
 
 @pytest.fixture(autouse=True)
@@ -184,6 +184,40 @@ def test_two_objects_share_an_image_side_by_side():
     add_sun(0)
     bake(left, right)
     assert (pixels(image)[:, :, 0] > 0).all()
+
+
+def test_two_round_tables_share_an_image():
+    """Whole, and with margins that continue them, although each lies in the corners of the other's margin."""
+    image = bpy.data.images.new("Atlas", 128, 64, float_buffer=True)
+    material = add_material(image=image, mean_free_path=(0.002,) * 3)
+    angles = 2 * np.pi * np.arange(32) / 32
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    charts = [0.5 + 0.49 * circle * [0.5, 1] + [shift, 0] for shift in (-0.25, 0.25)]
+    tables = [
+        add_mesh(name, [(x, y, 0) for x, y in circle.tolist()], [tuple(range(32))], uvs=uvs)
+        for name, uvs in zip(("Left", "Right"), charts)
+    ]
+    tables[1].location.x = 5
+    for table in tables:
+        table.data.materials.append(material)
+    add_sun(30, 20)
+    margin = bpy.context.scene.beamspread.margin = 4
+    alone = [bake(table)[0] for table in tables]
+    together = bake(*tables)[0]
+    counts = np.array([32], np.uint32)
+    coverages = [native.coverage(uvs * [128, 64], counts, 128, 64) for uvs in charts]
+    for coverage, texture in zip(coverages, alone):
+        assert np.array_equal(together[coverage > 0], texture[coverage > 0])
+    beside = (coverages[0] == 0) & (coverages[1] == 0)
+    # Means of what lies wholly inside are between its extremes; beyond the margin there is nothing.
+    inside = together[(coverages[0] > 0.99) | (coverages[1] > 0.99)]
+    filled = beside & together.any(axis=-1)
+    assert (together[filled] >= 0.999 * inside.min(axis=0)).all()
+    assert (together[filled] <= 1.001 * inside.max(axis=0)).all()
+    y, x = np.mgrid[:64, :128] + 0.5
+    distance = np.min([np.hypot(x - column, y - 32) for column in (32, 96)], axis=0) - 0.49 * 64
+    assert filled[beside & (distance < margin - 1)].all()
+    assert not filled[distance > np.sqrt(2) * (margin + 1)].any()
 
 
 def test_two_objects_on_the_same_part_of_an_image():
