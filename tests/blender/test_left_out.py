@@ -1,9 +1,12 @@
 """Whatever a bake leaves out or can't light is named: in the window, in the batch's report, and by the engine."""
 
+from unittest.mock import MagicMock
+
 import bpy
 import pytest
 from beamspread.blender.jobs.batch import bake_all
 from beamspread.blender.jobs.state import state
+from beamspread.blender.ui import panels
 from beamspread.core.batch import options
 from mathutils import Matrix
 from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
@@ -81,7 +84,7 @@ def test_the_others_are_baked(add):
     plane = add_plane("Sound", matrix=Matrix.Translation((5, 0, 0)), material=add_material("Sound"))
     add_sun(0)
     assert messages_of(lambda: bpy.ops.beamspread.bake(objects="ALL")).count("Error") == 1
-    assert pixels(node_of(plane.data.materials[0]).image).any()
+    assert (pixels(node_of(plane.data.materials[0]).image) > 0).all()
 
 
 def test_an_instance_of_what_was_baked_is_no_mistake():
@@ -146,6 +149,21 @@ def test_a_black_bake_says_why(add, words, tmp_path):
     state.forget()
     bpy.ops.object.bake(type="COMBINED")
     assert state.messages() == [message]
+
+
+def test_a_panel_says_once_what_both_the_object_and_its_last_bake_say(monkeypatch):
+    said = []
+    monkeypatch.setattr(panels, "draw_warnings", lambda _layout, _context, messages: said.extend(messages))
+    select(add_grouped())
+    messages_of(bpy.ops.beamspread.bake)
+    (message,) = state.messages()
+    panels.draw_bake(MagicMock(), bpy.context)
+    assert said == [message.replace("Grouped / Grouped: ", "Grouped: ")]
+    # Once nothing of it is selected, the bake's own words stay.
+    said.clear()
+    bpy.ops.object.select_all(action="DESELECT")
+    panels.draw_bake(MagicMock(), bpy.context)
+    assert said == [message]
 
 
 def test_messages_go_with_the_file():

@@ -17,7 +17,7 @@ from beamspread.core.bake.settings import COMBINED
 from beamspread.core.batch import options
 from beamspread.core.native import native
 from mathutils import Matrix
-from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
+from scenes import add_material, add_mesh, add_plane, add_sun, bake, messages_of, node_of, pixels, select
 
 
 @pytest.fixture(autouse=True)
@@ -32,11 +32,13 @@ def surface_source(material):
 def test_first_bake_makes_links_and_packs_an_image():
     plane = add_plane(size=(4, 2), material=add_material())
     add_sun(30)
-    bake(plane)
+    (texture,) = bake(plane)
     node = node_of(plane.data.materials[0])
-    assert tuple(node.image.size) == (32, 16)
+    assert texture.shape == (16, 32, 3)
     assert node.image.is_float
-    assert node.image.packed_file is not None
+    node.image.reload()
+    # What was packed, as half floats: 11 bits.
+    assert pixels(node.image) == pytest.approx(texture, rel=2**-11)
     assert node.node_tree.nodes["Image"].image == node.image
     assert surface_source(plane.data.materials[0]) == node.outputs["BSDF"]
 
@@ -111,44 +113,51 @@ def test_selected_objects_or_all_where_none_has_the_node():
     assert node_of(first.data.materials[0]).image is None
     select(bystander)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
-    assert node_of(first.data.materials[0]).image is not None
+    # They lie in the same place.
+    one, other = (pixels(node_of(plane.data.materials[0]).image) for plane in (first, second))
+    assert np.array_equal(one, other)
+    assert (one > 0).all()
 
 
 def test_hidden_in_viewport_is_baked_and_restored():
     plane = add_plane(material=add_material())
+    add_sun(0)
+    (open_air,) = bake(plane)
     wall = add_plane("Roof", matrix=Matrix.Translation((0, 0, 1)), size=(9, 9))
     wall.hide_viewport = True
-    add_sun(0)
     (dark,) = bake(plane)
     assert not dark.any()
     assert wall.hide_viewport
     wall.hide_render = True
     (lit,) = bake(plane)
-    assert lit.any()
+    assert np.array_equal(lit, open_air)
     wall.hide_render, wall.visible_shadow, wall.hide_viewport = False, False, False
     (lit,) = bake(plane)
-    assert lit.any()
+    assert np.array_equal(lit, open_air)
 
 
 def test_collection_hidden_in_viewport_casts_shadows():
     plane = add_plane(material=add_material())
+    add_sun(0)
+    (open_air,) = bake(plane)
     roof = add_plane("Roof", matrix=Matrix.Translation((0, 0, 1)), size=(9, 9))
     collection = bpy.data.collections.new("Roofs")
     bpy.context.scene.collection.children.link(collection)
     collection.objects.link(roof)
     bpy.context.scene.collection.objects.unlink(roof)
     collection.hide_viewport = True
-    add_sun(0)
     (dark,) = bake(plane)
     assert not dark.any()
     assert collection.hide_viewport
     bpy.context.view_layer.layer_collection.children["Roofs"].exclude = True
     (lit,) = bake(plane)
-    assert lit.any()
+    assert np.array_equal(lit, open_air)
 
 
 def test_instances_and_modifiers_cast_shadows():
     plane = add_plane(material=add_material())
+    add_sun(0)
+    (open_air,) = bake(plane)
     collection = bpy.data.collections.new("Roofs")
     roof = add_plane("Roof", size=(9, 9))
     bpy.context.scene.collection.objects.unlink(roof)
@@ -157,13 +166,13 @@ def test_instances_and_modifiers_cast_shadows():
     instance.instance_type, instance.instance_collection = "COLLECTION", collection
     instance.location.z = 1
     bpy.context.scene.collection.objects.link(instance)
-    add_sun(0)
     (dark,) = bake(plane)
     assert not dark.any()
     roof.modifiers.new("Shrink", "SOLIDIFY")
     roof.scale = (1e-3, 1e-3, 1e-3)
     (lit,) = bake(plane)
-    assert lit.any()
+    # What is left of it, a centimetre wide, meets one of the 16 samples of a texel at most.
+    assert lit == pytest.approx(open_air, rel=1 / 16)
 
 
 def test_two_objects_share_an_image_side_by_side():
@@ -175,6 +184,40 @@ def test_two_objects_share_an_image_side_by_side():
     add_sun(0)
     bake(left, right)
     assert (pixels(image)[:, :, 0] > 0).all()
+
+
+def test_two_round_tables_share_an_image():
+    """Whole, and with margins that continue them, although each lies in the corners of the other's margin."""
+    image = bpy.data.images.new("Atlas", 128, 64, float_buffer=True)
+    material = add_material(image=image, mean_free_path=(0.002,) * 3)
+    angles = 2 * np.pi * np.arange(32) / 32
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    charts = [0.5 + 0.49 * circle * [0.5, 1] + [shift, 0] for shift in (-0.25, 0.25)]
+    tables = [
+        add_mesh(name, [(x, y, 0) for x, y in circle.tolist()], [tuple(range(32))], uvs=uvs)
+        for name, uvs in zip(("Left", "Right"), charts)
+    ]
+    tables[1].location.x = 5
+    for table in tables:
+        table.data.materials.append(material)
+    add_sun(30, 20)
+    margin = bpy.context.scene.beamspread.margin = 4
+    alone = [bake(table)[0] for table in tables]
+    together = bake(*tables)[0]
+    counts = np.array([32], np.uint32)
+    coverages = [native.coverage(uvs * [128, 64], counts, 128, 64) for uvs in charts]
+    for coverage, texture in zip(coverages, alone):
+        assert np.array_equal(together[coverage > 0], texture[coverage > 0])
+    beside = (coverages[0] == 0) & (coverages[1] == 0)
+    # Means of what lies wholly inside are between its extremes; beyond the margin there is nothing.
+    inside = together[(coverages[0] > 0.99) | (coverages[1] > 0.99)]
+    filled = beside & together.any(axis=-1)
+    assert (together[filled] >= 0.999 * inside.min(axis=0)).all()
+    assert (together[filled] <= 1.001 * inside.max(axis=0)).all()
+    y, x = np.mgrid[:64, :128] + 0.5
+    distance = np.min([np.hypot(x - column, y - 32) for column in (32, 96)], axis=0) - 0.49 * 64
+    assert filled[beside & (distance < margin - 1)].all()
+    assert not filled[distance > np.sqrt(2) * (margin + 1)].any()
 
 
 def test_two_objects_on_the_same_part_of_an_image():

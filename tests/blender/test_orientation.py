@@ -5,6 +5,7 @@ import math
 import bpy
 import numpy as np
 import pytest
+from beamspread.core.native import native
 from mathutils import Matrix, Vector
 from scenes import SQUARE_UVS, add_blocker, add_material, add_plane, add_sun, bake
 
@@ -43,7 +44,8 @@ def test_light_spreads_where_it_travels(upright):
 
     shadow, open_ground = value(0.4, 0.0), value(-0.5, 0.0)
     assert 0 < shadow < 0.5 * open_ground
-    assert value(0.9, -0.6) == pytest.approx(value(-0.6, 0.5), rel=0.2)
+    # Two mean free paths from the edge where light flows in and where it flows out; without its direction as bright.
+    assert value(-0.9, -0.6) < 0.75 * value(0.9, -0.6)
 
 
 @pytest.mark.parametrize(
@@ -127,7 +129,7 @@ def test_chart_in_a_corner(upright):
 
 
 def test_turned_chart_in_the_texture(upright):
-    """A chart turned by 30 degrees, its size kept: the sum of light over it is that of the upright one."""
+    """A chart turned by 30 degrees, its size kept, shows the light of the upright one."""
     angle = math.radians(30)
     turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     corners = (np.array(SQUARE_UVS) - 0.5) * np.array(SIZE)
@@ -138,10 +140,13 @@ def test_turned_chart_in_the_texture(upright):
     add_sun(45, azimuth_deg=25)
     bpy.context.scene.beamspread.margin = 0
     (texture,) = bake(plane)
-    # Texels at the border count half on average.
-    inside = (texture > 0).sum() * (3.2 / 102) ** 2 / 3
-    assert texture.mean(where=texture > 0) * inside == pytest.approx(upright.mean() * SIZE[0] * SIZE[1], rel=0.05)
-    # The centre of the wall's shadow, found through the same rotation.
+    # Of a texel across the edge, the chart has some light, and less than all of it.
+    area, coverage = (3.2 / 102) ** 2, native.coverage(uvs * 102, np.array([4], np.uint32), 102, 102)
+    assert coverage.sum() * area == pytest.approx(SIZE[0] * SIZE[1], rel=1e-5)
+    whole, touched = ((texture * weight[..., None]).sum() * area for weight in (coverage > 0.999, coverage > 0))
+    assert whole < upright.sum() * SIZE[0] * SIZE[1] / (64 * 48) < touched < 1.1 * whole
+    # The centre of the wall's shadow through the same rotation: a texel's centre is at most a texel away.
     x, y = turn @ [0.4, 0.0]
     column, row = int((x / 3.2 + 0.5) * 102), int((y / 3.2 + 0.5) * 102)
-    assert texture[row, column, 0] == pytest.approx(upright[24, int((0.4 / 2 + 0.5) * 64), 0], rel=0.1)
+    around = upright[23:26, 43:46, 0]
+    assert around.min() < texture[row, column, 0] < around.max()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...core.bake.margin import extend_margin
+from ...core.bake.margin import WHOLE, extend_margin
 from ...core.bake.runner import Bake
 from ...core.bake.settings import COMBINED
 from ...core.errors import BakeError
@@ -15,8 +15,6 @@ from . import files
 
 # Texels wholly inside two charts, as a part of one of them: more than rounding at a common border.
 OVERLAP_TOLERANCE = 0.01
-# Coverage of a texel wholly inside a chart, but for rounding.
-WHOLE = 0.99
 
 
 class Results:
@@ -46,7 +44,7 @@ class Results:
         return paths.get(COMBINED, "")
 
     def _fill(self, image, bake: Bake, texture: np.ndarray) -> str:
-        covered = bake.job.receiver.inside()
+        covered = bake.job.receiver.coverage
         if image.name in self._filled:
             covered, texture = self._merge(image.name, bake, texture)
         path = files.fill_image(image, texture)
@@ -58,11 +56,11 @@ class Results:
         receiver, inside = bake.job.receiver, bake.job.receiver.inside()
         overlap = 1.0
         if inside.shape == covered.shape:
-            overlap = ((receiver.coverage > WHOLE) & covered).sum() / inside.sum()
+            overlap = ((receiver.coverage > WHOLE) & (covered > 0)).sum() / inside.sum()
         if overlap > OVERLAP_TOLERANCE:
             raise BakeError(
                 f"Another object is baked to the same part of the image '{image_name}': "
                 "give each object a material and an image of its own, or move its UVs."
             )
-        merged, covered = np.where(inside[..., None], texture, merged), covered | inside
+        merged, covered = np.where(inside[..., None], texture, merged), np.maximum(covered, receiver.coverage)
         return covered, extend_margin(merged, covered, bake.job.settings.margin)

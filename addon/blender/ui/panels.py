@@ -69,6 +69,7 @@ def draw_bake(layout, context) -> None:
     if native.problem:
         draw_warnings(layout, context, [native.problem])
         return
+    shown = []
     if state.is_running():
         column = layout.column(align=True)
         for line, icon in zip(state.progress(), ("RENDER_STILL", "BLANK1")):
@@ -77,12 +78,16 @@ def draw_bake(layout, context) -> None:
         # `context.object` is empty in the render properties.
         chosen, visible = list(context.view_layer.objects.selected), render_visible_names(context.view_layer)
         for obj in chosen[:MOST_OBJECTS]:
-            draw_warnings(layout, context, [f"{obj.name}: {message}" for message in warnings_for(obj, visible)])
+            warnings = warnings_for(obj, visible)
+            draw_warnings(layout, context, [f"{obj.name}: {message}" for message in warnings])
+            shown += warnings
         row = layout.row(align=True)
         row.scale_y = 1.4
         row.operator("beamspread.bake", text="Bake", icon="RENDER_STILL").objects = "SELECTED"
         row.operator("beamspread.bake", text="Bake All").objects = "ALL"
-    draw_warnings(layout, context, state.messages()[:MOST_OBJECTS])
+    # A bake that failed for a reason that still stands has said the same.
+    news = [message for message in state.messages() if not message.endswith(tuple(shown))]
+    draw_warnings(layout, context, news[:MOST_OBJECTS])
 
 
 def _use_columns(layout) -> None:

@@ -41,7 +41,7 @@ class BakeJob:
                 raise BakeError("The bake produced values that are not numbers: check the strengths of the lights.")
             texture = self.receiver.to_texture(values)
             del values  # large
-            layers[name] = extend_margin(texture, self.receiver.inside(), self.settings.margin)
+            layers[name] = extend_margin(texture, self.receiver.coverage, self.settings.margin)
         return layers
 
     def warnings(self) -> list[str]:
