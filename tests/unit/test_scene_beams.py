@@ -464,3 +464,14 @@ def test_bad_arguments_are_named(change, message):
 def test_bad_sun_directions(direction):
     with pytest.raises(ValueError, match="direction"):
         native.SunLight(direction)
+
+
+@pytest.mark.parametrize("place", [(4.0, 4.0, 17.0), (0.2, 7.7, 17.0)])
+def test_few_points_tell_the_mean_of_a_lamp_far_away(place):
+    """From 16 texels on: the Gauss rule against the mean of 64 x 64 points, known to (1 / 64 / 17)^2 = 1e-6."""
+    grid = native.ReceiverGrid((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 1.0, 1.0, 40, 8)
+    irradiance, _ = native.gather_beams(grid, native.PointLight(place), samples=4)
+    x, y = ((np.arange(64 * count) + 0.5) / 64 for count in (40, 8))
+    distance = np.sqrt((x - place[0]) ** 2 + (y[:, None] - place[1]) ** 2 + place[2] ** 2)
+    mean = (place[2] / (4 * np.pi * distance**3)).reshape(8, 64, 40, 64).mean((1, 3))
+    np.testing.assert_allclose(irradiance, mean, rtol=2e-6)

@@ -50,7 +50,8 @@ def convolve(
         texels the bound rests on a look at 1000 to 1500 texels, and of more than four lights at the four brightest,
         which may use up .2 of it; over lights, shadows and media that are hard for it the worst of all texels uses up
         .1 to 1 (tests/bench/terms.py). `adaptive`: the sum as for `fft`, and the error of each texel below `tolerance`
-        times the brightest one.
+        times the brightest one. That it counts on errors of many beams to cancel is measured, not proven: over random
+        masks up to 88 degrees the worst texel used up two thirds.
     threads : int
         0: all. The result does not depend on it.
     progress : callable, optional
