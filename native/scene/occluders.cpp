@@ -140,6 +140,13 @@ std::uint32_t Occluders::blocked(std::span<const ShadowRay> rays) const
     return bits;
 }
 
+void Occluders::transmit(std::span<const ShadowRay> rays, Vec3f* transmittance) const
+{
+    const std::uint32_t bits = blocked(rays);
+    for (std::size_t i = 0; i < rays.size(); ++i)
+        transmittance[i] = Vec3f(bits >> i & 1u ? 0.0f : 1.0f);
+}
+
 int embree_version()
 {
     const embree::Device device(rtcNewDevice("ignore_config_files=1"));

@@ -38,6 +38,9 @@ public:
     // Bit i: whether a triangle blocks the i-th of at most `packet_size` rays.
     std::uint32_t blocked(std::span<const ShadowRay> rays) const;
 
+    // What at most `packet_size` rays let through in each channel, 0 to 1.
+    void transmit(std::span<const ShadowRay> rays, Vec3f* transmittance) const;
+
     std::size_t triangle_count() const { return m_triangle_count; }
 
     // Its corners in the world, rounded as rays meet them.
