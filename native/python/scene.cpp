@@ -10,16 +10,6 @@ namespace beamspread {
 
 namespace {
 
-// A big array: its type is never converted silently.
-template <class T>
-std::span<const T> to_rows(const std::string& name, const py::array& array, py::ssize_t columns,
-                           const std::string& allowed)
-{
-    if (!py::isinstance<Array<T>>(array) || array.ndim() != 2 || array.shape(1) != columns)
-        reject(name, shape_text(array), allowed);
-    return {static_cast<const T*>(array.data()), static_cast<std::size_t>(array.size())};
-}
-
 std::unique_ptr<ReceiverGrid> make_grid(const Numbers& origin, const Numbers& x_axis, const Numbers& y_axis,
                                         const Numbers& normal, double pitch_x, double pitch_y, py::ssize_t width,
                                         py::ssize_t height)
@@ -147,6 +137,7 @@ ValueError
              py::arg("pitch_x"), py::arg("pitch_y"), py::arg("width"), py::arg("height"));
 
     bind_lights(m);
+    bind_extended_lights(m);
     m.def("gather_beams", &gather_beams, py::arg("grid"), py::arg("light"), py::arg("occluders") = py::none(),
           py::arg("samples") = 4, py::arg("threads") = 0, py::arg("progress") = py::none(), py::arg("clearance") = 0.0,
           py::arg("find_shadows") = true, py::arg("directions") = true,

@@ -1,6 +1,7 @@
 #include "scene/ray_start.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace beamspread {
@@ -38,6 +39,18 @@ double rounding_of(const std::array<Vec3, 3>& triangle, const Vec3& origin)
 {
     return rounding_at(
         std::max({largest(triangle[0] - origin), largest(triangle[1] - origin), largest(triangle[2] - origin)}));
+}
+
+ShadowRay shadow_ray(const ReceiverGrid& grid, const RayStart& start, const Vec3& point, const Vec3& travel,
+                     double distance)
+{
+    const Vec3 lift = grid.normal * start.height();
+    if (std::isinf(distance))
+        return {.origin = point + lift, .direction = -travel, .distance = distance};
+    const Vec3 way = -travel * distance - lift;
+    const double length = glm::length(way);
+    // Ending short of the lamp by the same margin: one that touches a surface is not shadowed by it.
+    return {.origin = point + lift, .direction = way / length, .distance = length - start.height()};
 }
 
 RayStart ray_start(const ReceiverGrid& grid, const Occluders* occluders, double clearance)
