@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,13 +45,27 @@ class Illumination:
     ----------
     lights : those that can be baked.
     warnings : sentences that name lights that are left out.
+    by_cycles : names of the lights that only Cycles knows, each with the sentence that says what counts instead.
     """
 
-    def __init__(self, lights: Sequence[Light], occluders: Mesh | None = None, warnings: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        lights: Sequence[Light],
+        occluders: Mesh | None = None,
+        warnings: Sequence[str] = (),
+        by_cycles: Mapping[str, str] | None = None,
+    ) -> None:
         self.lights = tuple(lights)
-        self.warnings = tuple(warnings)
+        self.by_cycles = dict(by_cycles or {})
+        self.warnings = (*warnings, *self.by_cycles.values())
         self._occluders = occluders or Mesh.empty()
-        self._caster = self._origin = None
+        self._casters: dict = {}  # one at most, by its origin
+
+    def lighting(self, receiver: str) -> Illumination:
+        """The same without the lights that are not linked to an object of that name; shares the hierarchy."""
+        linked = copy(self)
+        linked.lights = tuple(one for one in self.lights if one.receivers is None or receiver in one.receivers)
+        return linked
 
     def caster(self, grid: Grid):
         """The native `Occluders` with its origin near the receiver; None without triangles.
@@ -62,9 +77,8 @@ class Illumination:
             return None
         step = TEXELS_BETWEEN_ORIGINS * 2.0 ** math.ceil(math.log2(min(grid.pitch_x, grid.pitch_y)))
         origin = tuple(step * np.round(grid.centre / step))
-        if self._origin != origin:
-            self._caster = None  # before another is made: each may take gigabytes
+        if origin not in self._casters:
+            self._casters.clear()  # before another is made: each may take gigabytes
             vertices = np.ascontiguousarray(self._occluders.vertices, float)
-            self._caster = native.Occluders(vertices, self._occluders.triangles, origin)
-            self._origin = origin
-        return self._caster
+            self._casters[origin] = native.Occluders(vertices, self._occluders.triangles, origin)
+        return self._casters[origin]
