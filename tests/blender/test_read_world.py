@@ -68,10 +68,11 @@ def irradiance(light, normal):
     return seen @ radiance.reshape(-1, 3) * light.rgb()
 
 
-def assert_agrees(light, tilt, samples=4096, rel=0.01):
+def assert_agrees(light, tilt, samples=2048, rel=0.01):
     plane, image = add_receiver(tilt, texels=8)
     cycles = cycles_irradiance(plane, image, samples).mean(axis=(0, 1))
     normal = tilt.to_3x3().col[2]
+    bpy.data.objects.remove(plane)
     assert irradiance(light, normal) == pytest.approx(cycles, rel=rel)
 
 
@@ -206,7 +207,7 @@ SPACES = ["sRGB", "Non-Color", "Filmic sRGB", "Linear", "Linear Rec.709"]
 def test_color_spaces_of_images(kind, space, tmp_path):
     source = bpy.data.images.new("Source", 8, 4, float_buffer=kind != "PNG")
     source.colorspace_settings.name = "Non-Color"
-    source.pixels.foreach_set(np.tile(np.array([0.5, 0.25, 0.125, 1], np.float32), 32))
+    source.pixels.foreach_set(np.tile(np.array([0.5, 0.4, 0.3, 1], np.float32), 32))
     source.file_format, source.filepath_raw = kind, str(tmp_path / "image")
     source.save()
     image = bpy.data.images.load(source.filepath_raw)
@@ -233,7 +234,8 @@ def test_alpha_of_images(is_float, mode):
     image.alpha_mode = mode
     _, background = add_world()
     add_environment(image, background)
-    assert_agrees(the_world(), TILTS["up"], 1024, 0.005)
+    # Cycles rounds bytes down after it has multiplied them by alpha.
+    assert_agrees(the_world(), TILTS["up"], 1024, 0.01)
 
 
 def test_huge_images_are_averaged_with_their_energy():

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...core.scene.illumination import Illumination, Mesh
 from ...core.scene.lights import Light
+from .. import compat
 from .emitters import Glow
 from .geometry import GEOMETRY_TYPES, world_triangles
 from .lamps import is_portal, read_lamp
@@ -35,7 +36,7 @@ def read_illumination(depsgraph) -> Illumination:
                 lights.add_mesh(obj, instance.matrix_world)
             if obj.visible_shadow:
                 parts.append(world_triangles(obj, instance.matrix_world, cache))
-    lights.add_world(depsgraph.view_layer, depsgraph.scene_eval.world)
+    lights.add_world(depsgraph.view_layer, compat.world_of(depsgraph))
     return lights.with_occluders(Mesh.join([part for part in parts if part is not None]))
 
 

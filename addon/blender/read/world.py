@@ -9,7 +9,7 @@ from .. import compat
 from .node_math import NotUnderstoodError
 from .node_values import ON_NO_PATH, Scope
 from .shaders import radiance
-from .textures import Images
+from .textures import MOST_WIDE, Images
 
 # Of worlds whose nodes give every direction a value of its own: a quarter of a degree per texel.
 WIDTH, HEIGHT = 1440, 720
@@ -18,7 +18,7 @@ ROWS = 64
 
 
 def read_world(view_layer, world, images: Images) -> tuple[WorldLight | None, str]:
-    """The light of a world, or None if it is dark; and why only Cycles knows how it shines, if so."""
+    """The light of a world, or None if it is dark or there is none; and why only Cycles knows how it shines, if so."""
     if world is None or not view_layer.use_sky or not world.cycles_visibility.diffuse:
         return None, ""
     if not compat.uses_nodes(world):
@@ -69,16 +69,16 @@ def _finest(lookups: list, probes: np.ndarray) -> tuple[np.ndarray, int, int]:
 
     In that image's frame the panorama's texels are the image's own: a sun of one texel keeps its place and its power.
     """
-    best, size = np.eye(3), (0, 0)
+    turn, own_width, own_height = np.eye(3), 0, 0
     for pixels, towards in lookups:
-        turn = towards[:3].T
-        is_turn = np.allclose(turn @ turn.T, np.eye(3), atol=1e-5) and np.linalg.det(turn) > 0
-        if is_turn and np.allclose(probes @ turn.T, towards, atol=1e-5) and pixels.shape[1] > size[0]:
-            best, size = turn, (pixels.shape[1], pixels.shape[0])
+        matrix = towards[:3].T
+        is_turn = np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-5) and np.linalg.det(matrix) > 0
+        if is_turn and np.allclose(probes @ matrix.T, towards, atol=1e-5) and pixels.shape[1] > own_width:
+            turn, (own_height, own_width) = matrix, pixels.shape[:2]
+    if not own_width:
+        return turn, *((MOST_WIDE, MOST_WIDE // 2) if lookups else (WIDTH, HEIGHT))
     # Cycles is linear between the texels of a coarse image.
-    factors = [-(-least // own) if own else 0 for least, own in zip((WIDTH, HEIGHT), size)]
-    width, height = (factor * own or least for factor, own, least in zip(factors, size, (WIDTH, HEIGHT)))
-    return best, width, height
+    return turn, own_width * -(-WIDTH // own_width), own_height * -(-HEIGHT // own_height)
 
 
 def directions(width: int, height: int, rows: slice) -> np.ndarray:
@@ -95,7 +95,8 @@ def directions(width: int, height: int, rows: slice) -> np.ndarray:
 def _scope(images: Images, towards: np.ndarray) -> Scope:
     """Seen by a diffuse surface in these directions, of which a world's nodes know only the direction."""
     one = np.ones(1)
-    places = {("ShaderNodeTexCoord", name): towards for name in ("Generated", "Object")} | {
+    places = {
+        ("ShaderNodeTexCoord", "Generated"): towards,
         ("ShaderNodeTexCoord", "Normal"): -towards,
         ("ShaderNodeNewGeometry", "Position"): towards,
         ("ShaderNodeNewGeometry", "Normal"): -towards,
