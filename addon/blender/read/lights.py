@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...core.scene.illumination import Illumination, Mesh
+from ...core.scene.illumination import Illumination
 from ...core.scene.lights import Light, PointLight, SpotLight, SunLight
 from .. import compat
-from .geometry import GEOMETRY_TYPES, world_triangles
+from .occluders import OccluderReader
 from .visible import render_visible_names, renders
 
 
@@ -34,17 +34,21 @@ READERS = {"SUN": _sun, "POINT": _point, "SPOT": _spot}
 def read_illumination(depsgraph) -> Illumination:
     """Lights and shadow casters of all objects and instances that render."""
     visible = render_visible_names(depsgraph.view_layer)
-    lights, parts, warnings, cache = [], [], [], {}
+    lights, warnings, occluders = [], [], OccluderReader()
     for instance in depsgraph.object_instances:
         if not renders(instance, visible):
             continue
         obj = instance.object
         if obj.type == "LIGHT":
             lights.append(_read_light(obj, instance.matrix_world, warnings))
-        elif obj.type in GEOMETRY_TYPES and getattr(obj, "visible_shadow", True):
-            parts.append(world_triangles(obj, instance.matrix_world, cache))
-    occluders = Mesh.join([part for part in parts if part is not None])
-    return Illumination([light for light in lights if light is not None], occluders, tuple(dict.fromkeys(warnings)))
+        else:
+            occluders.add(instance)
+    return Illumination(
+        [light for light in lights if light is not None],
+        occluders.occluders(),
+        tuple(dict.fromkeys(warnings + occluders.warnings)),
+        compat.transparent_bounces(depsgraph.scene),
+    )
 
 
 def _read_light(obj, matrix, warnings: list[str]) -> Light | None:
