@@ -6,9 +6,10 @@ import numpy as np
 
 from ...core.scene.lights import MeshLight
 from .. import compat
-from .node_math import NotUnderstoodError
-from .node_values import ON_NO_PATH, Scope
-from .shaders import radiance
+from .image_texture import NotUnderstoodError
+from .node_links import Wanted
+from .places import ON_NO_PATH, Places
+from .shaders import radiance, surface_of
 from .textures import Images
 
 # A mesh whose materials glow by an image is cut into at least about this many triangles, each of which has the mean of
@@ -31,7 +32,7 @@ class Glow:
             if surface is None:
                 continue
             try:
-                light = radiance(surface, Scope(images=images))
+                light = radiance(Places(images=images), surface)
             except NotUnderstoodError:
                 glowing[slot] = surface
             else:
@@ -83,17 +84,13 @@ class Glow:
             places = _middles(PLACES) @ (pieces @ uvs[:, None]).reshape(-1, 3, 2)
             flat = np.concatenate([places.reshape(-1, 2), np.zeros((places[..., 0].size, 1))], axis=1)
             outputs["ShaderNodeTexCoord", "UV"] = flat
-        light = radiance(surface, Scope(outputs, self._images))
+        light = radiance(Places(outputs, self._images), surface)
         light = np.broadcast_to(light, (len(corners) * PLACES**2, 3)).reshape(len(corners), -1, 3).mean(axis=1)
         return corners, light.astype(np.float32)
 
 
-def _surface(material):
-    """The input socket that a material's surface comes from, or None."""
-    if material is None or not compat.uses_nodes(material):
-        return None
-    output = material.node_tree.get_output_node("CYCLES")
-    return None if output is None else output.inputs["Surface"]
+def _surface(material) -> Wanted | None:
+    return surface_of(material.node_tree) if material is not None and compat.uses_nodes(material) else None
 
 
 def _triangles(mesh, slot_count: int) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:

@@ -17,9 +17,9 @@ from ...core.scene.lights import (
     SunLight,
 )
 from .. import compat
-from .node_math import NotUnderstoodError
-from .node_values import Scope
-from .shaders import radiance
+from .image_texture import NotUnderstoodError
+from .places import Places
+from .shaders import radiance, surface_of
 
 
 def _frame(axes: np.ndarray) -> tuple:
@@ -71,9 +71,9 @@ def read_lamp(obj, matrix) -> tuple[Light | None, str]:
     data, axes = obj.data, np.array(matrix, dtype=float)
     color, reason = np.array(compat.light_color(data)), ""
     if data.use_nodes and data.node_tree is not None:
-        output = data.node_tree.get_output_node("CYCLES")
+        surface = surface_of(data.node_tree)
         try:
-            color = color * (0 if output is None else radiance(output.inputs["Surface"], Scope()))
+            color = color * (0 if surface is None else radiance(Places(), surface))
         except NotUnderstoodError as error:
             reason = str(error)
     strength = compat.light_strength(data) * _area_factor(data, axes)

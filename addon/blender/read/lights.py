@@ -7,13 +7,14 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ...core.scene.illumination import Illumination, Mesh
+from ...core.scene.illumination import Illumination
 from ...core.scene.lights import Light
 from .. import compat
 from .emitters import Glow
-from .geometry import GEOMETRY_TYPES, world_triangles
+from .geometry import GEOMETRY_TYPES
 from .lamps import is_portal, read_lamp
 from .linking import links_of
+from .occluders import OccluderReader
 from .textures import Images
 from .visible import render_visible_names, renders
 from .world import read_world
@@ -22,7 +23,7 @@ from .world import read_world
 def read_illumination(depsgraph) -> Illumination:
     """Lights and shadow casters of all objects and instances that render."""
     visible = render_visible_names(depsgraph.view_layer)
-    lights, parts, cache = _Lights(depsgraph), [], {}
+    lights, occluders = _Lights(depsgraph), OccluderReader()
     for instance in depsgraph.object_instances:
         if not renders(instance, visible):
             continue
@@ -31,13 +32,17 @@ def read_illumination(depsgraph) -> Illumination:
         lights_surfaces = obj.visible_diffuse and (not instance.is_instance or instance.parent.visible_diffuse)
         if obj.type == "LIGHT" and lights_surfaces:
             lights.add_lamp(obj, instance.matrix_world)
-        elif obj.type in GEOMETRY_TYPES:
-            if lights_surfaces:
-                lights.add_mesh(obj, instance.matrix_world)
-            if obj.visible_shadow:
-                parts.append(world_triangles(obj, instance.matrix_world, cache))
+        elif obj.type in GEOMETRY_TYPES and lights_surfaces:
+            lights.add_mesh(obj, instance.matrix_world)
+        occluders.add(instance)
     lights.add_world(depsgraph.view_layer, compat.world_of(depsgraph))
-    return lights.with_occluders(Mesh.join([part for part in parts if part is not None]))
+    return Illumination(
+        lights.all(),
+        occluders.occluders(),
+        (*lights.warnings, *dict.fromkeys(occluders.warnings)),
+        compat.transparent_bounces(depsgraph.scene),
+        lights.by_cycles,
+    )
 
 
 class _Lights:
@@ -49,21 +54,21 @@ class _Lights:
         self._glows: dict[str, Glow] = {}
         self._links: dict[str, dict] = {}
         self._images = Images()
-        self._warnings: dict[str, None] = {}  # in order, each once
-        self._by_cycles: dict[str, str] = {}
+        self.warnings: dict[str, None] = {}  # in order, each once
+        self.by_cycles: dict[str, str] = {}  # see Illumination
 
-    def with_occluders(self, occluders: Mesh) -> Illumination:
+    def all(self) -> list[Light]:
         glowing = [glow.light((name, 1.0, (1.0, 1.0, 1.0), True)) for name, glow in self._glows.items()]
         for light in filter(None, glowing):
             self._add(light, self._links[light.name])
-        return Illumination(self._lights, occluders, tuple(self._warnings), self._by_cycles)
+        return self._lights
 
     def add_lamp(self, obj, matrix) -> None:
         if is_portal(obj.data):
             return
         light, reason = read_lamp(obj, matrix)
         if reason:
-            self._by_cycles[obj.name] = f"The light '{obj.name}' counts as if it had no nodes: {reason}."
+            self.by_cycles[obj.name] = f"The light '{obj.name}' counts as if it had no nodes: {reason} not understood."
         if light is not None:
             self._add(light, links_of(obj, self._names))
 
@@ -73,19 +78,19 @@ class _Lights:
             self._glows[obj.name] = glow = Glow(obj, self._images)
             self._links[obj.name] = links_of(obj, self._names)
             if glow.reason:
-                self._by_cycles[obj.name] = f"What glows of '{obj.name}' is left out: {glow.reason}."
+                self.by_cycles[obj.name] = f"What glows of '{obj.name}' is left out: {glow.reason}."
         self._glows[obj.name].place(np.array(matrix, dtype=float))
 
     def add_world(self, view_layer, world) -> None:
         light, reason = read_world(view_layer, world, self._images)
         if reason:
-            self._by_cycles[world.name] = f"The world '{world.name}' is left out: {reason}."
+            self.by_cycles[world.name] = f"The world '{world.name}' is left out: {reason} not understood."
         if light is not None:
             self._add(light, {})
 
     def _add(self, light: Light, links: dict) -> None:
         fault = light.fault()
         if fault:
-            self._warnings[f"The light '{light.name}' is left out: {fault}."] = None
+            self.warnings[f"The light '{light.name}' is left out: {fault}."] = None
         else:
             self._lights.append(replace(light, **links))

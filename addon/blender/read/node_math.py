@@ -13,10 +13,6 @@ from . import blackbody
 LUMINANCE = np.array((0.2126729, 0.7151522, 0.0721750))
 
 
-class NotUnderstoodError(Exception):
-    """A node whose value only a renderer knows; the message is the end of a sentence that names it."""
-
-
 def _safe(function):
     """Cycles' nodes give 0 where there is no number."""
 
@@ -214,7 +210,7 @@ def _mapping(node):
     """Point, Texture, Vector, Normal: scaled, turned and moved, or back."""
     kind, vector = node.node.vector_type, node["Vector"]
     rotation, scale = _rotation(node["Rotation"]), node["Scale"]
-    if rotation is None or scale.ndim > 1:
+    if rotation is None:
         return None
     if kind == "TEXTURE":
         return _safe(np.divide)((vector - node["Location"]) @ rotation, scale)

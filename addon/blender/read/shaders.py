@@ -4,69 +4,68 @@ from __future__ import annotations
 
 import numpy as np
 
-from .node_math import NotUnderstoodError
-from .node_values import Node, Scope, linked_output, passed_on
+from .image_texture import NotUnderstoodError
+from .node_links import End, Wanted, follow
+from .places import Places
 
 DARK = np.zeros(3)
 
 
-def radiance(surface, scope: Scope) -> np.ndarray:
+def radiance(places: Places, surface: Wanted) -> np.ndarray:
     """Of the shader at an input socket: (3,) or (N, 3), W/(m^2 sr) on a mesh or of the world, a factor of a lamp.
 
     Shaders that only scatter are dark. NotUnderstoodError names the first node in the way of an answer.
     """
-    output = linked_output(surface)
-    origin = None if output is None else passed_on(output, scope)
-    if origin is None:
+    end = follow(surface)
+    if not end.socket.is_output or end.node.mute:
         return DARK
-    if origin[0] != output:
-        return radiance(*origin)
-    emits = EMITTERS.get(output.node.bl_idname)
-    return DARK if emits is None else emits(Node(output, scope))
+    emits = EMITTERS.get(end.node.bl_idname)
+    return DARK if emits is None else emits(places, end)
 
 
-def _product(node: Node, *names: str) -> np.ndarray:
+def surface_of(tree) -> Wanted | None:
+    """What a material's, a world's or a light's tree shows in Cycles, or None."""
+    output = tree.get_output_node("CYCLES")
+    return None if output is None else Wanted(output.inputs["Surface"], ())
+
+
+def _product(places: Places, end: End, *names: str) -> np.ndarray:
     """Of inputs; one that is 0 makes it 0, whether the others are understood or not."""
-    values, reason = [], None
+    product, reason = np.ones(3), None
     for name in names:
         try:
-            values.append(node[name])
+            product = product * places.value(end.input(name))
         except NotUnderstoodError as error:
             reason = reason or error
-    if any(not value.any() for value in values):
-        return DARK
-    if reason:
+    if reason and product.any():
         raise reason
-    product = np.ones(3)
-    for value in values:
-        product = product * value
     return product
 
 
-def _emission(node: Node) -> np.ndarray:
-    return _product(node, "Color", "Strength")
+def _emission(places: Places, end: End) -> np.ndarray:
+    return _product(places, end, "Color", "Strength")
 
 
-def _principled(node: Node) -> np.ndarray:
+def _principled(places: Places, end: End) -> np.ndarray:
     """A coat, sheen or transmission leaves it as it is, alpha does not."""
-    color = "Emission Color" if "Emission Color" in node.node.inputs else "Emission"
-    return _product(node, color, "Emission Strength", "Alpha")
+    color = "Emission Color" if "Emission Color" in end.node.inputs else "Emission"
+    return _product(places, end, color, "Emission Strength", "Alpha")
 
 
-def _add(node: Node) -> np.ndarray:
-    return radiance(node.socket(0), node.scope) + radiance(node.socket(1), node.scope)
+def _add(places: Places, end: End) -> np.ndarray:
+    return radiance(places, end.input(0)) + radiance(places, end.input(1))
 
 
-def _mix(node: Node) -> np.ndarray:
+def _mix(places: Places, end: End) -> np.ndarray:
     try:
-        factor = np.clip(node[0], 0, 1)
+        factor = np.clip(places.value(end.input(0)), 0, 1)
     except NotUnderstoodError:
-        if radiance(node.socket(1), node.scope).any() or radiance(node.socket(2), node.scope).any():
+        if radiance(places, end.input(1)).any() or radiance(places, end.input(2)).any():
             raise
         return DARK
     # A shader that does not count need not be understood.
-    first = DARK if (factor == 1).all() else radiance(node.socket(1), node.scope)
-    second = DARK if not factor.any() else radiance(node.socket(2), node.scope)
+    first = DARK if (factor == 1).all() else radiance(places, end.input(1))
+    second = DARK if not factor.any() else radiance(places, end.input(2))
     return first + factor * (second - first)
 
 

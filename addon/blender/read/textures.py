@@ -1,67 +1,45 @@
-"""Textures from images, as Cycles looks them up."""
+"""Images looked up by direction or by UV, as Cycles does it."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from .node_math import NotUnderstoodError
+from .image_texture import NotUnderstoodError, Pixels, outputs_of
 
 # Environment images that are wider are averaged down to it: a texel is then a tenth of a degree.
 MOST_WIDE = 4096
 
 
 class Images:
-    """Pixels of images, each read once.
-
-    Attributes
-    ----------
-    lookups : where not None, gets (pixels, directions (N, 3)) of each environment texture that is looked up.
-    """
+    """Pixels of images, each read once."""
 
     def __init__(self) -> None:
-        self._flat: dict[str, np.ndarray] = {}
+        self._pixels = Pixels()
         self._environments: dict[str, np.ndarray] = {}
-        self.lookups: list[tuple[np.ndarray, np.ndarray]] | None = None
 
-    def flat(self, image) -> np.ndarray:
-        """Float32 (H, W, 4) of scene linear colour and alpha, row 0 at the bottom."""
-        if image.name_full not in self._flat:
-            self._flat[image.name_full] = _pixels(image)
-        return self._flat[image.name_full]
+    def environment(self, node) -> np.ndarray:
+        """Linear float32 (H, W, 3) of the image of a node, at most `MOST_WIDE` texels wide, row 0 at the bottom."""
+        name = node.image.name_full if node.image else ""
+        if name not in self._environments:
+            color = np.asarray(outputs_of(node, self._stored(node))["Color"], np.float32)
+            # As Cycles; files of HDRIs have such texels now and then.
+            self._environments[name] = shrunk(np.where(np.isfinite(color), color, np.float32(0)))
+        return self._environments[name]
 
-    def environment(self, image) -> np.ndarray:
-        """The same, at most `MOST_WIDE` texels wide."""
-        if image.name_full not in self._environments:
-            self._environments[image.name_full] = shrunk(_pixels(image))
-        return self._environments[image.name_full]
+    def at(self, node, places: np.ndarray) -> dict[str, np.ndarray]:
+        """Outputs of an Image Texture node at UVs (N, 3)."""
+        stored = self._stored(node)
+        columns, rows = places[..., 0] * stored.shape[1], places[..., 1] * stored.shape[0]
+        found = lookup(stored, columns, rows, node.interpolation != "Closest", node.extension, node.extension)
+        return outputs_of(node, found)
 
-
-def _pixels(image) -> np.ndarray:
-    if image.source not in ("FILE", "GENERATED"):
-        raise NotUnderstoodError(f"its image '{image.name}' is no single picture")
-    width, height = image.size
-    if not (width and height and image.channels == 4):
-        raise NotUnderstoodError(f"its image '{image.name}' can't be read")
-    values = np.empty(width * height * 4, np.float32)
-    image.pixels.foreach_get(values)
-    values = values.reshape(height, width, 4)
-    if not image.is_float:
-        _linearize(image, values)
-    # As Cycles; files of HDRIs have such texels now and then.
-    values[~np.isfinite(values)] = 0
-    return values
-
-
-def _linearize(image, values: np.ndarray) -> None:
-    """Bytes come as they are stored; of float images Blender has already made scene linear values."""
-    space = image.colorspace_settings
-    if image.alpha_mode in ("STRAIGHT", "PREMUL"):
-        values[..., :3] *= values[..., 3:]
-    if space.name == "sRGB":
-        color = values[..., :3]
-        values[..., :3] = np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
-    elif not (space.is_data or space.name in ("Linear", "Linear Rec.709")):
-        raise NotUnderstoodError(f"its image '{image.name}' has the color space {space.name}")
+    def _stored(self, node) -> np.ndarray:
+        image = node.image
+        if image is not None and not image.is_float:
+            space = image.colorspace_settings
+            if not (space.is_data or space.name == "sRGB" or space.name in ("Linear", "Linear Rec.709")):
+                raise NotUnderstoodError(f"the color space {space.name} of the image '{image.name}' is")
+        return self._pixels(image)
 
 
 def shrunk(pixels: np.ndarray) -> np.ndarray:
@@ -79,51 +57,16 @@ def shrunk(pixels: np.ndarray) -> np.ndarray:
     return rows.reshape(len(rows), -1, step, channels).mean(axis=2)
 
 
-def environment_texture(node):
-    if node.node.projection != "EQUIRECTANGULAR":
-        return None
-    directions = _vector(node, "Generated")
-    if directions is None:
-        return None
-    pixels = node.scope.images.environment(_image_of(node))
-    if node.scope.images.lookups is not None:
-        node.scope.images.lookups.append((pixels, directions))
+def environment_coordinates(directions: np.ndarray, shape: tuple) -> tuple[np.ndarray, np.ndarray]:
+    """Columns and rows, in texels from the image's corner, where an equirectangular image has directions (N, 3)."""
     x, y, z = np.moveaxis(directions, -1, 0)
-    columns = (0.5 - np.arctan2(y, x) / (2 * np.pi)) * pixels.shape[1]
-    rows = (0.5 + np.arctan2(z, np.hypot(x, y)) / np.pi) * pixels.shape[0]
-    return lookup(pixels, columns, rows, node.node.interpolation, "REPEAT", "EXTEND")[..., :3]
+    columns = (0.5 - np.arctan2(y, x) / (2 * np.pi)) * shape[1]
+    return columns, (0.5 + np.arctan2(z, np.hypot(x, y)) / np.pi) * shape[0]
 
 
-def image_texture(node):
-    if node.node.projection != "FLAT":
-        return None
-    places = _vector(node, "UV")
-    if places is None:
-        return None
-    pixels, extension = node.scope.images.flat(_image_of(node)), node.node.extension
-    if extension not in ("REPEAT", "EXTEND", "CLIP"):
-        return None
-    columns, rows = places[..., 0] * pixels.shape[1], places[..., 1] * pixels.shape[0]
-    color = lookup(pixels, columns, rows, node.node.interpolation, extension, extension)
-    return color[..., 3:] if node.output.name == "Alpha" else color[..., :3]
-
-
-def _image_of(node):
-    if node.node.image is None:
-        raise NotUnderstoodError(f"its node '{node.node.name}' has no image")
-    return node.node.image
-
-
-def _vector(node, default: str):
-    """Where to look, or None if the place is unknown."""
-    if node.is_linked("Vector"):
-        return node["Vector"]
-    return node.scope.outputs.get(("ShaderNodeTexCoord", default))
-
-
-def lookup(pixels, columns, rows, interpolation: str, across: str, along: str) -> np.ndarray:
+def lookup(pixels, columns, rows, is_smooth: bool, across: str, along: str) -> np.ndarray:
     """Pixels (H, W, C) at positions in texels from the image's corner, (N,) each -> (N, C)."""
-    if interpolation == "Closest":
+    if not is_smooth:
         return _texels(pixels, np.floor(columns), np.floor(rows), across, along)
     column, row = np.floor(columns - 0.5), np.floor(rows - 0.5)
     right, up = (columns - 0.5 - column)[..., None], (rows - 0.5 - row)[..., None]
@@ -143,5 +86,9 @@ def _texels(pixels, columns, rows, across: str, along: str) -> np.ndarray:
 
 
 def _inside(numbers, count: int, extension: str) -> np.ndarray:
-    numbers = np.mod(numbers, count) if extension == "REPEAT" else np.clip(numbers, 0, count - 1)
-    return numbers.astype(int)
+    if extension == "REPEAT":
+        numbers = np.mod(numbers, count)
+    elif extension == "MIRROR":
+        numbers = np.mod(numbers, 2 * count)
+        numbers = np.minimum(numbers, 2 * count - 1 - numbers)
+    return np.clip(numbers, 0, count - 1).astype(int)

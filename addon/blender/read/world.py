@@ -6,9 +6,10 @@ import numpy as np
 
 from ...core.scene.lights import WorldLight
 from .. import compat
-from .node_math import NotUnderstoodError
-from .node_values import ON_NO_PATH, Scope
-from .shaders import radiance
+from .image_texture import NotUnderstoodError
+from .node_links import Wanted
+from .places import ON_NO_PATH, Places
+from .shaders import radiance, surface_of
 from .textures import MOST_WIDE, Images
 
 # Of worlds whose nodes give every direction a value of its own: a quarter of a degree per texel.
@@ -23,11 +24,11 @@ def read_world(view_layer, world, images: Images) -> tuple[WorldLight | None, st
         return None, ""
     if not compat.uses_nodes(world):
         return _even(world.name, np.array(world.color)), ""
-    output = world.node_tree.get_output_node("CYCLES")
-    if output is None:
+    surface = surface_of(world.node_tree)
+    if surface is None:
         return None, ""
     try:
-        return _panorama(world.name, output.inputs["Surface"], images), ""
+        return _panorama(world.name, surface, images), ""
     except NotUnderstoodError as error:
         return None, str(error)
 
@@ -43,22 +44,20 @@ def _rows(matrix: np.ndarray) -> tuple:
     return tuple(tuple(row) for row in matrix.tolist())
 
 
-def _panorama(name: str, surface, images: Images) -> WorldLight | None:
+def _panorama(name: str, surface: Wanted, images: Images) -> WorldLight | None:
     probes = np.concatenate([np.eye(3), directions(3, 2, slice(None))])
-    images.lookups = lookups = []
-    try:
-        light = radiance(surface, _scope(images, probes))
-    finally:
-        images.lookups = None
+    places = _places(images, probes)
+    places.lookups = []
+    light = radiance(places, surface)
     if light.ndim == 1:
         return _even(name, light)
-    to_image, width, height = _finest(lookups, probes)
+    to_image, width, height = _finest(places.lookups, probes)
     texels = np.empty((height, width, 3), np.float32)
     for first in range(0, height, ROWS):
         rows = slice(first, first + ROWS)
         # Rows of the matrix are the image's axes in the world.
         towards = directions(width, height, rows) @ to_image
-        texels[rows] = radiance(surface, _scope(images, towards)).reshape(-1, width, 3)
+        texels[rows] = radiance(_places(images, towards), surface).reshape(-1, width, 3)
     if not texels.any():
         return None
     return WorldLight(name, 1.0, (1.0, 1.0, 1.0), True, _without_noise(texels), _rows(to_image.T))
@@ -92,7 +91,7 @@ def directions(width: int, height: int, rows: slice) -> np.ndarray:
     return towards.reshape(-1, 3)
 
 
-def _scope(images: Images, towards: np.ndarray) -> Scope:
+def _places(images: Images, towards: np.ndarray) -> Places:
     """Seen by a diffuse surface in these directions, of which a world's nodes know only the direction."""
     one = np.ones(1)
     places = {
@@ -103,7 +102,7 @@ def _scope(images: Images, towards: np.ndarray) -> Scope:
         ("ShaderNodeNewGeometry", "Incoming"): -towards,
     }
     path = {("ShaderNodeLightPath", name): one for name in ("Is Diffuse Ray", "Is Reflection Ray")}
-    return Scope(ON_NO_PATH | places | path, images)
+    return Places(ON_NO_PATH | places | path, images)
 
 
 def _without_noise(texels: np.ndarray) -> np.ndarray:
