@@ -52,6 +52,11 @@ class Illumination:
         self._occluders = occluders or Mesh.empty()
         self._caster = self._origin = None
 
+    @property
+    def triangle_count(self) -> int:
+        """Of all that can stand in the light's way."""
+        return len(self._occluders.triangles)
+
     def caster(self, grid: Grid):
         """The native `Occluders` with its origin near the receiver; None without triangles.
 
