@@ -10,10 +10,9 @@ from ..scene.lights import Light
 
 
 def inventory(bakes: Sequence[Bake]) -> Iterator[str]:
-    """The light that bakes share, then each bake."""
+    """The light that bakes share, each line of it once, then each bake."""
     jobs = [bake.job for bake in bakes if bake.job is not None]
-    for illumination in dict.fromkeys(job.illumination for job in jobs):
-        yield from _light(illumination)
+    yield from dict.fromkeys(line for job in jobs for line in _light(job.illumination))
     for job in jobs:
         receiver, grids = job.receiver, [chart.grid for chart in job.receiver.charts]
         sizes = [f"{one.width * one.pitch_x:.4g} x {one.height * one.pitch_y:.4g}" for one in grids]
