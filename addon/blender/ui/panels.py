@@ -47,8 +47,12 @@ def warnings_for(obj, visible: set[str]) -> list[str]:
 BORDER_PIXELS, LETTER_PIXELS = 60, 6.4
 
 
-def draw_warnings(layout, context, messages: list[str], icon: str = "ERROR") -> None:
-    """Sentences, wrapped to the panel's width, with an icon."""
+def draw_warnings(layout, context, messages: list[str]) -> None:
+    draw_sentences(layout, context, messages, "ERROR")
+
+
+def draw_sentences(layout, context, messages: list[str], icon: str) -> None:
+    """Wrapped to the panel's width, each after an icon."""
     pixels = context.region.width / context.preferences.system.ui_scale
     width = max(20, int((pixels - BORDER_PIXELS) / LETTER_PIXELS))
     for message in messages:
@@ -120,7 +124,7 @@ class BEAMSPREAD_PT_render(RenderPanel, bpy.types.Panel):
             column.prop(settings, name)
         column.prop(settings, "use_indirect")
         if settings.use_indirect:
-            draw_warnings(column, context, [INDIRECT_COST], icon="INFO")
+            draw_sentences(column, context, [INDIRECT_COST], "INFO")
         if settings.output != "LUMINANCE":
             return  # no medium, no solver
         column.prop(settings, "solver")
