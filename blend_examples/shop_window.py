@@ -23,7 +23,7 @@ BOWL = "0,3 20,3 20,0 24,0 24,3 46,16 58,36 60,46 60,46 57,46 57,46 44,20 22,8 0
 
 
 def build():
-    scene = parts.empty_scene("Shop window", 540, 360, samples=96, view_transform="Filmic")
+    scene = parts.empty_scene("Shop window", 540, 360, samples=64, view_transform="Filmic")
     scene.view_settings.look = "Medium High Contrast"
     scene.beamspread.resolution = 768
     alabaster, _ = parts.medium_material(

@@ -30,7 +30,7 @@ ORANGE = "0,0 12,1.4 24,8 31,20 32.5,32 31,43 24,55 12,62 0,63.4"
 
 
 def build():
-    scene = parts.empty_scene("Soapstone", 540, 360, samples=96, view_transform="Filmic")
+    scene = parts.empty_scene("Soapstone", 540, 360, samples=64, view_transform="Filmic")
     scene.view_settings.look = "Medium High Contrast"
     scene.view_settings.exposure = 0.1
     scene.beamspread.resolution = 768
