@@ -51,6 +51,12 @@ class Illumination:
         linked.lights = tuple(one for one in self.lights if one.receivers is None or receiver in one.receivers)
         return linked
 
+    @property
+    def triangle_count(self) -> int:
+        """Of all that can stand in the light's way, those of instances each counted."""
+        placed = [(one.mesh, 1 if one.placements is None else len(one.placements)) for one in self._occluders]
+        return sum(count * len(mesh.triangles) for mesh, count in placed)
+
     def caster(self, grid: Grid, light: Light | None = None):
         """The native `Occluders` that may block the light, with its origin near the receiver; None without triangles.
 
