@@ -1,0 +1,2 @@
+def fields(request, scene, progress):
+    return {}
