@@ -12,6 +12,7 @@ namespace beamspread {
 
 using Vec2 = glm::dvec2;
 using Vec3 = glm::dvec3;
+using Vec2f = glm::vec2;
 using Vec3f = glm::vec3;
 using Mat3 = glm::dmat3;
 

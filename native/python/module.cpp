@@ -35,5 +35,6 @@ PYBIND11_MODULE(_native, m)
     bind_image(m);
     bind_scene(m);
     bind_solve(m);
+    bind_light_field(m);
     bind_fft(m);
 }

@@ -1,4 +1,4 @@
-// Python names of native/scene but its lights: Occluders, ReceiverGrid, gather_beams, coverage.
+// Python names of native/scene but lights and occluders: ReceiverGrid, gather_beams, coverage.
 #include <memory>
 #include <utility>
 
@@ -9,16 +9,6 @@
 namespace beamspread {
 
 namespace {
-
-// A big array: its type is never converted silently.
-template <class T>
-std::span<const T> to_rows(const std::string& name, const py::array& array, py::ssize_t columns,
-                           const std::string& allowed)
-{
-    if (!py::isinstance<Array<T>>(array) || array.ndim() != 2 || array.shape(1) != columns)
-        reject(name, shape_text(array), allowed);
-    return {static_cast<const T*>(array.data()), static_cast<std::size_t>(array.size())};
-}
 
 std::unique_ptr<ReceiverGrid> make_grid(const Numbers& origin, const Numbers& x_axis, const Numbers& y_axis,
                                         const Numbers& normal, double pitch_x, double pitch_y, py::ssize_t width,
@@ -43,15 +33,24 @@ py::tuple gather_beams(const ReceiverGrid& grid, const Light& light, const Occlu
 {
     const auto width = static_cast<py::ssize_t>(grid.width);
     const auto height = static_cast<py::ssize_t>(grid.height);
-    Array<float> irradiance({height, width});
-    BeamArrays beams{.irradiance = {irradiance.mutable_data(), grid.height, grid.width, width}, .direction = {}};
+    static_assert(sizeof(Vec3f) == 3 * sizeof(float));
+    BeamArrays beams;
+    py::object irradiance;
+    if (occluders && occluders->is_colored()) {
+        Array<float> colored({height, width, py::ssize_t{3}});
+        beams.colored = {reinterpret_cast<Vec3f*>(colored.mutable_data()), grid.height, grid.width, width};
+        irradiance = std::move(colored);
+    } else {
+        Array<float> amounts({height, width});
+        beams.irradiance = {amounts.mutable_data(), grid.height, grid.width, width};
+        irradiance = std::move(amounts);
+    }
     py::object direction = py::none();
     if (light.source().is_far) {
         const Vec3 travel = unblocked_direction(grid, light, grid.origin);
         direction = Array<double>(3, &travel.x);
     } else if (directions) {
         Array<float> field({height, width, py::ssize_t{3}});
-        static_assert(sizeof(Vec3f) == 3 * sizeof(float));
         beams.direction = {reinterpret_cast<Vec3f*>(field.mutable_data()), grid.height, grid.width, width};
         direction = std::move(field);
     }
@@ -85,45 +84,11 @@ Array<float> coverage(const py::array& corners, const py::array& corner_counts, 
     return covered;
 }
 
-std::unique_ptr<Occluders> make_occluders(const py::array& vertices, const py::array& triangles, const Numbers& origin)
-{
-    const auto coordinates = to_rows<double>("vertices", vertices, 3, "contiguous float64 (N, 3)");
-    const auto indices = to_rows<std::uint32_t>("triangles", triangles, 3, "contiguous uint32 (M, 3)");
-    const Vec3 centre = to_vec3("origin", origin);
-    static_assert(sizeof(Vec3) == 3 * sizeof(double));
-    const std::span corners(reinterpret_cast<const Vec3*>(coordinates.data()), coordinates.size() / 3);
-    const std::span faces(reinterpret_cast<const Occluders::Triangle*>(indices.data()), indices.size() / 3);
-    const py::gil_scoped_release released;
-    return std::make_unique<Occluders>(corners, faces, centre);
-}
-
 }  // namespace
 
 void bind_scene(py::module_& m)
 {
-    py::class_<Occluders>(m, "Occluders", R"(Triangles that block light, both sides of them.
-
-Parameters
-----------
-vertices : ndarray, float64, shape (N, 3), C-contiguous
-    World positions in metres. Copied.
-triangles : ndarray, uint32, shape (M, 3), C-contiguous
-    Vertex indices. Copied. M = 0 is allowed: nothing is blocked.
-origin : 3 floats
-    World position near the receivers, metres: rays are traced in single precision relative to it.
-
-Raises
-------
-ValueError
-    Wrong dtype or shape, a position that is not finite, an index that is out of range.
-)")
-        .def(py::init(&make_occluders), py::arg("vertices"), py::arg("triangles"),
-             py::arg("origin") = py::make_tuple(0.0, 0.0, 0.0))
-        .def_property_readonly("triangle_count", &Occluders::triangle_count, "int: number of triangles.");
-
-    m.def("embree_version", &embree_version,
-          "The version of Embree in use, 31305 for 3.13.5: not that of the host process.");
-
+    bind_occluders(m);
     py::class_<ReceiverGrid>(m, "ReceiverGrid", R"(The plane that receives light, divided into texels.
 
 Parameters
@@ -173,7 +138,7 @@ find_shadows : bool
 
 Returns
 -------
-irradiance : ndarray, float32, shape (height, width)
+irradiance : ndarray, float32, shape (height, width), or (height, width, 3) past coloured occluders
     W/m^2: cosine and visible part included, 0 if the light is behind the plane or in it. Row 0 is the lowest row.
 direction : ndarray, float32, shape (height, width, 3), or float64, shape (3,) of a light infinitely far away
     Unit vectors of travel in the plane frame (x_axis, y_axis, normal), z < 0. Where no light arrives: that of the

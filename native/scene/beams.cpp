@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "base/error.h"
@@ -45,7 +46,38 @@ std::vector<Vec3> gauss_points(const ReceiverGrid& grid)
     return points;
 }
 
-// One light's beams on one grid.
+Vec3f to_single(const Vec3& amount)
+{
+    return Vec3f(amount);
+}
+
+float to_single(double amount)
+{
+    return static_cast<float>(amount);
+}
+
+double mean(const Vec3& amount)
+{
+    return (amount.x + amount.y + amount.z) / 3.0;
+}
+
+double mean(double amount)
+{
+    return amount;
+}
+
+// Of a ray's light, what its transmittance leaves: in all channels, or in one that stands for all.
+template <class Amount>
+Amount let_through(double irradiance, const Vec3f& transmittance)
+{
+    if constexpr (std::is_same_v<Amount, Vec3>)
+        return irradiance * Vec3(transmittance);
+    else
+        return irradiance * static_cast<double>(transmittance.x);
+}
+
+// One light's beams on one grid; `Amount` of irradiance in W/m^2 is a number or, past coloured occluders, a Vec3.
+template <class Amount>
 class Gatherer {
 public:
     Gatherer(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, const BeamSettings& settings)
@@ -66,7 +98,8 @@ public:
     std::size_t bands() const { return m_shadows.bands(); }
 
     // Returns the number of rows.
-    std::size_t gather_band(std::size_t band, const BeamArrays& beams)
+    template <class Texels>
+    std::size_t gather_band(std::size_t band, const Texels& irradiance, const View2D<Vec3f>& direction)
     {
         const auto lease = m_shades.lend();
         std::vector<Shade>& shades = *lease;
@@ -74,25 +107,25 @@ public:
         const std::size_t begin = band * Shadows::rows_per_band;
         const std::size_t rows = shades.size() / m_grid.width;
         for (std::size_t row = 0; row < rows; ++row)
-            gather_row(begin + row, &shades[row * m_grid.width], beams);
+            gather_row(begin + row, &shades[row * m_grid.width], irradiance, direction);
         return rows;
     }
 
 private:
     struct Texel {
-        double irradiance;  // W/m^2
-        Vec3 flow;          // sum over the points of irradiance times direction of travel
+        Amount irradiance{0.0};
+        Vec3 flow{0.0};          // sum over the points of irradiance times direction of travel
         bool is_shaded = false;  // at any point
     };
 
-    void gather_row(std::size_t y, const Shade* shades, const BeamArrays& beams) const
+    template <class Texels>
+    void gather_row(std::size_t y, const Shade* shades, const Texels& irradiance, const View2D<Vec3f>& direction) const
     {
         for (std::size_t x = 0; x < m_grid.width; ++x) {
             const Texel found = texel(static_cast<double>(x), static_cast<double>(y), shades[x]);
-            beams.irradiance(y, x) = static_cast<float>(found.irradiance);
-            if (beams.direction.data)
-                beams.direction(y, x) =
-                    Vec3f(mean_direction(found.flow, static_cast<double>(x), static_cast<double>(y)));
+            irradiance(y, x) = to_single(found.irradiance);
+            if (direction.data)
+                direction(y, x) = Vec3f(mean_direction(found.flow, static_cast<double>(x), static_cast<double>(y)));
         }
     }
 
@@ -155,14 +188,15 @@ private:
             ++count;
         }
         sum.is_shaded |= count < subs.size();
-        const std::uint32_t blocked = occluders ? occluders->blocked(std::span(rays).first(count)) : 0;
+        std::array<Vec3f, Occluders::packet_size> transmittance;
+        transmittance.fill(Vec3f(1.0f));
+        if (occluders)
+            occluders->transmit(std::span(rays).first(count), transmittance.data());
         for (std::size_t i = 0; i < count; ++i) {
-            if (blocked >> i & 1u) {
-                sum.is_shaded = true;
-                continue;
-            }
-            sum.irradiance += irradiance[i];
-            sum.flow += irradiance[i] * travel[i];
+            sum.is_shaded |= transmittance[i] != Vec3f(1.0f);
+            const Amount arriving = let_through<Amount>(irradiance[i], transmittance[i]);
+            sum.irradiance += arriving;
+            sum.flow += mean(arriving) * travel[i];
         }
         return sum;
     }
@@ -220,11 +254,17 @@ void compute_beams(const ReceiverGrid& grid, const Light& light, const Occluders
         reject("clearance", settings.clearance, "a finite length >= 0 in metres");
 
     progress.set_total(static_cast<double>(grid.height));
-    Gatherer gatherer(grid, light, occluders, settings);
-    const auto gather_band = [&](std::size_t band) {
-        progress.advance(static_cast<double>(gatherer.gather_band(band, beams)));
+    const auto gather = [&]<class Amount>(Amount, const auto& irradiance) {
+        Gatherer<Amount> gatherer(grid, light, occluders, settings);
+        const auto gather_band = [&](std::size_t band) {
+            progress.advance(static_cast<double>(gatherer.gather_band(band, irradiance, beams.direction)));
+        };
+        with_threads(settings.threads, [&] { parallel_for(gatherer.bands(), gather_band); });
     };
-    with_threads(settings.threads, [&] { parallel_for(gatherer.bands(), gather_band); });
+    if (occluders && occluders->is_colored())
+        gather(Vec3(), beams.colored);
+    else
+        gather(0.0, beams.irradiance);
     progress.finish();
 }
 

@@ -28,6 +28,7 @@ struct BeamSettings {
 struct BeamArrays {
     View2D<float> irradiance;  // W/m^2: cosine and visible part included
     View2D<Vec3f> direction;  // may have no data: not wanted
+    View2D<Vec3f> colored;  // in the place of `irradiance` where occluders are coloured
 };
 
 // Unit vectors in single precision point to within this: light nearer to the plane travels within it as far as can be
@@ -39,7 +40,7 @@ inline constexpr double min_cos_theta = 0.5 * static_cast<double>(std::numeric_l
 Vec3 unblocked_direction(const ReceiverGrid& grid, const Light& light, const Vec3& point);
 
 // Light from behind the plane is 0, and so is light within it. Directions are unit vectors of travel in the plane frame
-// with z <= -min_cos_theta, the mean over the texel weighed by irradiance; in the dark the unblocked one at the texel's
+// with z <= -min_cos_theta, the mean over the texel weighed by irradiance, of all channels together; in the dark the unblocked one at the texel's
 // centre. `occluders` may be null. The result does not depend on the number of threads. Throws InvalidArgument,
 // Cancelled.
 void compute_beams(const ReceiverGrid& grid, const Light& light, const Occluders* occluders,

@@ -1,4 +1,4 @@
-// Embree behind one header: handles that release themselves. Only occluders.cpp includes it.
+// Embree behind one header: handles that release themselves. Only occluders.cpp and triangle_set include it.
 #pragma once
 
 #include <embree3/rtcore.h>

@@ -8,6 +8,8 @@
 #include "base/error.h"
 #include "scene/checks.h"
 #include "scene/embree.h"
+#include "scene/passage.h"
+#include "scene/triangle_set.h"
 
 namespace beamspread {
 
@@ -23,92 +25,221 @@ void check(RTCDevice device)
 
 namespace {
 
-// Embree's hits are undefined beyond this: products of coordinates overflow single precision.
-constexpr double max_coordinate = 1e18;
+// Instances of smaller meshes cost more than copies: one takes about 700 bytes, a triangle about 100.
+constexpr std::size_t least_instanced = 16;
 
-void check_arguments(std::span<const Vec3> vertices, std::span<const Occluders::Triangle> triangles, const Vec3& origin)
+// Rounding of a ray in an instance's frame grows with the condition of its matrix: beyond, instances are copied.
+constexpr double most_condition = 100.0;
+
+double frobenius(const Mat3& matrix)
 {
-    if (!detail::is_finite(origin))
-        reject("origin", detail::to_text(origin), "finite coordinates in metres");
-    for (const Vec3& vertex : vertices) {
-        const Vec3 size = glm::abs(vertex - origin);
-        if (!(size.x < max_coordinate && size.y < max_coordinate && size.z < max_coordinate))
-            reject("vertices", detail::to_text(vertex), "finite coordinates within 1e18 m of the origin");
-    }
-    for (const auto& triangle : triangles) {
-        for (const std::uint32_t index : triangle) {
-            if (index >= vertices.size())
-                reject("triangles", std::to_string(index),
-                       "indices below the number of vertices, " + std::to_string(vertices.size()));
-        }
-    }
+    return std::sqrt(glm::dot(matrix[0], matrix[0]) + glm::dot(matrix[1], matrix[1]) + glm::dot(matrix[2], matrix[2]));
 }
 
-// A new buffer of Embree's, padded as its vector loads need; it lives as long as the geometry.
-template <class T>
-std::span<T> make_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::size_t count)
+// 1 for a rotation with even scale, infinite or not a number for a singular matrix.
+double condition(const Mat3& matrix)
 {
-    void* buffer = rtcSetNewGeometryBuffer(geometry, type, 0, format, sizeof(T), count);
-    if (!buffer)
-        throw std::bad_alloc();
-    return {static_cast<T*>(buffer), count};
+    return frobenius(matrix) * frobenius(glm::inverse(matrix)) / 3.0;
+}
+
+bool is_shareable(const OccluderMesh& mesh)
+{
+    return mesh.placements.size() > 1 && mesh.triangles.size() >= least_instanced;
+}
+
+bool is_regular(const Placement& placement)
+{
+    return condition(placement.linear) <= most_condition;
+}
+
+// What `add` needs to know of meshes in advance.
+std::unique_ptr<TriangleSet> set_for(std::span<const OccluderMesh> meshes)
+{
+    std::size_t opaque = 0;
+    std::size_t see_through = 0;
+    std::size_t vertices = 0;
+    bool has_uvs = false;
+    for (const OccluderMesh& mesh : meshes) {
+        const std::size_t copies = mesh.placements.size();
+        std::size_t mesh_opaque = 0;
+        for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+            mesh_opaque += mesh.transmittance(i) ? 0 : 1;
+        opaque += copies * mesh_opaque;
+        see_through += copies * (mesh.triangles.size() - mesh_opaque);
+        vertices += copies * mesh.vertices.size();
+        has_uvs |= !mesh.uvs.empty() && mesh_opaque < mesh.triangles.size();
+    }
+    return std::make_unique<TriangleSet>(opaque, see_through, vertices, has_uvs);
+}
+
+embree::Scene new_scene(RTCDevice device)
+{
+    embree::Scene scene(rtcNewScene(device));
+    // Robust: no light leaks through the shared edges of triangles.
+    rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
+    return scene;
+}
+
+// Middle and half the size of a mesh in its own frame.
+struct Extent {
+    Vec3 middle;
+    Vec3 half;
+
+    explicit Extent(std::span<const Vec3> vertices)
+    {
+        Vec3 low = vertices[0];
+        Vec3 high = vertices[0];
+        for (const Vec3& vertex : vertices) {
+            low = glm::min(low, vertex);
+            high = glm::max(high, vertex);
+        }
+        middle = 0.5 * (low + high);
+        half = 0.5 * (high - low);
+    }
+};
+
+void attach_instance(RTCDevice device, RTCScene top, RTCScene part, const Mat3& linear, const Vec3& translation)
+{
+    const embree::Geometry owner(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE));
+    RTCGeometry geometry = owner.get();
+    rtcSetGeometryInstancedScene(geometry, part);
+    rtcSetGeometryTimeStepCount(geometry, 1);
+    const std::array<Vec3f, 4> columns = {Vec3f(linear[0]), Vec3f(linear[1]), Vec3f(linear[2]), Vec3f(translation)};
+    rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns.data());
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(top, geometry);
 }
 
 }  // namespace
 
 struct Occluders::Hierarchy {
+    std::vector<std::shared_ptr<const Transmittance>> transmittances;
+    std::vector<std::unique_ptr<TriangleSet>> sets;  // the first: in no instance
     embree::Device device;
-    embree::Scene scene;
-    std::span<const Vec3f> vertices;  // in buffers of the scene; relative to the origin
-    std::span<const Triangle> triangles;
+    std::vector<embree::Scene> parts;  // of instanced meshes
+    embree::Scene top;
 };
 
 Occluders::Occluders(std::span<const Vec3> vertices, std::span<const Triangle> triangles, const Vec3& origin)
-    : m_triangle_count(triangles.size()), m_origin(origin)
+    : Occluders(std::array{OccluderMesh{.vertices = vertices, .triangles = triangles}}, origin, {})
 {
-    check_arguments(vertices, triangles, origin);
-    if (triangles.empty())
-        return;
+}
 
+Occluders::Occluders(std::span<const OccluderMesh> meshes, const Vec3& origin, const OccluderSettings& settings)
+    : m_most_crossings(settings.most_crossings), m_origin(origin)
+{
+    if (!detail::is_finite(origin))
+        reject("origin", detail::to_text(origin), "finite coordinates in metres");
+    for (const OccluderMesh& mesh : meshes) {
+        mesh.check();
+        m_triangle_count += mesh.placements.size() * mesh.triangles.size();
+    }
+    if (m_triangle_count > 0)
+        build(meshes, settings.most_copied);
+}
+
+Occluders::~Occluders() = default;
+
+void Occluders::build(std::span<const OccluderMesh> meshes, std::size_t most_copied)
+{
     m_hierarchy = std::make_unique<Hierarchy>();
     // The user's own .embree3 files must not change what is baked.
     m_hierarchy->device.reset(rtcNewDevice("ignore_config_files=1"));
     RTCDevice device = m_hierarchy->device.get();
     if (!device)
         embree::check(nullptr);
-    m_hierarchy->scene.reset(rtcNewScene(device));
-    RTCScene scene = m_hierarchy->scene.get();
-    // Robust: no light leaks through the shared edges of triangles.
-    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
-    const embree::Geometry geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
-    static_assert(sizeof(Vec3f) == 3 * sizeof(float) && sizeof(Triangle) == 3 * sizeof(std::uint32_t));
-    const std::span corners =
-        make_buffer<Vec3f>(geometry.get(), RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, vertices.size());
-    for (std::size_t i = 0; i < vertices.size(); ++i) {
-        corners[i] = Vec3f(vertices[i] - origin);
+    m_hierarchy->top = new_scene(device);
+
+    std::vector<OccluderMesh> copied(meshes.begin(), meshes.end());
+    if (m_triangle_count > most_copied) {
+        for (OccluderMesh& mesh : copied)
+            if (is_shareable(mesh))
+                std::erase_if(mesh.placements, is_regular);
     }
-    const std::span indices =
-        make_buffer<Triangle>(geometry.get(), RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, triangles.size());
-    std::ranges::copy(triangles, indices.begin());
-    m_hierarchy->vertices = corners;
-    m_hierarchy->triangles = indices;
-    rtcCommitGeometry(geometry.get());
-    rtcAttachGeometry(scene, geometry.get());
-    rtcCommitScene(scene);
+    m_hierarchy->sets.push_back(set_for(copied));
+    TriangleSet& own = *m_hierarchy->sets.front();
+    for (std::size_t i = 0; i < meshes.size(); ++i) {
+        for (const Placement& placement : copied[i].placements)
+            own.add(meshes[i], placement, m_origin);
+        if (copied[i].placements.size() < meshes[i].placements.size())
+            add_instances(meshes[i]);
+        for (std::size_t j = 0; j < meshes[i].triangles.size(); ++j) {
+            const Transmittance* const transmittance = meshes[i].transmittance(j);
+            m_is_opaque &= !transmittance || transmittance->is_clear();
+            m_is_colored |= transmittance && transmittance->is_colored();
+        }
+        m_hierarchy->transmittances.insert(m_hierarchy->transmittances.end(), meshes[i].transmittances.begin(),
+                                           meshes[i].transmittances.end());
+    }
+    own.attach(device, m_hierarchy->top.get());
+    rtcCommitScene(m_hierarchy->top.get());
     embree::check(device);
 }
 
-Occluders::~Occluders() = default;
+void Occluders::add_instances(const OccluderMesh& mesh)
+{
+    RTCDevice device = m_hierarchy->device.get();
+    const Extent extent(mesh.vertices);
+    OccluderMesh alone = mesh;
+    alone.placements = {Placement{}};
+    m_hierarchy->sets.push_back(set_for({&alone, 1}));
+    TriangleSet& set = *m_hierarchy->sets.back();
+    set.add(alone, {}, extent.middle);
+    RTCScene part = m_hierarchy->parts.emplace_back(new_scene(device)).get();
+    set.attach(device, part);
+    rtcCommitScene(part);
+    for (const Placement& placement : mesh.placements) {
+        if (!is_regular(placement))
+            continue;
+        const Mat3& linear = placement.linear;
+        const Vec3 middle = placement(extent.middle);
+        attach_instance(device, m_hierarchy->top.get(), part, linear, middle - m_origin);
+        const Mat3 half_axes(linear[0] * extent.half.x, linear[1] * extent.half.y, linear[2] * extent.half.z);
+        const Vec3 reach =
+            glm::abs(middle - m_origin) + glm::abs(half_axes[0]) + glm::abs(half_axes[1]) + glm::abs(half_axes[2]);
+        m_hulls.push_back({middle, half_axes, std::max({reach.x, reach.y, reach.z}) * condition(linear)});
+    }
+}
+
+std::size_t Occluders::own_count() const
+{
+    return m_hierarchy ? m_hierarchy->sets.front()->size() : 0;
+}
+
+std::size_t Occluders::own_opaque_count() const
+{
+    return m_hierarchy ? m_hierarchy->sets.front()->opaque_count() : 0;
+}
 
 std::array<Vec3, 3> Occluders::triangle(std::size_t index) const
 {
-    const auto corner = [this, index](std::size_t i) {
-        return m_origin + Vec3(m_hierarchy->vertices[m_hierarchy->triangles[index][i]]);
-    };
-    return {corner(0), corner(1), corner(2)};
+    const auto [a, b, c] = m_hierarchy->sets.front()->corners(index);
+    return {m_origin + Vec3(a), m_origin + Vec3(b), m_origin + Vec3(c)};
 }
 
 std::uint32_t Occluders::blocked(std::span<const ShadowRay> rays) const
+{
+    if (m_is_opaque)
+        return trace(rays, nullptr);
+    std::array<Passage, packet_size> passages;
+    return trace(rays, passages.data());
+}
+
+void Occluders::transmit(std::span<const ShadowRay> rays, Vec3f* transmittance) const
+{
+    if (m_is_opaque) {
+        const std::uint32_t bits = trace(rays, nullptr);
+        for (std::size_t i = 0; i < rays.size(); ++i)
+            transmittance[i] = Vec3f(bits >> i & 1u ? 0.0f : 1.0f);
+        return;
+    }
+    std::array<Passage, packet_size> passages;
+    const std::uint32_t bits = trace(rays, passages.data());
+    for (std::size_t i = 0; i < rays.size(); ++i)
+        transmittance[i] = bits >> i & 1u ? Vec3f(0.0f) : passages[i].transmittance();
+}
+
+std::uint32_t Occluders::trace(std::span<const ShadowRay> rays, Passage* passages) const
 {
     if (!m_hierarchy || rays.empty())
         return 0;
@@ -128,23 +259,20 @@ std::uint32_t Occluders::blocked(std::span<const ShadowRay> rays) const
         packet.dir_z[i] = along.z;
         packet.tfar[i] = static_cast<float>(rays[i].distance);
         packet.mask[i] = ~0u;
+        packet.id[i] = static_cast<unsigned>(i);
     }
-    RTCIntersectContext context;
+    PassageContext context;
+    context.passages = passages;
+    context.most_crossings = m_most_crossings;
     rtcInitIntersectContext(&context);
-    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-    rtcOccluded16(valid.data(), m_hierarchy->scene.get(), &context, &packet);
+    // Rays that Embree takes for coherent it may test against one triangle several times, which only filters notice.
+    context.flags = passages ? RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT : RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    rtcOccluded16(valid.data(), m_hierarchy->top.get(), &context, &packet);
     std::uint32_t bits = 0;
     // Embree marks a blocked ray by a negative length.
     for (std::size_t i = 0; i < rays.size(); ++i)
         bits |= static_cast<std::uint32_t>(packet.tfar[i] < 0.0f) << i;
     return bits;
-}
-
-void Occluders::transmit(std::span<const ShadowRay> rays, Vec3f* transmittance) const
-{
-    const std::uint32_t bits = blocked(rays);
-    for (std::size_t i = 0; i < rays.size(); ++i)
-        transmittance[i] = Vec3f(bits >> i & 1u ? 0.0f : 1.0f);
 }
 
 int embree_version()

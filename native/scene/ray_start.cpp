@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <span>
 
 namespace beamspread {
 
@@ -22,12 +23,16 @@ double largest(const Vec3& v)
     return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
 }
 
-// Whether rounding might put a part of the triangle between the grid's texels and where rays start.
-bool may_lie_on(const ReceiverGrid& grid, const std::array<Vec3, 3>& triangle, double rounding)
+// Whether rounding might put a part of what lies between the corners between the grid's texels and where rays start.
+bool may_lie_on(const ReceiverGrid& grid, std::span<const Vec3> corners, double rounding)
 {
-    const auto corner = [&](std::size_t i) { return grid.to_plane(triangle[i] - grid.origin); };
-    const Vec3 low = glm::min(glm::min(corner(0), corner(1)), corner(2)) - rounding;
-    const Vec3 high = glm::max(glm::max(corner(0), corner(1)), corner(2)) + rounding;
+    Vec3 low(std::numeric_limits<double>::infinity());
+    Vec3 high = -low;
+    for (const Vec3& corner : corners) {
+        const Vec3 place = grid.to_plane(corner - grid.origin);
+        low = glm::min(low, place - rounding);
+        high = glm::max(high, place + rounding);
+    }
     return low.x <= static_cast<double>(grid.width) * grid.pitch_x && high.x >= 0.0 &&
            low.y <= static_cast<double>(grid.height) * grid.pitch_y && high.y >= 0.0 && low.z <= 0.0 && high.z >= 0.0;
 }
@@ -40,6 +45,11 @@ double rounding_of(const std::array<Vec3, 3>& triangle, const Vec3& origin)
         std::max({largest(triangle[0] - origin), largest(triangle[1] - origin), largest(triangle[2] - origin)}));
 }
 
+double rounding_of(const Hull& hull)
+{
+    return rounding_at(hull.reach);
+}
+
 RayStart ray_start(const ReceiverGrid& grid, const Occluders* occluders, double clearance)
 {
     if (!occluders)
@@ -48,11 +58,19 @@ RayStart ray_start(const ReceiverGrid& grid, const Occluders* occluders, double 
     const double in_world = offset_ulps * std::numeric_limits<double>::epsilon() * grid.reach(Vec3(0.0));
     double rounding = rounding_at(grid.reach(occluders->origin())) + in_world;
     // Large triangles far away must not lift the rays: only those that a ray could meet where it starts count.
-    for (std::size_t i = 0; i < occluders->triangle_count(); ++i) {
-        const std::array<Vec3, 3> triangle = occluders->triangle(i);
-        const double own = rounding_of(triangle, occluders->origin()) + in_world;
-        if (own > rounding && may_lie_on(grid, triangle, own + clearance))
+    const auto include = [&](std::span<const Vec3> corners, double own) {
+        if (own > rounding && may_lie_on(grid, corners, own + clearance))
             rounding = own;
+    };
+    for (std::size_t i = 0; i < occluders->own_count(); ++i) {
+        const std::array<Vec3, 3> triangle = occluders->triangle(i);
+        include(triangle, rounding_of(triangle, occluders->origin()) + in_world);
+    }
+    for (const Hull& hull : occluders->hulls()) {
+        std::array<Vec3, 8> corners;
+        for (unsigned i = 0; i < corners.size(); ++i)
+            corners[i] = hull.corner(i);
+        include(corners, rounding_of(hull) + in_world);
     }
     return {.rounding = rounding, .clearance = clearance};
 }

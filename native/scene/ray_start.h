@@ -15,8 +15,9 @@ struct RayStart {
     double height() const { return rounding + clearance; }
 };
 
-// Bound of the rounding of a triangle as rays meet it.
+// Bound of the rounding of a triangle, or of the instance in a hull, as rays meet it.
 double rounding_of(const std::array<Vec3, 3>& triangle, const Vec3& origin);
+double rounding_of(const Hull& hull);
 
 // `occluders` may be null.
 RayStart ray_start(const ReceiverGrid& grid, const Occluders* occluders, double clearance);

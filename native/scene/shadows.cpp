@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 
 namespace beamspread {
@@ -16,6 +17,23 @@ constexpr double min_relative_weight = 1e-6;
 
 // Texels: the rounding of what is computed here, far above that of double precision at the largest texture's side.
 constexpr double own_rounding = 1e-6;
+
+// As long as it takes to find the shadows of so many facets it takes to trace all rays of a million texels.
+constexpr std::size_t most_facets = std::size_t{1} << 21;
+
+// The sides of a box in triangles: numbers of corners as of Hull.
+constexpr std::array<std::array<unsigned, 3>, 12> box_facets = {{{0, 1, 3},
+                                                                 {0, 3, 2},
+                                                                 {4, 6, 7},
+                                                                 {4, 7, 5},
+                                                                 {0, 4, 5},
+                                                                 {0, 5, 1},
+                                                                 {2, 3, 7},
+                                                                 {2, 7, 6},
+                                                                 {0, 2, 6},
+                                                                 {0, 6, 4},
+                                                                 {1, 5, 7},
+                                                                 {1, 7, 3}}};
 
 struct Interval {
     double low = infinity;
@@ -32,7 +50,7 @@ struct Interval {
 struct Shadow {
     std::array<Vec2, 3> corners;
     Vec2 reach{};           // how far rounding moves it at most
-    bool is_whole = false;  // whether all of the triangle is between where rays start and where they end
+    bool is_whole = false;  // whether all of an opaque triangle is between where rays start and where they end
 
     Interval rows() const
     {
@@ -59,9 +77,8 @@ struct Shadow {
 // Central projection from the light onto the plane.
 class Projection {
 public:
-    Projection(const ReceiverGrid& grid, const LightSource& source, const Vec3& origin, const RayStart& start)
+    Projection(const ReceiverGrid& grid, const LightSource& source, const RayStart& start)
         : m_grid(grid),
-          m_origin(origin),
           m_source(source.position - (source.is_far ? Vec3(0.0) : grid.origin)),
           m_is_near(source.is_far ? 0.0 : 1.0),
           m_source_height(glm::dot(m_source, grid.normal)),
@@ -78,12 +95,12 @@ public:
         double rounding;  // of a ray and of the triangle
     };
 
-    Heights heights(const std::array<Vec3, 3>& triangle) const
+    Heights heights(const std::array<Vec3, 3>& triangle, double rounding) const
     {
         const auto height = [this](const Vec3& corner) { return glm::dot(corner - m_grid.origin, m_grid.normal); };
         const std::array<double, 3> all = {height(triangle[0]), height(triangle[1]), height(triangle[2])};
         const auto [lowest, highest] = std::minmax({all[0], all[1], all[2]});
-        return {all, lowest, highest, std::max(m_start.rounding, rounding_of(triangle, m_origin))};
+        return {all, lowest, highest, std::max(m_start.rounding, rounding)};
     }
 
     // Whether the triangle lies behind where rays start, or beyond the lamp where they end.
@@ -101,13 +118,14 @@ public:
                weight(heights.highest) > min_relative_weight * m_source_height;
     }
 
-    Shadow shadow(const std::array<Vec3, 3>& triangle, const Heights& heights) const
+    Shadow shadow(const std::array<Vec3, 3>& triangle, bool is_opaque, const Heights& heights) const
     {
         Shadow shadow{};
         for (std::size_t i = 0; i < 3; ++i)
             project(triangle[i], heights.corners[i], heights.rounding, shadow.corners[i], shadow.reach);
         const double margin = m_start.height() + heights.rounding;
-        shadow.is_whole = heights.lowest >= margin && (m_is_near == 0.0 || heights.highest <= m_source_height - margin);
+        shadow.is_whole =
+            is_opaque && heights.lowest >= margin && (m_is_near == 0.0 || heights.highest <= m_source_height - margin);
         return shadow;
     }
 
@@ -128,7 +146,6 @@ private:
     double weight(double height) const { return m_source_height - m_is_near * height; }
 
     const ReceiverGrid& m_grid;
-    Vec3 m_origin;  // of the rays' single precision
     Vec3 m_source;  // from the grid's origin to a lamp; the unit vector towards a sun
     double m_is_near;
     double m_source_height;
@@ -174,21 +191,25 @@ Shadows::Shadows(const ReceiverGrid& grid, const LightSource& source, const Occl
 {
     if (!occluders || !find)
         return;
-    const Projection projection(grid, source, occluders->origin(), start);
+    const Projection projection(grid, source, start);
     if (!projection.is_lit())
         return;
+    if (facet_count() > most_facets || is_lamp_in_a_hull()) {
+        m_is_unknown = true;
+        return;
+    }
     m_leaves = std::bit_ceil(bands());
     m_nodes.resize(2 * m_leaves);
-    for (std::size_t i = 0; i < occluders->triangle_count(); ++i) {
-        const std::array<Vec3, 3> triangle = occluders->triangle(i);
-        const Projection::Heights heights = projection.heights(triangle);
+    for (std::size_t i = 0; i < facet_count(); ++i) {
+        const Facet one = facet(i);
+        const Projection::Heights heights = projection.heights(one.corners, one.rounding);
         if (projection.is_off_the_way(heights))
             continue;
         if (!projection.has_shadow(heights)) {
             m_is_unknown = true;
             continue;
         }
-        const Interval rows = projection.shadow(triangle, heights).rows();
+        const Interval rows = projection.shadow(one.corners, one.is_opaque, heights).rows();
         if (rows.high < 0.0 || rows.low > static_cast<double>(grid.height))
             continue;
         std::size_t first = m_leaves + clamped(rows.low, grid.height - 1) / rows_per_band;
@@ -203,6 +224,33 @@ Shadows::Shadows(const ReceiverGrid& grid, const LightSource& source, const Occl
     }
 }
 
+std::size_t Shadows::facet_count() const
+{
+    return m_occluders->own_count() + box_facets.size() * m_occluders->hulls().size();
+}
+
+Shadows::Facet Shadows::facet(std::size_t index) const
+{
+    if (index < m_occluders->own_count()) {
+        const std::array<Vec3, 3> corners = m_occluders->triangle(index);
+        return {corners, rounding_of(corners, m_occluders->origin()), index < m_occluders->own_opaque_count()};
+    }
+    const auto [hull, side] = std::lldiv(static_cast<long long>(index - m_occluders->own_count()), box_facets.size());
+    const Hull& box = m_occluders->hulls()[static_cast<std::size_t>(hull)];
+    const auto [a, b, c] = box_facets[static_cast<std::size_t>(side)];
+    return {{box.corner(a), box.corner(b), box.corner(c)}, rounding_of(box), false};
+}
+
+// Rays that end inside a box need not cross its sides.
+bool Shadows::is_lamp_in_a_hull() const
+{
+    return !m_source.is_far && std::ranges::any_of(m_occluders->hulls(), [this](const Hull& hull) {
+        const double radius =
+            glm::length(hull.half_axes[0]) + glm::length(hull.half_axes[1]) + glm::length(hull.half_axes[2]);
+        return glm::length(m_source.position - hull.centre) <= radius + rounding_of(hull);
+    });
+}
+
 void Shadows::shade_band(std::size_t band, std::vector<Shade>& texels) const
 {
     const std::size_t begin = band * rows_per_band;
@@ -210,11 +258,12 @@ void Shadows::shade_band(std::size_t band, std::vector<Shade>& texels) const
     texels.assign((end - begin) * m_grid.width, m_is_unknown ? Shade::unknown : Shade::none);
     if (m_nodes.empty())
         return;
-    const Projection projection(m_grid, m_source, m_occluders->origin(), m_start);
+    const Projection projection(m_grid, m_source, m_start);
     for (std::size_t node = m_leaves + band; node > 0; node /= 2) {
         for (const std::uint32_t i : m_nodes[node]) {
-            const std::array<Vec3, 3> triangle = m_occluders->triangle(i);
-            const Shadow shadow = projection.shadow(triangle, projection.heights(triangle));
+            const Facet one = facet(i);
+            const Projection::Heights heights = projection.heights(one.corners, one.rounding);
+            const Shadow shadow = projection.shadow(one.corners, one.is_opaque, heights);
             const Interval rows = shadow.rows();
             const std::size_t first = std::max(begin, clamped(std::floor(rows.low), m_grid.height));
             const std::size_t last = std::min(end, clamped(std::ceil(rows.high), m_grid.height));

@@ -18,8 +18,9 @@ from beamspread.core.bake import luminance as bakes
 from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.native import native
 from beamspread.core.scene.grid import Grid
-from beamspread.core.scene.illumination import Illumination, Mesh
+from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import PointLight
+from beamspread.core.scene.occluders import Mesh
 from scipy.ndimage import uniform_filter
 
 SIDE = 1.0  # of the floor, metres

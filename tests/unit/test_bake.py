@@ -1,7 +1,7 @@
 """The bake of plain data: lights add up, colours and thickness act per channel, progress and cancel work."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 
 import beamspread
 import numpy as np
@@ -15,8 +15,9 @@ from beamspread.core.bake.surface import Surface
 from beamspread.core.errors import MaterialError
 from beamspread.core.material.material import Material
 from beamspread.core.scene.grid import Grid
-from beamspread.core.scene.illumination import Illumination, Mesh
+from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import Light, PointLight, SpotLight, SunLight
+from beamspread.core.scene.occluders import Mesh, Occluder
 from beamspread.core.scene.receiver import Chart, Receiver, build_receiver
 from beamspread.core.scene.uv_map import Polygons, fit_uv_maps
 
@@ -99,6 +100,39 @@ def test_receivers_near_each_other_share_the_shadows_of_their_scene():
     assert Illumination([SUN]).caster(grid()) is None
 
 
+@dataclass(frozen=True)
+class LinkedSun(SunLight):
+    """A sun that only some objects block."""
+
+    blockers: frozenset | None = None
+
+
+def test_lights_share_the_shadows_of_what_may_block_them():
+    others = Mesh(ROOF.vertices + (0, 0, 1), np.concatenate([ROOF.triangles] * 2))
+    scene = Illumination([SUN], [Occluder("Roof", ROOF), Occluder("Others", others)])
+
+    def count(*names):
+        return scene.caster(grid(), linked(*names)).triangle_count
+
+    def linked(*names):
+        return LinkedSun(*(getattr(SUN, field.name) for field in fields(SUN)), frozenset(names))
+
+    assert scene.caster(grid(), SUN).triangle_count == count("Roof", "Others") == 3
+    assert (count("Roof"), count("Others", "Elsewhere")) == (1, 2)
+    assert scene.caster(grid(), linked("Elsewhere")) is None
+    assert scene.caster(grid(), linked("Roof")) is scene.caster(grid(), linked("Roof", "Elsewhere"))
+    assert scene.caster(grid(), SUN) is scene.caster(grid(), linked("Roof", "Others"))
+
+
+def test_placements_of_one_mesh_stand_in_one_caster():
+    up, aside = np.eye(4)[:3], np.eye(4)[:3]
+    up[2, 3], aside[0, 3] = 1, 30
+    card = Mesh(ROOF.vertices - (0, 0, 1), ROOF.triangles)
+    scene = Illumination([SUN], [Occluder("A", card, aside[None]), Occluder("B", card, np.stack([up, aside]))])
+    assert scene.caster(grid()).triangle_count == 3
+    assert not bake(grid(), scene, MATERIAL, 0.0, SETTINGS).any()
+
+
 @pytest.mark.parametrize("distance", [1e4, 1e6])
 def test_shadows_do_not_drift_far_from_the_world_origin(distance):
     """Rays are traced relative to an origin within 2^13 texels, in single precision: known to 2^-11 of a texel.
@@ -132,7 +166,7 @@ def test_what_is_far_away_does_not_change_shadows_nearby(distance):
     far = np.array([(0, 0, -10), (1, 0, -10), (0, 1, -10)]) + (distance, 0, 0)
     sun = replace(SUN, direction=(0.3, 0.2, -1.0))
     alone = Mesh(card, np.array([(0, 1, 2)], np.uint32))
-    both = Mesh.join([alone, Mesh(far, np.array([(0, 1, 2)], np.uint32))])
+    both = [Occluder("", mesh) for mesh in (alone, Mesh(far, np.array([(0, 1, 2)], np.uint32)))]
     near, wide = (
         light_beams(grid(256), sun, Illumination([sun], mesh).caster(grid(256)), SETTINGS)[0] for mesh in (alone, both)
     )

@@ -1,0 +1,234 @@
+// Python names of what shades: Transmittance, OccluderMesh, Occluders.
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "python/vectors.h"
+#include "scene/occluders.h"
+
+namespace beamspread {
+
+namespace {
+
+// Keeps the arrays that an OccluderMesh views.
+struct HeldMesh {
+    py::array vertices, triangles;
+    std::optional<py::array> placements, materials, uvs;
+    OccluderMesh mesh;
+};
+
+std::span<const Vec3> to_vertices(const py::array& array)
+{
+    const auto rows = to_rows<double>("vertices", array, 3, "contiguous float64 (N, 3)");
+    static_assert(sizeof(Vec3) == 3 * sizeof(double));
+    return {reinterpret_cast<const Vec3*>(rows.data()), rows.size() / 3};
+}
+
+std::span<const Triangle> to_triangles(const py::array& array)
+{
+    const auto rows = to_rows<std::uint32_t>("triangles", array, 3, "contiguous uint32 (M, 3)");
+    return {reinterpret_cast<const Triangle*>(rows.data()), rows.size() / 3};
+}
+
+std::vector<Placement> to_placements(const py::array& array)
+{
+    const auto rows = to_rows<double>("placements", array, 12, "contiguous float64 (K, 12)");
+    std::vector<Placement> placements;
+    placements.reserve(rows.size() / 12);
+    for (std::size_t i = 0; i < rows.size(); i += 12) {
+        const double* const row = &rows[i];
+        const auto column = [row](int j) { return Vec3(row[j], row[4 + j], row[8 + j]); };
+        placements.push_back({Mat3(column(0), column(1), column(2)), column(3)});
+    }
+    return placements;
+}
+
+std::unique_ptr<HeldMesh> make_mesh(const py::array& vertices, const py::array& triangles,
+                                    const std::optional<py::array>& placements,
+                                    std::vector<std::shared_ptr<Transmittance>> transmittances,
+                                    const std::optional<py::array>& materials, const std::optional<py::array>& uvs)
+{
+    auto held = std::make_unique<HeldMesh>(HeldMesh{vertices, triangles, placements, materials, uvs, {}});
+    held->mesh.vertices = to_vertices(vertices);
+    held->mesh.triangles = to_triangles(triangles);
+    if (placements)
+        held->mesh.placements = to_placements(*placements);
+    held->mesh.transmittances.assign(transmittances.begin(), transmittances.end());
+    if (materials)
+        held->mesh.materials = to_rows<std::uint32_t>("materials", *materials, 1, "contiguous uint32 (M, 1)");
+    if (uvs) {
+        const auto rows = to_rows<float>("uvs", *uvs, 6, "contiguous float32 (M, 6)");
+        static_assert(sizeof(std::array<Vec2f, 3>) == 6 * sizeof(float));
+        held->mesh.uvs = {reinterpret_cast<const std::array<Vec2f, 3>*>(rows.data()), rows.size() / 6};
+    }
+    return held;
+}
+
+std::unique_ptr<Occluders> make_occluders(const py::array& vertices, const py::array& triangles, const Numbers& origin)
+{
+    const std::span corners = to_vertices(vertices);
+    const std::span faces = to_triangles(triangles);
+    const Vec3 centre = to_vec3("origin", origin);
+    const py::gil_scoped_release released;
+    return std::make_unique<Occluders>(corners, faces, centre);
+}
+
+std::unique_ptr<Occluders> join_occluders(const std::vector<const HeldMesh*>& held, const Numbers& origin,
+                                          std::optional<int> most_crossings, std::size_t most_copied)
+{
+    std::vector<OccluderMesh> meshes;
+    for (const HeldMesh* one : held)
+        meshes.push_back(one->mesh);
+    OccluderSettings settings{.most_copied = most_copied};
+    if (most_crossings)
+        settings.most_crossings = *most_crossings;
+    const Vec3 centre = to_vec3("origin", origin);
+    const py::gil_scoped_release released;
+    return std::make_unique<Occluders>(meshes, centre, settings);
+}
+
+Extension to_extension(const std::string& name)
+{
+    if (name == "repeat")
+        return Extension::repeat;
+    if (name == "extend")
+        return Extension::extend;
+    if (name == "clip")
+        return Extension::clip;
+    if (name == "mirror")
+        return Extension::mirror;
+    reject("extension", "'" + name + "'", "'repeat', 'extend', 'clip', 'mirror'");
+}
+
+std::shared_ptr<Transmittance> make_color(const Numbers& color)
+{
+    return std::make_shared<Transmittance>(Vec3f(to_vec3("color", color)));
+}
+
+std::shared_ptr<Transmittance> make_image(const py::array& texels, const std::string& extension, bool is_smooth,
+                                          const Numbers& outside)
+{
+    if (!py::isinstance<Array<float>>(texels) || texels.ndim() != 3 || (texels.shape(2) != 1 && texels.shape(2) != 3))
+        reject("texels", shape_text(texels), "contiguous float32 (H, W, 1) or (H, W, 3)");
+    const TexelArray view{.values = {static_cast<const float*>(texels.data()), static_cast<std::size_t>(texels.size())},
+                          .width = static_cast<std::size_t>(texels.shape(1)),
+                          .height = static_cast<std::size_t>(texels.shape(0)),
+                          .channels = static_cast<std::size_t>(texels.shape(2))};
+    return std::make_shared<Transmittance>(view, to_extension(extension), is_smooth,
+                                           Vec3f(to_vec3("outside", outside)));
+}
+
+}  // namespace
+
+void bind_occluders(py::module_& m)
+{
+    py::class_<Transmittance, std::shared_ptr<Transmittance>>(
+        m, "Transmittance", R"(What a surface lets through of the light that crosses it.
+
+Parameters
+----------
+color : 3 floats
+    0 to 1 in each channel.
+)")
+        .def(py::init(&make_color), py::arg("color"))
+        .def_static("from_image", &make_image, py::arg("texels"), py::arg("extension") = "repeat",
+                    py::arg("is_smooth") = true, py::arg("outside") = py::make_tuple(1.0, 1.0, 1.0),
+                    R"(From an image that is looked up by the triangles' UVs.
+
+Parameters
+----------
+texels : ndarray, float32, shape (H, W, 1) or (H, W, 3), C-contiguous
+    0 to 1; row 0 at v = 0. Kept in 16 bits.
+extension : str
+    Beyond the border: 'repeat', 'extend', 'clip', 'mirror'.
+is_smooth : bool
+    Bilinear, else that of the nearest texel.
+outside : 3 floats
+    Beyond the border of a clipped image.
+
+Raises
+------
+ValueError
+    Wrong dtype or shape, a value outside 0 to 1.
+)")
+        .def_property_readonly("is_opaque", &Transmittance::is_opaque, "bool: nothing gets through anywhere.")
+        .def_property_readonly("is_clear", &Transmittance::is_clear, "bool: everything gets through everywhere.")
+        .def_property_readonly("is_colored", &Transmittance::is_colored, "bool: channels differ somewhere.");
+
+    py::class_<HeldMesh>(m, "OccluderMesh", R"(A mesh, the places where it stands, and what its triangles let through.
+
+Parameters
+----------
+vertices : ndarray, float64, shape (N, 3), C-contiguous
+    Metres in the mesh's frame. As all arrays, it must not change before occluders are made of it.
+triangles : ndarray, uint32, shape (M, 3), C-contiguous
+    Vertex indices.
+placements : ndarray, float64, shape (K, 12), C-contiguous, optional
+    Rows of 3 x 4 matrices from the mesh's frame to the world; None: it stands there as it is.
+transmittances : list of Transmittance
+    By material.
+materials : ndarray, uint32, shape (M, 1), C-contiguous, optional
+    Of each triangle the index of its material; None: all are opaque.
+uvs : ndarray, float32, shape (M, 6), C-contiguous, optional
+    (u, v) of each triangle's corners; None: all are (0, 0).
+
+Raises
+------
+ValueError
+    Wrong dtype or shape.
+)")
+        .def(py::init(&make_mesh), py::arg("vertices"), py::arg("triangles"), py::arg("placements") = py::none(),
+             py::arg("transmittances") = py::list(), py::arg("materials") = py::none(), py::arg("uvs") = py::none());
+
+    py::class_<Occluders>(m, "Occluders", R"(Triangles that block light, both sides of them.
+
+Parameters
+----------
+vertices : ndarray, float64, shape (N, 3), C-contiguous
+    World positions in metres. Copied.
+triangles : ndarray, uint32, shape (M, 3), C-contiguous
+    Vertex indices. Copied. M = 0 is allowed: nothing is blocked.
+origin : 3 floats
+    World position near the receivers, metres: rays are traced in single precision relative to it.
+
+Raises
+------
+ValueError
+    Wrong dtype or shape, a position that is not finite, an index that is out of range.
+)")
+        .def(py::init(&make_occluders), py::arg("vertices"), py::arg("triangles"),
+             py::arg("origin") = py::make_tuple(0.0, 0.0, 0.0))
+        .def_static("of_meshes", &join_occluders, py::arg("meshes"), py::arg("origin") = py::make_tuple(0.0, 0.0, 0.0),
+                    py::arg("most_crossings") = py::none(), py::arg("most_copied") = OccluderSettings{}.most_copied,
+                    R"(Of meshes that may stand in many places and let light through.
+
+Parameters
+----------
+meshes : list of OccluderMesh
+origin : 3 floats
+    As above.
+most_crossings : int, optional
+    A ray that has crossed so many see-through triangles ends at the next.
+most_copied : int
+    Where there are more triangles than this, counting those of each placement, the placements of a mesh share its
+    triangles.
+
+Raises
+------
+ValueError
+    A number that is not finite, an index that is out of range.
+)")
+        .def_property_readonly("triangle_count", &Occluders::triangle_count,
+                               "int: number of triangles, those of each placement counted.")
+        .def_property_readonly(
+            "instance_count", [](const Occluders& self) { return self.hulls().size(); },
+            "int: placements that share their mesh's triangles.")
+        .def_property_readonly("is_opaque", &Occluders::is_opaque, "bool: all triangles block all light.")
+        .def_property_readonly("is_colored", &Occluders::is_colored,
+                               "bool: some let more of one channel through than of another.");
+
+    m.def("embree_version", &embree_version,
+          "The version of Embree in use, 31305 for 3.13.5: not that of the host process.");
+}
+
+}  // namespace beamspread
