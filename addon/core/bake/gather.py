@@ -12,7 +12,7 @@ from ..native import native
 from ..progress import Progress
 from ..scene.grid import Grid
 from ..scene.illumination import Illumination
-from ..scene.lights import ExtendedLight, Light, SunDiskLight
+from ..scene.lights import ExtendedLight, FieldLight, Light, SunDiskLight
 from .settings import BakeSettings
 
 # Of a sun up to so wide, radians, all light counts as coming from its middle but for its shadows: that leaves out what
@@ -41,7 +41,9 @@ class Gatherer:
     @staticmethod
     def has_one_direction(light: Light) -> bool:
         """Whether light reaches each texel from one direction only, as far as the medium can tell."""
-        return not isinstance(light, ExtendedLight) or (isinstance(light, SunDiskLight) and light.angle <= WIDEST_SUN)
+        if isinstance(light, ExtendedLight):
+            return isinstance(light, SunDiskLight) and light.angle <= WIDEST_SUN
+        return not isinstance(light, FieldLight)
 
     def is_colored(self, light: Light) -> bool:
         """Whether the light differs in color from ray to ray, be it by what it shines through."""
@@ -77,13 +79,17 @@ class Gatherer:
         if self.has_one_direction(light):
             yield from self.plane_lights(light, progress)
             return
-        for irradiance, direction in native.ray_layers(*self._traced(light), **self._options(self.rays, progress)):
+        if isinstance(light, FieldLight):
+            arriving = light.layers(self.grid)
+        else:
+            arriving = native.ray_layers(*self._traced(light), **self._options(self.rays, progress))
+        for irradiance, direction in arriving:
             yield from native.PlaneLight.of_channels(self._covered(irradiance) * light.rgb(), direction, 3)
 
     def add_to(self, field, light: Light, rays: int, progress: Progress | None = None) -> None:
         """Add the light to a native `LightField`."""
-        if self.has_one_direction(light):
-            for part in self.plane_lights(light, progress):
+        if self.has_one_direction(light) or isinstance(light, FieldLight):
+            for part in self.layers(light, progress):
                 field.add(part)
             return
         grid, shape, caster = self._traced(light)
@@ -97,6 +103,12 @@ class Gatherer:
         """
         if isinstance(light, ExtendedLight):
             irradiance, flow = native.gather_rays(*self._traced(light), **self._options(rays, progress))
+            return self._covered(irradiance), self._covered(flow)
+        if isinstance(light, FieldLight):
+            irradiance, flow = np.zeros((2, self.grid.height, self.grid.width, 3), np.float32)
+            for part, direction in light.layers(self.grid):
+                irradiance += part
+                flow += part.mean(axis=2, keepdims=True) * direction
             return self._covered(irradiance), self._covered(flow)
         irradiance, direction = self.beams(light, progress)
         if irradiance.ndim == 2:
