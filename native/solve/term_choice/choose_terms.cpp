@@ -18,18 +18,17 @@ namespace {
 // On planes of up to so many texels, the square of this, all terms are kept: choosing would take as long.
 constexpr std::size_t small_plane = 192;
 
-// What the texels looked at may use up of the tolerance. The rest is for those between, and for what the probe is off
-// by.
+// What the texels looked at may use up of the tolerance. The rest is for those between, and for what the probe is off by:
+// over the lights of tests/bench/terms.py the worst of all texels then uses up .56.
 constexpr double share = 0.25;
 
-// Of what is allowed: errors that need no weighing.
-constexpr float negligible = 0.05f;
-
-// So often there is a closer look around the texels where errors are largest.
+// So often there is a closer look around the texels where errors are largest. Without, the worst texel there is off by
+// twice as much, for 3 % fewer terms.
 constexpr std::size_t refinements = 2;
 constexpr std::size_t worst_count = 12;
 
-// Errors relative to the brightest texel that transforms in single precision make anyway.
+// Errors relative to the brightest texel that transforms in single precision make anyway: half of the 1e-5 that tests
+// leave to deep shadow.
 constexpr double rounding = 5e-6;
 
 // The mean of a site relative to what harmonic 0 alone would bring: where light travels away from, sums of harmonics are
@@ -98,18 +97,18 @@ struct Choice {
 // Leaves out one after the other, those first that bring least for what they cost, as long as no error is beyond 1.
 Choice leave_out(const Eigen::ArrayXXf& parts, const std::vector<float>& cost)
 {
+    // Fourth powers, as the few texels where a term brings most decide whether it is needed.
     std::vector<float> worth(cost.size());
-    parallel_for(worth.size(), [&](std::size_t c) {
-        worth[c] = parts.col(index(c)).square().square().sum() / cost[c];
-    });
+    parallel_for(worth.size(),
+                 [&](std::size_t c) { worth[c] = parts.col(index(c)).square().square().sum() / cost[c]; });
     std::vector<std::size_t> order(cost.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return worth[a] < worth[b]; });
     Choice choice{{}, Eigen::ArrayXf::Zero(parts.rows())};
     for (const std::size_t c : order) {
-        const Eigen::ArrayXf next = choice.error + parts.col(index(c));
+        Eigen::ArrayXf next = choice.error + parts.col(index(c));
         if (next.abs().maxCoeff() <= 1.0f)
-            choice.error = next;
+            choice.error.swap(next);
         else
             choice.kept.push_back(c);
     }
