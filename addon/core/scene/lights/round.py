@@ -20,13 +20,15 @@ class SunDiskLight(ExtendedLight):
     ----------
     direction : unit vector of travel from the disk's centre, world.
     angle : full angle of the disk, radians.
+    disk : "even"; or "flat" as in Blender 3.4, see native `SunDiskLight`.
     """
 
     direction: Vector
     angle: float
+    disk: str = "even"
 
     def native(self):
-        return native.SunDiskLight(self.direction, self.angle)
+        return native.SunDiskLight(self.direction, self.angle, self.disk)
 
     def is_behind(self, grid):
         return bool(np.dot(self.direction, grid.normal) >= math.sin(min(0.5 * self.angle, 0.5 * math.pi)))
