@@ -22,6 +22,17 @@ def uses_nodes(material) -> bool:
     return bpy.app.version >= (5, 0, 0) or material.use_nodes
 
 
+def has_transparent_shadow(material) -> bool:
+    """Whether Cycles looks at transparency in shadows (the switch moved to the material itself in Blender 4.2)."""
+    owner = material if hasattr(material, "use_transparent_shadow") else getattr(material, "cycles", None)
+    return bool(getattr(owner, "use_transparent_shadow", True))
+
+
+def transparent_bounces(scene) -> int | None:
+    """How many see-through surfaces a shadow ray of Cycles crosses; None where Blender comes without Cycles."""
+    return getattr(getattr(scene, "cycles", None), "transparent_max_bounces", None)
+
+
 def light_casts_shadow(light) -> bool:
     """Cycles' own shadow switch where it has one, else the light's."""
     cycles = getattr(light, "cycles", None)
@@ -33,6 +44,18 @@ def light_casts_shadow(light) -> bool:
 def spot_falloff() -> str:
     """How Cycles shapes a spot's cone (see native/scene/lights.h)."""
     return "scaled" if bpy.app.version >= (3, 5, 0) else "legacy"
+
+
+def world_of(depsgraph):
+    """The evaluated world that a render has, or None (view layers may have their own since Blender 4.4)."""
+    world = getattr(depsgraph.view_layer, "world_override", None) or depsgraph.scene.world
+    return world and world.evaluated_get(depsgraph)
+
+
+def round_lamp_model(light) -> str:
+    """How Cycles shapes a lamp with a radius (see `SphereLight`)."""
+    soft = getattr(light, "use_soft_falloff", bpy.app.version < (4, 0, 0))
+    return "disk" if soft else "sphere"
 
 
 def light_strength(light) -> float:

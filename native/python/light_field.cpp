@@ -27,10 +27,10 @@ public:
         Problem problem;
         problem.plane = plane_of(shape, pitch);
         problem.to_come.plane = plane_of(survey_shape, pitch);
-        problem.to_come.plane.pitch_x *= static_cast<double>(problem.plane.width) /
-                                         static_cast<double>(problem.to_come.plane.width);
-        problem.to_come.plane.pitch_y *= static_cast<double>(problem.plane.height) /
-                                         static_cast<double>(problem.to_come.plane.height);
+        problem.to_come.plane.pitch_x *=
+            static_cast<double>(problem.plane.width) / static_cast<double>(problem.to_come.plane.width);
+        problem.to_come.plane.pitch_y *=
+            static_cast<double>(problem.plane.height) / static_cast<double>(problem.to_come.plane.height);
         problem.tolerance = tolerance;
         problem.threads = threads;
         for (const HeldLight* held : lights) {
@@ -64,8 +64,7 @@ public:
         if (coverage.ndim() != 2 || static_cast<std::size_t>(coverage.size()) != plane.texels())
             reject("coverage", "of another shape", "that of the grid");
         Progress report(progress_callback(progress));
-        Sink sink(*m_field, color, light.is_colored(),
-                  coverage.data());
+        Sink sink(*m_field, color, light.is_colored(), coverage.data());
         const py::gil_scoped_release release;
         gather_rays(grid, light, occluders, settings, sink, report);
     }

@@ -37,14 +37,4 @@ inline Mat3 to_axes(const std::string& name, const Numbers& numbers)
     return axes;
 }
 
-// The values of a big array with that many columns: its type is never converted silently. Throws InvalidArgument.
-template <class T>
-std::span<const T> to_rows(const std::string& name, const py::array& array, py::ssize_t columns,
-                           const std::string& allowed)
-{
-    if (!py::isinstance<Array<T>>(array) || array.ndim() != 2 || array.shape(1) != columns)
-        reject(name, shape_text(array), allowed);
-    return {static_cast<const T*>(array.data()), static_cast<std::size_t>(array.size())};
-}
-
 }  // namespace beamspread

@@ -79,4 +79,4 @@ def _make_job(
         size = tuple(node.image.original.size) if resolution is None else None
     maps = fit_uv_maps(read_polygons(obj, target.material_name))
     size = size or texture_size(maps, resolution or depsgraph.scene.beamspread.resolution)
-    return BakeJob(obj.name, build_receiver(maps, *size), illumination, surface, settings)
+    return BakeJob(obj.name, build_receiver(maps, *size), illumination.lighting(obj.name), surface, settings)

@@ -5,36 +5,53 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.errors import ReceiverError
-from ...core.scene.illumination import Mesh
+from ...core.scene.occluders import Mesh
 from ...core.scene.uv_map import Polygons
 
 GEOMETRY_TYPES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 
 
-def world_triangles(obj, matrix, cache: dict) -> Mesh | None:
-    """Triangles of an evaluated object in world space; `cache` shares the local ones among instances."""
-    key = obj.data.as_pointer() if obj.data is not None else obj.as_pointer()
-    if key not in cache:
-        cache[key] = _local_triangles(obj)
-    local = cache[key]
-    if local is None:
-        return None
-    return Mesh(_transform(local.vertices, matrix), local.triangles)
-
-
-def _local_triangles(obj) -> Mesh | None:
+def local_mesh(obj, materials) -> Mesh | None:
+    """Triangles of an evaluated object in its own frame, with what `materials` read of its slots; None without any."""
     mesh = obj.to_mesh()
     if mesh is None:
         return None
     try:
         mesh.calc_loop_triangles()
-        if not mesh.loop_triangles:
+        count = len(mesh.loop_triangles)
+        if not count:
             return None
-        triangles = np.empty(len(mesh.loop_triangles) * 3, np.int32)
+        triangles, corners = np.empty((2, count * 3), np.int32)
         mesh.loop_triangles.foreach_get("vertices", triangles)
-        return Mesh(_vertices(mesh), triangles.astype(np.uint32).reshape(-1, 3))
+        vertices = _vertices(mesh).astype(float)
+        triangles = triangles.astype(np.uint32).reshape(-1, 3)
+        slots = [materials.read(slot.material) for slot in obj.material_slots]
+        if all(slot.transmittance.is_opaque for slot in slots):
+            return Mesh(vertices, triangles)
+        numbers = np.empty(count, np.int32)
+        mesh.loop_triangles.foreach_get("material_index", numbers)
+        numbers = np.clip(numbers, 0, len(slots) - 1)
+        mesh.loop_triangles.foreach_get("loops", corners)
+        uvs = _image_uvs(mesh, slots, numbers, corners.reshape(-1, 3))
+        transmittances = tuple(slot.transmittance for slot in slots)
+        return Mesh(vertices, triangles, transmittances, numbers.astype(np.uint32), uvs)
     finally:
         obj.to_mesh_clear()
+
+
+def _image_uvs(mesh, slots: list, numbers: np.ndarray, corners: np.ndarray) -> np.ndarray | None:
+    """Where each triangle's corners lie in its material's image, float32 (M, 3, 2)."""
+    if all(slot.place is None for slot in slots):
+        return None
+    found = np.zeros((*corners.shape, 2), np.float32)
+    for number, slot in enumerate(slots):
+        chosen = numbers == number
+        if slot.place is not None and chosen.any():
+            uvs = _uvs(mesh, slot.place.uv_map)
+            at = np.zeros((chosen.sum(), 3, 2)) if uvs is None else uvs[corners[chosen]]
+            matrix = np.array(slot.place.matrix)
+            found[chosen] = at @ matrix[:, :2].T + matrix[:, 2]
+    return np.clip(np.nan_to_num(found), -1e6, 1e6)  # beyond, an image has no texels in single precision
 
 
 def _vertices(mesh) -> np.ndarray:
@@ -60,7 +77,7 @@ def read_polygons(obj, material_name: str) -> Polygons:
         mesh.polygons.foreach_get("normal", normals)
         corners = np.empty(len(mesh.loops), np.int32)
         mesh.loops.foreach_get("vertex_index", corners)
-        uvs, vertices = _active_uvs(mesh), _vertices(mesh)
+        uvs, vertices = _uvs(mesh), _vertices(mesh)
     finally:
         obj.to_mesh_clear()
     chosen = np.flatnonzero(_has_material(obj, slots, material_name))
@@ -92,8 +109,9 @@ def _flat_scale(world: np.ndarray) -> np.ndarray:
     return world
 
 
-def _active_uvs(mesh) -> np.ndarray | None:
-    layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
+def _uvs(mesh, name: str = "") -> np.ndarray | None:
+    """Of each loop, of the map of that name or, without, the one that renders; float32 (N, 2)."""
+    layer = next((layer for layer in mesh.uv_layers if (layer.name == name if name else layer.active_render)), None)
     if layer is None:
         return None
     uvs = np.empty(len(mesh.loops) * 2, np.float32)

@@ -48,7 +48,7 @@ class Gatherer:
     def is_colored(self, light: Light) -> bool:
         """Whether the light differs in color from ray to ray, be it by what it shines through."""
         caster = self._caster(light)
-        return getattr(light, "is_colored", False) or getattr(caster, "is_colored", False)
+        return getattr(light, "is_colored", False) or (caster is not None and caster.is_colored)
 
     def plane_lights(self, light: Light, progress: Progress | None = None, directions: bool = False) -> list:
         """A light of one direction per texel, as a native `PlaneLight` or one for each color channel.
@@ -168,7 +168,7 @@ class Gatherer:
         return (height, width), lights, means
 
     def _caster(self, light: Light):
-        return self._illumination.caster(self.grid) if light.cast_shadow else None
+        return self._illumination.caster(self.grid, light) if light.cast_shadow else None
 
     def _traced(self, light: ExtendedLight) -> tuple:
         return self.grid.native(), light.native(), self._caster(light)

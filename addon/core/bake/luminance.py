@@ -148,7 +148,9 @@ def _spread_field(gatherer: Gatherer, lights: Sequence[Light], medium: dict, _so
     # What a survey has missed shines on few texels, and is looked at as it is.
     look_at = [*later[:MOST_STAND_INS], *(i for i in later[MOST_STAND_INS:] if means[i] == 0)]
     parts = [part for i in kept for part in gatherer.plane_lights(lights[i])]
-    parts = [part for part in parts + [part for i in look_at for part in gatherer.stand_in(lights[i])] if part.mean() > 0]
+    parts = [
+        part for part in parts + [part for i in look_at for part in gatherer.stand_in(lights[i])] if part.mean() > 0
+    ]
     expected = [part for i in lit for part in survey[i]]
     if not parts and not any(means):
         return _dark(grid)

@@ -1,0 +1,111 @@
+"""What materials let through of the light that shadow rays ask for, as Cycles without caustics.
+
+Only transparent closures let light through: Transparent BSDF and what alpha leaves of a Principled BSDF, mixed and
+added. Glass, refraction and translucent BSDFs bend or spread light, and throw full shadows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core.native import native
+from .. import compat
+from .image_texture import NotUnderstoodError, Pixels, TexturePlace
+from .node_links import Wanted, follow
+from .texels import FINE_SIDE, Texels
+
+BLACK, WHITE = np.zeros((1, 1, 3)), np.ones((1, 1, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class LetThrough:
+    """A native `Transmittance`, and where its image lies if it has one."""
+
+    transmittance: object
+    place: TexturePlace | None = None
+
+
+OPAQUE = LetThrough(native.Transmittance((0, 0, 0)))
+CLEAR = LetThrough(native.Transmittance((1, 1, 1)))
+
+
+class Materials:
+    """Evaluates each material once; `warnings` are sentences about what is not understood."""
+
+    def __init__(self) -> None:
+        self.warnings: list[str] = []
+        self._pixels = Pixels()
+        self._known: dict[str | None, LetThrough] = {None: OPAQUE}
+
+    def read(self, material) -> LetThrough:
+        """`material` None: Cycles' default, which is opaque."""
+        name = material and material.name_full
+        if name not in self._known:
+            self._known[name] = self._read(material)
+        return self._known[name]
+
+    def _read(self, material) -> LetThrough:
+        if not (compat.uses_nodes(material) and compat.has_transparent_shadow(material)):
+            return OPAQUE
+        output = material.node_tree.get_output_node("CYCLES")
+        if output is None:
+            return OPAQUE
+        if not output.inputs["Surface"].is_linked:
+            if not output.inputs["Volume"].is_linked:
+                return OPAQUE
+            self.warnings.append(
+                f"The material '{material.name}' has a volume alone: it throws no shadow, whatever the volume takes."
+            )
+            return CLEAR
+        try:
+            return self._evaluate(Wanted(output.inputs["Surface"], ()))
+        except NotUnderstoodError as what:
+            self.warnings.append(f"The material '{material.name}' throws opaque shadows: {what} not understood.")
+            return OPAQUE
+
+    def _evaluate(self, surface: Wanted) -> LetThrough:
+        # Once to see which images there are, then at the texels of the largest of them, or between.
+        values = Texels(self._pixels)
+        transmittance = transparency(values, surface)
+        place = values.place
+        if place is None:
+            return LetThrough(native.Transmittance(_in_range(transmittance)[0, 0].tolist()))
+        finer = max(1, FINE_SIDE // max(values.largest)) if values.is_bent else 1
+        size = tuple(side * finer for side in values.largest)
+        texels = _in_range(transparency(Texels(self._pixels, size), surface))
+        if (texels[..., :1] == texels).all():
+            texels = texels[..., :1]
+        outside = _in_range(transparency(Texels(self._pixels, is_outside=True), surface))[0, 0].tolist()
+        image = native.Transmittance.from_image(
+            np.ascontiguousarray(texels, np.float32), place.extension, place.is_smooth, outside
+        )
+        return LetThrough(image, place)
+
+
+def _in_range(transmittance: np.ndarray) -> np.ndarray:
+    return np.clip(np.nan_to_num(transmittance), 0, 1)
+
+
+def transparency(values: Texels, wanted: Wanted) -> np.ndarray:
+    """The weight of a shader's transparent closures, (1 or H, 1 or W, 3)."""
+    end = follow(wanted)
+    if not end.socket.is_output or end.node.mute:
+        return BLACK
+    kind = end.node.bl_idname
+    if kind == "ShaderNodeBsdfTransparent":
+        return values.color(end.input("Color"))
+    if kind == "ShaderNodeBsdfPrincipled":
+        return WHITE * (1 - np.clip(values.number(end.input("Alpha")), 0, 1))
+    if kind == "ShaderNodeAddShader":
+        return transparency(values, end.input(0)) + transparency(values, end.input(1))
+    if kind == "ShaderNodeMixShader":
+        first, second = (transparency(values, end.input(i)) for i in (1, 2))
+        if first is second or (values.place is None and np.array_equal(first, second)):
+            return first  # whatever the factor is
+        part = np.clip(values.number(end.input(0)), 0, 1)
+        if first.shape[:2] != (1, 1) or second.shape[:2] != (1, 1):
+            values.bent(part)
+        return (1 - part) * first + part * second
+    return BLACK
