@@ -18,6 +18,16 @@ inline std::string shape_text(const py::array& array)
     return std::string(py::str(array.dtype())) + " of shape " + std::string(py::str(array.attr("shape")));
 }
 
+// A big array: its type is never converted silently. Throws InvalidArgument.
+template <class T>
+std::span<const T> to_rows(const std::string& name, const py::array& array, py::ssize_t columns,
+                           const std::string& allowed)
+{
+    if (!py::isinstance<Array<T>>(array) || array.ndim() != 2 || array.shape(1) != columns)
+        reject(name, shape_text(array), allowed);
+    return {static_cast<const T*>(array.data()), static_cast<std::size_t>(array.size())};
+}
+
 // Throws InvalidArgument.
 inline Vec3 to_vec3(const std::string& name, const Numbers& numbers)
 {
