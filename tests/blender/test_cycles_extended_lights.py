@@ -165,7 +165,8 @@ def test_radius(kind, place, soft):
     if not IS_OLD:
         options["use_soft_falloff"] = soft
     lamp = add_light(kind, plane, place=place, shadow_soft_size=0.3, **options)
-    assert_agree(plane, image, core_light(lamp), samples=1024)
+    # Cycles is noisy where the lamp cuts the plane.
+    assert_agree(plane, image, core_light(lamp), samples=1024, worst=0.1)
 
 
 @pytest.mark.parametrize("soft", MODELS)
