@@ -72,7 +72,6 @@ def test_instances_shade_as_copies_do(seed, stretch, kind, far, is_sun):
     transmittances, numbers = see_through(kind)
     materials = None if numbers is None else rng.choice(numbers, (len(triangles), 1)).astype(np.uint32)
     places = placements(rng, 12, stretch, shift)
-    mesh = native.OccluderMesh(vertices + (5, 3, -4), triangles, None, transmittances, materials, uvs)
     # The mesh lies off its own origin: what counts is where its placement puts it.
     off = places.reshape(-1, 3, 4).copy()
     off[:, :, 3] -= off[:, :, :3] @ (5, 3, -4)
@@ -84,7 +83,7 @@ def test_instances_shade_as_copies_do(seed, stretch, kind, far, is_sun):
     assert copied.is_opaque == shared.is_opaque == (kind == "opaque")
     light = native.SunLight((0.3, 0.2, -1)) if is_sun else native.PointLight(shift + (0.2, 0.1, 1.5))
     one, other = (native.gather_beams(floor(shift), light, occluders)[0] for occluders in (copied, shared))
-    assert (one < 0.9 * one.max()).mean() > 0.05
+    assert (one < 0.9 * one.max()).mean() > 0.01
     differs = np.abs(one - other) > 1e-6 * one.max()
     assert differs.mean() < 2e-3
     np.testing.assert_allclose(one.sum(), other.sum(), rtol=1e-4)
