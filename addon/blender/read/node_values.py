@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .image_texture import NotUnderstoodError, Pixels, TexturePlace, outputs_of, place_of, resampled
+from .image_texture import NotUnderstoodError, Pixels, TexturePlace, alpha_of, color_of, place_of, resampled
 from .node_links import End, Wanted, follow
 
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear Rec. 709, as Cycles turns colours into numbers
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # of linear Rec. 709, as Cycles turns colours into numbers
 
 # Where nodes turn an image into another, not in proportion, Cycles does so after interpolating it: images whose longer
 # side is below this are evaluated between their texels, too.
@@ -54,18 +54,21 @@ class Values:
     def texture(self, end: End) -> np.ndarray:
         node = end.node
         stored = self._pixels(node.image)
+        evaluate = color_of
+        if end.socket.name == "Alpha":
+            stored, evaluate = stored[..., 3:], alpha_of
         if stored.shape[:2] != (1, 1):
             place = place_of(end)
             if self.place not in (None, place):
                 raise NotUnderstoodError(f"the node '{node.name}', which places its image otherwise than another, is")
             self.place = place
             self.largest = tuple(map(max, self.largest, stored.shape[:2]))
-            stored = np.zeros((1, 1, 4)) if self._is_outside else resampled(stored, place, self._size)
-        return outputs_of(node, stored)[end.socket.name]
+            stored = np.zeros_like(stored[:1, :1]) if self._is_outside else resampled(stored, place, self._size)
+        return evaluate(node, stored)
 
 
 def _constant(value) -> np.ndarray:
-    numbers = np.atleast_1d(np.asarray(value, float))
+    numbers = np.atleast_1d(np.asarray(value, np.float32))
     return numbers[None, None, :3]
 
 
@@ -88,7 +91,7 @@ def _invert(values: Values, end: End) -> np.ndarray:
 def _ramp(values: Values, end: End) -> np.ndarray:
     ramp, at = end.node.color_ramp, values.number(end.input(0))
     values.bent(at)
-    table = np.array([ramp.evaluate(i / 255) for i in range(256)])  # Cycles', too
+    table = np.array([ramp.evaluate(i / 255) for i in range(256)], np.float32)  # Cycles', too
     table = table[:, 3:] if end.socket.name == "Alpha" else table[:, :3]
     place = np.clip(at[..., 0], 0, 1) * 255
     cell = place.astype(int)
@@ -97,7 +100,7 @@ def _ramp(values: Values, end: End) -> np.ndarray:
 
 
 def _over(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.divide(a, b, out=np.zeros(np.broadcast_shapes(a.shape, b.shape)), where=b != 0)
+    return np.divide(a, b, out=np.zeros(np.broadcast_shapes(a.shape, b.shape), np.float32), where=b != 0)
 
 
 # How many inputs each operation has, and what it does with them.
@@ -112,8 +115,8 @@ MATH = {
     "ABSOLUTE": (1, np.abs),
     "MINIMUM": (2, np.minimum),
     "MAXIMUM": (2, np.maximum),
-    "LESS_THAN": (2, lambda a, b: (a < b) * 1.0),
-    "GREATER_THAN": (2, lambda a, b: (a > b) * 1.0),
+    "LESS_THAN": (2, lambda a, b: (a < b).astype(np.float32)),
+    "GREATER_THAN": (2, lambda a, b: (a > b).astype(np.float32)),
     "ROUND": (1, lambda a: np.floor(a + 0.5)),
     "FLOOR": (1, np.floor),
     "CEIL": (1, np.ceil),
