@@ -15,6 +15,7 @@ __all__: list[str] = [
     "LdfSource",
     "Light",
     "Medium",
+    "OccluderMesh",
     "Occluders",
     "PlaneLight",
     "PointLight",
@@ -22,6 +23,7 @@ __all__: list[str] = [
     "SampleSource",
     "SpotLight",
     "SunLight",
+    "Transmittance",
     "adaptive_beams",
     "complex_lines",
     "convolve",
@@ -356,6 +358,92 @@ class SampleSource(LdfSource):
     """
     def __init__(self, samples: list[LdfSample], method: str = "angular") -> None: ...
 
+class Transmittance:
+    """
+    What a surface lets through of the light that crosses it.
+
+    Parameters
+    ----------
+    color : 3 floats
+        0 to 1 in each channel.
+    """
+    @staticmethod
+    def from_image(
+        texels: numpy.ndarray,
+        extension: str = "repeat",
+        is_smooth: bool = True,
+        outside: numpy.ndarray = (1.0, 1.0, 1.0),
+    ) -> Transmittance:
+        """
+        From an image that is looked up by the triangles' UVs.
+
+        Parameters
+        ----------
+        texels : ndarray, float32, shape (H, W, 1) or (H, W, 3), C-contiguous
+            0 to 1; row 0 at v = 0. Kept in 16 bits.
+        extension : str
+            Beyond the border: 'repeat', 'extend', 'clip', 'mirror'.
+        is_smooth : bool
+            Bilinear, else that of the nearest texel.
+        outside : 3 floats
+            Beyond the border of a clipped image.
+
+        Raises
+        ------
+        ValueError
+            Wrong dtype or shape, a value outside 0 to 1.
+        """
+    def __init__(self, color: numpy.ndarray) -> None: ...
+    @property
+    def is_clear(self) -> bool:
+        """
+        bool: everything gets through everywhere.
+        """
+    @property
+    def is_colored(self) -> bool:
+        """
+        bool: channels differ somewhere.
+        """
+    @property
+    def is_opaque(self) -> bool:
+        """
+        bool: nothing gets through anywhere.
+        """
+
+class OccluderMesh:
+    """
+    A mesh, the places where it stands, and what its triangles let through.
+
+    Parameters
+    ----------
+    vertices : ndarray, float64, shape (N, 3), C-contiguous
+        Metres in the mesh's frame. As all arrays, it must not change before occluders are made of it.
+    triangles : ndarray, uint32, shape (M, 3), C-contiguous
+        Vertex indices.
+    placements : ndarray, float64, shape (K, 12), C-contiguous, optional
+        Rows of 3 x 4 matrices from the mesh's frame to the world; None: it stands there as it is.
+    transmittances : list of Transmittance
+        By material.
+    materials : ndarray, uint32, shape (M, 1), C-contiguous, optional
+        Of each triangle the index of its material; None: all are opaque.
+    uvs : ndarray, float32, shape (M, 6), C-contiguous, optional
+        (u, v) of each triangle's corners; None: all are (0, 0).
+
+    Raises
+    ------
+    ValueError
+        Wrong dtype or shape.
+    """
+    def __init__(
+        self,
+        vertices: numpy.ndarray,
+        triangles: numpy.ndarray,
+        placements: numpy.ndarray | None = None,
+        transmittances: list[Transmittance] = [],
+        materials: numpy.ndarray | None = None,
+        uvs: numpy.ndarray | None = None,
+    ) -> None: ...
+
 class Occluders:
     """
     Triangles that block light, both sides of them.
@@ -374,13 +462,54 @@ class Occluders:
     ValueError
         Wrong dtype or shape, a position that is not finite, an index that is out of range.
     """
+    @staticmethod
+    def of_meshes(
+        meshes: list[OccluderMesh],
+        origin: numpy.ndarray = (0.0, 0.0, 0.0),
+        most_crossings: int | None = None,
+        most_copied: int = 1048576,
+    ) -> Occluders:
+        """
+        Of meshes that may stand in many places and let light through.
+
+        Parameters
+        ----------
+        meshes : list of OccluderMesh
+        origin : 3 floats
+            As above.
+        most_crossings : int, optional
+            A ray that has crossed so many see-through triangles ends at the next.
+        most_copied : int
+            Where there are more triangles than this, counting those of each placement, the placements of a mesh share its
+            triangles.
+
+        Raises
+        ------
+        ValueError
+            A number that is not finite, an index that is out of range.
+        """
     def __init__(
         self, vertices: numpy.ndarray, triangles: numpy.ndarray, origin: numpy.ndarray = (0.0, 0.0, 0.0)
     ) -> None: ...
     @property
+    def instance_count(self) -> int:
+        """
+        int: placements that share their mesh's triangles.
+        """
+    @property
+    def is_colored(self) -> bool:
+        """
+        bool: some let more of one channel through than of another.
+        """
+    @property
+    def is_opaque(self) -> bool:
+        """
+        bool: all triangles block all light.
+        """
+    @property
     def triangle_count(self) -> int:
         """
-        int: number of triangles.
+        int: number of triangles, those of each placement counted.
         """
 
 class ReceiverGrid:
@@ -669,7 +798,7 @@ def gather_beams(
 
     Returns
     -------
-    irradiance : ndarray, float32, shape (height, width)
+    irradiance : ndarray, float32, shape (height, width), or (height, width, 3) past coloured occluders
         W/m^2: cosine and visible part included, 0 if the light is behind the plane or in it. Row 0 is the lowest row.
     direction : ndarray, float32, shape (height, width, 3), or float64, shape (3,) of a light infinitely far away
         Unit vectors of travel in the plane frame (x_axis, y_axis, normal), z < 0. Where no light arrives: that of the
