@@ -9,19 +9,27 @@ import typing
 
 __all__: list[str] = [
     "AngularSpace",
+    "AreaLight",
     "Cancelled",
+    "EnvironmentLight",
+    "ExtendedLight",
     "LdfLibrary",
     "LdfSample",
     "LdfSource",
     "Light",
+    "LightField",
     "Medium",
+    "MeshLight",
     "OccluderMesh",
     "Occluders",
     "PlaneLight",
     "PointLight",
     "ReceiverGrid",
     "SampleSource",
+    "SphereLight",
+    "SphereSpotLight",
     "SpotLight",
+    "SunDiskLight",
     "SunLight",
     "Transmittance",
     "adaptive_beams",
@@ -34,10 +42,12 @@ __all__: list[str] = [
     "fft_instruction_sets",
     "fresnel",
     "gather_beams",
+    "gather_rays",
     "half_lines",
     "henyey_greenstein_pdf",
     "henyey_greenstein_sample",
     "interpolate",
+    "ray_layers",
     "read_exr",
     "real_lines",
     "real_transform",
@@ -624,6 +634,165 @@ class SpotLight(Light):
         self, position: numpy.ndarray, frame: numpy.ndarray, spot_size: float, blend: float, falloff: str = "scaled"
     ) -> None: ...
 
+class ExtendedLight:
+    """
+    A light of a size; its kinds are SunDiskLight, SphereLight,
+    SphereSpotLight, AreaLight, EnvironmentLight and MeshLight. Each raises ValueError for an argument that is out of range,
+    with a message that names it.
+    """
+    def irradiance(self, point: numpy.ndarray, normal: numpy.ndarray) -> tuple:
+        """
+        What reaches a point with nothing in between.
+
+        Parameters
+        ----------
+        point : 3 floats
+            In the world, metres.
+        normal : 3 floats
+            Unit vector out of the lit side of the plane there.
+
+        Returns
+        -------
+        tuple of 3 floats
+            W/m^2 in each channel.
+        """
+    def sample(self, point: numpy.ndarray, normal: numpy.ndarray, square: numpy.ndarray) -> tuple:
+        """
+        Rays from a point towards the light.
+
+        Parameters
+        ----------
+        point, normal
+            Those of `irradiance`.
+        square : ndarray, float64, shape (N, 2), C-contiguous
+            Places in the unit square; even ones give the density of rays that `flux` stands for.
+
+        Returns
+        -------
+        travel : ndarray, float64, shape (N, 3)
+            Unit vectors along which the light travels, world.
+        distance : ndarray, float64, shape (N,)
+            To the light, metres.
+        flux : ndarray, float32, shape (N, 3)
+            W/m^2 on a square metre that faces the ray, over the density of rays: the mean of flux times cosine to the normal is
+            the irradiance.
+        """
+    @property
+    def is_colored(self) -> bool:
+        """
+        bool: whether its rays differ in colour.
+        """
+
+class SunDiskLight(ExtendedLight):
+    """
+    Light of 1 W/m^2 from a disk infinitely far away.
+
+    Parameters
+    ----------
+    direction : 3 floats
+        Of travel in the world from the disk's centre, any length but 0.
+    angle : float
+        Full angle of the disk in radians, 0 to pi.
+    disk : str
+        "even": of even radiance, and 1 W/m^2 at normal incidence, as Cycles in Blender 4.5. "flat": each part of a flat
+        disk gives the same flux, as in 3.4; E at normal incidence is smaller, by 1.7 % for an angle of 30 degrees.
+    """
+    def __init__(self, direction: numpy.ndarray, angle: float, disk: str = "even") -> None: ...
+
+class SphereLight(ExtendedLight):
+    """
+    A point lamp of 1 W with a radius.
+
+    Parameters
+    ----------
+    position : 3 floats
+        Of its centre in the world, metres.
+    radius : float
+        In metres, 0 or more.
+    model : str
+        "sphere"; or "disk", which faces each point that it lights.
+    """
+    def __init__(self, position: numpy.ndarray, radius: float, model: str) -> None: ...
+
+class SphereSpotLight(ExtendedLight):
+    """
+    A spot lamp of 1 W with a radius.
+
+    Parameters
+    ----------
+    position, frame, spot_size, blend, falloff
+        Those of `SpotLight`.
+    radius, model
+        Those of `SphereLight`.
+    """
+    def __init__(
+        self,
+        position: numpy.ndarray,
+        frame: numpy.ndarray,
+        spot_size: float,
+        blend: float,
+        falloff: str,
+        radius: float,
+        model: str,
+    ) -> None: ...
+
+class AreaLight(ExtendedLight):
+    """
+    An area lamp of 1 W as Blender counts it: of the radiance 1 W / (4 area).
+
+    Parameters
+    ----------
+    position : 3 floats
+        Of its centre in the world, metres.
+    frame : (3, 3) floats
+        Rows: the lamp's x, y and z axes in the world with their scale (the columns of its 3 x 3 world matrix). It shines
+        along -z.
+    size_x, size_y : float
+        Whole lengths along its own axes, 0 or more; without an area it is dark.
+    is_round : bool
+        An ellipse instead of a rectangle.
+    spread : float
+        Full angle that light leaves in, radians, 0 to pi.
+    """
+    def __init__(
+        self,
+        position: numpy.ndarray,
+        frame: numpy.ndarray,
+        size_x: float,
+        size_y: float,
+        is_round: bool = False,
+        spread: float = 3.141592653589793,
+    ) -> None: ...
+
+class EnvironmentLight(ExtendedLight):
+    """
+    Light from all directions.
+
+    Parameters
+    ----------
+    radiance : ndarray, float32, shape (H, W, 3), C-contiguous
+        W/(m^2 sr), 0 or more, equirectangular: from row 0 up the elevation rises from -pi/2 to pi/2, along a row the
+        azimuth falls from pi to -pi. Copied.
+    to_world : (3, 3) floats
+        Matrix that turns directions of the image into the world.
+    """
+    def __init__(self, radiance: numpy.ndarray, to_world: numpy.ndarray) -> None: ...
+
+class MeshLight(ExtendedLight):
+    """
+    Triangles that glow on both sides.
+
+    Parameters
+    ----------
+    vertices : ndarray, float64, shape (N, 3), C-contiguous
+        World positions in metres. Copied.
+    triangles : ndarray, uint32, shape (M, 3), C-contiguous
+        Vertex indices. Copied.
+    radiance : ndarray, float32, shape (M, 3), C-contiguous
+        Of each triangle, W/(m^2 sr), 0 or more. Copied.
+    """
+    def __init__(self, vertices: numpy.ndarray, triangles: numpy.ndarray, radiance: numpy.ndarray) -> None: ...
+
 class PlaneLight:
     """
     What arrives on a plane from one light, and what is known of where from.
@@ -648,6 +817,80 @@ class PlaneLight:
         Lights for irradiance (H, W) or (H, W, channels): one where channels differ by a factor, else one for each.
         """
     def __init__(self, irradiance: numpy.ndarray, direction: numpy.ndarray, color: list[float]) -> None: ...
+    def by_channel(self) -> list[PlaneLight]:
+        """
+        The same light as one for each channel.
+        """
+    def mean(self) -> float:
+        """
+        float: mean irradiance of all texels and channels, W/m^2.
+        """
+
+class LightField:
+    """
+    Luminance of light that comes bit by bit, in memory that does not grow with it.
+
+    By the solver 'fft'; parameters as of `convolve`.
+
+    Parameters
+    ----------
+    shape : (int, int)
+        Height and width of the plane, texels.
+    lights : sequence of PlaneLight
+        Those of one direction are part of the field. All others only stand for light to come where terms are chosen.
+    survey_shape : (int, int)
+        Of the plane that the survey looks at, as large but of fewer texels.
+    survey : sequence of PlaneLight
+        All light to come, on that plane: its angles and colours.
+    ldf, albedo, mean_free_path, pitch, tolerance, threads, progress
+        As for `convolve`; the progress is that of the choice of terms.
+    """
+    def __init__(
+        self,
+        shape: tuple,
+        lights: list[PlaneLight],
+        survey_shape: tuple,
+        survey: list[PlaneLight],
+        ldf: list[LdfSource],
+        albedo: list[float],
+        mean_free_path: list[float],
+        pitch: typing.Sequence[float],
+        tolerance: float,
+        threads: int = 0,
+        progress: typing.Any = None,
+    ) -> None: ...
+    def add(self, light: PlaneLight) -> None:
+        """
+        Adds a PlaneLight, also one of `lights` that only stood for it.
+        """
+    def add_rays(
+        self,
+        grid: ReceiverGrid,
+        light: ExtendedLight,
+        color: list[float],
+        coverage: numpy.ndarray,
+        occluders: Occluders = None,
+        rays: int = 16,
+        seed: int = 0,
+        threads: int = 0,
+        clearance: float = 0.0,
+        even_rays: int = 0,
+        progress: typing.Any = None,
+    ) -> None:
+        """
+        Adds the rays of a light of a size, see `gather_rays`.
+
+        `color`: factor in each channel; `coverage`: float32 (H, W), part of each texel that receives light.
+        """
+    def solve(self, progress: typing.Any = None) -> numpy.ndarray:
+        """
+        Luminance, float32 (H, W, C) in W/(m^2 sr); once.
+        """
+    @property
+    def terms(self) -> int:
+        """
+        int: how many transforms of light `solve` makes.
+        """
 
 def adaptive_beams(light: PlaneLight, tolerance: float) -> tuple[numpy.ndarray, numpy.ndarray]:
     """
@@ -812,6 +1055,56 @@ def gather_beams(
         `progress` returned False.
     """
 
+def gather_rays(
+    grid: ReceiverGrid,
+    light: ExtendedLight,
+    occluders: Occluders = None,
+    rays: int = 16,
+    seed: int = 0,
+    threads: int = 0,
+    progress: typing.Any = None,
+    clearance: float = 0.0,
+    even_rays: int = 0,
+) -> typing.Any:
+    """
+    Irradiance of a plane by a light of a size, and where it comes from on the whole.
+
+    Parameters
+    ----------
+    grid : ReceiverGrid
+    light : ExtendedLight
+    occluders : Occluders, optional
+        What casts shadows; None: nothing does.
+    rays : int
+        From each texel, 1 to 4096. Where nothing is in the way the irradiance does not depend on it, and has no noise.
+    seed : int
+        Another one gives other rays.
+    threads : int
+        0: all. The result is the same, bit for bit, for any number.
+    progress : callable, optional
+        progress(fraction) returns False to stop.
+    clearance : float
+        How far off the plane shadow rays start, in metres, besides what rounding needs.
+    even_rays : int
+        First, a look by so many rays: where they, and those of the texels around, all met light or all an obstacle, they are
+        enough, and `rays` are traced from the other texels only. 0: from all.
+
+    Returns
+    -------
+    irradiance : ndarray, float32, shape (height, width, 3)
+        W/m^2: cosine and visible part included. Row 0 is the lowest row.
+    flow : ndarray, float32, shape (height, width, 3)
+        The sum over the rays of luminance (of linear Rec. 709) of the irradiance times unit vector of travel in the plane
+        frame (x_axis, y_axis, normal), W/m^2.
+
+    Raises
+    ------
+    ValueError
+        An argument is out of range; the message names it.
+    Cancelled
+        `progress` returned False.
+    """
+
 def half_lines(half: numpy.ndarray, size: int, instruction_set: str = "") -> numpy.ndarray:
     """
     Inverse of `real_lines` but for a factor: complex64 (N, size // 2 + 1) to `size` times float32 (N, size).
@@ -865,6 +1158,26 @@ def interpolate(
     ------
     ValueError
         Names the argument, its value and what is allowed: outside of the samples, their span.
+    """
+
+def ray_layers(
+    grid: ReceiverGrid,
+    light: ExtendedLight,
+    occluders: Occluders = None,
+    rays: int = 16,
+    seed: int = 0,
+    threads: int = 0,
+    progress: typing.Any = None,
+    clearance: float = 0.0,
+) -> typing.Any:
+    """
+    The rays of `gather_rays` one by one; arguments as there, but for `even_rays`.
+
+    Returns
+    -------
+    list of (irradiance, direction)
+        One ray of each texel: ndarrays, float32, shape (height, width, 3), W/m^2 and unit vectors of travel in the plane
+        frame with z < 0.
     """
 
 def read_exr(path: str, part: str | None = None) -> tuple:

@@ -46,6 +46,18 @@ def spot_falloff() -> str:
     return "scaled" if bpy.app.version >= (3, 5, 0) else "legacy"
 
 
+def world_of(depsgraph):
+    """The evaluated world that a render has, or None (view layers may have their own since Blender 4.4)."""
+    world = getattr(depsgraph.view_layer, "world_override", None) or depsgraph.scene.world
+    return world and world.evaluated_get(depsgraph)
+
+
+def round_lamp_model(light) -> str:
+    """How Cycles shapes a lamp with a radius (see `SphereLight`)."""
+    soft = getattr(light, "use_soft_falloff", bpy.app.version < (4, 0, 0))
+    return "disk" if soft else "sphere"
+
+
 def light_strength(light) -> float:
     """Energy with exposure (Blender 4.5 on) applied."""
     return light.energy * 2.0 ** getattr(light, "exposure", 0.0)

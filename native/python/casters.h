@@ -43,8 +43,11 @@ void bind_ldf_interpolate(py::module_& m);
 void bind_image(py::module_& m);
 void bind_lights(py::module_& m);
 void bind_occluders(py::module_& m);
+void bind_extended_lights(py::module_& m);
+void bind_rays(py::module_& m);
 void bind_scene(py::module_& m);
 void bind_solve(py::module_& m);
+void bind_light_field(py::module_& m);
 void bind_fft(py::module_& m);
 
 }  // namespace beamspread

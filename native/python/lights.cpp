@@ -1,7 +1,8 @@
-// Python names of the lights in native/scene: Light, SunLight, PointLight, SpotLight.
+// Python names of the lights without size in native/scene: Light, SunLight, PointLight, SpotLight.
 #include <memory>
 #include <optional>
 
+#include "python/spot.h"
 #include "python/vectors.h"
 #include "scene/point_light.h"
 #include "scene/receiver.h"
@@ -11,26 +12,6 @@
 namespace beamspread {
 
 namespace {
-
-// Rows of the array become columns of the matrix: both are the lamp's axes.
-Mat3 to_axes(const std::string& name, const Numbers& numbers)
-{
-    if (numbers.ndim() != 2 || numbers.shape(0) != 3 || numbers.shape(1) != 3)
-        reject(name, shape_text(numbers), "3 x 3 numbers");
-    Mat3 axes;
-    for (int i = 0; i < 3; ++i)
-        axes[i] = {numbers.at(i, 0), numbers.at(i, 1), numbers.at(i, 2)};
-    return axes;
-}
-
-SpotFalloff to_falloff(const std::string& name)
-{
-    if (name == "scaled")
-        return SpotFalloff::scaled;
-    if (name == "legacy")
-        return SpotFalloff::legacy;
-    reject("falloff", "'" + name + "'", "'scaled' or 'legacy'");
-}
 
 std::unique_ptr<SunLight> make_sun(const Numbers& direction)
 {
@@ -45,8 +26,7 @@ std::unique_ptr<PointLight> make_point(const Numbers& position)
 std::unique_ptr<SpotLight> make_spot(const Numbers& position, const Numbers& frame, double spot_size, double blend,
                                      const std::string& falloff)
 {
-    return std::make_unique<SpotLight>(to_vec3("position", position), to_axes("frame", frame), spot_size, blend,
-                                       to_falloff(falloff));
+    return std::make_unique<SpotLight>(to_vec3("position", position), to_spot_cone(frame, spot_size, blend, falloff));
 }
 
 std::optional<py::tuple> position_in(const Light& light, const ReceiverGrid& grid)

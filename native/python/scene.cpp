@@ -112,6 +112,7 @@ ValueError
              py::arg("pitch_x"), py::arg("pitch_y"), py::arg("width"), py::arg("height"));
 
     bind_lights(m);
+    bind_extended_lights(m);
     m.def("gather_beams", &gather_beams, py::arg("grid"), py::arg("light"), py::arg("occluders") = py::none(),
           py::arg("samples") = 4, py::arg("threads") = 0, py::arg("progress") = py::none(), py::arg("clearance") = 0.0,
           py::arg("find_shadows") = true, py::arg("directions") = true,

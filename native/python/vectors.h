@@ -36,4 +36,15 @@ inline Vec3 to_vec3(const std::string& name, const Numbers& numbers)
     return {numbers.at(0), numbers.at(1), numbers.at(2)};
 }
 
+// Rows of the array become columns of the matrix: both are the axes of something. Throws InvalidArgument.
+inline Mat3 to_axes(const std::string& name, const Numbers& numbers)
+{
+    if (numbers.ndim() != 2 || numbers.shape(0) != 3 || numbers.shape(1) != 3)
+        reject(name, shape_text(numbers), "3 x 3 numbers");
+    Mat3 axes;
+    for (int i = 0; i < 3; ++i)
+        axes[i] = {numbers.at(i, 0), numbers.at(i, 1), numbers.at(i, 2)};
+    return axes;
+}
+
 }  // namespace beamspread

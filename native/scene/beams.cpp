@@ -184,7 +184,7 @@ private:
             travel[count] = arrival.travel;
             irradiance[count] = arrival.flux * cos_theta;
             if (occluders)
-                rays[count] = shadow_ray(points[i], arrival);
+                rays[count] = shadow_ray(m_grid, m_start, points[i], arrival.travel, arrival.distance);
             ++count;
         }
         sum.is_shaded |= count < subs.size();
@@ -199,17 +199,6 @@ private:
             sum.flow += mean(arriving) * travel[i];
         }
         return sum;
-    }
-
-    ShadowRay shadow_ray(const Vec3& point, const Arrival& arrival) const
-    {
-        const Vec3 lift = m_grid.normal * m_start.height();
-        if (std::isinf(arrival.distance))
-            return {.origin = point + lift, .direction = -arrival.travel, .distance = arrival.distance};
-        const Vec3 way = -arrival.travel * arrival.distance - lift;
-        const double distance = glm::length(way);
-        // Ending short of the lamp by the same margin: one that touches a surface is not shadowed by it.
-        return {.origin = point + lift, .direction = way / distance, .distance = distance - m_start.height()};
     }
 
     // In the plane frame.

@@ -3,6 +3,7 @@
 // In Cycles' units and by Cycles' formulas, like lights without size (light.h).
 #pragma once
 
+#include <memory>
 #include <span>
 
 #include "base/vec.h"
@@ -27,6 +28,22 @@ public:
 
     // Writes a ray for each place of the unit square, from a point of a plane that is lit from the side of its normal.
     virtual void sample(const Vec3& point, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const = 0;
+
+    // W/m^2 at a point of such a plane with nothing in between.
+    virtual Vec3 irradiance(const Vec3& point, const Vec3& normal) const = 0;
+
+    // The same light prepared for all points of planes with that normal, where that pays; null: it needs none.
+    virtual std::unique_ptr<const ExtendedLight> facing(const Vec3& normal) const
+    {
+        static_cast<void>(normal);
+        return nullptr;
+    }
+
+    // How near to a point it may come, at least; within a small part of it the irradiance hardly changes.
+    virtual double distance_from(const Vec3& point) const = 0;
+
+    // Whether it is the same at all points.
+    virtual bool is_far() const { return false; }
 
     // Whether rays of one light differ in colour; else all channels of `flux` are the same.
     virtual bool is_colored() const { return false; }

@@ -1,6 +1,7 @@
 #include "scene/ray_start.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <span>
 
@@ -48,6 +49,18 @@ double rounding_of(const std::array<Vec3, 3>& triangle, const Vec3& origin)
 double rounding_of(const Hull& hull)
 {
     return rounding_at(hull.reach);
+}
+
+ShadowRay shadow_ray(const ReceiverGrid& grid, const RayStart& start, const Vec3& point, const Vec3& travel,
+                     double distance)
+{
+    const Vec3 lift = grid.normal * start.height();
+    if (std::isinf(distance))
+        return {.origin = point + lift, .direction = -travel, .distance = distance};
+    const Vec3 way = -travel * distance - lift;
+    const double length = glm::length(way);
+    // Ending short of the lamp by the same margin: one that touches a surface is not shadowed by it.
+    return {.origin = point + lift, .direction = way / length, .distance = length - start.height()};
 }
 
 RayStart ray_start(const ReceiverGrid& grid, const Occluders* occluders, double clearance)

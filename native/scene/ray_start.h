@@ -19,6 +19,10 @@ struct RayStart {
 double rounding_of(const std::array<Vec3, 3>& triangle, const Vec3& origin);
 double rounding_of(const Hull& hull);
 
+// Towards a light from which light travels along that unit vector to `point` of the grid; the distance may be infinite.
+ShadowRay shadow_ray(const ReceiverGrid& grid, const RayStart& start, const Vec3& point, const Vec3& travel,
+                     double distance);
+
 // `occluders` may be null.
 RayStart ray_start(const ReceiverGrid& grid, const Occluders* occluders, double clearance);
 

@@ -13,11 +13,9 @@ from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.native import native
 from beamspread.core.scene.receiver import build_receiver
 from beamspread.core.scene.uv_map import fit_uv_maps
+from cycles_truth import CYCLES_SAMPLES, TEXELS, add_receiver, cycles_irradiance
 from mathutils import Euler, Matrix
 
-TEXELS = 64
-# Cycles samples each texel at random places; with this many their mean is that of the texel to 0.1 %.
-CYCLES_SAMPLES = 256
 TOLERANCE = 0.01
 
 TILTED = Matrix.Translation((0.3, -0.2, 0.5)) @ Euler((0.5, -0.4, 0.8)).to_matrix().to_4x4()
@@ -67,41 +65,6 @@ def frame_of(plane):
     x_axis = world.col[0].to_3d().normalized()
     axes = Matrix((x_axis, normal.cross(x_axis), normal)).transposed().to_4x4()
     return Matrix.Translation(world.translation) @ axes @ Matrix.Scale(world.col[0].length, 4)
-
-
-def white_material():
-    """White, diffuse, with an image to bake into."""
-    image = bpy.data.images.new("Bake", TEXELS, TEXELS, float_buffer=True, alpha=False)
-    image.colorspace_settings.name = "Non-Color"
-    material = bpy.data.materials.new("White")
-    if bpy.app.version < (5, 0, 0):  # later ones always use nodes, and warn
-        material.use_nodes = True
-    nodes = material.node_tree.nodes
-    nodes.clear()
-    output, diffuse = nodes.new("ShaderNodeOutputMaterial"), nodes.new("ShaderNodeBsdfDiffuse")
-    diffuse.inputs["Color"].default_value = (1, 1, 1, 1)
-    diffuse.inputs["Roughness"].default_value = 0
-    material.node_tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
-    texture = nodes.new("ShaderNodeTexImage")
-    texture.image = image
-    nodes.active = texture
-    return material, image
-
-
-def add_receiver(world, uvs=scenes.SQUARE_UVS):
-    material, image = white_material()
-    return scenes.add_plane("Receiver", (2, 2), world, uvs, material), image
-
-
-def cycles_irradiance(plane, image, samples=CYCLES_SAMPLES):
-    """Pi times what Cycles bakes."""
-    scene = bpy.context.scene
-    scene.cycles.samples = samples
-    scene.cycles.use_adaptive_sampling = False
-    scene.cycles.use_denoising = False
-    scenes.select(plane)
-    bpy.ops.object.bake(type="DIFFUSE", pass_filter={"DIRECT"}, margin=0, use_clear=True)
-    return math.pi * scenes.pixels(image)
 
 
 def our_irradiance(plane):

@@ -147,7 +147,7 @@ def color_of(node, stored: np.ndarray) -> np.ndarray:
     is_data = image.colorspace_settings.is_data
     if image.alpha_mode not in ("NONE", "CHANNEL_PACKED") and not is_data:
         # Cycles works with associated alpha and takes it off again where the node's alpha is used.
-        wants_straight = node.outputs["Alpha"].is_linked
+        wants_straight = "Alpha" in node.outputs and node.outputs["Alpha"].is_linked
         if image.is_float and wants_straight:
             color = color / np.where(alpha > 0, alpha, 1)
         elif not image.is_float and not wants_straight:
@@ -155,3 +155,8 @@ def color_of(node, stored: np.ndarray) -> np.ndarray:
     if not (is_data or image.is_float or image.colorspace_settings.name.startswith("Linear")):
         color = np.where(color <= 0.04045, color / 12.92, ((np.maximum(color, 0) + 0.055) / 1.055) ** 2.4)
     return color
+
+
+def outputs_of(node, stored: np.ndarray) -> dict[str, np.ndarray]:
+    """Color and Alpha of pixels as stored, or as interpolated between these."""
+    return {"Color": color_of(node, stored), "Alpha": alpha_of(node, stored[..., 3:])}

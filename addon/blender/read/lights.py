@@ -1,92 +1,96 @@
-"""The light of a scene. A new kind is a function here, its line in `READERS`, and its class in core."""
+"""The light of a scene: its lamps, its glowing meshes and its world, and what casts shadows."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import bpy
 import numpy as np
 
 from ...core.scene.illumination import Illumination
-from ...core.scene.lights import Light, PointLight, SpotLight, SunLight
+from ...core.scene.lights import Light
 from .. import compat
+from .emitters import Glow
+from .geometry import GEOMETRY_TYPES
+from .lamps import is_portal, read_lamp
+from .linking import links_of
 from .occluders import OccluderReader
+from .textures import Images
 from .visible import render_visible_names, renders
-
-
-def _sun(_data, axes: np.ndarray, common: tuple) -> SunLight:
-    with np.errstate(invalid="ignore"):  # a scale of zero; see Light.fault
-        travel = -axes[:3, 2] / np.linalg.norm(axes[:3, 2])
-    return SunLight(*common, tuple(travel.tolist()))
-
-
-def _point(_data, axes: np.ndarray, common: tuple) -> PointLight:
-    return PointLight(*common, tuple(axes[:3, 3].tolist()))
-
-
-def _spot(data, axes: np.ndarray, common: tuple) -> SpotLight:
-    frame = tuple(tuple(row) for row in axes[:3, :3].T.tolist())
-    cone = frame, data.spot_size, data.spot_blend, compat.spot_falloff()
-    return SpotLight(*common, tuple(axes[:3, 3].tolist()), *cone)
-
-
-# By Blender's type: (light data, matrix to the world, name, strength, color and shadow) -> Light.
-READERS = {"SUN": _sun, "POINT": _point, "SPOT": _spot}
+from .world import read_world
 
 
 def read_illumination(depsgraph) -> Illumination:
     """Lights and shadow casters of all objects and instances that render."""
     visible = render_visible_names(depsgraph.view_layer)
-    lights, warnings, occluders = [], [], OccluderReader()
+    lights, occluders = _Lights(depsgraph), OccluderReader()
     for instance in depsgraph.object_instances:
         if not renders(instance, visible):
             continue
         obj = instance.object
-        if obj.type == "LIGHT":
-            lights.append(_read_light(obj, instance.matrix_world, warnings))
-        else:
-            occluders.add(instance)
+        # Of an instance Cycles asks the instancer too.
+        lights_surfaces = obj.visible_diffuse and (not instance.is_instance or instance.parent.visible_diffuse)
+        if obj.type == "LIGHT" and lights_surfaces:
+            lights.add_lamp(obj, instance.matrix_world)
+        elif obj.type in GEOMETRY_TYPES and lights_surfaces:
+            lights.add_mesh(obj, instance.matrix_world)
+        occluders.add(instance)
+    lights.add_world(depsgraph.view_layer, compat.world_of(depsgraph))
     return Illumination(
-        [light for light in lights if light is not None],
+        lights.all(),
         occluders.occluders(),
-        tuple(dict.fromkeys(warnings + occluders.warnings)),
+        (*lights.warnings, *dict.fromkeys(occluders.warnings)),
         compat.transparent_bounces(depsgraph.scene),
+        lights.by_cycles,
     )
 
 
-def _read_light(obj, matrix, warnings: list[str]) -> Light | None:
-    """The light, or None if it is dark or left out; `warnings` then has a sentence that says so."""
-    data = obj.data
-    strength, color = compat.light_strength(data), compat.light_color(data)
-    if data.use_nodes and data.node_tree is not None:
-        factor, node_color, understood = _nodes(data.node_tree)
-        if not understood:
-            warnings.append(f"The nodes of the light '{obj.name}' are not understood: only its plain light counts.")
-        strength *= factor
-        color = tuple(a * b for a, b in zip(color, node_color))
-    if strength == 0 or not any(color):
-        return None
-    if data.type not in READERS:
-        kinds = ", ".join(READERS).lower()
-        left_out = f"The {data.type.lower()} light '{obj.name}' is left out"
-        warnings.append(f"{left_out}: only lights of these kinds can be baked so far: {kinds}.")
-        return None
-    common = obj.name, strength, color, compat.light_casts_shadow(data)
-    light = READERS[data.type](data, np.array(matrix, dtype=float), common)
-    fault = light.fault()
-    if fault:
-        warnings.append(f"The light '{obj.name}' is left out: {fault}.")
-        return None
-    return light
+class _Lights:
+    """What was read so far, and what there is to say about it."""
 
+    def __init__(self, depsgraph) -> None:
+        self._names = {one.name for one in depsgraph.ids if isinstance(one, bpy.types.Object)}
+        self._lights: list[Light] = []
+        self._glows: dict[str, Glow] = {}
+        self._links: dict[str, dict] = {}
+        self._images = Images()
+        self.warnings: dict[str, None] = {}  # in order, each once
+        self.by_cycles: dict[str, str] = {}  # see Illumination
 
-def _nodes(tree) -> tuple[float, tuple[float, float, float], bool]:
-    """Strength and colour that a light's nodes multiply it with, and whether they were understood."""
-    plain = 1.0, (1.0, 1.0, 1.0), False
-    output = tree.get_output_node("ALL")
-    if output is None or not output.inputs["Surface"].is_linked:
-        return 0.0, (0.0, 0.0, 0.0), True
-    emission = output.inputs["Surface"].links[0].from_node
-    if emission.bl_idname != "ShaderNodeEmission":
-        return plain
-    color, strength = emission.inputs["Color"], emission.inputs["Strength"]
-    if color.is_linked or strength.is_linked:
-        return plain
-    return float(strength.default_value), tuple(color.default_value)[:3], True
+    def all(self) -> list[Light]:
+        glowing = [glow.light((name, 1.0, (1.0, 1.0, 1.0), True)) for name, glow in self._glows.items()]
+        for light in filter(None, glowing):
+            self._add(light, self._links[light.name])
+        return self._lights
+
+    def add_lamp(self, obj, matrix) -> None:
+        if is_portal(obj.data):
+            return
+        light, reason = read_lamp(obj, matrix)
+        if reason:
+            self.by_cycles[obj.name] = f"The light '{obj.name}' counts as if it had no nodes: {reason} not understood."
+        if light is not None:
+            self._add(light, links_of(obj, self._names))
+
+    def add_mesh(self, obj, matrix) -> None:
+        """Instances of a mesh become one light."""
+        if obj.name not in self._glows:
+            self._glows[obj.name] = glow = Glow(obj, self._images)
+            self._links[obj.name] = links_of(obj, self._names)
+            if glow.reason:
+                self.by_cycles[obj.name] = f"What glows of '{obj.name}' is left out: {glow.reason} not understood."
+        self._glows[obj.name].place(np.array(matrix, dtype=float))
+
+    def add_world(self, view_layer, world) -> None:
+        light, reason = read_world(view_layer, world, self._images)
+        if reason:
+            self.by_cycles[world.name] = f"The world '{world.name}' is left out: {reason} not understood."
+        if light is not None:
+            self._add(light, {})
+
+    def _add(self, light: Light, links: dict) -> None:
+        fault = light.fault()
+        if fault:
+            self.warnings[f"The light '{light.name}' is left out: {fault}."] = None
+        else:
+            self._lights.append(replace(light, **links))

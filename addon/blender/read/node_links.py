@@ -5,6 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 
+# What a bake is shown by is no light, and lets none through: its tree counts for nothing.
+OWN_NODE = "BeamspreadNode"
+
+
 class End(NamedTuple):
     """A node's output, or an input without link, whose own value counts; `groups` are the group nodes around it."""
 
@@ -43,7 +47,7 @@ def follow(wanted: Wanted) -> End:
             socket = node.inputs[0]
         elif node.type == "GROUP_INPUT" and groups:
             socket, groups = _same(groups[-1].inputs, socket), groups[:-1]
-        elif getattr(node, "node_tree", None) is not None:
+        elif getattr(node, "node_tree", None) is not None and node.bl_idname != OWN_NODE:
             output = next(
                 (one for one in node.node_tree.nodes if one.type == "GROUP_OUTPUT" and one.is_active_output), None
             )

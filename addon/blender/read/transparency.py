@@ -14,7 +14,7 @@ from ...core.native import native
 from .. import compat
 from .image_texture import NotUnderstoodError, Pixels, TexturePlace
 from .node_links import Wanted, follow
-from .node_values import FINE_SIDE, Values
+from .texels import FINE_SIDE, Texels
 
 # A size that tells what comes from images from what is constant.
 PROBE = (2, 2)
@@ -70,18 +70,18 @@ class Materials:
     def _evaluate(self, surface: Wanted) -> LetThrough:
         pixels = Pixels()  # of this material alone: they may take gigabytes
         # Once to see which images there are, then at the texels of the largest of them, or between.
-        values = Values(pixels, PROBE)
+        values = Texels(pixels, PROBE)
         transmittance = transparency(values, surface)
         place = values.place
         if place is None:
             return LetThrough(native.Transmittance(_color(transmittance)))
         finer = max(1, FINE_SIDE // max(values.largest)) if values.is_bent else 1
         size = tuple(side * finer for side in values.largest)
-        texels = _in_range(transparency(Values(pixels, size), surface))
+        texels = _in_range(transparency(Texels(pixels, size), surface))
         if (texels[..., :1] == texels).all():
             texels = texels[..., :1]
         texels = np.ascontiguousarray(texels, np.float32)
-        outside = _color(transparency(Values(pixels, is_outside=True), surface))
+        outside = _color(transparency(Texels(pixels, is_outside=True), surface))
         image = native.Transmittance.from_image(texels, place.extension, place.is_smooth, outside)
         return LetThrough(image, place)
 
@@ -94,8 +94,8 @@ def _color(transmittance: np.ndarray) -> list[float]:
     return np.broadcast_to(_in_range(transmittance)[0, 0], 3).tolist()
 
 
-def transparency(values: Values, wanted: Wanted) -> np.ndarray:
-    """The weight of a shader's transparent closures, as of `Values`."""
+def transparency(values: Texels, wanted: Wanted) -> np.ndarray:
+    """The weight of a shader's transparent closures, as of `Texels`."""
     end = follow(wanted)
     if not end.socket.is_output or end.node.mute:
         return BLACK

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
+from copy import copy
 
 import numpy as np
 
@@ -24,6 +25,7 @@ class Illumination:
     ----------
     lights : those that can be baked.
     warnings : sentences that name what is left out.
+    by_cycles : names of the lights that only Cycles knows, each with the sentence that says what counts instead.
     """
 
     def __init__(
@@ -32,14 +34,49 @@ class Illumination:
         occluders: Sequence[Occluder] | Mesh | None = None,
         warnings: Sequence[str] = (),
         most_crossings: int | None = None,
+        by_cycles: Mapping[str, str] | None = None,
     ) -> None:
         """`most_crossings`: light that crossed so many see-through surfaces ends at the next; None: it never does."""
         self.lights = tuple(lights)
-        self.warnings = tuple(warnings)
+        self.by_cycles = dict(by_cycles or {})
+        self.warnings = (*warnings, *self.by_cycles.values())
         self._occluders = (Occluder("", occluders),) if isinstance(occluders, Mesh) else tuple(occluders or ())
         self._most_crossings = most_crossings
+        # By origin and names of the blockers, all of the same origin.
         self._casters: dict = {}
-        self._origin = None
+
+    def lighting(self, receiver: str) -> Illumination:
+        """The same without the lights that are not linked to an object of that name; shares the hierarchies."""
+        linked = copy(self)
+        linked.lights = tuple(one for one in self.lights if one.receivers is None or receiver in one.receivers)
+        return linked
+
+    def found(self, names: Collection[str]) -> Illumination:
+        """The same where Cycles takes over those lights of `by_cycles`: what counted instead is gone."""
+        rest = copy(self)
+        said = {self.by_cycles[name] for name in names}
+        rest.by_cycles = {name: why for name, why in self.by_cycles.items() if name not in names}
+        rest.warnings = tuple(one for one in self.warnings if one not in said)
+        rest.lights = tuple(light for light in self.lights if light.name not in names)
+        return rest
+
+    def warning(self, *sentences: str) -> Illumination:
+        """The same with more to say."""
+        more = copy(self)
+        more.warnings = tuple(dict.fromkeys((*self.warnings, *sentences)))
+        return more
+
+    def lit_by(self, lights: Sequence[Light]) -> Illumination:
+        """The same with more lights."""
+        more = copy(self)
+        more.lights = (*self.lights, *lights)
+        return more
+
+    @property
+    def triangle_count(self) -> int:
+        """Of all that can stand in the light's way, those of instances each counted."""
+        placed = [(one.mesh, 1 if one.placements is None else len(one.placements)) for one in self._occluders]
+        return sum(count * len(mesh.triangles) for mesh, count in placed)
 
     def caster(self, grid: Grid, light: Light | None = None):
         """The native `Occluders` that may block the light, with its origin near the receiver; None without triangles.
@@ -50,13 +87,12 @@ class Illumination:
         """
         step = TEXELS_BETWEEN_ORIGINS * 2.0 ** math.ceil(math.log2(min(grid.pitch_x, grid.pitch_y)))
         origin = tuple(step * np.round(grid.centre / step))
-        if self._origin != origin:
+        if any(known != origin for known, _ in self._casters):
             self._casters.clear()  # before others are made: each may take gigabytes
-            self._origin = origin
-        blockers = getattr(light, "blockers", None)
+        blockers = light.blockers if light else None
         names = {occluder.name for occluder in self._occluders}
         chosen = None if blockers is None or names <= blockers else frozenset(names & blockers)
-        if chosen not in self._casters:
+        if (origin, chosen) not in self._casters:
             occluders = [one for one in self._occluders if chosen is None or one.name in chosen]
-            self._casters[chosen] = build(occluders, origin, self._most_crossings)
-        return self._casters[chosen]
+            self._casters[origin, chosen] = build(occluders, origin, self._most_crossings)
+        return self._casters[origin, chosen]

@@ -1,0 +1,97 @@
+"""Blender's lights. A new kind is a function here and its line in `READERS`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...core.scene.lights import (
+    AreaLight,
+    Light,
+    PointLight,
+    SphereLight,
+    SphereSpotLight,
+    SpotLight,
+    SunDiskLight,
+    SunLight,
+)
+from .. import compat
+from .image_texture import NotUnderstoodError
+from .places import Places
+from .shaders import radiance, surface_of
+
+
+def _frame(axes: np.ndarray) -> tuple:
+    return tuple(tuple(row) for row in axes[:3, :3].T.tolist())
+
+
+def _position(axes: np.ndarray) -> tuple:
+    return tuple(axes[:3, 3].tolist())
+
+
+def _sun(data, axes: np.ndarray, common: tuple) -> Light:
+    with np.errstate(invalid="ignore"):  # a scale of zero; see Light.fault
+        travel = -axes[:3, 2] / np.linalg.norm(axes[:3, 2])
+    direction = tuple(travel.tolist())
+    return SunDiskLight(*common, direction, data.angle) if data.angle > 0 else SunLight(*common, direction)
+
+
+def _point(data, axes: np.ndarray, common: tuple) -> Light:
+    if data.shadow_soft_size > 0:
+        return SphereLight(*common, _position(axes), data.shadow_soft_size, compat.round_lamp_model(data))
+    return PointLight(*common, _position(axes))
+
+
+def _spot(data, axes: np.ndarray, common: tuple) -> Light:
+    cone = _frame(axes), data.spot_size, data.spot_blend, compat.spot_falloff()
+    if data.shadow_soft_size > 0:
+        ball = data.shadow_soft_size, compat.round_lamp_model(data)
+        return SphereSpotLight(*common, _position(axes), *cone, *ball)
+    return SpotLight(*common, _position(axes), *cone)
+
+
+def _area(data, axes: np.ndarray, common: tuple) -> Light:
+    size_y = data.size_y if data.shape in ("RECTANGLE", "ELLIPSE") else data.size
+    is_round = data.shape in ("DISK", "ELLIPSE")
+    return AreaLight(*common, _position(axes), _frame(axes), data.size, size_y, is_round, data.spread)
+
+
+# By Blender's type: (light data, matrix to the world, name, strength, color and shadow) -> Light.
+READERS = {"SUN": _sun, "POINT": _point, "SPOT": _spot, "AREA": _area}
+
+
+def is_portal(data) -> bool:
+    """Whether a lamp only shows Cycles where the world's light comes in."""
+    return data.type == "AREA" and data.cycles.is_portal
+
+
+def read_lamp(obj, matrix) -> tuple[Light | None, str]:
+    """The light, or None if it is dark; and why only Cycles knows how it shines, if so: then it is as without nodes."""
+    data, axes = obj.data, np.array(matrix, dtype=float)
+    color, reason = np.array(compat.light_color(data)), ""
+    if data.use_nodes and data.node_tree is not None:
+        surface = surface_of(data.node_tree)
+        try:
+            color = color * (0 if surface is None else radiance(Places(), surface))
+        except NotUnderstoodError as error:
+            reason = str(error)
+    strength = compat.light_strength(data) * _area_factor(data, axes)
+    if strength == 0 or not color.any():
+        return None, ""
+    common = obj.name, strength, tuple(color.tolist()), compat.light_casts_shadow(data)
+    return READERS[data.type](data, axes, common), reason
+
+
+def _area_factor(data, axes: np.ndarray) -> float:
+    """What a light without `normalize` is brighter by (Blender 4.5 on): its area as Cycles counts it, measured."""
+    if getattr(data, "normalize", True):
+        return 1.0
+    if data.type == "SUN":
+        return math.pi * math.sin(0.5 * data.angle) ** 2 or 1.0
+    if data.type == "AREA":
+        size_y = data.size_y if data.shape in ("RECTANGLE", "ELLIPSE") else data.size
+        part = 0.25 * math.pi if data.shape in ("DISK", "ELLIPSE") else 1.0
+        return part * data.size * size_y * math.prod(np.linalg.norm(axes[:3, :2], axis=0))
+    # Without a radius it is as of one watt per steradian and square metre.
+    return 4 * math.pi * data.shadow_soft_size**2 or 4.0

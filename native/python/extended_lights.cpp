@@ -1,0 +1,237 @@
+// Python names of the lights of a size in native/scene.
+#include <memory>
+#include <vector>
+
+#include "base/constants.h"
+
+#include "python/spot.h"
+#include "python/vectors.h"
+#include "scene/area_light.h"
+#include "scene/environment_light.h"
+#include "scene/mesh_light.h"
+#include "scene/sphere_spot_light.h"
+#include "scene/sun_disk_light.h"
+
+namespace beamspread {
+
+namespace {
+
+static_assert(sizeof(Vec3) == 3 * sizeof(double) && sizeof(Vec3f) == 3 * sizeof(float));
+
+std::unique_ptr<SunDiskLight> make_sun(const Numbers& direction, double angle, const std::string& disk)
+{
+    if (disk != "even" && disk != "flat")
+        reject("disk", "'" + disk + "'", "'even' or 'flat'");
+    return std::make_unique<SunDiskLight>(to_vec3("direction", direction), angle,
+                                          disk == "even" ? SunDisk::even : SunDisk::flat);
+}
+
+SphereModel to_model(const std::string& name)
+{
+    if (name != "sphere" && name != "disk")
+        reject("model", "'" + name + "'", "'sphere' or 'disk'");
+    return name == "sphere" ? SphereModel::sphere : SphereModel::disk;
+}
+
+std::unique_ptr<SphereLight> make_sphere(const Numbers& position, double radius, const std::string& model)
+{
+    return std::make_unique<SphereLight>(to_vec3("position", position), radius, to_model(model));
+}
+
+std::unique_ptr<SphereSpotLight> make_sphere_spot(const Numbers& position, const Numbers& frame, double spot_size,
+                                                  double blend, const std::string& falloff, double radius,
+                                                  const std::string& model)
+{
+    return std::make_unique<SphereSpotLight>(to_vec3("position", position),
+                                             to_spot_cone(frame, spot_size, blend, falloff), radius, to_model(model));
+}
+
+std::unique_ptr<AreaLight> make_area(const Numbers& position, const Numbers& frame, double size_x, double size_y,
+                                     bool is_round, double spread)
+{
+    return std::make_unique<AreaLight>(to_vec3("position", position), to_axes("frame", frame), size_x, size_y, is_round,
+                                       spread);
+}
+
+std::unique_ptr<EnvironmentLight> make_environment(const py::array& radiance, const Numbers& to_world)
+{
+    if (!py::isinstance<Array<float>>(radiance) || radiance.ndim() != 3 || radiance.shape(2) != 3 ||
+        radiance.size() == 0)
+        reject("radiance", shape_text(radiance), "contiguous float32 (H, W, 3) with a pixel or more");
+    const View2D<const Vec3f> pixels{static_cast<const Vec3f*>(radiance.data()),
+                                     static_cast<std::size_t>(radiance.shape(0)),
+                                     static_cast<std::size_t>(radiance.shape(1)), radiance.shape(1)};
+    // Its rows are those of the matrix.
+    return std::make_unique<EnvironmentLight>(pixels, glm::transpose(to_axes("to_world", to_world)));
+}
+
+std::unique_ptr<MeshLight> make_mesh(const py::array& vertices, const py::array& triangles, const py::array& radiance)
+{
+    const auto coordinates = to_rows<double>("vertices", vertices, 3, "contiguous float64 (N, 3)");
+    const auto indices = to_rows<std::uint32_t>("triangles", triangles, 3, "contiguous uint32 (M, 3)");
+    const auto glow = to_rows<float>("radiance", radiance, 3, "contiguous float32 (M, 3)");
+    return std::make_unique<MeshLight>(
+        std::span(reinterpret_cast<const Vec3*>(coordinates.data()), coordinates.size() / 3),
+        std::span(reinterpret_cast<const MeshLight::Triangle*>(indices.data()), indices.size() / 3),
+        std::span(reinterpret_cast<const Vec3f*>(glow.data()), glow.size() / 3));
+}
+
+py::tuple irradiance(const ExtendedLight& light, const Numbers& point, const Numbers& normal)
+{
+    const Vec3 light_there = light.irradiance(to_vec3("point", point), to_vec3("normal", normal));
+    return py::make_tuple(light_there.x, light_there.y, light_there.z);
+}
+
+py::tuple sample(const ExtendedLight& light, const Numbers& point, const Numbers& normal, const py::array& square)
+{
+    const auto places = to_rows<double>("square", square, 2, "contiguous float64 (N, 2)");
+    static_assert(sizeof(Vec2) == 2 * sizeof(double));
+    std::vector<LightRay> rays(places.size() / 2);
+    light.sample(to_vec3("point", point), to_vec3("normal", normal),
+                 {reinterpret_cast<const Vec2*>(places.data()), rays.size()}, rays.data());
+    const auto count = static_cast<py::ssize_t>(rays.size());
+    Array<double> travel({count, py::ssize_t{3}});
+    Array<double> distance(count);
+    Array<float> flux({count, py::ssize_t{3}});
+    for (py::ssize_t i = 0; i < count; ++i) {
+        const LightRay& ray = rays[static_cast<std::size_t>(i)];
+        distance.mutable_at(i) = ray.distance;
+        for (int k = 0; k < 3; ++k) {
+            travel.mutable_at(i, k) = ray.travel[k];
+            flux.mutable_at(i, k) = ray.flux[k];
+        }
+    }
+    return py::make_tuple(travel, distance, flux);
+}
+
+}  // namespace
+
+void bind_extended_lights(py::module_& m)
+{
+    py::class_<ExtendedLight>(m, "ExtendedLight", R"(A light of a size; its kinds are SunDiskLight, SphereLight,
+SphereSpotLight, AreaLight, EnvironmentLight and MeshLight. Each raises ValueError for an argument that is out of range,
+with a message that names it.
+)")
+        .def_property_readonly("is_colored", &ExtendedLight::is_colored, "bool: whether its rays differ in colour.")
+        .def("irradiance", &irradiance, py::arg("point"), py::arg("normal"),
+             R"(What reaches a point with nothing in between.
+
+Parameters
+----------
+point : 3 floats
+    In the world, metres.
+normal : 3 floats
+    Unit vector out of the lit side of the plane there.
+
+Returns
+-------
+tuple of 3 floats
+    W/m^2 in each channel.
+)")
+        .def("sample", &sample, py::arg("point"), py::arg("normal"), py::arg("square"),
+             R"(Rays from a point towards the light.
+
+Parameters
+----------
+point, normal
+    Those of `irradiance`.
+square : ndarray, float64, shape (N, 2), C-contiguous
+    Places in the unit square; even ones give the density of rays that `flux` stands for.
+
+Returns
+-------
+travel : ndarray, float64, shape (N, 3)
+    Unit vectors along which the light travels, world.
+distance : ndarray, float64, shape (N,)
+    To the light, metres.
+flux : ndarray, float32, shape (N, 3)
+    W/m^2 on a square metre that faces the ray, over the density of rays: the mean of flux times cosine to the normal is
+    the irradiance.
+)");
+
+    py::class_<SunDiskLight, ExtendedLight>(m, "SunDiskLight", R"(Light of 1 W/m^2 from a disk infinitely far away.
+
+Parameters
+----------
+direction : 3 floats
+    Of travel in the world from the disk's centre, any length but 0.
+angle : float
+    Full angle of the disk in radians, 0 to pi.
+disk : str
+    "even": of even radiance, and 1 W/m^2 at normal incidence, as Cycles in Blender 4.5. "flat": each part of a flat
+    disk gives the same flux, as in 3.4; E at normal incidence is smaller, by 1.7 % for an angle of 30 degrees.
+)")
+        .def(py::init(&make_sun), py::arg("direction"), py::arg("angle"), py::arg("disk") = "even");
+
+    py::class_<SphereLight, ExtendedLight>(m, "SphereLight", R"(A point lamp of 1 W with a radius.
+
+Parameters
+----------
+position : 3 floats
+    Of its centre in the world, metres.
+radius : float
+    In metres, 0 or more.
+model : str
+    "sphere"; or "disk", which faces each point that it lights.
+)")
+        .def(py::init(&make_sphere), py::arg("position"), py::arg("radius"), py::arg("model"));
+
+    py::class_<SphereSpotLight, ExtendedLight>(m, "SphereSpotLight", R"(A spot lamp of 1 W with a radius.
+
+Parameters
+----------
+position, frame, spot_size, blend, falloff
+    Those of `SpotLight`.
+radius, model
+    Those of `SphereLight`.
+)")
+        .def(py::init(&make_sphere_spot), py::arg("position"), py::arg("frame"), py::arg("spot_size"), py::arg("blend"),
+             py::arg("falloff"), py::arg("radius"), py::arg("model"));
+
+    py::class_<AreaLight, ExtendedLight>(m, "AreaLight",
+                                         R"(An area lamp of 1 W as Blender counts it: of the radiance 1 W / (4 area).
+
+Parameters
+----------
+position : 3 floats
+    Of its centre in the world, metres.
+frame : (3, 3) floats
+    Rows: the lamp's x, y and z axes in the world with their scale (the columns of its 3 x 3 world matrix). It shines
+    along -z.
+size_x, size_y : float
+    Whole lengths along its own axes, 0 or more; without an area it is dark.
+is_round : bool
+    An ellipse instead of a rectangle.
+spread : float
+    Full angle that light leaves in, radians, 0 to pi.
+)")
+        .def(py::init(&make_area), py::arg("position"), py::arg("frame"), py::arg("size_x"), py::arg("size_y"),
+             py::arg("is_round") = false, py::arg("spread") = pi);
+
+    py::class_<EnvironmentLight, ExtendedLight>(m, "EnvironmentLight", R"(Light from all directions.
+
+Parameters
+----------
+radiance : ndarray, float32, shape (H, W, 3), C-contiguous
+    W/(m^2 sr), 0 or more, equirectangular: from row 0 up the elevation rises from -pi/2 to pi/2, along a row the
+    azimuth falls from pi to -pi. Copied.
+to_world : (3, 3) floats
+    Matrix that turns directions of the image into the world.
+)")
+        .def(py::init(&make_environment), py::arg("radiance"), py::arg("to_world"));
+
+    py::class_<MeshLight, ExtendedLight>(m, "MeshLight", R"(Triangles that glow on both sides.
+
+Parameters
+----------
+vertices : ndarray, float64, shape (N, 3), C-contiguous
+    World positions in metres. Copied.
+triangles : ndarray, uint32, shape (M, 3), C-contiguous
+    Vertex indices. Copied.
+radiance : ndarray, float32, shape (M, 3), C-contiguous
+    Of each triangle, W/(m^2 sr), 0 or more. Copied.
+)")
+        .def(py::init(&make_mesh), py::arg("vertices"), py::arg("triangles"), py::arg("radiance"));
+}
+
+}  // namespace beamspread

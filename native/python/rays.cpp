@@ -1,0 +1,182 @@
+// Python names of the rays in native/scene: gather_rays, ray_layers.
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "python/casters.h"
+#include "scene/ray_gather.h"
+
+namespace beamspread {
+
+namespace {
+
+// Rows of vectors of one ray, or of the sum of all.
+class Field {
+public:
+    explicit Field(const ReceiverGrid& grid)
+        : m_array({static_cast<py::ssize_t>(grid.height), static_cast<py::ssize_t>(grid.width), py::ssize_t{3}}),
+          m_data(m_array.mutable_data()),
+          m_row(3 * grid.width)
+    {
+        std::fill_n(m_data, m_array.size(), 0.0f);
+    }
+
+    const Array<float>& array() const { return m_array; }
+    Vec3f* row(std::size_t y) const
+    {
+        static_assert(sizeof(Vec3f) == 3 * sizeof(float));
+        return reinterpret_cast<Vec3f*>(m_data + y * m_row);
+    }
+
+private:
+    Array<float> m_array;
+    float* m_data;
+    std::size_t m_row;
+};
+
+// Adds all rays of a texel up.
+class Sum final : public RaySink {
+public:
+    explicit Sum(const ReceiverGrid& grid) : m_irradiance(grid), m_flow(grid) {}
+
+    void add(const RayRow& row) override
+    {
+        Vec3f* const irradiance = m_irradiance.row(row.y);
+        Vec3f* const flow = m_flow.row(row.y);
+        for (std::size_t x = 0; x < row.width; ++x) {
+            const Vec3f& light = row.irradiance[x];
+            irradiance[x] += light;
+            flow[x] += glm::dot(light, luminance) * row.travel[x];
+        }
+    }
+
+    py::object result() const { return py::make_tuple(m_irradiance.array(), m_flow.array()); }
+
+private:
+    // Of linear sRGB (Rec. 709).
+    static constexpr Vec3f luminance{0.2126f, 0.7152f, 0.0722f};
+
+    Field m_irradiance, m_flow;
+};
+
+// Keeps each ray of a texel.
+class Layers final : public RaySink {
+public:
+    Layers(const ReceiverGrid& grid, int rays) : m_next(grid.height)
+    {
+        for (int i = 0; i < rays; ++i)
+            m_layers.emplace_back(Field(grid), Field(grid));
+    }
+
+    void add(const RayRow& row) override
+    {
+        const auto& [irradiance, direction] = m_layers[m_next[row.y]++];
+        std::copy_n(row.irradiance, row.width, irradiance.row(row.y));
+        std::copy_n(row.travel, row.width, direction.row(row.y));
+    }
+
+    py::object result() const
+    {
+        py::list layers;
+        for (const auto& [irradiance, direction] : m_layers)
+            layers.append(py::make_tuple(irradiance.array(), direction.array()));
+        return layers;
+    }
+
+private:
+    std::vector<std::pair<Field, Field>> m_layers;
+    std::vector<std::size_t> m_next;  // ray of each row
+};
+
+void check_rays(int rays)
+{
+    if (rays < 1 || rays > max_rays)
+        reject("rays", rays, "1 to " + std::to_string(max_rays));
+}
+
+template <class Sink>
+py::object gather(const ReceiverGrid& grid, const ExtendedLight& light, const Occluders* occluders,
+                  const RaySettings& settings, const py::object& callback, Sink& sink)
+{
+    Progress progress(progress_callback(callback));
+    {
+        const py::gil_scoped_release released;
+        gather_rays(grid, light, occluders, settings, sink, progress);
+    }
+    return sink.result();
+}
+
+py::object gather_sum(const ReceiverGrid& grid, const ExtendedLight& light, const Occluders* occluders, int rays,
+                      std::uint32_t seed, int threads, const py::object& callback, double clearance, int even_rays)
+{
+    Sum sum(grid);
+    return gather(grid, light, occluders, {rays, threads, clearance, seed, even_rays}, callback, sum);
+}
+
+py::object gather_layers(const ReceiverGrid& grid, const ExtendedLight& light, const Occluders* occluders, int rays,
+                         std::uint32_t seed, int threads, const py::object& callback, double clearance)
+{
+    check_rays(rays);
+    Layers layers(grid, rays);
+    return gather(grid, light, occluders, {rays, threads, clearance, seed}, callback, layers);
+}
+
+}  // namespace
+
+void bind_rays(py::module_& m)
+{
+    m.def("gather_rays", &gather_sum, py::arg("grid"), py::arg("light"), py::arg("occluders") = py::none(),
+          py::arg("rays") = 16, py::arg("seed") = 0, py::arg("threads") = 0, py::arg("progress") = py::none(),
+          py::arg("clearance") = 0.0, py::arg("even_rays") = 0,
+          R"(Irradiance of a plane by a light of a size, and where it comes from on the whole.
+
+Parameters
+----------
+grid : ReceiverGrid
+light : ExtendedLight
+occluders : Occluders, optional
+    What casts shadows; None: nothing does.
+rays : int
+    From each texel, 1 to 4096. Where nothing is in the way the irradiance does not depend on it, and has no noise.
+seed : int
+    Another one gives other rays.
+threads : int
+    0: all. The result is the same, bit for bit, for any number.
+progress : callable, optional
+    progress(fraction) returns False to stop.
+clearance : float
+    How far off the plane shadow rays start, in metres, besides what rounding needs.
+even_rays : int
+    First, a look by so many rays: where they, and those of the texels around, all met light or all an obstacle, they are
+    enough, and `rays` are traced from the other texels only. 0: from all.
+
+Returns
+-------
+irradiance : ndarray, float32, shape (height, width, 3)
+    W/m^2: cosine and visible part included. Row 0 is the lowest row.
+flow : ndarray, float32, shape (height, width, 3)
+    The sum over the rays of luminance (of linear Rec. 709) of the irradiance times unit vector of travel in the plane
+    frame (x_axis, y_axis, normal), W/m^2.
+
+Raises
+------
+ValueError
+    An argument is out of range; the message names it.
+Cancelled
+    `progress` returned False.
+)");
+
+    m.def("ray_layers", &gather_layers, py::arg("grid"), py::arg("light"), py::arg("occluders") = py::none(),
+          py::arg("rays") = 16, py::arg("seed") = 0, py::arg("threads") = 0, py::arg("progress") = py::none(),
+          py::arg("clearance") = 0.0, R"(The rays of `gather_rays` one by one; arguments as there, but for `even_rays`.
+
+Returns
+-------
+list of (irradiance, direction)
+    One ray of each texel: ndarrays, float32, shape (height, width, 3), W/m^2 and unit vectors of travel in the plane
+    frame with z < 0.
+)");
+}
+
+}  // namespace beamspread

@@ -1,0 +1,203 @@
+#include "scene/environment_light.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "base/constants.h"
+#include "base/error.h"
+#include "base/threads.h"
+#include "scene/checks.h"
+
+namespace beamspread {
+
+namespace {
+
+// At least so many cells around the horizon: the cosine hardly changes within one, so that chances fit it.
+constexpr std::size_t min_cells = 256;
+
+// Columns or rows of cells.
+struct Lines {
+    std::vector<double> angle, sine, cosine;  // at the borders
+
+    Lines(std::size_t count, double first, double last)
+    {
+        for (std::size_t i = 0; i <= count; ++i) {
+            angle.push_back(first + (last - first) * static_cast<double>(i) / static_cast<double>(count));
+            sine.push_back(std::sin(angle.back()));
+            cosine.push_back(std::cos(angle.back()));
+        }
+    }
+};
+
+// A place among cumulated chances, and the part of the way through it that `at` leaves.
+std::size_t find(std::span<const double> cumulated, double at, double& part)
+{
+    const double wanted = at * cumulated.back();
+    const auto above = std::upper_bound(cumulated.begin() + 1, cumulated.end() - 1, wanted);
+    const auto index = static_cast<std::size_t>(above - cumulated.begin()) - 1;
+    part = std::clamp((wanted - cumulated[index]) / (cumulated[index + 1] - cumulated[index]), 0.0, 1.0);
+    return index;
+}
+
+// An environment whose cells are chosen with chances proportional to their light on a plane.
+class FacingEnvironment final : public ExtendedLight {
+public:
+    FacingEnvironment(const EnvironmentMap& map, const Vec3& normal)
+        : m_map(map),
+          m_width(map.width * map.cells_x),
+          m_height(map.height * map.cells_y),
+          m_normal(glm::transpose(map.to_world) * normal),
+          m_columns(m_width, pi, -pi),
+          m_rows(m_height, -0.5 * pi, 0.5 * pi),
+          m_cumulated(m_height * (m_width + 1)),
+          m_cumulated_rows(m_height + 1)
+    {
+        std::vector<Vec3> sums(m_height);
+        parallel_for(m_height, [&](std::size_t y) { sums[y] = add_up(y); });
+        for (std::size_t y = 0; y < m_height; ++y) {
+            m_irradiance += sums[y];
+            m_cumulated_rows[y + 1] = m_cumulated_rows[y] + m_cumulated[(y + 1) * (m_width + 1) - 1];
+        }
+    }
+
+    void sample(const Vec3& /*point*/, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const override
+    {
+        const double total = m_cumulated_rows.back();
+        for (const Vec2& place : square) {
+            LightRay& ray = *rays++;
+            ray = {.travel = -normal, .distance = std::numeric_limits<double>::infinity(), .flux = Vec3f(0.0f)};
+            if (!(total > 0.0))
+                continue;
+            double part_x = 0.0;
+            double part_y = 0.0;
+            const std::size_t y = find(m_cumulated_rows, place.y, part_y);
+            const std::span<const double> row = cumulated(y);
+            const std::size_t x = find(row, place.x, part_x);
+            const double chance = (row[x + 1] - row[x]) / total;
+            const double sine = std::lerp(m_rows.sine[y], m_rows.sine[y + 1], part_y);
+            const double cosine = std::sqrt(std::max(1.0 - sine * sine, 0.0));
+            const double azimuth = std::lerp(m_columns.angle[x], m_columns.angle[x + 1], part_x);
+            const Vec3 direction(cosine * std::cos(azimuth), cosine * std::sin(azimuth), sine);
+            ray.travel = -glm::normalize(m_map.to_world * direction);
+            ray.flux = m_map.of_cell(x, y) * static_cast<float>(solid_angle(y) / chance);
+        }
+    }
+
+    Vec3 irradiance(const Vec3& /*point*/, const Vec3& /*normal*/) const override { return m_irradiance; }
+    double distance_from(const Vec3& /*point*/) const override { return std::numeric_limits<double>::infinity(); }
+    bool is_far() const override { return true; }
+
+private:
+    std::span<const double> cumulated(std::size_t y) const
+    {
+        return std::span(m_cumulated).subspan(y * (m_width + 1), m_width + 1);
+    }
+
+    double solid_angle(std::size_t y) const
+    {
+        return (m_rows.sine[y + 1] - m_rows.sine[y]) * 2.0 * pi / static_cast<double>(m_width);
+    }
+
+    // Cumulates the light of a row's cells in the mean of the channels; returns it.
+    Vec3 add_up(std::size_t y)
+    {
+        Vec3 sum(0.0);
+        for (std::size_t x = 0; x < m_width; ++x) {
+            const Vec3 light = Vec3(m_map.of_cell(x, y)) * projected_solid_angle(x, y);
+            sum += light;
+            double* const chances = &m_cumulated[y * (m_width + 1) + x];
+            chances[1] = chances[0] + (light.x + light.y + light.z) / 3.0;
+        }
+        return sum;
+    }
+
+    // The integral of cos(theta) over the part of a cell above the plane.
+    double projected_solid_angle(std::size_t x, std::size_t y) const
+    {
+        const double e0 = m_rows.angle[y];
+        const double e1 = m_rows.angle[y + 1];
+        const double width = m_columns.angle[x] - m_columns.angle[x + 1];
+        const double reach = 0.5 * std::hypot(width, e1 - e0);
+        const double middle = cosine(0.5 * (m_columns.angle[x] + m_columns.angle[x + 1]), std::sin(0.5 * (e0 + e1)));
+        if (middle <= -reach)
+            return 0.0;
+        if (middle >= reach) {
+            // The integrals of the direction's coordinates.
+            const double across =
+                0.5 * (e1 - e0 + m_rows.sine[y + 1] * m_rows.cosine[y + 1] - m_rows.sine[y] * m_rows.cosine[y]);
+            const Vec3 sum((m_columns.sine[x] - m_columns.sine[x + 1]) * across,
+                           (m_columns.cosine[x + 1] - m_columns.cosine[x]) * across,
+                           0.5 * width * (m_rows.sine[y + 1] * m_rows.sine[y + 1] - m_rows.sine[y] * m_rows.sine[y]));
+            return glm::dot(sum, m_normal);
+        }
+        constexpr int steps = 8;
+        double sum = 0.0;
+        for (int j = 0; j < steps; ++j) {
+            const double sine = std::lerp(m_rows.sine[y], m_rows.sine[y + 1], (j + 0.5) / steps);
+            for (int i = 0; i < steps; ++i)
+                sum += std::max(cosine(m_columns.angle[x] - width * (i + 0.5) / steps, sine), 0.0);
+        }
+        return sum / (steps * steps) * solid_angle(y);
+    }
+
+    double cosine(double azimuth, double sine) const
+    {
+        const double across = std::sqrt(std::max(1.0 - sine * sine, 0.0));
+        return glm::dot(m_normal, Vec3(across * std::cos(azimuth), across * std::sin(azimuth), sine));
+    }
+
+    const EnvironmentMap& m_map;
+    std::size_t m_width, m_height;  // cells
+    Vec3 m_normal;                  // in the image's space
+    Lines m_columns, m_rows;
+    std::vector<double> m_cumulated;  // of each row, one more than cells
+    std::vector<double> m_cumulated_rows;
+    Vec3 m_irradiance{0.0};
+};
+
+}  // namespace
+
+EnvironmentLight::EnvironmentLight(const View2D<const Vec3f>& radiance, const Mat3& to_world)
+{
+    for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) {
+            if (!(std::abs(glm::dot(to_world[i], to_world[j]) - (i == j ? 1.0 : 0.0)) <= 1e-4))
+                reject("to_world", detail::to_text(to_world[i]), "unit vectors at right angles");
+        }
+    }
+    m_map = {.width = radiance.width,
+             .height = radiance.height,
+             .cells_x = (min_cells + radiance.width - 1) / radiance.width,
+             .cells_y = (min_cells / 2 + radiance.height - 1) / radiance.height,
+             .radiance = {},
+             .to_world = to_world};
+    m_map.radiance.reserve(radiance.width * radiance.height);
+    for (std::size_t y = 0; y < radiance.height; ++y) {
+        for (std::size_t x = 0; x < radiance.width; ++x) {
+            const Vec3f value = radiance(y, x);
+            if (!(value.x >= 0.0f && value.y >= 0.0f && value.z >= 0.0f) || !detail::is_finite(Vec3(value)))
+                reject("radiance", detail::to_text(Vec3(value)), "finite values >= 0");
+            m_is_colored |= value.x != value.y || value.y != value.z;
+            m_map.radiance.push_back(value);
+        }
+    }
+}
+
+std::unique_ptr<const ExtendedLight> EnvironmentLight::facing(const Vec3& normal) const
+{
+    return std::make_unique<FacingEnvironment>(m_map, normal);
+}
+
+void EnvironmentLight::sample(const Vec3& point, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const
+{
+    facing(normal)->sample(point, normal, square, rays);
+}
+
+Vec3 EnvironmentLight::irradiance(const Vec3& point, const Vec3& normal) const
+{
+    return facing(normal)->irradiance(point, normal);
+}
+
+}  // namespace beamspread

@@ -1,0 +1,43 @@
+// The world: radiance from all directions, infinitely far away.
+#pragma once
+
+#include <limits>
+#include <vector>
+
+#include "base/view.h"
+#include "scene/extended_light.h"
+
+namespace beamspread {
+
+// An equirectangular image: from row 0 up the elevation rises from -pi / 2 to pi / 2, along a row the azimuth falls from
+// pi to -pi, both in even steps; each pixel of even radiance. Large pixels are divided into cells.
+struct EnvironmentMap {
+    std::size_t width = 0;  // pixels
+    std::size_t height = 0;
+    std::size_t cells_x = 1;  // along a side of a pixel
+    std::size_t cells_y = 1;
+    std::vector<Vec3f> radiance;  // W/(m^2 sr), row by row
+    Mat3 to_world{};
+
+    const Vec3f& of_cell(std::size_t x, std::size_t y) const { return radiance[y / cells_y * width + x / cells_x]; }
+};
+
+class EnvironmentLight final : public ExtendedLight {
+public:
+    // `radiance` >= 0 in W/(m^2 sr); `to_world` turns directions of the image into the world. Throws InvalidArgument.
+    EnvironmentLight(const View2D<const Vec3f>& radiance, const Mat3& to_world);
+
+    // By `facing`, which is what to sample: it chooses directions by radiance times cosine.
+    void sample(const Vec3& point, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const override;
+    Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
+    std::unique_ptr<const ExtendedLight> facing(const Vec3& normal) const override;
+    double distance_from(const Vec3& /*point*/) const override { return std::numeric_limits<double>::infinity(); }
+    bool is_far() const override { return true; }
+    bool is_colored() const override { return m_is_colored; }
+
+private:
+    EnvironmentMap m_map;
+    bool m_is_colored = false;
+};
+
+}  // namespace beamspread

@@ -1,0 +1,99 @@
+#include "scene/mesh_light.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "base/error.h"
+#include "scene/checks.h"
+#include "scene/polygon.h"
+
+namespace beamspread {
+
+namespace {
+
+// Of the way to a face, which may be among what blocks light; rays are traced in single precision.
+constexpr double short_of_face = 1.0 - 1e-5;
+
+}  // namespace
+
+MeshLight::MeshLight(std::span<const Vec3> vertices, std::span<const Triangle> triangles,
+                     std::span<const Vec3f> radiance)
+    : m_cumulated{0.0}
+{
+    for (const Vec3& vertex : vertices) {
+        if (!detail::is_finite(vertex))
+            reject("vertices", detail::to_text(vertex), "finite coordinates in metres");
+    }
+    if (radiance.size() != triangles.size())
+        reject("radiance", std::to_string(radiance.size()) + " rows",
+               "one for each triangle, " + std::to_string(triangles.size()));
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
+        const Vec3 glow(radiance[i]);
+        if (!(glow.x >= 0.0 && glow.y >= 0.0 && glow.z >= 0.0) || !detail::is_finite(glow))
+            reject("radiance", detail::to_text(glow), "finite values >= 0");
+        Face face{.corners = {}, .normal = {}, .radiance = glow};
+        for (std::size_t k = 0; k < 3; ++k) {
+            if (triangles[i][k] >= vertices.size())
+                reject("triangles", std::to_string(triangles[i][k]),
+                       "indices below the number of vertices, " + std::to_string(vertices.size()));
+            face.corners[k] = vertices[triangles[i][k]];
+        }
+        face.normal = glm::cross(face.corners[1] - face.corners[0], face.corners[2] - face.corners[0]);
+        const double power = glm::length(face.normal) * (glow.x + glow.y + glow.z) / 3.0;
+        if (!(power > 0.0))
+            continue;
+        for (const Vec3& corner : face.corners) {
+            const bool is_first = m_faces.empty() && &corner == face.corners.data();
+            m_low = is_first ? corner : glm::min(m_low, corner);
+            m_high = is_first ? corner : glm::max(m_high, corner);
+        }
+        m_is_colored |= glow.x != glow.y || glow.y != glow.z;
+        m_faces.push_back(face);
+        m_cumulated.push_back(m_cumulated.back() + power);
+    }
+}
+
+double MeshLight::distance_from(const Vec3& point) const
+{
+    return glm::distance(point, glm::clamp(point, m_low, m_high));
+}
+
+void MeshLight::sample(const Vec3& point, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const
+{
+    if (m_faces.empty()) {
+        std::fill_n(rays, square.size(), LightRay{.travel = -normal, .distance = 1.0, .flux = Vec3f(0.0f)});
+        return;
+    }
+    const double total = m_cumulated.back();
+    for (const Vec2& place : square) {
+        const double wanted = place.x * total;
+        const auto above = std::upper_bound(m_cumulated.begin() + 1, m_cumulated.end() - 1, wanted);
+        const auto index = static_cast<std::size_t>(above - m_cumulated.begin()) - 1;
+        const double power = m_cumulated[index + 1] - m_cumulated[index];
+        const Face& face = m_faces[index];
+        const double root = std::sqrt(std::clamp((wanted - m_cumulated[index]) / power, 0.0, 1.0));
+        const auto& [a, b, c] = face.corners;
+        const Vec3 way = a + root * ((b - a) + place.y * (c - b)) - point;
+        const double squared = glm::dot(way, way);
+        const double distance = std::sqrt(squared);
+        // Area times cosine at the light, over the chance of the face.
+        const double projected = 0.5 * std::abs(glm::dot(face.normal, way)) / distance * total / power;
+        *rays++ = {.travel = -way / distance,
+                   .distance = distance * short_of_face,
+                   .flux = Vec3f(face.radiance * (projected / squared))};
+    }
+}
+
+Vec3 MeshLight::irradiance(const Vec3& point, const Vec3& normal) const
+{
+    Vec3 sum(0.0);
+    for (const Face& face : m_faces) {
+        const auto& [a, b, c] = face.corners;
+        const std::array<Vec3, 3> corners = {a - point, b - point, c - point};
+        sum += face.radiance * polygon_irradiance(corners, normal);
+    }
+    return sum;
+}
+
+}  // namespace beamspread

@@ -1,0 +1,37 @@
+// Glowing triangles, both sides of them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "scene/extended_light.h"
+
+namespace beamspread {
+
+class MeshLight final : public ExtendedLight {
+public:
+    // Three indices of vertices.
+    using Triangle = std::array<std::uint32_t, 3>;
+
+    // `vertices` in world metres; `radiance` >= 0 of each triangle, W/(m^2 sr). Copied. Throws InvalidArgument.
+    MeshLight(std::span<const Vec3> vertices, std::span<const Triangle> triangles, std::span<const Vec3f> radiance);
+    void sample(const Vec3& point, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const override;
+    Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
+    double distance_from(const Vec3& point) const override;
+    bool is_colored() const override { return m_is_colored; }
+
+private:
+    struct Face {
+        std::array<Vec3, 3> corners;
+        Vec3 normal;  // its length is twice the area
+        Vec3 radiance;
+    };
+
+    Vec3 m_low{0.0}, m_high{0.0};  // its bounds
+    std::vector<Face> m_faces;
+    std::vector<double> m_cumulated;  // power of the faces in the mean of the channels, one more than faces
+    bool m_is_colored = false;
+};
+
+}  // namespace beamspread

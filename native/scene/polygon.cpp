@@ -1,0 +1,95 @@
+#include "scene/polygon.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/constants.h"
+
+namespace beamspread {
+
+namespace {
+
+// The angle between two vectors times the part along the normal of the unit vector at right angles to both.
+double edge(const Vec3& from, const Vec3& to, const Vec3& normal)
+{
+    const Vec3 across = glm::cross(from, to);
+    const double sine = glm::length(across);
+    return sine > 0.0 ? std::atan2(sine, glm::dot(from, to)) / sine * glm::dot(across, normal) : 0.0;
+}
+
+}  // namespace
+
+double polygon_irradiance(std::span<const Vec3> corners, const Vec3& normal)
+{
+    // Each edge is cut where it passes the horizon; the edge that closes the polygon along the horizon follows last.
+    double sum = 0.0;
+    Vec3 enters(0.0);
+    Vec3 leaves(0.0);
+    bool is_cut = false;
+    Vec3 from = corners.back();
+    double from_height = glm::dot(from, normal);
+    for (const Vec3& to : corners) {
+        const double to_height = glm::dot(to, normal);
+        const bool is_from_above = from_height > 0.0;
+        const bool is_to_above = to_height > 0.0;
+        if (is_from_above && is_to_above) {
+            sum += edge(from, to, normal);
+        } else if (is_from_above != is_to_above) {
+            const Vec3 cut = from + (to - from) * (from_height / (from_height - to_height));
+            is_cut = true;
+            sum += is_to_above ? edge(cut, to, normal) : edge(from, cut, normal);
+            (is_to_above ? enters : leaves) = cut;
+        }
+        from = to;
+        from_height = to_height;
+    }
+    if (is_cut)
+        sum += edge(leaves, enters, normal);
+    return 0.5 * std::abs(sum);
+}
+
+SphericalRectangle::SphericalRectangle(const Vec3& corner, const Vec3& side_x, const Vec3& side_y)
+{
+    const double length_x = glm::length(side_x);
+    const double length_y = glm::length(side_y);
+    m_x = side_x / length_x;
+    m_y = side_y / length_y;
+    m_z = glm::cross(m_x, m_y);
+    m_z0 = glm::dot(corner, m_z);
+    if (m_z0 > 0.0) {
+        m_z = -m_z;
+        m_z0 = -m_z0;
+    }
+    m_x0 = glm::dot(corner, m_x);
+    m_y0 = glm::dot(corner, m_y);
+    m_x1 = m_x0 + length_x;
+    m_y1 = m_y0 + length_y;
+
+    // z of the unit normals of the planes through the origin and each side.
+    const auto normal_z = [this](double at) { return -at / std::sqrt(m_z0 * m_z0 + at * at); };
+    const double bottom = normal_z(m_y0);
+    const double right = -normal_z(m_x1);
+    const double top = -normal_z(m_y1);
+    const double left = normal_z(m_x0);
+    const auto angle = [](double a, double b) { return std::acos(std::clamp(-a * b, -1.0, 1.0)); };
+    m_b0 = bottom;
+    m_b1 = top;
+    m_k = 2.0 * pi - angle(top, left) - angle(left, bottom);
+    m_solid_angle = std::max(angle(bottom, right) + angle(right, top) - m_k, 0.0);
+}
+
+Vec3 SphericalRectangle::point(const Vec2& place) const
+{
+    const double au = place.x * m_solid_angle + m_k;
+    const double fu = (std::cos(au) * m_b0 - m_b1) / std::sin(au);
+    const double cu = std::clamp(std::copysign(1.0 / std::sqrt(fu * fu + m_b0 * m_b0), fu), -1.0, 1.0);
+    const double xu = std::clamp(-(cu * m_z0) / std::sqrt(std::max(1.0 - cu * cu, 1e-30)), m_x0, m_x1);
+    const double d_squared = xu * xu + m_z0 * m_z0;
+    const double h0 = m_y0 / std::sqrt(d_squared + m_y0 * m_y0);
+    const double h1 = m_y1 / std::sqrt(d_squared + m_y1 * m_y1);
+    const double h = h0 + place.y * (h1 - h0);
+    const double yv = std::clamp(h * std::sqrt(d_squared / std::max(1.0 - h * h, 1e-30)), m_y0, m_y1);
+    return xu * m_x + yv * m_y + m_z0 * m_z;
+}
+
+}  // namespace beamspread

@@ -1,0 +1,254 @@
+"""Glowing meshes, summed over their triangles by plain code, against what Cycles bakes on a white plane."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+from beamspread.blender.read.emitters import _pieces
+from beamspread.blender.read.lights import read_illumination
+from beamspread.core.scene.lights import MeshLight
+from cycles_truth import add_receiver, cycles_irradiance
+from mathutils import Euler, Matrix
+
+ABOVE = Matrix.Translation((0.3, -0.2, 1.2)) @ Euler((0.5, -0.3, 0.2)).to_matrix().to_4x4()
+# Means over 64 texels of 512 samples each.
+NOISE = {"rel": 0.006}
+COLOR = (1.0, 0.5, 0.25, 1.0)
+
+
+def glowing_material(strength=3.0, color=COLOR, kind="ShaderNodeEmission"):
+    """A material and the node that glows."""
+    material = bpy.data.materials.new("Glow")
+    if bpy.app.version < (5, 0, 0):
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    node, output = tree.nodes.new(kind), tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(node.outputs[0], output.inputs["Surface"])
+    if kind == "ShaderNodeBsdfPrincipled":
+        name = "Emission Color" if "Emission Color" in node.inputs else "Emission"
+        node.inputs[name].default_value, node.inputs["Emission Strength"].default_value = color, strength
+        node.inputs["Base Color"].default_value = (0, 0, 0, 1)
+    else:
+        node.inputs["Color"].default_value, node.inputs["Strength"].default_value = color, strength
+    return material, node
+
+
+def add_panel(matrix=ABOVE, size=(1.0, 0.6), material=None):
+    return scenes.add_plane("Panel", size, matrix, material=material or glowing_material()[0])
+
+
+def read():
+    bpy.context.view_layer.update()
+    return read_illumination(bpy.context.evaluated_depsgraph_get())
+
+
+def irradiance(light, cuts=24, points=16):
+    """Mean over the plane -1..1 at z = 0, each triangle cut into small ones that shine from their middles."""
+    triangles = light.vertices[light.triangles]
+    if len(triangles) < 200:
+        pieces = _pieces(cuts)
+        triangles, count = (pieces @ triangles[:, None]).reshape(-1, 3, 3), len(pieces)
+    else:
+        count = 1
+    middles = triangles.mean(axis=1)
+    areas = 0.5 * np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    across = (np.arange(points) + 0.5) / points * 2 - 1
+    total = np.zeros(3)
+    for x in across:
+        for y in across:
+            way = middles - (x, y, 0)
+            squared = (way**2).sum(axis=1)
+            # Cosine here and there, both sides of the triangle glow.
+            weights = np.maximum(way[:, 2], 0) * np.abs((areas * way).sum(axis=1)) / squared**2
+            total += weights @ np.repeat(light.radiance, count, axis=0).astype(float)
+    return total / points**2 * light.rgb()
+
+
+def assert_agrees(*, lights=1, **tolerance):
+    """The sum of all glowing meshes."""
+    plane, image = add_receiver(Matrix(), texels=8)
+    cycles = cycles_irradiance(plane, image, 512).mean(axis=(0, 1))
+    bpy.data.objects.remove(plane)
+    found = read().lights
+    assert len(found) == lights
+    assert all(isinstance(light, MeshLight) and light.cast_shadow for light in found)
+    assert sum(irradiance(light) for light in found) == pytest.approx(cycles, **(tolerance or NOISE))
+    assert cycles.max() > 0
+
+
+MATRICES = {
+    "tilted": ABOVE,
+    "flipped": ABOVE @ Matrix.Rotation(math.pi, 4, "X"),
+    "stretched": ABOVE @ Matrix.Diagonal((1.6, 0.5, 1, 1)),
+    "mirrored": ABOVE @ Matrix.Diagonal((-1.2, 0.7, -1, 1)),
+    "flat": ABOVE @ Matrix.Diagonal((1, 1, 0, 1)),
+}
+
+
+@pytest.mark.parametrize("matrix", MATRICES.values(), ids=MATRICES.keys())
+def test_both_sides_glow(matrix):
+    add_panel(matrix)
+    assert_agrees()
+
+
+@pytest.mark.parametrize("alpha", [1.0, 0.4])
+def test_principled_glows_by_its_alpha(alpha):
+    material, node = glowing_material(kind="ShaderNodeBsdfPrincipled")
+    node.inputs["Alpha"].default_value = alpha
+    add_panel(material=material)
+    assert_agrees()
+
+
+def test_principled_is_dark_as_it_comes():
+    material = bpy.data.materials.new("Plain")
+    if bpy.app.version < (5, 0, 0):
+        material.use_nodes = True
+    add_panel(material=material)
+    assert read().lights == ()
+
+
+def test_materials_of_faces():
+    """Each face has its own; a slot too high stands for the last, an empty one is dark."""
+    box = [(x, y, z) for z in (0.8, 1.2) for y in (-0.3, 0.3) for x in (-0.3, 0.3)]
+    faces = [(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)]
+    obj = scenes.add_mesh("Box", box, faces)
+    for material in (glowing_material(1)[0], None, glowing_material(4, (0.1, 1, 0.2, 1))[0]):
+        obj.data.materials.append(material)
+    for polygon, slot in zip(obj.data.polygons, (0, 1, 2, 7, 1, 0)):
+        polygon.material_index = slot
+    obj.data.update()
+    # A convex body: of each face only the sunny side counts, and its back never sees the plane but through the others.
+    (light,) = read().lights
+    # Per glowing quad two triangles.
+    assert len(light.triangles) == 8
+    assert sorted(set(map(tuple, light.radiance.astype(float).round(3).tolist()))) == [(0.4, 4.0, 0.8), (1.0, 0.5, 0.25)]
+
+
+def test_instances_are_one_light():
+    panel = add_panel(Matrix.Translation((0, 0, 0.4)), size=(0.4, 0.3))
+    collection = bpy.data.collections.new("Lit")
+    collection.objects.link(panel)
+    bpy.context.scene.collection.objects.unlink(panel)
+    for x, scale in ((-0.4, 1), (0.5, -1.5)):
+        holder = bpy.data.objects.new("Holder", None)
+        holder.instance_type, holder.instance_collection = "COLLECTION", collection
+        holder.matrix_world = Matrix.Translation((x, 0.1, 0.8)) @ Matrix.Diagonal((scale, 1, 1, 1))
+        bpy.context.scene.collection.objects.link(holder)
+    assert_agrees()
+
+
+def test_modifiers_and_parents():
+    panel = add_panel(Matrix.Translation((0.2, 0, 0)))
+    parent = bpy.data.objects.new("Parent", None)
+    bpy.context.scene.collection.objects.link(parent)
+    parent.matrix_world = Matrix.Translation((0, 0, 1)) @ Matrix.Diagonal((1, -0.8, 1, 1))
+    panel.parent = parent
+    panel.modifiers.new("Array", "ARRAY").count = 2
+    assert_agrees()
+
+
+def test_text_glows():
+    text = bpy.data.objects.new("Sign", bpy.data.curves.new("Sign", "FONT"))
+    text.data.body, text.data.size, text.data.extrude = "IO", 0.8, 0.0
+    text.matrix_world = Matrix.Translation((-0.4, -0.2, 0.9))
+    text.data.materials.append(glowing_material()[0])
+    bpy.context.scene.collection.objects.link(text)
+    assert_agrees()
+
+
+def striped_image():
+    """Left half red, right half green with a gradient upward, 32 x 16."""
+    image = bpy.data.images.new("Stripes", 32, 16, float_buffer=True)
+    values = np.zeros((16, 32, 4), np.float32)
+    values[:, :16, 0], values[:, 16:, 1], values[..., 3] = 1, np.linspace(0, 2, 16)[:, None], 1
+    image.pixels.foreach_set(values.ravel())
+    return image
+
+
+@pytest.mark.parametrize("coordinates", ["default", "UV", "mapped"])
+def test_an_image_glows_by_its_uv_map(coordinates):
+    material, emission = glowing_material()
+    tree = material.node_tree
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image = striped_image()
+    tree.links.new(texture.outputs["Color"], emission.inputs["Color"])
+    if coordinates != "default":
+        source = tree.nodes.new("ShaderNodeTexCoord").outputs["UV"]
+        if coordinates == "mapped":
+            mapping = tree.nodes.new("ShaderNodeMapping")
+            mapping.inputs["Scale"].default_value, mapping.inputs["Location"].default_value = (2.5, 1, 1), (0.2, 0.3, 0)
+            tree.links.new(source, mapping.inputs["Vector"])
+            source = mapping.outputs["Vector"]
+        tree.links.new(source, texture.inputs["Vector"])
+    add_panel(Matrix.Translation((0, 0, 0.4)), (1.5, 1.5), material)
+    light = read().lights[0]
+    assert 4000 < len(light.triangles) < 20000
+    assert_agrees()
+
+
+def set_flag(name):
+    def apply(panel):
+        setattr(panel, name, False)
+
+    return apply
+
+
+def hide(panel):
+    panel.hide_render = True
+
+
+def no_nodes(panel):
+    if bpy.app.version >= (5, 0, 0):
+        pytest.skip("all materials have nodes")
+    panel.data.materials[0].use_nodes = False
+
+
+@pytest.mark.parametrize("darken", [set_flag("visible_diffuse"), hide, no_nodes], ids=["diffuse", "hidden", "no_nodes"])
+def test_dark_meshes(darken):
+    panel = add_panel()
+    darken(panel)
+    plane, image = add_receiver(Matrix(), texels=4)
+    assert cycles_irradiance(plane, image, 16).max() == 0
+    assert read().lights == ()
+
+
+@pytest.mark.parametrize("flag", ["visible_camera", "visible_shadow", "visible_glossy", "is_holdout"])
+def test_flags_that_do_not_matter(flag):
+    panel = add_panel()
+    setattr(panel, flag, not getattr(panel, flag))
+    assert_agrees()
+
+
+@pytest.mark.parametrize("flag", ["holdout", "indirect_only"])
+def test_collections_that_cameras_do_not_see_light_all_the_same(flag):
+    panel = add_panel()
+    collection = bpy.data.collections.new("Away")
+    bpy.context.scene.collection.children.link(collection)
+    collection.objects.link(panel)
+    bpy.context.scene.collection.objects.unlink(panel)
+    setattr(bpy.context.view_layer.layer_collection.children["Away"], flag, True)
+    assert_agrees()
+
+
+def test_the_beamspread_node_is_no_light():
+    scenes.add_plane(material=scenes.add_material(linked=True))
+    assert read().lights == ()
+
+
+def test_what_is_not_understood_is_named():
+    material, emission = glowing_material()
+    tree = material.node_tree
+    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs[0], emission.inputs["Strength"])
+    add_panel(material=material)
+    reason = "the node 'Noise Texture' is not understood"
+    assert read().lights == ()
+    assert read().by_cycles == {"Panel": f"What glows of 'Panel' is left out: {reason}."}
+
+
+def test_negative_light_is_named():
+    add_panel(material=glowing_material(-1)[0])
+    sentence = "The light 'Panel' is left out: its radiance has values that are negative or not numbers."
+    assert (read().lights, read().warnings) == ((), (sentence,))
