@@ -1,7 +1,7 @@
 """The bake of plain data: lights add up, colours and thickness act per channel, progress and cancel work."""
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 
 import beamspread
 import numpy as np
@@ -100,13 +100,6 @@ def test_receivers_near_each_other_share_the_shadows_of_their_scene():
     assert Illumination([SUN]).caster(grid()) is None
 
 
-@dataclass(frozen=True)
-class LinkedSun(SunLight):
-    """A sun that only some objects block."""
-
-    blockers: frozenset | None = None
-
-
 def test_lights_share_the_shadows_of_what_may_block_them():
     others = Mesh(ROOF.vertices + (0, 0, 1), np.concatenate([ROOF.triangles] * 2))
     scene = Illumination([SUN], [Occluder("Roof", ROOF), Occluder("Others", others)])
@@ -115,7 +108,7 @@ def test_lights_share_the_shadows_of_what_may_block_them():
         return scene.caster(grid(), linked(*names)).triangle_count
 
     def linked(*names):
-        return LinkedSun(*(getattr(SUN, field.name) for field in fields(SUN)), frozenset(names))
+        return replace(SUN, blockers=frozenset(names))
 
     assert scene.caster(grid(), SUN).triangle_count == count("Roof", "Others") == 3
     assert (count("Roof"), count("Others", "Elsewhere")) == (1, 2)
