@@ -1,5 +1,7 @@
 """Differences between Blender versions, bridged in this one place."""
 
+import math
+
 import bpy
 import numpy as np
 
@@ -50,6 +52,21 @@ def world_of(depsgraph):
     """The evaluated world that a render has, or None (view layers may have their own since Blender 4.4)."""
     world = getattr(depsgraph.view_layer, "world_override", None) or depsgraph.scene.world
     return world and world.evaluated_get(depsgraph)
+
+
+def sun_disk_factor(angle: float) -> float:
+    """What a sun of that full angle gives at normal incidence, over its strength.
+
+    Cycles 3.4 spreads the strength evenly over a flat disk across the direction to its centre and leaves out the
+    cosines; 4.5 has 1. Versions between are not measured.
+    """
+    squared = math.tan(0.5 * angle) ** 2
+    return 2 * (math.sqrt(1 + squared) - 1) / squared if bpy.app.version < (4, 0, 0) and squared > 1e-6 else 1.0
+
+
+def instancer_hides_lamps() -> bool:
+    """Whether Cycles asks the instancer's visibility, too, of lamps (4.5 does, 3.4 of meshes alone)."""
+    return bpy.app.version >= (4, 4, 0)
 
 
 def round_lamp_model(light) -> str:

@@ -1,13 +1,24 @@
-"""What Cycles makes of a scene: the irradiance of a white diffuse plane."""
+"""The irradiance of a white diffuse plane, by Cycles and by the add-on."""
 
 import math
 
 import bpy
+import numpy as np
 import scenes
+from beamspread.blender.read.geometry import read_polygons
+from beamspread.blender.read.lights import read_illumination
+from beamspread.core.bake.luminance import light_beams
+from beamspread.core.bake.settings import BakeSettings
+from beamspread.core.native import native
+from beamspread.core.scene.lights import ExtendedLight
+from beamspread.core.scene.receiver import build_receiver
+from beamspread.core.scene.uv_map import fit_uv_maps
 
 TEXELS = 64
 # Cycles samples each texel at random places; with this many their mean is that of the texel to 0.1 %.
 CYCLES_SAMPLES = 256
+# From each texel of ours, where something casts shadows.
+RAYS = 256
 
 
 def white_material(texels=TEXELS):
@@ -43,3 +54,22 @@ def cycles_irradiance(plane, image, samples=CYCLES_SAMPLES):
     scenes.select(plane)
     bpy.ops.object.bake(type="DIFFUSE", pass_filter={"DIRECT"}, margin=0, use_clear=True)
     return math.pi * scenes.pixels(image)
+
+
+def our_irradiance(plane):
+    """The same by the add-on, and the coverage of the texels."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    illumination = read_illumination(depsgraph).lighting(plane.name)
+    polygons = read_polygons(plane.evaluated_get(depsgraph), plane.data.materials[0].name)
+    receiver = build_receiver(fit_uv_maps(polygons), TEXELS, TEXELS)
+    grid = receiver.charts[0].grid
+    total = np.zeros((grid.height, grid.width, 3), np.float32)
+    for light in illumination.lights:
+        caster = illumination.caster(grid, light) if light.cast_shadow else None
+        if isinstance(light, ExtendedLight):
+            options = {"rays": RAYS, "clearance": grid.clearance}
+            by_rays, _ = native.gather_rays(grid.native(), light.native(), caster, **options)
+            total += by_rays * grid.coverage[..., None] * light.rgb()
+        else:
+            total += light_beams(grid, light, caster, BakeSettings(samples=8))[0]
+    return receiver.to_texture([total]), receiver.coverage

@@ -124,7 +124,10 @@ def test_materials_of_faces():
     (light,) = read().lights
     # Per glowing quad two triangles.
     assert len(light.triangles) == 8
-    assert sorted(set(map(tuple, light.radiance.astype(float).round(3).tolist()))) == [(0.4, 4.0, 0.8), (1.0, 0.5, 0.25)]
+    assert sorted(set(map(tuple, light.radiance.astype(float).round(3).tolist()))) == [
+        (0.4, 4.0, 0.8),
+        (1.0, 0.5, 0.25),
+    ]
 
 
 def test_instances_are_one_light():

@@ -34,7 +34,10 @@ def _sun(data, axes: np.ndarray, common: tuple) -> Light:
     with np.errstate(invalid="ignore"):  # a scale of zero; see Light.fault
         travel = -axes[:3, 2] / np.linalg.norm(axes[:3, 2])
     direction = tuple(travel.tolist())
-    return SunDiskLight(*common, direction, data.angle) if data.angle > 0 else SunLight(*common, direction)
+    if data.angle == 0:
+        return SunLight(*common, direction)
+    name, strength, *rest = common
+    return SunDiskLight(name, strength * compat.sun_disk_factor(data.angle), *rest, direction, data.angle)
 
 
 def _point(data, axes: np.ndarray, common: tuple) -> Light:

@@ -28,8 +28,8 @@ def read_illumination(depsgraph) -> Illumination:
         if not renders(instance, visible):
             continue
         obj = instance.object
-        # Of an instance Cycles asks the instancer too.
-        lights_surfaces = obj.visible_diffuse and (not instance.is_instance or instance.parent.visible_diffuse)
+        asks_instancer = instance.is_instance and (obj.type != "LIGHT" or compat.instancer_hides_lamps())
+        lights_surfaces = obj.visible_diffuse and (not asks_instancer or instance.parent.visible_diffuse)
         if obj.type == "LIGHT" and lights_surfaces:
             lights.add_lamp(obj, instance.matrix_world)
         elif obj.type in GEOMETRY_TYPES and lights_surfaces:
