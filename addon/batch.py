@@ -59,7 +59,7 @@ def run(arguments: list[str]) -> int:
             except OSError as error:
                 print(f"Beamspread: the report {options.report} cannot be written: {error}", file=sys.stderr)
                 return 1
-        return 0 if report.all_written() else 1
+        return 0 if report.all_written() and (options.allow_dark or not report.dark()) else 1
     finally:
         # Classes left registered can keep newer versions from exiting, and so can nodes of a class that is gone.
         if registers:

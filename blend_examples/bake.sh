@@ -38,6 +38,9 @@ bake laser_beams
 bake obstacle --frames 1-2
 bake marble_floor
 bake low_sun
+bake soapstone
+bake stage
+bake shop_window
 step "plot obstacle_cut" env PYTHONPATH="$root/build/stage" MPLBACKEND=Agg "$root/build/venv/bin/python" \
     "$here/cut_plot.py" "$pictures/baked/obstacle.json" "$here/cycles_edge.csv" "$pictures/obstacle_cut.png"
 cat "$logs/plot_obstacle_cut.log"

@@ -1,4 +1,4 @@
-"""Makes the example scenes: laser_beams, obstacle, marble_floor and low_sun, each a .blend beside this file.
+"""Makes the example scenes, each a .blend beside this file: those below and the modules that it imports.
 
     tools/build.sh && blender -b --factory-startup --python-exit-code 1 --python blend_examples/make_scenes.py
 
@@ -19,6 +19,9 @@ import beamspread  # noqa: E402
 import low_sun  # noqa: E402
 import marble_floor  # noqa: E402
 import scene_parts as parts  # noqa: E402
+import shop_window  # noqa: E402
+import soapstone  # noqa: E402
+import stage  # noqa: E402
 
 # The medium of the paper's figures 7 and 8 (Manabe et al. 2012): index-matched, forward scattering, coloured.
 PAPER_MEDIUM = {"color_mode": "ALBEDO", "albedo": (0.6, 0.9, 0.3), "anisotropy": 0.8, "ior": 1.0}
@@ -87,6 +90,9 @@ def main():
         "obstacle": obstacle,
         "marble_floor": marble_floor.build,
         "low_sun": low_sun.build,
+        "soapstone": soapstone.build,
+        "stage": stage.build,
+        "shop_window": shop_window.build,
     }
     # Names after the `--` choose.
     chosen = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []

@@ -92,6 +92,54 @@ def glowing_material(name, color, glow, strength):
     return material
 
 
+def card_material(name, color):
+    """For flat pictures with an alpha, which `cloudy_alpha` and `striped_alpha` make."""
+    return plain_material(name, color, roughness=1.0, specular=0.0)
+
+
+def _link_alpha(material, output):
+    tree = material.node_tree
+    tree.links.new(output, tree.nodes["Principled BSDF"].inputs["Alpha"])
+    material.blend_method, material.shadow_method = "HASHED", "HASHED"
+
+
+def cloudy_alpha(material, scale, thin, thick):
+    """Clouds between two alphas that fade out towards the card's border."""
+    tree = material.node_tree
+    new, link = tree.nodes.new, tree.links.new
+    place, noise, height = new("ShaderNodeTexCoord"), new("ShaderNodeTexNoise"), new("ShaderNodeMapRange")
+    ball, fade, product = new("ShaderNodeTexGradient"), new("ShaderNodeMapping"), new("ShaderNodeMath")
+    noise.inputs["Scale"].default_value, noise.inputs["Detail"].default_value = scale, 4.0
+    height.inputs["From Min"].default_value, height.inputs["From Max"].default_value = 0.42, 0.58
+    height.inputs["To Min"].default_value, height.inputs["To Max"].default_value = thin, thick
+    ball.gradient_type = "SPHERICAL"
+    fade.inputs["Location"].default_value, fade.inputs["Scale"].default_value = (-1, -1, 0), (2, 2, 0)
+    product.operation, product.use_clamp = "MULTIPLY", True
+    link(place.outputs["UV"], noise.inputs["Vector"])
+    link(place.outputs["UV"], fade.inputs["Vector"])
+    link(fade.outputs["Vector"], ball.inputs["Vector"])
+    link(noise.outputs["Fac"], height.inputs["Value"])
+    link(height.outputs[0], product.inputs[0])
+    link(ball.outputs["Fac"], product.inputs[1])
+    _link_alpha(material, product.outputs[0])
+
+
+def striped_alpha(material, count):
+    """Opaque stripes and gaps of the same width."""
+    tree = material.node_tree
+    new, link = tree.nodes.new, tree.links.new
+    place, split, wave = new("ShaderNodeTexCoord"), new("ShaderNodeSeparateXYZ"), new("ShaderNodeMath")
+    part, stripe = new("ShaderNodeMath"), new("ShaderNodeMath")
+    wave.operation, wave.inputs[1].default_value = "MULTIPLY", float(count)
+    part.operation = "FRACT"
+    stripe.operation, stripe.inputs[1].default_value = "GREATER_THAN", 0.5
+    link(place.outputs["UV"], split.inputs[0])
+    link(split.outputs["X"], wave.inputs[0])
+    link(wave.outputs[0], part.inputs[0])
+    link(part.outputs[0], stripe.inputs[0])
+    _link_alpha(material, stripe.outputs[0])
+
+
 # Objects
 
 
@@ -108,6 +156,13 @@ def plane(name, width, depth, material, center=(0.0, 0.0)):
     layer = obj.data.uv_layers.new(name="UVMap")
     for loop, uv in zip(layer.data, [(0, 0), (1, 0), (1, 1), (0, 1)]):
         loop.uv = uv
+    return obj
+
+
+def upright_card(name, width, height, material):
+    """A rectangle around the origin, its front where lamps and cameras look: along -z."""
+    obj = plane(name, width, height, material)
+    obj.data.flip_normals()
     return obj
 
 
@@ -146,6 +201,19 @@ def lathe(name, profile, material, location, scale=1.0):
     split = obj.modifiers.new("Edges", "EDGE_SPLIT")
     split.split_angle = math.radians(40)
     return obj
+
+
+def wire(name, points, radius, material):
+    """A round wire along a path; a curve, as artists would draw it."""
+    curve = bpy.data.curves.new(name, "CURVE")
+    curve.dimensions, curve.bevel_depth, curve.bevel_resolution, curve.use_fill_caps = "3D", radius, 3, True
+    spline = curve.splines.new("POLY")
+    spline.points.add(len(points) - 1)
+    for point, place in zip(spline.points, points):
+        point.co = (*place, 1.0)
+    spline.use_smooth = True
+    curve.materials.append(material)
+    return link(name, curve)
 
 
 def rounded(points, steps=6):
@@ -200,10 +268,21 @@ def point_lamp(name, location, watts, color=(1.0, 1.0, 1.0)):
     return obj
 
 
-def spot_lamp(name, target, along, distance, cone_deg, watts, color, blend=0.0):
+def area_lamp(name, location, target, size, watts, color=(1.0, 1.0, 1.0), shape="RECTANGLE", spread_deg=180.0):
+    """A lamp of `size` (across, up) whose front looks at `target`."""
+    light = bpy.data.lights.new(name, "AREA")
+    light.energy, light.color, light.shape, light.spread = watts, color, shape, math.radians(spread_deg)
+    light.size, light.size_y = size
+    obj = link(name, light)
+    obj.location = location
+    aim(obj, Vector(target) - Vector(location))
+    return obj
+
+
+def spot_lamp(name, target, along, distance, cone_deg, watts, color, blend=0.0, radius=0.0):
     """A spot that shines along a vector onto `target` from `distance` away."""
     light = bpy.data.lights.new(name, "SPOT")
-    light.energy, light.color, light.shadow_soft_size = watts, color, 0.0
+    light.energy, light.color, light.shadow_soft_size = watts, color, radius
     light.spot_size, light.spot_blend = math.radians(cone_deg), blend
     obj = link(name, light)
     obj.location = Vector(target) - along * distance

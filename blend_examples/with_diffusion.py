@@ -2,6 +2,8 @@
 
     blender -b --factory-startup SCENE.blend --python-exit-code 1 --python with_diffusion.py -- OUT.png SAMPLES
 
+and `diffuse` after that leaves the scattering out: a surface of the same colour that light does not enter.
+
 Every Beamspread node becomes a Principled BSDF (random walk) of the same medium, in the terms that it takes: the colour
 under even light, the length over which light falls by e far from where it entered, 1 / sqrt(3 sigma_a sigma_t')
 (A. Ishimaru, Wave Propagation and Scattering in Random Media, 1978), anisotropy and ior. Its light side is a Lambertian
@@ -25,24 +27,25 @@ def diffusion_length(albedo, mean_free_path, anisotropy):
     return mean_free_path / math.sqrt(3 * absorption * (absorption + reduced_scattering))
 
 
-def replace(tree, node):
+def replace(tree, node, subsurface):
     """Put a Principled BSDF of the node's medium in the node's place."""
-    library = beamspread.library(beamspread.Medium(node.anisotropy, node.ior))
-    color = [library.diffuse_reflectance(albedo) for albedo in node.albedo]
+    medium = node.surface().resolve("final")
+    library = beamspread.library(beamspread.Medium(medium.anisotropy, medium.ior))
+    color = [library.diffuse_reflectance(albedo) for albedo in medium.albedo]
     bsdf = tree.nodes.new("ShaderNodeBsdfPrincipled")
     bsdf.subsurface_method = "RANDOM_WALK"
     for name, value in {
-        "Subsurface": 1.0,
+        "Subsurface": subsurface,
         "Base Color": (*color, 1.0),
         "Subsurface Color": (*color, 1.0),
         "Subsurface Radius": [
-            diffusion_length(albedo, length, node.anisotropy)
-            for albedo, length in zip(node.albedo, node.mean_free_path)
+            diffusion_length(albedo, length, medium.anisotropy)
+            for albedo, length in zip(medium.albedo, medium.mean_free_path)
         ],
-        "Subsurface IOR": node.ior,
-        "Subsurface Anisotropy": node.anisotropy,
+        "Subsurface IOR": medium.ior,
+        "Subsurface Anisotropy": medium.anisotropy,
         # Reflection at normal incidence, as the socket counts it: 0.5 is 4 %. As rough as the Beamspread node's coat.
-        "Specular": ((node.ior - 1) / (node.ior + 1)) ** 2 / 0.08,
+        "Specular": ((medium.ior - 1) / (medium.ior + 1)) ** 2 / 0.08,
         "Roughness": 0.1,
     }.items():
         bsdf.inputs[name].default_value = value
@@ -50,13 +53,13 @@ def replace(tree, node):
 
 
 def main():
-    picture, samples = sys.argv[sys.argv.index("--") + 1 :]
+    picture, samples, *diffuse = sys.argv[sys.argv.index("--") + 1 :]
     beamspread.register()
     try:
         for material in bpy.data.materials:
             for node in material.node_tree.nodes if material.node_tree else ():
                 if node.bl_idname == "BeamspreadNode":
-                    replace(material.node_tree, node)
+                    replace(material.node_tree, node, subsurface=0.0 if diffuse else 1.0)
                     break
         scene = bpy.context.scene
         scene.cycles.samples = int(samples)

@@ -1,9 +1,9 @@
 """Settings of a scene: `scene.beamspread`."""
 
 import bpy
-from bpy.props import EnumProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
-from ..core.bake.settings import BakeSettings
+from ..core.bake.settings import OUTPUTS, BakeSettings
 from . import compat
 
 
@@ -79,6 +79,26 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         max=1024,
         subtype="PIXEL",
     )
+    output: EnumProperty(
+        name="Bake",
+        description="What the texels hold. All but luminance goes into images of its own, named after the node's",
+        items=[
+            ("LUMINANCE", "Luminance", "What leaves the surface, in W/(m² sr): the node shows it", 0),
+            (
+                "IRRADIANCE",
+                "Irradiance",
+                "What arrives on the surface, in W/m²: π times a white diffuse bake",
+                1,
+            ),
+            ("DIRECTION", "Direction", "The mean way that arriving light goes: right, up and out of the texture", 2),
+        ],
+        default="LUMINANCE",
+    )
+    use_indirect: BoolProperty(
+        name="Indirect Light",
+        description="Light that arrives by way of other objects counts, too: Cycles finds it before each bake",
+        default=True,
+    )
     output_dir: StringProperty(
         name="Output",
         description="Folder that a batch writes to",
@@ -96,10 +116,14 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         default="EXR",
     )
 
-    def for_bake(self, solver: str | None = None) -> BakeSettings:
-        """What core needs of them; `solver` overrides the scene's."""
+    def for_bake(
+        self, solver: str | None = None, output: str | None = None, indirect: bool | None = None
+    ) -> BakeSettings:
+        """What core needs of them; arguments override the scene's."""
         return BakeSettings(
             solver=solver or self.solver,
+            layers=(OUTPUTS[output or self.output],),
+            indirect=self.use_indirect if indirect is None else indirect,
             samples=self.samples,
             margin=self.margin,
             quality=self.quality,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 # Takes the fraction done, 0..1. Answering False (or NumPy's False_) stops the work, which then raises Cancelled; any
 # other answer goes on, also None and 0. The native module alone reads the answers: everything here passes them on.
@@ -21,3 +23,13 @@ def stages(progress: Progress | None, weights: list[float]) -> Iterator[Progress
 
 def _stage(progress: Progress, start: float, length: float) -> Progress:
     return lambda fraction: progress(min(1.0, start + length * fraction))
+
+
+@contextmanager
+def timed(stage: str) -> Iterator[None]:
+    """Log how long a stage of the work took: nothing shows it unless it is asked for (`batch.py --verbose`)."""
+    import logging  # takes its time, and is only for this
+
+    start = time.monotonic()
+    yield
+    logging.getLogger(__name__).info("%s: %.2f s", stage, time.monotonic() - start)

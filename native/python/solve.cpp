@@ -1,13 +1,14 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <numeric>
 #include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
 
 #include "base/error.h"
-#include "python/casters.h"
+#include "python/plane_light.h"
 #include "solve/adaptive/mask_pyramid.h"
 #include "solve/solve.h"
 #include "solve/spectral/spectral.h"
@@ -23,12 +24,6 @@ std::string shape_text(const py::array& array)
 
 // Of any strides: channels of an array are looked at where they are.
 using Plane2D = py::array_t<float, 0>;
-
-// A light and the arrays that it looks at.
-struct HeldLight {
-    PlaneLight light;
-    std::vector<py::object> arrays;
-};
 
 std::size_t side(const py::array& array, py::ssize_t axis)
 {
@@ -93,6 +88,30 @@ std::vector<HeldLight> lights_of(const Plane2D& irradiance, const Array<float>& 
         held.push_back({std::move(light), {irradiance, direction}});
     }
     return held;
+}
+
+double mean(const HeldLight& held)
+{
+    const View2D<const float>& irradiance = held.light.irradiance;
+    double sum = 0.0;
+    for (std::size_t y = 0; y < irradiance.height; ++y)
+        for (std::size_t x = 0; x < irradiance.width; ++x)
+            sum += static_cast<double>(irradiance(y, x));
+    const std::vector<double>& color = held.light.color;
+    return sum * std::accumulate(color.begin(), color.end(), 0.0) /
+           static_cast<double>(irradiance.height * irradiance.width * color.size());
+}
+
+std::vector<HeldLight> by_channel(const HeldLight& held)
+{
+    const std::size_t channels = held.light.color.size();
+    std::vector<HeldLight> lights(channels, held);
+    for (std::size_t c = 0; c < channels; ++c) {
+        std::vector<double> color(channels, 0.0);
+        color[c] = held.light.color[c];
+        lights[c].light.color = color;
+    }
+    return lights;
 }
 
 using Lights = std::vector<const HeldLight*>;
@@ -187,6 +206,8 @@ color : sequence of float
     Factor of the irradiance in each channel.
 )")
         .def(py::init(&light_of), py::arg("irradiance"), py::arg("direction"), py::arg("color"))
+        .def("mean", &mean, "float: mean irradiance of all texels and channels, W/m^2.")
+        .def("by_channel", &by_channel, "The same light as one for each channel.")
         .def_static("from_point", &point_light, py::arg("irradiance"), py::arg("position"), py::arg("color"),
                     "All light comes from one position: x, y, z > 0 in metres from the outer corner of texel (0, 0).")
         .def_static("of_channels", &lights_of, py::arg("irradiance"), py::arg("direction"), py::arg("channels"),

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <utility>
@@ -21,12 +22,18 @@ constexpr std::size_t rows_per_strip = 64;
 // Exits with less than this share of the incident power at any angle are left out.
 constexpr double negligible_power = 1e-6;
 
+// tan(theta / 2) of 89.9 degrees, beyond which nothing enters that could be seen.
+constexpr float steepest = 0.99825f;
+
+// Of sums in whole numbers, below the brightest light; above are 2^23 times as much.
+constexpr int fraction_bits = 40;
+
 // Distance and power of each exit over tan(theta / 2), which is smooth in both.
 class ExitTable {
 public:
-    ExitTable(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium)
+    ExitTable(const Plane& plane, const ChannelMedium& medium, std::pair<float, float> half_tangents)
     {
-        const auto [first, last] = present(plane, light);
+        const auto [first, last] = half_tangents;
         if (first > last || medium.ldf->ballistic(angle_deg(first), Side::reflected).empty())
             return;  // any angle tells: where one has exits, all have
         const double outside = 2.0 * (static_cast<double>(plane.width) * plane.pitch_x +
@@ -73,30 +80,48 @@ public:
     }
 
 private:
-    // The least and the largest tan(theta / 2) of lit texels.
-    static std::pair<float, float> present(const Plane& plane, const PlaneLight& light)
-    {
-        std::pair<float, float> range{1.0f, 0.0f};
-        BeamRow row;
-        for (std::size_t y = 0; y < plane.height; ++y) {
-            if (!row.read(plane, light, {y, 0, plane.width}))
-                continue;
-            for (std::size_t x = 0; x < plane.width; ++x) {
-                if (row.irradiance[x] == 0.0f)
-                    continue;
-                range.first = std::min(range.first, row.half_tangent[x]);
-                range.second = std::max(range.second, row.half_tangent[x]);
-            }
-        }
-        return range;
-    }
-
     static double angle_deg(double half_tangent) { return 2.0 * std::atan(half_tangent) / radians_per_degree; }
 
     float m_first = 0.0f;
     float m_per_step = 0.0f;
     std::vector<std::vector<Exit>> m_exits;
 };
+
+// The least and the largest tan(theta / 2) of lit texels.
+std::pair<float, float> present(const Plane& plane, const PlaneLight& light)
+{
+    std::pair<float, float> range{1.0f, 0.0f};
+    BeamRow row;
+    for (std::size_t y = 0; y < plane.height; ++y) {
+        if (!row.read(plane, light, {y, 0, plane.width}))
+            continue;
+        for (std::size_t x = 0; x < plane.width; ++x) {
+            if (row.irradiance[x] == 0.0f)
+                continue;
+            range.first = std::min(range.first, row.half_tangent[x]);
+            range.second = std::max(range.second, row.half_tangent[x]);
+        }
+    }
+    return range;
+}
+
+// Calls add(place, part) of the four texels that a texel covers whose corner is at (x, y), of those on the plane.
+template <class Add>
+void share(const Plane& plane, float x, float y, const Add& add)
+{
+    const float left = std::floor(x);
+    const float below = std::floor(y);
+    const std::array<float, 2> across = {1.0f - (x - left), x - left};
+    const std::array<float, 2> up = {1.0f - (y - below), y - below};
+    for (std::size_t j = 0; j < 2; ++j)
+        for (std::size_t i = 0; i < 2; ++i) {
+            // A negative place wraps around to a large one.
+            const std::size_t column = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(left)) + i;
+            const std::size_t row = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(below)) + j;
+            if (column < plane.width && row < plane.height)
+                add(row * plane.width + column, across[i] * up[j]);
+        }
+}
 
 // Exitance that some rows of light cause, over the rows that it can reach.
 struct Strip {
@@ -107,7 +132,7 @@ struct Strip {
 class LightPass {
 public:
     LightPass(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium)
-        : m_plane(plane), m_light(light), m_exits(plane, light, medium)
+        : m_plane(plane), m_light(light), m_exits(plane, medium, present(plane, light))
     {
     }
 
@@ -145,33 +170,16 @@ private:
                     continue;
                 for (std::size_t k = 0; k < m_exits.count(); ++k) {
                     const ExitTable::Exit exit = m_exits.at(k, row.half_tangent[x]);
-                    share(result, static_cast<float>(x) + exit.distance * row.cos_beta[x] * per_x,
+                    const float exitance = row.irradiance[x] * exit.power * static_cast<float>(inv_pi);
+                    share(m_plane, static_cast<float>(x) + exit.distance * row.cos_beta[x] * per_x,
                           static_cast<float>(y) + exit.distance * row.sin_beta[x] * per_y,
-                          row.irradiance[x] * exit.power * static_cast<float>(inv_pi));
+                          [&](std::size_t place, float part) {
+                              result.values[place - result.first_row * m_plane.width] += exitance * part;
+                          });
                 }
             }
         }
         return result;
-    }
-
-    // A texel's worth of light whose corner is at (x, y), among the four texels that it covers.
-    void share(Strip& to, float x, float y, float luminance) const
-    {
-        const float left = std::floor(x);
-        const float below = std::floor(y);
-        const auto column = static_cast<std::ptrdiff_t>(left);
-        const auto line = static_cast<std::ptrdiff_t>(below);
-        const std::array<float, 2> across = {luminance * (1.0f - (x - left)), luminance * (x - left)};
-        const std::array<float, 2> up = {1.0f - (y - below), y - below};
-        for (std::size_t j = 0; j < 2; ++j) {
-            const std::size_t row = static_cast<std::size_t>(line) + j;
-            if (row >= m_plane.height)  // a negative one wraps around to a large one
-                continue;
-            float* values = to.values.data() + (row - to.first_row) * m_plane.width;
-            for (std::size_t i = 0; i < 2; ++i)
-                if (const std::size_t place = static_cast<std::size_t>(column) + i; place < m_plane.width)
-                    values[place] += across[i] * up[j];
-        }
     }
 
     const Plane& m_plane;
@@ -183,10 +191,85 @@ private:
 
 void add_unscattered(const Problem& problem, float* luminance)
 {
-    const std::size_t channels = problem.channels.size();
     for (const PlaneLight& light : problem.lights)
-        for (std::size_t c = 0; c < channels; ++c)
-            LightPass(problem.plane, light, problem.channels[c]).add(luminance + c, channels, light.color[c]);
+        add_unscattered(problem, light, luminance);
+}
+
+void add_unscattered(const Problem& problem, const PlaneLight& light, float* luminance)
+{
+    const std::size_t channels = problem.channels.size();
+    for (std::size_t c = 0; c < channels; ++c)
+        LightPass(problem.plane, light, problem.channels[c]).add(luminance + c, channels, light.color[c]);
+}
+
+namespace {
+
+// In any channel, W/m^2.
+double largest(const PlaneLight& light)
+{
+    float most = 0.0f;
+    for (std::size_t y = 0; y < light.irradiance.height; ++y)
+        for (std::size_t x = 0; x < light.irradiance.width; ++x)
+            most = std::max(most, light.irradiance(y, x));
+    return static_cast<double>(most) * *std::max_element(light.color.begin(), light.color.end());
+}
+
+}  // namespace
+
+struct UnscatteredRays::Exits {
+    std::vector<ExitTable> tables;  // [channel]
+};
+
+UnscatteredRays::UnscatteredRays(const Problem& problem) : m_plane(problem.plane), m_exits(std::make_unique<Exits>())
+{
+    std::size_t count = 0;
+    for (const ChannelMedium& medium : problem.channels) {
+        m_exits->tables.emplace_back(m_plane, medium, std::pair{0.0f, steepest});
+        count += m_exits->tables.back().count();
+    }
+    double brightest = 0.0;
+    for (const auto* lights : {&problem.lights, &problem.to_come.lights})
+        for (const PlaneLight& light : *lights)
+            brightest += largest(light);
+    m_unit = std::ldexp(brightest > 0.0 ? brightest : 1.0, -fraction_bits);
+    if (count > 0)
+        m_sums.resize(m_plane.texels() * problem.channels.size());
+}
+
+UnscatteredRays::~UnscatteredRays() = default;
+
+void UnscatteredRays::add(const RayBeams& rays, const std::vector<double>& color)
+{
+    if (m_sums.empty())
+        return;
+    const std::size_t channels = color.size();
+    for (std::size_t x = 0; x < rays.width; ++x) {
+        const Vec3 travel(rays.travel[3 * x], rays.travel[3 * x + 1], rays.travel[3 * x + 2]);
+        const double across = std::hypot(travel.x, travel.y);
+        const double half_tangent = across / (1.0 - travel.z);
+        const Vec2 step =
+            across > 0.0 ? Vec2(travel.x / m_plane.pitch_x, travel.y / m_plane.pitch_y) / across : Vec2(0.0);
+        for (std::size_t c = 0; c < channels; ++c) {
+            const ExitTable& exits = m_exits->tables[c];
+            const double irradiance = color[c] * static_cast<double>(rays.irradiance[x * channels + c]);
+            for (std::size_t k = 0; k < exits.count() && irradiance > 0.0; ++k) {
+                const auto [distance, power] = exits.at(k, static_cast<float>(half_tangent));
+                const double exitance = irradiance * static_cast<double>(power) * inv_pi / m_unit;
+                share(m_plane, static_cast<float>(x) + distance * static_cast<float>(step.x),
+                      static_cast<float>(rays.y) + distance * static_cast<float>(step.y),
+                      [&](std::size_t place, float part) {
+                          std::atomic_ref(m_sums[place * channels + c])
+                              .fetch_add(std::llround(exitance * static_cast<double>(part)), std::memory_order_relaxed);
+                      });
+            }
+        }
+    }
+}
+
+void UnscatteredRays::add_to(float* luminance) const
+{
+    for (std::size_t i = 0; i < m_sums.size(); ++i)
+        luminance[i] += static_cast<float>(static_cast<double>(m_sums[i]) * m_unit);
 }
 
 }  // namespace beamspread

@@ -1,11 +1,39 @@
 // What all solvers leave out, as it has no place in a smooth kernel.
 #pragma once
 
+#include <cstdint>
+#include <memory>
+#include <vector>
+
 #include "solve/problem/problem.h"
 
 namespace beamspread {
 
 // Light that a slab with an ior above 1 returns unscattered from its far boundary; adds to (height, width, channels).
 void add_unscattered(const Problem& problem, float* luminance);
+void add_unscattered(const Problem& problem, const PlaneLight& light, float* luminance);
+
+// Likewise of rays, from any number of threads at once: in whole numbers, whose sum does not depend on their order.
+class UnscatteredRays {
+public:
+    explicit UnscatteredRays(const Problem& problem);
+    ~UnscatteredRays();
+    UnscatteredRays(const UnscatteredRays&) = delete;
+    UnscatteredRays& operator=(const UnscatteredRays&) = delete;
+
+    // Whether nothing returns unscattered.
+    bool none() const { return m_sums.empty(); }
+
+    void add(const RayBeams& rays, const std::vector<double>& color);
+    void add_to(float* luminance) const;
+
+private:
+    struct Exits;
+
+    Plane m_plane;
+    std::unique_ptr<Exits> m_exits;
+    double m_unit;  // of the sums, W/(m^2 sr)
+    std::vector<std::int64_t> m_sums;  // [texel][channel]
+};
 
 }  // namespace beamspread

@@ -15,7 +15,9 @@ from mathutils import Matrix
 from scenes import add_material, add_plane, add_sun, bake, node_of, pixels
 
 BATCH = Path(beamspread.__file__).parent / "batch.py"
-KEYS = {"object", "material", "frame", "path", "width", "height", "seconds", "status", "message"}
+KEYS = {"object", "material", "frame", "path", "width", "height", "seconds", "status", "message"} | {
+    *("output", "lights", "left_out", "indirect", "dark"),
+}
 
 
 def save_scene(folder):
@@ -48,6 +50,7 @@ def test_one_plane(tmp_path):
     assert len(bakes) == 1
     assert set(bakes[0]) == KEYS
     expected = {"object": "Plane", "material": "Stone", "frame": 1, "width": 32, "height": 16, "status": "written"}
+    expected |= {"output": "LUMINANCE", "lights": 1, "left_out": [], "dark": False}
     assert {key: bakes[0][key] for key in expected} == expected
     assert Path(bakes[0]["path"]) == tmp_path / "out" / "Plane_Stone.exr"
     stored, channels, _ = native.read_exr(bakes[0]["path"])
@@ -258,3 +261,83 @@ def test_node_is_read_from_the_file(tmp_path):
     assert not texture[..., :2].any()
     assert texture[..., 2].all()
     assert node_of(material).image is None
+
+
+def behind():
+    """A plane that turns its back on its only lamp."""
+    add_plane(matrix=Matrix.Diagonal((1, 1, -1, 1)), material=add_material())
+    add_sun(0)
+    return "All lights are behind 'Plane'"
+
+
+def in_shadow():
+    add_plane(material=add_material())
+    add_plane("Roof", size=(9, 9), matrix=Matrix.Translation((0, 0, 1)))
+    add_sun(0)
+    return "No light reaches 'Plane'"
+
+
+def without_lights():
+    add_plane(material=add_material())
+    return "No light of the scene can be baked"
+
+
+@pytest.mark.parametrize("add", [behind, in_shadow, without_lights])
+@pytest.mark.parametrize("output", ["LUMINANCE", "IRRADIANCE"])
+def test_a_bake_that_gets_no_light_is_no_success(add, output, tmp_path):
+    words = add()
+    add_plane("Lit", matrix=Matrix.Translation((20, 0, 0)), material=add_material("Lit"))
+    scene = save_scene(tmp_path)
+    code, bakes, output_text = run_batch(scene, "--pass", output, "--no-indirect", "--output", tmp_path)
+    assert code == 1
+    record, lit = bakes
+    assert (record["status"], record["dark"]) == ("written", True)
+    assert words in record["message"]
+    assert not native.read_exr(record["path"])[0].any()
+    assert lit["dark"] == (add is without_lights)
+    names = "'Plane', 'Lit'" if add is without_lights else "'Plane'"
+    assert f"Beamspread: No light reaches {names}: an error, unless --allow-dark is given." in output_text
+    code, bakes, output_text = run_batch(
+        scene, "--pass", output, "--no-indirect", "--allow-dark", "--output", tmp_path, "--object", "Plane"
+    )
+    assert (code, [one["dark"] for one in bakes]) == (0, [True])
+    assert "--allow-dark" not in output_text
+
+
+def test_what_fails_is_no_success_in_the_dark_either(tmp_path):
+    add_plane(material=add_material(albedo=(1, 1, 1)))
+    code, bakes, _ = run_batch(save_scene(tmp_path), "--allow-dark", "--output", tmp_path)
+    assert (code, bakes[0]["status"], bakes[0]["dark"]) == (1, "failed", False)
+
+
+def test_a_lamp_behind_a_slab_is_named_and_nothing_is_simulated(tmp_path, monkeypatch):
+    """Of a medium that no package brings: its simulation would leave a file in the cache."""
+    monkeypatch.setenv("BEAMSPREAD_CACHE", str(tmp_path / "cache"))
+    add_plane(material=add_material(thickness=0.0375, anisotropy=0.31))
+    sun = add_sun(0, matrix=Matrix.Rotation(np.pi, 4, "X"))
+    scene = save_scene(tmp_path)
+    code, bakes, _ = run_batch(scene, "--no-indirect", "--output", tmp_path)
+    assert code == 1
+    (sentence,) = bakes[0]["left_out"]
+    assert sentence == "What shines through the slab 'Plane' from behind is not baked yet: light of 'Sun'."
+    assert sentence in bakes[0]["message"]
+    assert not (tmp_path / "cache").exists()
+    # From the front it is lit, and then there is a simulation.
+    sun.matrix_world = Matrix()
+    code, bakes, _ = run_batch(save_scene(tmp_path), "--no-indirect", "--output", tmp_path)
+    assert (code, bakes[0]["left_out"], bakes[0]["dark"]) == (0, [], False)
+    assert [*(tmp_path / "cache").rglob("*.exr")]
+
+
+def test_verbose_prints_what_is_read_and_the_stages(tmp_path):
+    add_plane(size=(2, 1), material=add_material())
+    add_plane("Wall", size=(9, 9), matrix=Matrix.Translation((0, 0, -1)))
+    add_sun(0, strength=3.5, color=(1, 0.5, 0.25))
+    scene = save_scene(tmp_path)
+    _, _, quiet = run_batch(scene, "--no-indirect", "--output", tmp_path)
+    _, _, verbose = run_batch(scene, "--no-indirect", "--verbose", "--output", tmp_path)
+    # Two rectangles of two triangles each.
+    for words in ("1 lights; 4 triangles", "Sun 'Sun': strength 3.5, color 1 0.5 0.25", "32 x 16 texels, 2 x 1 scene"):
+        assert f"Beamspread: {words}" in verbose.replace("'Plane': ", "")
+        assert words not in quiet
+    assert [f"{stage}: " in verbose for stage in ("scene", "Combined of 'Plane'")] == [True, True]

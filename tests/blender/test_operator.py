@@ -352,7 +352,7 @@ def test_samples_of_a_folder(tmp_path):
 
 def test_other_layers_have_images_and_files_beside_the_combined_one(monkeypatch, tmp_path):
     plain = BeamspreadSettings.for_bake
-    wanted = lambda self, solver=None: replace(plain(self, solver), layers=(COMBINED, "Half"))  # noqa: E731
+    wanted = lambda self, *options: replace(plain(self, *options), layers=(COMBINED, "Half"))  # noqa: E731
     monkeypatch.setattr(BeamspreadSettings, "for_bake", wanted)
     monkeypatch.setitem(LAYERS, "Half", lambda *arguments: LAYERS[COMBINED](*arguments) / 2)
     plane = add_plane(material=add_material())
@@ -394,6 +394,9 @@ class DeafJob(EndlessJob):
 
     def run(self, progress):
         return {COMBINED: np.ones((2, 2, 3), np.float32)}
+
+    def is_dark(self, layers):
+        return False
 
     def warnings_after(self, layers):
         return []

@@ -379,6 +379,9 @@ class FailingJob:
     def warnings(self):
         return ["Careful."]
 
+    def is_dark(self, layers):
+        return False
+
     def warnings_after(self, layers):
         return []
 

@@ -8,18 +8,33 @@ def test_nothing_asked_leaves_all_to_the_scene():
     options = parse([])
     assert options.objects == ()
     assert {options.scene, options.frames, options.resolution, options.solver, options.output} == {None}
-    assert {options.format, options.report} == {None}
+    assert {options.format, options.report, options.pass_name, options.indirect} == {None}
+    assert {options.allow_dark, options.verbose} == {False}
 
 
 def test_every_option():
     options = parse(
         ["room.blend", "--object", "Floor", "--object", "Wall", "--frames", "2-5", "--resolution", "512"]
         + ["--solver", "direct", "--output", "out", "--format", "png", "--report", "report.json"]
+        + ["--pass", "Irradiance", "--no-indirect", "--allow-dark", "--verbose"]
     )
     assert options.scene == "room.blend"
     assert options.objects == ("Floor", "Wall")
     assert (options.frames, options.resolution, options.solver) == ((2, 5), 512, "direct")
     assert (options.output, options.format, options.report) == ("out", "PNG", "report.json")
+    assert (options.pass_name, options.indirect) == ("IRRADIANCE", False)
+    assert options.allow_dark
+    assert options.verbose
+
+
+@pytest.mark.parametrize("name", ["LUMINANCE", "irradiance", "Direction"])
+def test_passes_in_any_case(name):
+    assert parse(["--pass", name]).pass_name == name.upper()
+
+
+def test_indirect_light_may_be_asked_for():
+    assert parse(["--indirect"]).indirect is True
+    assert parse(["--indirect", "--no-indirect"]).indirect is False
 
 
 def test_objects_in_one_option_and_twice():
@@ -40,6 +55,8 @@ def test_a_single_frame():
         (["--resolution", "0"], "between 1 and 65536"),
         (["--resolution", "big"], "between 1 and 65536"),
         (["--solver", "magic"], "invalid choice"),
+        (["--pass", "normal"], "'LUMINANCE', 'IRRADIANCE', 'DIRECTION'"),
+        (["--pass"], "--pass"),
         (["--format", "JPG"], "invalid choice"),
         (["--sovler", "fft"], "--sovler"),
         (["--object"], "--object"),

@@ -45,9 +45,9 @@ def is_read_only(path: Path) -> bool:
     return not os.access(path, os.W_OK) or not path.stat().st_mode & 0o222
 
 
-def make_image(name: str, width: int, height: int):
-    """A new float image; Blender gives it the configuration's scene-linear colour space."""
-    return bpy.data.images.new(name, width, height, alpha=False, float_buffer=True)
+def make_image(name: str, width: int, height: int, is_data: bool = False):
+    """A new float image, of plain numbers or in the colour space that Blender gives it: scene-linear."""
+    return bpy.data.images.new(name, width, height, alpha=False, float_buffer=True, is_data=is_data)
 
 
 def fill_image(image, texture: np.ndarray) -> str:

@@ -26,22 +26,30 @@ class Results:
     def store(self, bake: Bake) -> str:
         """Fill the image of the target's node, or a new one, and link it back; other layers have images beside it.
 
-        The path of the image's file, "" where it is packed; BakeError if it can't be kept, or if another object of
-        this run has filled the same part of it.
+        The path of the first layer's file, "" where it is packed; BakeError if it can't be kept, or if another object
+        of this run has filled the same part of it.
         """
         node = find_node(bpy.data.materials.get(bake.target.material_name))
         if node is None:
             raise BakeError("The material or its Beamspread node was removed during the bake.")
         name = node.image.name if node.image else f"Beamspread {bake.target.object_name}"
-        paths = {}
+        paths = []
         for layer, texture in bake.layers.items():
-            image = node.image if layer == COMBINED else bpy.data.images.get(f"{name} {layer}")
+            shown, size = layer == COMBINED, texture.shape[1::-1]
+            image = node.image if shown else self._image_beside(f"{name} {layer}", size)
             if image is None:
-                image = files.make_image(name if layer == COMBINED else f"{name} {layer}", *texture.shape[1::-1])
-            paths[layer] = self._fill(image, bake, texture)
-            if layer == COMBINED:
+                image = files.make_image(name if shown else f"{name} {layer}", *size, is_data=not shown)
+            paths.append(self._fill(image, bake, texture))
+            if shown:
                 link_result(node, image)
-        return paths.get(COMBINED, "")
+        return paths[0]
+
+    def _image_beside(self, name: str, size: tuple[int, int]):
+        """The image of that name, if an earlier bake has made one; its size follows that of the node's."""
+        image = bpy.data.images.get(name)
+        if image is not None and image.name not in self._filled and tuple(image.size) != size and 0 not in image.size:
+            image.scale(*size)
+        return image
 
     def _fill(self, image, bake: Bake, texture: np.ndarray) -> str:
         covered = bake.job.receiver.coverage

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,10 +10,12 @@ from pathlib import Path
 import bpy
 
 from ...core.bake.runner import CANCELLED, WRITTEN, Bake, Target
-from ...core.bake.settings import COMBINED
+from ...core.bake.settings import COMBINED, DIRECTION
+from ...core.batch.inventory import inventory
 from ...core.batch.options import BatchOptions
 from ...core.batch.report import BakeRecord, Report, file_name
 from ...core.errors import ImageError
+from ...core.progress import timed
 from ..images import files
 from ..node.find import NOTHING_FOUND, find_misplaced, find_node, find_targets
 from .prepare import prepare_scene
@@ -20,6 +23,8 @@ from .prepare import prepare_scene
 
 def bake_all(options: BatchOptions) -> Report:
     """Bake every frame asked for and print what becomes of each bake; goes on when one fails."""
+    if options.verbose:
+        _show_log()
     scene = bpy.context.scene
     first, last = options.frames or (scene.frame_current, scene.frame_current)
     report, output = Report(), _Output(options)
@@ -36,7 +41,20 @@ def bake_all(options: BatchOptions) -> Report:
                 return report
     if not report.bakes:
         print(f"Beamspread: {NOTHING_FOUND}", file=sys.stderr)
+    if report.dark() and not options.allow_dark:
+        names = ", ".join(dict.fromkeys(f"'{one.object}'" for one in report.dark()))
+        print(f"Beamspread: No light reaches {names}: an error, unless --allow-dark is given.", file=sys.stderr)
     return report
+
+
+def _show_log() -> None:
+    """Print what the package logs: what it reads, and how long each stage takes."""
+    log = logging.getLogger(__package__.rpartition(".blender.")[0])
+    if not log.handlers:
+        printer = logging.StreamHandler(sys.stdout)
+        printer.setFormatter(logging.Formatter("Beamspread: %(message)s"))
+        log.addHandler(printer)
+    log.setLevel(logging.INFO)
 
 
 def _bakes(options: BatchOptions) -> Iterator[Bake]:
@@ -50,8 +68,13 @@ def _bakes(options: BatchOptions) -> Iterator[Bake]:
             yield Bake(Target(name), error=f"The object '{name}' {missing}.")
         yield from misplaced
         targets += found
-    settings = scene.beamspread.for_bake(options.solver)
-    yield from prepare_scene(bpy.context, targets, settings, options.resolution)
+    settings = scene.beamspread.for_bake(options.solver, options.pass_name, options.indirect)
+    with timed("scene"):
+        bakes = prepare_scene(bpy.context, targets, settings, options.resolution)
+    if options.verbose:
+        for line in inventory(bakes):
+            logging.getLogger(__name__).info(line)
+    yield from bakes
 
 
 class _Output:
@@ -77,6 +100,8 @@ class _Output:
         if folder.startswith("//") and not bpy.data.filepath:
             raise ImageError("The scene was never saved, so there is no folder to write to: give one with --output.")
         parts = [bake.target.object_name, bake.target.material_name, *([] if layer == COMBINED else [layer])]
+        if layer == DIRECTION and file_format == "PNG":
+            raise ImageError("A PNG can't hold directions, which have negative parts: choose EXR.")
         name = file_name(parts, frame if options.frames else None, files.EXTENSIONS[file_format], self._taken)
         path = Path(bpy.path.abspath(folder)).absolute() / name
         files.write_file(path, texture, file_format)

@@ -8,10 +8,10 @@ import bpy
 import numpy as np
 
 from ...core.bake.runner import WRITTEN, Bake, Target
-from ...core.bake.settings import COMBINED
-from ...core.errors import sentence
+from ...core.bake.settings import COMBINED, BakeSettings
+from ...core.errors import ImageError, sentence
 from .. import compat
-from ..node.find import NOTHING_FOUND, find_misplaced, materials_of
+from ..node.find import NOTHING_FOUND, find_misplaced, find_node, materials_of
 from .prepare import prepare
 from .state import state
 
@@ -71,16 +71,28 @@ def _prepare(depsgraph, obj, passes, size: tuple[int, int]) -> list[Bake]:
     try:
         targets = [Target(obj.name, name) for name in _materials_in(obj, passes, *size)]
         settings = depsgraph.scene.beamspread.for_bake()
+        for target in targets:
+            _check_active_image(bpy.data.materials[target.material_name], settings)
         bakes = prepare(depsgraph, targets, settings, size=size) or find_misplaced([obj])
     except Exception as error:  # noqa: BLE001 - Blender would swallow it
         return [Bake(Target(obj.name), error=sentence(error))]
     return bakes or [Bake(Target(obj.name), error=NOTHING_FOUND)]
 
 
+def _check_active_image(material, settings: BakeSettings) -> None:
+    """Raise ImageError if what is baked would be taken for luminance."""
+    active, shown = material.node_tree.nodes.active, find_node(material).image
+    if COMBINED not in settings.layers and shown is not None and getattr(active, "image", None) == shown:
+        raise ImageError(
+            f"The image '{shown.name}' shows luminance in the Beamspread node: choose another active image for "
+            f"{settings.output.lower()}."
+        )
+
+
 def _put(pixels: np.ndarray, bake: Bake) -> str:
-    """Fill the bake's part of RGBA pixels."""
+    """Fill the bake's part of RGBA pixels with its first layer."""
     inside = bake.job.receiver.inside()
-    pixels[inside, :3], pixels[inside, 3] = bake.layers[COMBINED][inside], 1
+    pixels[inside, :3], pixels[inside, 3] = next(iter(bake.layers.values()))[inside], 1
     return ""
 
 

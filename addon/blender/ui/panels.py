@@ -15,6 +15,8 @@ from ..node.find import find_misplaced, find_node, materials_of
 from ..node.node import draw_properties
 from ..read.visible import render_visible_names
 
+INDIRECT_COST = "Indirect light takes some seconds per object, as Cycles finds it first."
+
 # Objects whose warnings, and messages of bakes, that a panel shows; it is drawn often.
 MOST_OBJECTS = 8
 
@@ -46,13 +48,17 @@ BORDER_PIXELS, LETTER_PIXELS = 60, 6.4
 
 
 def draw_warnings(layout, context, messages: list[str]) -> None:
-    """Sentences, wrapped to the panel's width, with an icon."""
+    draw_sentences(layout, context, messages, "ERROR")
+
+
+def draw_sentences(layout, context, messages: list[str], icon: str) -> None:
+    """Wrapped to the panel's width, each after an icon."""
     pixels = context.region.width / context.preferences.system.ui_scale
     width = max(20, int((pixels - BORDER_PIXELS) / LETTER_PIXELS))
     for message in messages:
         column = layout.column(align=True)
         for number, line in enumerate(_wrap(message, width)):
-            column.label(text=line, icon="BLANK1" if number else "ERROR")
+            column.label(text=line, icon="BLANK1" if number else icon)
 
 
 def _wrap(text: str, width: int) -> list[str]:
@@ -114,8 +120,15 @@ class BEAMSPREAD_PT_render(RenderPanel, bpy.types.Panel):
         draw_bake(layout, context)
         column = layout.column()
         settings = context.scene.beamspread
-        for name in ("resolution", "margin", "samples", "solver", "distributions"):
+        for name in ("output", "resolution", "margin", "samples"):
             column.prop(settings, name)
+        column.prop(settings, "use_indirect")
+        if settings.use_indirect:
+            draw_sentences(column, context, [INDIRECT_COST], "INFO")
+        if settings.output != "LUMINANCE":
+            return  # no medium, no solver
+        column.prop(settings, "solver")
+        column.prop(settings, "distributions")
         column.prop(settings, "quality" if settings.distributions == "LIBRARY" else "sample_folder")
 
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..errors import BakeError
-from ..progress import Progress, stages
+from ..progress import Progress, stages, timed
 from ..scene.illumination import Illumination
+from ..scene.lights import Light
 from ..scene.receiver import Receiver
-from .layers import LAYERS
+from .layers import LAYERS, WITHOUT_MEDIUM
 from .luminance import LIBRARY_WEIGHT, LIGHT_WEIGHT, SOLVE_WEIGHT
 from .margin import extend_margin
 from .settings import COMBINED, BakeSettings
@@ -19,24 +21,41 @@ from .surface import Surface
 
 @dataclass(frozen=True, eq=False)
 class BakeJob:
-    """A receiver with its light and its surface; `name` is what to call the receiver in messages."""
+    """A receiver with its light and its surface; `name` is what to call the receiver in messages.
+
+    `more_light` finds what `illumination` lacks, as bounced light, when the job runs, in whatever thread.
+    """
 
     name: str
     receiver: Receiver
     illumination: Illumination
     surface: Surface
     settings: BakeSettings
+    more_light: Callable[[Receiver, Progress | None], Sequence[Light]] | None = None
 
     def run(self, progress: Progress | None = None) -> dict[str, np.ndarray]:
         """The layers: name -> float32 (height, width, 3), margin included, row 0 at the bottom."""
-        needs_albedo = 0.0 if self.surface.base_color is None else LIBRARY_WEIGHT
+        self.surface.check()
+        if self.more_light is not None:
+            finding, baking = stages(progress, [LIBRARY_WEIGHT, LIBRARY_WEIGHT + SOLVE_WEIGHT])
+            with timed(f"bounced light of '{self.name}'"):
+                illumination = self.illumination.lit_by(self.more_light(self.receiver, finding))
+            return replace(self, illumination=illumination, more_light=None).run(baking)
+        if self._surely_dark():  # at once: to simulate the medium may take half a minute
+            return {name: np.zeros((*self.receiver.coverage.shape, 3), np.float32) for name in self.settings.layers}
+        needs_medium = not WITHOUT_MEDIUM.issuperset(self.settings.layers)
+        needs_albedo = LIBRARY_WEIGHT if needs_medium and self.surface.base_color is not None else 0.0
         one = LIBRARY_WEIGHT + SOLVE_WEIGHT + LIGHT_WEIGHT * len(self.illumination.lights)
         parts = len(self.settings.layers) * len(self.receiver.charts)
         resolving, *baking = stages(progress, [needs_albedo] + [one] * parts)
-        material, steps = self.surface.resolve(self.settings.quality, resolving), iter(baking)
+        material, steps = self.surface.material, iter(baking)
+        if needs_medium:
+            with timed(f"albedo of '{self.name}'"):
+                material = self.surface.resolve(self.settings.quality, resolving)
         layers = {}
         for name in self.settings.layers:
-            values = [LAYERS[name](self, chart.grid, material, next(steps)) for chart in self.receiver.charts]
+            with timed(f"{name} of '{self.name}'"):
+                values = [LAYERS[name](self, chart.grid, material, next(steps)) for chart in self.receiver.charts]
             if not all(np.isfinite(on_grid).all() for on_grid in values):
                 raise BakeError("The bake produced values that are not numbers: check the strengths of the lights.")
             texture = self.receiver.to_texture(values)
@@ -46,9 +65,26 @@ class BakeJob:
 
     def warnings(self) -> list[str]:
         """What the artist should know before it runs."""
-        return [*self.illumination.warnings, *filter(None, [self._surely_dark()])]
+        return [*self.left_out(), *filter(None, [self._surely_dark()])]
+
+    def left_out(self) -> list[str]:
+        """Light that is missing from it, in sentences."""
+        return [*self.illumination.warnings, *filter(None, [self._shining_through()])]
+
+    def _shining_through(self) -> str:
+        """Of a slab, the lights that can reach its back: from there, light comes through to the side that is baked."""
+        if COMBINED not in self.settings.layers or not self.surface.thickness:
+            return ""
+        backs = [replace(one.grid, normal=tuple(-value for value in one.grid.normal)) for one in self.receiver.charts]
+        lights = [light for light in self.illumination.lights if not all(light.is_behind(back) for back in backs)]
+        if not lights:
+            return ""
+        names = ", ".join(f"'{light.name}'" for light in lights)
+        return f"What shines through the slab '{self.name}' from behind is not baked yet: light of {names}."
 
     def _surely_dark(self) -> str:
+        if self.more_light is not None:
+            return ""
         lights = self.illumination.lights
         if not lights:
             return "No light of the scene can be baked: it is black."
@@ -59,9 +95,16 @@ class BakeJob:
             )
         return ""
 
+    def is_dark(self, layers: dict[str, np.ndarray]) -> bool:
+        """Whether its result shows that no light arrived; what absorbs everything is black in any light."""
+        if self._surely_dark():
+            return True
+        color = self.surface.base_color or self.surface.material.albedo
+        telling = [texture for name, texture in layers.items() if name in WITHOUT_MEDIUM or any(color)]
+        return bool(telling) and not any(texture.any() for texture in telling)
+
     def warnings_after(self, layers: dict[str, np.ndarray]) -> list[str]:
         """What only its result shows."""
-        combined, color = layers.get(COMBINED), self.surface.base_color or self.surface.material.albedo
-        if combined is None or combined.any() or not any(color) or self._surely_dark():
+        if self._surely_dark() or not self.is_dark(layers):
             return []
         return [f"No light reaches '{self.name}', so it is black: look for what stands in its way."]

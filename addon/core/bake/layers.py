@@ -13,8 +13,9 @@ import numpy as np
 from ..material.material import Material
 from ..progress import Progress
 from ..scene.grid import Grid
+from .arrival import arrive, mean_direction
 from .luminance import bake
-from .settings import COMBINED
+from .settings import COMBINED, DIRECTION, IRRADIANCE
 
 if TYPE_CHECKING:
     from .job import BakeJob
@@ -27,4 +28,15 @@ def luminance(job: BakeJob, grid: Grid, material: Material, progress: Progress |
     return bake(grid, job.illumination, material, job.surface.thickness, job.settings, progress)
 
 
-LAYERS: dict[str, Layer] = {COMBINED: luminance}
+def irradiance(job: BakeJob, grid: Grid, _material: Material, progress: Progress | None) -> np.ndarray:
+    return arrive(grid, job.illumination, job.settings, progress)[0]
+
+
+def direction(job: BakeJob, grid: Grid, _material: Material, progress: Progress | None) -> np.ndarray:
+    return mean_direction(arrive(grid, job.illumination, job.settings, progress)[1])
+
+
+LAYERS: dict[str, Layer] = {COMBINED: luminance, IRRADIANCE: irradiance, DIRECTION: direction}
+
+WITHOUT_MEDIUM = {IRRADIANCE, DIRECTION}
+"""Layers that only look at the light: what the surface is made of need not be worked out for them."""

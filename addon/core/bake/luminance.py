@@ -15,8 +15,9 @@ from ..native import native
 from ..progress import Progress, stages
 from ..scene.grid import Grid
 from ..scene.illumination import Illumination
-from ..scene.lights import Light
-from .convolve import solve
+from ..scene.lights import Light, SunDiskLight, SunLight
+from .convolve import solve as convolve_plane_lights
+from .gather import Gatherer
 from .settings import BakeSettings
 
 # Shares of the time that a bake takes, roughly: simulating an LDF not in the cache, gathering a light, solving for all.
@@ -25,9 +26,16 @@ LIBRARY_WEIGHT, LIGHT_WEIGHT, SOLVE_WEIGHT = 2.0, 1.0, 3.0
 # Of the solvers, see `convolve`: half a per cent in the worst texel is not seen, and below the noise of libraries.
 TOLERANCE = 5e-3
 
-# Bytes of irradiance that wait for the solver at once, which bounds the memory for any number of lights: 128 of them on
-# 1024 x 1024 texels. Beyond, it solves again.
+# Bytes of irradiance that may wait for the solver, which then looks at all of it: 128 lights on 1024 x 1024 texels.
+# Beyond, light is added up as it comes, and some stands for all where the solver chooses how exactly to look.
 MOST_WAITING = 512 << 20
+MOST_STAND_INS = 4
+
+# Suns that have kernels of their own then; see `LightField`.
+MOST_KEPT = 4
+
+# From each texel to all lights of a size together, at 4 x 4 samples, and at least to each of them.
+MOST_RAYS, FEWEST_RAYS = 256, 4
 
 
 def bake(
@@ -60,68 +68,101 @@ def bake(
     Cancelled
         `progress` returned False.
     """
-    lights = illumination.lights
     material.check()
     check_thickness(thickness)
-    at_once = max(1, MOST_WAITING // (4 * grid.width * grid.height))
-    together = [lights[first : first + at_once] for first in range(0, len(lights), at_once)]
-    weights = [LIBRARY_WEIGHT] + [weight for some in together for weight in (LIGHT_WEIGHT * len(some), SOLVE_WEIGHT)]
-    media_progress, *steps = stages(progress, weights)
+    lights = illumination.lights
+    media_progress, light_progress = stages(progress, [LIBRARY_WEIGHT, LIGHT_WEIGHT * len(lights) + SOLVE_WEIGHT])
     if settings.distributions == "library":
         sources = _libraries(material, thickness, settings.quality, media_progress)
     else:
         sources = [load_source(settings.sample_folder, settings.distributions)] * 3
-    luminance = np.zeros((grid.height, grid.width, 3), np.float32)
-    for some, gathering, solving in zip(together, steps[::2], steps[1::2]):
-        arriving = _gather(grid, some, illumination.caster(grid), settings, gathering)
-        if arriving:
-            luminance += _spread(arriving, sources, material, grid, settings, solving)
+    gatherer = Gatherer(grid, illumination, settings, _rays(grid, material, settings))
+    bytes_waiting = 4 * grid.width * grid.height * len(lights)
+    if all(map(gatherer.has_one_direction, lights)) and bytes_waiting <= MOST_WAITING:
+        spread = _spread_together
+    elif settings.solver == "fft":
+        spread = _spread_field
+    else:
+        spread = _spread_apart
+    medium = {
+        "ldf": sources,
+        "albedo": material.albedo,
+        "mean_free_path": material.mean_free_path,
+        "pitch": (grid.pitch_x, grid.pitch_y),
+        "tolerance": TOLERANCE,
+        "threads": settings.threads,
+    }
+    try:
+        luminance = spread(gatherer, lights, medium, settings.solver, light_progress)
+    except ValueError as error:
+        if settings.distributions == "library":
+            raise
+        raise BakeError(f"The LDF samples in '{settings.sample_folder}' don't reach this far: {error}.") from error
     return luminance
 
 
-def _gather(grid: Grid, lights: Sequence[Light], caster, settings: BakeSettings, progress) -> list:
-    """What arrives from each light that reaches the chart, as native `PlaneLight`s."""
-    arriving = []
-    for light, step in zip(lights, stages(progress, [1.0] * len(lights))):
-        irradiance, direction = gather_unit(grid, light, caster, settings, step, directions=False)
-        color = light.rgb()
-        if not (irradiance.any() and color.any()):
-            continue
-        position = light.position_in(grid)
-        if position is None:
-            arriving.append(native.PlaneLight(irradiance, direction.astype(np.float32), color.tolist()))
-        else:
-            arriving.append(native.PlaneLight.from_point(irradiance, position, color.tolist()))
-    return arriving
+def _rays(grid: Grid, material: Material, settings: BakeSettings) -> int:
+    """How many rays of each texel leave noise of a hundredth, in a penumbra, of what the medium spreads.
 
-
-def gather_unit(
-    grid: Grid, light: Light, caster, settings: BakeSettings, progress: Progress | None = None, directions: bool = True
-) -> tuple[np.ndarray, np.ndarray | None]:
-    """Irradiance (H, W) of the light at strength 1 and color 1, W/m^2 with cosine, visibility and coverage.
-
-    And the direction of travel, unit vectors in the plane's frame: (3,) for a sun, else (H, W, 3), or None if no
-    `directions` are wanted. `caster` is a native `Occluders` or None.
+    Light from a point fills some 4 pi l^2 texels, l the mean free path, over whose rays its noise is averaged; that of
+    n low-discrepancy rays falls about as n^-3/4.
     """
-    irradiance, direction = light.gather(
-        grid,
-        caster if light.cast_shadow else None,
-        samples=settings.samples,
-        threads=settings.threads,
-        progress=progress,
-        clearance=grid.clearance,
-        directions=directions,
-    )
-    irradiance *= grid.coverage
-    return irradiance, direction
+    path = min(material.mean_free_path) / max(grid.pitch_x, grid.pitch_y)
+    texels = 1.0 + 4.0 * math.pi * path**2
+    wanted = (100.0 / math.sqrt(texels)) ** (4.0 / 3.0)
+    return round(min(max(wanted, FEWEST_RAYS), MOST_RAYS) * (settings.samples / 4) ** 2) or 1
 
 
-def light_beams(
-    grid: Grid, light: Light, caster, settings: BakeSettings, progress: Progress | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Irradiance (H, W, 3) of the light as it is, and its direction; see `gather_unit`."""
-    irradiance, direction = gather_unit(grid, light, caster, settings, progress)
-    return irradiance[..., None] * light.rgb(), direction
+def _spread_together(gatherer: Gatherer, lights: Sequence[Light], medium: dict, solver: str, progress) -> np.ndarray:
+    """All lights first, then the solver: for few lights of one direction per texel."""
+    gathering, solving = stages(progress, [LIGHT_WEIGHT * len(lights), SOLVE_WEIGHT])
+    arriving = []
+    for light, step in zip(lights, stages(gathering, [1.0] * len(lights))):
+        arriving += [part for part in gatherer.plane_lights(light, step) if part.mean() > 0]
+    if not arriving:
+        return _dark(gatherer.grid)
+    return convolve_plane_lights(arriving, solver=solver, progress=solving, **medium)
+
+
+def _spread_apart(gatherer: Gatherer, lights: Sequence[Light], medium: dict, solver: str, progress) -> np.ndarray:
+    """Light after light, and ray after ray where one has a size: for the solvers that share no work among them."""
+    luminance = _dark(gatherer.grid)
+    for light, step in zip(lights, stages(progress, [1.0] * len(lights))):
+        gathering, solving = stages(step, [LIGHT_WEIGHT, SOLVE_WEIGHT])
+        parts = [part for part in gatherer.layers(light, gathering) if part.mean() > 0]
+        for part, part_step in zip(parts, stages(solving, [1.0] * len(parts))):
+            luminance += convolve_plane_lights([part], solver=solver, progress=part_step, **medium)
+    return luminance
+
+
+def _spread_field(gatherer: Gatherer, lights: Sequence[Light], medium: dict, _solver: str, progress) -> np.ndarray:
+    """Lights of any number and size, added up as they come."""
+    choosing, *adding, solving = stages(progress, [SOLVE_WEIGHT] + [LIGHT_WEIGHT] * len(lights) + [SOLVE_WEIGHT])
+    grid = gatherer.grid
+    shape, survey, means = gatherer.survey()
+    brightest = sorted(range(len(lights)), key=lambda i: means[i], reverse=True)
+    lit = [i for i in brightest if not lights[i].is_behind(grid)]
+    suns = [i for i in lit if isinstance(lights[i], SunLight | SunDiskLight) and gatherer.has_one_direction(lights[i])]
+    kept = suns if len(suns) <= MOST_KEPT else []
+    later = [i for i in lit if i not in kept]
+    # What a survey has missed shines on few texels, and is looked at as it is.
+    look_at = [*later[:MOST_STAND_INS], *(i for i in later[MOST_STAND_INS:] if means[i] == 0)]
+    parts = [part for i in kept for part in gatherer.plane_lights(lights[i])]
+    parts = [
+        part for part in parts + [part for i in look_at for part in gatherer.stand_in(lights[i])] if part.mean() > 0
+    ]
+    expected = [part for i in lit for part in survey[i]]
+    if not parts and not any(means):
+        return _dark(grid)
+    field = native.LightField((grid.height, grid.width), parts, shape, expected, progress=choosing, **medium)
+    for i, step in zip(later, adding):
+        rays = round(gatherer.rays * means[i] / sum(means))
+        gatherer.add_to(field, lights[i], max(FEWEST_RAYS, rays), step)
+    return field.solve(solving)
+
+
+def _dark(grid: Grid) -> np.ndarray:
+    return np.zeros((grid.height, grid.width, 3), np.float32)
 
 
 def _libraries(material: Material, thickness: float, quality: str, progress: Progress | None) -> list:
@@ -134,22 +175,3 @@ def _libraries(material: Material, thickness: float, quality: str, progress: Pro
         medium = native.Medium(g=g, ior=material.ior, thickness=depth)
         by_channel[g, depth] = library(medium, quality=quality, progress=stage)
     return [by_channel[channel] for channel in channels]
-
-
-def _spread(arriving: list, sources: list, material: Material, grid: Grid, settings: BakeSettings, progress):
-    try:
-        return solve(
-            arriving,
-            sources,
-            material.albedo,
-            material.mean_free_path,
-            (grid.pitch_x, grid.pitch_y),
-            solver=settings.solver,
-            tolerance=TOLERANCE,
-            threads=settings.threads,
-            progress=progress,
-        )
-    except ValueError as error:
-        if settings.distributions == "library":
-            raise
-        raise BakeError(f"The LDF samples in '{settings.sample_folder}' don't reach this far: {error}.") from error

@@ -38,6 +38,7 @@ class Bake:
     seconds : that run and keep took.
     error : one sentence unless `status` is "written".
     warnings : sentences that hold whatever the status.
+    is_dark : once it has run, whether no light arrived.
     """
 
     def __init__(self, target: Target, job: BakeJob | None = None, error: str = "") -> None:
@@ -45,6 +46,7 @@ class Bake:
         self.status = FAILED
         self.layers: dict[str, np.ndarray] = {}
         self.path = ""
+        self.is_dark = False
         self.seconds = 0.0
         self.warnings = job.warnings() if job else []
 
@@ -55,6 +57,7 @@ class Bake:
         start = time.monotonic()
         try:
             self.layers = self.job.run(progress)
+            self.is_dark = self.job.is_dark(self.layers)
             self.warnings += self.job.warnings_after(self.layers)
         except (KeyboardInterrupt, native.Cancelled):
             self.cancel()

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-COMBINED = "Combined"
-"""The layer that materials show: luminance under all lights."""
+COMBINED, IRRADIANCE, DIRECTION = "Combined", "Irradiance", "Direction"
+"""Layers: the one that materials show, luminance under all lights; and what arrives, see `arrive`."""
+
+OUTPUTS = {"LUMINANCE": COMBINED, "IRRADIANCE": IRRADIANCE, "DIRECTION": DIRECTION}
+"""What users choose from, and its layer."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +25,7 @@ class BakeSettings:
         interpolated: "angular", "adaptive" or "planar". Samples stand for anisotropy, index of refraction and
         thickness of every material.
     threads : 0 for all.
+    indirect : whether light counts that other objects return.
     layers : names of results wanted, see layers.py.
     """
 
@@ -32,4 +36,10 @@ class BakeSettings:
     distributions: str = "library"
     sample_folder: str = ""
     threads: int = 0
+    indirect: bool = True
     layers: tuple[str, ...] = (COMBINED,)
+
+    @property
+    def output(self) -> str:
+        """The first layer, by the name that users know."""
+        return next((name for name, layer in OUTPUTS.items() if layer == self.layers[0]), self.layers[0])

@@ -6,8 +6,11 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..bake.settings import OUTPUTS
+
 SOLVERS = ("fft", "direct", "adaptive")
 FORMATS = ("EXR", "PNG")
+PASSES = tuple(OUTPUTS)
 
 
 @dataclass(frozen=True)
@@ -22,6 +25,10 @@ class BatchOptions:
     output: str | None
     format: str | None
     report: str | None
+    pass_name: str | None
+    indirect: bool | None
+    allow_dark: bool
+    verbose: bool
 
 
 def arguments_for_script(argv: Sequence[str], inside_blender: bool) -> list[str]:
@@ -53,7 +60,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="beamspread batch",
         description="Bake the light inside translucent surfaces of a scene into image files.",
-        epilog="Exit code 0 only if every bake asked for was written.",
+        epilog="Exit code 0 only if every bake asked for was written and light reached it; 2 for a mistake in these.",
         allow_abbrev=False,
         formatter_class=_Help,
     )
@@ -70,9 +77,23 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--frames", type=_frames, metavar="A-B", help="first and last frame (default: the current one)")
     parser.add_argument("--resolution", type=_resolution, metavar="N", help="texels along the longer side")
     parser.add_argument("--solver", type=str.lower, choices=SOLVERS)
+    parser.add_argument(
+        "--pass",
+        dest="pass_name",
+        type=str.upper,
+        choices=PASSES,
+        help="what leaves the surface, what arrives on it, or the way that travels (default: the scene's setting)",
+    )
+    parser.add_argument(
+        "--indirect",
+        action=argparse.BooleanOptionalAction,
+        help="with or without the light that other objects return (default: the scene's setting)",
+    )
     parser.add_argument("--output", metavar="DIR", help="folder for the images (default: the scene's setting)")
     parser.add_argument("--format", type=str.upper, choices=FORMATS)
     parser.add_argument("--report", metavar="FILE.json", help="write what became of each bake")
+    parser.add_argument("--allow-dark", action="store_true", help="exit code 0 also where no light arrives")
+    parser.add_argument("--verbose", action="store_true", help="print what is read, and how long each stage takes")
     parser.add_argument("--resume", action="store_true", help="not supported yet")
     return parser
 

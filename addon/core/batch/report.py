@@ -12,7 +12,18 @@ from ..bake.runner import FAILED, WRITTEN, Bake
 
 @dataclass
 class BakeRecord:
-    """One bake of one material of one object at one frame; `seconds` is wall-clock time, `path` the file written."""
+    """One bake of one material of one object at one frame.
+
+    Attributes
+    ----------
+    path : the file written.
+    seconds : wall-clock time.
+    output : what was asked for, LUMINANCE, IRRADIANCE or DIRECTION.
+    lights : how many were baked.
+    left_out : sentences that name light which is missing.
+    indirect : whether light that other objects return was asked for.
+    dark : whether no light arrived; the file is written all the same.
+    """
 
     object: str
     material: str = ""
@@ -23,13 +34,22 @@ class BakeRecord:
     seconds: float = 0.0
     status: str = FAILED
     message: str = ""
+    output: str = ""
+    lights: int = 0
+    left_out: list[str] = field(default_factory=list)
+    indirect: bool = False
+    dark: bool = False
 
     @classmethod
     def of(cls, bake: Bake, frame: int) -> BakeRecord:
         """What became of a bake."""
-        width, height = (bake.job.receiver.width, bake.job.receiver.height) if bake.job else (0, 0)
-        subject = bake.target.object_name, bake.target.material_name, frame, bake.path
-        return cls(*subject, width, height, round(bake.seconds, 3), bake.status, " ".join(bake.messages()))
+        job, subject = bake.job, (bake.target.object_name, bake.target.material_name, frame, bake.path)
+        outcome = round(bake.seconds, 3), bake.status, " ".join(bake.messages())
+        if job is None:
+            return cls(*subject, 0, 0, *outcome)
+        lights = len(job.illumination.lights), job.left_out(), job.settings.indirect
+        size = job.receiver.width, job.receiver.height
+        return cls(*subject, *size, *outcome, job.settings.output, *lights, bake.is_dark)
 
     def __str__(self) -> str:
         subject = f"{self.object} / {self.material}" if self.material else self.object
@@ -48,6 +68,10 @@ class Report:
     def all_written(self) -> bool:
         """Whether there was something to bake and every bake was written."""
         return bool(self.bakes) and all(bake.status == WRITTEN for bake in self.bakes)
+
+    def dark(self) -> list[BakeRecord]:
+        """Those that no light reached."""
+        return [bake for bake in self.bakes if bake.dark]
 
     def save(self, path: str) -> None:
         """Write {"bakes": [...]} as JSON, whole or not at all."""

@@ -11,7 +11,7 @@
 #include "solve/adaptive/multilevel_sum.h"
 #include "solve/adaptive/near_radius.h"
 #include "solve/adaptive/wide_beams.h"
-#include "solve/separable/light_terms.h"
+#include "solve/separable/term_row.h"
 
 namespace beamspread {
 

@@ -11,14 +11,14 @@ namespace {
 constexpr double same_color = 1e-6;
 
 // The factor between the light of two channels, if that is all they differ by; else 0.
-double common_factor(const std::vector<PlaneLight>& lights, std::size_t channel, std::size_t reference)
+double common_factor(const std::vector<std::vector<double>>& colors, std::size_t channel, std::size_t reference)
 {
     double factor = 0.0;
-    for (const PlaneLight& light : lights)
-        if (light.color[reference] > 0.0)
-            factor = std::max(factor, light.color[channel] / light.color[reference]);
-    for (const PlaneLight& light : lights)
-        if (std::abs(light.color[channel] - factor * light.color[reference]) > same_color * light.color[channel])
+    for (const std::vector<double>& color : colors)
+        if (color[reference] > 0.0)
+            factor = std::max(factor, color[channel] / color[reference]);
+    for (const std::vector<double>& color : colors)
+        if (std::abs(color[channel] - factor * color[reference]) > same_color * color[channel])
             return 0.0;
     return factor;
 }
@@ -27,11 +27,15 @@ double common_factor(const std::vector<PlaneLight>& lights, std::size_t channel,
 
 ChannelSets::ChannelSets(const Problem& problem)
 {
+    std::vector<std::vector<double>> colors;
+    for (const auto* lights : {&problem.lights, &problem.to_come.lights})
+        for (const PlaneLight& light : *lights)
+            colors.push_back(light.color);
     for (std::size_t c = 0; c < problem.channels.size(); ++c) {
         double factor = 0.0;
         std::size_t set = 0;
         while (set < m_reference.size()) {
-            factor = common_factor(problem.lights, c, m_reference[set]);
+            factor = common_factor(colors, c, m_reference[set]);
             if (factor != 0.0)
                 break;
             ++set;

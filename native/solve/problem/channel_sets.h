@@ -25,14 +25,15 @@ struct ChannelSets {
 
     std::size_t count() const { return m_reference.size(); }
 
-    // The colour of a light in a set.
+    // The channel that stands for a set, and the colour of a light in it.
+    std::size_t channel(std::size_t set) const { return m_reference[set]; }
     double color(const PlaneLight& light, std::size_t set) const { return light.color[m_reference[set]]; }
 
     std::vector<ChannelMedium> media;
     std::vector<Result> results;
 
 private:
-    std::vector<std::size_t> m_reference;  // [set]: the channel that stands for it
+    std::vector<std::size_t> m_reference;  // [set]
 };
 
 }  // namespace beamspread

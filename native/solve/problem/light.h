@@ -55,6 +55,14 @@ struct PlaneLight {
 std::vector<PlaneLight> lights_of_channels(const std::vector<View2D<const float>>& irradiance,
                                            const Directions& directions);
 
+// Rays of any directions that come from one light, one at each texel of a row.
+struct RayBeams {
+    std::size_t y;
+    std::size_t width;
+    const float* travel;  // [texel][x, y, z]
+    const float* irradiance;  // [texel][channel], W/m^2
+};
+
 // The angles of a light in part of a row.
 struct BeamRow {
     std::vector<float> irradiance;

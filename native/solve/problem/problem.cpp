@@ -74,13 +74,13 @@ void check_row(const PlaneLight& light, std::size_t y)
                 check_direction(Vec3(d[0], d[1], d[2]));
 }
 
-void check_light(const Problem& problem, const PlaneLight& light)
+void check_light(const Plane& plane, std::size_t channels, const PlaneLight& light)
 {
     const View2D<const float>& irradiance = light.irradiance;
-    if (irradiance.width != problem.plane.width || irradiance.height != problem.plane.height)
+    if (irradiance.width != plane.width || irradiance.height != plane.height)
         reject("irradiance", std::to_string(irradiance.height) + " x " + std::to_string(irradiance.width) + " texels",
                "as many for all lights");
-    if (light.color.size() != problem.channels.size())
+    if (light.color.size() != channels)
         reject("color", std::to_string(light.color.size()) + " channels", "as many as there are media");
     for (const double part : light.color)
         if (!(part >= 0.0 && part <= static_cast<double>(most_irradiance)))
@@ -118,10 +118,17 @@ void validate(const Problem& problem)
         if (!(channel.mean_free_path > 0.0 && channel.mean_free_path <= most_paths_per_texel * shorter))
             reject("mean_free_path", channel.mean_free_path, "above 0 metres, and up to 1e8 texels");
     }
-    if (problem.lights.empty())
+    if (problem.lights.empty() && problem.to_come.lights.empty())
         reject("lights", "empty", "at least one light");
     for (const PlaneLight& light : problem.lights)
-        check_light(problem, light);
+        validate(problem, light);
+    for (const PlaneLight& light : problem.to_come.lights)
+        check_light(problem.to_come.plane, problem.channels.size(), light);
+}
+
+void validate(const Problem& problem, const PlaneLight& light)
+{
+    check_light(problem.plane, problem.channels.size(), light);
 }
 
 }  // namespace beamspread

@@ -18,6 +18,12 @@ struct ChannelMedium {
     bool operator==(const ChannelMedium&) const = default;
 };
 
+// Light that is still to come, at a few texels spread over the plane.
+struct LightSurvey {
+    Plane plane;
+    std::vector<PlaneLight> lights;
+};
+
 enum class Solver { fft, direct, adaptive };
 
 struct Problem {
@@ -29,9 +35,13 @@ struct Problem {
     int threads = 0;
     std::size_t memory = std::size_t{5} << 26;  // bytes that spectra may take at once; beyond, in tiles
     std::size_t coarsening = 0;  // of the grid that light spreads far on, texels; 1: none, 0: what costs least
+    LightSurvey to_come{};  // in a field of light, see `SpectralField`
 };
 
 // Throws InvalidArgument for a plane, media, light or options that solvers don't cover.
 void validate(const Problem& problem);
+
+// Likewise for a light that comes later.
+void validate(const Problem& problem, const PlaneLight& light);
 
 }  // namespace beamspread

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "base/constants.h"
 #include "base/threads.h"
+#include "simd/loops.h"
 
 namespace beamspread {
 
@@ -95,6 +97,33 @@ Histogram histogram_of(const Plane& plane, const std::vector<PlaneLight>& lights
     return sum;
 }
 
+// The widest step between the angles of lit neighbours: what lies between them is off theirs by less.
+double widest_step(const LightSurvey& survey)
+{
+    float widest = 0.0f;
+    const std::size_t width = survey.plane.width;
+    for (const PlaneLight& light : survey.lights) {
+        BeamRow row;
+        BeamRow below;  // of the row before
+        for (std::size_t y = 0; y < survey.plane.height; ++y) {
+            std::swap(row, below);
+            if (!row.read(survey.plane, light, {y, 0, width})) {
+                row.irradiance.assign(width, 0.0f);
+                continue;
+            }
+            for (std::size_t x = 0; x < width; ++x) {
+                if (row.irradiance[x] == 0.0f)
+                    continue;
+                if (x > 0 && row.irradiance[x - 1] > 0.0f)
+                    widest = std::max(widest, std::abs(row.half_tangent[x] - row.half_tangent[x - 1]));
+                if (y > 0 && below.irradiance[x] > 0.0f)
+                    widest = std::max(widest, std::abs(row.half_tangent[x] - below.half_tangent[x]));
+            }
+        }
+    }
+    return static_cast<double>(widest);
+}
+
 // Of four neighbours at t in [0, 1] between the second and the third.
 std::array<double, 4> cubic_b_spline(double t)
 {
@@ -110,15 +139,18 @@ double angle_deg(double half_tangent)
     return 2.0 * std::atan(half_tangent) / radians_per_degree;
 }
 
-Incidence::Incidence(const Plane& plane, const std::vector<PlaneLight>& lights)
+Incidence::Incidence(const Plane& plane, const std::vector<PlaneLight>& lights, const LightSurvey& to_come)
 {
-    const Histogram histogram = histogram_of(plane, lights);
+    Histogram histogram = histogram_of(plane, lights);
     extremes = histogram.extremes;
-    for (const Extremes& each : extremes) {
-        first = std::min(first, static_cast<double>(each.least));
-        last = std::max(last, static_cast<double>(each.greatest));
+    extend(extremes, 0.0);
+    if (!to_come.lights.empty()) {
+        const Histogram later = histogram_of(to_come.plane, to_come.lights);
+        const double texels = static_cast<double>(plane.texels()) / static_cast<double>(to_come.plane.texels());
+        add_scaled(histogram.light.data(), later.light.data(), texels, bin_count);
+        add_scaled(histogram.beams.data(), later.beams.data(), texels, bin_count);
+        extend(later.extremes, widest_step(to_come));
     }
-    last = std::min(last, largest);
     if (none())
         return;
 
@@ -145,6 +177,17 @@ Incidence::Incidence(const Plane& plane, const std::vector<PlaneLight>& lights)
     for (std::size_t i = 0; i < count; ++i)
         if (beams[i] > 0.0)
             share[i] = (light[i] / all_light + beams[i] / all_beams + 1.0 / static_cast<double>(occupied)) / 3.0;
+}
+
+void Incidence::extend(const std::vector<Extremes>& found, double margin)
+{
+    for (const Extremes& each : found) {
+        if (each.irradiance == 0.0)
+            continue;
+        first = std::min(first, std::max(static_cast<double>(each.least) - margin, 0.0));
+        last = std::max(last, static_cast<double>(each.greatest) + margin);
+    }
+    last = std::min(last, largest);
 }
 
 }  // namespace beamspread

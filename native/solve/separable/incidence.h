@@ -27,11 +27,15 @@ struct Incidence {
     // At `count` angles evenly from first to last, sum 1: the mean of the shares of light, of lit beams and of angles.
     // Each angle that occurs counts at the four around it, so that a basis for these holds what is between them.
     std::array<double, count> share{};
-    std::vector<Extremes> extremes;  // [light]
+    std::vector<Extremes> extremes;  // [light], not of those to come
 
-    Incidence(const Plane& plane, const std::vector<PlaneLight>& lights);
+    Incidence(const Plane& plane, const std::vector<PlaneLight>& lights, const LightSurvey& to_come = {});
 
     bool none() const { return first > last; }
+
+private:
+    // Reaches over what was found and so much beyond.
+    void extend(const std::vector<Extremes>& found, double margin);
 };
 
 double angle_deg(double half_tangent);

@@ -5,14 +5,9 @@
 #include <map>
 #include <utility>
 
-#include "simd/loops.h"
-
 namespace beamspread {
 
 namespace {
-
-// Texels of a row whose values stay in the cache from step to step.
-constexpr std::size_t texels_at_once = 512;
 
 // Directions that have a term each. A basis for more of them needs hardly more terms than these would be.
 constexpr std::size_t most_fixed_directions = 4;
@@ -104,7 +99,7 @@ void add_basis(LightTerms& terms, LowRankBasis basis)
 
 LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& choose)
 {
-    LightTerms result{problem.plane, ChannelSets(problem), {}, {}, {}, {}, {}, {}};
+    LightTerms result{problem.plane, ChannelSets(problem), {}, {}, {}, {}, {}, {}, {}};
     for (const PlaneLight& light : problem.lights)
         (std::holds_alternative<OneDirection>(light.directions) ? result.fixed : result.changing).push_back(light);
     const auto directions = by_direction(result.fixed);
@@ -118,69 +113,26 @@ LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& 
         for (std::size_t set = 0; set < result.sets.count(); ++set)
             result.colors.back().push_back(static_cast<float>(result.sets.color(light, set)));
     }
-    const Incidence incidence(problem.plane, result.changing);
+    const bool is_to_come = !problem.to_come.lights.empty();
+    const Incidence incidence(problem.plane, result.changing, problem.to_come);
     if (incidence.none())
         return result;
     const KernelDecomposition kernels(incidence, result.sets.media,
                                       std::max(problem.plane.pitch_x, problem.plane.pitch_y));
     add_basis(result, kernels.basis(choose(kernels, incidence, result), beyond));
+    if (is_to_come) {
+        std::size_t kept = 0;
+        for (std::size_t l = 0; l < result.changing.size(); ++l)
+            if (std::holds_alternative<OneDirection>(result.changing[l].directions)) {
+                result.changing[kept] = result.changing[l];
+                result.colors[kept++] = result.colors[l];
+            }
+        result.changing.resize(kept);
+        result.colors.resize(kept);
+        for (const LightTerm& term : result.terms)
+            result.moments.emplace_back(term.fixed.empty() ? problem.plane.texels() : 0);
+    }
     return result;
-}
-
-void TermRow::start(const LightTerms& terms, const RowSpan& span, std::size_t first, std::size_t count)
-{
-    m_width = span.width;
-    m_first = first;
-    m_values.assign(count * span.width, 0.0f);
-    bool has_moments = false;
-    for (std::size_t t = first; t < first + count; ++t) {
-        has_moments |= terms.terms[t].fixed.empty();
-        for (const auto& [light, weight] : terms.terms[t].fixed) {
-            m_u.resize(span.width);
-            copy_row(terms.fixed[light].irradiance, span.y, span.x, span.width, m_u.data());
-            add_scaled(m_values.data() + (t - first) * m_width, m_u.data(), weight, span.width);
-        }
-    }
-    if (!has_moments)
-        return;
-    for (std::size_t x = 0; x < span.width; x += texels_at_once) {
-        const RowSpan part{span.y, span.x + x, std::min(texels_at_once, span.width - x)};
-        for (std::size_t l = 0; l < terms.changing.size(); ++l)
-            if (m_beams.read(terms.plane, terms.changing[l], part))
-                add_moments(terms, {span.y, x, part.width}, terms.colors[l], first + count);
-    }
-}
-
-// Of the beams of one light, to texels [span.x, ...) of the row.
-void TermRow::add_moments(const LightTerms& terms, const RowSpan& span, const std::vector<float>& colors,
-                          std::size_t end)
-{
-    const std::size_t count = span.width;
-    m_step.resize(count);
-    for (auto* values : {&m_part, &m_cosine, &m_sine, &m_u})
-        values->resize(count);
-    const LowRankBasis& basis = terms.basis;
-    const std::size_t steps = basis.functions.front().values.size() - 1;
-    const double per_step = basis.last > basis.first ? static_cast<double>(steps) / (basis.last - basis.first) : 0.0;
-    find_steps(m_step.data(), m_part.data(), m_beams.half_tangent.data(), static_cast<float>(basis.first),
-               static_cast<float>(per_step), static_cast<std::uint32_t>(steps), count);
-    std::copy_n(m_beams.irradiance.data(), count, m_cosine.data());
-    std::fill_n(m_sine.data(), count, 0.0f);
-    std::size_t m = 0;
-    std::optional<std::size_t> function;  // that m_u holds
-    for (std::size_t t = m_first; t < end; ++t) {
-        const LightTerm& term = terms.terms[t];
-        if (!term.fixed.empty() || colors[term.set] == 0.0f)
-            continue;
-        const LowRankBasis::AngleFunction& wanted = basis.functions[term.function];
-        for (; m < wanted.m; ++m)
-            rotate(m_cosine.data(), m_sine.data(), m_beams.cos_beta.data(), m_beams.sin_beta.data(), count);
-        if (function != term.function)
-            look_up(m_u.data(), wanted.values.data(), m_step.data(), m_part.data(), count);
-        function = term.function;
-        add_scaled_product(m_values.data() + (t - m_first) * m_width + span.x, m_u.data(),
-                           (term.phase == Phase::cosine ? m_cosine : m_sine).data(), colors[term.set], count);
-    }
 }
 
 }  // namespace beamspread

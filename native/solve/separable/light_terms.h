@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <functional>
 #include <optional>
 #include <vector>
@@ -29,7 +28,7 @@ struct LightTerm {
 };
 
 // Lights of few directions have a term with all harmonics for each; all others add up to moments of one basis, however
-// many they are.
+// many they are: row by row where the lights are kept, or as they come.
 struct LightTerms {
     Plane plane;
     ChannelSets sets;
@@ -39,6 +38,7 @@ struct LightTerms {
     LowRankBasis basis;                      // of `changing`
     std::vector<LightTerm> terms;
     std::vector<ScaledProfile> profiles;
+    std::vector<std::vector<float>> moments;  // [term][texel] of light that came; empty: of none, or a fixed term's
 };
 
 // The terms of a decomposition that the lights of changing direction need.
@@ -46,29 +46,7 @@ using TermChoice =
     std::function<std::vector<std::size_t>(const KernelDecomposition&, const Incidence&, const LightTerms&)>;
 
 // Kernels end where all but the fraction `beyond` of their power lies inside; those of one direction no earlier than for
-// a millionth.
+// a millionth. With light to come, only lights of one direction are kept; the others stand for it in the choice.
 LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& choose);
-
-// The light of one row of texels.
-class TermRow {
-public:
-    // Finds the values of terms [first, first + count).
-    void start(const LightTerms& terms, const RowSpan& span, std::size_t first, std::size_t count);
-
-    const float* values(std::size_t term) const { return m_values.data() + (term - m_first) * m_width; }
-
-private:
-    void add_moments(const LightTerms& terms, const RowSpan& span, const std::vector<float>& colors, std::size_t end);
-
-    std::size_t m_width = 0;
-    std::size_t m_first = 0;
-    std::vector<float> m_values;  // [term - first][texel]
-    BeamRow m_beams;              // of one light
-    std::vector<std::uint32_t> m_step;  // in the tables of the basis
-    std::vector<float> m_part;
-    std::vector<float> m_cosine;  // cos(m beta), sin(m beta) times irradiance
-    std::vector<float> m_sine;
-    std::vector<float> m_u;
-};
 
 }  // namespace beamspread

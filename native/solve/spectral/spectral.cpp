@@ -11,7 +11,7 @@
 #include "base/pool.h"
 #include "base/threads.h"
 #include "simd/loops.h"
-#include "solve/separable/light_terms.h"
+#include "solve/separable/term_row.h"
 #include "solve/spectral/coarse_grid.h"
 #include "solve/spectral/convolution.h"
 #include "solve/spectral/padded_plane.h"
@@ -28,9 +28,6 @@ constexpr double centre_deviation = 3.0;
 // Power that kernels of changing directions may lack at their ends: dark texels are off by less than such a fraction of
 // the brightest.
 constexpr double most_beyond = 1e-5;
-
-// Of the choice of terms, relative to the convolution: about the same for a lamp on 512 x 512 texels.
-constexpr double choice_work = 1.0;
 
 // Light on the texels themselves.
 class TexelRow final : public LightRow {
@@ -79,12 +76,12 @@ LightTerms chosen_terms(const Problem& problem, Progress& progress)
     return light_terms(problem, std::min(1e-2 * problem.tolerance, most_beyond), choose);
 }
 
-class SpectralSolver {
+}  // namespace
+
+class SpectralField::Solver {
 public:
-    SpectralSolver(const Problem& problem, Progress& progress, float* luminance)
+    Solver(const Problem& problem, Progress& progress)
         : m_problem(problem),
-          m_progress(progress),
-          m_luminance(luminance),
           m_terms(chosen_terms(problem, progress)),
           m_levels(choose_levels(problem.plane, m_terms.profiles,
                                  {centre_deviation, problem.memory, m_terms.terms.size(), m_terms.sets.results.size(),
@@ -92,10 +89,26 @@ public:
     {
     }
 
-    void solve()
+    std::size_t terms() const { return m_terms.terms.size(); }
+
+    void add(const PlaneLight& light)
+    {
+        parallel_for(m_problem.plane.height, [&](std::size_t y) {
+            const auto lease = m_sums.lend();
+            (*lease).add(m_terms, light, y);
+        });
+    }
+
+    void add(const RayBeams& rays, const std::vector<double>& color, bool is_colored)
+    {
+        const auto lease = m_sums.lend();
+        (*lease).add(m_terms, rays, color, is_colored);
+    }
+
+    void solve(Progress& progress, float* luminance)
     {
         if (m_terms.terms.empty()) {  // nothing is lit
-            std::fill_n(m_luminance, m_problem.plane.texels() * m_problem.channels.size(), 0.0f);
+            std::fill_n(luminance, m_problem.plane.texels() * m_problem.channels.size(), 0.0f);
             return;
         }
         double share = 1.0;  // of the texels in the work
@@ -103,7 +116,7 @@ public:
         if (m_levels.coarse) {
             share = nodes(m_levels.texels.plane);
             share /= share + nodes(m_levels.coarse->plane);
-            coarse.emplace(solve_coarse(*m_levels.coarse, 1.0 - share));
+            coarse.emplace(solve_coarse(*m_levels.coarse, progress, 1.0 - share));
         }
         const KernelSpectra spectra(m_levels.texels, m_terms.profiles, m_levels.outside_centre);
         Convolution convolution(spectra, m_terms.terms, m_terms.sets.results.size(), m_problem.memory);
@@ -112,9 +125,9 @@ public:
                 const auto lease = m_scratch.lend();
                 coarse->grid.add_interpolated(coarse->nodes[result], span, values, *lease);
             }
-            store_row(result, span, values, factor);
+            store_row(result, span, values, factor, luminance);
         };
-        convolution.solve(texel_rows(), store, m_progress, share);
+        convolution.solve(texel_rows(), store, progress, share);
     }
 
 private:
@@ -128,7 +141,7 @@ private:
         return [this] { return std::make_unique<TexelRow>(m_terms); };
     }
 
-    CoarseLuminance solve_coarse(const Level& level, double work)
+    CoarseLuminance solve_coarse(const Level& level, Progress& progress, double work)
     {
         const PaddedPlane& plane = level.plane;
         const CoarseGrid grid(plane, m_problem.plane.width, m_problem.plane.height);
@@ -148,39 +161,63 @@ private:
         for (std::size_t first = 0; first < terms; first += at_once) {
             const std::size_t count = std::min(at_once, terms - first);
             const double part = work * static_cast<double>(count) / static_cast<double>(terms);
-            const auto light = grid.spread(texel_rows(), first, count, m_progress, 0.5 * part);
+            const auto light = grid.spread(texel_rows(), first, count, progress, 0.5 * part);
             Convolution convolution(spectra, std::span(m_terms.terms).subspan(first, count), results, for_spectra);
             const auto rows = [&] { return std::make_unique<NodeRow>(light, plane.width); };
-            convolution.solve(rows, add, m_progress, 0.5 * part);
+            convolution.solve(rows, add, progress, 0.5 * part);
         }
         return {grid, std::move(sums)};
     }
 
-    void store_row(std::size_t result, const RowSpan& span, const float* values, double factor)
+    void store_row(std::size_t result, const RowSpan& span, const float* values, double factor, float* luminance) const
     {
         const std::size_t channels = m_problem.channels.size();
         for (const ChannelSets::Member& member : m_terms.sets.results[result].members) {
             const auto scaled = static_cast<float>(factor * inv_pi * member.factor);
-            float* out = m_luminance + (span.y * m_problem.plane.width + span.x) * channels + member.channel;
+            float* out = luminance + (span.y * m_problem.plane.width + span.x) * channels + member.channel;
             for (std::size_t x = 0; x < span.width; ++x)
                 out[x * channels] = scaled * values[x];
         }
     }
 
-    const Problem& m_problem;
-    Progress& m_progress;
-    float* m_luminance;
+    Problem m_problem;
     LightTerms m_terms;
     Levels m_levels;
+    Pool<MomentSum> m_sums;
     Pool<CoarseGrid::Scratch> m_scratch;
 };
 
-}  // namespace
+SpectralField::SpectralField(const Problem& problem, Progress& progress)
+    : m_solver(std::make_unique<Solver>(problem, progress))
+{
+}
+
+SpectralField::~SpectralField() = default;
+
+void SpectralField::add(const PlaneLight& light)
+{
+    m_solver->add(light);
+}
+
+void SpectralField::add(const RayBeams& rays, const std::vector<double>& color, bool is_colored)
+{
+    m_solver->add(rays, color, is_colored);
+}
+
+void SpectralField::solve(Progress& progress, float* luminance)
+{
+    m_solver->solve(progress, luminance);
+}
+
+std::size_t SpectralField::terms() const
+{
+    return m_solver->terms();
+}
 
 void solve_spectral(const Problem& problem, Progress& progress, float* luminance)
 {
-    progress.set_total(choice_work + 1.0);
-    SpectralSolver(problem, progress, luminance).solve();
+    progress.set_total(choice_work + spread_work);
+    SpectralField(problem, progress).solve(progress, luminance);
 }
 
 std::size_t count_terms(const Problem& problem, Progress& progress)

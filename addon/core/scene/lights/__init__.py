@@ -4,6 +4,7 @@ A new kind is one class here, and its reader in blender/read/lights.py.
 """
 
 from .area import AreaLight
+from .field import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight
 from .light import ExtendedLight, Light, TracedLight
 from .mesh import MeshLight
 from .point_like import PointLight, SpotLight, SunLight
@@ -11,8 +12,13 @@ from .round import SphereLight, SphereSpotLight, SunDiskLight
 from .world import WorldLight
 
 __all__ = [
+    "DIRECTIONS",
+    "STRATA",
+    "WEIGHTS",
     "AreaLight",
     "ExtendedLight",
+    "Field",
+    "FieldLight",
     "Light",
     "MeshLight",
     "PointLight",

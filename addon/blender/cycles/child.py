@@ -1,0 +1,73 @@
+"""What runs in the child process, in Blender or with it as a module: child.py -- FILE.blend REQUEST.json
+
+It computes on a copy of the scene that nobody else sees, so that it may change everything. One task per process; what
+it returns, arrays by name, is written to the file that the request names.
+"""
+
+import json
+import os
+import sys
+import traceback
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import child_fields
+import child_world
+
+TASKS = {"world": child_world.panorama, "fields": child_fields.fields}
+
+
+def restore_images(file: Path) -> None:
+    """Give images the pixels that they had in memory alone."""
+    with np.load(file) as pixels:
+        for name in pixels.files:
+            old, values = bpy.data.images.get(name), pixels[name]
+            if old is None:
+                continue
+            height, width, channels = values.shape
+            image = bpy.data.images.new(name, width, height, alpha=channels == 4, float_buffer=old.is_float)
+            image.colorspace_settings.name = old.colorspace_settings.name
+            image.alpha_mode = old.alpha_mode
+            full = np.ones((height, width, 4), np.float32)
+            full[..., :channels] = values if channels > 1 else np.broadcast_to(values, (height, width, 1))
+            image.pixels.foreach_set(full.ravel())
+            old.user_remap(image)
+
+
+def main() -> None:
+    """Do the task, and leave without the tidying up at which some versions hang."""
+    blend, request_file = map(Path, sys.argv[sys.argv.index("--") + 1 :])
+    request = json.loads(request_file.read_text())
+    if not bpy.app.binary_path:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        bpy.ops.wm.open_mainfile(filepath=str(blend), use_scripts=request["scripts"])
+    restore_images(blend.with_name("images.npz"))
+    scene = bpy.data.scenes[request["scene"]]
+    window = bpy.context.window
+    if window is not None:
+        window.scene = scene
+        window.view_layer = scene.view_layers[request["view_layer"]]
+
+    def progress(fraction: float) -> None:
+        # Without a parent that listens this fails, which ends the process.
+        print(f"\n{request['mark']} {fraction:.4f}", flush=True)
+
+    progress(0.0)
+    arrays = TASKS[request["task"]](request, scene, progress)
+    np.savez(request["output"], **arrays)
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except BaseException:
+        traceback.print_exc()
+        code = 1
+    else:
+        code = 0
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)

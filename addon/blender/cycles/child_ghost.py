@@ -1,0 +1,131 @@
+"""Mirrors that gather what arrives at a plane, direction by direction, when Cycles bakes them.
+
+Part of the child process (child.py). A bake looks straight down on each of its points. A sharp mirror whose shading
+normal lies halfway between that view and a direction w shows the radiance that arrives from w. Here w is drawn at
+random for every sample, by the cosine, from one stratum of the hemisphere: the mean is the stratum's irradiance / pi
+times the number of strata. Each stratum has a mirror of its own at the same place and a tile of its own in the image,
+so one bake gathers all. Rays other than those of volumes don't see the mirrors, so they block nothing.
+"""
+
+import bpy
+import numpy as np
+
+STRATUM, AXES = "stratum", ("x_axis", "y_axis", "z_axis")
+
+
+def add_ghost(charts, strata):
+    """The object, and its image; every chart's tiles fill rows of the image from `chart_rows` on.
+
+    Parameters
+    ----------
+    charts : dicts with corner, x_axis, y_axis, normal, size (2), nodes (columns, rows).
+    strata : (K, 4): of r^2 and the azimuth / 2 pi, each where it begins and how far it reaches.
+    """
+    width = max(chart["nodes"][0] for chart in charts) * len(strata)
+    height = sum(chart["nodes"][1] for chart in charts)
+    corners, uvs, values, axes = [], [], [], ([], [], [])
+    row = 0
+    for chart in charts:
+        columns, rows = chart["nodes"]
+        x_axis, y_axis, normal = (np.array(chart[name]) for name in ("x_axis", "y_axis", "normal"))
+        across, up = chart["size"][0] * x_axis, chart["size"][1] * y_axis
+        corner = np.array(chart["corner"])
+        # Counter-clockwise as seen from outside; a mirrored UV map makes the frame left-handed.
+        around = [(0, 0), (1, 0), (1, 1), (0, 1)]
+        if np.dot(np.cross(x_axis, y_axis), normal) < 0:
+            around.reverse()
+        for number, stratum in enumerate(strata):
+            corners += [corner + u * across + v * up for u, v in around]
+            uvs += [((number + u) * columns / width, (row + v * rows) / height) for u, v in around]
+            values += [stratum] * 4
+            for filled, axis in zip(axes, (x_axis, y_axis, normal)):
+                filled += [axis] * 4
+        row += rows
+    mesh = bpy.data.meshes.new("Beamspread ghost")
+    mesh.from_pydata([tuple(point) for point in corners], [], np.arange(len(corners)).reshape(-1, 4).tolist())
+    mesh.uv_layers.new(name="UVMap").data.foreach_set("uv", np.ravel(uvs).astype(np.float32))
+    mesh.attributes.new(STRATUM, "FLOAT_COLOR", "POINT").data.foreach_set("color", np.ravel(values).astype(np.float32))
+    for name, filled in zip(AXES, axes):
+        mesh.attributes.new(name, "FLOAT_VECTOR", "POINT").data.foreach_set(
+            "vector", np.ravel(filled).astype(np.float32)
+        )
+    image = bpy.data.images.new("Beamspread ghost", width, height, float_buffer=True, alpha=False)
+    image.colorspace_settings.name = "Non-Color"
+    mesh.materials.append(_mirror(image))
+    obj = bpy.data.objects.new("Beamspread ghost", mesh)
+    for kind in ("camera", "diffuse", "glossy", "transmission", "shadow"):
+        setattr(obj, f"visible_{kind}", False)
+    return obj, image
+
+
+def _mirror(image):
+    """The material; what a ray sees follows from the attributes."""
+    material = bpy.data.materials.new("Beamspread ghost")
+    if bpy.app.version < (5, 0, 0):
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    link = tree.links.new
+
+    def attribute(name):
+        node = tree.nodes.new("ShaderNodeAttribute")
+        node.attribute_name = name
+        return node
+
+    def math(operation, *inputs):
+        return _operate(tree, "ShaderNodeMath", operation, inputs)
+
+    def vector(operation, *inputs):
+        return _operate(tree, "ShaderNodeVectorMath", operation, inputs)
+
+    def scaled(axis, factor):
+        node = tree.nodes.new("ShaderNodeVectorMath")
+        node.operation = "SCALE"
+        link(node.inputs[0], attribute(axis).outputs["Vector"])
+        link(node.inputs["Scale"], factor)
+        return node.outputs[0]
+
+    uv = tree.nodes.new("ShaderNodeUVMap")
+    uv.uv_map = "UVMap"
+    noise = tree.nodes.new("ShaderNodeTexWhiteNoise")
+    noise.noise_dimensions = "2D"
+    link(noise.inputs["Vector"], uv.outputs[0])
+    random = tree.nodes.new("ShaderNodeSeparateXYZ")
+    link(random.inputs[0], noise.outputs["Color"])
+    stratum = attribute(STRATUM)
+    part = tree.nodes.new("ShaderNodeSeparateXYZ")
+    link(part.inputs[0], stratum.outputs["Color"])
+    # A place in the unit disk, which is the foot of a direction drawn by the cosine (Malley's method).
+    squared = math("MULTIPLY_ADD", random.outputs[0], part.outputs[1], part.outputs[0])
+    turn = math("MULTIPLY_ADD", random.outputs[1], stratum.outputs["Alpha"], part.outputs[2])
+    azimuth, radius = math("MULTIPLY", turn, 2 * np.pi), math("SQRT", squared)
+    height = math("SQRT", math("SUBTRACT", 1.0, squared))
+    x = scaled(AXES[0], math("MULTIPLY", radius, math("COSINE", azimuth)))
+    y = scaled(AXES[1], math("MULTIPLY", radius, math("SINE", azimuth)))
+    direction = vector("ADD", vector("ADD", x, y), scaled(AXES[2], height))
+    view = tree.nodes.new("ShaderNodeNewGeometry").outputs["Incoming"]
+    halfway = vector("NORMALIZE", vector("ADD", direction, view))
+
+    glossy = tree.nodes.new("ShaderNodeBsdfGlossy")
+    glossy.inputs["Color"].default_value = (1, 1, 1, 1)
+    glossy.inputs["Roughness"].default_value = 0
+    if "SHARP" in {item.identifier for item in glossy.bl_rna.properties["distribution"].enum_items}:
+        glossy.distribution = "SHARP"
+    link(glossy.inputs["Normal"], halfway)
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    link(output.inputs["Surface"], glossy.outputs[0])
+    target = tree.nodes.new("ShaderNodeTexImage")
+    target.image = image
+    tree.nodes.active = target
+    return material
+
+
+def _operate(tree, kind, operation, inputs):
+    node = tree.nodes.new(kind)
+    node.operation = operation
+    for socket, value in zip(node.inputs, inputs):
+        if isinstance(value, bpy.types.NodeSocket):
+            tree.links.new(socket, value)
+        else:
+            socket.default_value = value
+    return node.outputs[0]

@@ -1,0 +1,148 @@
+"""The radiance of the world by direction, rendered by an equirectangular camera where nothing else is.
+
+Part of the child process (child.py).
+"""
+
+import math
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+# What Light Path nodes tell the light that a receiver gets: Cycles itself asks for it with all flags off where it
+# samples the world, and as a diffuse ray elsewhere.
+LIGHT_PATH = {"Is Diffuse Ray": 1.0, "Ray Depth": 1.0, "Diffuse Depth": 1.0}
+
+# Tiles whose radiance varies most are rendered again with more samples: suns of a few texels are there.
+TILE, TILES = 32, 12
+
+
+def panorama(request, scene, progress) -> dict:
+    """The task `world`; the request has width, height, samples and fine_samples."""
+    world = getattr(bpy.context.view_layer, "world_override", None) or scene.world
+    size = request["width"], request["height"]
+    if world is None or not lights_diffuse(world):
+        return {"radiance": np.zeros((size[1], size[0], 3), np.float32)}
+    for tree in trees_of(world):
+        fix_light_path(tree)
+    without_volume(world)
+    studio = bpy.data.scenes.new("Studio")
+    studio.world = world
+    studio.frame_set(scene.frame_current, subframe=scene.frame_subframe)
+    set_up(studio, *size)
+    radiance = render(studio, request["samples"])
+    progress(0.7)
+    tiles = uneven_tiles(radiance)
+    for number, (row, column) in enumerate(tiles):
+        refine(studio, radiance, row, column, request["fine_samples"])
+        progress(0.7 + 0.3 * (number + 1) / len(tiles))
+    return {"radiance": radiance}
+
+
+def lights_diffuse(world) -> bool:
+    """Whether the world's visibility lets it light diffuse surfaces."""
+    visibility = getattr(world, "cycles_visibility", None)
+    return bool(getattr(visibility, "diffuse", True))
+
+
+def trees_of(world) -> list:
+    """The world's node tree and the groups in it."""
+    trees, waiting = [], [world.node_tree] if world.node_tree else []
+    while waiting:
+        tree = waiting.pop()
+        if tree not in trees:
+            trees.append(tree)
+            waiting += [node.node_tree for node in tree.nodes if getattr(node, "node_tree", None)]
+    return trees
+
+
+def fix_light_path(tree) -> None:
+    """Let Light Path nodes answer as to a ray of a diffuse surface, whatever the camera's own ray is."""
+    for node in [node for node in tree.nodes if node.bl_idname == "ShaderNodeLightPath"]:
+        for socket in node.outputs:
+            for target in [link.to_socket for link in socket.links]:
+                value = tree.nodes.new("ShaderNodeValue")
+                value.outputs[0].default_value = LIGHT_PATH.get(socket.name, 0.0)
+                tree.links.new(target, value.outputs[0])
+        tree.nodes.remove(node)
+
+
+def without_volume(world) -> None:
+    """A world's volume dims everything that far away; without it the background remains."""
+    for node in world.node_tree.nodes if world.node_tree else ():
+        if node.bl_idname == "ShaderNodeOutputWorld":
+            for link in list(node.inputs["Volume"].links):
+                world.node_tree.links.remove(link)
+
+
+def set_up(studio, width: int, height: int) -> None:
+    """Nothing but the world around a panoramic camera; linear EXR without view transform."""
+    data = bpy.data.cameras.new("Panorama")
+    data.type = "PANO"
+    owner = data if hasattr(data, "panorama_type") else data.cycles
+    owner.panorama_type = "EQUIRECTANGULAR"
+    camera = bpy.data.objects.new("Panorama", data)
+    # Upright, looking along +X: the camera's picture then is what an environment texture would have.
+    camera.rotation_euler = (math.pi / 2, 0.0, -math.pi / 2)
+    studio.collection.objects.link(camera)
+    studio.camera = camera
+    render_settings, cycles = studio.render, studio.cycles
+    render_settings.engine = "CYCLES"
+    render_settings.resolution_x, render_settings.resolution_y = width, height
+    render_settings.resolution_percentage = 100
+    render_settings.film_transparent = False
+    render_settings.use_compositing = render_settings.use_sequencer = False
+    render_settings.image_settings.file_format = "OPEN_EXR"
+    render_settings.image_settings.color_mode = "RGB"
+    render_settings.image_settings.color_depth = "32"
+    cycles.use_denoising = cycles.use_adaptive_sampling = False
+    cycles.film_exposure = 1.0
+    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
+    cycles.pixel_filter_type = "BOX"
+    cycles.max_bounces = 0
+
+
+def render(studio, samples: int) -> np.ndarray:
+    """Float32 (height, width, 3), row 0 at the bottom; of a border, only what is in it."""
+    studio.cycles.samples = samples
+    with tempfile.TemporaryDirectory() as folder:
+        studio.render.filepath = str(Path(folder) / "world.exr")
+        bpy.ops.render.render(write_still=True, scene=studio.name)
+        image = bpy.data.images.load(studio.render.filepath)
+        image.colorspace_settings.name = "Non-Color"
+        values = np.empty(len(image.pixels), np.float32)
+        image.pixels.foreach_get(values)
+        radiance = values.reshape(image.size[1], image.size[0], image.channels)[..., :3].copy()
+        bpy.data.images.remove(image)
+    return np.nan_to_num(radiance, nan=0.0, posinf=0.0, neginf=0.0)
+
+
+def uneven_tiles(radiance: np.ndarray) -> list:
+    """First row and column of the tiles where few samples may miss most of the light."""
+    height, width, _ = radiance.shape
+    rows, columns = height // TILE, width // TILE
+    if not rows or not columns:
+        return []
+    solid = np.sin((np.arange(height) + 0.5) / height * np.pi)[:, None]
+    weighted = radiance.mean(axis=2) * solid
+    tiles = weighted[: rows * TILE, : columns * TILE].reshape(rows, TILE, columns, TILE)
+    spread = np.ptp(tiles, axis=(1, 3))
+    # Where a texel's error may be a thousandth of all light.
+    worst = [
+        index for index in np.argsort(spread, axis=None)[::-1][:TILES] if spread.flat[index] > 1e-4 * weighted.sum()
+    ]
+    return [(int(index) // columns * TILE, int(index) % columns * TILE) for index in worst]
+
+
+def refine(studio, radiance: np.ndarray, row: int, column: int, samples: int) -> None:
+    """Render one tile again, in place."""
+    height, width, _ = radiance.shape
+    settings = studio.render
+    settings.use_border = settings.use_crop_to_border = True
+    settings.border_min_x, settings.border_max_x = column / width, (column + TILE) / width
+    settings.border_min_y, settings.border_max_y = row / height, (row + TILE) / height
+    tile = render(studio, samples)
+    if tile.shape[:2] != (TILE, TILE):
+        raise RuntimeError(f"a tile of {TILE} texels came as {tile.shape}")
+    radiance[row : row + TILE, column : column + TILE] = tile

@@ -1,0 +1,118 @@
+"""Runs child.py on a copy of the scene; nothing here touches the host's data, so that it may run in any thread."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+import time
+import uuid
+from collections import deque
+from pathlib import Path
+
+import numpy as np
+
+from ...core.errors import BakeError
+from ...core.native import native
+from ...core.progress import Progress
+from .scene_copy import SceneCopy
+
+CHILD = Path(__file__).with_name("child.py")
+
+# Begins the lines by which the child says how far it is; Blender prints many others.
+MARK = "BEAMSPREAD-PROGRESS"
+
+POLL_SECONDS = 0.1
+
+# Without a sign of life for this long a process hangs: loading a scene of gigabytes takes minutes.
+SILENT_SECONDS = 1800.0
+
+LAST_LINES = 12
+
+
+def run(copy: SceneCopy, task: str, request: dict, progress: Progress | None = None) -> dict[str, np.ndarray]:
+    """Have a child process do a task of child.py on the copy.
+
+    Parameters
+    ----------
+    request : what the task needs, as JSON can hold it.
+    progress : called with 0..1 several times a second, returns False to stop.
+
+    Returns
+    -------
+    Arrays by name.
+
+    Raises
+    ------
+    BakeError
+        The process failed; with the last lines that it printed.
+    Cancelled
+        `progress` returned False; the process is dead by then.
+    """
+    name = uuid.uuid4().hex
+    output, file = copy.folder / f"{name}.npz", copy.folder / f"{name}.json"
+    file.write_text(json.dumps({**copy.request, **request, "task": task, "output": str(output), "mark": MARK}))
+    child = _Child(_command(copy, file))
+    try:
+        while child.is_running(POLL_SECONDS):
+            answer = None if progress is None else progress(child.fraction)
+            if isinstance(answer, bool | np.bool_) and not answer:
+                raise native.Cancelled("the bake was cancelled")
+            if time.monotonic() - child.heard > SILENT_SECONDS:
+                raise BakeError(f"Cycles gave no sign of life for {SILENT_SECONDS / 60:.0f} minutes.")
+    finally:
+        child.end()
+    if child.code != 0 or not output.exists():
+        said = " | ".join(child.last_lines)
+        raise BakeError(f"Cycles failed on a copy of the scene (exit code {child.code}). It said last: {said}")
+    with np.load(output) as arrays:
+        return dict(arrays)
+
+
+def _command(copy: SceneCopy, request: Path) -> list[str]:
+    if not copy.binary:  # Blender as a module
+        return [sys.executable, str(CHILD), "--", str(copy.file), str(request)]
+    scripts = ["--enable-autoexec"] if copy.request["scripts"] else ["--disable-autoexec"]
+    options = ["-b", "--factory-startup", *scripts, str(copy.file), "--python-exit-code", "3", "--python", str(CHILD)]
+    return [copy.binary, *options, "--", str(copy.file), str(request)]
+
+
+class _Child:
+    """A process, and what it says."""
+
+    def __init__(self, command: list[str]) -> None:
+        pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+        self._process = subprocess.Popen(command, text=True, errors="replace", **pipes)
+        self.fraction, self.heard = 0.0, time.monotonic()
+        self.last_lines: deque[str] = deque(maxlen=LAST_LINES)
+        self._listener = threading.Thread(target=self._listen, daemon=True)
+        self._listener.start()
+
+    @property
+    def code(self) -> int | None:
+        return self._process.returncode
+
+    def is_running(self, seconds: float) -> bool:
+        """Whether it still runs after this time at the most."""
+        try:
+            self._process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            return True
+        return False
+
+    def end(self) -> None:
+        """Kill it if it still runs, and wait until it and all it said are through."""
+        if self._process.poll() is None:
+            self._process.kill()
+        self._process.wait()
+        self._listener.join()
+        self._process.stdout.close()
+
+    def _listen(self) -> None:
+        for line in self._process.stdout:
+            self.heard = time.monotonic()
+            if line.startswith(MARK):
+                self.fraction = float(line.split()[1])
+            elif line.strip():
+                self.last_lines.append(line.strip())

@@ -1,0 +1,189 @@
+"""Lights of any kind -> what reaches a chart's grid, as solvers take it: native `PlaneLight`s, or rays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ..native import native
+from ..progress import Progress
+from ..scene.grid import Grid
+from ..scene.illumination import Illumination
+from ..scene.lights import ExtendedLight, FieldLight, Light, SunDiskLight
+from .settings import BakeSettings
+
+# Of a sun up to so wide, radians, all light counts as coming from its middle but for its shadows: that leaves out what
+# grows with the square of the angle, at most 1e-4 of the light up to 80 degrees of incidence.
+WIDEST_SUN = math.radians(2.0)
+
+# Of a survey, which only has to know what directions there are.
+SURVEY_TEXELS, SURVEY_RAYS = 96, 4
+
+# Of light that stands for itself where the solver chooses how exactly to look.
+STAND_IN_RAYS = 8
+
+
+class Gatherer:
+    """What reaches one grid.
+
+    Attributes
+    ----------
+    rays : traced from each texel to all lights of a size together, about.
+    """
+
+    def __init__(self, grid: Grid, illumination: Illumination, settings: BakeSettings, rays: int = 256) -> None:
+        self.grid, self.rays = grid, rays
+        self._illumination, self._settings = illumination, settings
+
+    @staticmethod
+    def has_one_direction(light: Light) -> bool:
+        """Whether light reaches each texel from one direction only, as far as the medium can tell."""
+        if isinstance(light, ExtendedLight):
+            return isinstance(light, SunDiskLight) and light.angle <= WIDEST_SUN
+        return not isinstance(light, FieldLight)
+
+    def is_colored(self, light: Light) -> bool:
+        """Whether the light differs in color from ray to ray, be it by what it shines through."""
+        caster = self._caster(light)
+        return getattr(light, "is_colored", False) or (caster is not None and caster.is_colored)
+
+    def plane_lights(self, light: Light, progress: Progress | None = None, directions: bool = False) -> list:
+        """A light of one direction per texel, as a native `PlaneLight` or one for each color channel.
+
+        With `directions` as arrays, even where one direction or one point says it all.
+        """
+        if isinstance(light, ExtendedLight):
+            irradiance, _ = self.totals(light, self.rays, progress)
+            direction = self._in_plane(light.direction)
+            if not self.is_colored(light):
+                irradiance = irradiance[..., 0]
+        else:
+            position = None if directions else light.position_in(self.grid)
+            irradiance, direction = self.beams(light, progress, directions=position is None)
+            if position is not None and irradiance.ndim == 2:
+                return [native.PlaneLight.from_point(irradiance, position, light.rgb().tolist())]
+            if position is not None:
+                _, direction = self.beams(light)
+        direction = np.ascontiguousarray(direction, np.float32)
+        if directions and direction.ndim == 1:
+            direction = np.tile(direction, (*irradiance.shape[:2], 1))
+        if irradiance.ndim == 2:
+            return [native.PlaneLight(irradiance, direction, light.rgb().tolist())]
+        return native.PlaneLight.of_channels(irradiance * light.rgb(), direction, 3)
+
+    def layers(self, light: Light, progress: Progress | None = None) -> Iterator:
+        """Any light as native `PlaneLight`s, which make it up together; one ray per texel each where it has a size."""
+        if self.has_one_direction(light):
+            yield from self.plane_lights(light, progress)
+            return
+        if isinstance(light, FieldLight):
+            arriving = light.layers(self.grid)
+        else:
+            arriving = native.ray_layers(*self._traced(light), **self._options(self.rays, progress))
+        for irradiance, direction in arriving:
+            yield from native.PlaneLight.of_channels(self._covered(irradiance) * light.rgb(), direction, 3)
+
+    def add_to(self, field, light: Light, rays: int, progress: Progress | None = None) -> None:
+        """Add the light to a native `LightField`."""
+        if self.has_one_direction(light) or isinstance(light, FieldLight):
+            for part in self.layers(light, progress):
+                field.add(part)
+            return
+        grid, shape, caster = self._traced(light)
+        field.add_rays(grid, shape, light.rgb().tolist(), self.grid.coverage, caster, **self._options(rays, progress))
+
+    def totals(self, light: Light, rays: int, progress: Progress | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Irradiance (H, W, 3) of the light at strength 1 and color 1, W/m^2 on the covered part of each texel.
+
+        And its flow (H, W, 3): the sum of the irradiance, the mean of the channels, times the unit vector of travel in
+        the plane's frame.
+        """
+        if isinstance(light, ExtendedLight):
+            irradiance, flow = native.gather_rays(*self._traced(light), **self._options(rays, progress))
+            return self._covered(irradiance), self._covered(flow)
+        if isinstance(light, FieldLight):
+            irradiance, flow = np.zeros((2, self.grid.height, self.grid.width, 3), np.float32)
+            for part, direction in light.layers(self.grid):
+                irradiance += part
+                flow += part.mean(axis=2, keepdims=True) * direction
+            return self._covered(irradiance), self._covered(flow)
+        irradiance, direction = self.beams(light, progress)
+        if irradiance.ndim == 2:
+            irradiance = np.repeat(irradiance[..., None], 3, axis=2)
+        return irradiance, irradiance.mean(axis=2, keepdims=True) * np.asarray(direction, np.float32)
+
+    def beams(self, light: Light, progress: Progress | None = None, directions: bool = True):
+        """Irradiance of a light without size at strength 1 and color 1, and its direction; see `Light.gather`.
+
+        (H, W), or (H, W, 3) behind what colors light; W/m^2 with cosine, visibility and coverage.
+        """
+        irradiance, direction = light.gather(
+            self.grid,
+            self._caster(light),
+            samples=self._settings.samples,
+            threads=self._settings.threads,
+            progress=progress,
+            clearance=self.grid.clearance,
+            directions=directions,
+        )
+        return self._covered(irradiance), direction
+
+    def stand_in(self, light: Light) -> list:
+        """The light as far as a `LightField` needs it to look, with the mean direction of each texel.
+
+        Harmonics of all directions together are weaker than those of their mean.
+        """
+        if self.has_one_direction(light):
+            return self.plane_lights(light, directions=True)
+        irradiance, flow = self.totals(light, STAND_IN_RAYS)
+        length = np.linalg.norm(flow, axis=-1, keepdims=True)
+        direction = np.divide(flow, length, out=np.full_like(flow, (0, 0, -1)), where=length > 0)
+        return native.PlaneLight.of_channels(irradiance * light.rgb(), direction, 3)
+
+    def survey(self) -> tuple[tuple[int, int], list[list], list[float]]:
+        """All light without what stands in its way, at few texels.
+
+        Returns
+        -------
+        The shape of the grid looked at; for each light of the illumination native `PlaneLight`s, one for each channel
+        where its rays differ in color; and its mean irradiance, W/m^2.
+        """
+        grid = self.grid
+        width, height = min(grid.width, SURVEY_TEXELS), min(grid.height, SURVEY_TEXELS)
+        pitch = {"pitch_x": grid.pitch_x * grid.width / width, "pitch_y": grid.pitch_y * grid.height / height}
+        whole = np.ones((height, width), np.float32)
+        coarse = replace(grid, width=width, height=height, coverage=whole, **pitch)
+        settings = replace(self._settings, samples=1)
+        bare = Gatherer(coarse, Illumination(()), settings, SURVEY_RAYS)
+        lights, means = [], []
+        for light in self._illumination.lights:
+            parts = list(bare.layers(light))
+            means.append(sum(part.mean() for part in parts))
+            if self.is_colored(light):
+                parts = [one for part in parts for one in part.by_channel()]
+            lights.append(parts)
+        return (height, width), lights, means
+
+    def _caster(self, light: Light):
+        return self._illumination.caster(self.grid, light) if light.cast_shadow else None
+
+    def _traced(self, light: ExtendedLight) -> tuple:
+        return self.grid.native(), light.native(), self._caster(light)
+
+    def _options(self, rays: int, progress: Progress | None) -> dict:
+        return {
+            "rays": rays,
+            "threads": self._settings.threads,
+            "progress": progress,
+            "clearance": self.grid.clearance,
+        }
+
+    def _in_plane(self, direction) -> np.ndarray:
+        return np.array([np.dot(direction, axis) for axis in (self.grid.x_axis, self.grid.y_axis, self.grid.normal)])
+
+    def _covered(self, values: np.ndarray) -> np.ndarray:
+        values *= self.grid.coverage if values.ndim == 2 else self.grid.coverage[..., None]
+        return values

@@ -1,0 +1,32 @@
+"""What a batch read, in lines: lights with kind and strength, what throws shadows, and what is baked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from ..bake.runner import Bake
+from ..scene.illumination import Illumination
+from ..scene.lights import Light
+
+
+def inventory(bakes: Sequence[Bake]) -> Iterator[str]:
+    """The light that bakes share, each line of it once, then each bake."""
+    jobs = [bake.job for bake in bakes if bake.job is not None]
+    yield from dict.fromkeys(line for job in jobs for line in _light(job.illumination))
+    for job in jobs:
+        receiver, grids = job.receiver, [chart.grid for chart in job.receiver.charts]
+        sizes = [f"{one.width * one.pitch_x:.4g} x {one.height * one.pitch_y:.4g}" for one in grids]
+        yield f"'{job.name}': {receiver.width} x {receiver.height} texels, {', '.join(sizes)} scene units"
+
+
+def _light(illumination: Illumination) -> Iterator[str]:
+    yield f"{len(illumination.lights)} lights; {illumination.triangle_count} triangles in the light's way"
+    yield from map(_one_light, illumination.lights)
+    yield from illumination.warnings
+
+
+def _one_light(light: Light) -> str:
+    kind = type(light).__name__.removesuffix("Light")
+    color = " ".join(f"{value:.4g}" for value in light.color)
+    shadow = "" if light.cast_shadow else ", throws no shadow"
+    return f"{kind} '{light.name}': strength {light.strength:.6g}, color {color}{shadow}"

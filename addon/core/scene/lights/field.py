@@ -1,0 +1,138 @@
+"""Light that was computed elsewhere, at coarse grids on the planes that it reaches, by direction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..grid import Grid, Vector
+from .light import Light
+
+# Rings of the hemisphere from the zenith down, by the squared sine of the angle where they end, and their sectors. The
+# rings are narrow near the horizon, where media differ most with the angle: the reflectance of even light is right to
+# .5 %, for a medium as dark as an albedo of .5 and without coat to 2 %.
+RINGS = ((0.25, 4), (0.6, 8), (0.85, 8), (0.96, 8), (1.0, 4))
+
+
+def _strata() -> np.ndarray:
+    parts, begin = [], 0.0
+    for end, sectors in RINGS:
+        parts += [(begin, end - begin, sector / sectors, 1 / sectors) for sector in range(sectors)]
+        begin = end
+    return np.array(parts)
+
+
+STRATA = _strata()
+"""(K, 4): parts of the hemisphere.
+
+Directions by the squared sine of their angle and their azimuth / 2 pi, each as where it begins and how far it reaches.
+Drawn by the cosine, both are even.
+"""
+
+WEIGHTS = STRATA[:, 1] * STRATA[:, 3]
+"""(K,): the irradiance of each under even light, as part of all."""
+
+
+def _directions() -> np.ndarray:
+    begin, reach, turn, part = STRATA.T
+    cosine = 2 / 3 * ((1 - begin) ** 1.5 - np.maximum(1 - begin - reach, 0) ** 1.5) / reach
+    sine, azimuth = np.sqrt(1 - cosine**2), 2 * np.pi * (turn + part / 2)
+    return -np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], axis=1).astype(np.float32)
+
+
+DIRECTIONS = _directions()
+"""Float32 (K, 3): unit vectors along which the light of each travels, in the plane's frame: the mean cosine."""
+
+# A texel whose surroundings are dark in all directions for more than this part of them keeps the darkness.
+LIT_PART = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """What arrives at one plane.
+
+    Attributes
+    ----------
+    origin, normal : of the `Grid` that it was computed for; its nodes are evenly spread over that grid.
+    radiance : float32 (K, rows, columns, 3), the mean by the cosine over each of `STRATA`, W/(m^2 sr).
+    """
+
+    origin: Vector
+    normal: Vector
+    radiance: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class FieldLight(Light):
+    """Light that Cycles has computed; `strength` is a factor.
+
+    Attributes
+    ----------
+    fields : one for each plane that it reaches.
+    """
+
+    fields: tuple[Field, ...]
+
+    def is_behind(self, grid):
+        field = self._field(grid)
+        return field is None or not field.radiance.any()
+
+    @property
+    def is_colored(self):
+        return True
+
+    def layers(self, grid: Grid) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Irradiance float32 (H, W, 3) on the whole of each texel, at strength and color 1, and where it travels.
+
+        Together the layers make up the light. Between nodes a cubic B-spline interpolates: smooth, never negative, and
+        it averages noise. What light can't reach at all is no darker part of its surroundings: nodes inside of things
+        that stand on the plane don't darken texels beside them.
+        """
+        field = self._field(grid)
+        if field is None:
+            return
+        rows, columns = field.radiance.shape[1:3]
+        up, across = spline_weights(grid.height, rows), spline_weights(grid.width, columns)
+        lit = field.radiance.any(axis=(0, 3)).astype(np.float32)
+        reached = np.maximum(up @ lit @ across.T, LIT_PART)[..., None]
+        for radiance, weight, direction in zip(field.radiance, WEIGHTS, DIRECTIONS):
+            if radiance.any():
+                channels = [up @ radiance[..., channel] @ across.T for channel in range(3)]
+                irradiance = np.stack(channels, axis=2) * np.float32(np.pi * weight) / reached
+                yield np.maximum(irradiance, 0, out=irradiance), direction
+
+    def _field(self, grid: Grid) -> Field | None:
+        for field in self.fields:
+            if np.array_equal(field.origin, grid.origin) and np.array_equal(field.normal, grid.normal):
+                return field
+        return None
+
+    def fault(self):
+        if not all(np.isfinite(field.radiance).all() and (field.radiance >= 0).all() for field in self.fields):
+            return "its radiance has values that are negative or not numbers"
+        return super().fault()
+
+
+def spline_weights(texels: int, nodes: int) -> np.ndarray:
+    """Float32 (texels, nodes): a uniform cubic B-spline with `nodes` evenly spread coefficients, at texels' centres.
+
+    Beyond the first and the last node it goes on in a straight line: what is linear in the nodes stays so everywhere.
+    """
+    place = (np.arange(texels) + 0.5) * nodes / texels - 0.5
+    first = np.floor(place).astype(int) - 1
+    t = place - first - 1
+    basis = np.stack([(1 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, -3 * t**3 + 3 * t**2 + 3 * t + 1, t**3]) / 6
+    weights = np.zeros((texels, nodes + 4))
+    for step, values in enumerate(basis):
+        weights[np.arange(texels), first + step + 2] = values
+    inner = weights[:, 2:-2].copy()
+    last = nodes - 1
+    neighbour = min(1, last)
+    for outside in (1, 2):
+        inner[:, 0] += (1 + outside) * weights[:, 2 - outside]
+        inner[:, neighbour] -= outside * weights[:, 2 - outside]
+        inner[:, last] += (1 + outside) * weights[:, nodes + 1 + outside]
+        inner[:, last - neighbour] -= outside * weights[:, nodes + 1 + outside]
+    return inner.astype(np.float32)

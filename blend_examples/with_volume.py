@@ -1,0 +1,142 @@
+"""Renders an example with light that Cycles traces through its slab as a volume, all else being the same:
+
+    blender -b --factory-startup SCENE.blend --python-exit-code 1 --python with_volume.py -- OUT.png OURS.exr SAMPLES
+
+The slab is a box below the plane, wide and deep enough to have no ends, of a medium without a step in refraction, which
+paths can be traced through. What leaves it is measured as in cycles_slab.py, by a ghost above it, and shown by the
+Beamspread node. Prints how far OURS.exr, a bake of the same plane, is off: mean over texels of the ghost.
+"""
+
+import sys
+from pathlib import Path
+
+import bpy
+import cycles_slab
+import numpy as np
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "build" / "stage"))
+
+import beamspread  # noqa: E402
+
+COLUMNS = 208
+PASSES = 8  # of which the scatter gives the noise
+ENDS = 40  # of the box beyond the plane and below it, in mean free paths
+
+
+def medium(node):
+    """As cycles_slab.py builds it, with the node's values."""
+    length = node.mean_free_path[0]
+    if node.ior != 1.0 or set(node.mean_free_path) != {length}:
+        raise SystemExit("with_volume.py takes a medium of ior 1 and of one mean free path")
+
+    def build(nodes, links, output):
+        scatter, absorption = nodes.new("ShaderNodeVolumeScatter"), nodes.new("ShaderNodeVolumeAbsorption")
+        for shader in (scatter, absorption):
+            shader.inputs["Color"].default_value = (*node.albedo, 1.0)
+            shader.inputs["Density"].default_value = 1 / length
+        scatter.inputs["Anisotropy"].default_value = node.anisotropy
+        add = nodes.new("ShaderNodeAddShader")
+        links.new(scatter.outputs[0], add.inputs[0])
+        links.new(absorption.outputs[0], add.inputs[1])
+        links.new(add.outputs[0], output.inputs["Volume"])
+
+    return cycles_slab.material("Medium", build)
+
+
+def add_box(low, high, node):
+    ends = ENDS * node.mean_free_path[0]
+    bpy.ops.mesh.primitive_cube_add(size=1.0)
+    box = bpy.context.object
+    box.scale = (high[0] - low[0] + 2 * ends, high[1] - low[1] + 2 * ends, ends)
+    box.location = (*((low + high) / 2), -ends / 2)
+    box.data.materials.append(medium(node))
+    return box
+
+
+def add_ghost(low, high):
+    """A triangle that holds the texture, its normal down; see cycles_slab.add_ghost."""
+    (x, y), (width, depth) = low, high - low
+    corners = [(x, y, 0), (x, y + 2 * depth, 0), (x + 2 * width, y, 0)]
+    ghost = cycles_slab.mesh_object("Ghost", corners, [(0, 1, 2)], [(0, 0), (0, 2), (2, 0)])
+    ghost.location.z = cycles_slab.GHOST_HEIGHT
+    ghost.visible_camera = ghost.visible_diffuse = ghost.visible_transmission = False
+    ghost.visible_volume_scatter = ghost.visible_shadow = False
+    white = cycles_slab.material("White", cycles_slab.diffuse_nodes(1.0))
+    ghost.data.materials.append(white)
+    target = white.node_tree.nodes.new("ShaderNodeTexImage")
+    rows = round(COLUMNS * depth / width)
+    target.image = bpy.data.images.new("Exitance", COLUMNS, rows, float_buffer=True, is_data=True)
+    white.node_tree.nodes.active = target
+    return ghost, target.image
+
+
+def pixels(image):
+    values = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(values)
+    return values.reshape(image.size[1], image.size[0], image.channels)[..., :3].astype(float)
+
+
+def bake(ghost, image, samples):
+    """Exitance / pi of each pass."""
+    scene = bpy.context.scene
+    cycles, kept = scene.cycles, scene.cycles.samples
+    cycles.max_bounces = cycles.volume_bounces = 1024
+    cycles.use_adaptive_sampling, cycles.samples, scene.render.bake.margin = False, samples, 0
+    for obj in scene.objects:
+        obj.select_set(obj == ghost)
+    bpy.context.view_layer.objects.active = ghost
+    passes = []
+    for seed in range(PASSES):
+        cycles.seed = seed + 1
+        bpy.ops.object.bake(type="DIFFUSE", pass_filter={"DIRECT", "INDIRECT"}, use_clear=True)
+        passes.append(pixels(image))
+    cycles.samples = kept
+    return np.array(passes)
+
+
+def resampled(texture, shape):
+    """Mean over the texels of a coarser grid, of which an array of finer ones is left."""
+    rows, columns = (np.arange(size) * part // size for size, part in zip(texture.shape, shape))
+    total, count = np.zeros((*shape, 3)), np.zeros((*shape, 1))
+    np.add.at(total, (rows[:, None], columns[None]), texture)
+    np.add.at(count, (rows[:, None], columns[None]), 1)
+    return total / count
+
+
+def main():
+    picture, ours, samples = sys.argv[sys.argv.index("--") + 1 :]
+    beamspread.register()
+    try:
+        plane = next(obj for obj in bpy.data.objects if obj.type == "MESH" and obj.data.uv_layers and _node(obj))
+        node = _node(plane)
+        corners = np.array([vertex.co[:2] for vertex in plane.data.vertices])
+        plane.hide_render = True
+        box = add_box(corners.min(axis=0), corners.max(axis=0), node)
+        ghost, image = add_ghost(corners.min(axis=0), corners.max(axis=0))
+        passes = bake(ghost, image, int(samples) // PASSES)
+        exitance = np.nanmean(passes, axis=0)
+        noise = np.nanstd(passes, axis=0, ddof=1) / np.sqrt(PASSES)
+        baked = resampled(pixels(bpy.data.images.load(str(Path(ours).resolve()))), exitance.shape[:2])
+        off = abs(baked - exitance).mean() / exitance.mean()
+        print(
+            f"off by {off:.2%} in the mean, of which the noise of Cycles makes up {noise.mean() / exitance.mean():.2%};"
+        )
+        print(f"sums: {baked.mean() / exitance.mean() - 1:+.2%}")
+        for obj in (box, ghost):
+            bpy.data.objects.remove(obj)
+        plane.hide_render = False
+        image.pixels.foreach_set(np.dstack([exitance, np.ones(exitance.shape[:2])]).astype(np.float32).ravel())
+        node.image = image
+        bpy.context.scene.render.filepath = str(Path(picture).resolve())
+        bpy.ops.render.render(write_still=True)
+    finally:
+        beamspread.unregister()
+
+
+def _node(obj):
+    trees = [slot.material.node_tree for slot in obj.material_slots if slot.material]
+    return next((node for tree in trees for node in tree.nodes if node.bl_idname == "BeamspreadNode"), None)
+
+
+main()

@@ -1,0 +1,173 @@
+// Python name of native/solve/light_field.h: LightField, and the rays of lights that it takes.
+#include <array>
+#include <memory>
+#include <utility>
+
+#include "base/error.h"
+#include "base/pool.h"
+#include "python/plane_light.h"
+#include "scene/ray_gather.h"
+#include "solve/light_field.h"
+
+namespace beamspread {
+
+namespace {
+
+using Lights = std::vector<const HeldLight*>;
+using Sources = std::vector<std::shared_ptr<LdfSource>>;
+
+// A field and what it looks at.
+class HeldField {
+public:
+    HeldField(const py::tuple& shape, const Lights& lights, const py::tuple& survey_shape, const Lights& survey,
+              const Sources& ldf, const std::vector<double>& albedo, const std::vector<double>& mean_free_path,
+              std::array<double, 2> pitch, double tolerance, int threads, const py::object& progress)
+        : m_sources(ldf)
+    {
+        Problem problem;
+        problem.plane = plane_of(shape, pitch);
+        problem.to_come.plane = plane_of(survey_shape, pitch);
+        problem.to_come.plane.pitch_x *=
+            static_cast<double>(problem.plane.width) / static_cast<double>(problem.to_come.plane.width);
+        problem.to_come.plane.pitch_y *=
+            static_cast<double>(problem.plane.height) / static_cast<double>(problem.to_come.plane.height);
+        problem.tolerance = tolerance;
+        problem.threads = threads;
+        for (const HeldLight* held : lights) {
+            problem.lights.push_back(held->light);
+            m_lights.push_back(*held);
+        }
+        for (const HeldLight* held : survey)
+            problem.to_come.lights.push_back(held->light);
+        if (ldf.size() != albedo.size() || mean_free_path.size() != albedo.size())
+            reject("ldf", "of another number of channels than albedo", "one per channel");
+        for (std::size_t c = 0; c < albedo.size(); ++c)
+            problem.channels.push_back({ldf[c].get(), albedo[c], mean_free_path[c]});
+        Progress report(progress_callback(progress));
+        const py::gil_scoped_release release;
+        m_field = std::make_unique<LightField>(problem, report);
+    }
+
+    void add(const HeldLight& light)
+    {
+        const py::gil_scoped_release release;
+        m_field->add(light.light);
+    }
+
+    void add_rays(const ReceiverGrid& grid, const ExtendedLight& light, const std::vector<double>& color,
+                  const Array<float>& coverage, const Occluders* occluders, const RaySettings& settings,
+                  const py::object& progress)
+    {
+        const Plane& plane = m_field->problem().plane;
+        if (grid.width != plane.width || grid.height != plane.height)
+            reject("grid", "of another size", "that of the field");
+        if (coverage.ndim() != 2 || static_cast<std::size_t>(coverage.size()) != plane.texels())
+            reject("coverage", "of another shape", "that of the grid");
+        Progress report(progress_callback(progress));
+        Sink sink(*m_field, color, light.is_colored(), coverage.data());
+        const py::gil_scoped_release release;
+        gather_rays(grid, light, occluders, settings, sink, report);
+    }
+
+    Array<float> solve(const py::object& progress)
+    {
+        const Plane& plane = m_field->problem().plane;
+        Progress report(progress_callback(progress));
+        Array<float> luminance({plane.height, plane.width, m_field->problem().channels.size()});
+        float* data = luminance.mutable_data();
+        const py::gil_scoped_release release;
+        m_field->solve(report, data);
+        return luminance;
+    }
+
+    std::size_t terms() const { return m_field->terms(); }
+
+private:
+    // Hands the rays on, of the part of each texel that is covered.
+    class Sink final : public RaySink {
+    public:
+        Sink(LightField& field, std::vector<double> color, bool is_colored, const float* coverage)
+            : m_field(field), m_color(std::move(color)), m_is_colored(is_colored), m_coverage(coverage)
+        {
+        }
+
+        void add(const RayRow& row) override
+        {
+            const auto lease = m_scratch.lend();
+            std::vector<Vec3f>& covered = *lease;
+            covered.resize(row.width);
+            const float* coverage = m_coverage + row.y * row.width;
+            for (std::size_t x = 0; x < row.width; ++x)
+                covered[x] = coverage[x] * row.irradiance[x];
+            static_assert(sizeof(Vec3f) == 3 * sizeof(float));
+            m_field.add({row.y, row.width, &row.travel->x, &covered.front().x}, m_color, m_is_colored);
+        }
+
+    private:
+        LightField& m_field;
+        std::vector<double> m_color;
+        bool m_is_colored;
+        const float* m_coverage;
+        Pool<std::vector<Vec3f>> m_scratch;
+    };
+
+    static Plane plane_of(const py::tuple& shape, std::array<double, 2> pitch)
+    {
+        return {shape[1].cast<std::size_t>(), shape[0].cast<std::size_t>(), pitch[0], pitch[1]};
+    }
+
+    Sources m_sources;
+    std::vector<HeldLight> m_lights;
+    std::unique_ptr<LightField> m_field;
+};
+
+}  // namespace
+
+void bind_light_field(py::module_& m)
+{
+    py::class_<HeldField>(m, "LightField",
+                          R"(Luminance of light that comes bit by bit, in memory that does not grow with it.
+
+By the solver 'fft'; parameters as of `convolve`.
+
+Parameters
+----------
+shape : (int, int)
+    Height and width of the plane, texels.
+lights : sequence of PlaneLight
+    Those of one direction are part of the field. All others only stand for light to come where terms are chosen.
+survey_shape : (int, int)
+    Of the plane that the survey looks at, as large but of fewer texels.
+survey : sequence of PlaneLight
+    All light to come, on that plane: its angles and colours.
+ldf, albedo, mean_free_path, pitch, tolerance, threads, progress
+    As for `convolve`; the progress is that of the choice of terms.
+)")
+        .def(py::init<const py::tuple&, const Lights&, const py::tuple&, const Lights&, const Sources&,
+                      const std::vector<double>&, const std::vector<double>&, std::array<double, 2>, double, int,
+                      const py::object&>(),
+             py::arg("shape"), py::arg("lights"), py::arg("survey_shape"), py::arg("survey"), py::arg("ldf"),
+             py::arg("albedo"), py::arg("mean_free_path"), py::arg("pitch"), py::arg("tolerance"),
+             py::arg("threads") = 0, py::arg("progress") = py::none())
+        .def("add", &HeldField::add, py::arg("light"),
+             "Adds a PlaneLight, also one of `lights` that only stood for it.")
+        .def(
+            "add_rays",
+            [](HeldField& field, const ReceiverGrid& grid, const ExtendedLight& light, const std::vector<double>& color,
+               const Array<float>& coverage, const Occluders* occluders, int rays, std::uint32_t seed, int threads,
+               double clearance, const py::object& progress) {
+                field.add_rays(grid, light, color, coverage, occluders, {rays, threads, clearance, seed}, progress);
+            },
+            py::arg("grid"), py::arg("light"), py::arg("color"), py::arg("coverage"), py::arg("occluders") = py::none(),
+            py::arg("rays") = 16, py::arg("seed") = 0, py::arg("threads") = 0, py::arg("clearance") = 0.0,
+            py::arg("progress") = py::none(),
+            R"(Adds the rays of a light of a size, see `gather_rays`.
+
+`color`: factor in each channel; `coverage`: float32 (H, W), part of each texel that receives light.
+)")
+        .def("solve", &HeldField::solve, py::arg("progress") = py::none(),
+             "Luminance, float32 (H, W, C) in W/(m^2 sr); once.")
+        .def_property_readonly("terms", &HeldField::terms, "int: how many transforms of light `solve` makes.");
+}
+
+}  // namespace beamspread

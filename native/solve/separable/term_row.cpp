@@ -1,0 +1,122 @@
+#include "solve/separable/term_row.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "simd/loops.h"
+#include "solve/problem/beam_loops.h"
+
+namespace beamspread {
+
+namespace {
+
+// Texels of a row whose values stay in the cache from step to step.
+constexpr std::size_t texels_at_once = 512;
+
+}  // namespace
+
+void BeamMoments::add(const LightTerms& terms, const BeamRow& beams, const std::vector<float>& colors,
+                      std::size_t first, std::size_t end, const Values& values)
+{
+    const std::size_t count = beams.irradiance.size();
+    m_step.resize(count);
+    for (auto* scratch : {&m_part, &m_cosine, &m_sine, &m_u})
+        scratch->resize(count);
+    const LowRankBasis& basis = terms.basis;
+    const std::size_t steps = basis.functions.front().values.size() - 1;
+    const double per_step = basis.last > basis.first ? static_cast<double>(steps) / (basis.last - basis.first) : 0.0;
+    find_steps(m_step.data(), m_part.data(), beams.half_tangent.data(), static_cast<float>(basis.first),
+               static_cast<float>(per_step), static_cast<std::uint32_t>(steps), count);
+    std::copy_n(beams.irradiance.data(), count, m_cosine.data());
+    std::fill_n(m_sine.data(), count, 0.0f);
+    std::size_t m = 0;
+    std::optional<std::size_t> function;  // that m_u holds
+    for (std::size_t t = first; t < end; ++t) {
+        const LightTerm& term = terms.terms[t];
+        if (!term.fixed.empty() || colors[term.set] == 0.0f)
+            continue;
+        const LowRankBasis::AngleFunction& wanted = basis.functions[term.function];
+        for (; m < wanted.m; ++m)
+            rotate(m_cosine.data(), m_sine.data(), beams.cos_beta.data(), beams.sin_beta.data(), count);
+        if (function != term.function)
+            look_up(m_u.data(), wanted.values.data(), m_step.data(), m_part.data(), count);
+        function = term.function;
+        add_scaled_product(values(t), m_u.data(), (term.phase == Phase::cosine ? m_cosine : m_sine).data(),
+                           colors[term.set], count);
+    }
+}
+
+void TermRow::start(const LightTerms& terms, const RowSpan& span, std::size_t first, std::size_t count)
+{
+    m_width = span.width;
+    m_first = first;
+    m_values.assign(count * span.width, 0.0f);
+    bool has_moments = false;
+    for (std::size_t t = first; t < first + count; ++t) {
+        float* row = m_values.data() + (t - first) * m_width;
+        has_moments |= terms.terms[t].fixed.empty();
+        for (const auto& [light, weight] : terms.terms[t].fixed) {
+            m_light.resize(span.width);
+            copy_row(terms.fixed[light].irradiance, span.y, span.x, span.width, m_light.data());
+            add_scaled(row, m_light.data(), weight, span.width);
+        }
+        if (!terms.moments.empty() && !terms.moments[t].empty())
+            std::copy_n(terms.moments[t].data() + span.y * terms.plane.width + span.x, span.width, row);
+    }
+    if (!has_moments)
+        return;
+    for (std::size_t x = 0; x < span.width; x += texels_at_once) {
+        const RowSpan part{span.y, span.x + x, std::min(texels_at_once, span.width - x)};
+        for (std::size_t l = 0; l < terms.changing.size(); ++l)
+            if (m_beams.read(terms.plane, terms.changing[l], part))
+                m_moments.add(terms, m_beams, terms.colors[l], first, first + count,
+                              [&](std::size_t t) { return m_values.data() + (t - first) * m_width + x; });
+    }
+}
+
+void MomentSum::add(LightTerms& terms, const PlaneLight& light, std::size_t y)
+{
+    m_colors.clear();
+    for (std::size_t set = 0; set < terms.sets.count(); ++set)
+        m_colors.push_back(static_cast<float>(terms.sets.color(light, set)));
+    for (std::size_t x = 0; x < terms.plane.width; x += texels_at_once) {
+        const RowSpan span{y, x, std::min(texels_at_once, terms.plane.width - x)};
+        if (m_beams.read(terms.plane, light, span))
+            add_beams(terms, span, m_colors);
+    }
+}
+
+void MomentSum::add(LightTerms& terms, const RayBeams& rays, const std::vector<double>& color, bool is_colored)
+{
+    const std::size_t channels = color.size();
+    const std::size_t sets = terms.sets.count();
+    m_colors.resize(sets);
+    for (std::size_t x = 0; x < rays.width; x += texels_at_once) {
+        const RowSpan span{rays.y, x, std::min(texels_at_once, rays.width - x)};
+        const float* irradiance = rays.irradiance + x * channels;
+        for (auto* values : {&m_beams.irradiance, &m_beams.cos_beta, &m_beams.sin_beta, &m_beams.half_tangent})
+            values->resize(span.width);
+        for (std::size_t i = 0; i < span.width; ++i)  // in any channel: what is 0 may have no direction
+            m_beams.irradiance[i] = *std::max_element(irradiance + i * channels, irradiance + (i + 1) * channels);
+        if (std::all_of(m_beams.irradiance.begin(), m_beams.irradiance.end(), [](float e) { return e == 0.0f; }))
+            continue;
+        find_angles(rays.travel + 3 * x, m_beams.irradiance.data(), m_beams.cos_beta.data(), m_beams.sin_beta.data(),
+                    m_beams.half_tangent.data(), span.width);
+        for (std::size_t part = 0; part < (is_colored ? sets : 1); ++part) {
+            if (is_colored)
+                for (std::size_t i = 0; i < span.width; ++i)
+                    m_beams.irradiance[i] = irradiance[i * channels + terms.sets.channel(part)];
+            for (std::size_t set = 0; set < sets; ++set)
+                m_colors[set] = is_colored && set != part ? 0.0f : static_cast<float>(color[terms.sets.channel(set)]);
+            add_beams(terms, span, m_colors);
+        }
+    }
+}
+
+void MomentSum::add_beams(LightTerms& terms, const RowSpan& span, const std::vector<float>& colors)
+{
+    m_moments.add(terms, m_beams, colors, 0, terms.terms.size(),
+                  [&](std::size_t t) { return terms.moments[t].data() + span.y * terms.plane.width + span.x; });
+}
+
+}  // namespace beamspread

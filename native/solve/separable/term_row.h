@@ -1,0 +1,65 @@
+// The light of terms, row by row.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "solve/separable/light_terms.h"
+
+namespace beamspread {
+
+// Adds beams of changing directions to the moments of terms.
+class BeamMoments {
+public:
+    // Where the value of a term at the first beam is.
+    using Values = std::function<float*(std::size_t term)>;
+
+    // To terms [first, end); `colors`: of the beams in each set.
+    void add(const LightTerms& terms, const BeamRow& beams, const std::vector<float>& colors, std::size_t first,
+             std::size_t end, const Values& values);
+
+private:
+    std::vector<std::uint32_t> m_step;  // in the tables of the basis
+    std::vector<float> m_part;
+    std::vector<float> m_cosine;  // cos(m beta), sin(m beta) times irradiance
+    std::vector<float> m_sine;
+    std::vector<float> m_u;
+};
+
+// The light of one row of texels: of lights that are kept, and what else has been added up.
+class TermRow {
+public:
+    // Finds the values of terms [first, first + count).
+    void start(const LightTerms& terms, const RowSpan& span, std::size_t first, std::size_t count);
+
+    const float* values(std::size_t term) const { return m_values.data() + (term - m_first) * m_width; }
+
+private:
+    std::size_t m_width = 0;
+    std::size_t m_first = 0;
+    std::vector<float> m_values;  // [term - first][texel]
+    std::vector<float> m_light;
+    BeamRow m_beams;  // of one light
+    BeamMoments m_moments;
+};
+
+// Adds up light as it comes. One for each thread; no two may add to one row at the same time.
+class MomentSum {
+public:
+    // Of a light of changing directions, or of one of the many directions of lights without a term of their own.
+    void add(LightTerms& terms, const PlaneLight& light, std::size_t y);
+
+    // `is_colored`: channels differ by more than factors; else the first is that of all. Times `color` in any case.
+    void add(LightTerms& terms, const RayBeams& rays, const std::vector<double>& color, bool is_colored);
+
+private:
+    void add_beams(LightTerms& terms, const RowSpan& span, const std::vector<float>& colors);
+
+    BeamRow m_beams;
+    BeamMoments m_moments;
+    std::vector<float> m_colors;
+};
+
+}  // namespace beamspread

@@ -1,0 +1,171 @@
+"""Scenes whose light was once lost without a word: a batch bakes it as Cycles does, or names the light."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+from beamspread.blender.jobs.batch import bake_all
+from beamspread.core.batch import options
+from beamspread.core.native import native
+from cycles_truth import TEXELS, add_receiver, cycles_irradiance
+from mathutils import Euler, Matrix
+from scenes import add_blocker, add_material, add_mesh, add_plane, add_sun
+
+# Of Cycles: the noise of a texel is at most 1 / sqrt(1024) = 3 % of its light where light is partly hidden or varies by
+# as much as its mean, on average below 1 %; that of the sum of 64 x 64 texels below 0.1 %.
+SAMPLES = 1024
+TOTAL = 0.01
+TEXEL = 0.02
+
+
+def add_light(kind, place=(0.3, -0.2, 1.0), energy=50.0, euler=(0, 0, 0), **properties):
+    data = bpy.data.lights.new(kind.title(), kind)
+    data.energy = energy
+    for name, value in properties.items():
+        setattr(data, name, value)
+    lamp = bpy.data.objects.new(data.name, data)
+    lamp.location, lamp.rotation_euler = place, Euler(euler)
+    bpy.context.collection.objects.link(lamp)
+    return lamp
+
+
+def area():
+    add_light("AREA", euler=(0.4, 0.3, 0), shape="RECTANGLE", size=0.8, size_y=0.3, color=(1, 0.5, 0.2))
+
+
+def sky_and_sun():
+    world = bpy.data.worlds.new("Sky")
+    bpy.context.scene.world = world
+    world.use_nodes = True
+    sky = world.node_tree.nodes.new("ShaderNodeTexSky")
+    sky.sky_type, sky.sun_disc, sky.sun_elevation = "NISHITA", False, math.radians(25)
+    background = world.node_tree.nodes["Background"]
+    background.inputs["Strength"].default_value = 0.5
+    world.node_tree.links.new(sky.outputs[0], background.inputs["Color"])
+    add_sun(65, 30, strength=2.0)
+    add_blocker(0.5)
+
+
+def soft_sun():
+    """Seen through the half-shadow of a card, a third of the plane wide."""
+    add_sun(40, 20, strength=2.0).data.angle = math.radians(5)
+    add_plane("Card", (0.9, 0.9), Matrix.Translation((-1.6, -0.5, 2.2)))
+
+
+def soft_point():
+    add_light("POINT", place=(-0.4, 0.0, 0.8), shadow_soft_size=0.3)
+    add_blocker(0.3)
+
+
+def glowing_panel():
+    glow = bpy.data.materials.new("Glow")
+    glow.use_nodes = True
+    tree = glow.node_tree
+    emission = tree.nodes.new("ShaderNodeEmission")
+    emission.inputs["Color"].default_value, emission.inputs["Strength"].default_value = (0.3, 0.6, 1, 1), 4.0
+    tree.links.new(emission.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
+    add_plane("Panel", (0.7, 0.4), Matrix.Translation((0.1, 0.2, 0.6)) @ Matrix.Rotation(2.6, 4, "X"), material=glow)
+
+
+def leaf_card():
+    """A card with stripes of alpha, which let the sun and a colourless part of it through."""
+    leaf = bpy.data.materials.new("Leaf")
+    leaf.use_nodes = True
+    tree = leaf.node_tree
+    image = bpy.data.images.new("Alpha", 8, 8, alpha=True)
+    values = np.zeros((8, 8, 4), np.float32)
+    values[:, :4, 3], values[:4, 4:, 3] = 1.0, 0.5
+    image.pixels.foreach_set(values.ravel())
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image, texture.interpolation = image, "Closest"
+    principled = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeBsdfPrincipled")
+    tree.links.new(texture.outputs["Alpha"], principled.inputs["Alpha"])
+    add_plane("Leaf", (1, 1), Matrix.Translation((0, 0, 0.4)), material=leaf)
+    add_sun(20, 70, strength=2.0)
+
+
+SCENES = [area, sky_and_sun, soft_sun, soft_point, glowing_panel, leaf_card]
+
+
+@pytest.fixture(autouse=True)
+def without_margin():
+    bpy.context.scene.beamspread.margin = 0
+
+
+def compared(tmp_path):
+    """What the batch says of the receiver, the irradiance that it bakes, and Cycles'."""
+    plane, image = add_receiver(Matrix())
+    expected = cycles_irradiance(plane, image, SAMPLES)
+    plane.data.materials[0] = add_material()
+    arguments = ["--pass", "irradiance", "--no-indirect", "--resolution", str(TEXELS), "--output", str(tmp_path)]
+    (record,) = bake_all(options.parse(arguments)).bakes
+    assert record.status == "written", record.message
+    return record, native.read_exr(record.path)[0], expected
+
+
+def agree(ours, expected):
+    sums = ours.sum(axis=(0, 1)), expected.sum(axis=(0, 1))
+    return sums[0] == pytest.approx(sums[1], rel=TOTAL) and abs(ours - expected).mean() <= TEXEL * expected.mean()
+
+
+@pytest.mark.parametrize("add", SCENES, ids=[add.__name__ for add in SCENES])
+def test_light_arrives_as_in_cycles(add, tmp_path):
+    add()
+    record, ours, expected = compared(tmp_path)
+    assert expected.mean() > 0.1
+    assert agree(ours, expected), (ours.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), record.message)
+    assert (record.left_out, record.dark) == ([], False)
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 0, 0), reason="light linking came with Blender 4.0")
+def test_a_light_linked_elsewhere_does_not_count(tmp_path):
+    elsewhere = bpy.data.collections.new("Elsewhere")
+    elsewhere.objects.link(add_mesh("Other", [(9, 9, 9), (9, 8, 9), (8, 9, 9)], [(0, 1, 2)]))
+    add_sun(30, strength=5.0).light_linking.receiver_collection = elsewhere
+    add_sun(50, 90, strength=1.0)
+    _, ours, expected = compared(tmp_path)
+    assert expected == pytest.approx(np.full_like(expected, math.cos(math.radians(50))), rel=1e-3)
+    assert ours == pytest.approx(expected, rel=1e-3)
+
+
+def nodes_of(lamp):
+    lamp.data.use_nodes = True
+    tree = lamp.data.node_tree
+    return tree, next(node for node in tree.nodes if node.bl_idname == "ShaderNodeEmission")
+
+
+def blackbody(tree, emission):
+    node = tree.nodes.new("ShaderNodeBlackbody")
+    node.inputs[0].default_value = 2500.0
+    tree.links.new(node.outputs[0], emission.inputs["Color"])
+
+
+def gobo(tree, emission):
+    place, checker = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeTexChecker")
+    tree.links.new(place.outputs["Normal"], checker.inputs["Vector"])
+    tree.links.new(checker.outputs["Color"], emission.inputs["Color"])
+
+
+def ies(tree, emission):
+    text = bpy.data.texts.new("lamp.ies")
+    angles = " ".join(str(10 * step) for step in range(10))
+    candela = " ".join(str(1000 - 100 * step) for step in range(10))
+    header = "IESNA:LM-63-1995\nTILT=NONE\n1 1000 1 10 1 1 2 0 0 0\n1 1 100\n"
+    text.write(f"{header}{angles}\n0\n{candela}\n")
+    node = tree.nodes.new("ShaderNodeTexIES")
+    node.ies = text
+    tree.links.new(node.outputs[0], emission.inputs["Strength"])
+
+
+@pytest.mark.parametrize("add", [blackbody, gobo, ies])
+def test_nodes_of_a_lamp_are_understood_or_named(add, tmp_path):
+    add(*nodes_of(add_light("SPOT", spot_size=1.2, shadow_soft_size=0.0, energy=100.0)))
+    record, ours, expected = compared(tmp_path)
+    assert expected.mean() > 0.01
+    if record.left_out:
+        (sentence,) = record.left_out
+        assert "'Spot'" in sentence
+        assert sentence in record.message
+    else:
+        assert agree(ours, expected), (ours.mean(axis=(0, 1)), expected.mean(axis=(0, 1)))

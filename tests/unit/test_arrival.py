@@ -1,0 +1,176 @@
+"""Irradiance and direction: what arrives, without a medium; and bakes that no light reaches."""
+
+import math
+from dataclasses import replace
+
+import beamspread
+import numpy as np
+import pytest
+from beamspread.core.bake.job import BakeJob
+from beamspread.core.bake.runner import Bake, Target
+from beamspread.core.bake.settings import COMBINED, DIRECTION, IRRADIANCE, OUTPUTS, BakeSettings
+from beamspread.core.bake.surface import Surface
+from beamspread.core.material.material import Material
+from beamspread.core.scene.grid import Grid
+from beamspread.core.scene.illumination import Illumination, Mesh
+from beamspread.core.scene.lights import PointLight, SunLight
+from beamspread.core.scene.receiver import Chart, Receiver
+
+from helpers import travel
+
+SIZE = 24
+MATERIAL = Material(albedo=(0.9, 0.8, 0.7), mean_free_path=(0.02,) * 3, anisotropy=0.0)
+SUN = SunLight("Sun", 2.0, (1.0, 0.5, 0.25), True, tuple(travel(60, 30).tolist()))
+LAMP = PointLight("Lamp", 40.0, (0.2, 0.4, 0.6), True, (0.1, -0.2, 0.8))
+ROOF = Mesh(np.array([[-9, -9, 1], [9, -9, 1], [0, 18, 1]], float), np.array([[0, 1, 2]], np.uint32))
+# Sums of a few float32 numbers.
+ROUNDING = 1e-5
+
+
+def plane(coverage=1.0, normal=(0.0, 0.0, 1.0)):
+    """A square of side 1 in the xy plane around the origin."""
+    covered = np.full((SIZE, SIZE), coverage, np.float32)
+    axes = (1.0, 0.0, 0.0), (0.0, normal[2], 0.0), normal
+    return Grid((-0.5, -0.5 * normal[2], 0.0), *axes, 1 / SIZE, 1 / SIZE, SIZE, SIZE, covered)
+
+
+def job(lights, *layers, grid=None, occluders=None, thickness=0.0, material=MATERIAL):
+    grid = grid or plane()
+    receiver = Receiver(grid.coverage, (Chart(grid, grid.coverage),))
+    settings = BakeSettings(quality="preview", samples=2, margin=0, layers=layers or (COMBINED,))
+    return BakeJob("Plane", receiver, Illumination(lights, occluders), Surface(material, thickness), settings)
+
+
+def arriving(*lights, **options):
+    layers = job(lights, IRRADIANCE, DIRECTION, **options).run()
+    return layers[IRRADIANCE], layers[DIRECTION]
+
+
+def lamp_light():
+    """E and the way of travel of `LAMP` at the middles of texels: P / (4 pi r^2) times the cosine, by hand."""
+    middles = (np.arange(SIZE) + 0.5) / SIZE - 0.5
+    x, y = np.meshgrid(middles, middles)
+    way = np.stack([x, y, np.zeros_like(x)], -1) - LAMP.position
+    distance = np.linalg.norm(way, axis=-1, keepdims=True)
+    return LAMP.strength * -way[..., 2:] / (4 * math.pi * distance**3) * LAMP.color, way / distance
+
+
+def test_a_sun_arrives_with_its_cosine_colour_and_direction():
+    irradiance, direction = arriving(SUN)
+    assert irradiance == pytest.approx(np.broadcast_to([1, 0.5, 0.25], irradiance.shape), rel=ROUNDING)
+    assert direction == pytest.approx(np.broadcast_to(travel(60, 30), direction.shape), abs=ROUNDING)
+
+
+def test_light_of_several_lights_adds_up_and_its_ways_are_weighed_with_its_power():
+    lamp, way = lamp_light()
+    sun = 2 * math.cos(math.radians(60)) * np.array(SUN.color)
+    irradiance, direction = arriving(SUN, LAMP)
+    # Texels are means of 2 x 2 points: at most pitch^2 / 8 times the second derivative away from the middle, which is
+    # below 12 / height^2 of the light: (1 / 24)^2 / 8 * 12 / 0.8^2 = 0.4 %.
+    assert irradiance == pytest.approx(lamp + sun, rel=4e-3)
+    flow = lamp.mean(axis=-1, keepdims=True) * way + sun.mean() * travel(60, 30)
+    assert direction == pytest.approx(flow / np.linalg.norm(flow, axis=-1, keepdims=True), abs=4e-3)
+    assert np.linalg.norm(direction, axis=-1) == pytest.approx(np.ones((SIZE, SIZE)), abs=ROUNDING)
+
+
+def test_axes_are_those_of_the_texture():
+    """Seen from below, the rows run the other way."""
+    below = replace(SUN, direction=tuple((travel(60, 30) * [1, 1, -1]).tolist()))
+    _, direction = arriving(below, grid=plane(normal=(0.0, 0.0, -1.0)))
+    assert direction[3, 5] == pytest.approx(travel(60, 30) * [1, -1, 1], abs=ROUNDING)
+
+
+def test_the_border_of_the_mesh_is_as_bright_as_its_inside():
+    """A texel that lies inside by a third shows what arrives on that third, as renderers' bakes do."""
+    whole, third = arriving(SUN, LAMP), arriving(SUN, LAMP, grid=plane(coverage=1 / 3))
+    assert all(np.array_equal(one, other) for one, other in zip(whole, third))
+
+
+def test_shadow_is_dark_and_has_no_direction():
+    irradiance, direction = arriving(SUN, occluders=ROOF)
+    assert not irradiance.any()
+    assert not direction.any()
+    free = arriving(replace(SUN, cast_shadow=False), occluders=ROOF)
+    assert np.array_equal(free[0], arriving(SUN)[0])
+
+
+def test_both_passes_are_what_convolve_takes_to_the_luminance():
+    layers = job([LAMP], COMBINED, IRRADIANCE, DIRECTION).run()
+    ldf = beamspread.library(beamspread.Medium(g=0.0, ior=1.0), quality="preview")
+    medium = ldf, MATERIAL.albedo, MATERIAL.mean_free_path
+    again = beamspread.convolve(layers[IRRADIANCE], layers[DIRECTION], *medium, pitch=1 / SIZE)
+    # Both keep every term of so small a plane.
+    assert again == pytest.approx(layers[COMBINED], rel=1e-3)
+
+
+def no_simulation(*_arguments, **_options):
+    raise AssertionError("simulated")
+
+
+@pytest.fixture
+def without_media(monkeypatch):
+    """Whatever asks for a medium's LDF fails."""
+    monkeypatch.setattr("beamspread.core.bake.luminance.library", no_simulation)
+    monkeypatch.setattr("beamspread.core.ldf.albedo.library", no_simulation)
+
+
+COLORED = Surface(MATERIAL, base_color=(0.5, 0.4, 0.3))
+
+
+def test_what_arrives_needs_no_medium(without_media):
+    for layer in (IRRADIANCE, DIRECTION):
+        assert replace(job([SUN], layer), surface=COLORED).run()[layer].any()
+
+
+@pytest.mark.parametrize("layer", OUTPUTS.values())
+@pytest.mark.parametrize(
+    "lights", [(), (replace(SUN, direction=(0.0, 0.0, 1.0)),), (replace(LAMP, position=(0, 0, -1.0)),)]
+)
+def test_what_is_surely_dark_takes_no_simulation(lights, layer, without_media):
+    one = Bake(Target("Plane"), replace(job(lights, layer), surface=COLORED))
+    one.run()
+    assert one.error == ""
+    assert one.is_dark
+    assert list(one.layers) == [layer]
+    assert one.layers[layer].shape == (SIZE, SIZE, 3)
+    assert not one.layers[layer].any()
+    (warning,) = one.warnings
+    assert "black" in warning
+
+
+def test_the_medium_is_checked_in_the_dark_too():
+    with pytest.raises(beamspread.core.errors.MaterialError, match="albedo"):
+        job([], material=replace(MATERIAL, albedo=(1.0, 0.5, 0.5))).run()
+
+
+@pytest.mark.parametrize("layer", OUTPUTS.values())
+def test_a_bake_in_the_shadow_is_dark_and_says_so(layer):
+    dark, lit = (Bake(Target("Plane"), job([SUN], layer, occluders=roof)) for roof in (ROOF, None))
+    for one in (dark, lit):
+        one.run()
+    assert (dark.is_dark, lit.is_dark) == (True, False)
+    assert [("No light reaches 'Plane'" in warning) for warning in dark.warnings] == [True]
+    assert lit.warnings == []
+
+
+def test_what_absorbs_all_light_is_not_dark():
+    one = Bake(Target("Plane"), job([SUN], material=replace(MATERIAL, albedo=(0.0, 0.0, 0.0))))
+    one.run()
+    assert not one.layers[COMBINED].any()
+    assert not one.is_dark
+
+
+def test_light_behind_a_slab_is_named():
+    above, below = LAMP, replace(LAMP, name="Low lamp", position=(0.0, 0.0, -1.0))
+    rising = replace(SUN, name="Rising sun", direction=(0.0, 0.6, 0.8))
+    assert job([above, SUN], thickness=0.1).warnings() == []
+    assert job([above, below, rising]).warnings() == []  # endlessly thick
+    assert (
+        job([above, below], IRRADIANCE, thickness=0.1).warnings() == []
+    )  # of what arrives in front, nothing is missing
+    (some,) = job([above, below, rising], thickness=0.1).warnings()
+    assert some.startswith("What shines through the slab 'Plane' from behind is not baked yet")
+    assert some.endswith("light of 'Low lamp', 'Rising sun'.")
+    through, black = job([below], thickness=0.1).warnings()
+    assert through.endswith("light of 'Low lamp'.")
+    assert "it is black" in black
