@@ -109,7 +109,7 @@ def test_fields():
     lights = {light.name: light for light in read().lights}
     assert set(lights) == set(lamps)
     sun, point, spot = (lights[name] for name in ("sun", "point", "spot"))
-    assert isinstance(sun, SunDiskLight) and isinstance(point, SphereLight) and isinstance(spot, SphereSpotLight)
+    assert [type(one) for one in (sun, point, spot)] == [SunDiskLight, SphereLight, SphereSpotLight]
     assert (sun.direction, sun.angle) == ((0, 0, -1), pytest.approx(0.3))
     assert (point.position, point.radius) == ((1, 2, 3), pytest.approx(0.3))
     assert (spot.frame, spot.radius, spot.blend) == (frame, pytest.approx(0.2), pytest.approx(0.4))
