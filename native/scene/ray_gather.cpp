@@ -25,6 +25,11 @@ constexpr std::size_t max_rays_at_once = 256;
 // From so many texels away on a texel's centre knows its mean to 5e-4 of the light of a point, and better of a larger one.
 constexpr double texels_to_even_light = 24.0;
 
+// How often rays are moved on where none finds the light, and how far: a lattice of four dimensions (Roberts 2018, "The
+// unreasonable effectiveness of quasirandom sequences").
+constexpr int max_trials = 64;
+constexpr GridSobol::Point steps = {0.8566748838545029, 0.7338918566271259, 0.6287067210378086, 0.5385972572236101};
+
 // One light's rays on one grid.
 class RayGatherer {
 public:
@@ -88,17 +93,14 @@ private:
         if (open == Vec3(0.0))
             return;
         m_sobol.points(x, y, first, count, rays.places.data());
-        Vec3 sum(0.0);
-        for (std::size_t i = 0; i < count; ++i) {
-            const GridSobol::Point& place = rays.places[i];
-            rays.points[i] = m_grid.point(static_cast<double>(x) + place[2], static_cast<double>(y) + place[3]);
-            const Vec2 on_light(place[0], place[1]);
-            m_light.sample(rays.points[i], m_grid.normal, {&on_light, 1}, &rays.found[i]);
-            const LightRay& found = rays.found[i];
-            const double cos_theta = -glm::dot(found.travel, m_grid.normal);
-            const bool counts = cos_theta > min_cos_theta && found.distance > m_position_rounding;
-            rays.weights[i] = counts ? Vec3(found.flux) * cos_theta : Vec3(0.0);
-            sum += rays.weights[i];
+        Vec3 sum = sample(x, y, rays);
+        // Where all miss, although there is light, others are tried.
+        for (int i = 0; i < max_trials && sum == Vec3(0.0); ++i) {
+            for (GridSobol::Point& place : rays.places) {
+                for (std::size_t k = 0; k < place.size(); ++k)
+                    place[k] += steps[k] - std::floor(place[k] + steps[k]);
+            }
+            sum = sample(x, y, rays);
         }
         // The sum of what comes unhindered is known: what is hindered takes its part of it.
         const auto per_weight = [&](int channel) { return sum[channel] > 0.0 ? open[channel] / sum[channel] : 0.0; };
@@ -117,6 +119,24 @@ private:
             if (++rays.waiting == Occluders::packet_size)
                 trace(rays);
         }
+    }
+
+    // The rays of a texel at their places, and what they carry unhindered; returns the sum of that.
+    Vec3 sample(std::size_t x, std::size_t y, Rays& rays) const
+    {
+        Vec3 sum(0.0);
+        for (std::size_t i = 0; i < rays.places.size(); ++i) {
+            const GridSobol::Point& place = rays.places[i];
+            rays.points[i] = m_grid.point(static_cast<double>(x) + place[2], static_cast<double>(y) + place[3]);
+            const Vec2 on_light(place[0], place[1]);
+            m_light.sample(rays.points[i], m_grid.normal, {&on_light, 1}, &rays.found[i]);
+            const LightRay& found = rays.found[i];
+            const double cos_theta = -glm::dot(found.travel, m_grid.normal);
+            const bool counts = cos_theta > min_cos_theta && found.distance > m_position_rounding;
+            rays.weights[i] = counts ? Vec3(found.flux) * cos_theta : Vec3(0.0);
+            sum += rays.weights[i];
+        }
+        return sum;
     }
 
     // Of a texel, in the mean, with nothing in between.
