@@ -54,14 +54,14 @@ def world_of(depsgraph):
     return world and world.evaluated_get(depsgraph)
 
 
-def sun_disk_factor(angle: float) -> float:
-    """What a sun of that full angle gives at normal incidence, over its strength.
+def sun_disk() -> str:
+    """How Cycles shapes a sun with an angle (see `SunDiskLight`): measured in 3.4 and 4.5, not between."""
+    return "flat" if bpy.app.version < (4, 0, 0) else "even"
 
-    Cycles 3.4 spreads the strength evenly over a flat disk across the direction to its centre and leaves out the
-    cosines; 4.5 has 1. Versions between are not measured.
-    """
-    squared = math.tan(0.5 * angle) ** 2
-    return 2 * (math.sqrt(1 + squared) - 1) / squared if bpy.app.version < (4, 0, 0) and squared > 1e-6 else 1.0
+
+def area_lamp_factor() -> float:
+    """Over `AreaLight`'s radiance of P / (4 A): Cycles 4.5 has P / (pi A). Versions between are not measured."""
+    return 1.0 if bpy.app.version < (4, 0, 0) else 4 / math.pi
 
 
 def instancer_hides_lamps() -> bool:

@@ -7,10 +7,8 @@ import numpy as np
 import scenes
 from beamspread.blender.read.geometry import read_polygons
 from beamspread.blender.read.lights import read_illumination
-from beamspread.core.bake.luminance import light_beams
+from beamspread.core.bake.gather import Gatherer
 from beamspread.core.bake.settings import BakeSettings
-from beamspread.core.native import native
-from beamspread.core.scene.lights import ExtendedLight
 from beamspread.core.scene.receiver import build_receiver
 from beamspread.core.scene.uv_map import fit_uv_maps
 
@@ -63,13 +61,8 @@ def our_irradiance(plane):
     polygons = read_polygons(plane.evaluated_get(depsgraph), plane.data.materials[0].name)
     receiver = build_receiver(fit_uv_maps(polygons), TEXELS, TEXELS)
     grid = receiver.charts[0].grid
+    gatherer = Gatherer(grid, illumination, BakeSettings(samples=8))
     total = np.zeros((grid.height, grid.width, 3), np.float32)
     for light in illumination.lights:
-        caster = illumination.caster(grid, light) if light.cast_shadow else None
-        if isinstance(light, ExtendedLight):
-            options = {"rays": RAYS, "clearance": grid.clearance}
-            by_rays, _ = native.gather_rays(grid.native(), light.native(), caster, **options)
-            total += by_rays * grid.coverage[..., None] * light.rgb()
-        else:
-            total += light_beams(grid, light, caster, BakeSettings(samples=8))[0]
+        total += gatherer.totals(light, RAYS)[0] * light.rgb()
     return receiver.to_texture([total]), receiver.coverage

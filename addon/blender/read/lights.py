@@ -12,7 +12,7 @@ from ...core.scene.lights import Light
 from .. import compat
 from .emitters import Glow
 from .geometry import GEOMETRY_TYPES
-from .lamps import is_portal, read_lamp
+from .lamps import fault, is_portal, read_lamp
 from .linking import links_of
 from .occluders import OccluderReader
 from .textures import Images
@@ -89,8 +89,7 @@ class _Lights:
             self._add(light, {})
 
     def _add(self, light: Light, links: dict) -> None:
-        fault = light.fault()
-        if fault:
-            self.warnings[f"The light '{light.name}' is left out: {fault}."] = None
+        if why := fault(light):
+            self.warnings[f"The light '{light.name}' is left out: {why}."] = None
         else:
             self._lights.append(replace(light, **links))
