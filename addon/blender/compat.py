@@ -64,6 +64,11 @@ def area_lamp_factor() -> float:
     return 1.0 if bpy.app.version < (4, 0, 0) else 4 / math.pi
 
 
+def flat_area_lamps_shine() -> bool:
+    """Whether Cycles lights by area lamps of scale 0 along their axis (3.4 does, 4.5 does not)."""
+    return bpy.app.version < (4, 0, 0)
+
+
 def instancer_hides_lamps() -> bool:
     """Whether Cycles asks the instancer's visibility, too, of lamps (4.5 does, 3.4 of meshes alone)."""
     return bpy.app.version >= (4, 4, 0)

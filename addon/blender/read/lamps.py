@@ -56,6 +56,8 @@ def _spot(data, axes: np.ndarray, common: tuple) -> Light:
 def _area(data, axes: np.ndarray, common: tuple) -> Light:
     size_y = data.size_y if data.shape in ("RECTANGLE", "ELLIPSE") else data.size
     is_round = data.shape in ("DISK", "ELLIPSE")
+    if not axes[:3, 2].any() and compat.flat_area_lamps_shine():
+        axes[:3, 2] = np.cross(axes[:3, 0], axes[:3, 1])
     name, strength, *rest = common
     brighter = name, strength * compat.area_lamp_factor(), *rest
     return AreaLight(*brighter, _position(axes), _frame(axes), data.size, size_y, is_round, data.spread)
