@@ -162,7 +162,7 @@ def test_color_ramp(world, interpolation):
         world.show(output)
         for factor in (-1, 0.1, 0.39, 0.41, 0.77, 2):
             node.inputs[0].default_value = factor
-            world.assert_agree(abs=1e-5)
+            world.assert_agree(abs=5e-5)
 
 
 @pytest.mark.parametrize(("kind", "outputs"), [("XYZ", "XYZ"), ("Color", ("Red", "Green", "Blue"))])
