@@ -25,7 +25,7 @@ NODES, MOST_NODES = 64, 2 * 64**2
 
 # Part of the bounced irradiance that is noise, at a node; interpolation averages it to about half. In seconds, where
 # that takes longer.
-NOISE, SECONDS = 0.02, 60.0
+NOISE, SECONDS = 0.04, 30.0
 
 # Of a node, how high above the receiver its light is gathered: nothing that stands there may be below.
 LIFT = 1e-3
