@@ -101,7 +101,10 @@ def test_mixed_colors(world, kind, blend):
         set_inputs(node, factor, *COLORS)
         world.assert_agree()
 
-@pytest.mark.parametrize("temperature", [300, 800, 1000, 1500, 1902, 2400, 2700, 3300, 4000, 5500, 6500, 9000, 12000, 3e4])
+
+@pytest.mark.parametrize(
+    "temperature", [300, 800, 1000, 1500, 1902, 2400, 2700, 3300, 4000, 5500, 6500, 9000, 12000, 3e4]
+)
 def test_blackbody(world, temperature):
     """A fit: within .4 % of the strongest channel."""
     node = world.add("ShaderNodeBlackbody")
@@ -135,7 +138,11 @@ PLAIN = [
         ((0.1, 0.5, 0.9), (0.1, 0.2, 0.3), (0.5, 0.1, 0.9)),
     ),
     *(
-        ("ShaderNodeMapping", {"vector_type": kind}, ((0.3, 0.5, 0.2), (0.1, -0.2, 0.3), (0.4, 0.5, 0.6), (1.5, 0.7, 2)))
+        (
+            "ShaderNodeMapping",
+            {"vector_type": kind},
+            ((0.3, 0.5, 0.2), (0.1, -0.2, 0.3), (0.4, 0.5, 0.6), (1.5, 0.7, 2)),
+        )
         for kind in ("TEXTURE", "VECTOR")
     ),
     (
