@@ -1,6 +1,7 @@
 """Light that Cycles finds on a copy of the scene: what bounces, what glows, the world; and the scene stays as it is."""
 
 import math
+import os
 import subprocess
 import tempfile
 from pathlib import Path
@@ -136,7 +137,10 @@ FRAMES = {
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("world", FRAMES.values(), ids=FRAMES.keys())
 def test_directions_of_a_glowing_square(world, mirrored):
-    """Irradiance and flow on a small plane against sums over the square: 1 %, of the flow 3 % for the strata."""
+    """What arrives on a small plane, stratum by stratum, against sums over the square: 1 % of all.
+
+    Of the flow 5 %, as each stratum counts as one direction and the square fills parts of few.
+    """
     side, place = 0.6, np.array((0.5, 0.3, 0.8))
     corners = [place + (x * side / 2, y * side / 2, 0) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     panel = scenes.add_mesh("Panel", [tuple(corner) for corner in corners], [(0, 1, 2, 3)], world)
@@ -163,8 +167,12 @@ def test_directions_of_a_glowing_square(world, mirrored):
     power = 2.0 * cosine**2 / distance**2 * (side / 200) ** 2
     ours = np.pi * WEIGHTS * found
     assert ours.sum() == pytest.approx(power.sum(), rel=0.01)
+    squared, turn = 1 - cosine**2, np.arctan2(way[..., 1], sign * way[..., 0]) / (2 * np.pi) % 1
+    begin, reach, first, part = STRATA.T[:, :, None, None]
+    inside = (begin <= squared) & (squared < begin + reach) & (first <= turn) & (turn < first + part)
+    np.testing.assert_allclose(ours, (inside * power).sum(axis=(1, 2)), atol=0.01 * power.sum())
     flow = (power[..., None] * -way / distance[..., None]).sum(axis=(0, 1)) * (sign, 1, 1)
-    np.testing.assert_allclose(ours @ DIRECTIONS, flow, atol=0.03 * np.linalg.norm(flow))
+    np.testing.assert_allclose(ours @ DIRECTIONS, flow, atol=0.05 * np.linalg.norm(flow))
 
 
 def test_nothing_above_a_receiver_means_no_search():
@@ -218,8 +226,8 @@ def test_the_scene_stays_as_it_is(monkeypatch, tmp_path):
     bpy.context.scene.frame_set(7)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
     saved = []
-    monkeypatch.setattr(bpy.app.handlers, "save_pre", bpy.app.handlers.save_pre)
-    bpy.app.handlers.save_pre.append(lambda *_: saved.append(1))
+    handler = lambda *_: saved.append(1)  # noqa: E731
+    bpy.app.handlers.save_pre.append(handler)
     try:
         before, there = state(), folders()
         (bake,) = jobs_of(floor)
@@ -238,7 +246,7 @@ def test_the_scene_stays_as_it_is(monkeypatch, tmp_path):
         assert state() == before
         assert not saved
     finally:
-        bpy.app.handlers.save_pre.clear()
+        bpy.app.handlers.save_pre.remove(handler)
     del bake
     assert folders() == there
 

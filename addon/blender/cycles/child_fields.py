@@ -85,6 +85,7 @@ class Baker:
         self.scene, self.image, self.light = scene, image, light
         self.rounds, self.seconds = 0, 0.0
         view_layer = bpy.context.view_layer
+        view_layer.update()  # before, the ghost can't be selected
         for obj in view_layer.objects:
             obj.select_set(obj == ghost)
         view_layer.objects.active = ghost
