@@ -24,9 +24,9 @@ TEXELS, GREY = 32, 0.5
 
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch):
-    """Few nodes and little time: noise of some 2 % at each."""
+    """Few nodes, with noise of 2 % at each."""
     monkeypatch.setattr(light, "NODES", 32)
-    monkeypatch.setattr(light, "SECONDS", 20.0)
+    monkeypatch.setattr(light, "NOISE", 0.02)
     bpy.context.scene.beamspread.use_indirect = True
     bpy.context.scene.beamspread.margin = 0
 
@@ -137,9 +137,9 @@ FRAMES = {
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("world", FRAMES.values(), ids=FRAMES.keys())
 def test_directions_of_a_glowing_square(world, mirrored):
-    """What arrives on a small plane, stratum by stratum, against sums over the square: 1 % of all.
+    """What arrives on a small plane, stratum by stratum, against sums over the square.
 
-    Of the flow 5 %, as each stratum counts as one direction and the square fills parts of few.
+    With noise of .4 %: within 1.5 % of all. Of the flow 7 %, as each stratum counts as one direction and the square fills parts of few.
     """
     side, place = 0.6, np.array((0.5, 0.3, 0.8))
     corners = [place + (x * side / 2, y * side / 2, 0) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
@@ -149,14 +149,14 @@ def test_directions_of_a_glowing_square(world, mirrored):
     axes = np.array(world.to_3x3().transposed())
     sign = -1.0 if mirrored else 1.0
     chart = {
-        "corner": (np.array(world.translation) + axes.T @ (-0.05 * sign, -0.05, 0)).tolist(),
+        "corner": (np.array(world.translation) + axes.T @ (-0.005 * sign, -0.005, 0)).tolist(),
         "x_axis": (sign * axes[0]).tolist(),
         "y_axis": axes[1].tolist(),
         "normal": axes[2].tolist(),
-        "size": [0.1, 0.1],
+        "size": [0.01, 0.01],
         "nodes": [4, 4],
     }
-    request = {"strata": STRATA.tolist(), "light": "DIRECT", "noise": 0.002, "seconds": 20.0, "reflectances": {}}
+    request = {"strata": STRATA.tolist(), "light": "DIRECT", "noise": 0.002, "most_samples": 1500, "reflectances": {}}
     with SceneCopy(bpy.context.scene, bpy.context.view_layer) as copy:
         found = process.run(copy, "fields", {**request, "charts": [chart]})["radiance_0"].mean(axis=(1, 2, 3))
     steps = (np.arange(200) + 0.5) / 200 - 0.5
@@ -166,13 +166,13 @@ def test_directions_of_a_glowing_square(world, mirrored):
     cosine = place[2] / distance
     power = 2.0 * cosine**2 / distance**2 * (side / 200) ** 2
     ours = np.pi * WEIGHTS * found
-    assert ours.sum() == pytest.approx(power.sum(), rel=0.01)
+    assert ours.sum() == pytest.approx(power.sum(), rel=0.015)
     squared, turn = 1 - cosine**2, np.arctan2(way[..., 1], sign * way[..., 0]) / (2 * np.pi) % 1
     begin, reach, first, part = STRATA.T[:, :, None, None]
     inside = (begin <= squared) & (squared < begin + reach) & (first <= turn) & (turn < first + part)
-    np.testing.assert_allclose(ours, (inside * power).sum(axis=(1, 2)), atol=0.01 * power.sum())
+    np.testing.assert_allclose(ours, (inside * power).sum(axis=(1, 2)), atol=0.015 * power.sum())
     flow = (power[..., None] * -way / distance[..., None]).sum(axis=(0, 1)) * (sign, 1, 1)
-    np.testing.assert_allclose(ours @ DIRECTIONS, flow, atol=0.05 * np.linalg.norm(flow))
+    np.testing.assert_allclose(ours @ DIRECTIONS, flow, atol=0.07 * np.linalg.norm(flow))
 
 
 def test_nothing_above_a_receiver_means_no_search():
@@ -220,7 +220,7 @@ def folders():
 
 def test_the_scene_stays_as_it_is(monkeypatch, tmp_path):
     floor = add_scene()
-    monkeypatch.setattr(light, "SECONDS", 1.0)
+    monkeypatch.setattr(light, "MOST_SAMPLES", 8)
     dirty = bpy.data.images.new("In memory", 8, 8)
     dirty.pixels[0] = 0.5
     bpy.context.scene.frame_set(7)
@@ -254,7 +254,7 @@ def test_the_scene_stays_as_it_is(monkeypatch, tmp_path):
 def test_cancelling_kills_the_process(monkeypatch):
     floor = add_scene()
     monkeypatch.setattr(light, "NOISE", 1e-4)
-    monkeypatch.setattr(light, "SECONDS", 600.0)
+    monkeypatch.setattr(light, "MOST_SAMPLES", 10**4)
     children = []
 
     class Popen(subprocess.Popen):
@@ -269,14 +269,14 @@ def test_cancelling_kills_the_process(monkeypatch):
 
     def progress(fraction):
         fractions.append(fraction)
-        return fraction < 0.01
+        return fraction == 0
 
     bake.run(progress)
     assert bake.status == CANCELLED
     (child,) = children
     assert child.returncode is not None
     assert child.returncode != 0
-    assert 0.01 <= fractions[-1] < 0.5  # it had begun, and had not ended
+    assert 0 < fractions[-1] < 0.1  # it had begun, and had not ended
     assert state() == before
     del bake
     assert folders() < there

@@ -3,17 +3,13 @@
 Part of the child process (child.py).
 """
 
-import time
-
 import bpy
 import numpy as np
 from child_ghost import add_ghost
 
-# Samples per node and stratum of the first two looks, from which noise and speed follow.
+# Samples per node and stratum of the first two rounds, from which the noise follows. Later rounds take twice as many
+# as the one before, since each prepares the scene anew. Nothing depends on how long it takes, or each run would differ.
 LOOK = 4
-
-# A round is no shorter than this, as each prepares the scene anew, unless that takes no time.
-ROUND_SECONDS = 4.0
 
 # In 3.4 a bake of indirect light alone lacks what lamps send to other objects. The difference of two bakes does not;
 # with the same seed they follow the same paths, so what arrives directly is gone without noise.
@@ -33,24 +29,17 @@ def fields(request, scene, progress) -> dict:
     scene.collection.objects.link(ghost)
     baker = Baker(scene, ghost, image, request["light"])
     looks = [baker.bake(LOOK), baker.bake(LOOK)]
-    spent = baker.seconds
-    progress(0.05)
-    noise = noise_of(request, *looks)
+    total, samples, count = sum(looks) * LOOK, 2 * LOOK, 2 * LOOK
     # The mean of both has noise / sqrt(2); it falls by the root of the samples.
-    wanted = 2 * LOOK * (noise / np.sqrt(2) / request["noise"]) ** 2
-    affordable = 2 * LOOK * request["seconds"] / max(spent, 1e-3)
-    missing = int(np.ceil(min(wanted, affordable))) - 2 * LOOK
-    total, samples = sum(looks) * LOOK, 2 * LOOK
-    if missing > 0:
-        seconds = spent / (2 * LOOK) * missing
-        rounds = int(np.clip(seconds / ROUND_SECONDS, 1, 32))
-        for number in range(rounds):
-            count = missing // rounds + (number < missing % rounds)
-            if count:
-                total, samples = total + count * baker.bake(count), samples + count
-            progress(0.05 + 0.95 * (number + 1) / rounds)
+    noise = noise_of(request, *looks) / np.sqrt(2)
+    wanted = int(min(np.ceil(samples * (noise / request["noise"]) ** 2), request["most_samples"]))
+    progress(samples / max(wanted, samples))
+    while samples < wanted:
+        count = min(count, wanted - samples)
+        total, samples, count = total + count * baker.bake(count), samples + count, 2 * count
+        progress(samples / wanted)
     result = {f"radiance_{n}": part for n, part in enumerate(split(request, np.maximum(total / samples, 0)))}
-    result["noise"] = np.array(noise / np.sqrt(2) * np.sqrt(2 * LOOK / samples))
+    result["noise"] = np.array(noise * np.sqrt(2 * LOOK / samples))
     result["samples"] = np.array(samples)
     return result
 
@@ -83,7 +72,7 @@ class Baker:
 
     def __init__(self, scene, ghost, image, light) -> None:
         self.scene, self.image, self.light = scene, image, light
-        self.rounds, self.seconds = 0, 0.0
+        self.rounds = 0
         view_layer = bpy.context.view_layer
         view_layer.update()  # before, the ghost can't be selected
         for obj in view_layer.objects:
@@ -95,15 +84,11 @@ class Baker:
 
     def bake(self, samples: int) -> np.ndarray:
         """Float32 (height, width, 3) of the image."""
-        start = time.monotonic()
         self.rounds += 1
         self.scene.cycles.seed, self.scene.cycles.samples = self.rounds, samples
         if self.light == "INDIRECT" and INDIRECT_LACKS_LAMPS:
-            pixels = self._bake({"DIRECT", "INDIRECT"}) - self._bake({"DIRECT"})
-        else:
-            pixels = self._bake({self.light})
-        self.seconds += time.monotonic() - start
-        return pixels
+            return self._bake({"DIRECT", "INDIRECT"}) - self._bake({"DIRECT"})
+        return self._bake({self.light})
 
     def _bake(self, passes: set) -> np.ndarray:
         bpy.ops.object.bake(type="GLOSSY", pass_filter=passes, **self.options)
