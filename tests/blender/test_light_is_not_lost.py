@@ -8,9 +8,9 @@ import pytest
 from beamspread.blender.jobs.batch import bake_all
 from beamspread.core.batch import options
 from beamspread.core.native import native
+from cycles_truth import TEXELS, add_receiver, cycles_irradiance
 from mathutils import Euler, Matrix
 from scenes import add_blocker, add_material, add_mesh, add_plane, add_sun
-from test_cycles_irradiance import TEXELS, add_receiver, cycles_irradiance
 
 # Of Cycles: the noise of a texel is at most 1 / sqrt(1024) = 3 % of its light where light is partly hidden or varies by
 # as much as its mean, on average below 1 %; that of the sum of 64 x 64 texels below 0.1 %.

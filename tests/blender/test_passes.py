@@ -12,9 +12,9 @@ from beamspread.blender.jobs.state import state
 from beamspread.blender.ui import panels
 from beamspread.core.batch import options
 from beamspread.core.native import native
+from cycles_truth import TEXELS, add_receiver, cycles_irradiance
 from mathutils import Matrix
 from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
-from test_cycles_irradiance import TEXELS, add_receiver, cycles_irradiance
 
 SUN_ANGLE, SUN_AZIMUTH = 50, 35
 # Images of data are packed as half floats: 11 bits.
