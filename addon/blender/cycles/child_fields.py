@@ -19,15 +19,20 @@ INDIRECT_LACKS_LAMPS = bpy.app.version < (4, 5, 0)
 def fields(request, scene, progress) -> dict:
     """The task `fields`: radiance_0, radiance_1, ... of the charts, float32 (K, rows, columns, 3), and noise.
 
+    `light` is "INDIRECT" or "DIRECT", `only` names the objects whose light counts, none: all. With `by_lamps` a white
+    diffuse surface stands in place of the mirrors, for which Cycles looks for lamps however small; it has one stratum.
+
     Radiance is each stratum's mean by the cosine. The noise is that of the irradiance, the root of its mean square over
     all nodes, as part of its mean.
     """
     for name, color in request["reflectances"].items():
         make_diffuse(bpy.data.materials[name], color)
     set_up(scene)
-    ghost, image = add_ghost(request["charts"], request["strata"])
+    if request["only"]:
+        shine_alone(scene, request["only"])
+    ghost, image = add_ghost(request["charts"], request["strata"], request["by_lamps"])
     scene.collection.objects.link(ghost)
-    baker = Baker(scene, ghost, image, request["light"])
+    baker = Baker(scene, ghost, image, request["light"], "DIFFUSE" if request["by_lamps"] else "GLOSSY")
     looks = [baker.bake(LOOK), baker.bake(LOOK)]
     total, samples, count = sum(looks) * LOOK, 2 * LOOK, 2 * LOOK
     # The mean of both has noise / sqrt(2); it falls by the root of the samples.
@@ -54,6 +59,26 @@ def make_diffuse(material, color) -> None:
     tree.links.new(output.inputs["Surface"], diffuse.outputs[0])
 
 
+def shine_alone(scene, names) -> None:
+    """Switch off all light but that of these objects."""
+    scene.world = None
+    own = {slot.material for name in names for slot in bpy.data.objects[name].material_slots}
+    for obj in scene.objects:
+        if obj.type == "LIGHT" and obj.name not in names:
+            obj.hide_render = True
+    trees = [one.node_tree for one in bpy.data.materials if one.node_tree and one not in own]
+    for tree in [*trees, *bpy.data.node_groups]:
+        used_by_own = any(
+            tree is getattr(node, "node_tree", None) for one in own if one for node in one.node_tree.nodes
+        )
+        for node in () if used_by_own else tree.nodes:
+            for socket in node.inputs if node.type in {"EMISSION", "BSDF_PRINCIPLED"} else ():
+                if socket.name in {"Strength", "Emission Strength"}:
+                    for link in list(socket.links):
+                        tree.links.remove(link)
+                    socket.default_value = 0.0
+
+
 def set_up(scene) -> None:
     """The artist's materials and bounces, but no clamps, no exposure, nothing that stops early."""
     scene.render.engine = "CYCLES"
@@ -70,8 +95,8 @@ def set_up(scene) -> None:
 class Baker:
     """Bakes the ghost again and again."""
 
-    def __init__(self, scene, ghost, image, light) -> None:
-        self.scene, self.image, self.light = scene, image, light
+    def __init__(self, scene, ghost, image, light, kind) -> None:
+        self.scene, self.image, self.light, self.kind = scene, image, light, kind
         self.rounds = 0
         view_layer = bpy.context.view_layer
         view_layer.update()  # before, the ghost can't be selected
@@ -91,7 +116,7 @@ class Baker:
         return self._bake({self.light})
 
     def _bake(self, passes: set) -> np.ndarray:
-        bpy.ops.object.bake(type="GLOSSY", pass_filter=passes, **self.options)
+        bpy.ops.object.bake(type=self.kind, pass_filter=passes, **self.options)
         values = np.empty(len(self.image.pixels), np.float32)
         self.image.pixels.foreach_get(values)
         pixels = values.reshape(self.image.size[1], self.image.size[0], self.image.channels)[..., :3]
