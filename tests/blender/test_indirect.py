@@ -162,11 +162,13 @@ def test_directions_of_a_glowing_square(world, mirrored):
         "light": "DIRECT",
         "only": [],
         "by_lamps": False,
+        "reflectances": {},
         "noise": 0.002,
         "most_samples": 1500,
+        "charts": [chart],
     }
     with SceneCopy(bpy.context.scene, bpy.context.view_layer) as copy:
-        found = process.run(copy, "fields", {**request, "charts": [chart], "noise": 0.002, "most_samples": 1500})
+        found = process.run(copy, "fields", request)
     found = found["radiance_0"].mean(axis=(1, 2, 3))
     steps = (np.arange(200) + 0.5) / 200 - 0.5
     x, y = np.meshgrid(place[0] + side * steps, place[1] + side * steps)
