@@ -5,8 +5,8 @@ Each part imports only core and those above it (tests/unit/test_layers.py reads 
     compat      differences between Blender versions
     settings    scene.beamspread
     read        geometry, lights and what a render would show
-    cycles      what Cycles computes: the world's radiance, bounced light; in a process of its own
     node        the shader node, and where a scene has it
+    cycles      what Cycles finds in a process of its own: bounced light, the world's radiance
     images      images of the scene, files, atlases
     jobs        what becomes a job, and what runs it: operator, engine, batch; the state of a run
     ui          panels

@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
 
 #include "base/constants.h"
 #include "base/error.h"
+#include "base/gauss_rule.h"
 #include "scene/checks.h"
 #include "scene/polygon.h"
-#include "scene/quadrature.h"
 
 namespace beamspread {
 
@@ -20,8 +23,91 @@ constexpr double max_spread = static_cast<double>(static_cast<float>(pi));
 // A lamp that looks smaller than this, in steradians, is sampled evenly over its area: that is as good and costs less.
 constexpr double small_solid_angle = 0.05;
 
-// Corners of the polygon that stands for an ellipse: at a tenth of a circle's radius its light is right to 1e-3.
-constexpr int ellipse_corners = 64;
+constexpr std::array<Vec2, 4> rectangle = {Vec2(-0.5, -0.5), Vec2(0.5, -0.5), Vec2(0.5, 0.5), Vec2(-0.5, 0.5)};
+
+// Weights over [0, 1], dense at both ends, where the outline is seen along its edge: four points of Gauss in each third.
+struct Node {
+    double at;
+    double weight;
+};
+
+std::array<Node, 12> make_rule()
+{
+    std::array<Node, 12> nodes;
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+        const double s = (static_cast<double>(i / 4) + 0.5 * (1.0 + gauss_node[i % 4])) / 3.0;
+        nodes[i] = {s * s * (3.0 - 2.0 * s), s * (1.0 - s) * gauss_weight[i % 4]};
+    }
+    return nodes;
+}
+
+const std::array<Node, 12> rule = make_rule();
+
+struct Range {
+    double first;
+    double last;
+};
+
+// The border of a lamp whose sides are 1 long, seen from a place in its plane.
+struct Outline {
+    Vec2 from;
+    bool is_round;
+
+    // Along from + t direction, t >= 0; empty ones end before they begin.
+    Range span(const Vec2& direction) const
+    {
+        if (is_round) {
+            const double a = glm::dot(direction, direction);
+            const double b = glm::dot(direction, from);
+            const double root = std::sqrt(std::max(b * b - a * (glm::dot(from, from) - 0.25), 0.0));
+            return {std::max((-b - root) / a, 0.0), (root - b) / a};
+        }
+        Range range{0.0, std::numeric_limits<double>::infinity()};
+        for (int i = 0; i < 2; ++i) {
+            const double begin = (std::copysign(0.5, -direction[i]) - from[i]) / direction[i];
+            const double end = (std::copysign(0.5, direction[i]) - from[i]) / direction[i];
+            range = {std::max(range.first, begin), std::min(range.last, end)};
+        }
+        return range;
+    }
+
+    // Pieces of the azimuths in which it is seen, on each of which it is smooth; the sides have these lengths.
+    std::vector<Range> azimuths(const Vec2& lengths) const
+    {
+        std::vector<Range> pieces;
+        const bool is_inside =
+            is_round ? glm::dot(from, from) < 0.25 : std::abs(from.x) < 0.5 && std::abs(from.y) < 0.5;
+        if (is_round && is_inside) {
+            for (int i = 0; i < 4; ++i)
+                pieces.push_back({0.5 * pi * i, 0.5 * pi * (i + 1)});
+            return pieces;
+        }
+        // Around the direction to the centre, so that what lies ahead has no jump.
+        const Vec2 ahead = from == Vec2(0.0) ? Vec2(1.0, 0.0) : -from * lengths;
+        const double middle = std::atan2(ahead.y, ahead.x);
+        const auto azimuth = [&](const Vec2& to) {
+            const Vec2 way = to * lengths;
+            return middle + std::atan2(ahead.x * way.y - ahead.y * way.x, glm::dot(ahead, way));
+        };
+        if (is_round) {
+            // Tangents of the circle of radius 1/2.
+            const double distance = glm::length(from);
+            const double sine = std::min(0.5 / distance, 1.0);
+            const Vec2 x = -from / distance * std::sqrt(1.0 - sine * sine);
+            const Vec2 y = Vec2(from.y, -from.x) / distance * sine;
+            return {{azimuth(x - y), azimuth(x + y)}};
+        }
+        std::array<double, 4> corners;
+        for (std::size_t i = 0; i < 4; ++i)
+            corners[i] = azimuth(rectangle[i] - from);
+        std::ranges::sort(corners);
+        for (std::size_t i = 0; i < 3; ++i)
+            pieces.push_back({corners[i], corners[i + 1]});
+        if (is_inside)
+            pieces.push_back({corners[3], corners[0] + 2.0 * pi});
+        return pieces;
+    }
+};
 
 void check_size(const std::string& name, double size)
 {
@@ -55,16 +141,6 @@ AreaLight::AreaLight(const Vec3& position, const Mat3& lamp_to_world, double siz
         reject("spread", spread, "0 <= spread <= pi, the full angle in radians");
     if (!detail::is_finite(m_axis))
         m_radiance = 0.0;
-    if (!is_round) {
-        for (const Vec2& corner : {Vec2(-0.5, -0.5), Vec2(0.5, -0.5), Vec2(0.5, 0.5), Vec2(-0.5, 0.5)})
-            m_border.push_back(m_side_x * corner.x + m_side_y * corner.y);
-        return;
-    }
-    // As large as the ellipse.
-    const double step = 2.0 * pi / ellipse_corners;
-    const double radius = 0.5 * std::sqrt(step / std::sin(step));
-    for (int i = 0; i < ellipse_corners; ++i)
-        m_border.push_back(radius * (m_side_x * std::cos(i * step) + m_side_y * std::sin(i * step)));
 }
 
 Vec2 AreaLight::foot(const Vec3& point) const
@@ -162,15 +238,69 @@ Vec3 AreaLight::irradiance(const Vec3& point, const Vec3& normal) const
     Part part;
     if (!lit_part(point, to_plane, part))
         return Vec3(0.0);
-    if (m_half_spread >= 0.5 * pi) {
-        std::array<Vec3, ellipse_corners> corners;
-        for (std::size_t i = 0; i < m_border.size(); ++i)
-            corners[i] = m_position - point + m_border[i];
-        return Vec3(m_radiance * polygon_irradiance(std::span(corners).first(m_border.size()), normal));
+    if (m_half_spread >= 0.5 * pi && !m_is_round) {
+        std::array<Vec3, 4> corners;
+        for (std::size_t i = 0; i < 4; ++i)
+            corners[i] = m_position - point + rectangle[i].x * m_side_x + rectangle[i].y * m_side_y;
+        return Vec3(m_radiance * polygon_irradiance(corners, normal));
     }
     if (m_half_spread == 0.0)
         return Vec3(is_on(part.low) ? pi * m_radiance * std::max(-glm::dot(m_axis, normal), 0.0) : 0.0);
-    return mean_irradiance(*this, point, normal);
+    return Vec3(m_radiance * seen(point, normal, to_plane));
+}
+
+double AreaLight::distance_from(const Vec3& point) const
+{
+    return glm::distance(point, m_position) - 0.5 * (glm::length(m_side_x) + glm::length(m_side_y));
+}
+
+double AreaLight::up_to(double along, double across, double tangent) const
+{
+    const double angle = std::atan(tangent);
+    const double cosine = 1.0 / std::sqrt(1.0 + tangent * tangent);
+    const double sine = std::isinf(tangent) ? 1.0 : tangent * cosine;
+    const double sin_cos = 0.5 * sine * sine;                   // integrals from 0 of sin cos,
+    const double sin_sin = 0.5 * (angle - sine * cosine);       // sin^2
+    const double open = along * sin_cos + across * sin_sin;
+    if (m_half_spread >= 0.5 * pi)
+        return open;
+    const double sin_sin_tan = 0.5 * std::log1p(tangent * tangent) - sin_cos;  // and sin^2 tan
+    return (m_tan_spread * open - along * sin_sin - across * sin_sin_tan) / (m_tan_spread - m_half_spread);
+}
+
+double AreaLight::seen(const Vec3& point, const Vec3& normal, double depth) const
+{
+    // By the angle a to the lamp's axis and the azimuth phi around the foot of the point on the lamp: the lamp is convex,
+    // so that for each azimuth it spans one range of angles, and the integral over that is known.
+    const Vec2 lengths(glm::length(m_side_x), glm::length(m_side_y));
+    const double along = -glm::dot(normal, m_axis);  // cos(theta) = along cos(a) + across(phi) sin(a)
+    const double across_x = glm::dot(normal, m_side_x) / lengths.x;
+    const double across_y = glm::dot(normal, m_side_y) / lengths.y;
+    const Outline outline{.from = foot(point), .is_round = m_is_round};
+    const double reach = m_half_spread >= 0.5 * pi ? std::numeric_limits<double>::infinity() : depth * m_tan_spread;
+
+    double sum = 0.0;
+    for (const auto& [first, last] : outline.azimuths(lengths)) {
+        for (const auto& [at, weight] : rule) {
+            const double azimuth = std::lerp(first, last, at);
+            const Vec2 direction(std::cos(azimuth), std::sin(azimuth));
+            auto [near, far] = outline.span(direction / lengths);
+            const double across = across_x * direction.x + across_y * direction.y;
+            far = std::min(far, reach);
+            // The horizon: where along depth + across rho changes its sign.
+            if (across != 0.0) {
+                const double horizon = -along * depth / across;
+                (across > 0.0 ? near : far) = across > 0.0 ? std::max(near, horizon) : std::min(far, horizon);
+            } else if (along <= 0.0) {
+                continue;
+            }
+            if (near < far) {
+                const double light = up_to(along, across, far / depth) - up_to(along, across, near / depth);
+                sum += weight * (last - first) * light;
+            }
+        }
+    }
+    return sum;
 }
 
 }  // namespace beamspread

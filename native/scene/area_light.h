@@ -3,8 +3,6 @@
 // angle a, by which as much leaves as without.
 #pragma once
 
-#include <vector>
-
 #include "scene/extended_light.h"
 
 namespace beamspread {
@@ -18,6 +16,7 @@ public:
               double spread);
     void sample(const Vec3& point, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const override;
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
+    double distance_from(const Vec3& point) const override;
 
 private:
     // A part of the lamp that rays are sent to, along its sides, which are 1 long: from there to there.
@@ -34,6 +33,10 @@ private:
     bool lit_part(const Vec3& point, double depth, Part& part) const;
     bool is_on(const Vec2& place) const;
     double through_grid(double cos_angle) const;
+    // The integral of cos(theta) over the directions in which the point sees it, times what comes through the grid; of
+    // one azimuth from the axis up to an angle of that tangent, where cos(theta) = along cos(a) + across sin(a).
+    double up_to(double along, double across, double tangent) const;
+    double seen(const Vec3& point, const Vec3& normal, double depth) const;
     LightRay ray(const Vec3& way, const Vec2& place, double flux) const;
 
     Vec3 m_position;
@@ -44,7 +47,6 @@ private:
     double m_radiance;
     double m_half_spread;
     double m_tan_spread;  // of half of it
-    std::vector<Vec3> m_border;  // corners from the centre
 };
 
 }  // namespace beamspread

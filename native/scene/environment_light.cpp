@@ -86,6 +86,8 @@ public:
     }
 
     Vec3 irradiance(const Vec3& /*point*/, const Vec3& /*normal*/) const override { return m_irradiance; }
+    double distance_from(const Vec3& /*point*/) const override { return std::numeric_limits<double>::infinity(); }
+    bool is_far() const override { return true; }
 
 private:
     std::span<const double> cumulated(std::size_t y) const

@@ -39,6 +39,9 @@ public:
         return nullptr;
     }
 
+    // How near to a point it may come, at least; within a small part of it the irradiance hardly changes.
+    virtual double distance_from(const Vec3& point) const = 0;
+
     // Whether it is the same at all points.
     virtual bool is_far() const { return false; }
 

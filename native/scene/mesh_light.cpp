@@ -43,10 +43,20 @@ MeshLight::MeshLight(std::span<const Vec3> vertices, std::span<const Triangle> t
         const double power = glm::length(face.normal) * (glow.x + glow.y + glow.z) / 3.0;
         if (!(power > 0.0))
             continue;
+        for (const Vec3& corner : face.corners) {
+            const bool is_first = m_faces.empty() && &corner == face.corners.data();
+            m_low = is_first ? corner : glm::min(m_low, corner);
+            m_high = is_first ? corner : glm::max(m_high, corner);
+        }
         m_is_colored |= glow.x != glow.y || glow.y != glow.z;
         m_faces.push_back(face);
         m_cumulated.push_back(m_cumulated.back() + power);
     }
+}
+
+double MeshLight::distance_from(const Vec3& point) const
+{
+    return glm::distance(point, glm::clamp(point, m_low, m_high));
 }
 
 void MeshLight::sample(const Vec3& point, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const

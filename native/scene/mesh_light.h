@@ -18,6 +18,7 @@ public:
     MeshLight(std::span<const Vec3> vertices, std::span<const Triangle> triangles, std::span<const Vec3f> radiance);
     void sample(const Vec3& point, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const override;
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
+    double distance_from(const Vec3& point) const override;
     bool is_colored() const override { return m_is_colored; }
 
 private:
@@ -27,6 +28,7 @@ private:
         Vec3 radiance;
     };
 
+    Vec3 m_low{0.0}, m_high{0.0};  // its bounds
     std::vector<Face> m_faces;
     std::vector<double> m_cumulated;  // power of the faces in the mean of the channels, one more than faces
     bool m_is_colored = false;

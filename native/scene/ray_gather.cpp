@@ -22,6 +22,9 @@ namespace {
 // More rays of a row than that are not kept at once: 50 MB of each thread for 8192 texels.
 constexpr std::size_t max_rays_at_once = 256;
 
+// From so many texels away on a texel's centre knows its mean to 5e-4 of the light of a point, and better of a larger one.
+constexpr double texels_to_even_light = 24.0;
+
 // One light's rays on one grid.
 class RayGatherer {
 public:
@@ -121,15 +124,17 @@ private:
     {
         if (m_light.is_far())
             return m_far_irradiance;
+        const auto at = [&](double sub_x, double sub_y) {
+            const Vec3 point = m_grid.point(static_cast<double>(x) + sub_x, static_cast<double>(y) + sub_y);
+            return m_light.irradiance(point, m_grid.normal);
+        };
+        const double distance = m_light.distance_from(m_grid.point(static_cast<double>(x), static_cast<double>(y)));
+        if (distance > texels_to_even_light * std::max(m_grid.pitch_x, m_grid.pitch_y))
+            return at(0.5, 0.5);
         // The Gauss rule of two points along each axis.
         constexpr double offset = 0.5 / std::numbers::sqrt3;
-        Vec3 sum(0.0);
-        for (const double sub_y : {0.5 - offset, 0.5 + offset}) {
-            for (const double sub_x : {0.5 - offset, 0.5 + offset})
-                sum += m_light.irradiance(m_grid.point(static_cast<double>(x) + sub_x, static_cast<double>(y) + sub_y),
-                                          m_grid.normal);
-        }
-        return 0.25 * sum;
+        return 0.25 * (at(0.5 - offset, 0.5 - offset) + at(0.5 + offset, 0.5 - offset) +
+                       at(0.5 - offset, 0.5 + offset) + at(0.5 + offset, 0.5 + offset));
     }
 
     void trace(Rays& rays) const

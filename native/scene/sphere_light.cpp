@@ -25,8 +25,9 @@ bool SphereLight::is_inside(const Vec3& point) const
     return m_model == SphereModel::sphere && glm::dot(way, way) <= m_radius * m_radius;
 }
 
-Cone SphereLight::cone(const Vec3& away) const
+Cone SphereLight::seen_from(const Vec3& point) const
 {
+    const Vec3 away = m_position - point;
     const double distance_squared = glm::dot(away, away);
     const double radius_squared = m_radius * m_radius;
     const double hypotenuse_squared =
@@ -52,7 +53,7 @@ void SphereLight::sample(const Vec3& point, const Vec3& normal, std::span<const 
         }
         return;
     }
-    const Cone seen = cone(away);
+    const Cone seen = seen_from(point);
     const double distance = std::sqrt(distance_squared);
     // Radiance times solid angle, in a form that holds for a radius of 0 too.
     const double hypotenuse_squared =
@@ -80,7 +81,7 @@ Vec3 SphereLight::irradiance(const Vec3& point, const Vec3& normal) const
         const double cos_theta = std::max(glm::dot(away, normal) / std::sqrt(distance_squared), 0.0);
         return Vec3(0.25 * inv_pi * cos_theta / distance_squared);
     }
-    return Vec3(0.25 * inv_pi * inv_pi * cone(away).irradiance(normal) / (m_radius * m_radius));
+    return Vec3(0.25 * inv_pi * inv_pi * seen_from(point).irradiance(normal) / (m_radius * m_radius));
 }
 
 }  // namespace beamspread

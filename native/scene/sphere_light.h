@@ -22,12 +22,14 @@ public:
     void sample(const Vec3& point, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const override;
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
 
+    double distance_from(const Vec3& point) const override { return glm::distance(point, m_position) - m_radius; }
+
     bool is_inside(const Vec3& point) const;
 
-private:
-    // How it looks from there.
-    Cone cone(const Vec3& away) const;
+    // How it looks from a point outside.
+    Cone seen_from(const Vec3& point) const;
 
+private:
     Vec3 m_position;
     double m_radius;
     SphereModel m_model;

@@ -1,6 +1,9 @@
 #include "scene/sphere_spot_light.h"
 
-#include "scene/quadrature.h"
+#include <algorithm>
+
+#include "base/gauss_rule.h"
+#include "scene/cone.h"
 
 namespace beamspread {
 
@@ -18,13 +21,48 @@ void SphereSpotLight::sample(const Vec3& point, const Vec3& normal, std::span<co
         ray.flux *= static_cast<float>(m_cone.falloff(ray.travel));
 }
 
+double SphereSpotLight::mean_falloff(const Vec3& point, const Vec3& normal) const
+{
+    const Cone seen = m_sphere.seen_from(point);
+    // Where nothing falls off is convex: that the sphere's rim is in it is enough.
+    constexpr int rim = 8;
+    double lowest = m_cone.falloff(-seen.axis());
+    double highest = lowest;
+    for (int i = 0; i < rim; ++i) {
+        double along = 0.0;
+        const double falloff = m_cone.falloff(-seen.direction({1.0, (i + 0.5) / rim}, along));
+        lowest = std::min(lowest, falloff);
+        highest = std::max(highest, falloff);
+    }
+    if (lowest == 1.0)
+        return 1.0;
+    // Rings by the Gauss rule, more where the border is hard.
+    const int panels = highest - lowest < 0.5 ? 2 : 8;
+    const int azimuths = 8 * panels;
+    double sum = 0.0;
+    double whole = 0.0;
+    for (int panel = 0; panel < panels; ++panel) {
+        for (std::size_t node = 0; node < gauss_node.size(); ++node) {
+            const double ring = (panel + 0.5 * (1.0 + gauss_node[node])) / panels;
+            for (int i = 0; i < azimuths; ++i) {
+                double along = 0.0;
+                // Turned from ring to ring, so that no border runs along the points.
+                const double azimuth =
+                    (i + 0.618 * static_cast<double>(node + 4 * static_cast<std::size_t>(panel))) / azimuths;
+                const Vec3 direction = seen.direction({ring, azimuth}, along);
+                const double weight = gauss_weight[node] * std::max(glm::dot(direction, normal), 0.0);
+                whole += weight;
+                sum += weight * m_cone.falloff(-direction);
+            }
+        }
+    }
+    return whole > 0.0 ? sum / whole : 0.0;
+}
+
 Vec3 SphereSpotLight::irradiance(const Vec3& point, const Vec3& normal) const
 {
-    // The sphere's, which is exact, times the mean falloff.
-    const double whole = mean_irradiance(m_sphere, point, normal).x;
-    if (!(whole > 0.0))
-        return Vec3(0.0);
-    return m_sphere.irradiance(point, normal) * (mean_irradiance(*this, point, normal).x / whole);
+    const Vec3 whole = m_sphere.irradiance(point, normal);
+    return m_sphere.is_inside(point) || !(whole.x > 0.0) ? whole : whole * mean_falloff(point, normal);
 }
 
 }  // namespace beamspread

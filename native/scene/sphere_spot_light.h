@@ -12,8 +12,12 @@ public:
     SphereSpotLight(const Vec3& position, const SpotCone& cone, double radius, SphereModel model);
     void sample(const Vec3& point, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const override;
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
+    double distance_from(const Vec3& point) const override { return m_sphere.distance_from(point); }
 
 private:
+    // Over what a point sees of the sphere above the plane.
+    double mean_falloff(const Vec3& point, const Vec3& normal) const;
+
     SphereLight m_sphere;
     SpotCone m_cone;
 };

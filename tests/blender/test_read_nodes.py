@@ -5,9 +5,10 @@ import math
 import bpy
 import numpy as np
 import pytest
-from beamspread.blender.read.node_math import BLENDS, LUMINANCE, MATH, VECTOR_MATH, NotUnderstoodError
-from beamspread.blender.read.node_values import Scope
-from beamspread.blender.read.shaders import radiance
+from beamspread.blender.read.image_texture import NotUnderstoodError
+from beamspread.blender.read.node_math import BLENDS, LUMINANCE, MATH, VECTOR_MATH
+from beamspread.blender.read.places import Places
+from beamspread.blender.read.shaders import radiance, surface_of
 from cycles_truth import add_receiver, cycles_irradiance
 from mathutils import Matrix
 
@@ -43,7 +44,7 @@ class World:
         self.link(output, self.background.inputs["Color"])
 
     def ours(self):
-        return radiance(self.output.inputs["Surface"], Scope())
+        return radiance(Places(), surface_of(self.tree))
 
     def cycles(self, samples):
         return cycles_irradiance(self.plane, self.image, samples).mean(axis=(0, 1)) / math.pi
@@ -274,7 +275,7 @@ def test_shaders(world):
 def test_what_is_not_understood_is_named(world):
     noise = world.add("ShaderNodeTexNoise", name="Clouds")
     world.show(noise.outputs["Color"])
-    with pytest.raises(NotUnderstoodError, match="only Cycles knows what its node 'Clouds' does"):
+    with pytest.raises(NotUnderstoodError, match="the node 'Clouds' is"):
         world.ours()
     for size in (0.0, 1.0):
         world.background.inputs["Strength"].default_value = size
@@ -282,5 +283,5 @@ def test_what_is_not_understood_is_named(world):
             assert not world.assert_agree().any()
     curves = world.add("ShaderNodeMath", operation="PINGPONG")
     world.show(curves.outputs[0])
-    with pytest.raises(NotUnderstoodError, match="'Math' does here"):
+    with pytest.raises(NotUnderstoodError, match="the node 'Math' is"):
         world.ours()

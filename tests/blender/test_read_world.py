@@ -220,7 +220,7 @@ def test_color_spaces_of_images(kind, space, tmp_path):
     illumination = read()
     if kind == "PNG" and space == "Filmic sRGB":
         assert illumination.lights == ()
-        assert "its image 'image' has the color space Filmic sRGB" in illumination.by_cycles["World"]
+        assert "the color space Filmic sRGB of the image 'image' is not understood" in illumination.by_cycles["World"]
         return
     # Blender reads 8 bits of HDR files a little differently from Cycles.
     assert_agrees(the_world(), TILTS["up"], 1024, 0.02 if kind == "HDR" else 0.005)
@@ -256,7 +256,7 @@ def test_what_is_not_understood_is_left_to_cycles():
     tree = background.id_data
     tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], background.inputs["Color"])
     illumination = read()
-    sentence = "The world 'World' is left out: only Cycles knows what its node 'Noise Texture' does."
+    sentence = "The world 'World' is left out: the node 'Noise Texture' is not understood."
     assert (illumination.lights, illumination.by_cycles) == ((), {"World": sentence})
     assert illumination.warnings == (sentence,)
 

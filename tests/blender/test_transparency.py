@@ -13,6 +13,7 @@ from beamspread.core.scene.uv_map import fit_uv_maps
 from mathutils import Matrix
 from test_cycles_irradiance import TEXELS, TOLERANCE, add_receiver, around, cycles_irradiance
 
+FINE = 4
 ABOVE = Matrix.Translation((0, 0, 0.5))
 
 
@@ -83,34 +84,44 @@ def add_card(material, size=(1.2, 1.2), **options):
 
 
 def our_irradiance(plane):
-    """By the add-on, and what it warns of."""
+    """By the add-on, at FINE x FINE points of each texel (FINE H, FINE W, 3), and what it warns of."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     illumination = read_illumination(depsgraph)
-    receiver = build_receiver(fit_uv_maps(read_polygons(plane.evaluated_get(depsgraph), "White")), TEXELS, TEXELS)
+    polygons = fit_uv_maps(read_polygons(plane.evaluated_get(depsgraph), "White"))
+    receiver = build_receiver(polygons, FINE * TEXELS, FINE * TEXELS)
     grid = receiver.charts[0].grid
     total = np.zeros((grid.height, grid.width, 3), np.float32)
     for lamp in illumination.lights:
-        light, _ = lamp.gather(grid, illumination.caster(grid, lamp), samples=8, clearance=grid.clearance)
+        light, _ = lamp.gather(grid, illumination.caster(grid, lamp), samples=2, clearance=grid.clearance)
         total += (light if light.ndim == 3 else light[..., None]) * lamp.rgb()
     return receiver.to_texture([total]), illumination.warnings
 
 
+def in_texels(fine):
+    """Each texel's points, and those one step around it: (N, TEXELS, TEXELS, 3)."""
+    near = np.stack([around(fine[..., i]) for i in range(3)], axis=-1)
+    return near.reshape(9, TEXELS, FINE, TEXELS, FINE, 3).transpose(0, 2, 4, 1, 3, 5).reshape(-1, TEXELS, TEXELS, 3)
+
+
 def assert_agree(warnings=()):
-    """Within 1 % of the brightest outside of borders, the sum within 0.5 %; returns ours."""
+    """Within 1 % of the brightest where a texel is even, else among what we find within it; returns ours."""
     plane, image = add_receiver(Matrix())
     scenes.add_sun(20, 30)
     cycles = cycles_irradiance(plane, image)
-    ours, said = our_irradiance(plane)
+    fine, said = our_irradiance(plane)
     assert list(said) == list(warnings)
     inner = np.zeros((TEXELS, TEXELS), bool)
     inner[2:-2, 2:-2] = True
-    # At the diagonal of the plane, and there alone, Cycles samples a part of a texel.
+    # At the diagonal of the plane, and there alone, Cycles samples a part of a texel; elsewhere its middle most.
     inner &= np.abs(np.subtract.outer(np.arange(TEXELS), np.arange(TEXELS))) > 1
-    steep = np.max([np.ptp(around(ours[..., i]), axis=0) for i in range(3)], axis=0) > 0.2 * ours.max()
-    even = inner & ~steep
+    points = in_texels(fine)
+    ours, low, high = points.mean(0), points.min(0), points.max(0)
+    error = TOLERANCE * ours.max()
+    assert (cycles >= low - error)[inner].all()
+    assert (cycles <= high + error)[inner].all()
+    even = inner & ((high - low).max(-1) < 3 * error)
     assert even.sum() > 0.3 * inner.sum()
-    np.testing.assert_allclose(cycles[even], ours[even], rtol=0, atol=TOLERANCE * ours.max())
-    np.testing.assert_allclose(cycles[inner].sum(0), ours[inner].sum(0), rtol=5e-3)
+    np.testing.assert_allclose(cycles[even], ours[even], rtol=0, atol=error)
     return ours
 
 
@@ -234,8 +245,8 @@ def test_trees_that_let_three_fifths_through(shader):
     np.testing.assert_allclose(ours[28, 34] / math.cos(math.radians(20)), 0.6, atol=1e-5)
 
 
-@pytest.mark.parametrize("kind", ["BsdfGlass", "BsdfRefraction", "BsdfTranslucent", "Emission", "Holdout"])
-def test_what_bends_spreads_or_sends_light_throws_full_shadows(kind):
+@pytest.mark.parametrize("kind", ["BsdfGlass", "BsdfRefraction", "BsdfTranslucent", "Holdout"])
+def test_what_bends_or_spreads_light_throws_full_shadows(kind):
     tree = Tree()
     add_card(tree.finish(tree.add(kind)))
     assert not assert_agree()[28, 34].any()
@@ -299,7 +310,7 @@ def test_what_is_not_understood_is_opaque_and_named():
     plane, _ = add_receiver(Matrix())
     scenes.add_sun(20, 30)
     ours, warnings = our_irradiance(plane)
-    assert not ours[28, 34].any()
+    assert not ours[112, 136].any()
     words = "The material 'Mottled' throws opaque shadows: the node 'Noise Texture' is not understood."
     assert list(warnings) == [words]
 

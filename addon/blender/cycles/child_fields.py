@@ -19,8 +19,8 @@ ROUND_SECONDS = 4.0
 def fields(request, scene, progress) -> dict:
     """The task `fields`: radiance_0, radiance_1, ... of the charts, float32 (K, rows, columns, 3), and noise.
 
-    Radiance is each stratum's mean by the cosine: the irradiance is pi times the mean over the strata. The noise is
-    that of the irradiance, the root of its mean square over all nodes, as part of its mean.
+    Radiance is each stratum's mean by the cosine. The noise is that of the irradiance, the root of its mean square over
+    all nodes, as part of its mean.
     """
     for name, color in request["reflectances"].items():
         make_diffuse(bpy.data.materials[name], color)
@@ -115,8 +115,12 @@ def split(request, pixels) -> list:
 
 def noise_of(request, one, other) -> float:
     """Of the irradiance in `one`, from its difference to `other`."""
-    pairs = list(zip(split(request, one), split(request, other)))
-    square = [((a - b).mean(axis=(0, 3)) ** 2 / 2).ravel() for a, b in pairs]
-    mean = [(a + b).mean(axis=(0, 3)).ravel() / 2 for a, b in pairs]
+    _, reach, _, part = np.transpose(request["strata"])
+    weights = reach * part
+    square, mean = [], []
+    for a, b in zip(split(request, one), split(request, other)):
+        a, b = (np.tensordot(weights, values.mean(axis=3), 1).ravel() for values in (a, b))
+        square.append((a - b) ** 2 / 2)
+        mean.append((a + b) / 2)
     total = np.concatenate(mean).mean()
     return float(np.sqrt(np.concatenate(square).mean()) / total) if total > 0 else 0.0

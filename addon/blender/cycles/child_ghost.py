@@ -46,7 +46,9 @@ def add_ghost(charts, strata):
     mesh.uv_layers.new(name="UVMap").data.foreach_set("uv", np.ravel(uvs).astype(np.float32))
     mesh.attributes.new(STRATUM, "FLOAT_COLOR", "POINT").data.foreach_set("color", np.ravel(values).astype(np.float32))
     for name, filled in zip(AXES, axes):
-        mesh.attributes.new(name, "FLOAT_VECTOR", "POINT").data.foreach_set("vector", np.ravel(filled).astype(np.float32))
+        mesh.attributes.new(name, "FLOAT_VECTOR", "POINT").data.foreach_set(
+            "vector", np.ravel(filled).astype(np.float32)
+        )
     image = bpy.data.images.new("Beamspread ghost", width, height, float_buffer=True, alpha=False)
     image.colorspace_settings.name = "Non-Color"
     mesh.materials.append(_mirror(image))

@@ -6,6 +6,7 @@ import os
 import shutil
 import tempfile
 import time
+import weakref
 from pathlib import Path
 
 import bpy
@@ -21,7 +22,8 @@ STALE_SECONDS = 7 * 24 * 3600
 class SceneCopy:
     """The scene as it is now, in a folder of its own; nothing of the host's is touched, undo and paths included.
 
-    Make it in the main thread (it reads `bpy.data`), use it anywhere, and `remove` it in the end.
+    Make it in the main thread (it reads `bpy.data`), and use it anywhere. The folder goes when nobody needs it any more,
+    at the latest when the process ends, or by `remove()`.
 
     Attributes
     ----------
@@ -32,6 +34,7 @@ class SceneCopy:
     def __init__(self, scene, view_layer) -> None:
         remove_stale()
         self.folder = Path(tempfile.mkdtemp(prefix=f"{PREFIX}{os.getpid()}-"))
+        self.remove = weakref.finalize(self, shutil.rmtree, self.folder, ignore_errors=True)
         self.warnings: list[str] = []
         self.binary = bpy.app.binary_path
         self.request = {
@@ -53,9 +56,6 @@ class SceneCopy:
     @property
     def file(self) -> Path:
         return self.folder / FILE
-
-    def remove(self) -> None:
-        shutil.rmtree(self.folder, ignore_errors=True)
 
     def __enter__(self) -> SceneCopy:
         return self

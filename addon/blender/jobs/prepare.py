@@ -11,6 +11,7 @@ from ...core.errors import BakeError, sentence
 from ...core.scene.illumination import Illumination
 from ...core.scene.receiver import build_receiver, texture_size
 from ...core.scene.uv_map import fit_uv_maps
+from ..cycles.light import CyclesLight
 from ..images.files import check_image
 from ..node.find import find_node, materials_of
 from ..read.geometry import read_polygons
@@ -44,7 +45,7 @@ def prepare(
 ) -> list[Bake]:
     """A bake for each target; `size` overrides all other sizes, `visible` names the objects that render, None: all."""
     try:
-        illumination = read_illumination(depsgraph)
+        illumination, by_cycles = read_illumination(depsgraph), CyclesLight(depsgraph)
     except Exception as error:  # noqa: BLE001 - each bake asked for needs an answer
         return [Bake(target, error=sentence(error)) for target in targets]
     bakes = []
@@ -52,7 +53,8 @@ def prepare(
         try:
             if visible is not None:
                 check_visible(target.object_name, visible)
-            bakes.append(Bake(target, _make_job(depsgraph, target, illumination, settings, resolution, size)))
+            job = _make_job(depsgraph, target, illumination, settings, resolution, size)
+            bakes.append(Bake(target, by_cycles.complete(job)))
         except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
             bakes.append(Bake(target, error=sentence(error)))
     return bakes

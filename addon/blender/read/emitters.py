@@ -110,7 +110,15 @@ def _triangles(mesh, slot_count: int) -> tuple[np.ndarray, np.ndarray | None, np
         layer.data.foreach_get("uv", uvs)
         uvs = uvs.reshape(-1, 2)[loops].reshape(-1, 3, 2).astype(float)
     corners = places.reshape(-1, 3)[vertices].reshape(-1, 3, 3).astype(float)
-    return corners, uvs, np.clip(slots, 0, slot_count - 1)
+    own = _seen(corners)
+    return corners[own], uvs if uvs is None else uvs[own], np.clip(slots[own], 0, slot_count - 1)
+
+
+def _seen(corners: np.ndarray) -> np.ndarray:
+    """Numbers of the triangles that no other one lies upon: flat text has each twice, and one hides the other."""
+    order = np.lexsort(np.moveaxis(corners, -1, 0))
+    same = np.take_along_axis(corners, order[..., None], axis=1).reshape(-1, 9)
+    return np.sort(np.unique(same, axis=0, return_index=True)[1])
 
 
 def _pieces(cuts: int) -> np.ndarray:

@@ -78,7 +78,7 @@ class _Lights:
             self._glows[obj.name] = glow = Glow(obj, self._images)
             self._links[obj.name] = links_of(obj, self._names)
             if glow.reason:
-                self.by_cycles[obj.name] = f"What glows of '{obj.name}' is left out: {glow.reason}."
+                self.by_cycles[obj.name] = f"What glows of '{obj.name}' is left out: {glow.reason} not understood."
         self._glows[obj.name].place(np.array(matrix, dtype=float))
 
     def add_world(self, view_layer, world) -> None:

@@ -16,6 +16,9 @@ from .image_texture import NotUnderstoodError, Pixels, TexturePlace
 from .node_links import Wanted, follow
 from .texels import FINE_SIDE, Texels
 
+# A size that tells what comes from images from what is constant.
+PROBE = (2, 2)
+
 BLACK, WHITE = np.zeros((1, 1, 3)), np.ones((1, 1, 3))
 
 
@@ -67,7 +70,7 @@ class Materials:
 
     def _evaluate(self, surface: Wanted) -> LetThrough:
         # Once to see which images there are, then at the texels of the largest of them, or between.
-        values = Texels(self._pixels)
+        values = Texels(self._pixels, PROBE)
         transmittance = transparency(values, surface)
         place = values.place
         if place is None:

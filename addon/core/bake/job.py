@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from ..errors import BakeError
 from ..progress import Progress, stages, timed
 from ..scene.illumination import Illumination
+from ..scene.lights import Light
 from ..scene.receiver import Receiver
 from .layers import LAYERS, WITHOUT_MEDIUM
 from .luminance import LIBRARY_WEIGHT, LIGHT_WEIGHT, SOLVE_WEIGHT
@@ -19,17 +21,26 @@ from .surface import Surface
 
 @dataclass(frozen=True, eq=False)
 class BakeJob:
-    """A receiver with its light and its surface; `name` is what to call the receiver in messages."""
+    """A receiver with its light and its surface; `name` is what to call the receiver in messages.
+
+    `more_light` finds what `illumination` lacks, as bounced light, when the job runs, in whatever thread.
+    """
 
     name: str
     receiver: Receiver
     illumination: Illumination
     surface: Surface
     settings: BakeSettings
+    more_light: Callable[[Receiver, Progress | None], Sequence[Light]] | None = None
 
     def run(self, progress: Progress | None = None) -> dict[str, np.ndarray]:
         """The layers: name -> float32 (height, width, 3), margin included, row 0 at the bottom."""
         self.surface.check()
+        if self.more_light is not None:
+            finding, baking = stages(progress, [LIBRARY_WEIGHT, LIBRARY_WEIGHT + SOLVE_WEIGHT])
+            with timed(f"bounced light of '{self.name}'"):
+                illumination = self.illumination.lit_by(self.more_light(self.receiver, finding))
+            return replace(self, illumination=illumination, more_light=None).run(baking)
         if self._surely_dark():  # at once: to simulate the medium may take half a minute
             return {name: np.zeros((*self.receiver.coverage.shape, 3), np.float32) for name in self.settings.layers}
         needs_medium = not WITHOUT_MEDIUM.issuperset(self.settings.layers)
@@ -72,6 +83,8 @@ class BakeJob:
         return f"What shines through the slab '{self.name}' from behind is not baked yet: light of {names}."
 
     def _surely_dark(self) -> str:
+        if self.more_light is not None:
+            return ""
         lights = self.illumination.lights
         if not lights:
             return "No light of the scene can be baked: it is black."

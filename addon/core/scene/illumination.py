@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 
 import numpy as np
@@ -50,6 +50,27 @@ class Illumination:
         linked = copy(self)
         linked.lights = tuple(one for one in self.lights if one.receivers is None or receiver in one.receivers)
         return linked
+
+    def found(self, names: Collection[str]) -> Illumination:
+        """The same where Cycles takes over those lights of `by_cycles`: what counted instead is gone."""
+        rest = copy(self)
+        said = {self.by_cycles[name] for name in names}
+        rest.by_cycles = {name: why for name, why in self.by_cycles.items() if name not in names}
+        rest.warnings = tuple(one for one in self.warnings if one not in said)
+        rest.lights = tuple(light for light in self.lights if light.name not in names)
+        return rest
+
+    def warning(self, *sentences: str) -> Illumination:
+        """The same with more to say."""
+        more = copy(self)
+        more.warnings = tuple(dict.fromkeys((*self.warnings, *sentences)))
+        return more
+
+    def lit_by(self, lights: Sequence[Light]) -> Illumination:
+        """The same with more lights."""
+        more = copy(self)
+        more.lights = (*self.lights, *lights)
+        return more
 
     @property
     def triangle_count(self) -> int:

@@ -20,8 +20,7 @@ using Block = float __attribute__((vector_size(harmonics_per_block * sizeof(floa
 
 }  // namespace
 
-BEAMSPREAD_CLONES void multiple_angles(float* __restrict cosine, float* __restrict sine, float cos_angle,
-                                       float sin_angle, float factor, std::size_t count)
+BEAMSPREAD_CLONES void multiple_angles(float* cosine, float cos_angle, float sin_angle, float factor, std::size_t count)
 {
     // The angle times i bit by bit of i: few steps, each for all of a block at once.
     constexpr std::array<Block, 3> bits = {Block{0, 1, 0, 1, 0, 1, 0, 1}, Block{0, 0, 1, 1, 0, 0, 1, 1},
@@ -34,22 +33,19 @@ BEAMSPREAD_CLONES void multiple_angles(float* __restrict cosine, float* __restri
         cos_angle = cos_angle * cos_angle - sin_angle * sin_angle;
         sin_angle = twice;
     }
-    const Block cos_block = Block{} + cos_angle;
-    const Block sin_block = Block{} + sin_angle;
     for (std::size_t m = 0; m < count; m += harmonics_per_block) {
         std::memcpy(cosine + m, &cos_m, sizeof(cos_m));
-        std::memcpy(sine + m, &sin_m, sizeof(sin_m));
-        rotate(cos_m, sin_m, cos_block, sin_block);
+        rotate(cos_m, sin_m, Block{} + cos_angle, Block{} + sin_angle);
     }
 }
 
-BEAMSPREAD_CLONES void add_harmonics(float* __restrict sum, const float* values, const float* by_harmonic,
+BEAMSPREAD_CLONES void add_harmonics(float* __restrict sum, const float* values, const float* by_harmonic, float factor,
                                      const std::size_t* first, std::size_t blocks)
 {
     for (std::size_t block = 0; block < blocks; ++block) {
         const float* harmonics = by_harmonic + first[block];
         for (std::size_t i = 0; i < harmonics_per_block; ++i)
-            sum[i] += values[i] * harmonics[i];
+            sum[i] += factor * values[i] * harmonics[i];
         sum += harmonics_per_block;
         values += harmonics_per_block;
     }

@@ -5,14 +5,14 @@
 #include <span>
 #include <vector>
 
+#include "base/aligned.h"
 #include "solve/separable/light_terms.h"
-#include "solve/term_choice/probe_tables.h"
 
 namespace beamspread {
 
-// Light of the texels around is taken as it is, that of cells farther away from some of their texels, and kernels are
-// integrated over each cell: a treecode (Barnes & Hut 1986, doi:10.1038/324446a0) whose tree is centred on the texel
-// looked at. Right to some per cent, which is enough to tell what a function is worth.
+// Sums up light ring by ring around a texel, whose width grows with its radius: of each ring the light in as many
+// directions, where a ray that way meets it, times the kernel's integral over the ring. Right to some per cent, which is
+// enough to tell what a function is worth.
 class RadianceProbe {
 public:
     // `lights`: which of those of changing direction are looked at. All must outlive the probe.
@@ -23,17 +23,24 @@ public:
     std::vector<std::vector<float>> read(std::span<const Texel> site) const;
 
 private:
-    struct Cell;
-    struct Moments;
-
-    void add_cells(const Texel& texel, std::size_t first_size, std::size_t end_size, Moments& moments,
-                   AlignedVector<float>& sums) const;
-    void add_cell(const Cell& cell, Moments& moments, AlignedVector<float>& sums) const;
-    void add_light(const Cell& cell, std::size_t light, Moments& moments) const;
+    void add_rings(const Texel& texel, std::size_t first, std::size_t end, AlignedVector<float>& sums) const;
+    void add_beam(const PlaneLight& light, const std::vector<float>& colors, const Texel& texel, const Vec2& way,
+                  AlignedVector<float>& cosines, AlignedVector<float>& moments) const;
 
     const LightTerms& m_light;
     std::vector<std::size_t> m_lights;
-    ProbeTables m_tables;
+    // Rows of tables hold, for each rank, the harmonics up to the last that the basis has, in whole blocks; zero for
+    // those that it lacks.
+    std::vector<std::size_t> m_places;   // [function]: in a row
+    std::vector<std::size_t> m_columns;  // [block]: its first harmonic
+    std::size_t m_harmonics = 0;
+    std::size_t m_row_size = 0;
+    float m_first_angle;
+    float m_steps_per_angle;
+    AlignedVector<float> m_by_angle;  // [step]: functions of the angle
+    std::vector<double> m_radii;      // of the rings, metres
+    std::size_t m_near = 0;           // rings that differ from texel to texel of a site
+    AlignedVector<float> m_by_ring;   // [ring][medium]: integrals of c_m(r) over a ring, per direction
 };
 
 }  // namespace beamspread

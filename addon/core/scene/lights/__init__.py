@@ -4,7 +4,7 @@ A new kind is one class here, and its reader in blender/read/lights.py.
 """
 
 from .area import AreaLight
-from .field import DIRECTIONS, STRATA, Field, FieldLight
+from .field import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight
 from .light import ExtendedLight, Light, TracedLight
 from .mesh import MeshLight
 from .point_like import PointLight, SpotLight, SunLight
@@ -14,6 +14,7 @@ from .world import WorldLight
 __all__ = [
     "DIRECTIONS",
     "STRATA",
+    "WEIGHTS",
     "AreaLight",
     "ExtendedLight",
     "Field",

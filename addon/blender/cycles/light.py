@@ -1,0 +1,147 @@
+"""The light of a scene that Cycles finds: what bounces, and what our own readers don't understand."""
+
+from __future__ import annotations
+
+import math
+import threading
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from ...core.bake.job import BakeJob
+from ...core.errors import MaterialError
+from ...core.progress import Progress, stages
+from ...core.scene.lights import STRATA, Field, FieldLight, Light, WorldLight
+from ...core.scene.receiver import Receiver
+from ..node.find import find_node
+from ..read.visible import render_visible_names, renders
+from .process import run
+from .scene_copy import SceneCopy
+from .world import world_panorama
+
+# Nodes along the longest side of a receiver, and the most of all its charts.
+NODES, MOST_NODES = 64, 2 * 64**2
+
+# Part of the bounced irradiance that is noise, at a node; interpolation averages it to about half. In seconds, where
+# that takes longer.
+NOISE, SECONDS = 0.02, 60.0
+
+# Of a node, how high above the receiver its light is gathered: nothing that stands there may be below.
+LIFT = 1e-3
+
+# What light bounces from.
+SOLID = {"MESH", "CURVE", "CURVES", "SURFACE", "FONT", "META", "VOLUME", "POINTCLOUD"}
+
+WHITE = 1.0, (1.0, 1.0, 1.0)
+UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+class CyclesLight:
+    """Completes the jobs of one scene, which share a copy of it. Make it, and call `complete`, in the main thread."""
+
+    def __init__(self, depsgraph) -> None:
+        self._scene = bpy.data.scenes[depsgraph.scene.name]
+        self._view_layer = self._scene.view_layers[depsgraph.view_layer.name]
+        self._corners = _corners_of_solids(depsgraph)
+        self._copy: SceneCopy | None = None
+        self._surfaces: dict = {}
+        self._panorama: WorldLight | None = None
+
+    def complete(self, job: BakeJob) -> BakeJob:
+        """The job, with what finds the light that it still lacks."""
+        illumination = job.illumination
+        world = self._world_name() if self._world_name() in illumination.by_cycles else ""
+        bounced = job.settings.indirect and bool(illumination.lights or illumination.by_cycles)
+        bounced = bounced and self._is_below_something(job.receiver)
+        if not (world or bounced):
+            return job
+        if threading.current_thread() is not threading.main_thread():
+            missing = "Blender's own Bake leaves out what Cycles finds, as bounced light: use Bake Beamspread."
+            return replace(job, illumination=illumination.warning(missing))
+        if self._copy is None:
+            self._copy = SceneCopy(self._scene, self._view_layer)
+            self._surfaces = {one.name: find_node(one).surface() for one in bpy.data.materials if find_node(one)}
+        illumination = illumination.found({world} - {""}).warning(*self._copy.warnings)
+        return replace(
+            job,
+            illumination=illumination,
+            more_light=lambda receiver, progress: self._find(receiver, world, bounced, progress),
+        )
+
+    def _world_name(self) -> str:
+        return self._scene.world.name if self._scene.world else ""
+
+    def _is_below_something(self, receiver: Receiver) -> bool:
+        for grid in (chart.grid for chart in receiver.charts):
+            heights = (self._corners - grid.origin) @ np.array(grid.normal)
+            # Its own corners lie in the plane but for rounding.
+            size = max(grid.width * grid.pitch_x, grid.height * grid.pitch_y)
+            if heights.max(initial=0) > grid.clearance + 1e-5 * size + 1e-6 * np.abs(grid.origin).max():
+                return True
+        return False
+
+    def _find(self, receiver: Receiver, world: str, bounced: bool, progress: Progress | None) -> list[Light]:
+        """Runs in any thread."""
+        first, second = stages(progress, [float(bool(world) and self._panorama is None), 2.0 * bounced])
+        lights: list[Light] = []
+        if world:
+            if self._panorama is None:
+                radiance = world_panorama(self._copy, progress=first)
+                self._panorama = WorldLight(world, *WHITE, True, radiance, UPRIGHT)
+            lights.append(self._panorama)
+        if bounced:
+            lights.append(self._bounced(receiver, second))
+        return lights
+
+    def _bounced(self, receiver: Receiver, progress: Progress | None) -> FieldLight:
+        request = {
+            "charts": charts_of(receiver),
+            "strata": STRATA.tolist(),
+            "light": "INDIRECT",
+            "reflectances": {name: _reflectance(surface) for name, surface in self._surfaces.items()},
+            "noise": NOISE,
+            "seconds": SECONDS,
+        }
+        found = run(self._copy, "fields", request, progress)
+        grids = (chart.grid for chart in receiver.charts)
+        fields = (Field(grid.origin, grid.normal, found[f"radiance_{n}"]) for n, grid in enumerate(grids))
+        return FieldLight("Bounced light", *WHITE, False, tuple(fields))
+
+
+def charts_of(receiver: Receiver) -> list[dict]:
+    """The charts as child_fields.py takes them: rectangles a little above the receiver, in nodes."""
+    sizes = [(c.grid.width * c.grid.pitch_x, c.grid.height * c.grid.pitch_y) for c in receiver.charts]
+    cell = max(max(map(max, sizes)) / NODES, math.sqrt(sum(x * y for x, y in sizes) / MOST_NODES))
+    charts = []
+    for grid, size in zip((chart.grid for chart in receiver.charts), sizes):
+        lift = grid.clearance + LIFT * cell + 1e-6 * float(np.abs(grid.origin).max())
+        charts.append(
+            {
+                "corner": (np.array(grid.origin) + lift * np.array(grid.normal)).tolist(),
+                "x_axis": list(map(float, grid.x_axis)),
+                "y_axis": list(map(float, grid.y_axis)),
+                "normal": list(map(float, grid.normal)),
+                "size": size,
+                "nodes": [max(1, round(length / cell)) for length in size],
+            }
+        )
+    return charts
+
+
+def _corners_of_solids(depsgraph) -> np.ndarray:
+    """World positions (N, 3) of the corners of the boxes around all that renders."""
+    visible = render_visible_names(depsgraph.view_layer)
+    corners = [np.zeros((0, 3))]
+    for instance in depsgraph.object_instances:
+        if instance.object.type in SOLID and renders(instance, visible):
+            world = np.array(instance.matrix_world, dtype=float)
+            corners.append(np.array(instance.object.bound_box) @ world[:3, :3].T + world[:3, 3])
+    return np.concatenate(corners)
+
+
+def _reflectance(surface) -> list[float]:
+    try:
+        return surface.reflectance()
+    except MaterialError:  # of another object: it can't be baked, and says so when it is tried
+        return [0.0, 0.0, 0.0]

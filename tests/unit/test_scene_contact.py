@@ -1,0 +1,144 @@
+"""Things that touch or cross the receiver leave neither gaps nor acne, here and 10 km from the world's origin."""
+
+import math
+
+import numpy as np
+import pytest
+from beamspread.core.native import native
+from beamspread.core.scene.grid import Grid
+from beamspread.core.scene.illumination import Illumination
+from beamspread.core.scene.lights import PointLight, SunLight
+from beamspread.core.scene.occluders import Mesh, Occluder
+
+SIZE = 80  # texels of a floor of 2 m
+TEXEL = 2 / SIZE
+TURNS = {"upright": (0.0, 0.0), "turned": (0.7, 0.0), "tilted": (0.7, 0.5)}
+FAR = 10_000 * np.array([0.6, -0.64, 0.48])
+
+
+def frame(turn):
+    """Rows: the floor's axes in the world."""
+    about, tilt = TURNS[turn]
+    spin = np.array([[math.cos(about), math.sin(about), 0], [-math.sin(about), math.cos(about), 0], [0, 0, 1]])
+    lean = np.array([[1, 0, 0], [0, math.cos(tilt), math.sin(tilt)], [0, -math.sin(tilt), math.cos(tilt)]])
+    return spin @ lean
+
+
+def floor(axes, shift):
+    corner = tuple(shift - axes[0] - axes[1])
+    return Grid(corner, *map(tuple, axes), TEXEL, TEXEL, SIZE, SIZE, np.ones((SIZE, SIZE), np.float32))
+
+
+def box(low, high):
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    triangles = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))], np.uint32)
+    return np.array(low) + corners * np.subtract(high, low), triangles
+
+
+def sphere(steps=48):
+    zenith, azimuth = np.meshgrid(np.linspace(0, np.pi, steps + 1), np.linspace(0, 2 * np.pi, 2 * steps + 1))
+    points = np.stack([np.sin(zenith) * np.cos(azimuth), np.sin(zenith) * np.sin(azimuth), np.cos(zenith)], -1)
+    corner = (np.arange(2 * steps)[:, None] * (steps + 1) + np.arange(steps)).ravel()
+    a, b, c, d = corner, corner + 1, corner + steps + 2, corner + steps + 1
+    return points.reshape(-1, 3), np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]).astype(np.uint32)
+
+
+GROUND = np.array([(-3, -3, 0), (3, -3, 0), (3, 3, 0), (-3, 3, 0)], float), np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+
+
+def light_past(*meshes, sun, turn, shift, is_instanced=False):
+    """Irradiance by a sun or lamp over its unblocked one; meshes in the floor's frame, as are sun and lamp."""
+    axes = frame(turn)
+    grid = floor(axes, shift)
+    placement = np.column_stack([axes.T, shift])[None]
+    occluders = []
+    for i, (vertices, triangles) in enumerate((*meshes, GROUND)):
+        if is_instanced:
+            # A second one stands where it shades nothing, below the floor.
+            below = placement.copy()
+            below[0, :, 3] -= 50 * axes[2]
+            occluders.append(Occluder(str(i), Mesh(vertices, triangles), np.concatenate([placement, below])))
+        else:
+            occluders.append(Occluder(str(i), Mesh(vertices @ axes + shift, triangles)))
+    common = "Light", 1.0, (1.0, 1.0, 1.0), True
+    place = np.array(sun) @ axes
+    light = SunLight(*common, tuple(place)) if sun[2] < 0 else PointLight(*common, tuple(place + shift))
+    caster = Illumination([], occluders).caster(grid)
+    if is_instanced:
+        step = 2**13 * 2.0 ** math.ceil(math.log2(TEXEL))
+        origin = step * np.round(grid.centre / step)
+        caster = native.Occluders.of_meshes(
+            [one.mesh.native(one.placements) for one in occluders], origin, most_copied=0
+        )
+    return light.gather(grid, caster, samples=4)[0] / light.gather(grid, None, samples=4)[0]
+
+
+def middles():
+    return np.meshgrid(*[(np.arange(SIZE) + 0.5) * TEXEL - 1] * 2)
+
+
+SHIFTS = {"here": np.zeros(3), "far": FAR}
+EVERYWHERE = pytest.mark.parametrize("shift", SHIFTS.values(), ids=SHIFTS.keys())
+EVERY_TURN = pytest.mark.parametrize("turn", TURNS)
+
+
+@EVERYWHERE
+@EVERY_TURN
+@pytest.mark.parametrize("bottom", [0.0, -0.2, 1e-9, -1e-9])
+def test_a_box_on_the_floor(bottom, turn, shift):
+    """Standing on it, sunk, or off by less than what rounding can tell: dark under the box and in its shadow, else lit.
+
+    The box covers texels 30 to 49, and its shadow reaches .4 m further, 16 texels: 30 to 65.
+    """
+    lit = light_past(box((-0.25, -0.25, bottom), (0.25, 0.25, 0.4)), sun=(1, 0, -1), turn=turn, shift=shift)
+    dark = np.zeros((SIZE, SIZE), bool)
+    dark[30:50, 30:66] = True
+    # Borders lie between texels: where rounding moves them by 2^-11 of a texel a ray or two may find the other side.
+    border = dark ^ np.pad(dark, 1)[2:, 1:-1] | dark ^ np.pad(dark, 1)[:-2, 1:-1]
+    border |= dark ^ np.pad(dark, 1)[1:-1, 2:] | dark ^ np.pad(dark, 1)[1:-1, :-2]
+    assert not lit[dark & ~border].any()
+    assert (lit[~dark & ~border] == 1).all()
+    np.testing.assert_allclose(lit[border], ~dark[border], atol=0.26)
+
+
+@EVERYWHERE
+@EVERY_TURN
+def test_a_wall_that_crosses_the_floor(turn, shift):
+    """A wall without thickness along x = .0125 (the middle of a texel's column): no gap at its foot."""
+    x = 0.5 * TEXEL
+    wall = np.array([(x, -2, -0.5), (x, 2, -0.5), (x, 2, 0.5), (x, -2, 0.5)], float), GROUND[1]
+    lit = light_past(wall, sun=(0.5, 0, -1), turn=turn, shift=shift)
+    column = np.arange(SIZE)
+    # Its shadow: x to x + .25, 10 texels.
+    assert (lit[:, column < 40] == 1).all()
+    np.testing.assert_allclose(lit[:, 40], 0.5, atol=0.26)
+    assert not lit[:, (column > 40) & (column < 50)].any()
+    np.testing.assert_allclose(lit[:, 50], 0.5, atol=0.26)
+    assert (lit[:, column > 50] == 1).all()
+
+
+@EVERYWHERE
+@EVERY_TURN
+@pytest.mark.parametrize("is_instanced", [False, True])
+@pytest.mark.parametrize("sun", [(0, 0, -1), (0.1, 0.2, 3.0)], ids=["sun", "lamp"])
+def test_a_sphere_half_sunk(sun, is_instanced, turn, shift):
+    """Light from above leaves a disk dark, of the radius of the sphere and no larger than a lamp makes it."""
+    vertices, triangles = sphere()
+    lit = light_past((0.5 * vertices, triangles), sun=sun, turn=turn, shift=shift, is_instanced=is_instanced)
+    x, y = middles()
+    distance = np.hypot(x, y)
+    # The polygon's corners and a texel's own; a lamp 3 m up sees what lies beyond by .5 / sqrt(1 - (.5 / 3)^2) - .5.
+    edge = 0.5 * math.cos(math.pi / 48) - 0.75 * TEXEL
+    assert not lit[distance < edge].any()
+    assert (lit[distance > 0.5 / math.sqrt(1 - (0.5 / 3) ** 2) + 0.06] == 1).all()
+
+
+@EVERYWHERE
+@EVERY_TURN
+@pytest.mark.parametrize("angle", [0.0, 60.0, 85.0, 89.5])
+@pytest.mark.parametrize("is_instanced", [False, True])
+def test_a_bare_floor_has_no_acne(angle, is_instanced, turn, shift):
+    """The floor itself is among the occluders, as two instances of a mesh below the size that is shared, too."""
+    sun = math.sin(math.radians(angle)), 0.0, -math.cos(math.radians(angle))
+    assert (light_past(sun=sun, turn=turn, shift=shift, is_instanced=is_instanced) == 1).all()
