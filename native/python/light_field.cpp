@@ -155,12 +155,13 @@ ldf, albedo, mean_free_path, pitch, tolerance, threads, progress
             "add_rays",
             [](HeldField& field, const ReceiverGrid& grid, const ExtendedLight& light, const std::vector<double>& color,
                const Array<float>& coverage, const Occluders* occluders, int rays, std::uint32_t seed, int threads,
-               double clearance, const py::object& progress) {
-                field.add_rays(grid, light, color, coverage, occluders, {rays, threads, clearance, seed}, progress);
+               double clearance, int even_rays, const py::object& progress) {
+                field.add_rays(grid, light, color, coverage, occluders, {rays, threads, clearance, seed, even_rays},
+                               progress);
             },
             py::arg("grid"), py::arg("light"), py::arg("color"), py::arg("coverage"), py::arg("occluders") = py::none(),
             py::arg("rays") = 16, py::arg("seed") = 0, py::arg("threads") = 0, py::arg("clearance") = 0.0,
-            py::arg("progress") = py::none(),
+            py::arg("even_rays") = 0, py::arg("progress") = py::none(),
             R"(Adds the rays of a light of a size, see `gather_rays`.
 
 `color`: factor in each channel; `coverage`: float32 (H, W), part of each texel that receives light.

@@ -108,10 +108,10 @@ py::object gather(const ReceiverGrid& grid, const ExtendedLight& light, const Oc
 }
 
 py::object gather_sum(const ReceiverGrid& grid, const ExtendedLight& light, const Occluders* occluders, int rays,
-                      std::uint32_t seed, int threads, const py::object& callback, double clearance)
+                      std::uint32_t seed, int threads, const py::object& callback, double clearance, int even_rays)
 {
     Sum sum(grid);
-    return gather(grid, light, occluders, {rays, threads, clearance, seed}, callback, sum);
+    return gather(grid, light, occluders, {rays, threads, clearance, seed, even_rays}, callback, sum);
 }
 
 py::object gather_layers(const ReceiverGrid& grid, const ExtendedLight& light, const Occluders* occluders, int rays,
@@ -128,7 +128,7 @@ void bind_rays(py::module_& m)
 {
     m.def("gather_rays", &gather_sum, py::arg("grid"), py::arg("light"), py::arg("occluders") = py::none(),
           py::arg("rays") = 16, py::arg("seed") = 0, py::arg("threads") = 0, py::arg("progress") = py::none(),
-          py::arg("clearance") = 0.0,
+          py::arg("clearance") = 0.0, py::arg("even_rays") = 0,
           R"(Irradiance of a plane by a light of a size, and where it comes from on the whole.
 
 Parameters
@@ -147,6 +147,9 @@ progress : callable, optional
     progress(fraction) returns False to stop.
 clearance : float
     How far off the plane shadow rays start, in metres, besides what rounding needs.
+even_rays : int
+    First, a look by so many rays: where they, and those of the texels around, all met light or all an obstacle, they are
+    enough, and `rays` are traced from the other texels only. 0: from all.
 
 Returns
 -------
@@ -166,7 +169,7 @@ Cancelled
 
     m.def("ray_layers", &gather_layers, py::arg("grid"), py::arg("light"), py::arg("occluders") = py::none(),
           py::arg("rays") = 16, py::arg("seed") = 0, py::arg("threads") = 0, py::arg("progress") = py::none(),
-          py::arg("clearance") = 0.0, R"(The rays of `gather_rays` one by one; the arguments are the same.
+          py::arg("clearance") = 0.0, R"(The rays of `gather_rays` one by one; arguments as there, but for `even_rays`.
 
 Returns
 -------

@@ -20,8 +20,9 @@ namespace {
 // Hosts that keep angles in single precision round pi up.
 constexpr double max_spread = static_cast<double>(static_cast<float>(pi));
 
-// A lamp that looks smaller than this, in steradians, is sampled evenly over its area: that is as good and costs less.
-constexpr double small_solid_angle = 0.05;
+// A lamp whose squared size is less than this part of its squared distance is sampled evenly over its area: that is as
+// good and costs less.
+constexpr double small = 0.05;
 
 constexpr std::array<Vec2, 4> rectangle = {Vec2(-0.5, -0.5), Vec2(0.5, -0.5), Vec2(0.5, 0.5), Vec2(-0.5, 0.5)};
 
@@ -198,8 +199,7 @@ void AreaLight::sample(const Vec3& point, const Vec3& normal, std::span<const Ve
     const Vec3 side_y = size.y * m_side_y;
     const double area = size.x * size.y * glm::length(m_side_x) * glm::length(m_side_y);
     const Vec3 middle = corner + 0.5 * (side_x + side_y);
-    const double distance_squared = glm::dot(middle, middle);
-    if (area * to_plane < small_solid_angle * distance_squared * std::sqrt(distance_squared)) {
+    if (glm::dot(side_x, side_x) + glm::dot(side_y, side_y) < small * glm::dot(middle, middle)) {
         const bool is_whole = size.x == 1.0 && size.y == 1.0;
         for (const Vec2& at : square) {
             Vec2 place;

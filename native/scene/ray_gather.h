@@ -32,9 +32,12 @@ struct RaySettings {
     int threads = 0;  // 0: all
     double clearance = 0.0;  // see BeamSettings
     std::uint32_t seed = 0;
+    // First, a look by so many rays: where they, and those of the texels around, all met light or all an obstacle, they
+    // are enough. 0: no look.
+    int even_rays = 0;
 };
 
-// `rays` rows of rays for each row of texels; their sum is the light of the texel. Low-discrepancy over the texel and
+// At most `rays` rows of rays for each row of texels; their sum is the light of the texel. Low-discrepancy over the texel and
 // over the light, from a seed: the same for any number of threads. Where nothing is in the way the sum is that of many
 // more rays, without noise. `occluders` may be null. Throws InvalidArgument, Cancelled.
 void gather_rays(const ReceiverGrid& grid, const ExtendedLight& light, const Occluders* occluders,

@@ -22,6 +22,9 @@ WIDEST_SUN = math.radians(2.0)
 # Of a survey, which only has to know what directions there are.
 SURVEY_TEXELS, SURVEY_RAYS = 96, 4
 
+# Of the rays of a texel, where nothing stands in their way or everything does: there only their directions matter.
+EVEN_PART, FEWEST_EVEN, MOST_EVEN = 8, 4, 16
+
 # Of light that stands for itself where the solver chooses how exactly to look.
 STAND_IN_RAYS = 8
 
@@ -32,7 +35,10 @@ class Gatherer:
     Attributes
     ----------
     rays : traced from each texel to all lights of a size together, about.
+    seed : of these rays.
     """
+
+    seed = 0
 
     def __init__(self, grid: Grid, illumination: Illumination, settings: BakeSettings, rays: int = 256) -> None:
         self.grid, self.rays = grid, rays
@@ -93,7 +99,8 @@ class Gatherer:
                 field.add(part)
             return
         grid, shape, caster = self._traced(light)
-        field.add_rays(grid, shape, light.rgb().tolist(), self.grid.coverage, caster, **self._options(rays, progress))
+        options = self._options(rays, progress) | self._even_rays(rays)
+        field.add_rays(grid, shape, light.rgb().tolist(), self.grid.coverage, caster, **options)
 
     def totals(self, light: Light, rays: int, progress: Progress | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Irradiance (H, W, 3) of the light at strength 1 and color 1, W/m^2 on the covered part of each texel.
@@ -102,7 +109,8 @@ class Gatherer:
         the plane's frame.
         """
         if isinstance(light, ExtendedLight):
-            irradiance, flow = native.gather_rays(*self._traced(light), **self._options(rays, progress))
+            options = self._options(rays, progress) | self._even_rays(rays)
+            irradiance, flow = native.gather_rays(*self._traced(light), **options)
             return self._covered(irradiance), self._covered(flow)
         if isinstance(light, FieldLight):
             irradiance, flow = np.zeros((2, self.grid.height, self.grid.width, 3), np.float32)
@@ -173,9 +181,14 @@ class Gatherer:
     def _traced(self, light: ExtendedLight) -> tuple:
         return self.grid.native(), light.native(), self._caster(light)
 
+    @staticmethod
+    def _even_rays(rays: int) -> dict:
+        return {"even_rays": min(max(rays // EVEN_PART, FEWEST_EVEN), MOST_EVEN)}
+
     def _options(self, rays: int, progress: Progress | None) -> dict:
         return {
             "rays": rays,
+            "seed": self.seed,
             "threads": self._settings.threads,
             "progress": progress,
             "clearance": self.grid.clearance,

@@ -35,7 +35,7 @@ MOST_STAND_INS = 4
 MOST_KEPT = 4
 
 # From each texel to all lights of a size together, at 4 x 4 samples, and at least to each of them.
-MOST_RAYS, FEWEST_RAYS = 256, 4
+MOST_RAYS, FEWEST_RAYS = 1024, 8
 
 
 def bake(

@@ -13,6 +13,9 @@ namespace {
 // Texels of a row whose values stay in the cache from step to step.
 constexpr std::size_t texels_at_once = 512;
 
+// Of rays, which may reach only parts of a row.
+constexpr std::size_t rays_at_once = 64;
+
 }  // namespace
 
 void BeamMoments::add(const LightTerms& terms, const BeamRow& beams, const std::vector<float>& colors,
@@ -91,8 +94,8 @@ void MomentSum::add(LightTerms& terms, const RayBeams& rays, const std::vector<d
     const std::size_t channels = color.size();
     const std::size_t sets = terms.sets.count();
     m_colors.resize(sets);
-    for (std::size_t x = 0; x < rays.width; x += texels_at_once) {
-        const RowSpan span{rays.y, x, std::min(texels_at_once, rays.width - x)};
+    for (std::size_t x = 0; x < rays.width; x += rays_at_once) {
+        const RowSpan span{rays.y, x, std::min(rays_at_once, rays.width - x)};
         const float* irradiance = rays.irradiance + x * channels;
         for (auto* values : {&m_beams.irradiance, &m_beams.cos_beta, &m_beams.sin_beta, &m_beams.half_tangent})
             values->resize(span.width);
