@@ -8,7 +8,7 @@ import pytest
 import scenes
 from beamspread.blender.read.geometry import read_polygons
 from beamspread.blender.read.lights import read_illumination
-from beamspread.core.bake.luminance import light_beams
+from beamspread.core.bake.arrival import arrive
 from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.native import native
 from beamspread.core.scene.receiver import build_receiver
@@ -74,11 +74,8 @@ def our_irradiance(plane):
     polygons = read_polygons(plane.evaluated_get(depsgraph), "White")
     receiver = build_receiver(fit_uv_maps(polygons), TEXELS, TEXELS)
     grid = receiver.charts[0].grid
-    total = np.zeros((grid.height, grid.width, 3), np.float32)
-    caster = illumination.caster(grid)
-    for lamp in illumination.lights:
-        total += light_beams(grid, lamp, caster, BakeSettings(samples=8))[0]
-    return receiver.to_texture([total]), receiver.coverage
+    irradiance, _ = arrive(grid, illumination, BakeSettings(samples=8))
+    return receiver.to_texture([irradiance * grid.coverage[..., None]]), receiver.coverage
 
 
 def around(values):
