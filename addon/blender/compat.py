@@ -81,8 +81,13 @@ def round_lamp_model(light) -> str:
 
 
 def light_strength(light) -> float:
-    """Energy with exposure (Blender 4.5 on) applied."""
-    return light.energy * 2.0 ** getattr(light, "exposure", 0.0)
+    """Energy with exposure (Blender 4.5 on) applied, as `Light` counts it.
+
+    Radiance times area of an area light is a quarter of its energy, from Blender 4.5 on a pi-th; opening an older file
+    there changes its energy.
+    """
+    quarters = 4 / math.pi if light.type == "AREA" and bpy.app.version >= (4, 5, 0) else 1.0
+    return quarters * light.energy * 2.0 ** getattr(light, "exposure", 0.0)
 
 
 def light_color(light) -> tuple[float, float, float]:
