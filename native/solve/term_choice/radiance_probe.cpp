@@ -9,6 +9,7 @@
 #include "base/constants.h"
 #include "base/random.h"
 #include "base/threads.h"
+#include "simd/loops.h"
 #include "solve/term_choice/probe_loops.h"
 #include "solve/term_choice/probe_sites.h"
 
@@ -136,8 +137,8 @@ void RadianceProbe::add_rings(const Texel& texel, std::size_t first, std::size_t
         }
         for (std::size_t r = 0; r < m_light.sets.results.size(); ++r) {
             const auto& [set, medium, members] = m_light.sets.results[r];
-            add_products(sums.data() + r * m_row_size, moments.data() + set * m_row_size,
-                         m_by_ring.data() + (ring * media + medium) * m_row_size, m_row_size);
+            add_scaled_product(sums.data() + r * m_row_size, moments.data() + set * m_row_size,
+                               m_by_ring.data() + (ring * media + medium) * m_row_size, 1.0f, m_row_size);
         }
     }
 }
