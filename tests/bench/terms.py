@@ -15,7 +15,7 @@ from beamspread import Medium, _native, library
 from scipy.ndimage import uniform_filter
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from helpers import lights_of, lit_texels  # noqa: E402
+from helpers import lights_of, lit_texels
 
 SIZE = int(sys.argv[1]) if len(sys.argv) > 1 else 512
 

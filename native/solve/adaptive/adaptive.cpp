@@ -63,7 +63,9 @@ HarmonicSum term_kernel(const LightTerms& terms, std::size_t t)
 // are the narrowest.
 std::vector<AngleLight> by_angle(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium)
 {
-    // Of tan(theta / 2): some 5 degrees each.
+    // Rounded up to 90 degrees exactly, an angle would be no angle of incidence.
+    constexpr float largest = 1.0f - 1e-6f;
+    // Even in tan(theta / 2): 4 to 7 degrees each.
     struct Bin {
         double power = 0.0;
         float most_grazing = 0.0f;
@@ -74,8 +76,8 @@ std::vector<AngleLight> by_angle(const Plane& plane, const PlaneLight& light, co
         for (std::size_t x = 0, end = row.read(plane, light, {y, 0, plane.width}) ? plane.width : 0; x < end; ++x) {
             if (row.irradiance[x] == 0.0f)
                 continue;
-            const float angle = row.half_tangent[x];
-            Bin& bin = bins[std::min(static_cast<std::size_t>(angle * 16.0f), bins.size() - 1)];
+            const float angle = std::min(row.half_tangent[x], largest);
+            Bin& bin = bins[static_cast<std::size_t>(angle * static_cast<float>(bins.size()))];
             bin.power += static_cast<double>(row.irradiance[x]);
             bin.most_grazing = std::max(bin.most_grazing, angle);
         }

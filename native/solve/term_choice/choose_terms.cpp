@@ -1,6 +1,7 @@
 #include "solve/term_choice/choose_terms.h"
 
 #include <algorithm>
+#include <functional>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -94,14 +95,15 @@ struct Choice {
     Eigen::ArrayXf error;  // [texel and result]
 };
 
-// Leaves out one after the other, those first that bring least for what they cost, as long as no error is beyond 1.
-Choice leave_out(const Eigen::ArrayXXf& parts, const std::vector<float>& cost)
+// Leaves out one after the other, those first that bring least per transform, as long as no error is beyond 1.
+Choice leave_out(const Eigen::ArrayXXf& parts, const std::vector<KernelDecomposition::Term>& terms)
 {
     // Fourth powers, as the few texels where a term brings most decide whether it is needed.
-    std::vector<float> worth(cost.size());
-    parallel_for(worth.size(),
-                 [&](std::size_t c) { worth[c] = parts.col(index(c)).square().square().sum() / cost[c]; });
-    std::vector<std::size_t> order(cost.size());
+    std::vector<float> worth(terms.size());
+    parallel_for(worth.size(), [&](std::size_t c) {
+        worth[c] = parts.col(index(c)).square().square().sum() / (terms[c].m > 0 ? 2.0f : 1.0f);
+    });
+    std::vector<std::size_t> order(terms.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return worth[a] < worth[b]; });
     Choice choice{{}, Eigen::ArrayXf::Zero(parts.rows())};
@@ -116,22 +118,17 @@ Choice leave_out(const Eigen::ArrayXXf& parts, const std::vector<float>& cost)
     return choice;
 }
 
-// The texels with the largest errors, one of a site.
-std::vector<Texel> worst_texels(const std::vector<Texel>& texels, const Eigen::ArrayXf& error)
+// The middles of the sites with the largest errors.
+std::vector<Texel> worst_sites(const std::vector<Texel>& texels, const Eigen::ArrayXf& error)
 {
-    const auto results = error.size() / index(texels.size());
-    std::vector<std::pair<float, std::size_t>> worst;  // of each site
-    for (std::size_t i = 0; i < texels.size(); ++i) {
-        const float here = error.segment(index(i) * results, results).abs().maxCoeff();
-        if (i % texels_per_site == 0)
-            worst.emplace_back(here, i);
-        else if (here > worst.back().first)
-            worst.back() = {here, i};
-    }
-    std::stable_sort(worst.begin(), worst.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+    const Eigen::Index sites = index(texels.size() / texels_per_site);
+    const Eigen::ArrayXf worst = error.abs().reshaped(error.size() / sites, sites).colwise().maxCoeff();
+    std::vector<Eigen::Index> order(static_cast<std::size_t>(sites));
+    std::iota(order.begin(), order.end(), Eigen::Index{0});
+    std::ranges::stable_sort(order, std::greater{}, [&](Eigen::Index site) { return worst[site]; });
     std::vector<Texel> found;
-    for (std::size_t i = 0; i < std::min(worst_count, worst.size()); ++i)
-        found.push_back(texels[worst[i].second]);
+    for (std::size_t i = 0; i < std::min(worst_count, order.size()); ++i)
+        found.push_back(texels[static_cast<std::size_t>(order[i]) * texels_per_site + texels_per_site / 2]);
     return found;
 }
 
@@ -145,9 +142,6 @@ std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const 
     if (candidates.empty() || light.plane.texels() <= small_plane * small_plane)
         return candidates;
 
-    std::vector<float> transforms;
-    for (const KernelDecomposition::Term& term : kernels.terms())
-        transforms.push_back(term.m > 0 ? 2.0f : 1.0f);
     const std::vector<std::size_t> lights = representatives(incidence);
     const RadianceProbe probe(light, lights, kernels.basis(candidates, rounding));
     std::vector<Texel> texels = probe_sites(light, lights, incidence);
@@ -163,10 +157,10 @@ std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const 
                               readings.begin() + static_cast<std::ptrdiff_t>(first));
             progress.advance(part);
         });
-        Choice choice = leave_out(relative_parts(readings, kernels.terms(), tolerance), transforms);
+        Choice choice = leave_out(relative_parts(readings, kernels.terms(), tolerance), kernels.terms());
         if (round == refinements)
             return std::move(choice.kept);
-        const std::vector<Texel> more = sites_around(worst_texels(texels, choice.error), light.plane, round);
+        const std::vector<Texel> more = sites_around(worst_sites(texels, choice.error), light.plane, round);
         texels.insert(texels.end(), more.begin(), more.end());
     }
 }
