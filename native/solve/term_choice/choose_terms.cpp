@@ -50,9 +50,7 @@ std::vector<std::size_t> representatives(const Incidence& incidence)
 {
     std::vector<std::size_t> lights(incidence.extremes.size());
     std::iota(lights.begin(), lights.end(), std::size_t{0});
-    std::stable_sort(lights.begin(), lights.end(), [&](std::size_t a, std::size_t b) {
-        return incidence.extremes[a].irradiance > incidence.extremes[b].irradiance;
-    });
+    std::ranges::stable_sort(lights, std::greater{}, [&](std::size_t l) { return incidence.extremes[l].irradiance; });
     lights.resize(std::min(lights.size(), most_lights));
     return lights;
 }
@@ -90,13 +88,10 @@ Eigen::ArrayXXf relative_parts(const Readings& readings, const std::vector<Kerne
     return parts;
 }
 
-struct Choice {
-    std::vector<std::size_t> kept;
-    Eigen::ArrayXf error;  // [texel and result]
-};
-
 // Leaves out one after the other, those first that bring least per transform, as long as no error is beyond 1.
-Choice leave_out(const Eigen::ArrayXXf& parts, const std::vector<KernelDecomposition::Term>& terms)
+// Finds those that are kept, and the errors of [texel and result].
+std::pair<std::vector<std::size_t>, Eigen::ArrayXf> leave_out(const Eigen::ArrayXXf& parts,
+                                                              const std::vector<KernelDecomposition::Term>& terms)
 {
     // Fourth powers, as the few texels where a term brings most decide whether it is needed.
     std::vector<float> worth(terms.size());
@@ -105,17 +100,18 @@ Choice leave_out(const Eigen::ArrayXXf& parts, const std::vector<KernelDecomposi
     });
     std::vector<std::size_t> order(terms.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return worth[a] < worth[b]; });
-    Choice choice{{}, Eigen::ArrayXf::Zero(parts.rows())};
+    std::ranges::stable_sort(order, {}, [&](std::size_t c) { return worth[c]; });
+    std::vector<std::size_t> kept;
+    Eigen::ArrayXf error = Eigen::ArrayXf::Zero(parts.rows());
     for (const std::size_t c : order) {
-        Eigen::ArrayXf next = choice.error + parts.col(index(c));
+        Eigen::ArrayXf next = error + parts.col(index(c));
         if (next.abs().maxCoeff() <= 1.0f)
-            choice.error.swap(next);
+            error.swap(next);
         else
-            choice.kept.push_back(c);
+            kept.push_back(c);
     }
-    std::sort(choice.kept.begin(), choice.kept.end());
-    return choice;
+    std::ranges::sort(kept);
+    return {std::move(kept), std::move(error)};
 }
 
 // The middles of the sites with the largest errors.
@@ -157,10 +153,10 @@ std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const 
                               readings.begin() + static_cast<std::ptrdiff_t>(first));
             progress.advance(part);
         });
-        Choice choice = leave_out(relative_parts(readings, kernels.terms(), tolerance), kernels.terms());
+        auto [kept, error] = leave_out(relative_parts(readings, kernels.terms(), tolerance), kernels.terms());
         if (round == refinements)
-            return std::move(choice.kept);
-        const std::vector<Texel> more = sites_around(worst_sites(texels, choice.error), light.plane, round);
+            return kept;
+        const std::vector<Texel> more = sites_around(worst_sites(texels, error), light.plane, round);
         texels.insert(texels.end(), more.begin(), more.end());
     }
 }

@@ -119,9 +119,8 @@ std::optional<Texel> origin(const Plane& plane, const PlaneLight& light, const s
     const Vec2 place = glm::inverse(sum) * projected;
     const bool on_plane = place.x >= 0.0 && place.y >= 0.0 && place.x < static_cast<double>(plane.width) &&
                           place.y < static_cast<double>(plane.height);
-    if (!on_plane)
-        return std::nullopt;
-    return Texel{static_cast<std::size_t>(place.y), static_cast<std::size_t>(place.x)};
+    return on_plane ? std::optional(Texel{static_cast<std::size_t>(place.y), static_cast<std::size_t>(place.x)})
+                    : std::nullopt;
 }
 
 }  // namespace

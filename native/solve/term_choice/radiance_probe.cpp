@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
-#include <numeric>
 #include <utility>
 
 #include "base/constants.h"
@@ -51,14 +49,11 @@ RadianceProbe::RadianceProbe(const LightTerms& light, std::vector<std::size_t> l
             m_harmonics = std::max(m_harmonics, m + harmonics_per_block);
         }
     }
-    for (const LowRankBasis::AngleFunction& function : basis.functions)
-        m_places.push_back(starts[function.rank] + function.m);
-
     m_by_angle.resize(angle_steps * m_row_size);
-    for (std::size_t f = 0; f < m_places.size(); ++f) {
-        const std::vector<TableStep>& values = basis.functions[f].values;
+    for (const auto& [m, rank, values] : basis.functions) {
+        m_places.push_back(starts[rank] + m);
         for (std::size_t step = 0; step < angle_steps; ++step)
-            m_by_angle[step * m_row_size + m_places[f]] =
+            m_by_angle[step * m_row_size + m_places.back()] =
                 values[(2 * step + 1) * (values.size() - 1) / (2 * angle_steps)].value;
     }
 
