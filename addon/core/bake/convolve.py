@@ -49,7 +49,7 @@ def convolve(
         with ior 1, and for thin slabs with an ior above 1 by up to 1e-3, beyond 80 degrees 2e-3. Beyond 192 x 192
         texels the bound rests on a look at 1000 to 1500 texels, and of more than four lights at the four brightest,
         which may use up .25 of it; over lights, shadows and media that are hard for it the worst of all texels uses up
-        .1 to 1 (tests/bench/terms.py). `adaptive`: the sum as for `fft`, for which
+        .2 to .6 (tests/bench/terms.py). `adaptive`: the sum as for `fft`, for which
         what each beam's kernel is off by is integrated and added up in full; the error of each texel stays below
         `tolerance` times the brightest one, which is measured: the worst used up .1 of it.
     threads : int
