@@ -60,7 +60,7 @@ def sun_disk() -> str:
 
 
 def area_lamp_factor() -> float:
-    """Over `AreaLight`'s radiance of P / (4 A): Cycles 4.5 has P / (pi A). Versions between are not measured."""
+    """Over `AreaLight`'s radiance of P / (4 A): Cycles has P / (pi A) from 4.2 on. 4.0 is not measured."""
     return 1.0 if bpy.app.version < (4, 0, 0) else 4 / math.pi
 
 
@@ -81,13 +81,8 @@ def round_lamp_model(light) -> str:
 
 
 def light_strength(light) -> float:
-    """Energy with exposure (Blender 4.5 on) applied, as `Light` counts it.
-
-    Radiance times area of an area light is a quarter of its energy, from Blender 4.5 on a pi-th; opening an older file
-    there changes its energy.
-    """
-    quarters = 4 / math.pi if light.type == "AREA" and bpy.app.version >= (4, 5, 0) else 1.0
-    return quarters * light.energy * 2.0 ** getattr(light, "exposure", 0.0)
+    """Energy with exposure (Blender 4.5 on) applied."""
+    return light.energy * 2.0 ** getattr(light, "exposure", 0.0)
 
 
 def light_color(light) -> tuple[float, float, float]:

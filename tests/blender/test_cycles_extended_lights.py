@@ -8,7 +8,6 @@ import math
 import bpy
 import numpy as np
 import pytest
-from beamspread.blender.compat import light_strength
 from beamspread.blender.read.geometry import read_polygons
 from beamspread.core.native import native
 from beamspread.core.scene.lights import AreaLight, SphereLight, SphereSpotLight, SunDiskLight
@@ -42,7 +41,7 @@ def add_light(kind, plane, euler=(0.35, 0.25, 0.4), place=(0.3, -0.2, 1.1), scal
 def core_light(lamp):
     """The light as core takes it."""
     data, axes = lamp.data, np.array(lamp.matrix_world, float)
-    common = lamp.name, light_strength(data), COLOR, True
+    common = lamp.name, data.energy, COLOR, True
     position, frame = tuple(axes[:3, 3]), tuple(map(tuple, axes[:3, :3].T))
     if data.type == "SUN":
         travel = -axes[:3, 2] / np.linalg.norm(axes[:3, 2])
