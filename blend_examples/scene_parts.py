@@ -3,6 +3,7 @@
 import math
 
 import bpy
+import numpy as np
 from mathutils import Matrix, Vector
 
 BEAMSPREAD_NODE = "BeamspreadNode"
@@ -92,52 +93,40 @@ def glowing_material(name, color, glow, strength):
     return material
 
 
-def card_material(name, color):
-    """For flat pictures with an alpha, which `cloudy_alpha` and `striped_alpha` make."""
-    return plain_material(name, color, roughness=1.0, specular=0.0)
+def card_material(name, color, alpha):
+    """For flat pictures; `alpha` is an array (rows upward, columns) of what they cover, 0..1."""
+    material = plain_material(name, color, roughness=1.0, specular=0.0)
+    height, width = alpha.shape
+    image = bpy.data.images.new(name, width, height, alpha=True)
+    pixels = np.ones((height, width, 4), np.float32)
+    pixels[..., 3] = alpha
+    image.pixels.foreach_set(pixels.ravel())
+    image.pack()
+    texture = material.node_tree.nodes.new("ShaderNodeTexImage")
+    texture.image, texture.location = image, (0, 0)
+    material.node_tree.links.new(texture.outputs["Alpha"], material.node_tree.nodes["Principled BSDF"].inputs["Alpha"])
+    material.blend_method = material.shadow_method = "HASHED"
+    return material
 
 
-def _link_alpha(material, output):
-    tree = material.node_tree
-    tree.links.new(output, tree.nodes["Principled BSDF"].inputs["Alpha"])
-    material.blend_method, material.shadow_method = "HASHED", "HASHED"
+def clouds(size, thin, thick, seed=1):
+    """Alpha of clouds between two values, which fade out towards the border of a square."""
+    generator, total = np.random.default_rng(seed), np.zeros((size, size))
+    waves = np.hypot(*np.meshgrid(np.fft.fftfreq(size), np.fft.fftfreq(size))) * size
+    for octave in range(2, 7):
+        noise = np.fft.fft2(generator.standard_normal((size, size)))
+        layer = np.fft.ifft2(noise * np.exp(-((waves / 2**octave - 1) ** 2) * 4)).real
+        total += layer / layer.std() * 0.6**octave
+    share = np.clip(0.5 + 0.45 * total / total.std(), 0, 1)
+    x = (np.arange(size) + 0.5) / size * 2 - 1
+    fade = np.clip(3 * (1 - np.hypot(x[:, None], x)), 0, 1)
+    return fade * (thin + (thick - thin) * share)
 
 
-def cloudy_alpha(material, scale, thin, thick):
-    """Clouds between two alphas that fade out towards the card's border."""
-    tree = material.node_tree
-    new, link = tree.nodes.new, tree.links.new
-    place, noise, height = new("ShaderNodeTexCoord"), new("ShaderNodeTexNoise"), new("ShaderNodeMapRange")
-    ball, fade, product = new("ShaderNodeTexGradient"), new("ShaderNodeMapping"), new("ShaderNodeMath")
-    noise.inputs["Scale"].default_value, noise.inputs["Detail"].default_value = scale, 4.0
-    height.inputs["From Min"].default_value, height.inputs["From Max"].default_value = 0.42, 0.58
-    height.inputs["To Min"].default_value, height.inputs["To Max"].default_value = thin, thick
-    ball.gradient_type = "SPHERICAL"
-    fade.inputs["Location"].default_value, fade.inputs["Scale"].default_value = (-1, -1, 0), (2, 2, 0)
-    product.operation, product.use_clamp = "MULTIPLY", True
-    link(place.outputs["UV"], noise.inputs["Vector"])
-    link(place.outputs["UV"], fade.inputs["Vector"])
-    link(fade.outputs["Vector"], ball.inputs["Vector"])
-    link(noise.outputs["Fac"], height.inputs["Value"])
-    link(height.outputs[0], product.inputs[0])
-    link(ball.outputs["Fac"], product.inputs[1])
-    _link_alpha(material, product.outputs[0])
-
-
-def striped_alpha(material, count):
-    """Opaque stripes and gaps of the same width."""
-    tree = material.node_tree
-    new, link = tree.nodes.new, tree.links.new
-    place, split, wave = new("ShaderNodeTexCoord"), new("ShaderNodeSeparateXYZ"), new("ShaderNodeMath")
-    part, stripe = new("ShaderNodeMath"), new("ShaderNodeMath")
-    wave.operation, wave.inputs[1].default_value = "MULTIPLY", float(count)
-    part.operation = "FRACT"
-    stripe.operation, stripe.inputs[1].default_value = "GREATER_THAN", 0.5
-    link(place.outputs["UV"], split.inputs[0])
-    link(split.outputs["X"], wave.inputs[0])
-    link(wave.outputs[0], part.inputs[0])
-    link(part.outputs[0], stripe.inputs[0])
-    _link_alpha(material, stripe.outputs[0])
+def slats(size, count):
+    """Alpha of opaque stripes and gaps of the same width."""
+    stripes = (np.arange(size) * 2 * count // size) % 2
+    return np.repeat(stripes[None].astype(float), size, axis=0)
 
 
 # Objects

@@ -49,14 +49,12 @@ def build():
 
 def cards():
     """Each stands across a beam, facing its lamp."""
-    clouds = parts.card_material("Haze", (0.75, 0.75, 0.78))
-    parts.cloudy_alpha(clouds, scale=4.0, thin=0.05, thick=0.95)
-    slats = parts.card_material("Slats", (0.02, 0.02, 0.02))
-    parts.striped_alpha(slats, count=7)
+    haze = parts.card_material("Haze", (0.75, 0.75, 0.78), parts.clouds(256, thin=0.05, thick=0.9))
+    gobo = parts.card_material("Slats", (0.02, 0.02, 0.02), parts.slats(512, count=7))
     for (name, place, target, _, _), part, side, material in (
-        (SPOTS[0], 0.62, 1.0, clouds),
-        (SPOTS[1], 0.45, 0.62, slats),
-        (SPOTS[3], 0.70, 1.1, clouds),
+        (SPOTS[0], 0.62, 1.0, haze),
+        (SPOTS[1], 0.45, 0.62, gobo),
+        (SPOTS[3], 0.70, 1.1, haze),
     ):
         lamp, floor = Vector(place), Vector(target)
         card = parts.upright_card(f"Card of {name}", side, side, material)

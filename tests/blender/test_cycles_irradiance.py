@@ -6,14 +6,8 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from beamspread.blender.read.geometry import read_polygons
-from beamspread.blender.read.lights import read_illumination
-from beamspread.core.bake.luminance import light_beams
-from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.native import native
-from beamspread.core.scene.receiver import build_receiver
-from beamspread.core.scene.uv_map import fit_uv_maps
-from cycles_truth import CYCLES_SAMPLES, TEXELS, add_receiver, cycles_irradiance
+from cycles_truth import CYCLES_SAMPLES, TEXELS, add_receiver, around, cycles_irradiance, our_irradiance
 from mathutils import Euler, Matrix
 
 TOLERANCE = 0.01
@@ -65,27 +59,6 @@ def frame_of(plane):
     x_axis = world.col[0].to_3d().normalized()
     axes = Matrix((x_axis, normal.cross(x_axis), normal)).transposed().to_4x4()
     return Matrix.Translation(world.translation) @ axes @ Matrix.Scale(world.col[0].length, 4)
-
-
-def our_irradiance(plane):
-    """The same by the add-on, and the coverage of the texels."""
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    illumination = read_illumination(depsgraph)
-    polygons = read_polygons(plane.evaluated_get(depsgraph), "White")
-    receiver = build_receiver(fit_uv_maps(polygons), TEXELS, TEXELS)
-    grid = receiver.charts[0].grid
-    total = np.zeros((grid.height, grid.width, 3), np.float32)
-    caster = illumination.caster(grid)
-    for lamp in illumination.lights:
-        total += light_beams(grid, lamp, caster, BakeSettings(samples=8))[0]
-    return receiver.to_texture([total]), receiver.coverage
-
-
-def around(values):
-    """Each texel's 3 x 3 neighbourhood, (9, H, W); the image's border is repeated."""
-    padded = np.pad(values, 1, mode="edge")
-    height, width = values.shape
-    return np.stack([padded[i : i + height, j : j + width] for i in range(3) for j in range(3)])
 
 
 def inside_one_triangle(plane):

@@ -322,16 +322,6 @@ def test_nothing_to_bake():
     assert "No mesh has a material with a Beamspread node" in messages_of(bpy.ops.beamspread.bake)
 
 
-def test_area_lights_are_named_in_a_warning(capfd):
-    plane = add_plane(material=add_material())
-    lamp = bpy.data.objects.new("Panel", bpy.data.lights.new("Panel", "AREA"))
-    bpy.context.collection.objects.link(lamp)
-    bake(plane)
-    output = capfd.readouterr().out
-    assert "'Panel' is left out" in output
-    assert "it is black" in output
-
-
 def test_samples_of_a_folder(tmp_path):
     """Exitance far from the border is the power of the sample, whatever the material's anisotropy."""
     image = np.zeros((21, 21))

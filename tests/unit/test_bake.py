@@ -1,14 +1,16 @@
 """The bake of plain data: lights add up, colours and thickness act per channel, progress and cancel work."""
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 
 import beamspread
 import numpy as np
 import pytest
+from beamspread.core.bake.arrival import arrive
+from beamspread.core.bake.gather import Gatherer
 from beamspread.core.bake.job import BakeJob
 from beamspread.core.bake.layers import LAYERS
-from beamspread.core.bake.luminance import bake, light_beams
+from beamspread.core.bake.luminance import bake
 from beamspread.core.bake.runner import Bake, Target
 from beamspread.core.bake.settings import COMBINED, BakeSettings
 from beamspread.core.bake.surface import Surface
@@ -53,6 +55,12 @@ def shifted(receiver, distance):
     return replace(receiver, origin=tuple(np.array(receiver.origin) + distance))
 
 
+def light_beams(receiver, light, occluders=None, settings=SETTINGS):
+    """Irradiance (H, W, 3) of a light without size, and the direction in which it travels."""
+    irradiance, direction = Gatherer(receiver, Illumination([light], occluders), settings).beams(light)
+    return irradiance[..., None] * light.rgb(), direction
+
+
 def reflectance(angle, albedo=0.9, thickness=math.inf):
     medium = beamspread.Medium(g=0.0, ior=1.0, thickness=thickness)
     return beamspread.library(medium, quality="preview").reflectance(angle, albedo)
@@ -84,7 +92,7 @@ def test_an_uneven_receiver_does_not_shadow_itself():
     target = build_receiver(fit_uv_maps(polygons), 32, 32).charts[0].grid
     mesh = Mesh(corners, np.array([(0, 1, 2), (0, 2, 3)], np.uint32))
     low_sun = replace(SUN, direction=(math.sin(1.5), 0.0, -math.cos(1.5)))
-    irradiance, _ = light_beams(target, low_sun, Illumination([low_sun], mesh).caster(target), SETTINGS)
+    irradiance, _ = light_beams(target, low_sun, mesh)
     assert irradiance == pytest.approx(np.full((32, 32, 3), 2 * math.cos(1.5)), rel=1e-3)
 
 
@@ -100,13 +108,6 @@ def test_receivers_near_each_other_share_the_shadows_of_their_scene():
     assert Illumination([SUN]).caster(grid()) is None
 
 
-@dataclass(frozen=True)
-class LinkedSun(SunLight):
-    """A sun that only some objects block."""
-
-    blockers: frozenset | None = None
-
-
 def test_lights_share_the_shadows_of_what_may_block_them():
     others = Mesh(ROOF.vertices + (0, 0, 1), np.concatenate([ROOF.triangles] * 2))
     scene = Illumination([SUN], [Occluder("Roof", ROOF), Occluder("Others", others)])
@@ -115,7 +116,7 @@ def test_lights_share_the_shadows_of_what_may_block_them():
         return scene.caster(grid(), linked(*names)).triangle_count
 
     def linked(*names):
-        return LinkedSun(*(getattr(SUN, field.name) for field in fields(SUN)), frozenset(names))
+        return replace(SUN, blockers=frozenset(names))
 
     assert scene.caster(grid(), SUN).triangle_count == count("Roof", "Others") == 3
     assert (count("Roof"), count("Others", "Elsewhere")) == (1, 2)
@@ -148,7 +149,7 @@ def test_shadows_do_not_drift_far_from_the_world_origin(distance):
         mesh = Mesh(card + offset, np.array([(0, 1, 2)], np.uint32))
         there = replace(lamp, position=tuple(np.array(lamp.position) + offset))
         receiver = shifted(grid(256), offset)
-        return light_beams(receiver, there, Illumination([there], mesh).caster(receiver), replace(SETTINGS, samples=4))
+        return light_beams(receiver, there, mesh, replace(SETTINGS, samples=4))
 
     (here, direction), (there, direction_there) = beams(np.zeros(3)), beams(offset)
     dark = (here[..., 0] == 0).sum()
@@ -167,9 +168,7 @@ def test_what_is_far_away_does_not_change_shadows_nearby(distance):
     sun = replace(SUN, direction=(0.3, 0.2, -1.0))
     alone = Mesh(card, np.array([(0, 1, 2)], np.uint32))
     both = [Occluder("", mesh) for mesh in (alone, Mesh(far, np.array([(0, 1, 2)], np.uint32)))]
-    near, wide = (
-        light_beams(grid(256), sun, Illumination([sun], mesh).caster(grid(256)), SETTINGS)[0] for mesh in (alone, both)
-    )
+    near, wide = (light_beams(grid(256), sun, mesh)[0] for mesh in (alone, both))
     assert (near == 0).any()
     assert np.array_equal(near, wide)
 
@@ -199,7 +198,7 @@ def test_light_along_a_turned_plane_adds_nothing(kind):
             light = PointLight("Lamp", 100.0, (1.0, 1.0, 1.0), True, tuple(within))
         else:
             light = replace(SUN, direction=tuple(within / np.linalg.norm(within)))
-        irradiance, direction = light_beams(receiver, light, None, SETTINGS)
+        irradiance, direction = light_beams(receiver, light)
         assert not irradiance.any()
         assert (direction == (0, 0, -1)).all()
         sun = replace(SUN, direction=tuple(-axes[2]))
@@ -342,14 +341,13 @@ def test_a_new_kind_of_light_and_a_new_layer_need_nothing_but_themselves(monkeyp
             return False
 
     def irradiance(one, target, _material, _progress):
-        lights = one.illumination.lights
-        return sum(light_beams(target, light, one.illumination.caster(target), one.settings)[0] for light in lights)
+        return arrive(target, one.illumination, one.settings)[0]
 
-    monkeypatch.setitem(LAYERS, "Irradiance", irradiance)
+    monkeypatch.setitem(LAYERS, "Own", irradiance)
     sky = Sky("Sky", 3.0, (1.0, 0.5, 0.0), True)
-    layers = job([sky], settings=replace(SETTINGS, layers=(COMBINED, "Irradiance"))).run()
-    assert list(layers) == [COMBINED, "Irradiance"]
-    assert layers["Irradiance"][12, 12] == pytest.approx([3, 1.5, 0])
+    layers = job([sky], settings=replace(SETTINGS, layers=(COMBINED, "Own"))).run()
+    assert list(layers) == [COMBINED, "Own"]
+    assert layers["Own"][12, 12] == pytest.approx([3, 1.5, 0])
     assert layers[COMBINED][12, 12] == pytest.approx(reflectance(0) / math.pi * np.array([3, 1.5, 0]), rel=2e-3)
 
 

@@ -15,7 +15,7 @@ from ..node.find import find_misplaced, find_node, materials_of
 from ..node.node import draw_properties
 from ..read.visible import render_visible_names
 
-INDIRECT_COST = "Indirect light takes some seconds per object, as Cycles finds it first."
+INDIRECT_COST = "Indirect light takes seconds to a minute per object: Cycles finds it first."
 
 # Objects whose warnings, and messages of bakes, that a panel shows; it is drawn often.
 MOST_OBJECTS = 8

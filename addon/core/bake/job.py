@@ -83,8 +83,10 @@ class BakeJob:
         return f"What shines through the slab '{self.name}' from behind is not baked yet: light of {names}."
 
     def _surely_dark(self) -> str:
-        if self.more_light is not None:
-            return ""
+        return "" if self.more_light is not None else self._dark_by_lights()
+
+    def _dark_by_lights(self) -> str:
+        """Why none of its own lights can reach it, whatever stands in their way; empty where one can."""
         lights = self.illumination.lights
         if not lights:
             return "No light of the scene can be baked: it is black."
@@ -107,4 +109,5 @@ class BakeJob:
         """What only its result shows."""
         if self._surely_dark() or not self.is_dark(layers):
             return []
-        return [f"No light reaches '{self.name}', so it is black: look for what stands in its way."]
+        in_the_way = f"No light reaches '{self.name}', so it is black: look for what stands in its way."
+        return [self._dark_by_lights() or in_the_way]

@@ -1,6 +1,6 @@
 """The kinds of light that can be baked; strengths follow Cycles (see each class).
 
-A new kind is one class here, and its reader in blender/read/lights.py.
+A new kind is one class here, and its reader in blender/read/.
 """
 
 from .area import AreaLight
