@@ -90,6 +90,8 @@ def set_up(scene) -> None:
     # The mirror stands for a diffuse surface: it uses up a glossy bounce in place of a diffuse one.
     cycles.glossy_bounces += 1
     cycles.diffuse_bounces -= 1
+    for obj in scene.objects:
+        obj.visible_glossy = obj.visible_diffuse
 
 
 class Baker:
