@@ -17,8 +17,10 @@ __all__: list[str] = [
     "LdfSample",
     "LdfSource",
     "Light",
+    "LightField",
     "Medium",
     "MeshLight",
+    "OccluderMesh",
     "Occluders",
     "PlaneLight",
     "PointLight",
@@ -29,6 +31,7 @@ __all__: list[str] = [
     "SpotLight",
     "SunDiskLight",
     "SunLight",
+    "Transmittance",
     "adaptive_beams",
     "complex_lines",
     "convolve",
@@ -365,6 +368,92 @@ class SampleSource(LdfSource):
     """
     def __init__(self, samples: list[LdfSample], method: str = "angular") -> None: ...
 
+class Transmittance:
+    """
+    What a surface lets through of the light that crosses it.
+
+    Parameters
+    ----------
+    color : 3 floats
+        0 to 1 in each channel.
+    """
+    @staticmethod
+    def from_image(
+        texels: numpy.ndarray,
+        extension: str = "repeat",
+        is_smooth: bool = True,
+        outside: numpy.ndarray = (1.0, 1.0, 1.0),
+    ) -> Transmittance:
+        """
+        From an image that is looked up by the triangles' UVs.
+
+        Parameters
+        ----------
+        texels : ndarray, float32, shape (H, W, 1) or (H, W, 3), C-contiguous
+            0 to 1; row 0 at v = 0. Kept in 16 bits.
+        extension : str
+            Beyond the border: 'repeat', 'extend', 'clip', 'mirror'.
+        is_smooth : bool
+            Bilinear, else that of the nearest texel.
+        outside : 3 floats
+            Beyond the border of a clipped image.
+
+        Raises
+        ------
+        ValueError
+            Wrong dtype or shape, a value outside 0 to 1.
+        """
+    def __init__(self, color: numpy.ndarray) -> None: ...
+    @property
+    def is_clear(self) -> bool:
+        """
+        bool: everything gets through everywhere.
+        """
+    @property
+    def is_colored(self) -> bool:
+        """
+        bool: channels differ somewhere.
+        """
+    @property
+    def is_opaque(self) -> bool:
+        """
+        bool: nothing gets through anywhere.
+        """
+
+class OccluderMesh:
+    """
+    A mesh, the places where it stands, and what its triangles let through.
+
+    Parameters
+    ----------
+    vertices : ndarray, float64, shape (N, 3), C-contiguous
+        Metres in the mesh's frame. As all arrays, it must not change before occluders are made of it.
+    triangles : ndarray, uint32, shape (M, 3), C-contiguous
+        Vertex indices.
+    placements : ndarray, float64, shape (K, 12), C-contiguous, optional
+        Rows of 3 x 4 matrices from the mesh's frame to the world; None: it stands there as it is.
+    transmittances : list of Transmittance
+        By material.
+    materials : ndarray, uint32, shape (M, 1), C-contiguous, optional
+        Of each triangle the index of its material; None: all are opaque.
+    uvs : ndarray, float32, shape (M, 6), C-contiguous, optional
+        (u, v) of each triangle's corners; None: all are (0, 0).
+
+    Raises
+    ------
+    ValueError
+        Wrong dtype or shape.
+    """
+    def __init__(
+        self,
+        vertices: numpy.ndarray,
+        triangles: numpy.ndarray,
+        placements: numpy.ndarray | None = None,
+        transmittances: list[Transmittance] = [],
+        materials: numpy.ndarray | None = None,
+        uvs: numpy.ndarray | None = None,
+    ) -> None: ...
+
 class Occluders:
     """
     Triangles that block light, both sides of them.
@@ -383,13 +472,54 @@ class Occluders:
     ValueError
         Wrong dtype or shape, a position that is not finite, an index that is out of range.
     """
+    @staticmethod
+    def of_meshes(
+        meshes: list[OccluderMesh],
+        origin: numpy.ndarray = (0.0, 0.0, 0.0),
+        most_crossings: int | None = None,
+        most_copied: int = 1048576,
+    ) -> Occluders:
+        """
+        Of meshes that may stand in many places and let light through.
+
+        Parameters
+        ----------
+        meshes : list of OccluderMesh
+        origin : 3 floats
+            As above.
+        most_crossings : int, optional
+            A ray that has crossed so many see-through triangles ends at the next.
+        most_copied : int
+            Where there are more triangles than this, counting those of each placement, the placements of a mesh share its
+            triangles.
+
+        Raises
+        ------
+        ValueError
+            A number that is not finite, an index that is out of range.
+        """
     def __init__(
         self, vertices: numpy.ndarray, triangles: numpy.ndarray, origin: numpy.ndarray = (0.0, 0.0, 0.0)
     ) -> None: ...
     @property
+    def instance_count(self) -> int:
+        """
+        int: placements that share their mesh's triangles.
+        """
+    @property
+    def is_colored(self) -> bool:
+        """
+        bool: some let more of one channel through than of another.
+        """
+    @property
+    def is_opaque(self) -> bool:
+        """
+        bool: all triangles block all light.
+        """
+    @property
     def triangle_count(self) -> int:
         """
-        int: number of triangles.
+        int: number of triangles, those of each placement counted.
         """
 
 class ReceiverGrid:
@@ -687,6 +817,80 @@ class PlaneLight:
         Lights for irradiance (H, W) or (H, W, channels): one where channels differ by a factor, else one for each.
         """
     def __init__(self, irradiance: numpy.ndarray, direction: numpy.ndarray, color: list[float]) -> None: ...
+    def by_channel(self) -> list[PlaneLight]:
+        """
+        The same light as one for each channel.
+        """
+    def mean(self) -> float:
+        """
+        float: mean irradiance of all texels and channels, W/m^2.
+        """
+
+class LightField:
+    """
+    Luminance of light that comes bit by bit, in memory that does not grow with it.
+
+    By the solver 'fft'; parameters as of `convolve`.
+
+    Parameters
+    ----------
+    shape : (int, int)
+        Height and width of the plane, texels.
+    lights : sequence of PlaneLight
+        Those of one direction are part of the field. All others only stand for light to come where terms are chosen.
+    survey_shape : (int, int)
+        Of the plane that the survey looks at, as large but of fewer texels.
+    survey : sequence of PlaneLight
+        All light to come, on that plane: its angles and colours.
+    ldf, albedo, mean_free_path, pitch, tolerance, threads, progress
+        As for `convolve`; the progress is that of the choice of terms.
+    """
+    def __init__(
+        self,
+        shape: tuple,
+        lights: list[PlaneLight],
+        survey_shape: tuple,
+        survey: list[PlaneLight],
+        ldf: list[LdfSource],
+        albedo: list[float],
+        mean_free_path: list[float],
+        pitch: typing.Sequence[float],
+        tolerance: float,
+        threads: int = 0,
+        progress: typing.Any = None,
+    ) -> None: ...
+    def add(self, light: PlaneLight) -> None:
+        """
+        Adds a PlaneLight, also one of `lights` that only stood for it.
+        """
+    def add_rays(
+        self,
+        grid: ReceiverGrid,
+        light: ExtendedLight,
+        color: list[float],
+        coverage: numpy.ndarray,
+        occluders: Occluders = None,
+        rays: int = 16,
+        seed: int = 0,
+        threads: int = 0,
+        clearance: float = 0.0,
+        even_rays: int = 0,
+        progress: typing.Any = None,
+    ) -> None:
+        """
+        Adds the rays of a light of a size, see `gather_rays`.
+
+        `color`: factor in each channel; `coverage`: float32 (H, W), part of each texel that receives light.
+        """
+    def solve(self, progress: typing.Any = None) -> numpy.ndarray:
+        """
+        Luminance, float32 (H, W, C) in W/(m^2 sr); once.
+        """
+    @property
+    def terms(self) -> int:
+        """
+        int: how many transforms of light `solve` makes.
+        """
 
 def adaptive_beams(light: PlaneLight, tolerance: float) -> tuple[numpy.ndarray, numpy.ndarray]:
     """
@@ -837,7 +1041,7 @@ def gather_beams(
 
     Returns
     -------
-    irradiance : ndarray, float32, shape (height, width)
+    irradiance : ndarray, float32, shape (height, width), or (height, width, 3) past coloured occluders
         W/m^2: cosine and visible part included, 0 if the light is behind the plane or in it. Row 0 is the lowest row.
     direction : ndarray, float32, shape (height, width, 3), or float64, shape (3,) of a light infinitely far away
         Unit vectors of travel in the plane frame (x_axis, y_axis, normal), z < 0. Where no light arrives: that of the
@@ -860,6 +1064,7 @@ def gather_rays(
     threads: int = 0,
     progress: typing.Any = None,
     clearance: float = 0.0,
+    even_rays: int = 0,
 ) -> typing.Any:
     """
     Irradiance of a plane by a light of a size, and where it comes from on the whole.
@@ -880,6 +1085,9 @@ def gather_rays(
         progress(fraction) returns False to stop.
     clearance : float
         How far off the plane shadow rays start, in metres, besides what rounding needs.
+    even_rays : int
+        First, a look by so many rays: where they, and those of the texels around, all met light or all an obstacle, they are
+        enough, and `rays` are traced from the other texels only. 0: from all.
 
     Returns
     -------
@@ -963,7 +1171,7 @@ def ray_layers(
     clearance: float = 0.0,
 ) -> typing.Any:
     """
-    The rays of `gather_rays` one by one; the arguments are the same.
+    The rays of `gather_rays` one by one; arguments as there, but for `even_rays`.
 
     Returns
     -------

@@ -32,17 +32,18 @@ struct Node {
     double weight;
 };
 
-std::array<Node, 12> make_rule()
+constexpr std::array<Node, 12> make_rule()
 {
-    std::array<Node, 12> nodes;
+    std::array<Node, 12> nodes{};
     for (std::size_t i = 0; i < nodes.size(); ++i) {
-        const double s = (static_cast<double>(i / 4) + 0.5 * (1.0 + gauss_node[i % 4])) / 3.0;
-        nodes[i] = {s * s * (3.0 - 2.0 * s), s * (1.0 - s) * gauss_weight[i % 4]};
+        const std::size_t third = i / 4;
+        const double s = (static_cast<double>(third) + 0.5 * (1.0 + gauss_node[i % 4])) / 3.0;
+        nodes[i] = {.at = s * s * (3.0 - 2.0 * s), .weight = s * (1.0 - s) * gauss_weight[i % 4]};
     }
     return nodes;
 }
 
-const std::array<Node, 12> rule = make_rule();
+constexpr std::array<Node, 12> rule = make_rule();
 
 struct Range {
     double first;

@@ -13,6 +13,7 @@
 #include "base/pool.h"
 #include "base/sobol.h"
 #include "base/threads.h"
+#include "base/vec.h"
 #include "scene/beams.h"
 #include "scene/ray_start.h"
 
@@ -173,15 +174,19 @@ private:
             sum = sample(x, y, rays);
         }
         // The sum of what comes unhindered is known: what is hindered takes its part of it.
-        const auto per_weight = [&](int channel) { return sum[channel] > 0.0 ? open[channel] / sum[channel] : 0.0; };
-        const Vec3 scale(per_weight(0), per_weight(1), per_weight(2));
+        // A channel in which all rays happen to be dark goes along with the mean of the channels.
+        const double mean = (sum.x + sum.y + sum.z) / 3.0;
+        const Vec3 scale = open / glm::mix(sum, Vec3(mean), glm::equal(sum, Vec3(0.0)));
+        const auto unhindered = [&](const Vec3& weight) {
+            return scale * glm::mix(weight, Vec3((weight.x + weight.y + weight.z) / 3.0), glm::equal(sum, Vec3(0.0)));
+        };
         for (std::size_t i = 0; i < count; ++i) {
             if (rays.weights[i] == Vec3(0.0))
                 continue;
             const LightRay& found = rays.found[i];
             const std::size_t index = i * m_grid.width + x;
             rays.travel[index] = Vec3f(glm::normalize(m_grid.to_plane(found.travel)));
-            rays.irradiance[index] = Vec3f(rays.weights[i] * scale);
+            rays.irradiance[index] = Vec3f(unhindered(rays.weights[i]));
             if (!part.is_traced)
                 continue;
             rays.packet[rays.waiting] = shadow_ray(m_grid, m_start, rays.points[i], found.travel, found.distance);

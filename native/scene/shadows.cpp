@@ -194,7 +194,7 @@ Shadows::Shadows(const ReceiverGrid& grid, const LightSource& source, const Occl
     const Projection projection(grid, source, start);
     if (!projection.is_lit())
         return;
-    if (facet_count() > most_facets || is_lamp_in_a_hull()) {
+    if (facet_count() > most_facets) {
         m_is_unknown = true;
         return;
     }
@@ -205,6 +205,7 @@ Shadows::Shadows(const ReceiverGrid& grid, const LightSource& source, const Occl
         const Projection::Heights heights = projection.heights(one.corners, one.rounding);
         if (projection.is_off_the_way(heights))
             continue;
+        // Among them are sides of a box that holds the lamp, which rays that end there need not cross.
         if (!projection.has_shadow(heights)) {
             m_is_unknown = true;
             continue;
@@ -239,16 +240,6 @@ Shadows::Facet Shadows::facet(std::size_t index) const
     const Hull& box = m_occluders->hulls()[static_cast<std::size_t>(hull)];
     const auto [a, b, c] = box_facets[static_cast<std::size_t>(side)];
     return {{box.corner(a), box.corner(b), box.corner(c)}, rounding_of(box), false};
-}
-
-// Rays that end inside a box need not cross its sides.
-bool Shadows::is_lamp_in_a_hull() const
-{
-    return !m_source.is_far && std::ranges::any_of(m_occluders->hulls(), [this](const Hull& hull) {
-        const double radius =
-            glm::length(hull.half_axes[0]) + glm::length(hull.half_axes[1]) + glm::length(hull.half_axes[2]);
-        return glm::length(m_source.position - hull.centre) <= radius + rounding_of(hull);
-    });
 }
 
 void Shadows::shade_band(std::size_t band, std::vector<Shade>& texels) const

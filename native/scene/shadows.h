@@ -50,7 +50,6 @@ private:
 
     Facet facet(std::size_t index) const;
     std::size_t facet_count() const;
-    bool is_lamp_in_a_hull() const;
 
     const ReceiverGrid& m_grid;
     LightSource m_source;

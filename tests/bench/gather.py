@@ -1,4 +1,5 @@
-"""What finding shadows without rays saves: beams with and without it, by light, occluders and size of the grid.
+"""What finding shadows without rays saves: beams with and without it, by light, occluders and size of the grid; and
+how many rays of lights of a size are traced.
 
 PYTHONPATH=build/stage build/venv/bin/python tests/bench/gather.py [--sizes N ...]
 """
@@ -58,6 +59,30 @@ def seconds(grid, light, occluders, find_shadows):
     return min(times)
 
 
+EXTENDED = {
+    "sun of .1": native.SunDiskLight((0.3, 0.2, -1), 0.1),
+    "sphere": native.SphereLight((0.3, 0.2, 1.5), 0.2, "sphere"),
+    "area": native.AreaLight((0.3, 0.2, 1.5), np.eye(3), 0.6, 0.4),
+    "disk": native.AreaLight((0.3, 0.2, 1.5), np.eye(3), 0.6, 0.6, True),
+    "spread": native.AreaLight((0.3, 0.2, 1.5), np.eye(3), 0.6, 0.4, False, 1.0),
+    "sky": native.EnvironmentLight(np.ones((512, 1024, 3), np.float32), np.eye(3)),
+}
+
+
+def print_ray_rates(grid, rays=16):
+    """Million rays a second and core of lights of a size, besides what occluders take."""
+    print(f"{'10^6 rays/CPU s':23}" + "".join(f"{name:>10}" for name in EXTENDED))
+    for name, vertices in SCENES.items():
+        triangles = None if vertices is None else np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)
+        occluders = None if vertices is None else native.Occluders(vertices, triangles)
+        row = f"{name:23}"
+        for light in EXTENDED.values():
+            start = time.process_time()
+            native.gather_rays(grid, light, occluders, rays=rays)
+            row += f"{512 * 512 * rays / (time.process_time() - start) / 1e6:10.2f}"
+        print(row, flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sizes", type=int, nargs="+", default=[512, 1024])
@@ -74,6 +99,7 @@ def main():
                 found, traced = (seconds(grid, light, occluders, find_shadows) for find_shadows in (True, False))
                 row += f"{found:8.3f}{traced:10.3f}{traced / found:7.1f}"
             print(row, flush=True)
+    print_ray_rates(native.ReceiverGrid((-1, -1, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 2 / 512, 2 / 512, 512, 512))
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 import math
 
 import bpy
+import numpy as np
 import scenes
 
 TEXELS = 64
@@ -43,3 +44,10 @@ def cycles_irradiance(plane, image, samples=CYCLES_SAMPLES):
     scenes.select(plane)
     bpy.ops.object.bake(type="DIFFUSE", pass_filter={"DIRECT"}, margin=0, use_clear=True)
     return math.pi * scenes.pixels(image)
+
+
+def around(values):
+    """Each texel's 3 x 3 neighbourhood, (9, H, W); the image's border is repeated."""
+    padded = np.pad(values, 1, mode="edge")
+    height, width = values.shape
+    return np.stack([padded[i : i + height, j : j + width] for i in range(3) for j in range(3)])

@@ -13,7 +13,7 @@ from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.native import native
 from beamspread.core.scene.receiver import build_receiver
 from beamspread.core.scene.uv_map import fit_uv_maps
-from cycles_truth import CYCLES_SAMPLES, TEXELS, add_receiver, cycles_irradiance
+from cycles_truth import CYCLES_SAMPLES, TEXELS, add_receiver, around, cycles_irradiance
 from mathutils import Euler, Matrix
 
 TOLERANCE = 0.01
@@ -76,13 +76,6 @@ def our_irradiance(plane):
     grid = receiver.charts[0].grid
     irradiance, _ = arrive(grid, illumination, BakeSettings(samples=8))
     return receiver.to_texture([irradiance * grid.coverage[..., None]]), receiver.coverage
-
-
-def around(values):
-    """Each texel's 3 x 3 neighbourhood, (9, H, W); the image's border is repeated."""
-    padded = np.pad(values, 1, mode="edge")
-    height, width = values.shape
-    return np.stack([padded[i : i + height, j : j + width] for i in range(3) for j in range(3)])
 
 
 def inside_one_triangle(plane):

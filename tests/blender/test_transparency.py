@@ -10,10 +10,11 @@ from beamspread.blender.read.geometry import read_polygons
 from beamspread.blender.read.lights import read_illumination
 from beamspread.core.scene.receiver import build_receiver
 from beamspread.core.scene.uv_map import fit_uv_maps
+from cycles_truth import TEXELS, add_receiver, around, cycles_irradiance
 from mathutils import Matrix
-from test_cycles_irradiance import TEXELS, TOLERANCE, add_receiver, around, cycles_irradiance
 
 FINE = 4
+TOLERANCE = 0.01
 ABOVE = Matrix.Translation((0, 0, 0.5))
 
 

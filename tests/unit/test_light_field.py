@@ -6,15 +6,17 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import beamspread
 import numpy as np
 import pytest
-from beamspread.core.bake import luminance
+from beamspread.core.bake import gather, luminance
 from beamspread.core.bake.luminance import TOLERANCE, bake
 from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.material.material import Material
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
-from beamspread.core.scene.lights import PointLight, SpotLight, SunLight
+from beamspread.core.scene.lights import AreaLight, PointLight, SpotLight, SunDiskLight, SunLight, WorldLight
+from beamspread.core.scene.occluders import Mesh
 
 SETTINGS = BakeSettings(quality="preview", samples=1, margin=0)
 MATERIAL = Material(albedo=(0.95, 0.9, 0.8), mean_free_path=(0.01, 0.01, 0.005), anisotropy=0.6, ior=1.4)
@@ -94,6 +96,92 @@ def test_light_between_the_places_of_a_survey_counts(monkeypatch):
 def test_darkness_stays_dark(monkeypatch):
     behind = replace(lamps(1)[0], position=(0.0, 0.0, -1.0))
     assert not bake_as_it_comes(monkeypatch, grid(32), Illumination([behind]), MATERIAL, 0.0, SETTINGS).any()
+
+
+ASIDE = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))  # an area light that shines towards -x
+WALL = Mesh(
+    np.array([(0.1, -0.3, 0.0), (0.1, 0.2, 0.0), (0.1, 0.2, 0.2), (0.1, -0.3, 0.2)]),
+    np.array([(0, 1, 2), (0, 2, 3)], np.uint32),
+)
+
+
+def panel(size=0.8, middle=(0.9, 0.0, 0.6), power=20.0):
+    color = (1.0, 0.8, 0.5)
+    return AreaLight("Panel", power, color, True, middle, ASIDE, size, size, False, math.pi)
+
+
+def split(light, count):
+    """The panel as count x count small ones."""
+    places = (np.arange(count) + 0.5) / count - 0.5
+    return [
+        panel(light.size_x / count, tuple(np.add(light.position, (0.0, light.size_x * y, light.size_y * z))), share)
+        for share in [light.strength / count**2]
+        for y in places
+        for z in places
+    ]
+
+
+def test_directions_of_a_low_wide_light_are_kept():
+    """A panel against itself in 100 parts, each its own light: the parts have one direction each, but for .06 rad.
+
+    What they differ by, as the square of that angle, is some 3e-4 of the luminance; rays make 2e-3 of noise in the
+    penumbra. The mean direction alone would be off by far more, and so would light from everywhere.
+    """
+
+    def bake_one(lights):
+        return bake(grid(64), Illumination(lights, WALL), MATERIAL, 0.0, SETTINGS)
+
+    truth, whole = bake_one(split(panel(), 10)), bake_one([panel()])
+    error = np.abs(whole - truth) / truth.mean(axis=(0, 1))
+    assert error.mean() < 3e-3
+    assert error.max() < 4e-2
+    mirrored = bake_one([replace(panel(), position=(-0.9, 0.0, 0.6), frame=(*ASIDE[:2], (-1.0, 0.0, 0.0)))])
+    assert np.abs(mirrored - truth).mean() > 0.2 * truth.mean()
+
+
+@pytest.mark.parametrize("solver", ["direct", "adaptive"])
+def test_solvers_that_take_lights_apart_agree(solver, monkeypatch):
+    """Ray by ray, each a light of one direction per texel: the same rays, so what differs is the solvers' tolerance."""
+    for name in ("MOST_RAYS", "FEWEST_RAYS"):
+        monkeypatch.setattr(luminance, name, 32)  # two rays, by samples of 1
+    arguments = grid(16), Illumination([panel(), sky()], WALL), MATERIAL, 0.02
+    apart = bake(*arguments, replace(SETTINGS, solver=solver))
+    assert relative_error(bake(*arguments, SETTINGS), apart) < 4 * TOLERANCE
+
+
+def sky():
+    """Blue, with a red quarter."""
+    radiance = np.full((16, 32, 3), (0.1, 0.2, 0.4), np.float32)
+    radiance[8:, :8] = (2.0, 0.2, 0.1)
+    identity = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    return WorldLight("World", 1.0, (1.0, 1.0, 1.0), True, radiance, identity)
+
+
+def test_light_of_many_colors_and_directions_has_the_power_of_its_parts():
+    """A sky over an open plane: beams from everywhere, summed by angle of incidence, against the library itself."""
+    luminance_in_the_middle = bake(grid(48, side=4.0), Illumination([sky()]), MATERIAL, 0.0, SETTINGS)[24, 24]
+    medium = beamspread.Medium(g=MATERIAL.anisotropy, ior=MATERIAL.ior)
+    library = beamspread.library(medium, quality="preview")
+    elevation = (np.arange(16) + 0.5) / 16 * np.pi - np.pi / 2
+    steps = np.linspace(0, np.pi / 2, 8 * 64 + 1)
+    middles = (steps[1:] + steps[:-1]) / 2
+    share = np.sin(steps[1:]) ** 2 / 2 - np.sin(steps[:-1]) ** 2 / 2  # of cos(theta) over a ring, by 2 pi
+    assert elevation[8] > 0
+    for channel, albedo in enumerate(MATERIAL.albedo):
+        reflected = [library.reflectance(90 - float(np.degrees(angle)), albedo) for angle in middles]
+        radiance = sky().radiance[8:, :, channel].mean()
+        expected = 2 * np.pi * radiance * float(np.dot(reflected, share)) / np.pi
+        assert luminance_in_the_middle[channel] == pytest.approx(expected, rel=1e-2)
+
+
+def test_a_narrow_sun_counts_as_one_direction():
+    """The widest sun that does, at 75 degrees, against its rays: that leaves out what grows with the angle's square."""
+    angle = math.radians(75)
+    sun = SunDiskLight("Sun", 1.0, (1.0, 1.0, 1.0), True, (math.sin(angle), 0.0, -math.cos(angle)), gather.WIDEST_SUN)
+    one = bake(grid(48), Illumination([sun], WALL), MATERIAL, 0.0, SETTINGS)
+    rays = bake(grid(48), Illumination([replace(sun, angle=1.0001 * sun.angle)], WALL), MATERIAL, 0.0, SETTINGS)
+    difference = np.abs(one - rays) / rays.mean(axis=(0, 1))
+    assert 0 < difference.mean() < 2e-3
 
 
 MEMORY = """

@@ -72,7 +72,6 @@ def test_instances_shade_as_copies_do(seed, stretch, kind, far, is_sun):
     transmittances, numbers = see_through(kind)
     materials = None if numbers is None else rng.choice(numbers, (len(triangles), 1)).astype(np.uint32)
     places = placements(rng, 12, stretch, shift)
-    mesh = native.OccluderMesh(vertices + (5, 3, -4), triangles, None, transmittances, materials, uvs)
     # The mesh lies off its own origin: what counts is where its placement puts it.
     off = places.reshape(-1, 3, 4).copy()
     off[:, :, 3] -= off[:, :, :3] @ (5, 3, -4)
@@ -84,7 +83,7 @@ def test_instances_shade_as_copies_do(seed, stretch, kind, far, is_sun):
     assert copied.is_opaque == shared.is_opaque == (kind == "opaque")
     light = native.SunLight((0.3, 0.2, -1)) if is_sun else native.PointLight(shift + (0.2, 0.1, 1.5))
     one, other = (native.gather_beams(floor(shift), light, occluders)[0] for occluders in (copied, shared))
-    assert (one < 0.9 * one.max()).mean() > 0.05
+    assert (one < 0.9 * one.max()).mean() > 0.01
     differs = np.abs(one - other) > 1e-6 * one.max()
     assert differs.mean() < 2e-3
     np.testing.assert_allclose(one.sum(), other.sum(), rtol=1e-4)
@@ -122,9 +121,10 @@ def test_boxes_of_instances_hide_no_shadow(seed, far, lamp, kind, size):
     far=st.sampled_from([0.0, 1e4]),
     angle=st.sampled_from([0.0, 60.0, 89.0]),
     stretch=st.sampled_from([1.0, 30.0]),
+    size=st.sampled_from([1.0, 3000.0]),
 )
-def test_an_instanced_receiver_does_not_shadow_itself(seed, far, angle, stretch):
-    """The receiver is one of the instances of a tessellated card, in a random plane, stretched along itself."""
+def test_an_instanced_receiver_does_not_shadow_itself(seed, far, angle, stretch, size):
+    """The receiver is a part of an instance of a tessellated card, in a random plane, stretched along itself."""
     rng = np.random.default_rng(seed)
     axes, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     centre = far * rng.normal(size=3)
@@ -133,14 +133,15 @@ def test_an_instanced_receiver_does_not_shadow_itself(seed, far, angle, stretch)
     faces = [(corner, corner + 1, corner + 6), (corner, corner + 6, corner + 5)]
     triangles = np.concatenate([np.stack(face, 1) for face in faces]).astype(np.uint32)
     vertices = np.stack([x, y, np.zeros_like(x)], -1).reshape(-1, 3)
-    linear = axes.T * (1, 1 / stretch, 0.7)
-    places = [np.column_stack([linear, centre]), np.column_stack([linear, centre - 5 * axes[2]])]
+    linear = axes.T * (size, size / stretch, 0.7 * size)
+    places = [np.column_stack([linear, centre]), np.column_stack([linear, centre - 5 * size * axes[2]])]
     mesh = native.OccluderMesh(vertices, triangles, np.reshape(places, (2, 12)))
     # As the add-on does: an origin near the receiver, not at it.
-    occluders = native.Occluders.of_meshes([mesh], np.round(centre / 8) * 8, most_copied=0)
+    middle = centre + linear @ (*rng.uniform(-0.5, 0.5, 2), 0) * (size > 1)
+    occluders = native.Occluders.of_meshes([mesh], np.round(middle / 8) * 8, most_copied=0)
     assert occluders.instance_count == 2
     half = np.array([0.9, 0.9 / stretch])
-    grid = native.ReceiverGrid(centre - half @ axes[:2], *axes, half[0] / 8, half[1] / 8, 16, 16)
+    grid = native.ReceiverGrid(middle - half @ axes[:2], *axes, half[0] / 8, half[1] / 8, 16, 16)
     local = travel(angle, seed % 360)
     lit, _ = native.gather_beams(grid, native.SunLight(local @ axes), occluders)
     np.testing.assert_allclose(lit, -local[2], rtol=1e-6)

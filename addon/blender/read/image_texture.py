@@ -89,7 +89,7 @@ def _mapping(mapping: End) -> np.ndarray:
 
 
 class Pixels:
-    """Pixels of images, read once."""
+    """Pixels of a material's images, read once."""
 
     def __init__(self) -> None:
         self._known: dict[str, np.ndarray] = {}
@@ -134,16 +134,18 @@ def resampled(texels: np.ndarray, place: TexturePlace, size: tuple[int, int]) ->
     return texels
 
 
-def outputs_of(node, stored: np.ndarray) -> dict[str, np.ndarray]:
-    """Color, linear (H, W, 3), and Alpha (H, W, 1) from pixels as stored, or as interpolated between these."""
-    color, alpha = stored[..., :3], stored[..., 3:]
-    image = node.image
+def alpha_of(node, stored: np.ndarray) -> np.ndarray:
+    """(H, W, 1) from the alpha of pixels as stored."""
+    return np.ones_like(stored) if node.image is not None and node.image.alpha_mode == "NONE" else stored
+
+
+def color_of(node, stored: np.ndarray) -> np.ndarray:
+    """Linear (H, W, 3) from pixels as stored, or as interpolated between these."""
+    color, alpha, image = stored[..., :3], stored[..., 3:], node.image
     if image is None:
-        return {"Color": color, "Alpha": alpha}
+        return color
     is_data = image.colorspace_settings.is_data
-    if image.alpha_mode == "NONE":
-        alpha = np.ones_like(alpha)
-    elif image.alpha_mode != "CHANNEL_PACKED" and not is_data:
+    if image.alpha_mode not in ("NONE", "CHANNEL_PACKED") and not is_data:
         # Cycles works with associated alpha and takes it off again where the node's alpha is used.
         wants_straight = "Alpha" in node.outputs and node.outputs["Alpha"].is_linked
         if image.is_float and wants_straight:
@@ -152,4 +154,9 @@ def outputs_of(node, stored: np.ndarray) -> dict[str, np.ndarray]:
             color = color * alpha
     if not (is_data or image.is_float or image.colorspace_settings.name.startswith("Linear")):
         color = np.where(color <= 0.04045, color / 12.92, ((np.maximum(color, 0) + 0.055) / 1.055) ** 2.4)
-    return {"Color": color, "Alpha": alpha}
+    return color
+
+
+def outputs_of(node, stored: np.ndarray) -> dict[str, np.ndarray]:
+    """Color and Alpha of pixels as stored, or as interpolated between these."""
+    return {"Color": color_of(node, stored), "Alpha": alpha_of(node, stored[..., 3:])}

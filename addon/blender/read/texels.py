@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .image_texture import NotUnderstoodError, Pixels, TexturePlace, outputs_of, place_of, resampled
+from .image_texture import NotUnderstoodError, Pixels, TexturePlace, alpha_of, color_of, place_of, resampled
 from .node_links import End, Wanted
 from .node_values import Evaluator, converted
 
@@ -62,15 +62,17 @@ class Texels(Evaluator):
 
     def _texture(self, end: End) -> np.ndarray:
         node = end.node
-        stored = self._pixels(node.image)
+        stored, evaluate = self._pixels(node.image), color_of
+        if end.socket.name == "Alpha":
+            stored, evaluate = stored[..., 3:], alpha_of
         if stored.shape[:2] != (1, 1):
             place = place_of(end)
             if self.place not in (None, place):
                 raise NotUnderstoodError(f"the node '{node.name}', which places its image otherwise than another, is")
             self.place = place
             self.largest = tuple(map(max, self.largest, stored.shape[:2]))
-            stored = np.zeros((1, 1, 4)) if self._is_outside else resampled(stored, place, self._size)
-        return outputs_of(node, stored)[end.socket.name]
+            stored = np.zeros_like(stored[:1, :1]) if self._is_outside else resampled(stored, place, self._size)
+        return evaluate(node, stored)
 
     def _light_path(self, end: End) -> np.ndarray:
         """What shades is asked of shadow rays, whatever they left from."""

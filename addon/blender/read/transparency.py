@@ -19,7 +19,7 @@ from .texels import FINE_SIDE, Texels
 # A size that tells what comes from images from what is constant.
 PROBE = (2, 2)
 
-BLACK, WHITE = np.zeros((1, 1, 3)), np.ones((1, 1, 3))
+BLACK = np.zeros((1, 1, 1), np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,6 @@ class Materials:
 
     def __init__(self) -> None:
         self.warnings: list[str] = []
-        self._pixels = Pixels()
         self._known: dict[str | None, LetThrough] = {None: OPAQUE}
 
     def read(self, material) -> LetThrough:
@@ -69,21 +68,21 @@ class Materials:
             return OPAQUE
 
     def _evaluate(self, surface: Wanted) -> LetThrough:
+        pixels = Pixels()  # of this material alone: they may take gigabytes
         # Once to see which images there are, then at the texels of the largest of them, or between.
-        values = Texels(self._pixels, PROBE)
+        values = Texels(pixels, PROBE)
         transmittance = transparency(values, surface)
         place = values.place
         if place is None:
-            return LetThrough(native.Transmittance(_in_range(transmittance)[0, 0].tolist()))
+            return LetThrough(native.Transmittance(_color(transmittance)))
         finer = max(1, FINE_SIDE // max(values.largest)) if values.is_bent else 1
         size = tuple(side * finer for side in values.largest)
-        texels = _in_range(transparency(Texels(self._pixels, size), surface))
+        texels = _in_range(transparency(Texels(pixels, size), surface))
         if (texels[..., :1] == texels).all():
             texels = texels[..., :1]
-        outside = _in_range(transparency(Texels(self._pixels, is_outside=True), surface))[0, 0].tolist()
-        image = native.Transmittance.from_image(
-            np.ascontiguousarray(texels, np.float32), place.extension, place.is_smooth, outside
-        )
+        texels = np.ascontiguousarray(texels, np.float32)
+        outside = _color(transparency(Texels(pixels, is_outside=True), surface))
+        image = native.Transmittance.from_image(texels, place.extension, place.is_smooth, outside)
         return LetThrough(image, place)
 
 
@@ -91,8 +90,12 @@ def _in_range(transmittance: np.ndarray) -> np.ndarray:
     return np.clip(np.nan_to_num(transmittance), 0, 1)
 
 
+def _color(transmittance: np.ndarray) -> list[float]:
+    return np.broadcast_to(_in_range(transmittance)[0, 0], 3).tolist()
+
+
 def transparency(values: Texels, wanted: Wanted) -> np.ndarray:
-    """The weight of a shader's transparent closures, (1 or H, 1 or W, 3)."""
+    """The weight of a shader's transparent closures, as of `Texels`."""
     end = follow(wanted)
     if not end.socket.is_output or end.node.mute:
         return BLACK
@@ -100,7 +103,7 @@ def transparency(values: Texels, wanted: Wanted) -> np.ndarray:
     if kind == "ShaderNodeBsdfTransparent":
         return values.color(end.input("Color"))
     if kind == "ShaderNodeBsdfPrincipled":
-        return WHITE * (1 - np.clip(values.number(end.input("Alpha")), 0, 1))
+        return 1 - np.clip(values.number(end.input("Alpha")), 0, 1)
     if kind == "ShaderNodeAddShader":
         return transparency(values, end.input(0)) + transparency(values, end.input(1))
     if kind == "ShaderNodeMixShader":

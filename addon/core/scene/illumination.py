@@ -89,7 +89,7 @@ class Illumination:
         origin = tuple(step * np.round(grid.centre / step))
         if any(known != origin for known, _ in self._casters):
             self._casters.clear()  # before others are made: each may take gigabytes
-        blockers = getattr(light, "blockers", None)
+        blockers = light.blockers if light else None
         names = {occluder.name for occluder in self._occluders}
         chosen = None if blockers is None or names <= blockers else frozenset(names & blockers)
         if (origin, chosen) not in self._casters:

@@ -13,7 +13,9 @@ from .light import ExtendedLight
 
 @dataclass(frozen=True)
 class AreaLight(ExtendedLight):
-    """A rectangle or ellipse that shines from its front; `strength` is Cycles' watts.
+    """A rectangle or ellipse that shines from its front, of the radiance `strength` / (4 area).
+
+    That is Cycles' watts in Blender 3.4; in 4.2 and 4.5 a watt gives strength / (pi area), 4 / pi of it.
 
     Attributes
     ----------
