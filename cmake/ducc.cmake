@@ -5,18 +5,18 @@ endif()
 set(ducc_src ${DUCC_SOURCE_DIR}/src)
 
 # What templates and inline functions become for a newer processor must not be what the linker keeps for the rest of
-# the program: each target is linked into one object file, where the groups that linkers merge by name are dissolved
+# the program: each is linked into one object file, where the groups that linkers merge by name are dissolved
 # (--force-group-allocation) and every symbol but the one that it is found by is local, which unique ones could not be.
 set(ducc_objects)
-function(ducc_target name)
-  add_library(ducc_${name} OBJECT ${CMAKE_SOURCE_DIR}/native/fft/targets/fft.cpp ${ducc_src}/ducc0/infra/mav.cc
+function(ducc_instruction_set name)
+  add_library(ducc_${name} OBJECT ${CMAKE_SOURCE_DIR}/native/fft/instruction_sets/fft.cpp ${ducc_src}/ducc0/infra/mav.cc
               ${ducc_src}/ducc0/infra/string_utils.cc ${ducc_src}/ducc0/infra/threading.cc)
   target_include_directories(ducc_${name} PRIVATE ${CMAKE_SOURCE_DIR}/native)
   # Threads are ours (base/threads.h): a guest in another process brings no pool of its own. DUCC's own switch for
   # that, DUCC0_NO_LOWLEVEL_THREADING, would also take the locks off the plans that our threads share.
   target_include_directories(ducc_${name} SYSTEM PRIVATE ${ducc_src} ${CMAKE_SOURCE_DIR}/cmake/ducc)
   target_compile_definitions(ducc_${name} PRIVATE DUCC0_CUSTOM_LOWLEVEL_THREADING
-                             BEAMSPREAD_FFT_TARGET=beamspread_fft_${name})
+                             BEAMSPREAD_FFT_INSTRUCTION_SET=beamspread_fft_${name})
   target_compile_options(ducc_${name} PRIVATE -w -O3 -fno-gnu-unique ${ARGN})
   if(BEAMSPREAD_SANITIZE)
     # Minutes to compile otherwise, and not what a sanitizer is here to check.
@@ -31,14 +31,14 @@ function(ducc_target name)
   set(ducc_objects ${ducc_objects} ${object} PARENT_SCOPE)
 endfunction()
 
-ducc_target(baseline)
+ducc_instruction_set(baseline)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
-  ducc_target(avx2 -march=x86-64-v3)
-  ducc_target(avx512 -march=x86-64-v4)
+  ducc_instruction_set(avx2 -march=x86-64-v3)
+  ducc_instruction_set(avx512 -march=x86-64-v4)
 endif()
-list(LENGTH ducc_objects ducc_target_count)
+list(LENGTH ducc_objects ducc_instruction_set_count)
 add_library(beamspread_ducc STATIC ${ducc_objects})
 set_target_properties(beamspread_ducc PROPERTIES LINKER_LANGUAGE CXX)
-if(ducc_target_count GREATER 1)
-  target_compile_definitions(beamspread_ducc INTERFACE BEAMSPREAD_FFT_TARGETS)
+if(ducc_instruction_set_count GREATER 1)
+  target_compile_definitions(beamspread_ducc INTERFACE BEAMSPREAD_FFT_INSTRUCTION_SETS)
 endif()

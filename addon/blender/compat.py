@@ -54,6 +54,26 @@ def world_of(depsgraph):
     return world and world.evaluated_get(depsgraph)
 
 
+def sun_disk() -> str:
+    """How Cycles shapes a sun with an angle (see `SunDiskLight`): measured in 3.4 and 4.5, not between."""
+    return "flat" if bpy.app.version < (4, 0, 0) else "even"
+
+
+def area_lamp_factor() -> float:
+    """Over `AreaLight`'s radiance of P / (4 A): Cycles has P / (pi A) from 4.2 on. 4.0 is not measured."""
+    return 1.0 if bpy.app.version < (4, 0, 0) else 4 / math.pi
+
+
+def flat_area_lamps_shine() -> bool:
+    """Whether Cycles lights by area lamps of scale 0 along their axis (3.4 does, 4.5 does not)."""
+    return bpy.app.version < (4, 0, 0)
+
+
+def instancer_hides_lamps() -> bool:
+    """Whether Cycles asks the instancer's visibility, too, of lamps (4.5 does, 3.4 of meshes alone)."""
+    return bpy.app.version >= (4, 4, 0)
+
+
 def round_lamp_model(light) -> str:
     """How Cycles shapes a lamp with a radius (see `SphereLight`)."""
     soft = getattr(light, "use_soft_falloff", bpy.app.version < (4, 0, 0))
@@ -61,13 +81,8 @@ def round_lamp_model(light) -> str:
 
 
 def light_strength(light) -> float:
-    """Energy with exposure (Blender 4.5 on) applied, as `Light` counts it.
-
-    Radiance times area of an area light is a quarter of its energy, from Blender 4.5 on a pi-th; opening an older file
-    there changes its energy.
-    """
-    quarters = 4 / math.pi if light.type == "AREA" and bpy.app.version >= (4, 5, 0) else 1.0
-    return quarters * light.energy * 2.0 ** getattr(light, "exposure", 0.0)
+    """Energy with exposure (Blender 4.5 on) applied."""
+    return light.energy * 2.0 ** getattr(light, "exposure", 0.0)
 
 
 def light_color(light) -> tuple[float, float, float]:

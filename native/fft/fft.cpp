@@ -12,15 +12,15 @@ namespace {
 
 struct Named {
     const char* name;
-    const FftTarget* target;
+    const FftInstructionSet* instructions;
 };
 
 // Fastest first.
-const std::vector<Named>& targets()
+const std::vector<Named>& runnable_sets()
 {
     static const std::vector<Named> runnable = [] {
         std::vector<Named> found;
-#ifdef BEAMSPREAD_FFT_TARGETS
+#ifdef BEAMSPREAD_FFT_INSTRUCTION_SETS
         __builtin_cpu_init();
         // What the compiler's levels x86-64-v4 and -v3 stand for.
         if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
@@ -36,10 +36,10 @@ const std::vector<Named>& targets()
     return runnable;
 }
 
-const FftTarget& fastest()
+const FftInstructionSet& fastest()
 {
-    static const FftTarget& target = *targets().front().target;
-    return target;
+    static const FftInstructionSet& instructions = *runnable_sets().front().instructions;
+    return instructions;
 }
 
 }  // namespace
@@ -69,8 +69,8 @@ void complex_in_place(Complex* lines, std::size_t count, std::size_t size, bool 
     fastest().complex_in_place(lines, count, size, forward);
 }
 
-void real_to_half_2d(const FftTarget& target, const float* real, Complex* half, std::size_t height, std::size_t width,
-                     int threads)
+void real_to_half_2d(const FftInstructionSet& instructions, const float* real, Complex* half, std::size_t height,
+                     std::size_t width, int threads)
 {
     const std::size_t columns = width / 2 + 1;
     // Some hundred kilobytes, so that an item stays in the cache.
@@ -79,12 +79,12 @@ void real_to_half_2d(const FftTarget& target, const float* real, Complex* half, 
         parallel_for((height + lines - 1) / lines, [&](std::size_t item) {
             const std::size_t first = item * lines;
             const std::size_t count = std::min(lines, height - first);
-            target.real_to_half(real + first * width, half + first * columns, count, width);
+            instructions.real_to_half(real + first * width, half + first * columns, count, width);
         });
         parallel_for((columns + lines - 1) / lines, [&](std::size_t item) {
             const std::size_t first = item * lines;
             const std::size_t count = std::min(lines, columns - first);
-            target.complex_columns(half + first, count, height, columns);
+            instructions.complex_columns(half + first, count, height, columns);
         });
     });
 }
@@ -92,17 +92,17 @@ void real_to_half_2d(const FftTarget& target, const float* real, Complex* half, 
 std::vector<std::string> fft_instruction_sets()
 {
     std::vector<std::string> names;
-    for (const Named& entry : targets())
+    for (const Named& entry : runnable_sets())
         names.emplace_back(entry.name);
     return names;
 }
 
-const FftTarget& fft_target(const std::string& instruction_set)
+const FftInstructionSet& fft_instruction_set(const std::string& instruction_set)
 {
     std::string allowed;
-    for (const Named& entry : targets()) {
+    for (const Named& entry : runnable_sets()) {
         if (instruction_set == entry.name)
-            return *entry.target;
+            return *entry.instructions;
         allowed += (allowed.empty() ? "'" : ", '") + std::string(entry.name) + "'";
     }
     reject("instruction_set", "'" + instruction_set + "'", allowed + " on this processor");

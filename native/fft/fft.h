@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "fft/targets/fft.h"
+#include "fft/instruction_sets/fft.h"
 
 namespace beamspread {
 
@@ -24,14 +24,14 @@ void complex_in_place(Complex* lines, std::size_t count, std::size_t size, bool 
 
 // Two-dimensional transform of (height, width) real values, width even: (height, width / 2 + 1) frequencies. What the
 // cost of the solver is counted in.
-void real_to_half_2d(const FftTarget& target, const float* real, Complex* half, std::size_t height, std::size_t width,
-                     int threads);
+void real_to_half_2d(const FftInstructionSet& instructions, const float* real, Complex* half, std::size_t height,
+                     std::size_t width, int threads);
 
 // What the transforms were compiled for and this processor has, fastest first: "avx512", "avx2", "baseline". The
 // functions above use the first.
 std::vector<std::string> fft_instruction_sets();
 
 // The transforms as compiled for one of these, so that tests reach each of them. Throws InvalidArgument.
-const FftTarget& fft_target(const std::string& instruction_set);
+const FftInstructionSet& fft_instruction_set(const std::string& instruction_set);
 
 }  // namespace beamspread

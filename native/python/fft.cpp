@@ -7,9 +7,9 @@ namespace beamspread {
 
 namespace {
 
-const FftTarget& target_named(const std::string& instruction_set)
+const FftInstructionSet& instructions_named(const std::string& instruction_set)
 {
-    return fft_target(instruction_set.empty() ? fft_instruction_sets().front() : instruction_set);
+    return fft_instruction_set(instruction_set.empty() ? fft_instruction_sets().front() : instruction_set);
 }
 
 std::size_t side(const py::array& array, py::ssize_t axis)
@@ -28,25 +28,25 @@ Array<Complex> real_transform(const Array<float>& values, int threads, const std
     check_lines("values", values);
     if (values.shape(1) % 2 != 0)
         reject("values", std::to_string(values.shape(1)) + " columns", "an even number of columns");
-    const FftTarget& target = target_named(instruction_set);
+    const FftInstructionSet& instructions = instructions_named(instruction_set);
     const std::size_t height = side(values, 0);
     const std::size_t width = side(values, 1);
     Array<Complex> spectrum({height, width / 2 + 1});
     Complex* out = spectrum.mutable_data();
     const float* in = values.data();
     const py::gil_scoped_release release;
-    real_to_half_2d(target, in, out, height, width, threads);
+    real_to_half_2d(instructions, in, out, height, width, threads);
     return spectrum;
 }
 
 Array<Complex> real_lines(const Array<float>& values, const std::string& instruction_set)
 {
     check_lines("values", values);
-    const FftTarget& target = target_named(instruction_set);
+    const FftInstructionSet& instructions = instructions_named(instruction_set);
     const std::size_t count = side(values, 0);
     const std::size_t size = side(values, 1);
     Array<Complex> half({count, size / 2 + 1});
-    target.real_to_half(values.data(), half.mutable_data(), count, size);
+    instructions.real_to_half(values.data(), half.mutable_data(), count, size);
     return half;
 }
 
@@ -55,22 +55,22 @@ Array<float> half_lines(const Array<Complex>& half, std::size_t size, const std:
     check_lines("half", half);
     if (size / 2 + 1 != side(half, 1))
         reject("size", static_cast<double>(size), "one whose half has as many frequencies as the lines");
-    const FftTarget& target = target_named(instruction_set);
+    const FftInstructionSet& instructions = instructions_named(instruction_set);
     const std::size_t count = side(half, 0);
     Array<float> values({count, size});
-    target.half_to_real(half.data(), values.mutable_data(), count, size);
+    instructions.half_to_real(half.data(), values.mutable_data(), count, size);
     return values;
 }
 
 Array<Complex> complex_lines(const Array<Complex>& values, bool forward, const std::string& instruction_set)
 {
     check_lines("values", values);
-    const FftTarget& target = target_named(instruction_set);
+    const FftInstructionSet& instructions = instructions_named(instruction_set);
     const std::size_t count = side(values, 0);
     const std::size_t size = side(values, 1);
     Array<Complex> result({count, size});
     std::copy_n(values.data(), count * size, result.mutable_data());
-    target.complex_in_place(result.mutable_data(), count, size, forward);
+    instructions.complex_in_place(result.mutable_data(), count, size, forward);
     return result;
 }
 

@@ -10,3 +10,4 @@ def empty_file():
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.render.engine = "CYCLES"
     bpy.context.scene.beamspread.quality = "preview"
+    bpy.context.scene.beamspread.use_indirect = False  # starts another Blender; test_indirect.py asks for it

@@ -1,14 +1,22 @@
-"""What Cycles makes of a scene: the irradiance of a white diffuse plane."""
+"""The irradiance of a white diffuse plane, by Cycles and by the add-on."""
 
 import math
 
 import bpy
 import numpy as np
 import scenes
+from beamspread.blender.read.geometry import read_polygons
+from beamspread.blender.read.lights import read_illumination
+from beamspread.core.bake.gather import Gatherer
+from beamspread.core.bake.settings import BakeSettings
+from beamspread.core.scene.receiver import build_receiver
+from beamspread.core.scene.uv_map import fit_uv_maps
 
 TEXELS = 64
 # Cycles samples each texel at random places; with this many their mean is that of the texel to 0.1 %.
 CYCLES_SAMPLES = 256
+# From each texel of ours, where something casts shadows.
+RAYS = 256
 
 
 def white_material(texels=TEXELS):
@@ -51,3 +59,17 @@ def around(values):
     padded = np.pad(values, 1, mode="edge")
     height, width = values.shape
     return np.stack([padded[i : i + height, j : j + width] for i in range(3) for j in range(3)])
+
+
+def our_irradiance(plane):
+    """The same by the add-on, and the coverage of the texels."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    illumination = read_illumination(depsgraph).lighting(plane.name)
+    polygons = read_polygons(plane.evaluated_get(depsgraph), plane.data.materials[0].name)
+    receiver = build_receiver(fit_uv_maps(polygons), TEXELS, TEXELS)
+    grid = receiver.charts[0].grid
+    gatherer = Gatherer(grid, illumination, BakeSettings(samples=8))
+    total = np.zeros((grid.height, grid.width, 3), np.float32)
+    for light in illumination.lights:
+        total += gatherer.totals(light, RAYS)[0] * light.rgb()
+    return receiver.to_texture([total]), receiver.coverage

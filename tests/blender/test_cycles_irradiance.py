@@ -6,14 +6,8 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from beamspread.blender.read.geometry import read_polygons
-from beamspread.blender.read.lights import read_illumination
-from beamspread.core.bake.arrival import arrive
-from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.native import native
-from beamspread.core.scene.receiver import build_receiver
-from beamspread.core.scene.uv_map import fit_uv_maps
-from cycles_truth import CYCLES_SAMPLES, TEXELS, add_receiver, around, cycles_irradiance
+from cycles_truth import CYCLES_SAMPLES, TEXELS, add_receiver, around, cycles_irradiance, our_irradiance
 from mathutils import Euler, Matrix
 
 TOLERANCE = 0.01
@@ -65,17 +59,6 @@ def frame_of(plane):
     x_axis = world.col[0].to_3d().normalized()
     axes = Matrix((x_axis, normal.cross(x_axis), normal)).transposed().to_4x4()
     return Matrix.Translation(world.translation) @ axes @ Matrix.Scale(world.col[0].length, 4)
-
-
-def our_irradiance(plane):
-    """The same by the add-on, and the coverage of the texels."""
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    illumination = read_illumination(depsgraph)
-    polygons = read_polygons(plane.evaluated_get(depsgraph), "White")
-    receiver = build_receiver(fit_uv_maps(polygons), TEXELS, TEXELS)
-    grid = receiver.charts[0].grid
-    irradiance, _ = arrive(grid, illumination, BakeSettings(samples=8))
-    return receiver.to_texture([irradiance * grid.coverage[..., None]]), receiver.coverage
 
 
 def inside_one_triangle(plane):

@@ -67,15 +67,15 @@ def irradiance(light, cuts=24, points=16):
     return total / points**2 * light.rgb()
 
 
-def assert_agrees(*, lights=1, **tolerance):
+def assert_agrees(*, lights=1, texels=8):
     """The sum of all glowing meshes."""
-    plane, image = add_receiver(Matrix(), texels=8)
+    plane, image = add_receiver(Matrix(), texels=texels)
     cycles = cycles_irradiance(plane, image, 512).mean(axis=(0, 1))
     bpy.data.objects.remove(plane)
     found = read().lights
     assert len(found) == lights
     assert all(isinstance(light, MeshLight) and light.cast_shadow for light in found)
-    assert sum(irradiance(light) for light in found) == pytest.approx(cycles, **(tolerance or NOISE))
+    assert sum(irradiance(light) for light in found) == pytest.approx(cycles, **NOISE)
     assert cycles.max() > 0
 
 
@@ -124,7 +124,10 @@ def test_materials_of_faces():
     (light,) = read().lights
     # Per glowing quad two triangles.
     assert len(light.triangles) == 8
-    assert sorted(set(map(tuple, light.radiance.astype(float).round(3).tolist()))) == [(0.4, 4.0, 0.8), (1.0, 0.5, 0.25)]
+    assert sorted(set(map(tuple, light.radiance.astype(float).round(3).tolist()))) == [
+        (0.4, 4.0, 0.8),
+        (1.0, 0.5, 0.25),
+    ]
 
 
 def test_instances_are_one_light():
@@ -186,7 +189,8 @@ def test_an_image_glows_by_its_uv_map(coordinates):
     add_panel(Matrix.Translation((0, 0, 0.4)), (1.5, 1.5), material)
     light = read().lights[0]
     assert 4000 < len(light.triangles) < 20000
-    assert_agrees()
+    # Of texels on the diagonal Cycles samples a half, which tells where one side of the plane is brighter.
+    assert_agrees(texels=64)
 
 
 def set_flag(name):

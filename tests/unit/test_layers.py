@@ -16,7 +16,7 @@ def native_folders():
         str.split, re.findall(r"^beamspread_folder\((.*)\)$", (ROOT / "CMakeLists.txt").read_text(), re.MULTILINE)
     ):
         known[folder] = {folder, *direct}.union(*(known[name] for name in direct))
-    return known | {"python": {"python", *known}, "fft/targets": {"fft/targets"}}
+    return known | {"python": {"python", *known}, "fft/instruction_sets": {"fft/instruction_sets"}}
 
 
 def test_native_includes_point_upwards():
@@ -26,7 +26,7 @@ def test_native_includes_point_upwards():
         for path in [*NATIVE.rglob("*.cpp"), *NATIVE.rglob("*.h")]
         for header in re.findall(r'^#include "([^"]+)"', path.read_text(), re.MULTILINE)
         if (NATIVE / header).exists()
-        and str(Path(header).parent) not in may_include[str(path.relative_to(NATIVE).parent)] | {"fft/targets"}
+        and str(Path(header).parent) not in may_include[str(path.relative_to(NATIVE).parent)] | {"fft/instruction_sets"}
     ]
     assert not wrong
 

@@ -125,16 +125,16 @@ def test_directions_of_a_low_wide_light_are_kept():
     """A panel against itself in 100 parts, each its own light: the parts have one direction each, but for .06 rad.
 
     What they differ by, as the square of that angle, is some 3e-4 of the luminance; rays make 2e-3 of noise in the
-    penumbra. The mean direction alone would be off by far more, and so would light from everywhere.
+    penumbra, where ten parts make steps. The mean direction alone would be off by far more.
     """
 
     def bake_one(lights):
-        return bake(grid(64), Illumination(lights, WALL), MATERIAL, 0.0, SETTINGS)
+        return bake(grid(64), Illumination(lights, WALL), MATERIAL, 0.0, replace(SETTINGS, samples=4))
 
     truth, whole = bake_one(split(panel(), 10)), bake_one([panel()])
     error = np.abs(whole - truth) / truth.mean(axis=(0, 1))
     assert error.mean() < 3e-3
-    assert error.max() < 4e-2
+    assert np.quantile(error, 0.99) < 3e-2
     mirrored = bake_one([replace(panel(), position=(-0.9, 0.0, 0.6), frame=(*ASIDE[:2], (-1.0, 0.0, 0.0)))])
     assert np.abs(mirrored - truth).mean() > 0.2 * truth.mean()
 
@@ -143,10 +143,11 @@ def test_directions_of_a_low_wide_light_are_kept():
 def test_solvers_that_take_lights_apart_agree(solver, monkeypatch):
     """Ray by ray, each a light of one direction per texel: the same rays, so what differs is the solvers' tolerance."""
     for name in ("MOST_RAYS", "FEWEST_RAYS"):
-        monkeypatch.setattr(luminance, name, 32)  # two rays, by samples of 1
-    arguments = grid(16), Illumination([panel(), sky()], WALL), MATERIAL, 0.02
-    apart = bake(*arguments, replace(SETTINGS, solver=solver))
-    assert relative_error(bake(*arguments, SETTINGS), apart) < 4 * TOLERANCE
+        monkeypatch.setattr(luminance, name, 2)
+    arguments = grid(16), Illumination([sky()], WALL), MATERIAL, 0.0
+    settings = replace(SETTINGS, samples=4)
+    apart = bake(*arguments, replace(settings, solver=solver))
+    assert relative_error(bake(*arguments, settings), apart) < 4 * TOLERANCE
 
 
 def sky():

@@ -5,7 +5,7 @@ import pytest
 from beamspread import Medium, convolve, convolve_lights, library, simulate
 from scipy.ndimage import uniform_filter
 
-from helpers import travel
+from helpers import lamp, lights_of, lit_texels, travel
 
 # Planes up to 192 x 192 texels keep all terms.
 SIZE = 200
@@ -23,54 +23,6 @@ MEDIA = {
 @pytest.fixture(scope="module")
 def media():
     return {name: make() for name, make in MEDIA.items()}
-
-
-def lamp(x, y, height):
-    """Irradiance and directions of a point lamp, lengths in widths of the plane."""
-    across = (np.arange(SIZE) + 0.5) / SIZE - 0.5
-    field = np.stack([*np.meshgrid(across - x, across - y), np.full((SIZE, SIZE), -height)], -1)
-    distance = np.linalg.norm(field, axis=-1, keepdims=True)
-    return (height / distance[..., 0] ** 3).astype(np.float32), (field / distance).astype(np.float32)
-
-
-def noise(rng, waves):
-    """Smooth noise of standard deviation 1."""
-    frequencies = np.hypot(*np.meshgrid(*[np.fft.fftfreq(SIZE) * SIZE] * 2))
-    spectrum = np.fft.fft2(rng.normal(size=(SIZE, SIZE))) * np.exp(-0.5 * (frequencies / waves) ** 2)
-    smooth = np.fft.ifft2(spectrum).real
-    return smooth / smooth.std()
-
-
-def field(kind, rng):
-    """Lights of some kind: irradiance and directions of each."""
-    if kind == "smooth":  # few texels have extreme angles
-        directions = travel(np.clip(45 + 20 * noise(rng, 3), 0, 89), np.degrees(2 * noise(rng, 3)))
-    elif kind in ("texels", "blocks"):
-        side = {"texels": 1, "blocks": 8}[kind]
-        shape = SIZE // side, SIZE // side
-        directions = np.kron(travel(rng.uniform(0, 89, shape), rng.uniform(0, 360, shape)), np.ones((side, side, 1)))
-    else:
-        return {
-            "lamp": [lamp(0.1, -0.2, 0.1)],
-            "aside": [lamp(0.3, 0.0, 0.1)],
-            "grazing": [lamp(-0.2, 0.1, 0.01)],
-            "outside": [lamp(0.8, 0.1, 0.02)],
-            "beside": [lamp(0.2, -0.2, 0.02)],
-            "two lamps": [lamp(-0.02, -0.2, 0.05), lamp(0.22, 0.15, 0.05)],
-        }[kind]
-    return [(np.ones((SIZE, SIZE), np.float32), directions)]
-
-
-def mask(kind, rng):
-    lit = np.zeros((SIZE, SIZE), np.float32)
-    if kind == "texels":
-        lit[rng.random(lit.shape) < 0.3] = 1
-    elif kind == "blocks":
-        lit = np.kron(rng.random((8, 8)) < 0.6, np.ones((SIZE // 8, SIZE // 8))).astype(np.float32)
-    else:
-        part = {"none": np.s_[:], "half": np.s_[:, : SIZE // 2], "stripes": np.s_[:, ::8], "corner": np.s_[:33, :33]}
-        lit[part[kind]] = 1
-    return lit
 
 
 def assert_within(tolerance, result, expected, floor=FLOOR):
@@ -99,8 +51,8 @@ def assert_within(tolerance, result, expected, floor=FLOOR):
 def test_all_errors_are_below_the_tolerance(media, medium, albedo, light, shadows, mean_free_path):
     """Against all terms, which the tests of `convolve` and the next one compare with `direct`."""
     rng = np.random.default_rng(31)
-    lit = mask(shadows, rng)
-    lights = [(irradiance * lit, directions) for irradiance, directions in field(light, rng)]
+    lit = lit_texels(shadows, SIZE, rng)
+    lights = [(irradiance * lit, directions) for irradiance, directions in lights_of(light, SIZE, rng)]
     paths = mean_free_path * np.array([1, 0.7, 0.5])
     arguments = lights, media[medium], albedo, paths, 1.0
     exact = convolve_lights(*arguments, tolerance=1e-7)
@@ -121,7 +73,7 @@ def test_patches_of_light_against_direct(media, light, mean_free_path):
     lit = np.zeros((SIZE, SIZE), np.float32)
     for y, x in rng.integers(0, SIZE - 5, (6, 2)):
         lit[y : y + 5, x : x + 5] = 1
-    ((irradiance, directions),) = field(light, rng)
+    ((irradiance, directions),) = lights_of(light, SIZE, rng)
     arguments = irradiance * lit, directions, media["ior 1"], (0.6, 0.9, 0.3), mean_free_path, 1.0
     direct = convolve(*arguments, solver="direct")
     for tolerance in (1e-2, 1e-3):
@@ -133,7 +85,7 @@ def test_light_that_spreads_as_far_as_the_plane_against_direct(media):
     rng = np.random.default_rng(34)
     lit = np.zeros((SIZE, SIZE), np.float32)
     lit[:16, :16] = 1
-    ((irradiance, directions),) = field("texels", rng)
+    ((irradiance, directions),) = lights_of("texels", SIZE, rng)
     arguments = irradiance * lit, directions, media["ior 1"], 0.9, 300.0, 1.0
     direct = convolve(*arguments, solver="direct")
     for tolerance in (1e-2, 1e-3):
@@ -154,27 +106,27 @@ def test_grazing_light_against_direct(media):
 
 def test_terms_are_left_out(media):
     """A loose tolerance changes the result by about what it allows."""
-    ((irradiance, directions),) = field("lamp", None)
+    ((irradiance, directions),) = lights_of("lamp", SIZE, None)
     arguments = irradiance, directions, media["ior 1"], 0.9, 4.0, 1.0
     loose, strict = (convolve(*arguments, tolerance=tolerance) for tolerance in (1e-2, 1e-7))
     assert np.abs(loose / strict - 1).max() > 2e-4
 
 
 def test_same_choice_for_any_number_of_threads(media):
-    arguments = field("two lamps", None), media["ior 1"], (0.6, 0.9, 0.3), 2.0, 1.0
+    arguments = lights_of("two lamps", SIZE, None), media["ior 1"], (0.6, 0.9, 0.3), 2.0, 1.0
     runs = [convolve_lights(*arguments, tolerance=1e-2, threads=n) for n in (1, 2)]
     assert np.array_equal(*runs)
 
 
 @pytest.mark.parametrize("albedo", [(0.0, 0.9, 0.5), 0.0])
 def test_channels_may_be_black(media, albedo):
-    ((irradiance, directions),) = field("lamp", None)
+    ((irradiance, directions),) = lights_of("lamp", SIZE, None)
     result = convolve(irradiance, directions, media["ior 1"], albedo, 2.0, 1.0)
     assert np.isfinite(result).all()
     assert np.array_equal(result.max((0, 1)) > 0, np.broadcast_to(albedo, 3) != 0)
 
 
 def test_darkness(media):
-    _, directions = lamp(0.0, 0.0, 0.1)
+    _, directions = lamp(SIZE, 0.0, 0.0, 0.1)
     dark = np.zeros((SIZE, SIZE), np.float32)
     assert not convolve(dark, directions, media["ior 1"], 0.9, 2.0, 1.0).any()

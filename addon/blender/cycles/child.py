@@ -53,7 +53,8 @@ def main() -> None:
 
     def progress(fraction: float) -> None:
         # Without a parent that listens this fails, which ends the process.
-        print(f"\n{request['mark']} {fraction:.4f}", flush=True)
+        sys.stdout.write(f"\n{request['mark']} {fraction:.4f}\n")
+        sys.stdout.flush()
 
     progress(0.0)
     arrays = TASKS[request["task"]](request, scene, progress)
@@ -63,7 +64,7 @@ def main() -> None:
 if __name__ == "__main__":
     try:
         main()
-    except BaseException:
+    except BaseException:  # noqa: BLE001 - whatever it is, the parent shows it
         traceback.print_exc()
         code = 1
     else:

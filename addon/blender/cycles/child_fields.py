@@ -3,21 +3,24 @@
 Part of the child process (child.py).
 """
 
-import time
-
 import bpy
 import numpy as np
 from child_ghost import add_ghost
 
-# Samples per node and stratum of the first two looks, from which noise and speed follow.
+# Samples per node and stratum of the first two rounds, from which the noise follows. Later rounds take twice as many
+# as the one before, since each prepares the scene anew. Nothing depends on how long it takes, or each run would differ.
 LOOK = 4
 
-# A round is no shorter than this, as each prepares the scene anew, unless that takes no time.
-ROUND_SECONDS = 4.0
+# In 3.4 a bake of indirect light alone lacks what lamps send to other objects. The difference of two bakes does not;
+# with the same seed they follow the same paths, so what arrives directly is gone without noise.
+INDIRECT_LACKS_LAMPS = bpy.app.version < (4, 5, 0)
 
 
 def fields(request, scene, progress) -> dict:
     """The task `fields`: radiance_0, radiance_1, ... of the charts, float32 (K, rows, columns, 3), and noise.
+
+    `light` is "INDIRECT" or "DIRECT", `only` names the objects whose light counts, none: all. With `by_lamps` a white
+    diffuse surface stands in place of the mirrors, for which Cycles looks for lamps however small; it has one stratum.
 
     Radiance is each stratum's mean by the cosine. The noise is that of the irradiance, the root of its mean square over
     all nodes, as part of its mean.
@@ -25,28 +28,23 @@ def fields(request, scene, progress) -> dict:
     for name, color in request["reflectances"].items():
         make_diffuse(bpy.data.materials[name], color)
     set_up(scene)
-    ghost, image = add_ghost(request["charts"], request["strata"])
+    if request["only"]:
+        shine_alone(scene, request["only"])
+    ghost, image = add_ghost(request["charts"], request["strata"], request["by_lamps"])
     scene.collection.objects.link(ghost)
-    baker = Baker(scene, ghost, image, request["light"])
+    baker = Baker(scene, ghost, image, request["light"], "DIFFUSE" if request["by_lamps"] else "GLOSSY")
     looks = [baker.bake(LOOK), baker.bake(LOOK)]
-    spent = baker.seconds
-    progress(0.05)
-    noise = noise_of(request, *looks)
+    total, samples, count = sum(looks) * LOOK, 2 * LOOK, 2 * LOOK
     # The mean of both has noise / sqrt(2); it falls by the root of the samples.
-    wanted = 2 * LOOK * (noise / np.sqrt(2) / request["noise"]) ** 2
-    affordable = 2 * LOOK * request["seconds"] / max(spent, 1e-3)
-    missing = int(np.ceil(min(wanted, affordable))) - 2 * LOOK
-    total, samples = sum(looks) * LOOK, 2 * LOOK
-    if missing > 0:
-        seconds = spent / (2 * LOOK) * missing
-        rounds = int(np.clip(seconds / ROUND_SECONDS, 1, 32))
-        for number in range(rounds):
-            count = missing // rounds + (number < missing % rounds)
-            if count:
-                total, samples = total + count * baker.bake(count), samples + count
-            progress(0.05 + 0.95 * (number + 1) / rounds)
-    result = {f"radiance_{n}": part for n, part in enumerate(split(request, total / samples))}
-    result["noise"] = np.array(noise / np.sqrt(2) * np.sqrt(2 * LOOK / samples))
+    noise = noise_of(request, *looks) / np.sqrt(2)
+    wanted = int(min(np.ceil(samples * (noise / request["noise"]) ** 2), request["most_samples"]))
+    progress(samples / max(wanted, samples))
+    while samples < wanted:
+        count = min(count, wanted - samples)
+        total, samples, count = total + count * baker.bake(count), samples + count, 2 * count
+        progress(samples / wanted)
+    result = {f"radiance_{n}": part for n, part in enumerate(split(request, np.maximum(total / samples, 0)))}
+    result["noise"] = np.array(noise * np.sqrt(2 * LOOK / samples))
     result["samples"] = np.array(samples)
     return result
 
@@ -61,6 +59,26 @@ def make_diffuse(material, color) -> None:
     tree.links.new(output.inputs["Surface"], diffuse.outputs[0])
 
 
+def shine_alone(scene, names) -> None:
+    """Switch off all light but that of these objects."""
+    scene.world = None
+    own = {slot.material for name in names for slot in bpy.data.objects[name].material_slots}
+    for obj in scene.objects:
+        if obj.type == "LIGHT" and obj.name not in names:
+            obj.hide_render = True
+    trees = [one.node_tree for one in bpy.data.materials if one.node_tree and one not in own]
+    for tree in [*trees, *bpy.data.node_groups]:
+        used_by_own = any(
+            tree is getattr(node, "node_tree", None) for one in own if one for node in one.node_tree.nodes
+        )
+        for node in () if used_by_own else tree.nodes:
+            for socket in node.inputs if node.type in {"EMISSION", "BSDF_PRINCIPLED"} else ():
+                if socket.name in {"Strength", "Emission Strength"}:
+                    for link in list(socket.links):
+                        tree.links.remove(link)
+                    socket.default_value = 0.0
+
+
 def set_up(scene) -> None:
     """The artist's materials and bounces, but no clamps, no exposure, nothing that stops early."""
     scene.render.engine = "CYCLES"
@@ -72,15 +90,18 @@ def set_up(scene) -> None:
     # The mirror stands for a diffuse surface: it uses up a glossy bounce in place of a diffuse one.
     cycles.glossy_bounces += 1
     cycles.diffuse_bounces -= 1
+    for obj in scene.objects:
+        obj.visible_glossy = obj.visible_diffuse
 
 
 class Baker:
     """Bakes the ghost again and again."""
 
-    def __init__(self, scene, ghost, image, light) -> None:
-        self.scene, self.image, self.light = scene, image, light
-        self.rounds, self.seconds = 0, 0.0
+    def __init__(self, scene, ghost, image, light, kind) -> None:
+        self.scene, self.image, self.light, self.kind = scene, image, light, kind
+        self.rounds = 0
         view_layer = bpy.context.view_layer
+        view_layer.update()  # before, the ghost can't be selected
         for obj in view_layer.objects:
             obj.select_set(obj == ghost)
         view_layer.objects.active = ghost
@@ -90,13 +111,16 @@ class Baker:
 
     def bake(self, samples: int) -> np.ndarray:
         """Float32 (height, width, 3) of the image."""
-        start = time.monotonic()
         self.rounds += 1
         self.scene.cycles.seed, self.scene.cycles.samples = self.rounds, samples
-        bpy.ops.object.bake(type="GLOSSY", pass_filter={self.light}, **self.options)
+        if self.light == "INDIRECT" and INDIRECT_LACKS_LAMPS:
+            return self._bake({"DIRECT", "INDIRECT"}) - self._bake({"DIRECT"})
+        return self._bake({self.light})
+
+    def _bake(self, passes: set) -> np.ndarray:
+        bpy.ops.object.bake(type=self.kind, pass_filter=passes, **self.options)
         values = np.empty(len(self.image.pixels), np.float32)
         self.image.pixels.foreach_get(values)
-        self.seconds += time.monotonic() - start
         pixels = values.reshape(self.image.size[1], self.image.size[0], self.image.channels)[..., :3]
         # A texel in ten thousand may come as no number.
         return np.nan_to_num(pixels, nan=0.0, posinf=0.0, neginf=0.0)

@@ -13,12 +13,13 @@ import numpy as np
 STRATUM, AXES = "stratum", ("x_axis", "y_axis", "z_axis")
 
 
-def add_ghost(charts, strata):
+def add_ghost(charts, strata, is_diffuse=False):
     """The object, and its image; every chart's tiles fill rows of the image from `chart_rows` on.
 
     Parameters
     ----------
     charts : dicts with corner, x_axis, y_axis, normal, size (2), nodes (columns, rows).
+    is_diffuse : whether the mirrors are white diffuse surfaces.
     strata : (K, 4): of r^2 and the azimuth / 2 pi, each where it begins and how far it reaches.
     """
     width = max(chart["nodes"][0] for chart in charts) * len(strata)
@@ -51,7 +52,7 @@ def add_ghost(charts, strata):
         )
     image = bpy.data.images.new("Beamspread ghost", width, height, float_buffer=True, alpha=False)
     image.colorspace_settings.name = "Non-Color"
-    mesh.materials.append(_mirror(image))
+    mesh.materials.append(_diffuse(image) if is_diffuse else _mirror(image))
     obj = bpy.data.objects.new("Beamspread ghost", mesh)
     for kind in ("camera", "diffuse", "glossy", "transmission", "shadow"):
         setattr(obj, f"visible_{kind}", False)
@@ -60,11 +61,8 @@ def add_ghost(charts, strata):
 
 def _mirror(image):
     """The material; what a ray sees follows from the attributes."""
-    material = bpy.data.materials.new("Beamspread ghost")
-    if bpy.app.version < (5, 0, 0):
-        material.use_nodes = True
+    material = _new_material()
     tree = material.node_tree
-    tree.nodes.clear()
     link = tree.links.new
 
     def attribute(name):
@@ -107,17 +105,36 @@ def _mirror(image):
     halfway = vector("NORMALIZE", vector("ADD", direction, view))
 
     glossy = tree.nodes.new("ShaderNodeBsdfGlossy")
-    glossy.inputs["Color"].default_value = (1, 1, 1, 1)
     glossy.inputs["Roughness"].default_value = 0
     if "SHARP" in {item.identifier for item in glossy.bl_rna.properties["distribution"].enum_items}:
         glossy.distribution = "SHARP"
     link(glossy.inputs["Normal"], halfway)
+    _finish(tree, glossy, image)
+    return material
+
+
+def _diffuse(image):
+    material = _new_material()
+    _finish(material.node_tree, material.node_tree.nodes.new("ShaderNodeBsdfDiffuse"), image)
+    return material
+
+
+def _new_material():
+    material = bpy.data.materials.new("Beamspread ghost")
+    if bpy.app.version < (5, 0, 0):
+        material.use_nodes = True
+    material.node_tree.nodes.clear()
+    return material
+
+
+def _finish(tree, surface, image) -> None:
+    """White, at the output, and with the image that is baked into."""
+    surface.inputs["Color"].default_value = (1, 1, 1, 1)
     output = tree.nodes.new("ShaderNodeOutputMaterial")
-    link(output.inputs["Surface"], glossy.outputs[0])
+    tree.links.new(output.inputs["Surface"], surface.outputs[0])
     target = tree.nodes.new("ShaderNodeTexImage")
     target.image = image
     tree.nodes.active = target
-    return material
 
 
 def _operate(tree, kind, operation, inputs):

@@ -22,8 +22,8 @@ STALE_SECONDS = 7 * 24 * 3600
 class SceneCopy:
     """The scene as it is now, in a folder of its own; nothing of the host's is touched, undo and paths included.
 
-    Make it in the main thread (it reads `bpy.data`), and use it anywhere. The folder goes when nobody needs it any more,
-    at the latest when the process ends, or by `remove()`.
+    Make it in the main thread (it reads `bpy.data`), and use it anywhere. The folder goes when nobody needs it any
+    more, at the latest when the process ends, or by `remove()`.
 
     Attributes
     ----------

@@ -19,32 +19,48 @@ TEXTURED_TRIANGLES, MOST_CUTS = 8192, 64
 PLACES = 6
 
 
+class Materials:
+    """What materials emit, each evaluated once."""
+
+    def __init__(self) -> None:
+        self.images = Images()
+        self._known: dict[str | None, np.ndarray | Wanted | None] = {None: None}
+
+    def read(self, material) -> np.ndarray | Wanted | None:
+        """W/(m^2 sr), (3,); or what it comes from if not every place emits the same; or None if it is dark."""
+        name = material and material.name_full
+        if name not in self._known:
+            self._known[name] = self._read(material)
+        return self._known[name]
+
+    def _read(self, material) -> np.ndarray | Wanted | None:
+        surface = surface_of(material.node_tree) if compat.uses_nodes(material) else None
+        if surface is None:
+            return None
+        try:
+            light = radiance(Places(images=self.images), surface)
+        except NotUnderstoodError:
+            return surface
+        return light if light.any() else None
+
+
 class Glow:
     """What the triangles of an evaluated object emit, and where its instances stand."""
 
-    def __init__(self, obj, images: Images) -> None:
-        self._images = images
+    def __init__(self, obj, materials: Materials) -> None:
+        self._images = materials.images
         self._parts: list[tuple[np.ndarray, np.ndarray]] = []
         self._places: list[np.ndarray] = []
         self.reason = ""
-        glowing = {}
-        for slot, surface in enumerate(map(_surface, (slot.material for slot in obj.material_slots))):
-            if surface is None:
-                continue
-            try:
-                light = radiance(Places(images=images), surface)
-            except NotUnderstoodError:
-                glowing[slot] = surface
-            else:
-                if light.any():
-                    glowing[slot] = light
+        found = {slot: materials.read(one.material) for slot, one in enumerate(obj.material_slots)}
+        glowing = {slot: light for slot, light in found.items() if light is not None}
         if glowing:
             self._add(obj, glowing)
 
-    def place(self, matrix: np.ndarray) -> None:
+    def place(self, matrix) -> None:
         """Put an instance of it at a 4 x 4 matrix."""
         if self._parts:
-            self._places.append(matrix)
+            self._places.append(np.array(matrix, dtype=float))
 
     def light(self, common: tuple) -> MeshLight | None:
         """All instances in the world, or None if all is dark."""
@@ -87,10 +103,6 @@ class Glow:
         light = radiance(Places(outputs, self._images), surface)
         light = np.broadcast_to(light, (len(corners) * PLACES**2, 3)).reshape(len(corners), -1, 3).mean(axis=1)
         return corners, light.astype(np.float32)
-
-
-def _surface(material) -> Wanted | None:
-    return surface_of(material.node_tree) if material is not None and compat.uses_nodes(material) else None
 
 
 def _triangles(mesh, slot_count: int) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:

@@ -8,7 +8,8 @@ from ...core.errors import ReceiverError
 from ...core.scene.occluders import Mesh
 from ...core.scene.uv_map import Polygons
 
-GEOMETRY_TYPES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+# A depsgraph has curves, text and metaballs as they are and, as instances of themselves, as meshes: these count.
+GEOMETRY_TYPES = {"MESH"}
 
 
 def local_mesh(obj, materials) -> Mesh | None:

@@ -34,7 +34,9 @@ def _sun(data, axes: np.ndarray, common: tuple) -> Light:
     with np.errstate(invalid="ignore"):  # a scale of zero; see Light.fault
         travel = -axes[:3, 2] / np.linalg.norm(axes[:3, 2])
     direction = tuple(travel.tolist())
-    return SunDiskLight(*common, direction, data.angle) if data.angle > 0 else SunLight(*common, direction)
+    if data.angle == 0:
+        return SunLight(*common, direction)
+    return SunDiskLight(*common, direction, data.angle, compat.sun_disk())
 
 
 def _point(data, axes: np.ndarray, common: tuple) -> Light:
@@ -54,7 +56,11 @@ def _spot(data, axes: np.ndarray, common: tuple) -> Light:
 def _area(data, axes: np.ndarray, common: tuple) -> Light:
     size_y = data.size_y if data.shape in ("RECTANGLE", "ELLIPSE") else data.size
     is_round = data.shape in ("DISK", "ELLIPSE")
-    return AreaLight(*common, _position(axes), _frame(axes), data.size, size_y, is_round, data.spread)
+    if not axes[:3, 2].any() and compat.flat_area_lamps_shine():
+        axes[:3, 2] = np.cross(axes[:3, 0], axes[:3, 1])
+    name, strength, *rest = common
+    brighter = name, strength * compat.area_lamp_factor(), *rest
+    return AreaLight(*brighter, _position(axes), _frame(axes), data.size, size_y, is_round, data.spread)
 
 
 # By Blender's type: (light data, matrix to the world, name, strength, color and shadow) -> Light.
@@ -64,6 +70,13 @@ READERS = {"SUN": _sun, "POINT": _point, "SPOT": _spot, "AREA": _area}
 def is_portal(data) -> bool:
     """Whether a lamp only shows Cycles where the world's light comes in."""
     return data.type == "AREA" and data.cycles.is_portal
+
+
+def fault(light: Light) -> str:
+    """See `Light.fault`; a spot's cone takes the lamp's scale."""
+    if isinstance(light, SpotLight | SphereSpotLight) and np.linalg.matrix_rank(light.frame) < 3:
+        return "its scale is 0"
+    return light.fault()
 
 
 def read_lamp(obj, matrix) -> tuple[Light | None, str]:

@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import bpy
-import numpy as np
 
 from ...core.scene.illumination import Illumination
 from ...core.scene.lights import Light
 from .. import compat
-from .emitters import Glow
+from .emitters import Glow, Materials
 from .geometry import GEOMETRY_TYPES
-from .lamps import is_portal, read_lamp
+from .lamps import fault, is_portal, read_lamp
 from .linking import links_of
 from .occluders import OccluderReader
-from .textures import Images
 from .visible import render_visible_names, renders
 from .world import read_world
 
@@ -28,8 +26,8 @@ def read_illumination(depsgraph) -> Illumination:
         if not renders(instance, visible):
             continue
         obj = instance.object
-        # Of an instance Cycles asks the instancer too.
-        lights_surfaces = obj.visible_diffuse and (not instance.is_instance or instance.parent.visible_diffuse)
+        asks_instancer = instance.is_instance and (obj.type != "LIGHT" or compat.instancer_hides_lamps())
+        lights_surfaces = obj.visible_diffuse and (not asks_instancer or instance.parent.visible_diffuse)
         if obj.type == "LIGHT" and lights_surfaces:
             lights.add_lamp(obj, instance.matrix_world)
         elif obj.type in GEOMETRY_TYPES and lights_surfaces:
@@ -51,14 +49,14 @@ class _Lights:
     def __init__(self, depsgraph) -> None:
         self._names = {one.name for one in depsgraph.ids if isinstance(one, bpy.types.Object)}
         self._lights: list[Light] = []
-        self._glows: dict[str, Glow] = {}
+        self._glows: dict[tuple[str, int], Glow] = {}  # by name and mesh: geometry nodes may give an object several
         self._links: dict[str, dict] = {}
-        self._images = Images()
+        self._materials = Materials()
         self.warnings: dict[str, None] = {}  # in order, each once
         self.by_cycles: dict[str, str] = {}  # see Illumination
 
     def all(self) -> list[Light]:
-        glowing = [glow.light((name, 1.0, (1.0, 1.0, 1.0), True)) for name, glow in self._glows.items()]
+        glowing = [glow.light((name, 1.0, (1.0, 1.0, 1.0), True)) for (name, _), glow in self._glows.items()]
         for light in filter(None, glowing):
             self._add(light, self._links[light.name])
         return self._lights
@@ -74,23 +72,23 @@ class _Lights:
 
     def add_mesh(self, obj, matrix) -> None:
         """Instances of a mesh become one light."""
-        if obj.name not in self._glows:
-            self._glows[obj.name] = glow = Glow(obj, self._images)
+        key = obj.name, obj.data.as_pointer()
+        if key not in self._glows:
+            self._glows[key] = glow = Glow(obj, self._materials)
             self._links[obj.name] = links_of(obj, self._names)
             if glow.reason:
                 self.by_cycles[obj.name] = f"What glows of '{obj.name}' is left out: {glow.reason} not understood."
-        self._glows[obj.name].place(np.array(matrix, dtype=float))
+        self._glows[key].place(matrix)
 
     def add_world(self, view_layer, world) -> None:
-        light, reason = read_world(view_layer, world, self._images)
+        light, reason = read_world(view_layer, world, self._materials.images)
         if reason:
             self.by_cycles[world.name] = f"The world '{world.name}' is left out: {reason} not understood."
         if light is not None:
             self._add(light, {})
 
     def _add(self, light: Light, links: dict) -> None:
-        fault = light.fault()
-        if fault:
-            self.warnings[f"The light '{light.name}' is left out: {fault}."] = None
+        if why := fault(light):
+            self.warnings[f"The light '{light.name}' is left out: {why}."] = None
         else:
             self._lights.append(replace(light, **links))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-
 # What a bake is shown by is no light, and lets none through: its tree counts for nothing.
 OWN_NODE = "BeamspreadNode"
 

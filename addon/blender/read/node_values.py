@@ -1,7 +1,7 @@
-"""Values of shader nodes by NumPy, without a renderer: numbers, images, and arithmetic on them, as Cycles evaluates them.
+"""Values of shader nodes by NumPy, without a renderer: numbers, images and arithmetic on them, as Cycles has them.
 
-Values are arrays whose last axis is 1 for numbers, 3 for colours and vectors; the axes before it, if any, are the places
-that a tree is evaluated at together.
+Values are arrays whose last axis is 1 for numbers, 3 for colours and vectors; the axes before it, if any, are the
+places that a tree is evaluated at together.
 """
 
 from __future__ import annotations

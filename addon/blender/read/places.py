@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .image_texture import NotUnderstoodError
 from .node_links import End, Wanted, follow
 from .node_values import Evaluator, converted
 from .textures import Images, environment_coordinates, lookup

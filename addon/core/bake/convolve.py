@@ -48,10 +48,10 @@ def convolve(
         tolerance, `fft` is besides off by some 1e-5 of the brightest texel: by 4e-5 at most, by 7e-5 beyond 80 degrees
         with ior 1, and for thin slabs with an ior above 1 by up to 1e-3, beyond 80 degrees 2e-3. Beyond 192 x 192
         texels the bound rests on a look at 1000 to 1500 texels, and of more than four lights at the four brightest,
-        which may use up .2 of it; over lights, shadows and media that are hard for it the worst of all texels uses up
-        .1 to 1 (tests/bench/terms.py). `adaptive`: the sum as for `fft`, and the error of each texel below `tolerance`
-        times the brightest one. That it counts on errors of many beams to cancel is measured, not proven: over random
-        masks up to 88 degrees the worst texel used up two thirds.
+        which may use up .25 of it; over lights, shadows and media that are hard for it the worst of all texels uses up
+        .2 to .6 (tests/bench/terms.py). `adaptive`: the sum as for `fft`, for which
+        what each beam's kernel is off by is integrated and added up in full; the error of each texel stays below
+        `tolerance` times the brightest one, which is measured: the worst used up .1 of it.
     threads : int
         0: all. The result does not depend on it.
     progress : callable, optional

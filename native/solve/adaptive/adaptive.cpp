@@ -1,6 +1,7 @@
 #include "solve/adaptive/adaptive.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <map>
@@ -58,26 +59,34 @@ HarmonicSum term_kernel(const LightTerms& terms, std::size_t t)
     return sum;
 }
 
-SpreadLight spread_light(const LightTerms& terms, std::size_t t, const Grid& light)
+// All light by its angle of incidence; that of about the same angle as if all were the most grazing of it, whose kernels
+// are the narrowest.
+std::vector<AngleLight> by_angle(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium)
 {
-    SpreadLight spread{&terms.profiles[term_profile(terms, t)].profile, term_kernel(terms, t)};
-    for (const double value : light.values) {
-        spread.sum += value;
-        spread.absolute_sum += std::abs(value);
-    }
-    return spread;
+    // Rounded up to 90 degrees exactly, an angle would be no angle of incidence.
+    constexpr float largest = 1.0f - 1e-6f;
+    // Even in tan(theta / 2): 4 to 7 degrees each.
+    struct Bin {
+        double power = 0.0;
+        float most_grazing = 0.0f;
+    };
+    std::array<Bin, 16> bins{};
+    BeamRow row;
+    for (std::size_t y = 0; y < plane.height; ++y)
+        for (std::size_t x = 0, end = row.read(plane, light, {y, 0, plane.width}) ? plane.width : 0; x < end; ++x) {
+            if (row.irradiance[x] == 0.0f)
+                continue;
+            const float angle = std::min(row.half_tangent[x], largest);
+            Bin& bin = bins[static_cast<std::size_t>(angle * static_cast<float>(bins.size()))];
+            bin.power += static_cast<double>(row.irradiance[x]);
+            bin.most_grazing = std::max(bin.most_grazing, angle);
+        }
+    std::vector<AngleLight> lights;
+    for (const auto& [power, most_grazing] : bins)
+        if (power > 0.0)
+            lights.push_back({medium.ldf->profile(angle_deg(most_grazing), medium.albedo, Side::reflected), power});
+    return lights;
 }
-
-// Errors of an interpolated kernel have either sign, and cancel where many beams light each texel. Measured on 1024 x 1024
-// texels, a random half of them lit, up to 88 degrees: the worst texel's error is at most a fifteenth of what near_radius
-// expects, which leaves a third of the tolerance.
-double cancellation(double lit_share)
-{
-    return std::max(1.0, 20.0 * std::sqrt(2.0 * lit_share));
-}
-
-// Beyond, a kernel is not seen at all by the points of a grid, and its errors have one sign.
-constexpr double largest_expected = 0.1;
 
 // The squares that cost less as beams of their width, four steps seen by all texels, than texel by texel. A texel is
 // added to some 2000 others.
@@ -156,26 +165,12 @@ std::vector<float> solve_adaptive(const Plane& plane, const PlaneLight& light, c
     const std::size_t count = terms.terms.size();
     const std::vector<Square> wide = wide_beams(squares, height * width);
 
-    std::vector<SpreadLight> lights;
-    for (std::size_t t = 0; t < count; ++t) {
-        lights.push_back(spread_light(terms, t, term_light(terms, t, height, width)));
-        progress.advance(0.0);
-    }
-    double lit = 0.0;
-    for (const Square& square : squares)
-        lit += static_cast<double>(square.size * square.size);
-    const double allowed = 2.0 * tolerance_share * tolerance;
     const double distance = std::hypot(static_cast<double>(height) * pitch_y, static_cast<double>(width) * pitch_x);
-    const auto radius = [&](double lit_share) {
-        return near_radius(lights, std::max(pitch_y, pitch_x), distance,
-                           std::min(allowed * cancellation(lit_share), largest_expected), progress);
-    };
-    LevelSums texel_sums(
-        terms, grid_levels(height, width, pitch_y, pitch_x, radius(lit / static_cast<double>(height * width))));
-    // The kernel of wide beams is the light that one texel spreads to all offsets, seen coarsely itself; its errors
-    // cancel over a square.
-    LevelSums kernel_sums(
-        terms, grid_levels(2 * height - 1, 2 * width - 1, pitch_y, pitch_x, wide.empty() ? 1.0 : radius(1.0)));
+    const double near = near_radius(by_angle(plane, even, medium), std::max(pitch_y, pitch_x), distance,
+                                    2.0 * tolerance_share * tolerance, progress);
+    LevelSums texel_sums(terms, grid_levels(height, width, pitch_y, pitch_x, near));
+    // The kernel of wide beams is the light that one texel spreads to all offsets, seen as coarsely.
+    LevelSums kernel_sums(terms, grid_levels(2 * height - 1, 2 * width - 1, pitch_y, pitch_x, near));
 
     Grid sum(height, width);
     for (std::size_t t = 0; t < count; ++t) {

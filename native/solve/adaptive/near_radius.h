@@ -4,21 +4,19 @@
 #include <vector>
 
 #include "base/progress.h"
-#include "solve/adaptive/multilevel_kernel.h"
+#include "ldf/radial/radial_profile.h"
 
 namespace beamspread {
 
-// A kernel and the light that it spreads.
-struct SpreadLight {
-    const RadialProfile* profile;
-    HarmonicSum kernel;
-    double sum = 0.0;
-    double absolute_sum = 0.0;
+// Beams of about one angle.
+struct AngleLight {
+    RadialProfile profile;
+    double power = 0.0;
 };
 
-// The near radius in points of a level's grid by which the errors of a multilevel sum, in all texels together, are at most
-// the fraction `allowed` of the light that comes back within a distance. Lengths in mean free paths.
-double near_radius(const std::vector<SpreadLight>& lights, double pitch, double distance, double allowed,
+// The near radius in points of a level's grid by which the absolute errors of a multilevel sum, of all beams in all texels,
+// add up to at most the fraction `allowed` of the light that comes back within a distance. Lengths in mean free paths.
+double near_radius(const std::vector<AngleLight>& lights, double pitch, double distance, double allowed,
                    Progress& progress);
 
 }  // namespace beamspread

@@ -1,6 +1,7 @@
 #include "solve/term_choice/choose_terms.h"
 
 #include <algorithm>
+#include <functional>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -19,7 +20,7 @@ namespace {
 constexpr std::size_t small_plane = 192;
 
 // What the texels looked at may use up of the tolerance. The rest is for those between, and for what the probe is off by:
-// over the lights of tests/bench/terms.py the worst of all texels then uses up .56.
+// over the lights of tests/bench/terms.py the worst of all texels then uses up .62.
 constexpr double share = 0.25;
 
 // So often there is a closer look around the texels where errors are largest. Without, the worst texel there is off by
@@ -49,9 +50,7 @@ std::vector<std::size_t> representatives(const Incidence& incidence)
 {
     std::vector<std::size_t> lights(incidence.extremes.size());
     std::iota(lights.begin(), lights.end(), std::size_t{0});
-    std::stable_sort(lights.begin(), lights.end(), [&](std::size_t a, std::size_t b) {
-        return incidence.extremes[a].irradiance > incidence.extremes[b].irradiance;
-    });
+    std::ranges::stable_sort(lights, std::greater{}, [&](std::size_t l) { return incidence.extremes[l].irradiance; });
     lights.resize(std::min(lights.size(), most_lights));
     return lights;
 }
@@ -89,49 +88,43 @@ Eigen::ArrayXXf relative_parts(const Readings& readings, const std::vector<Kerne
     return parts;
 }
 
-struct Choice {
-    std::vector<std::size_t> kept;
-    Eigen::ArrayXf error;  // [texel and result]
-};
-
-// Leaves out one after the other, those first that bring least for what they cost, as long as no error is beyond 1.
-Choice leave_out(const Eigen::ArrayXXf& parts, const std::vector<float>& cost)
+// Leaves out one after the other, those first that bring least per transform, as long as no error is beyond 1.
+// Finds those that are kept, and the errors of [texel and result].
+std::pair<std::vector<std::size_t>, Eigen::ArrayXf> leave_out(const Eigen::ArrayXXf& parts,
+                                                              const std::vector<KernelDecomposition::Term>& terms)
 {
     // Fourth powers, as the few texels where a term brings most decide whether it is needed.
-    std::vector<float> worth(cost.size());
-    parallel_for(worth.size(),
-                 [&](std::size_t c) { worth[c] = parts.col(index(c)).square().square().sum() / cost[c]; });
-    std::vector<std::size_t> order(cost.size());
+    std::vector<float> worth(terms.size());
+    parallel_for(worth.size(), [&](std::size_t c) {
+        worth[c] = parts.col(index(c)).square().square().sum() / (terms[c].m > 0 ? 2.0f : 1.0f);
+    });
+    std::vector<std::size_t> order(terms.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return worth[a] < worth[b]; });
-    Choice choice{{}, Eigen::ArrayXf::Zero(parts.rows())};
+    std::ranges::stable_sort(order, {}, [&](std::size_t c) { return worth[c]; });
+    std::vector<std::size_t> kept;
+    Eigen::ArrayXf error = Eigen::ArrayXf::Zero(parts.rows());
     for (const std::size_t c : order) {
-        Eigen::ArrayXf next = choice.error + parts.col(index(c));
+        Eigen::ArrayXf next = error + parts.col(index(c));
         if (next.abs().maxCoeff() <= 1.0f)
-            choice.error.swap(next);
+            error.swap(next);
         else
-            choice.kept.push_back(c);
+            kept.push_back(c);
     }
-    std::sort(choice.kept.begin(), choice.kept.end());
-    return choice;
+    std::ranges::sort(kept);
+    return {std::move(kept), std::move(error)};
 }
 
-// The texels with the largest errors, one of a site.
-std::vector<Texel> worst_texels(const std::vector<Texel>& texels, const Eigen::ArrayXf& error)
+// The middles of the sites with the largest errors.
+std::vector<Texel> worst_sites(const std::vector<Texel>& texels, const Eigen::ArrayXf& error)
 {
-    const auto results = error.size() / index(texels.size());
-    std::vector<std::pair<float, std::size_t>> worst;  // of each site
-    for (std::size_t i = 0; i < texels.size(); ++i) {
-        const float here = error.segment(index(i) * results, results).abs().maxCoeff();
-        if (i % texels_per_site == 0)
-            worst.emplace_back(here, i);
-        else if (here > worst.back().first)
-            worst.back() = {here, i};
-    }
-    std::stable_sort(worst.begin(), worst.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+    const Eigen::Index sites = index(texels.size() / texels_per_site);
+    const Eigen::ArrayXf worst = error.abs().reshaped(error.size() / sites, sites).colwise().maxCoeff();
+    std::vector<Eigen::Index> order(static_cast<std::size_t>(sites));
+    std::iota(order.begin(), order.end(), Eigen::Index{0});
+    std::ranges::stable_sort(order, std::greater{}, [&](Eigen::Index site) { return worst[site]; });
     std::vector<Texel> found;
-    for (std::size_t i = 0; i < std::min(worst_count, worst.size()); ++i)
-        found.push_back(texels[worst[i].second]);
+    for (std::size_t i = 0; i < std::min(worst_count, order.size()); ++i)
+        found.push_back(texels[static_cast<std::size_t>(order[i]) * texels_per_site + texels_per_site / 2]);
     return found;
 }
 
@@ -145,9 +138,6 @@ std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const 
     if (candidates.empty() || light.plane.texels() <= small_plane * small_plane)
         return candidates;
 
-    std::vector<float> transforms;
-    for (const KernelDecomposition::Term& term : kernels.terms())
-        transforms.push_back(term.m > 0 ? 2.0f : 1.0f);
     const std::vector<std::size_t> lights = representatives(incidence);
     const RadianceProbe probe(light, lights, kernels.basis(candidates, rounding));
     std::vector<Texel> texels = probe_sites(light, lights, incidence);
@@ -163,10 +153,10 @@ std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const 
                               readings.begin() + static_cast<std::ptrdiff_t>(first));
             progress.advance(part);
         });
-        Choice choice = leave_out(relative_parts(readings, kernels.terms(), tolerance), transforms);
+        auto [kept, error] = leave_out(relative_parts(readings, kernels.terms(), tolerance), kernels.terms());
         if (round == refinements)
-            return std::move(choice.kept);
-        const std::vector<Texel> more = sites_around(worst_texels(texels, choice.error), light.plane, round);
+            return kept;
+        const std::vector<Texel> more = sites_around(worst_sites(texels, error), light.plane, round);
         texels.insert(texels.end(), more.begin(), more.end());
     }
 }

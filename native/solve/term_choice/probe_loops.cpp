@@ -51,10 +51,4 @@ BEAMSPREAD_CLONES void add_harmonics(float* __restrict sum, const float* values,
     }
 }
 
-BEAMSPREAD_CLONES void add_products(float* __restrict sum, const float* a, const float* b, std::size_t count)
-{
-    for (std::size_t i = 0; i < count; ++i)
-        sum[i] += a[i] * b[i];
-}
-
 }  // namespace beamspread

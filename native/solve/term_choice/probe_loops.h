@@ -15,7 +15,4 @@ void multiple_angles(float* cosine, float cos_angle, float sin_angle, float fact
 void add_harmonics(float* sum, const float* values, const float* by_harmonic, float factor, const std::size_t* first,
                    std::size_t blocks);
 
-// sum[i] += a[i] * b[i]
-void add_products(float* sum, const float* a, const float* b, std::size_t count);
-
 }  // namespace beamspread

@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
-#include <numeric>
 #include <utility>
 
 #include "base/constants.h"
 #include "base/random.h"
 #include "base/threads.h"
+#include "simd/loops.h"
 #include "solve/term_choice/probe_loops.h"
 #include "solve/term_choice/probe_sites.h"
 
@@ -50,14 +49,11 @@ RadianceProbe::RadianceProbe(const LightTerms& light, std::vector<std::size_t> l
             m_harmonics = std::max(m_harmonics, m + harmonics_per_block);
         }
     }
-    for (const LowRankBasis::AngleFunction& function : basis.functions)
-        m_places.push_back(starts[function.rank] + function.m);
-
     m_by_angle.resize(angle_steps * m_row_size);
-    for (std::size_t f = 0; f < m_places.size(); ++f) {
-        const std::vector<TableStep>& values = basis.functions[f].values;
+    for (const auto& [m, rank, values] : basis.functions) {
+        m_places.push_back(starts[rank] + m);
         for (std::size_t step = 0; step < angle_steps; ++step)
-            m_by_angle[step * m_row_size + m_places[f]] =
+            m_by_angle[step * m_row_size + m_places.back()] =
                 values[(2 * step + 1) * (values.size() - 1) / (2 * angle_steps)].value;
     }
 
@@ -136,8 +132,8 @@ void RadianceProbe::add_rings(const Texel& texel, std::size_t first, std::size_t
         }
         for (std::size_t r = 0; r < m_light.sets.results.size(); ++r) {
             const auto& [set, medium, members] = m_light.sets.results[r];
-            add_products(sums.data() + r * m_row_size, moments.data() + set * m_row_size,
-                         m_by_ring.data() + (ring * media + medium) * m_row_size, m_row_size);
+            add_scaled_product(sums.data() + r * m_row_size, moments.data() + set * m_row_size,
+                               m_by_ring.data() + (ring * media + medium) * m_row_size, 1.0f, m_row_size);
         }
     }
 }

@@ -1,10 +1,10 @@
 """The kinds of light that can be baked; strengths follow Cycles (see each class).
 
-A new kind is one class here, and its reader in blender/read/lights.py.
+A new kind is one class here, and its reader in blender/read/.
 """
 
 from .area import AreaLight
-from .field import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight
+from .field import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight, LampFieldLight
 from .light import ExtendedLight, Light, TracedLight
 from .mesh import MeshLight
 from .point_like import PointLight, SpotLight, SunLight
@@ -19,6 +19,7 @@ __all__ = [
     "ExtendedLight",
     "Field",
     "FieldLight",
+    "LampFieldLight",
     "Light",
     "MeshLight",
     "PointLight",

@@ -56,17 +56,35 @@ class Field:
     Attributes
     ----------
     origin, normal : of the `Grid` that it was computed for; its nodes are evenly spread over that grid.
-    radiance : float32 (K, rows, columns, 3), the mean by the cosine over each of `STRATA`, W/(m^2 sr).
+    radiance : float32 (K, rows, columns, 3), means by the cosine over K parts of the hemisphere, W/(m^2 sr).
     """
 
     origin: Vector
     normal: Vector
     radiance: np.ndarray
 
+    def is_of(self, grid: Grid) -> bool:
+        return np.array_equal(self.origin, grid.origin) and np.array_equal(self.normal, grid.normal)
+
+    def at_texels(self, grid: Grid) -> Iterator[np.ndarray]:
+        """Float32 (H, W, 3) of each part of the hemisphere.
+
+        Between nodes a cubic B-spline interpolates: smooth, never negative, and it averages noise. What light can't
+        reach at all is no darker part of its surroundings: nodes inside of things that stand on the plane don't darken
+        texels beside them.
+        """
+        rows, columns = self.radiance.shape[1:3]
+        up, across = spline_weights(grid.height, rows), spline_weights(grid.width, columns)
+        lit = self.radiance.any(axis=(0, 3)).astype(np.float32)
+        reached = np.maximum(up @ lit @ across.T, LIT_PART)[..., None]
+        for part in self.radiance:
+            values = np.stack([up @ part[..., channel] @ across.T for channel in range(3)], axis=2) / reached
+            yield np.maximum(values, 0, out=values)
+
 
 @dataclass(frozen=True, eq=False)
-class FieldLight(Light):
-    """Light that Cycles has computed; `strength` is a factor.
+class _ComputedLight(Light):
+    """`strength` is a factor.
 
     Attributes
     ----------
@@ -75,44 +93,67 @@ class FieldLight(Light):
 
     fields: tuple[Field, ...]
 
-    def is_behind(self, grid):
-        field = self._field(grid)
-        return field is None or not field.radiance.any()
-
     @property
     def is_colored(self):
         return True
 
-    def layers(self, grid: Grid) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Irradiance float32 (H, W, 3) on the whole of each texel, at strength and color 1, and where it travels.
+    def field_of(self, grid: Grid) -> Field | None:
+        return next((field for field in self.fields if field.is_of(grid)), None)
 
-        Together the layers make up the light. Between nodes a cubic B-spline interpolates: smooth, never negative, and
-        it averages noise. What light can't reach at all is no darker part of its surroundings: nodes inside of things
-        that stand on the plane don't darken texels beside them.
-        """
-        field = self._field(grid)
-        if field is None:
-            return
-        rows, columns = field.radiance.shape[1:3]
-        up, across = spline_weights(grid.height, rows), spline_weights(grid.width, columns)
-        lit = field.radiance.any(axis=(0, 3)).astype(np.float32)
-        reached = np.maximum(up @ lit @ across.T, LIT_PART)[..., None]
-        for radiance, weight, direction in zip(field.radiance, WEIGHTS, DIRECTIONS):
-            if radiance.any():
-                channels = [up @ radiance[..., channel] @ across.T for channel in range(3)]
-                irradiance = np.stack(channels, axis=2) * np.float32(np.pi * weight) / reached
-                yield np.maximum(irradiance, 0, out=irradiance), direction
-
-    def _field(self, grid: Grid) -> Field | None:
-        for field in self.fields:
-            if np.array_equal(field.origin, grid.origin) and np.array_equal(field.normal, grid.normal):
-                return field
-        return None
+    def is_behind(self, grid):
+        field = self.field_of(grid)
+        return field is None or not field.radiance.any()
 
     def fault(self):
         if not all(np.isfinite(field.radiance).all() and (field.radiance >= 0).all() for field in self.fields):
             return "its radiance has values that are negative or not numbers"
         return super().fault()
+
+
+@dataclass(frozen=True, eq=False)
+class FieldLight(_ComputedLight):
+    """Light from all over the hemisphere; its fields have the parts `STRATA`."""
+
+    def layers(self, grid: Grid) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Irradiance float32 (H, W, 3) on the whole of each texel, at strength and color 1, and where it travels.
+
+        Together the layers make up the light.
+        """
+        field = self.field_of(grid)
+        if field is not None:
+            for values, part, weight, direction in zip(field.at_texels(grid), field.radiance, WEIGHTS, DIRECTIONS):
+                if part.any():
+                    yield values * np.float32(np.pi * weight), direction
+
+
+@dataclass(frozen=True, eq=False)
+class LampFieldLight(_ComputedLight):
+    """Light of a lamp; its fields have one part, the whole hemisphere.
+
+    Attributes
+    ----------
+    place : world position of the lamp, or for `is_sun` the unit vector along which its light travels.
+    """
+
+    place: Vector
+    is_sun: bool = False
+
+    def gather(self, grid: Grid, _caster, **_options) -> tuple[np.ndarray, np.ndarray]:
+        """As `TracedLight.gather`; the irradiance, (H, W, 3), has its shadows."""
+        field = self.field_of(grid)
+        axes = np.array((grid.x_axis, grid.y_axis, grid.normal))
+        if field is None:
+            irradiance = np.zeros((grid.height, grid.width, 3), np.float32)
+        else:
+            irradiance = next(field.at_texels(grid)) * np.float32(np.pi)
+        if self.is_sun:
+            return irradiance, axes @ self.place
+        x, y, height = axes @ np.subtract(self.place, grid.origin)
+        along = (np.arange(grid.width) + 0.5) * grid.pitch_x - x
+        up = ((np.arange(grid.height) + 0.5) * grid.pitch_y - y)[:, None]
+        # What it lights it stands above; a lamp of a size may do so while its middle is not.
+        way = np.stack(np.broadcast_arrays(along, up, -max(height, 1e-3 * grid.pitch_x)), axis=2)
+        return irradiance, way / np.linalg.norm(way, axis=2, keepdims=True)
 
 
 def spline_weights(texels: int, nodes: int) -> np.ndarray:

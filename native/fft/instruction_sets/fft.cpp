@@ -1,6 +1,6 @@
-// Compiled once per instruction set, BEAMSPREAD_FFT_TARGET naming the function that it is found by. DUCC's templates
+// Compiled once per instruction set, BEAMSPREAD_FFT_INSTRUCTION_SET naming the function that it is found by. DUCC's templates
 // are instantiated here, and only those that are used.
-#include "fft/targets/fft.h"
+#include "fft/instruction_sets/fft.h"
 
 #include "ducc0/fft/fftnd_impl.h"
 
@@ -42,11 +42,12 @@ std::size_t good_size(std::size_t size)
     return size > long_line ? ducc0::good_size_complex(size) : ducc0::good_size_real(size);
 }
 
-constexpr beamspread::FftTarget target{real_to_half, half_to_real, complex_in_place, complex_columns, good_size};
+constexpr beamspread::FftInstructionSet instruction_set{real_to_half, half_to_real, complex_in_place, complex_columns,
+                                                        good_size};
 
 }  // namespace
 
-extern "C" const beamspread::FftTarget* BEAMSPREAD_FFT_TARGET()
+extern "C" const beamspread::FftInstructionSet* BEAMSPREAD_FFT_INSTRUCTION_SET()
 {
-    return &target;
+    return &instruction_set;
 }

@@ -1,4 +1,4 @@
-// The transforms of solve/fft.h as compiled for one instruction set.
+// The transforms of fft/fft.h as compiled for one instruction set.
 #pragma once
 
 #include <complex>
@@ -6,7 +6,7 @@
 
 namespace beamspread {
 
-struct FftTarget {
+struct FftInstructionSet {
     void (*real_to_half)(const float*, std::complex<float>*, std::size_t count, std::size_t size);
     void (*half_to_real)(const std::complex<float>*, float*, std::size_t count, std::size_t size);
     void (*complex_in_place)(std::complex<float>*, std::size_t count, std::size_t size, bool forward);
@@ -19,7 +19,7 @@ struct FftTarget {
 
 // One per instruction set: each is its own object file, of which only this symbol can be seen (cmake/ducc.cmake).
 extern "C" {
-const beamspread::FftTarget* beamspread_fft_baseline();
-const beamspread::FftTarget* beamspread_fft_avx2();
-const beamspread::FftTarget* beamspread_fft_avx512();
+const beamspread::FftInstructionSet* beamspread_fft_baseline();
+const beamspread::FftInstructionSet* beamspread_fft_avx2();
+const beamspread::FftInstructionSet* beamspread_fft_avx512();
 }
