@@ -34,10 +34,11 @@ bake() { # SCENE [batch options]
         --python "$here/render_examples.py" -- "$pictures/baked/$scene.json" "$pictures"
 }
 
-bake laser_beams
-bake obstacle --frames 1-2
-bake marble_floor
-bake low_sun
+# Light bounces in these too, but what they are compared with, or their darkness, is without.
+bake laser_beams --no-indirect
+bake obstacle --no-indirect --frames 1-2
+bake marble_floor --no-indirect
+bake low_sun --no-indirect
 bake soapstone
 bake stage
 bake shop_window

@@ -192,10 +192,15 @@ def lathe(name, profile, material, location, scale=1.0):
     return obj
 
 
-def wire(name, points, radius, material):
-    """A round wire along a path; a curve, as artists would draw it."""
+def wire(name, points, radius, material, sides=10):
+    """A wire along a path, round or with fewer sides; a curve, as artists would draw it."""
     curve = bpy.data.curves.new(name, "CURVE")
-    curve.dimensions, curve.bevel_depth, curve.bevel_resolution, curve.use_fill_caps = "3D", radius, 3, True
+    curve.dimensions, curve.bevel_depth, curve.bevel_resolution, curve.use_fill_caps = (
+        "3D",
+        radius,
+        (sides - 4) // 2,
+        True,
+    )
     spline = curve.splines.new("POLY")
     spline.points.add(len(points) - 1)
     for point, place in zip(spline.points, points):

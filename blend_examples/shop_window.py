@@ -2,18 +2,24 @@
 
 Two area lamps, a long one over the window and a round one from the side, and a sign of glowing tubes, whose colour runs
 over the stone beside it. The back wall is pale: a good part of the light comes to the shelf by way of it. Light spreads
-some 2 cm inside the alabaster.
+some 1 cm inside the alabaster.
 """
 
 import math
 
-import bpy
 import scene_parts as parts
-from mathutils import Vector
 
 MM, CM = 0.001, 0.01
 WIDTH, DEPTH, HEIGHT = 1.20, 0.56, 0.80
-SIGN, SIGN_SIZE = "PARFUM", 0.17
+SIGN, LETTER, STEP, TUBE = "PARFUM", 0.13, 0.135, 2.5 * MM
+STROKES = {  # across and up
+    "P": "0,0 0,1 .4,1 .6,.87 .6,.63 .4,.5 0,.5",
+    "A": "0,0 .3,1 .6,0 / .12,.36 .48,.36",
+    "R": "0,0 0,1 .4,1 .6,.87 .6,.63 .4,.5 0,.5 / .3,.5 .6,0",
+    "F": "0,0 0,1 .55,1 / 0,.5 .45,.5",
+    "U": "0,1 0,.25 .1,.06 .3,0 .5,.06 .6,.25 .6,1",
+    "M": "0,0 .05,1 .32,.35 .6,1 .65,0",
+}
 
 FLACON = "0,0 0,0 30,0 30,0 33,3 33,3 33,62 33,62 30,68 12,74 12,74 12,84 12,84 17,85 17,85 17,110 17,110 15,112 0,112"
 ROUND = "0,0 0,0 18,0 18,0 30,8 40,26 40,44 32,62 14,74 10,80 10,90 10,90 14,91 14,91 19,104 14,118 0,122"
@@ -25,12 +31,12 @@ BOWL = "0,3 20,3 20,0 24,0 24,3 46,16 58,36 60,46 60,46 57,46 57,46 44,20 22,8 0
 def build():
     scene = parts.empty_scene("Shop window", 540, 360, samples=64, view_transform="Filmic")
     scene.view_settings.look = "Medium High Contrast"
-    scene.beamspread.resolution = 768
+    scene.beamspread.resolution = 512
     alabaster, _ = parts.medium_material(
         "Alabaster",
         color_mode="BASE_COLOR",
         base_color=(0.78, 0.74, 0.66),
-        mean_free_path=(2.4 * MM, 2.2 * MM, 1.9 * MM),
+        mean_free_path=(1.4 * MM, 1.3 * MM, 1.1 * MM),
         anisotropy=0.8,
         ior=1.5,
     )
@@ -78,14 +84,12 @@ def goods():
 
 
 def sign():
-    """Letters of glowing tube on the back wall: their outlines, rounded."""
-    glow = parts.glowing_material("Neon", (0.02, 0.02, 0.02), (1.0, 0.06, 0.16), 28.0)
+    """Letters bent from glowing tube, before the back wall."""
+    glow = parts.glowing_material("Neon", (0.02, 0.02, 0.02), (1.0, 0.06, 0.16), 60.0)
     glow.cycles.sample_as_light = True
-    text = bpy.data.curves.new("Sign", "FONT")
-    text.body, text.size, text.align_x = SIGN, SIGN_SIZE, "CENTER"
-    text.fill_mode, text.bevel_depth, text.bevel_resolution, text.resolution_u = "NONE", 2.5 * MM, 1, 4
-    text.space_character = 1.15
-    text.materials.append(glow)
-    letters = parts.link("Sign", text)
-    letters.location = Vector((0, DEPTH / 2 - 2.5 * CM, 0.22))
-    letters.rotation_euler = (math.radians(90), 0, 0)
+    middle = 0.5 * (len(SIGN) - 1 + 0.6)
+    for place, letter in enumerate(SIGN):
+        for number, stroke in enumerate(STROKES[letter].split(" / ")):
+            points = [tuple(float(value) for value in point.split(",")) for point in stroke.split()]
+            path = [((place + x - middle) * STEP, DEPTH / 2 - 2.5 * CM, 0.22 + y * LETTER) for x, y in points]
+            parts.wire(f"Sign {place + 1} {letter} {number + 1}", path, TUBE, glow, sides=4)

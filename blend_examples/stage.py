@@ -26,7 +26,7 @@ WATTS, RADIUS, BLEND = 650.0, 6 * CM, 0.25
 def build():
     scene = parts.empty_scene("Stage", 540, 360, samples=64, view_transform="Filmic")
     scene.view_settings.look = "Medium High Contrast"
-    scene.beamspread.resolution = 768
+    scene.beamspread.resolution = 512
     acrylic, _ = parts.medium_material(
         "Milky acrylic",
         color_mode="ALBEDO",

@@ -11,13 +11,13 @@ import sys
 from pathlib import Path
 
 import bpy
-import cycles_slab
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent / "build" / "stage"))
+sys.path[:0] = [str(HERE), str(HERE.parent / "build" / "stage")]
 
 import beamspread  # noqa: E402
+import cycles_slab  # noqa: E402
 
 COLUMNS = 208
 PASSES = 8  # of which the scatter gives the noise
