@@ -150,6 +150,16 @@ def test_solvers_that_take_lights_apart_agree(solver, monkeypatch):
     assert relative_error(bake(*arguments, settings), apart) < 4 * TOLERANCE
 
 
+def test_rays_return_unscattered_from_a_slab_as_lights_do(monkeypatch):
+    """A fifth of a mean free path thick, where some per cent of the light returns from the far side unscattered."""
+    for name in ("MOST_RAYS", "FEWEST_RAYS"):
+        monkeypatch.setattr(luminance, name, 2)
+    settings = replace(SETTINGS, samples=4)
+    arguments = grid(8), Illumination([sky()]), replace(MATERIAL, mean_free_path=(0.05, 0.05, 0.05)), 0.01
+    apart = bake(*arguments, replace(settings, solver="direct"))
+    assert relative_error(bake(*arguments, settings), apart) < 4 * TOLERANCE
+
+
 def sky():
     """Blue, with a red quarter."""
     radiance = np.full((16, 32, 3), (0.1, 0.2, 0.4), np.float32)
