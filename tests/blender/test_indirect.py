@@ -163,7 +163,9 @@ def test_directions_of_a_glowing_square(world, mirrored):
         "only": [],
         "by_lamps": False,
         "reflectances": {},
-        "noise": 0.002,
+        "noise": (0.002, 0.002),
+        "noise_of_all": 0.0,
+        "direct": 0.0,
         "most_samples": 1500,
         "charts": [chart],
     }

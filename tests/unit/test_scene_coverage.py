@@ -48,7 +48,9 @@ def coverage(polygons, width, height, **options):
 
 def star(rng, width, height, corners):
     """A simple polygon, mostly concave, partly outside the grid."""
-    angles = np.sort(rng.uniform(0, 2 * np.pi, corners))
+    angles = np.zeros(corners)
+    while np.diff(angles, append=angles[0] + 2 * np.pi).max() > 3.1:  # sides would cross
+        angles = np.sort(rng.uniform(0, 2 * np.pi, corners))
     radii = rng.uniform(0.2, 0.9, corners) * max(width, height)
     middle = rng.uniform(0, 1, 2) * (width, height)
     points = middle + radii[:, None] * np.stack([np.cos(angles), np.sin(angles)], 1)

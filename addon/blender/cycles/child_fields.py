@@ -37,7 +37,8 @@ def fields(request, scene, progress) -> dict:
     total, samples, count = sum(looks) * LOOK, 2 * LOOK, 2 * LOOK
     # The mean of both has noise / sqrt(2); it falls by the root of the samples.
     noise = noise_of(request, *looks) / np.sqrt(2)
-    wanted = int(min(np.ceil(samples * (noise / request["noise"]) ** 2), request["most_samples"]))
+    allowed = allowed_noise(request, looks)
+    wanted = int(min(np.ceil(samples * (noise / allowed) ** 2), request["most_samples"]))
     progress(samples / max(wanted, samples))
     while samples < wanted:
         count = min(count, wanted - samples)
@@ -137,14 +138,23 @@ def split(request, pixels) -> list:
     return parts
 
 
+def mean_radiance(request, pixels) -> np.ndarray:
+    """Of each node, by the cosine over the hemisphere."""
+    _, reach, _, part = np.transpose(request["strata"])
+    return np.concatenate(
+        [np.tensordot(reach * part, values.mean(axis=3), 1).ravel() for values in split(request, pixels)]
+    )
+
+
+def allowed_noise(request, looks) -> float:
+    """Of the irradiance found, as part of it; where there is much light besides, more of it goes unseen."""
+    found = np.pi * float(np.mean([mean_radiance(request, look) for look in looks]))
+    least, most = request["noise"]
+    return float(np.clip(request["noise_of_all"] * (1 + request["direct"] / found), least, most)) if found > 0 else most
+
+
 def noise_of(request, one, other) -> float:
     """Of the irradiance in `one`, from its difference to `other`."""
-    _, reach, _, part = np.transpose(request["strata"])
-    weights = reach * part
-    square, mean = [], []
-    for a, b in zip(split(request, one), split(request, other)):
-        a, b = (np.tensordot(weights, values.mean(axis=3), 1).ravel() for values in (a, b))
-        square.append((a - b) ** 2 / 2)
-        mean.append((a + b) / 2)
-    total = np.concatenate(mean).mean()
-    return float(np.sqrt(np.concatenate(square).mean()) / total) if total > 0 else 0.0
+    one, other = mean_radiance(request, one), mean_radiance(request, other)
+    total = (one + other).mean() / 2
+    return float(np.sqrt(((one - other) ** 2 / 2).mean()) / total) if total > 0 else 0.0

@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 import os
 import threading
+from collections.abc import Sequence
 from dataclasses import replace
 
 import bpy
 import numpy as np
 
+from ...core.bake.gather import Gatherer
 from ...core.bake.job import BakeJob
+from ...core.bake.settings import BakeSettings
 from ...core.errors import MaterialError
 from ...core.progress import Progress, stages
+from ...core.scene.illumination import Illumination
 from ...core.scene.lights import STRATA, Field, FieldLight, LampFieldLight, Light, WorldLight
 from ...core.scene.receiver import Receiver
 from ..node.find import find_node
@@ -24,9 +28,10 @@ from .world import world_panorama
 # Nodes along the longest side of a receiver; the nodes of all its charts fill so many squares of that side at most.
 NODES, MOST_SQUARES = 64, 2.0
 
-# Part of the bounced irradiance that is noise at a node, which interpolation averages to about half, unless that takes
-# more samples of each of its directions.
-NOISE, MOST_SAMPLES = 0.03, 128
+# Part of all irradiance that is noise of what bounces at a node, but of the bounced one at least and at most so much;
+# interpolation averages it to about half. Unless that takes more samples of each of its directions.
+NOISE_OF_ALL, LEAST_NOISE, MOST_NOISE = 0.01, 0.03, 0.1
+MOST_SAMPLES = 128
 
 # Of light that comes directly, with its shadows, and is not understood by our readers.
 DIRECT_NODES, DIRECT_NOISE = 256, 0.02
@@ -75,7 +80,9 @@ class CyclesLight:
         return replace(
             job,
             illumination=illumination,
-            more_light=lambda receiver, progress: self._find(receiver, world, others, bounced, progress),
+            more_light=lambda receiver, progress: self._find(
+                receiver, illumination.lights, world, others, bounced, progress
+            ),
         )
 
     def _world_name(self) -> str:
@@ -91,9 +98,15 @@ class CyclesLight:
         return False
 
     def _find(
-        self, receiver: Receiver, world: str, others: list[str], bounced: bool, progress: Progress | None
+        self,
+        receiver: Receiver,
+        own: Sequence[Light],
+        world: str,
+        others: list[str],
+        bounced: bool,
+        progress: Progress | None,
     ) -> list[Light]:
-        """Runs in any thread."""
+        """What Cycles adds to the scene's `own` lights. Runs in any thread."""
         weights = [float(bool(world) and self._panorama is None), 2.0 * bounced, *(1.0 for _ in others)]
         first, second, *each = stages(progress, weights)
         lights: list[Light] = []
@@ -103,13 +116,14 @@ class CyclesLight:
                 self._panorama = WorldLight(world, *WHITE, True, radiance, UPRIGHT)
             lights.append(self._panorama)
         if bounced:
-            lights.append(FieldLight("Bounced light", *WHITE, False, self._fields(receiver, second)))
+            direct = _irradiance_in_the_open(receiver, [*own, *lights])
+            lights.append(FieldLight("Bounced light", *WHITE, False, self._fields(receiver, second, direct=direct)))
         return lights + [self._direct(receiver, name, step) for name, step in zip(others, each)]
 
     def _direct(self, receiver: Receiver, name: str, progress: Progress | None) -> Light:
         """What an object sends to the receiver."""
         lamp = self._lamps.get(name)
-        options = {"light": "DIRECT", "only": [name], "noise": DIRECT_NOISE}
+        options = {"light": "DIRECT", "only": [name], "noise": (DIRECT_NOISE, DIRECT_NOISE)}
         if lamp is None:
             return FieldLight(name, *WHITE, False, self._fields(receiver, progress, **options))
         whole = {"by_lamps": True, "strata": [[0.0, 1.0, 0.0, 1.0]], "charts": charts_of(receiver, DIRECT_NODES)}
@@ -124,12 +138,22 @@ class CyclesLight:
             "only": [],
             "by_lamps": False,
             "reflectances": {name: _reflectance(surface) for name, surface in self._surfaces.items()},
-            "noise": NOISE,
+            "noise": (LEAST_NOISE, MOST_NOISE),
+            "noise_of_all": NOISE_OF_ALL,
+            "direct": 0.0,
             "most_samples": MOST_SAMPLES,
         }
         found = run(self._copy, "fields", {**request, **options}, progress)
         grids = (chart.grid for chart in receiver.charts)
         return tuple(Field(grid.origin, grid.normal, found[f"radiance_{n}"]) for n, grid in enumerate(grids))
+
+
+def _irradiance_in_the_open(receiver: Receiver, lights: Sequence[Light]) -> float:
+    """The mean, W/m^2, of the lights without what stands in their way."""
+    grids = [chart.grid for chart in receiver.charts]
+    means = [sum(Gatherer(grid, Illumination(lights), BakeSettings()).survey()[2]) for grid in grids]
+    areas = [grid.width * grid.pitch_x * grid.height * grid.pitch_y for grid in grids]
+    return float(np.average(means, weights=areas))
 
 
 def charts_of(receiver: Receiver, nodes: int) -> list[dict]:
