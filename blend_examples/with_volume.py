@@ -4,8 +4,8 @@
 
 The slab is a box below the plane, wide and deep enough to have no ends, of a medium without a step in refraction, which
 paths can be traced through. What leaves it is measured as in cycles_slab.py, by a ghost above it, and shown by the
-Beamspread node. Prints how far OURS.exr, a bake of the same plane, is off: mean over texels of the ghost, and over blocks
-of them, which have less noise.
+Beamspread node. Prints how far OURS.exr, a bake of the same plane, is off: mean over texels of the ghost, and over
+blocks of them, which have less noise.
 """
 
 import sys
@@ -107,7 +107,7 @@ def resampled(texture, shape):
 
 
 def compare(baked, passes, size):
-    """Print the mean error of blocks of `size` squared texels of the ghost, and what the noise of Cycles makes of it."""
+    """Print the mean error over blocks of `size` squared texels of the ghost, and what noise of Cycles is of it."""
     rows, columns = passes.shape[1] // size, passes.shape[2] // size
     blocks = passes[:, : rows * size, : columns * size].reshape(PASSES, rows, size, columns, size, 3)
     blocks = np.nanmean(blocks, axis=(2, 4))
