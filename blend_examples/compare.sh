@@ -1,24 +1,37 @@
 #!/usr/bin/env bash
-# Makes pictures in blend_examples/pictures: low_sun by Beamspread and by Cycles' own subsurface scattering, the scenes with
-# lights of a size by Beamspread and as surfaces that light does not enter. Bakes the examples first. Cycles takes ten
-# minutes on two cores for the first, half a minute for each of the others.
+# Makes pictures in blend_examples/pictures: low_sun by Beamspread and by Cycles' own subsurface scattering; the scenes with
+# lights of a size by Beamspread and as surfaces that light does not enter; stage also as a volume that Cycles traces paths
+# through. Bakes the examples first. On two cores Cycles takes ten minutes for low_sun, five for the volume, half a minute for
+# each of the others.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 root=$(dirname "$here")
 pictures=$root/build/examples
 "$here/bake.sh"
 
-# beside SCENE TITLE TITLE SAMPLES [diffuse]: Beamspread on the left, Cycles on the right.
-beside() {
-    local scene=$1 left=$2 right=$3
-    shift 3
-    blender -b --factory-startup "$here/$scene.blend" --python-exit-code 1 --python "$here/with_diffusion.py" -- \
-        "$pictures/${scene}_by_cycles.png" "$@"
-    MPLBACKEND=Agg "$root/build/venv/bin/python" "$here/side_by_side.py" "$here/pictures/$scene.png" \
-        "$pictures/$scene.png" "$left" "$pictures/${scene}_by_cycles.png" "$right"
+render() { # SCENE SCRIPT [arguments]: a picture of the scene, changed by the script
+    local scene=$1 script=$2
+    shift 2
+    blender -b --factory-startup "$here/$scene.blend" --python-exit-code 1 --python "$here/$script" -- "$@"
 }
 
-beside low_sun "Beamspread: light goes on the way it was going" "Cycles, subsurface scattering: it spreads evenly" 1024
+beside() { # SCENE (PICTURE TITLE)*: what was baked on the left, the others on its right
+    local scene=$1
+    shift
+    MPLBACKEND=Agg "$root/build/venv/bin/python" "$here/side_by_side.py" "$here/pictures/$scene.png" "$@"
+}
+
+render low_sun with_diffusion.py "$pictures/low_sun_with_diffusion.png" 1024
+beside low_sun "$pictures/low_sun.png" "Beamspread: light goes on the way it was going" \
+    "$pictures/low_sun_with_diffusion.png" "Cycles, subsurface scattering: it spreads evenly"
+
 for scene in soapstone stage shop_window; do
-    beside "$scene" "Beamspread" "Cycles, diffuse" 96 diffuse
+    render "$scene" with_diffusion.py "$pictures/${scene}_diffuse.png" 64 diffuse
 done
+beside soapstone "$pictures/soapstone.png" "Beamspread" "$pictures/soapstone_diffuse.png" "Cycles, diffuse"
+beside shop_window "$pictures/shop_window.png" "Beamspread" "$pictures/shop_window_diffuse.png" "Cycles, diffuse"
+
+render stage with_volume.py "$pictures/stage_by_volume.png" \
+    "$pictures/baked/stage/Stage_floor_Milky_acrylic.exr" 384
+beside stage "$pictures/stage.png" "Beamspread" "$pictures/stage_by_volume.png" "Cycles, paths through the volume" \
+    "$pictures/stage_diffuse.png" "Cycles, diffuse"
