@@ -11,7 +11,7 @@ KINDS = {
     "laser_beams": ["SpotLight"] * 7,
     "obstacle": ["SunLight"],
     # Its world is for the eye alone.
-    "marble_floor": ["MeshLight"] * 2 + ["PointLight", "SunLight", "SunLight"],
+    "marble_floor": ["MeshLight", "PointLight", "SunLight", "SunLight"],
     "low_sun": ["SunLight", "SunLight"],
     "soapstone": ["WorldLight"],
     "stage": ["AreaLight"] + ["SphereSpotLight"] * 4,
