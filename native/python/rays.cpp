@@ -47,16 +47,13 @@ public:
         for (std::size_t x = 0; x < row.width; ++x) {
             const Vec3f& light = row.irradiance[x];
             irradiance[x] += light;
-            flow[x] += glm::dot(light, luminance) * row.travel[x];
+            flow[x] += (light.x + light.y + light.z) / 3.0f * row.travel[x];
         }
     }
 
     py::object result() const { return py::make_tuple(m_irradiance.array(), m_flow.array()); }
 
 private:
-    // Of linear sRGB (Rec. 709).
-    static constexpr Vec3f luminance{0.2126f, 0.7152f, 0.0722f};
-
     Field m_irradiance, m_flow;
 };
 
@@ -156,8 +153,8 @@ Returns
 irradiance : ndarray, float32, shape (height, width, 3)
     W/m^2: cosine and visible part included. Row 0 is the lowest row.
 flow : ndarray, float32, shape (height, width, 3)
-    The sum over the rays of luminance (of linear Rec. 709) of the irradiance times unit vector of travel in the plane
-    frame (x_axis, y_axis, normal), W/m^2.
+    The sum over the rays of the irradiance, the mean of its channels, times unit vector of travel in the plane frame
+    (x_axis, y_axis, normal), W/m^2.
 
 Raises
 ------

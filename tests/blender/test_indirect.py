@@ -308,7 +308,8 @@ def test_the_scene_stays_as_it_is(monkeypatch, tmp_path):
 
 def test_cancelling_kills_the_process(monkeypatch):
     floor = add_scene()
-    monkeypatch.setattr(light, "NOISE", 1e-4)
+    monkeypatch.setattr(light, "LEAST_NOISE", 1e-4)
+    monkeypatch.setattr(light, "MOST_NOISE", 1e-4)
     monkeypatch.setattr(light, "MOST_SAMPLES", 10**4)
     children = []
 

@@ -195,6 +195,11 @@ def test_a_narrow_sun_counts_as_one_direction():
     assert 0 < difference.mean() < 2e-3
 
 
+def test_a_black_medium_stays_black():
+    black = replace(MATERIAL, albedo=(0.0, 0.0, 0.0))
+    assert not bake(grid(32), Illumination([sky(), panel()], WALL), black, 0.0, SETTINGS).any()
+
+
 MEMORY = """
 import sys
 sys.path.insert(0, sys.argv[2])

@@ -16,7 +16,7 @@ from ..scene.lights import ExtendedLight, FieldLight, Light, SunDiskLight
 from .settings import BakeSettings
 
 # Of a sun up to so wide, radians, all light counts as coming from its middle but for its shadows: that leaves out what
-# grows with the square of the angle, at most 1e-4 of the light up to 80 degrees of incidence.
+# grows with the square of the angle, of the luminance 6e-4 at 80 degrees of incidence and 5e-3 at 85.
 WIDEST_SUN = math.radians(2.0)
 
 # Of a survey, which only has to know what directions there are.

@@ -21,6 +21,8 @@ constexpr std::size_t rays_at_once = 64;
 void BeamMoments::add(const LightTerms& terms, const BeamRow& beams, const std::vector<float>& colors,
                       std::size_t first, std::size_t end, const Values& values)
 {
+    if (first == end || terms.basis.functions.empty())  // a black medium needs none
+        return;
     const std::size_t count = beams.irradiance.size();
     m_step.resize(count);
     for (auto* scratch : {&m_part, &m_cosine, &m_sine, &m_u})
