@@ -27,7 +27,7 @@ def fields(request, scene, progress) -> dict:
     """
     for name, color in request["reflectances"].items():
         make_diffuse(bpy.data.materials[name], color)
-    set_up(scene)
+    set_up(scene, request["light"])
     if request["only"]:
         shine_alone(scene, request["only"])
     ghost, image = add_ghost(request["charts"], request["strata"], request["by_lamps"])
@@ -80,7 +80,7 @@ def shine_alone(scene, names) -> None:
                     socket.default_value = 0.0
 
 
-def set_up(scene) -> None:
+def set_up(scene, light) -> None:
     """The artist's materials and bounces, but no clamps, no exposure, nothing that stops early."""
     scene.render.engine = "CYCLES"
     cycles = scene.cycles
@@ -92,7 +92,10 @@ def set_up(scene) -> None:
     cycles.glossy_bounces += 1
     cycles.diffuse_bounces -= 1
     for obj in scene.objects:
-        obj.visible_glossy = obj.visible_diffuse
+        # What mirrors meet of a lamp behind something see-through would count as indirect.
+        obj.visible_glossy = obj.visible_diffuse and not (light == "INDIRECT" and obj.type == "LIGHT")
+    if light == "INDIRECT" and scene.world is not None:
+        scene.world.cycles_visibility.glossy = False
 
 
 class Baker:

@@ -19,6 +19,11 @@ TEXTURED_TRIANGLES, MOST_CUTS = 8192, 64
 PLACES = 6
 
 
+def _shows_a_bake(tree) -> bool:
+    """Whether what glows is light that was baked before: what a receiver returns, no light of its own."""
+    return any(node.bl_idname == "BeamspreadNode" for node in tree.nodes)
+
+
 class Materials:
     """What materials emit, each evaluated once."""
 
@@ -35,7 +40,7 @@ class Materials:
 
     def _read(self, material) -> np.ndarray | Wanted | None:
         surface = surface_of(material.node_tree) if compat.uses_nodes(material) else None
-        if surface is None:
+        if surface is None or _shows_a_bake(material.node_tree):
             return None
         try:
             light = radiance(Places(images=self.images), surface)

@@ -57,7 +57,8 @@ def _panorama(name: str, surface: Wanted, images: Images) -> WorldLight | None:
         rows = slice(first, first + ROWS)
         # Rows of the matrix are the image's axes in the world.
         towards = directions(width, height, rows) @ to_image
-        texels[rows] = radiance(_places(images, towards), surface).reshape(-1, width, 3)
+        light = radiance(_places(images, towards), surface)
+        texels[rows] = light.reshape(-1, width, 3) if light.ndim > 1 else light
     if not texels.any():
         return None
     return WorldLight(name, 1.0, (1.0, 1.0, 1.0), True, _without_noise(texels), _rows(to_image.T))
