@@ -15,6 +15,9 @@ namespace {
 // Of the way to a face, which may be among what blocks light; rays are traced in single precision.
 constexpr double short_of_face = 1.0 - 1e-5;
 
+// Squared distance over squared size from which on a face is as good as a point: right to 2e-3.
+constexpr double sizes_to_small = 20.0 * 20.0;
+
 }  // namespace
 
 MeshLight::MeshLight(std::span<const Vec3> vertices, std::span<const Triangle> triangles,
@@ -32,13 +35,15 @@ MeshLight::MeshLight(std::span<const Vec3> vertices, std::span<const Triangle> t
         const Vec3 glow(radiance[i]);
         if (!(glow.x >= 0.0 && glow.y >= 0.0 && glow.z >= 0.0) || !detail::is_finite(glow))
             reject("radiance", detail::to_text(glow), "finite values >= 0");
-        Face face{.corners = {}, .normal = {}, .radiance = glow};
+        Face face{.corners = {}, .normal = {}, .squared_size = 0.0, .radiance = glow};
         for (std::size_t k = 0; k < 3; ++k) {
             if (triangles[i][k] >= vertices.size())
                 reject("triangles", std::to_string(triangles[i][k]),
                        "indices below the number of vertices, " + std::to_string(vertices.size()));
             face.corners[k] = vertices[triangles[i][k]];
         }
+        const auto& [a, b, c] = face.corners;
+        face.squared_size = std::max({glm::dot(b - a, b - a), glm::dot(c - b, c - b), glm::dot(a - c, a - c)});
         face.normal = glm::cross(face.corners[1] - face.corners[0], face.corners[2] - face.corners[0]);
         const double power = glm::length(face.normal) * (glow.x + glow.y + glow.z) / 3.0;
         if (!(power > 0.0))
@@ -91,6 +96,13 @@ Vec3 MeshLight::irradiance(const Vec3& point, const Vec3& normal) const
     for (const Face& face : m_faces) {
         const auto& [a, b, c] = face.corners;
         const std::array<Vec3, 3> corners = {a - point, b - point, c - point};
+        const Vec3 way = (corners[0] + corners[1] + corners[2]) / 3.0;
+        const double squared = glm::dot(way, way);
+        if (squared > sizes_to_small * face.squared_size) {
+            const double cosines = std::abs(glm::dot(face.normal, way)) * std::max(glm::dot(normal, way), 0.0);
+            sum += face.radiance * (0.5 * cosines / (squared * squared));
+            continue;
+        }
         sum += face.radiance * polygon_irradiance(corners, normal);
     }
     return sum;

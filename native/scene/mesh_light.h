@@ -25,6 +25,7 @@ private:
     struct Face {
         std::array<Vec3, 3> corners;
         Vec3 normal;  // its length is twice the area
+        double squared_size;  // of the longest edge
         Vec3 radiance;
     };
 

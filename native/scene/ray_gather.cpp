@@ -15,6 +15,7 @@
 #include "base/threads.h"
 #include "base/vec.h"
 #include "scene/beams.h"
+#include "scene/open_irradiance.h"
 #include "scene/ray_start.h"
 
 namespace beamspread {
@@ -23,9 +24,6 @@ namespace {
 
 // More rays of a row than that are not kept at once: 50 MB of each thread for 8192 texels.
 constexpr std::size_t max_rays_at_once = 256;
-
-// From so many texels away on a texel's centre knows its mean to 5e-4 of the light of a point, and better of a larger one.
-constexpr double texels_to_even_light = 24.0;
 
 // What the rays of a texel met.
 enum Met : std::uint8_t { nothing = 0, light = 1, obstacle = 2, both = light | obstacle };
@@ -43,6 +41,7 @@ public:
         : m_grid(grid),
           m_prepared(light.facing(grid.normal)),
           m_light(m_prepared ? *m_prepared : light),
+          m_open(grid, m_light),
           m_occluders(occluders),
           m_rays(static_cast<std::size_t>(settings.rays)),
           m_even_rays(occluders ? std::min(static_cast<std::size_t>(settings.even_rays), m_rays) : 0),
@@ -51,8 +50,6 @@ public:
           m_start(ray_start(grid, occluders, settings.clearance)),
           m_position_rounding(std::numeric_limits<double>::epsilon() * grid.reach(Vec3(0.0)))
     {
-        if (m_light.is_far())
-            m_far_irradiance = m_light.irradiance(grid.origin, grid.normal);
         if (takes_a_look())
             m_met.resize(grid.width * grid.height);
     }
@@ -159,7 +156,7 @@ private:
     void gather_texel(std::size_t x, std::size_t y, const Part& part, Rays& rays) const
     {
         const std::size_t count = part.count;
-        const Vec3 open = open_irradiance(x, y) * (static_cast<double>(count) / static_cast<double>(part.all));
+        const Vec3 open = m_open.at(x, y) * (static_cast<double>(count) / static_cast<double>(part.all));
         if (open == Vec3(0.0))
             return;
         rays.places.resize(count);
@@ -214,24 +211,6 @@ private:
         return sum;
     }
 
-    // Of a texel, in the mean, with nothing in between.
-    Vec3 open_irradiance(std::size_t x, std::size_t y) const
-    {
-        if (m_light.is_far())
-            return m_far_irradiance;
-        const auto at = [&](double sub_x, double sub_y) {
-            const Vec3 point = m_grid.point(static_cast<double>(x) + sub_x, static_cast<double>(y) + sub_y);
-            return m_light.irradiance(point, m_grid.normal);
-        };
-        const double distance = m_light.distance_from(m_grid.point(static_cast<double>(x), static_cast<double>(y)));
-        if (distance > texels_to_even_light * std::max(m_grid.pitch_x, m_grid.pitch_y))
-            return at(0.5, 0.5);
-        // The Gauss rule of two points along each axis.
-        constexpr double offset = 0.5 / std::numbers::sqrt3;
-        return 0.25 * (at(0.5 - offset, 0.5 - offset) + at(0.5 + offset, 0.5 - offset) +
-                       at(0.5 - offset, 0.5 + offset) + at(0.5 + offset, 0.5 + offset));
-    }
-
     void trace(Rays& rays) const
     {
         std::array<Vec3f, Occluders::packet_size> transmittance;
@@ -251,6 +230,7 @@ private:
     const ReceiverGrid& m_grid;
     std::unique_ptr<const ExtendedLight> m_prepared;
     const ExtendedLight& m_light;
+    OpenIrradiance m_open;
     const Occluders* m_occluders;
     std::size_t m_rays;
     std::size_t m_even_rays;
@@ -258,7 +238,6 @@ private:
     GridSobol m_even_sobol;
     RayStart m_start;
     double m_position_rounding;
-    Vec3 m_far_irradiance{0.0};
     std::vector<std::uint8_t> m_met;  // [texel] by the rays of a look
     Pool<Rays> m_rows;
 };
