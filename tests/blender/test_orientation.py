@@ -31,6 +31,7 @@ def upright():
     """The plane as it is; tests compare with it."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.beamspread.quality = "preview"
+    bpy.context.scene.beamspread.use_indirect = False
     return scene_texture()
 
 

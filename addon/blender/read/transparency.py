@@ -6,6 +6,7 @@ added. Glass, refraction and translucent BSDFs bend or spread light, and throw f
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,8 +31,10 @@ class LetThrough:
     place: TexturePlace | None = None
 
 
-OPAQUE = LetThrough(native.Transmittance((0, 0, 0)))
-CLEAR = LetThrough(native.Transmittance((1, 1, 1)))
+@functools.cache
+def plain(part: int) -> LetThrough:
+    """What lets everything or nothing through: 1 or 0."""
+    return LetThrough(native.Transmittance((part, part, part)))
 
 
 class Materials:
@@ -39,7 +42,7 @@ class Materials:
 
     def __init__(self) -> None:
         self.warnings: list[str] = []
-        self._known: dict[str | None, LetThrough] = {None: OPAQUE}
+        self._known: dict[str | None, LetThrough] = {None: plain(0)}
 
     def read(self, material) -> LetThrough:
         """`material` None: Cycles' default, which is opaque."""
@@ -50,22 +53,22 @@ class Materials:
 
     def _read(self, material) -> LetThrough:
         if not (compat.uses_nodes(material) and compat.has_transparent_shadow(material)):
-            return OPAQUE
+            return plain(0)
         output = material.node_tree.get_output_node("CYCLES")
         if output is None:
-            return OPAQUE
+            return plain(0)
         if not output.inputs["Surface"].is_linked:
             if not output.inputs["Volume"].is_linked:
-                return OPAQUE
+                return plain(0)
             self.warnings.append(
                 f"The material '{material.name}' has a volume alone: it throws no shadow, whatever the volume takes."
             )
-            return CLEAR
+            return plain(1)
         try:
             return self._evaluate(Wanted(output.inputs["Surface"], ()))
         except NotUnderstoodError as what:
             self.warnings.append(f"The material '{material.name}' throws opaque shadows: {what} not understood.")
-            return OPAQUE
+            return plain(0)
 
     def _evaluate(self, surface: Wanted) -> LetThrough:
         pixels = Pixels()  # of this material alone: they may take gigabytes
