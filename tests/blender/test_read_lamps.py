@@ -177,7 +177,8 @@ DARK = [portal, no_power, black, not_for_diffuse, hidden, without_shader]
 def test_dark_lamps(darken):
     darken(add_lamp("AREA", size=0.5))
     plane, image = add_receiver(Matrix(), texels=4)
-    assert cycles_irradiance(plane, image, 16).max() == 0
+    if darken is not portal:  # of a portal without a world Cycles 4.5 crashes
+        assert cycles_irradiance(plane, image, 16).max() == 0
     illumination = read()
     assert (illumination.lights, illumination.warnings) == ((), ())
 
