@@ -1094,8 +1094,8 @@ def gather_rays(
     irradiance : ndarray, float32, shape (height, width, 3)
         W/m^2: cosine and visible part included. Row 0 is the lowest row.
     flow : ndarray, float32, shape (height, width, 3)
-        The sum over the rays of luminance (of linear Rec. 709) of the irradiance times unit vector of travel in the plane
-        frame (x_axis, y_axis, normal), W/m^2.
+        The sum over the rays of the irradiance, the mean of its channels, times unit vector of travel in the plane frame
+        (x_axis, y_axis, normal), W/m^2.
 
     Raises
     ------
