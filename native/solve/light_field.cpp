@@ -12,7 +12,7 @@ namespace beamspread {
 
 namespace {
 
-const Problem& checked(const Problem& problem)
+Problem checked(Problem problem)
 {
     with_threads(problem.threads, [&] { validate(problem); });
     return problem;

@@ -170,7 +170,8 @@ def sky():
 
 def test_light_of_many_colors_and_directions_has_the_power_of_its_parts():
     """A sky over an open plane: beams from everywhere, summed by angle of incidence, against the library itself."""
-    luminance_in_the_middle = bake(grid(48, side=4.0), Illumination([sky()]), MATERIAL, 0.0, SETTINGS)[24, 24]
+    result = bake(grid(48, side=4.0), Illumination([sky()]), MATERIAL, 0.0, SETTINGS)
+    luminance_in_the_middle = result[16:32, 16:32].mean(axis=(0, 1))
     medium = beamspread.Medium(g=MATERIAL.anisotropy, ior=MATERIAL.ior)
     library = beamspread.library(medium, quality="preview")
     elevation = (np.arange(16) + 0.5) / 16 * np.pi - np.pi / 2
