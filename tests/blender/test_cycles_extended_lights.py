@@ -76,7 +76,10 @@ def blocks(values):
 
 def assert_agree(plane, image, light, least=0.02, samples=256, worst=0.06, total=3e-3, most=TOLERANCE):
     """Nine of ten lit blocks within 1 %, the others, which Cycles samples badly, within 6 %; the total .3 %."""
-    cycles, ours = blocks(cycles_irradiance(plane, image, samples)), blocks(our_irradiance(plane, light))
+    cycles, ours = cycles_irradiance(plane, image, samples), our_irradiance(plane, light)
+    broken = ~np.isfinite(cycles)  # of spots without blend, at the cone's border in newer Blenders
+    assert broken.mean() < 0.05
+    cycles, ours = (blocks(np.where(broken, 0, values)) for values in (cycles, ours))
     strength = ours.max(axis=2)
     bright = strength > least * strength.max()
     assert bright.sum() > 0.02 * bright.size
