@@ -100,6 +100,43 @@ def beams():
     return sun, point, point_direction
 
 
+def rays(library):
+    pitch = 0.2 / SIZE
+    grid = native.ReceiverGrid((-0.1, -0.1, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), pitch, pitch, SIZE, SIZE)
+    corners = np.array([[0, -1, 0.5], [0.5, -1, 0.5], [0.5, 1, 0.5], [0, 1, 0.5]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+    tinted = native.OccluderMesh(
+        corners, faces, None, [native.Transmittance((0.5, 0.2, 0.1))], np.zeros((2, 1), np.uint32), None
+    )
+    occluders = native.Occluders.of_meshes([tinted], (0, 0, 0))
+    image = np.random.default_rng(0).random((8, 16, 3)).astype(np.float32)
+    lights = [
+        native.SunDiskLight((0.3, 0, -1), 0.2),
+        native.AreaLight((0.1, 0, 1), np.eye(3), 0.3, 0.3),
+        native.SphereLight((0.1, 0, 1), 0.1, "sphere"),
+        native.EnvironmentLight(image, np.eye(3)),
+        native.MeshLight(corners + (0, 0, 0.5), faces, np.ones((2, 3), np.float32)),
+    ]
+    steep = lights[:3]  # within the angles of the library
+    coverage = np.ones((SIZE, SIZE), np.float32)
+    parts = [
+        part
+        for light in steep
+        for irradiance, direction in native.ray_layers(grid, light, rays=2)
+        for part in native.PlaneLight.of_channels(irradiance, direction, 3)
+    ]
+    size = (SIZE, SIZE)
+    medium = ([library] * 3, (0.9, 0.5, 0.1), (0.1, 0.1, 0.1), (pitch, pitch), 1e-2)
+    field = native.LightField(size, parts[:3], size, parts, *medium, threads=THREADS)
+    for light in lights:
+        total, _ = native.gather_rays(grid, light, occluders, rays=8, even_rays=4, threads=THREADS)
+        assert total.max() > 0
+    for light in steep:
+        field.add_rays(grid, light, (1, 1, 1), coverage, occluders, rays=8, even_rays=4, threads=THREADS)
+    field.add(parts[0])
+    assert np.isfinite(field.solve()).all()
+
+
 def solvers(library, sun, point, direction):
     from beamspread import convolve
 
@@ -124,5 +161,7 @@ def images(folder):
 
 with tempfile.TemporaryDirectory() as folder:
     images(folder)
-    solvers(libraries(folder), *beams())
+    library = libraries(folder)
+    solvers(library, *beams())
+    rays(library)
 print("smoke: all fine")
