@@ -22,9 +22,6 @@ constexpr std::size_t rows_per_strip = 64;
 // Exits with less than this share of the incident power at any angle are left out.
 constexpr double negligible_power = 1e-6;
 
-// tan(theta / 2) of 89.9 degrees, beyond which nothing enters that could be seen.
-constexpr float steepest = 0.99825f;
-
 // Of sums in whole numbers, below the brightest light; above are 2^23 times as much.
 constexpr int fraction_bits = 40;
 
@@ -222,9 +219,19 @@ struct UnscatteredRays::Exits {
 
 UnscatteredRays::UnscatteredRays(const Problem& problem) : m_plane(problem.plane), m_exits(std::make_unique<Exits>())
 {
+    // Of rays that come, those of a survey tell; the few beyond count as the last of these.
+    std::pair<float, float> angles{1.0f, 0.0f};
+    const auto include = [&](const Plane& plane, const PlaneLight& light) {
+        const auto [first, last] = present(plane, light);
+        angles = {std::min(angles.first, first), std::max(angles.second, last)};
+    };
+    for (const PlaneLight& light : problem.lights)
+        include(problem.plane, light);
+    for (const PlaneLight& light : problem.to_come.lights)
+        include(problem.to_come.plane, light);
     std::size_t count = 0;
     for (const ChannelMedium& medium : problem.channels) {
-        m_exits->tables.emplace_back(m_plane, medium, std::pair{0.0f, steepest});
+        m_exits->tables.emplace_back(m_plane, medium, angles);
         count += m_exits->tables.back().count();
     }
     double brightest = 0.0;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 #include <utility>
+#include <variant>
 
 #include "base/constants.h"
 #include "base/threads.h"
@@ -97,12 +98,15 @@ Histogram histogram_of(const Plane& plane, const std::vector<PlaneLight>& lights
     return sum;
 }
 
-// The widest step between the angles of lit neighbours: what lies between them is off theirs by less.
+// The widest step between the angles of lit neighbours: what lies between them is off theirs by less. Of lamps; rays of
+// lights of a size differ by chance, and are many.
 double widest_step(const LightSurvey& survey)
 {
     float widest = 0.0f;
     const std::size_t width = survey.plane.width;
     for (const PlaneLight& light : survey.lights) {
+        if (!std::holds_alternative<FromPoint>(light.directions))
+            continue;
         BeamRow row;
         BeamRow below;  // of the row before
         for (std::size_t y = 0; y < survey.plane.height; ++y) {
