@@ -84,6 +84,8 @@ def bake(ghost, image, samples):
     scene = bpy.context.scene
     cycles, kept = scene.cycles, scene.cycles.samples
     cycles.max_bounces = cycles.volume_bounces = 1024
+    # A clamp, as new scenes have one, takes from the bright rest of the light: 2 % of the stage's.
+    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
     cycles.use_adaptive_sampling, cycles.samples, scene.render.bake.margin = False, samples, 0
     for obj in scene.objects:
         obj.select_set(obj == ghost)

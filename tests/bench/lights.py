@@ -13,8 +13,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from beamspread import presets
+from beamspread import Medium, library, presets
 from beamspread.core.bake import luminance as bakes
+from beamspread.core.bake.gather import Gatherer
 from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.native import native
 from beamspread.core.scene.grid import Grid
@@ -63,8 +64,9 @@ def bake(size, lights, material, shadows=0):
 def transforms(size, lights, material):
     """Of the light, as the solver chooses."""
     grid = floor(size)
-    arriving = bakes._gather(grid, lights, None, SETTINGS, None)
-    libraries = bakes._libraries(material, 0.0, SETTINGS.quality, None)
+    gatherer = Gatherer(grid, Illumination(lights), SETTINGS)
+    arriving = [part for light in lights for part in gatherer.plane_lights(light)]
+    libraries = [library(Medium(g, material.ior)) for g in material.channel_anisotropy]
     rest = list(material.albedo), list(material.mean_free_path), (grid.pitch_x, grid.pitch_y)
     return native.transforms(arriving, libraries, *rest, bakes.TOLERANCE)
 
