@@ -120,6 +120,40 @@ def test_a_light_of_impossible_power_is_named_and_left_out(power, words, tmp_pat
     assert (record.status, record.message) == ("written", messages[0])
 
 
+def add_hair():
+    plane = add_plane("Furry")
+    select(plane)
+    bpy.ops.object.particle_system_add()
+    plane.particle_systems[0].settings.type = "HAIR"
+    return "The hair of 'Furry' is not baked: neither its shadow nor its own light."
+
+
+def add_volume():
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Fog", bpy.data.volumes.new("Fog")))
+    return "'Fog' is a volume: its shadow and its own light are not baked."
+
+
+def add_foggy_world():
+    world = bpy.data.worlds.new("Hazy")
+    if bpy.app.version < (5, 0, 0):
+        world.use_nodes = True
+    tree = world.node_tree
+    tree.nodes.clear()
+    output, fog = tree.nodes.new("ShaderNodeOutputWorld"), tree.nodes.new("ShaderNodeVolumeScatter")
+    tree.links.new(output.inputs["Volume"], fog.outputs[0])
+    bpy.context.scene.world = world
+    return "The world 'Hazy' is filled with a volume: what that takes from the light, or adds, is not baked."
+
+
+@pytest.mark.parametrize("add", [add_hair, add_volume, add_foggy_world])
+def test_what_renders_and_no_bake_knows_is_named(add):
+    plane = add_plane(material=add_material())
+    add_sun(0)
+    sentence = add()
+    _, messages = baked_with_messages(plane)
+    assert messages == [sentence]
+
+
 def flipped():
     return add_plane(matrix=Matrix.Diagonal((1, 1, -1, 1)), material=add_material())
 

@@ -86,7 +86,8 @@ class CyclesLight:
         )
 
     def _world_name(self) -> str:
-        return self._scene.world.name if self._scene.world else ""
+        world = getattr(self._view_layer, "world_override", None) or self._scene.world
+        return world.name if world else ""
 
     def _is_below_something(self, receiver: Receiver) -> bool:
         for grid in (chart.grid for chart in receiver.charts):

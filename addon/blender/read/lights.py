@@ -12,6 +12,7 @@ from .. import compat
 from .emitters import Glow, Materials
 from .geometry import GEOMETRY_TYPES
 from .lamps import fault, is_portal, read_lamp
+from .left_out import left_out, left_out_of_world
 from .linking import links_of
 from .occluders import OccluderReader
 from .visible import render_visible_names, renders
@@ -26,6 +27,7 @@ def read_illumination(depsgraph) -> Illumination:
         if not renders(instance, visible):
             continue
         obj = instance.object
+        lights.say(left_out(obj))
         asks_instancer = instance.is_instance and (obj.type != "LIGHT" or compat.instancer_hides_lamps())
         lights_surfaces = obj.visible_diffuse and (not asks_instancer or instance.parent.visible_diffuse)
         if obj.type == "LIGHT" and lights_surfaces:
@@ -33,7 +35,9 @@ def read_illumination(depsgraph) -> Illumination:
         elif obj.type in GEOMETRY_TYPES and lights_surfaces:
             lights.add_mesh(obj, instance.matrix_world)
         occluders.add(instance)
-    lights.add_world(depsgraph.view_layer, compat.world_of(depsgraph))
+    world = compat.world_of(depsgraph)
+    lights.add_world(depsgraph.view_layer, world)
+    lights.say(left_out_of_world(world))
     return Illumination(
         lights.all(),
         occluders.occluders(),
@@ -60,6 +64,10 @@ class _Lights:
         for light in filter(None, glowing):
             self._add(light, self._links[light.name])
         return self._lights
+
+    def say(self, sentence: str) -> None:
+        if sentence:
+            self.warnings[sentence] = None
 
     def add_lamp(self, obj, matrix) -> None:
         if is_portal(obj.data):
@@ -89,6 +97,6 @@ class _Lights:
 
     def _add(self, light: Light, links: dict) -> None:
         if why := fault(light):
-            self.warnings[f"The light '{light.name}' is left out: {why}."] = None
+            self.say(f"The light '{light.name}' is left out: {why}.")
         else:
             self._lights.append(replace(light, **links))
