@@ -34,7 +34,10 @@ def fields(request, scene, progress) -> dict:
     scene.collection.objects.link(ghost)
     baker = Baker(scene, ghost, image, request["light"], "DIFFUSE" if request["by_lamps"] else "GLOSSY")
     looks = [baker.bake(LOOK), baker.bake(LOOK)]
-    total, samples, count = sum(looks) * LOOK, 2 * LOOK, 2 * LOOK
+    mean, samples, count = Mean(), 2 * LOOK, 2 * LOOK
+    for look in looks:
+        mean.add(look, LOOK)
+    looks = [np.nan_to_num(look) for look in looks]
     # The mean of both has noise / sqrt(2); it falls by the root of the samples.
     noise = noise_of(request, *looks) / np.sqrt(2)
     allowed = allowed_noise(request, looks)
@@ -42,9 +45,10 @@ def fields(request, scene, progress) -> dict:
     progress(samples / max(wanted, samples))
     while samples < wanted:
         count = min(count, wanted - samples)
-        total, samples, count = total + count * baker.bake(count), samples + count, 2 * count
+        mean.add(baker.bake(count), count)
+        samples, count = samples + count, 2 * count
         progress(samples / wanted)
-    result = {f"radiance_{n}": part for n, part in enumerate(split(request, np.maximum(total / samples, 0)))}
+    result = {f"radiance_{n}": part for n, part in enumerate(split(request, np.maximum(mean.values(), 0)))}
     result["noise"] = np.array(noise * np.sqrt(2 * LOOK / samples))
     result["samples"] = np.array(samples)
     return result
@@ -98,6 +102,20 @@ def set_up(scene, light) -> None:
         scene.world.cycles_visibility.glossy = False
 
 
+class Mean:
+    """Of bakes of one image by their samples. A texel in ten thousand may come as no number: its other bakes count."""
+
+    def __init__(self) -> None:
+        self._total, self._samples = 0.0, 0.0
+
+    def add(self, pixels, samples: int) -> None:
+        self._total = self._total + np.nan_to_num(samples * pixels, nan=0.0)
+        self._samples = self._samples + samples * np.isfinite(pixels)
+
+    def values(self) -> np.ndarray:
+        return self._total / np.maximum(self._samples, 1)
+
+
 class Baker:
     """Bakes the ghost again and again."""
 
@@ -114,7 +132,7 @@ class Baker:
             self.options["view_from"] = "ABOVE_SURFACE"
 
     def bake(self, samples: int) -> np.ndarray:
-        """Float32 (height, width, 3) of the image."""
+        """Float32 (height, width, 3) of the image; NaN where Cycles finds no number."""
         self.rounds += 1
         self.scene.cycles.seed, self.scene.cycles.samples = self.rounds, samples
         if self.light == "INDIRECT" and INDIRECT_LACKS_LAMPS:
@@ -126,8 +144,7 @@ class Baker:
         values = np.empty(len(self.image.pixels), np.float32)
         self.image.pixels.foreach_get(values)
         pixels = values.reshape(self.image.size[1], self.image.size[0], self.image.channels)[..., :3]
-        # A texel in ten thousand may come as no number.
-        return np.nan_to_num(pixels, nan=0.0, posinf=0.0, neginf=0.0)
+        return np.where(np.isfinite(pixels), pixels, np.nan)
 
 
 def split(request, pixels) -> list:
