@@ -225,10 +225,10 @@ std::uint32_t Occluders::blocked(std::span<const ShadowRay> rays) const
     return trace(rays, passages.data());
 }
 
-void Occluders::transmit(std::span<const ShadowRay> rays, Vec3f* transmittance) const
+void Occluders::transmit(std::span<const ShadowRay> rays, Vec3f* transmittance, bool is_coherent) const
 {
     if (m_is_opaque) {
-        const std::uint32_t bits = trace(rays, nullptr);
+        const std::uint32_t bits = trace(rays, nullptr, is_coherent);
         for (std::size_t i = 0; i < rays.size(); ++i)
             transmittance[i] = Vec3f(bits >> i & 1u ? 0.0f : 1.0f);
         return;
@@ -239,7 +239,7 @@ void Occluders::transmit(std::span<const ShadowRay> rays, Vec3f* transmittance) 
         transmittance[i] = bits >> i & 1u ? Vec3f(0.0f) : passages[i].transmittance();
 }
 
-std::uint32_t Occluders::trace(std::span<const ShadowRay> rays, Passage* passages) const
+std::uint32_t Occluders::trace(std::span<const ShadowRay> rays, Passage* passages, bool is_coherent) const
 {
     if (!m_hierarchy || rays.empty())
         return 0;
@@ -268,7 +268,8 @@ std::uint32_t Occluders::trace(std::span<const ShadowRay> rays, Passage* passage
     // Rays that Embree takes for coherent it may test against one triangle several times, which only filters notice, and
     // in instances without end.
     const bool is_plain = !passages && m_hulls.empty();
-    context.flags = is_plain ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+    context.flags =
+        is_plain && is_coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
     rtcOccluded16(valid.data(), m_hierarchy->top.get(), &context, &packet);
     std::uint32_t bits = 0;
     // Embree marks a blocked ray by a negative length.

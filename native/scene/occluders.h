@@ -65,8 +65,9 @@ public:
     // Bit i: whether nothing of the i-th of at most `packet_size` rays gets through.
     std::uint32_t blocked(std::span<const ShadowRay> rays) const;
 
-    // What at most `packet_size` rays let through in each channel, 0 to 1.
-    void transmit(std::span<const ShadowRay> rays, Vec3f* transmittance) const;
+    // What at most `packet_size` rays let through in each channel, 0 to 1. Whether they go much the same way only decides
+    // how they are traced.
+    void transmit(std::span<const ShadowRay> rays, Vec3f* transmittance, bool is_coherent = true) const;
 
     // Whether all triangles block all light; else whether some let one channel through more than another.
     bool is_opaque() const { return m_is_opaque; }
@@ -87,7 +88,7 @@ public:
 
 private:
     struct Hierarchy;
-    std::uint32_t trace(std::span<const ShadowRay> rays, Passage* passages) const;
+    std::uint32_t trace(std::span<const ShadowRay> rays, Passage* passages, bool is_coherent = true) const;
     void build(std::span<const OccluderMesh> meshes, std::size_t most_copied);
     void add_instances(const OccluderMesh& mesh);
 

@@ -105,11 +105,11 @@ def _rays(grid: Grid, material: Material, settings: BakeSettings) -> int:
     """How many rays of each texel leave noise of a hundredth, in a penumbra, of what the medium spreads.
 
     Light from a point fills some 4 pi l^2 texels, l the mean free path, over whose rays its noise is averaged; that of
-    n low-discrepancy rays falls about as n^-5/8, from .65 for one (tests/bench/room.py).
+    n low-discrepancy rays falls about as n^-5/8, from .69 for one (tests/bench/room.py).
     """
     path = min(material.mean_free_path) / max(grid.pitch_x, grid.pitch_y)
     texels = 1.0 + 4.0 * math.pi * path**2
-    wanted = (65.0 / math.sqrt(texels)) ** (8.0 / 5.0)
+    wanted = (69.0 / math.sqrt(texels)) ** (8.0 / 5.0)
     return round(min(max(wanted, FEWEST_RAYS), MOST_RAYS) * (settings.samples / 4) ** 2) or 1
 
 
