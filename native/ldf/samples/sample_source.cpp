@@ -14,6 +14,7 @@ namespace beamspread {
 
 namespace {
 
+// Between directions for which the samples are interpolated once; in between, their moments are.
 constexpr double largest_step_deg = 5.0;
 
 // Directions come in single precision.

@@ -20,7 +20,7 @@ namespace {
 constexpr std::size_t small_plane = 192;
 
 // What the texels looked at may use up of the tolerance. The rest is for those between, and for what the probe is off by:
-// over the lights of tests/bench/terms.py the worst of all texels then uses up .62.
+// over the lights of tests/bench/terms.py the worst of all texels then uses up .57.
 constexpr double share = 0.25;
 
 // So often there is a closer look around the texels where errors are largest. Without, the worst texel there is off by
