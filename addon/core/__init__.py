@@ -5,6 +5,7 @@ Each package imports only those above it (tests/unit/test_layers.py reads this l
     native      the compiled module, and why it is missing if it is
     errors      sentences for the artist
     progress    progress of a job made of stages
+    whole_file  files that are whole or as they were
     arrays      array arguments, converted only where nothing is lost
     scene       receivers (charts on planes), lights, triangles that throw shadows
     material    optical properties, measured presets

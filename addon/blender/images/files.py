@@ -1,4 +1,4 @@
-"""Images of the scene, and image files."""
+"""Images of the scene: what can be baked into, and filling them."""
 
 from __future__ import annotations
 
@@ -9,9 +9,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import ImageError
-from ...core.native import native
-
-EXTENSIONS = {"EXR": ".exr", "PNG": ".png"}
+from .writing import is_read_only, save_image, set_pixels, write_exr
 
 
 def file_of(image) -> Path | None:
@@ -40,16 +38,6 @@ def check_image(image) -> None:
         raise ImageError(f"{name} has no pixels: its file may be damaged, so choose another image in the node.")
 
 
-def is_read_only(path: Path) -> bool:
-    """Whether a file or folder is write-protected, also for an administrator, whom the system lets write anyway."""
-    return not os.access(path, os.W_OK) or not path.stat().st_mode & 0o222
-
-
-def make_image(name: str, width: int, height: int, is_data: bool = False):
-    """A new float image, of plain numbers or in the colour space that Blender gives it: scene-linear."""
-    return bpy.data.images.new(name, width, height, alpha=False, float_buffer=True, is_data=is_data)
-
-
 def fill_image(image, texture: np.ndarray) -> str:
     """Put linear RGB (height, width, 3) into an image and keep it; the path of its file, "" where it is packed.
 
@@ -59,68 +47,28 @@ def fill_image(image, texture: np.ndarray) -> str:
     if tuple(image.size) != texture.shape[1::-1]:
         raise ImageError(f"The image '{image.name}' changed its size during the bake: bake it again.")
     path = file_of(image)
-    if path is not None and path.suffix.lower() == ".exr":
-        write_exr(path, texture)
-        image.reload()
-        return str(path)
     encode = not image.is_float and not image.colorspace_settings.is_data
-    set_pixels(image, to_srgb(texture) if encode else texture)
+    stored = to_srgb(texture) if encode else texture
     if path is None:
+        set_pixels(image, stored)
         image.pack()
         return ""
-    try:
-        image.save()
-    except RuntimeError as error:
-        image.reload()
-        raise ImageError(f"The image '{image.name}' cannot be saved to {path}: {error}") from error
+    if path.suffix.lower() == ".exr":
+        write_exr(path, texture)
+    else:
+        _write_like(image, stored, path)
+    image.reload()
     return str(path)
 
 
-def set_pixels(image, texture: np.ndarray) -> None:
-    """Replace all pixels; `texture` float (height, width, 3), row 0 at the bottom, in the image's own encoding."""
-    pixels = np.ones(texture.shape[:2] + (4,), np.float32)
-    pixels[..., :3] = texture
-    image.pixels.foreach_set(pixels.ravel())
-    image.update()
-
-
-def write_file(path: Path, texture: np.ndarray, file_format: str) -> None:
-    """Write linear RGB (height, width, 3), row 0 at the bottom, as EXR or PNG."""
-    folder = path.parent
+def _write_like(image, stored: np.ndarray, path: Path) -> None:
+    """Write pixels to a file of the image's own format."""
+    copy = image.copy()
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ImageError(f"The output folder {folder} cannot be made: {error.strerror}.") from error
-    protected = next((part for part in (path, folder) if part.exists() and is_read_only(part)), None)
-    if protected is not None:
-        raise ImageError(f"The output cannot be written because {protected} is read-only.")
-    if file_format == "EXR":
-        write_exr(path, texture)
-    else:
-        write_png(path, texture)
-
-
-def write_exr(path: Path, texture: np.ndarray) -> None:
-    """Linear 32-bit float RGB, not packed, as Blender saves float images by itself."""
-    try:
-        native.write_exr(str(path), np.ascontiguousarray(texture, np.float32), ["R", "G", "B"], compression="none")
-    except OSError as error:
-        raise ImageError(f"The file {path} cannot be written: {error}") from error
-
-
-def write_png(path: Path, texture: np.ndarray) -> None:
-    """PNG for looking at; from a float image, Blender itself converts to the colour space of its byte images."""
-    height, width = texture.shape[:2]
-    image = make_image("Beamspread PNG", width, height)
-    try:
-        set_pixels(image, texture)
-        image.file_format = "PNG"
-        image.filepath_raw = str(path)
-        image.save()
-    except RuntimeError as error:
-        raise ImageError(f"The file {path} cannot be written: {error}") from error
+        set_pixels(copy, stored)
+        save_image(copy, path)
     finally:
-        bpy.data.images.remove(image)
+        bpy.data.images.remove(copy)
 
 
 def to_srgb(linear: np.ndarray) -> np.ndarray:

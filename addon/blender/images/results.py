@@ -12,6 +12,7 @@ from ...core.errors import BakeError
 from ..node.find import find_node
 from ..node.node import link_result
 from . import files
+from .writing import make_image
 
 # Texels wholly inside two charts, as a part of one of them: more than rounding at a common border.
 OVERLAP_TOLERANCE = 0.01
@@ -38,7 +39,7 @@ class Results:
             shown, size = layer == COMBINED, texture.shape[1::-1]
             image = node.image if shown else self._image_beside(f"{name} {layer}", size)
             if image is None:
-                image = files.make_image(name if shown else f"{name} {layer}", *size, is_data=not shown)
+                image = make_image(name if shown else f"{name} {layer}", *size, is_data=not shown)
             paths.append(self._fill(image, bake, texture))
             if shown:
                 link_result(node, image)

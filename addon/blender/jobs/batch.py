@@ -16,7 +16,7 @@ from ...core.batch.options import BatchOptions
 from ...core.batch.report import BakeRecord, Report, file_name
 from ...core.errors import ImageError
 from ...core.progress import timed
-from ..images import files
+from ..images import files, writing
 from ..node.find import NOTHING_FOUND, find_misplaced, find_node, find_targets
 from .prepare import prepare_scene
 
@@ -102,9 +102,9 @@ class _Output:
         parts = [bake.target.object_name, bake.target.material_name, *([] if layer == COMBINED else [layer])]
         if layer == DIRECTION and file_format == "PNG":
             raise ImageError("A PNG can't hold directions, which have negative parts: choose EXR.")
-        name = file_name(parts, frame if options.frames else None, files.EXTENSIONS[file_format], self._taken)
+        name = file_name(parts, frame if options.frames else None, writing.EXTENSIONS[file_format], self._taken)
         path = Path(bpy.path.abspath(folder)).absolute() / name
-        files.write_file(path, texture, file_format)
+        writing.write_file(path, texture, file_format)
         return self._note_clipping(str(path), bake, texture)
 
     def _belongs_in(self, image, bake: Bake) -> bool:
@@ -113,7 +113,7 @@ class _Output:
         size = receiver.width, receiver.height
         if path is None or self._options.frames is not None or tuple(image.size) != size:
             return False
-        return file_format is None or path.suffix.lower() == files.EXTENSIONS[file_format]
+        return file_format is None or path.suffix.lower() == writing.EXTENSIONS[file_format]
 
     @staticmethod
     def _note_clipping(path: str, bake: Bake, texture) -> str:

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from ..bake.runner import FAILED, WRITTEN, Bake
+from ..whole_file import whole_file
 
 
 @dataclass
@@ -79,10 +80,9 @@ class Report:
 
         target = Path(path)
         target.parent.mkdir(parents=True, exist_ok=True)
-        temporary = target.with_name(target.name + ".part")
         text = json.dumps({"bakes": [asdict(bake) for bake in self.bakes]}, indent=2, ensure_ascii=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
-        temporary.replace(target)
+        with whole_file(target) as temporary:
+            temporary.write_text(text + "\n", encoding="utf-8")
 
 
 def file_name(names: Sequence[str], frame: int | None, extension: str, taken: set[str]) -> str:
