@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import csv
 import math
+import sys
 from pathlib import Path
 
+import beamspread
 import bpy
 import numpy as np
 from mathutils import Matrix
 
 REFERENCE = Path(__file__).resolve().parent.parent / "reference" / "adding_doubling.csv"
+BATCH = Path(beamspread.__file__).parent / "batch.py"
 SQUARE_UVS = ((0, 0), (1, 0), (1, 1), (0, 1))
 
 
@@ -70,6 +73,16 @@ def add_sun(angle_deg=0.0, azimuth_deg=0.0, strength=1.0, color=(1, 1, 1), matri
     return obj
 
 
+def add_lamp(location, power=100.0):
+    """A point lamp, watts."""
+    data = bpy.data.lights.new("Lamp", "POINT")
+    data.energy, data.shadow_soft_size = power, 0.0
+    obj = bpy.data.objects.new("Lamp", data)
+    obj.location = location
+    bpy.context.collection.objects.link(obj)
+    return obj
+
+
 def add_blocker(height, matrix=None):
     """An upright wall in the plane x = 0.2 over y from -0.3 to 0.1, standing on the ground."""
     vertices = [(0.2, -0.3, 0), (0.2, 0.1, 0), (0.2, 0.1, height), (0.2, -0.3, height)]
@@ -95,6 +108,22 @@ def bake(*objects):
     select(*objects)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
     return [pixels(node_of(obj.data.materials[0]).image) for obj in objects]
+
+
+def save_scene(folder):
+    """Save the current scene; its path."""
+    bpy.context.scene.beamspread.resolution = 32
+    path = folder / "scene.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def batch_command(scene, *arguments, program=()):
+    """The command line of a batch, in this Blender; `program` are options of Blender itself."""
+    start = [sys.executable, BATCH, scene]
+    if bpy.app.binary_path:
+        start = [bpy.app.binary_path, "-b", "--factory-startup", scene, *program, "--python", BATCH, "--"]
+    return [*map(str, start), *map(str, arguments)]
 
 
 def messages_of(callable_):

@@ -95,6 +95,23 @@ def save_image(image, path: Path) -> None:
         _check_whole(temporary, file_format, expected, colorspace)
 
 
+def size_of(path: Path) -> tuple[int, int] | None:
+    """Width and height of an image file; None where there is none that is whole."""
+    if not path.is_file():
+        return None
+    if path.suffix.lower() == EXTENSIONS["EXR"]:
+        try:
+            height, width = native.read_exr(str(path))[0].shape[:2]
+        except OSError:
+            return None
+        return width, height
+    image = bpy.data.images.load(str(path))
+    try:
+        return None if 0 in image.size else tuple(image.size)
+    finally:
+        bpy.data.images.remove(image)
+
+
 @contextmanager
 def _kept(path: Path) -> Iterator[Path]:
     """Where to write what will have `path`; ImageError, naming it, where that fails."""
