@@ -1280,10 +1280,15 @@ def walk_kernels() -> list[str]:
     """
 
 def write_exr(
-    path: str, array: numpy.ndarray, channels: list[str], attributes: dict = {}, compression: str = "zip"
+    path: str,
+    array: numpy.ndarray,
+    channels: list[str],
+    attributes: dict = {},
+    compression: str = "zip",
+    half: bool = False,
 ) -> None:
     """
-    Write an OpenEXR file of 32-bit float channels.
+    Write an OpenEXR file of 32-bit or 16-bit float channels.
 
     The file is written beside `path` and takes its name when it is whole.
 
@@ -1299,6 +1304,8 @@ def write_exr(
         Header attributes: str, int, float, or a sequence of numbers (stored as 32-bit floats).
     compression : {"zip", "none"}
         Both without loss.
+    half : bool
+        Round to 16 bits: 11 bits of precision, up to 65504; what is larger becomes infinite.
 
     Raises
     ------

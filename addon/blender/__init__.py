@@ -13,11 +13,12 @@ Each part imports only core and those above it (tests/unit/test_layers.py reads 
 """
 
 from . import settings
+from .images import operators, undo
 from .jobs import engine, operator, state
 from .node import menu, node
 from .ui import panels
 
-PARTS = (settings, node, menu, state, engine, operator, panels)
+PARTS = (settings, operators, undo, node, menu, state, engine, operator, panels)
 
 
 def register() -> None:

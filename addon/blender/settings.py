@@ -99,6 +99,27 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         description="Light that arrives by way of other objects counts, too: Cycles finds it before each bake",
         default=True,
     )
+    image_storage: EnumProperty(
+        name="New Images",
+        description="Where images are kept that a bake makes because a node has none",
+        items=[
+            ("FILES", "Files", "OpenEXR files; packed as long as the scene was never saved", 0),
+            ("PACKED", "Packed", "In the .blend file, which grows: by 200 MB for 4096 x 4096 texels", 1),
+        ],
+        default="FILES",
+    )
+    image_dir: StringProperty(
+        name="Folder",
+        description="Where the files of new images go",
+        default="//textures/",
+        subtype="DIR_PATH",
+        options=compat.PATH_OPTIONS,
+    )
+    image_name: StringProperty(
+        name="Name",
+        description="Of new images and their files: {object} and {material} stand for what they are called",
+        default="{object}_{material}",
+    )
     output_dir: StringProperty(
         name="Output",
         description="Folder that a batch writes to",

@@ -6,6 +6,7 @@ Each package imports only those above it (tests/unit/test_layers.py reads this l
     errors      sentences for the artist
     progress    progress of a job made of stages
     whole_file  files that are whole or as they were
+    exr_header  what OpenEXR files say of their channels
     arrays      array arguments, converted only where nothing is lost
     scene       receivers (charts on planes), lights, triangles that throw shadows
     material    optical properties, measured presets

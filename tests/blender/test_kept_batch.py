@@ -152,7 +152,7 @@ def test_resume_bakes_what_is_missing_damaged_or_older(tmp_path, monkeypatch):
         assert native.read_exr(records[name].path)[0].any()
     # Another size, or another pass, is another bake.
     for more in (["--resolution", "16"], ["--pass", "irradiance"], ["--format", "PNG"]):
-        assert set(one.status for one in run(*arguments, "--resume", *more).values()) == {"written"}
+        assert {one.status for one in run(*arguments, "--resume", *more).values()} == {"written"}
 
 
 def test_resume_takes_an_images_own_file_only_by_its_report(tmp_path):

@@ -95,7 +95,7 @@ def test_direction_follows_the_texture(settings):
     )
     across = np.array([-along[1], along[0]])
     expected = [along @ (x, y), across @ (x, y), z]
-    baked = pixels(bpy.data.images["Beamspread Plane Direction"])
+    baked = pixels(bpy.data.images["Plane_Medium Direction"])
     assert baked == pytest.approx(np.broadcast_to(expected, baked.shape), abs=1e-6)
 
 
@@ -112,7 +112,7 @@ def test_passes_go_into_images_of_their_own_and_leave_the_nodes_alone(settings):
     for output, value in expected.items():
         settings.output = output
         assert np.array_equal(bake(plane)[0], luminance)
-        image = bpy.data.images[f"Beamspread Plane {output.capitalize()}"]
+        image = bpy.data.images[f"Plane_Medium {output.capitalize()}"]
         assert image.is_float
         assert image.colorspace_settings.is_data
         shown = pixels(image)
@@ -123,10 +123,10 @@ def test_passes_go_into_images_of_their_own_and_leave_the_nodes_alone(settings):
     node.image.scale(16, 8)
     bake(plane)
     assert sorted(one.name for one in bpy.data.images) == [
-        f"Beamspread Plane{end}" for end in ("", " Direction", " Irradiance")
+        f"Plane_Medium{end}" for end in ("", " Direction", " Irradiance")
     ]
-    assert tuple(bpy.data.images["Beamspread Plane Direction"].size) == (16, 8)
-    assert tuple(bpy.data.images["Beamspread Plane Irradiance"].size) == (32, 32)
+    assert tuple(bpy.data.images["Plane_Medium Direction"].size) == (16, 8)
+    assert tuple(bpy.data.images["Plane_Medium Irradiance"].size) == (32, 32)
 
 
 def test_a_pass_alone_links_nothing(settings):

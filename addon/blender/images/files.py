@@ -9,7 +9,11 @@ import bpy
 import numpy as np
 
 from ...core.errors import ImageError
-from .writing import is_read_only, save_image, set_pixels, write_exr
+from . import undo
+from .writing import is_read_only, pixels_of, save_image, set_pixels, write_exr
+
+# Formats of files that keep values above 1.
+WITH_RANGE = {".exr", ".hdr"}
 
 
 def file_of(image) -> Path | None:
@@ -47,11 +51,11 @@ def fill_image(image, texture: np.ndarray) -> str:
     if tuple(image.size) != texture.shape[1::-1]:
         raise ImageError(f"The image '{image.name}' changed its size during the bake: bake it again.")
     path = file_of(image)
-    encode = not image.is_float and not image.colorspace_settings.is_data
-    stored = to_srgb(texture) if encode else texture
+    stored = to_srgb(texture) if _is_encoded(image) else texture
     if path is None:
         set_pixels(image, stored)
         image.pack()
+        undo.stamp(image)
         return ""
     if path.suffix.lower() == ".exr":
         write_exr(path, texture)
@@ -65,6 +69,8 @@ def _write_like(image, stored: np.ndarray, path: Path) -> None:
     """Write pixels to a file of the image's own format."""
     copy = image.copy()
     try:
+        if copy.size[:] != image.size[:]:
+            copy.scale(*image.size)  # as the image was since it was loaded
         set_pixels(copy, stored)
         save_image(copy, path)
     finally:
@@ -75,3 +81,24 @@ def to_srgb(linear: np.ndarray) -> np.ndarray:
     """Encode linear values with the sRGB transfer function (IEC 61966-2-1), clipped to 0..1."""
     clipped = np.clip(linear, 0, 1)
     return np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055).astype(np.float32)
+
+
+def linear_pixels(image) -> np.ndarray:
+    """What an image shows, linear RGB (height, width, 3)."""
+    stored = pixels_of(image)
+    return from_srgb(stored) if _is_encoded(image) else stored
+
+
+def clips(image) -> bool:
+    """Whether an image, or its file, holds no values above 1."""
+    path = file_of(image)
+    return not image.is_float or (path is not None and path.suffix.lower() not in WITH_RANGE)
+
+
+def _is_encoded(image) -> bool:
+    return not image.is_float and not image.colorspace_settings.is_data
+
+
+def from_srgb(encoded: np.ndarray) -> np.ndarray:
+    """Linear values from those of `to_srgb`."""
+    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4).astype(np.float32)

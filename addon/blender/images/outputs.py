@@ -15,13 +15,14 @@ from ...core.batch.options import BatchOptions
 from ...core.errors import ImageError
 from ..node.find import find_node, find_targets
 from . import files, writing
+from .results import Results
 
 
 class Outputs:
     """The files of a run. Their names depend on the scene alone, whatever of it is baked."""
 
     def __init__(self, scene, options: BatchOptions) -> None:
-        self._options, self._settings = options, scene.beamspread
+        self._options, self._settings, self._results = options, scene.beamspread, Results()
         targets = find_targets(scene.objects)
         self._stems = file_stems(_names(target, layer) for target in targets for layer in LAYERS)
 
@@ -56,13 +57,17 @@ class Outputs:
     def _write_layer(self, bake: Bake, frame: int, layer: str, texture: np.ndarray) -> str:
         image = self.own_image(bake.target, layer)
         if image is not None and tuple(image.size) == texture.shape[1::-1]:
-            path = files.fill_image(image, texture)
-        else:
-            path = str(self.path(bake.target, layer, frame))
-            writing.write_file(Path(path), texture, _format_of(Path(path)))
-        if path.lower().endswith(".png") and texture.max() > 1:
+            filled = self._results.fill_shown(image, bake, texture)
+            if filled is not None:
+                return filled
+            bake.warnings.append(
+                f"The image '{image.name}' keeps the result of another: this one has a file of its own."
+            )
+        path = self.path(bake.target, layer, frame)
+        writing.write_file(path, texture, _format_of(path))
+        if path.suffix == writing.EXTENSIONS["PNG"] and texture.max() > 1:
             bake.warnings.append("Values above 1 were clipped: EXR keeps them.")
-        return path
+        return str(path)
 
 
 def _names(target: Target, layer: str) -> tuple[str, ...]:

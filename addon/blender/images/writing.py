@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import ImageError
+from ...core.exr_header import is_half
 from ...core.native import native
 from ...core.whole_file import whole_file
 
@@ -49,8 +50,8 @@ def pixels_of(image) -> np.ndarray:
     return values.reshape(image.size[1], image.size[0], image.channels)[..., :3]
 
 
-def write_file(path: Path, texture: np.ndarray, file_format: str) -> None:
-    """Write linear RGB (height, width, 3), row 0 at the bottom, as EXR or PNG."""
+def write_file(path: Path, texture: np.ndarray, file_format: str, attributes: dict[str, str] | None = None) -> None:
+    """Write linear RGB (height, width, 3), row 0 at the bottom, as EXR, which may have attributes, or PNG."""
     folder = path.parent
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -60,17 +61,21 @@ def write_file(path: Path, texture: np.ndarray, file_format: str) -> None:
     if protected is not None:
         raise ImageError(f"The output cannot be written because {protected} is read-only.")
     if file_format == "EXR":
-        write_exr(path, texture)
+        write_exr(path, texture, attributes)
     else:
         write_png(path, texture)
 
 
-def write_exr(path: Path, texture: np.ndarray) -> None:
-    """Linear 32-bit float RGB, not packed, as Blender saves float images by itself."""
+def write_exr(path: Path, texture: np.ndarray, attributes: dict[str, str] | None = None) -> None:
+    """Linear RGB, not packed, as Blender saves float images by itself: 32 bits, or 16 where the file has had these."""
     texture = np.ascontiguousarray(texture, np.float32)
+    half = is_half(path) and np.abs(texture).max() <= np.finfo(np.float16).max
+    kept = texture.astype(np.float16) if half else texture
     with _kept(path) as temporary:
-        native.write_exr(str(temporary), texture, ["R", "G", "B"], compression="none")
-        if not np.array_equal(native.read_exr(str(temporary))[0], texture):
+        native.write_exr(
+            str(temporary), texture, ["R", "G", "B"], attributes or {}, compression="none", half=bool(half)
+        )
+        if not np.array_equal(native.read_exr(str(temporary))[0], kept):
             raise OSError("it can't be read back")
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import logging
-import os
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import bpy
 
@@ -148,7 +148,7 @@ def _cancelled(target: Target) -> Bake:
 
 def _saved() -> float:
     """When the scene was saved, as files' times are."""
-    return os.path.getmtime(bpy.data.filepath) if bpy.data.filepath else 0.0
+    return Path(bpy.data.filepath).stat().st_mtime if bpy.data.filepath else 0.0
 
 
 class _Printer:

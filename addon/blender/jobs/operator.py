@@ -126,7 +126,8 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         else:
             self.report({"ERROR"}, NOTHING_FOUND)
             return False
-        bakes = misplaced + prepare_scene(context, targets, context.scene.beamspread.for_bake())
+        bakes = prepare_scene(context, targets, context.scene.beamspread.for_bake())
+        bakes = misplaced + [self._results.admit(bake) for bake in bakes]
         self._queue = [bake for bake in bakes if bake.job is not None]
         for bake in bakes:
             state.note(bake)

@@ -7,7 +7,8 @@ import bpy
 from ...core import native
 from ...core.errors import BakeError
 from .. import compat
-from ..images.files import check_image
+from ..images.files import check_image, clips
+from ..images.operators import image_in, wanted_size
 from ..jobs.engine import BeamspreadEngine
 from ..jobs.prepare import check_visible
 from ..jobs.state import state
@@ -96,6 +97,19 @@ def draw_bake(layout, context) -> None:
     draw_warnings(layout, context, news[:MOST_OBJECTS])
 
 
+def draw_image_buttons(layout, context) -> None:
+    """What can be mended about the image of the active material's node."""
+    image = image_in(context)
+    if image is None or 0 in image.size or image.library is not None:
+        return
+    if clips(image):
+        layout.operator("beamspread.make_float", text="Make Float: it clips values above 1", icon="IMAGE_DATA")
+    size = wanted_size(image, context.scene.beamspread.resolution)
+    if tuple(image.size) != size:
+        text = f"Resize {image.size[0]} x {image.size[1]} to {size[0]} x {size[1]}"
+        layout.operator("beamspread.resize_image", text=text, icon="FULLSCREEN_ENTER")
+
+
 def _use_columns(layout) -> None:
     layout.use_property_split = True
     layout.use_property_decorate = False
@@ -151,6 +165,22 @@ class BEAMSPREAD_PT_active_image(RenderPanel, bpy.types.Panel):
         layout.prop(context.scene.render.bake, "use_clear", text="Clear Image")
 
 
+class BEAMSPREAD_PT_images(RenderPanel, bpy.types.Panel):
+    """Where the images go that bakes make."""
+
+    bl_label = "New Images"
+    bl_parent_id = "BEAMSPREAD_PT_render"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout, settings = self.layout, context.scene.beamspread
+        _use_columns(layout)
+        layout.prop(settings, "image_storage")
+        if settings.image_storage == "FILES":
+            layout.prop(settings, "image_dir")
+        layout.prop(settings, "image_name")
+
+
 class BEAMSPREAD_PT_batch(RenderPanel, bpy.types.Panel):
     """Where a batch writes."""
 
@@ -179,6 +209,7 @@ class MaterialPanel:
         layout = self.layout
         _use_columns(layout)
         draw_properties(find_node(_active_material(context)), layout)
+        draw_image_buttons(layout, context)
         draw_bake(layout, context)
 
 
@@ -205,6 +236,7 @@ class BEAMSPREAD_PT_node_editor(MaterialPanel, bpy.types.Panel):
 _classes = (
     BEAMSPREAD_PT_render,
     BEAMSPREAD_PT_active_image,
+    BEAMSPREAD_PT_images,
     BEAMSPREAD_PT_batch,
     BEAMSPREAD_PT_material,
     BEAMSPREAD_PT_node_editor,
