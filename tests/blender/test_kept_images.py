@@ -341,12 +341,32 @@ def test_nothing_is_stored_where_the_part_is_anothers():
     assert np.array_equal(pixels(image_of(plane)), before)
 
 
+def test_a_result_is_kept_where_the_image_was_resized_meanwhile():
+    """As undo does."""
+    plane = add_plane(material=add_material(image=bpy.data.images.new("Own", 16, 16, float_buffer=True)))
+    add_sun(0)
+    (one,) = batch.prepare_scene(bpy.context, batch.find_targets([plane]), for_bake())
+    one.run()
+    image_of(plane).scale(8, 4)
+    one.keep(Results().store)
+    assert one.status == "written"
+    assert "changed its size during the bake" in one.warnings[-1]
+    assert pixels(image_of(plane)).shape == (16, 16, 3)
+
+
 def for_bake():
     return bpy.context.scene.beamspread.for_bake()
 
 
-def test_undo_in_background_shows_what_is_packed():
-    plane = add_plane(material=add_material())
+@pytest.mark.parametrize("has_file", [False, True])
+def test_undo_in_background_shows_what_is_packed(has_file, tmp_path):
+    """Also where a packed image has a file, which is none of this."""
+    image = None
+    if has_file:
+        native.write_exr(str(tmp_path / "a.exr"), np.zeros((16, 16, 3), np.float32), ["R", "G", "B"])
+        image = bpy.data.images.load(str(tmp_path / "a.exr"))
+        image.pack()
+    plane = add_plane(material=add_material(image=image))
     sun = add_sun(0)
     bake(plane)
     name = image_of(plane).name
@@ -360,5 +380,6 @@ def test_undo_in_background_shows_what_is_packed():
         operator()
         image = bpy.data.images[name]
         assert pixels(image) == pytest.approx(expected, rel=2**-10)
-        image.reload()
+        image.buffers_free()
         assert pixels(image) == pytest.approx(expected, rel=2**-10)
+        assert expected.any()

@@ -76,6 +76,12 @@ class Results:
 
     def fill_shown(self, image, bake: Bake, texture: np.ndarray) -> str | None:
         """Fill the bake's part of its node's image, and note whose it is; None if it is another's."""
+        size = texture.shape[1::-1]
+        if tuple(image.size) != size and 0 not in image.size:
+            image.scale(*size)
+            bake.warnings.append(
+                f"The image '{image.name}' changed its size during the bake: now it has that of before."
+            )
         path = self.fill(image, bake, texture)
         if path is not None:
             note_owner(image, bake.target)

@@ -24,7 +24,9 @@ def _show_what_is_kept(*_arguments) -> None:
     for image in bpy.data.images:
         kept = image.get(KEY, "")
         if _shown.get(image.name, "") != kept:
-            image.reload()
+            # Not `reload`: it would pack the image's file anew, where there is one.
+            image.buffers_free()
+            image.gl_free()
             _shown[image.name] = kept
 
 
