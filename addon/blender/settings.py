@@ -137,6 +137,12 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         default="EXR",
     )
 
+    use_view_transform: BoolProperty(
+        name="View Transform",
+        description="PNG files look as a render would: with the view transform, exposure and look of Color Management",
+        default=False,
+    )
+
     def for_bake(
         self, solver: str | None = None, output: str | None = None, indirect: bool | None = None
     ) -> BakeSettings:

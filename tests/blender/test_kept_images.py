@@ -262,6 +262,32 @@ def test_an_image_is_resized_only_when_asked(tmp_path, settings):
     assert native.read_exr(str(tmp_path / "textures" / "Plane_Medium.exr"))[0].shape == (32, 64, 3)
 
 
+@pytest.mark.parametrize("file_format", ["FFMPEG", "OPEN_EXR"])
+def test_a_png_has_the_view_transform_where_that_is_asked_for(tmp_path, settings, file_format):
+    plane = add_plane(material=add_material())
+    add_sun(0, strength=5.0)
+    (linear,) = bake(plane)
+    scene = bpy.context.scene
+    scene.view_settings.view_transform, scene.view_settings.exposure = "Standard", 1.0
+    if hasattr(scene.render.image_settings, "media_type"):
+        scene.render.image_settings.media_type = "VIDEO" if file_format == "FFMPEG" else "IMAGE"
+    scene.render.image_settings.file_format = file_format
+    shown = {}
+    for use in (False, True):
+        settings.use_view_transform = use
+        (record,) = batch.bake_all(options.parse(["--format", "PNG", "--output", str(tmp_path / str(use))])).bakes
+        image = bpy.data.images.load(record.path)
+        image.colorspace_settings.is_data = True
+        shown[use] = pixels(image)
+    assert shown[False] == pytest.approx(files.to_srgb(linear), abs=0.005)
+    assert shown[True] == pytest.approx(files.to_srgb(2 * linear), abs=0.005)
+    assert scene.render.image_settings.file_format == file_format
+    scene.view_settings.view_transform = "Filmic"
+    batch.bake_all(options.parse(["--format", "PNG", "--output", str(tmp_path / "filmic")]))
+    filmic = bpy.data.images.load(str(tmp_path / "filmic" / "Plane_Medium.png"))
+    assert np.abs(pixels(filmic) - shown[True]).max() > 0.03
+
+
 def link_from_library(folder):
     """Link a plane with a material, and a sun, from another file; the plane."""
     add_plane(material=add_material())

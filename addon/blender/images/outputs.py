@@ -23,6 +23,7 @@ class Outputs:
 
     def __init__(self, scene, options: BatchOptions) -> None:
         self._options, self._settings, self._results = options, scene.beamspread, Results()
+        self._view_of = scene if scene.beamspread.use_view_transform else None
         targets = find_targets(scene.objects)
         self._stems = file_stems(_names(target, layer) for target in targets for layer in LAYERS)
 
@@ -64,8 +65,8 @@ class Outputs:
                 f"The image '{image.name}' keeps the result of another: this one has a file of its own."
             )
         path = self.path(bake.target, layer, frame)
-        writing.write_file(path, texture, _format_of(path))
-        if path.suffix == writing.EXTENSIONS["PNG"] and texture.max() > 1:
+        writing.write_file(path, texture, _format_of(path), view_of=self._view_of)
+        if path.suffix == writing.EXTENSIONS["PNG"] and texture.max() > 1 and self._view_of is None:
             bake.warnings.append("Values above 1 were clipped: EXR keeps them.")
         return str(path)
 

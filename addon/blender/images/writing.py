@@ -14,6 +14,7 @@ from ...core.errors import ImageError
 from ...core.exr_header import is_half
 from ...core.native import native
 from ...core.whole_file import whole_file
+from .. import compat
 
 EXTENSIONS = {"EXR": ".exr", "PNG": ".png"}
 
@@ -50,8 +51,13 @@ def pixels_of(image) -> np.ndarray:
     return values.reshape(image.size[1], image.size[0], image.channels)[..., :3]
 
 
-def write_file(path: Path, texture: np.ndarray, file_format: str, attributes: dict[str, str] | None = None) -> None:
-    """Write linear RGB (height, width, 3), row 0 at the bottom, as EXR, which may have attributes, or PNG."""
+def write_file(
+    path: Path, texture: np.ndarray, file_format: str, attributes: dict[str, str] | None = None, view_of=None
+) -> None:
+    """Write linear RGB (height, width, 3), row 0 at the bottom, as EXR, which may have attributes, or PNG.
+
+    `view_of` is the scene whose view transform a PNG gets, None for plain sRGB.
+    """
     folder = path.parent
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -63,7 +69,7 @@ def write_file(path: Path, texture: np.ndarray, file_format: str, attributes: di
     if file_format == "EXR":
         write_exr(path, texture, attributes)
     else:
-        write_png(path, texture)
+        write_png(path, texture, view_of)
 
 
 def write_exr(path: Path, texture: np.ndarray, attributes: dict[str, str] | None = None) -> None:
@@ -79,14 +85,19 @@ def write_exr(path: Path, texture: np.ndarray, attributes: dict[str, str] | None
             raise OSError("it can't be read back")
 
 
-def write_png(path: Path, texture: np.ndarray) -> None:
+def write_png(path: Path, texture: np.ndarray, view_of=None) -> None:
     """PNG for looking at; from a float image, Blender itself converts to the colour space of its byte images."""
     height, width = texture.shape[:2]
     image = make_image("Beamspread PNG", width, height)
     try:
         set_pixels(image, texture)
         image.file_format = "PNG"
-        save_image(image, path)
+        if view_of is None:
+            save_image(image, path)
+            return
+        with _kept(path) as temporary, compat.saving_png(view_of):
+            image.save_render(str(temporary), scene=view_of)
+            _check_whole(temporary, "PNG", texture, image.colorspace_settings.name)
     finally:
         bpy.data.images.remove(image)
 

@@ -193,6 +193,8 @@ class BEAMSPREAD_PT_batch(RenderPanel, bpy.types.Panel):
         _use_columns(layout)
         layout.prop(context.scene.beamspread, "output_dir")
         layout.prop(context.scene.beamspread, "format")
+        if context.scene.beamspread.format == "PNG":
+            layout.prop(context.scene.beamspread, "use_view_transform")
 
 
 class MaterialPanel:
