@@ -7,7 +7,7 @@ Each part imports only core and those above it (tests/unit/test_layers.py reads 
     read        geometry, lights and what a render would show
     node        the shader node, and where a scene has it
     cycles      what Cycles finds in a process of its own: bounced light, the world's radiance
-    images      images of the scene, files, atlases
+    images      images of the scene, whole files, whose result an image holds
     jobs        what becomes a job, and what runs it: operator, engine, batch; the state of a run
     ui          panels
 """

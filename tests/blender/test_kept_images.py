@@ -367,6 +367,23 @@ def test_nothing_is_stored_where_the_part_is_anothers():
     assert np.array_equal(pixels(image_of(plane)), before)
 
 
+def test_undo_leaves_what_was_painted_on_an_older_bake(tmp_path):
+    plane = add_plane(material=add_material())
+    add_sun(0)
+    bake(plane)
+    name = image_of(plane).name
+    path = str(tmp_path / "saved.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    bpy.ops.ed.undo_push(message="before")
+    bpy.data.images[name].pixels[0] = 9.0
+    bpy.data.objects["Sun"].data.energy = 3.0
+    bpy.ops.ed.undo_push(message="light")
+    bpy.ops.ed.undo()
+    assert bpy.data.objects["Sun"].data.energy == 1
+    assert bpy.data.images[name].pixels[0] == 9
+
+
 def test_a_result_is_kept_where_the_image_was_resized_meanwhile():
     """As undo does."""
     plane = add_plane(material=add_material(image=bpy.data.images.new("Own", 16, 16, float_buffer=True)))

@@ -24,6 +24,9 @@ KEY = "beamspread_results"
 # Texels wholly inside two charts, as a part of one of them: more than rounding at a common border.
 OVERLAP_TOLERANCE = 0.01
 
+# Of each chart: column and row of its first texel, and the part of each texel inside it, float32 (rows, columns).
+Parts = tuple[tuple[int, int, np.ndarray], ...]
+
 
 def note_owner(image, target: Target) -> None:
     """Note that the image holds the result of the target beside those of its other owners."""
@@ -60,17 +63,27 @@ def _known_as(noted: Target, users: list[Target]) -> list[Target]:
     return same_material or [user for user in users if user.object_name == noted.object_name]
 
 
-def coverage_of(target: Target, width: int, height: int) -> np.ndarray:
-    """Part of each texel inside the target's charts, float32 (height, width); all of it where that can't be told."""
+def parts_of(receiver: Receiver) -> Parts:
+    """Where a receiver's charts lie in its texture."""
+    return tuple((*chart.offset, chart.coverage) for chart in receiver.charts)
+
+
+def read_parts(target: Target, width: int, height: int) -> Parts:
+    """Where the charts of a target lie in a texture of that size: all over it, if that can't be told."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     try:
         obj = bpy.data.objects[target.object_name].evaluated_get(depsgraph)
-        return build_receiver(fit_uv_maps(read_polygons(obj, target.material_name)), width, height).coverage
+        return parts_of(build_receiver(fit_uv_maps(read_polygons(obj, target.material_name)), width, height))
     except BakeError:
-        return np.ones((height, width), np.float32)
+        return ((0, 0, np.ones((height, width), np.float32)),)
 
 
-def overlaps(receiver: Receiver, covered: np.ndarray) -> bool:
-    """Whether a receiver's charts lie on what others cover of the texture, (height, width), by more than rounding."""
-    shared = (receiver.coverage > WHOLE) & (covered > 0)
-    return bool(shared.sum() > OVERLAP_TOLERANCE * receiver.inside().sum())
+def within(texture: np.ndarray, column: int, row: int, coverage: np.ndarray) -> np.ndarray:
+    """The part of a texture (height, width) where a chart lies, a view."""
+    return texture[row : row + coverage.shape[0], column : column + coverage.shape[1]]
+
+
+def overlaps(receiver: Receiver, parts: Parts) -> bool:
+    """Whether a receiver's charts lie on those of others in the same texture by more than rounding."""
+    shared = sum(int(((within(receiver.coverage, *part) > WHOLE) & (part[2] > 0)).sum()) for part in parts)
+    return shared > OVERLAP_TOLERANCE * receiver.inside().sum()

@@ -13,14 +13,15 @@ from ..node.find import find_node
 from ..node.node import link_result
 from . import files
 from .new_image import keep_new, name_for
-from .owners import coverage_of, note_owner, others_in, overlaps, users_of
+from .owners import Parts, note_owner, others_in, overlaps, parts_of, read_parts, users_of, within
 
 
 class Results:
     """The images filled in one run; objects that share an image each fill their own part of it."""
 
     def __init__(self) -> None:
-        self._planned: dict[str, dict[Target, np.ndarray]] = {}
+        self._planned: dict[str, list[Target]] = {}  # by the name of the image, in the order of the run
+        self._parts: dict[tuple, Parts] = {}  # by target and size
 
     def admit(self, bake: Bake) -> Bake:
         """The bake, if its result can be kept; else one that says why not, before it has run for hours."""
@@ -39,7 +40,9 @@ class Results:
         """Reserve the bake's part of an image; BakeError if another has it and there can't be two images."""
         if image is not None:
             self._check_room(image, bake)
-            self._planned.setdefault(image.name, {})[bake.target] = bake.job.receiver.coverage
+            self._planned.setdefault(image.name, []).append(bake.target)
+            receiver = bake.job.receiver
+            self._parts[bake.target, receiver.width, receiver.height] = parts_of(receiver)
 
     def store(self, bake: Bake) -> str:
         """Fill the image of the target's node, or a new one, and link it back; other layers have images beside it.
@@ -66,12 +69,16 @@ class Results:
         `shown` is the image of the node, whose owners count, where that is another.
         """
         receiver, others = bake.job.receiver, self._others(shown or image, bake.target)
-        covered = self._covered(shown or image, others)
-        if others and overlaps(receiver, covered):
-            return None
         if others:
+            parts = [part for other in others for part in self._parts_of(other, image)]
+            if overlaps(receiver, parts):
+                return None
+            covered = receiver.coverage.copy()
+            for part in parts:
+                there = within(covered, *part)
+                np.maximum(there, part[2], out=there)
             merged = np.where(receiver.inside()[..., None], texture, files.linear_pixels(image))
-            texture = extend_margin(merged, np.maximum(covered, receiver.coverage), bake.job.settings.margin)
+            texture = extend_margin(merged, covered, bake.job.settings.margin)
         return files.fill_image(image, texture)
 
     def fill_shown(self, image, bake: Bake, texture: np.ndarray) -> str | None:
@@ -125,30 +132,28 @@ class Results:
 
     def _others(self, image, target: Target) -> list[Target]:
         """Those whose results the image holds, or will by the end of this run because they came first."""
-        planned = list(self._planned.get(image.name, {}))
+        planned = self._planned.get(image.name, [])
         first = planned[: planned.index(target)] if target in planned else planned
         users = users_of(image)
         return list(dict.fromkeys([*others_in(image, target), *(other for other in first if other in users)]))
 
-    def _covered(self, image, others: list[Target]) -> np.ndarray:
-        planned, covered = self._planned.get(image.name, {}), np.zeros(tuple(image.size)[::-1], np.float32)
-        for other in others:
-            known = planned.get(other)
-            own = coverage_of(other, *image.size) if known is None or known.shape != covered.shape else known
-            np.maximum(covered, own, out=covered)
-        return covered
+    def _parts_of(self, target: Target, image) -> Parts:
+        """Where the target's charts lie in the image."""
+        key = target, *image.size
+        if key not in self._parts:
+            self._parts[key] = read_parts(*key)
+        return self._parts[key]
 
     def _check_room(self, image, bake: Bake) -> None:
         """Raise BakeError if the image is another's who has the same material, and so can't have two images."""
-        receiver = bake.job.receiver
-        same = [other for other in self._others(image, bake.target) if other.material_name == bake.target.material_name]
-        if receiver.coverage.shape != tuple(image.size)[::-1] or not same:
+        receiver, target = bake.job.receiver, bake.target
+        if receiver.coverage.shape != tuple(image.size)[::-1]:
             return
-        for other in same:
-            if overlaps(receiver, self._covered(image, [other])):
+        for other in self._others(image, target):
+            if other.material_name == target.material_name and overlaps(receiver, self._parts_of(other, image)):
                 raise BakeError(
                     f"'{other.object_name}' is baked to the same part of the image '{image.name}' by the same "
-                    f"material: give '{bake.target.object_name}' a material of its own (Object > Relations > Make "
+                    f"material: give '{target.object_name}' a material of its own (Object > Relations > Make "
                     "Single User > Materials), or move its UVs."
                 )
 

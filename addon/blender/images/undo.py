@@ -11,7 +11,7 @@ from bpy.app.handlers import persistent
 KEY = "beamspread_stamp"
 
 _shown: dict[str, str] = {}
-"""Stamp of the pixels that an image shows, by its name."""
+"""Stamp of the pixels that an image shows, by its name, where this session baked them: others may be painted."""
 
 
 def stamp(image) -> None:
@@ -23,7 +23,7 @@ def stamp(image) -> None:
 def _show_what_is_kept(*_arguments) -> None:
     for image in bpy.data.images:
         kept = image.get(KEY, "")
-        if _shown.get(image.name, "") != kept:
+        if _shown.get(image.name, kept) != kept:
             # Not `reload`: it would pack the image's file anew, where there is one.
             image.buffers_free()
             image.gl_free()
