@@ -100,7 +100,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         default=True,
     )
     image_storage: EnumProperty(
-        name="New Images",
+        name="Storage",
         description="Where images are kept that a bake makes because a node has none",
         items=[
             ("FILES", "Files", "OpenEXR files; packed as long as the scene was never saved", 0),

@@ -83,7 +83,8 @@ def test_a_signal_ends_a_batch_soon_and_leaves_a_report(tmp_path, number):
     assert not (tmp_path / "out").exists()
 
 
-def test_ctrl_c_ends_cycles_as_well(tmp_path):
+@pytest.mark.parametrize("number", SIGNALS)
+def test_cycles_ends_as_well(tmp_path, number):
     """A terminal's Ctrl-C goes to all processes at once: Cycles' own end must not count as its failure."""
     add_plane(material=add_material())
     add_plane("Wall", matrix=Matrix.Translation((0, 0, 3)))
@@ -92,8 +93,11 @@ def test_ctrl_c_ends_cycles_as_well(tmp_path):
     process, report, log = start(save_scene(tmp_path), "--resolution", 1024, "--output", tmp_path / "out")
     try:
         (child,) = wait_for(lambda: children_of(process), process)
-        os.killpg(process.pid, signal.SIGINT)
-        assert process.wait(60) == 130, log.read_text()
+        if number == signal.SIGINT:
+            os.killpg(process.pid, number)
+        else:
+            process.send_signal(number)
+        assert process.wait(60) == SIGNALS[number], log.read_text()
     finally:
         process.kill()
     assert not Path(f"/proc/{child}").exists()
