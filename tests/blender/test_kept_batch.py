@@ -80,6 +80,7 @@ def test_a_signal_ends_a_batch_soon_and_leaves_a_report(tmp_path, number):
         ("Second", "cancelled", ""),
     ]
     assert "Traceback" not in log.read_text()
+    assert "stopped, 2 of 2 bakes are left" in log.read_text()
     assert not (tmp_path / "out").exists()
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.bake.runner import SKIPPED, WRITTEN, Bake, Target
+from ...core.bake.runner import CANCELLED, SKIPPED, WRITTEN, Bake, Target
 from ...core.batch.inventory import Inventory
 from ...core.batch.options import BatchOptions
 from ...core.batch.report import BakeRecord, Report
@@ -34,8 +34,12 @@ def bake_all(options: BatchOptions, stop: Stop | None = None) -> Report:
     report, batch = Report(), _Batch(options, Stop() if stop is None else stop)
     for record in batch.run():
         report.bakes.append(record)
-        stream = sys.stdout if record.status in (WRITTEN, SKIPPED) else sys.stderr
-        print(f"Beamspread: {record}", file=stream, flush=True)
+        if record.status != CANCELLED:
+            stream = sys.stdout if record.status in (WRITTEN, SKIPPED) else sys.stderr
+            print(f"Beamspread: {record}", file=stream, flush=True)
+    left = sum(record.status == CANCELLED for record in report.bakes)
+    if left:
+        print(f"Beamspread: stopped, {left} of {len(report.bakes)} bakes are left.", file=sys.stderr)
     if not report.bakes:
         print(f"Beamspread: {NOTHING_FOUND}", file=sys.stderr)
     if report.dark() and not options.allow_dark:
