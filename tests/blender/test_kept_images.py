@@ -206,6 +206,20 @@ def test_folder_name_and_storage_are_settings(tmp_path, settings):
     assert any("packed into the .blend file instead" in line for line in state.messages())
 
 
+def test_an_exr_file_that_was_read_as_srgb_is_read_as_what_it_is(tmp_path):
+    path = tmp_path / "own.exr"
+    native.write_exr(str(path), np.ones((16, 16, 3), np.float32), ["R", "G", "B"])
+    image = bpy.data.images.load(str(path))
+    plane = add_plane(material=add_material(image=image))
+    add_sun(0)
+    (expected,) = bake(plane)
+    image.colorspace_settings.name = "sRGB"
+    assert bake(plane)[0] == pytest.approx(expected, abs=1e-6)
+    image.colorspace_settings.is_data = True
+    assert bake(plane)[0] == pytest.approx(expected, abs=1e-6)
+    assert image.colorspace_settings.is_data
+
+
 def test_half_floats_stay_half_where_the_values_fit(tmp_path):
     path = tmp_path / "half.exr"
     native.write_exr(str(path), np.ones((16, 16, 3), np.float32), ["R", "G", "B"], compression="none", half=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.errors import ImageError
 from . import undo
-from .writing import is_read_only, pixels_of, save_image, set_pixels, write_exr
+from .writing import is_read_only, pixels_of, save_image, scene_linear, set_pixels, write_exr
 
 # Formats of files that keep values above 1.
 WITH_RANGE = {".exr", ".hdr"}
@@ -59,6 +59,8 @@ def fill_image(image, texture: np.ndarray) -> str:
         return ""
     if path.suffix.lower() == ".exr":
         write_exr(path, texture)
+        if not image.colorspace_settings.is_data:
+            image.colorspace_settings.name = scene_linear()  # which it now is, whatever it was
     else:
         _write_like(image, stored, path)
     image.reload()

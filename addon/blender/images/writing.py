@@ -36,6 +36,15 @@ def make_image(name: str, width: int, height: int, is_data: bool = False):
     return bpy.data.images.new(name, width, height, alpha=False, float_buffer=True, is_data=is_data)
 
 
+def scene_linear() -> str:
+    """Name of the colour space of linear values, which differs between versions and configurations."""
+    image = make_image("Beamspread", 1, 1)
+    try:
+        return image.colorspace_settings.name
+    finally:
+        bpy.data.images.remove(image)
+
+
 def set_pixels(image, texture: np.ndarray) -> None:
     """Replace all pixels; `texture` float (height, width, 3), row 0 at the bottom, in the image's own encoding."""
     pixels = np.ones(texture.shape[:2] + (4,), np.float32)
