@@ -91,13 +91,17 @@ def test_owners_are_known_by_their_new_names(rename, tmp_path):
     assert pixels(image_of(plane)) == pytest.approx(before, rel=1e-3)
 
 
-def test_a_removed_owners_image_is_free():
+@pytest.mark.parametrize("removed", [True, False])
+def test_a_removed_owners_image_is_free(removed):
     plane = add_plane(material=add_material())
     add_sun(0)
     bake(plane)
     copy = duplicate(plane, own_material=False)
     image = image_of(plane)
-    bpy.data.objects.remove(plane)
+    if removed:
+        bpy.data.objects.remove(plane)
+    else:
+        bpy.context.collection.objects.unlink(plane)
     bake(copy)
     assert image_of(copy) == image
     assert json.loads(image[owners.KEY]) == [["Plane.001", "Medium"]]
@@ -323,6 +327,10 @@ def test_a_linked_material_is_refused_before_the_bake(tmp_path):
     message = messages_of(bpy.ops.beamspread.bake)
     assert "The material 'Medium' belongs to another .blend file" in message
     assert image_of(plane) is None
+    (late,) = batch.prepare_scene(bpy.context, batch.find_targets([plane]), for_bake())
+    late.run()
+    late.keep(Results().store)
+    assert "belongs to another .blend file" in late.error
     # A batch changes nothing in it.
     report = batch.bake_all(options.parse(["--output", str(tmp_path / "out")]))
     assert [one.status for one in report.bakes] == ["written"]

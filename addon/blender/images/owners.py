@@ -47,10 +47,10 @@ def others_in(image, target: Target) -> list[Target]:
 
 
 def users_of(image) -> list[Target]:
-    """What shows the image in its Beamspread node."""
+    """What shows the image in its Beamspread node, in any scene."""
     return [
         target
-        for target in find_targets(bpy.data.objects)
+        for target in find_targets(obj for obj in bpy.data.objects if obj.users_scene)
         if find_node(bpy.data.materials[target.material_name]).image == image
     ]
 

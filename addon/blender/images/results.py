@@ -53,6 +53,8 @@ class Results:
         node = find_node(bpy.data.materials.get(bake.target.material_name))
         if node is None:
             raise BakeError("The material or its Beamspread node was removed during the bake.")
+        if COMBINED in bake.layers:
+            check_editable(bpy.data.materials[bake.target.material_name])
         paths = []
         for layer, texture in bake.layers.items():
             if layer == COMBINED:
