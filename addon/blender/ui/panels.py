@@ -7,14 +7,14 @@ import bpy
 from ...core import native
 from ...core.errors import BakeError
 from .. import compat
-from ..images.files import check_image, clips
-from ..images.operators import image_in, wanted_size
+from ..images.files import check_image
 from ..jobs.engine import BeamspreadEngine
 from ..jobs.prepare import check_visible
 from ..jobs.state import state
 from ..node.find import find_misplaced, find_node, materials_of
 from ..node.node import draw_properties
 from ..read.visible import render_visible_names
+from .image_buttons import draw_image_buttons
 
 INDIRECT_COST = "Indirect light takes seconds to a minute per object: Cycles finds it first."
 
@@ -95,19 +95,6 @@ def draw_bake(layout, context) -> None:
     # A bake that failed for a reason that still stands has said the same.
     news = [message for message in state.messages() if not message.endswith(tuple(shown))]
     draw_warnings(layout, context, news[:MOST_OBJECTS])
-
-
-def draw_image_buttons(layout, context) -> None:
-    """What can be mended about the image of the active material's node."""
-    image = image_in(context)
-    if image is None or 0 in image.size or image.library is not None:
-        return
-    if clips(image):
-        layout.operator("beamspread.make_float", text="Make Float: it clips values above 1", icon="IMAGE_DATA")
-    size = wanted_size(image, context.scene.beamspread.resolution)
-    if tuple(image.size) != size:
-        text = f"Resize {image.size[0]} x {image.size[1]} to {size[0]} x {size[1]}"
-        layout.operator("beamspread.resize_image", text=text, icon="FULLSCREEN_ENTER")
 
 
 def _use_columns(layout) -> None:
