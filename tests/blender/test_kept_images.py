@@ -8,7 +8,9 @@ import pytest
 from beamspread.blender.images import files, owners
 from beamspread.blender.images.results import Results
 from beamspread.blender.jobs import batch
+from beamspread.blender.jobs.prepare import prepare_scene
 from beamspread.blender.jobs.state import state
+from beamspread.blender.node.find import find_targets
 from beamspread.core.batch import options
 from beamspread.core.native import native
 from mathutils import Matrix
@@ -327,7 +329,7 @@ def test_a_linked_material_is_refused_before_the_bake(tmp_path):
     message = messages_of(bpy.ops.beamspread.bake)
     assert "The material 'Medium' belongs to another .blend file" in message
     assert image_of(plane) is None
-    (late,) = batch.prepare_scene(bpy.context, batch.find_targets([plane]), for_bake())
+    (late,) = prepare_scene(bpy.context, find_targets([plane]), for_bake())
     late.run()
     late.keep(Results().store)
     assert "belongs to another .blend file" in late.error
@@ -377,11 +379,9 @@ def test_nothing_is_stored_where_the_part_is_anothers():
     add_sun(0)
     (before,) = bake(plane)
     copy = duplicate(plane, own_material=False)
-    (refused,) = (
-        Results().admit(one) for one in batch.prepare_scene(bpy.context, batch.find_targets([copy]), for_bake())
-    )
+    (refused,) = (Results().admit(one) for one in prepare_scene(bpy.context, find_targets([copy]), for_bake()))
     assert refused.job is None
-    (late,) = batch.prepare_scene(bpy.context, batch.find_targets([copy]), for_bake())
+    (late,) = prepare_scene(bpy.context, find_targets([copy]), for_bake())
     late.run()
     late.keep(Results().store)
     assert late.status == "failed"
@@ -410,7 +410,7 @@ def test_a_result_is_kept_where_the_image_was_resized_meanwhile():
     """As undo does."""
     plane = add_plane(material=add_material(image=bpy.data.images.new("Own", 16, 16, float_buffer=True)))
     add_sun(0)
-    (one,) = batch.prepare_scene(bpy.context, batch.find_targets([plane]), for_bake())
+    (one,) = prepare_scene(bpy.context, find_targets([plane]), for_bake())
     one.run()
     image_of(plane).scale(8, 4)
     one.keep(Results().store)
