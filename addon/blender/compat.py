@@ -37,6 +37,27 @@ def transparent_bounces(scene) -> int | None:
     return getattr(getattr(scene, "cycles", None), "transparent_max_bounces", None)
 
 
+@contextmanager
+def saving_png(scene) -> Iterator[None]:
+    """Have what the scene renders saved as PNG of 8 bits (since Blender 5.0, a kind of media limits the formats)."""
+    settings = scene.render.image_settings
+    names = [name for name in ("media_type", "file_format", "color_mode", "color_depth") if hasattr(settings, name)]
+    before = {name: getattr(settings, name) for name in names}
+    try:
+        for name, value in {
+            "media_type": "IMAGE",
+            "file_format": "PNG",
+            "color_mode": "RGB",
+            "color_depth": "8",
+        }.items():
+            if name in before:
+                setattr(settings, name, value)
+        yield
+    finally:
+        for name, value in before.items():
+            setattr(settings, name, value)
+
+
 def light_casts_shadow(light) -> bool:
     """Cycles' own shadow switch where it has one, else the light's."""
     cycles = getattr(light, "cycles", None)
@@ -122,24 +143,3 @@ def _foreach(access, values: np.ndarray) -> None:
         access(values.ravel())
     except TypeError:
         access(values)
-
-
-@contextmanager
-def saving_png(scene) -> Iterator[None]:
-    """Have what the scene renders saved as PNG of 8 bits (since Blender 5.0, a kind of media limits the formats)."""
-    settings = scene.render.image_settings
-    names = [name for name in ("media_type", "file_format", "color_mode", "color_depth") if hasattr(settings, name)]
-    before = {name: getattr(settings, name) for name in names}
-    try:
-        for name, value in {
-            "media_type": "IMAGE",
-            "file_format": "PNG",
-            "color_mode": "RGB",
-            "color_depth": "8",
-        }.items():
-            if name in before:
-                setattr(settings, name, value)
-        yield
-    finally:
-        for name, value in before.items():
-            setattr(settings, name, value)

@@ -99,6 +99,13 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         description="Light that arrives by way of other objects counts, too: Cycles finds it before each bake",
         default=True,
     )
+    output_dir: StringProperty(
+        name="Output",
+        description="Folder that a batch writes to",
+        default="//beamspread/",
+        subtype="DIR_PATH",
+        options=compat.PATH_OPTIONS,
+    )
     image_storage: EnumProperty(
         name="Storage",
         description="Where images are kept that a bake makes because a node has none",
@@ -120,12 +127,10 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         description="Of new images and their files: {object} and {material} stand for what they are called",
         default="{object}_{material}",
     )
-    output_dir: StringProperty(
-        name="Output",
-        description="Folder that a batch writes to",
-        default="//beamspread/",
-        subtype="DIR_PATH",
-        options=compat.PATH_OPTIONS,
+    use_view_transform: BoolProperty(
+        name="View Transform",
+        description="PNG files look as a render would: with the view transform, exposure and look of Color Management",
+        default=False,
     )
     format: EnumProperty(
         name="Format",
@@ -135,12 +140,6 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
             ("PNG", "PNG", "For looking at: values above 1 are clipped", 1),
         ],
         default="EXR",
-    )
-
-    use_view_transform: BoolProperty(
-        name="View Transform",
-        description="PNG files look as a render would: with the view transform, exposure and look of Color Management",
-        default=False,
     )
 
     def for_bake(
