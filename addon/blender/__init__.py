@@ -14,10 +14,10 @@ Each part imports only core and those above it (tests/unit/test_layers.py reads 
 
 from . import settings
 from .jobs import engine, operator, state
-from .node import menu, node
+from .node import menu, node, operators
 from .ui import panels
 
-PARTS = (settings, node, menu, state, engine, operator, panels)
+PARTS = (settings, node, menu, operators, state, engine, operator, panels)
 
 
 def register() -> None:

@@ -17,6 +17,31 @@ def add_output_socket(tree, socket_type: str, name: str) -> None:
         tree.outputs.new(socket_type, name)
 
 
+def add_input_socket(tree, socket_type: str, name: str, default=None, hide_value: bool = False) -> None:
+    """Give a node group an input with links alone if `hide_value`, "NodeSocketFloat" being a factor from 0 to 1."""
+    if hasattr(tree, "interface"):
+        socket = tree.interface.new_socket(name, in_out="INPUT", socket_type=socket_type)
+        if socket_type == "NodeSocketFloat":
+            socket.subtype = "FACTOR"
+    else:
+        socket = tree.inputs.new("NodeSocketFloatFactor" if socket_type == "NodeSocketFloat" else socket_type, name)
+    if socket_type == "NodeSocketFloat":
+        socket.min_value, socket.max_value = 0.0, 1.0
+    if default is not None:
+        socket.default_value = default
+    socket.hide_value = hide_value
+
+
+def has_input_socket(tree, name: str) -> bool:
+    """Whether a node group has an input of that name."""
+    if hasattr(tree, "interface"):
+        return any(
+            item.item_type == "SOCKET" and item.in_out == "INPUT" and item.name == name
+            for item in tree.interface.items_tree
+        )
+    return name in tree.inputs
+
+
 def uses_nodes(material) -> bool:
     """Whether a material has a node tree in use (`use_nodes` is deprecated since Blender 5.0, where all have)."""
     if material.node_tree is None:
@@ -120,3 +145,15 @@ def _foreach(access, values: np.ndarray) -> None:
         access(values.ravel())
     except TypeError:
         access(values)
+
+
+def set_shader_color(tree) -> None:
+    """Have nodes of this group wear the colour of shaders (Blender 4.3 on)."""
+    if hasattr(tree, "color_tag"):
+        tree.color_tag = "SHADER"
+
+
+def has_fixed_radius(principled) -> bool:
+    """Whether Cycles takes a Principled BSDF's radius as it is, whatever its colour (names changed in Blender 4.0)."""
+    other = "RANDOM_WALK_SKIN" if bpy.app.version >= (4, 0, 0) else "RANDOM_WALK"
+    return principled.subsurface_method != other

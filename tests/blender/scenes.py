@@ -36,12 +36,15 @@ def add_plane(name="Plane", size=(2.0, 2.0), matrix=None, uvs=SQUARE_UVS, materi
     return obj
 
 
-def add_material(name="Medium", image=None, linked=False, **properties):
-    """A material with a Beamspread node."""
+def add_material(name="Medium", image=None, linked=False, shader=False, **properties):
+    """A material with a Beamspread node; it shows nothing, or with `shader` the Principled BSDF of new materials."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
+    for link in () if shader else list(material.node_tree.links):
+        material.node_tree.links.remove(link)
     node = material.node_tree.nodes.new("BeamspreadNode")
-    for key, value in ({"albedo": (0.9, 0.8, 0.6), "mean_free_path": (0.05,) * 3} | properties).items():
+    values = {"albedo": (0.9, 0.8, 0.6), "mean_free_path": (0.05,) * 3, "ior": 1.0}
+    for key, value in (values | properties).items():
         setattr(node, key, value)
     node.image = image
     if linked:

@@ -68,7 +68,7 @@ def test_baking_again_replaces_the_pixels():
 
 
 def test_an_artists_own_use_of_the_node_is_kept():
-    material = add_material()
+    material = add_material(shader=True)
     tree = material.node_tree
     principled = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeBsdfPrincipled")
     tree.links.new(principled.inputs["Base Color"], node_of(material).outputs["Color"])

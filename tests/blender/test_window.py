@@ -31,7 +31,7 @@ def seen(tmp_path_factory):
 
 
 def test_every_panel_the_node_and_its_menu_are_drawn(seen):
-    assert set(seen["drawn"]) == {panel.__name__ for panel in panels._classes} | {"node", "menu"}
+    assert set(seen["drawn"]) == {panel.__name__ for panel in panels._classes} | {"draw", "menu"}
 
 
 def test_a_bake_runs_beside_the_user_and_one_at_a_time(seen):

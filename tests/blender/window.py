@@ -19,7 +19,7 @@ sys.path[:0] = [str(FOLDER), str(FOLDER.parent.parent / "build" / "stage")]
 import beamspread  # noqa: E402
 import scenes  # noqa: E402
 from beamspread.blender.jobs.state import state  # noqa: E402
-from beamspread.blender.node import menu, node  # noqa: E402
+from beamspread.blender.node import draw, menu  # noqa: E402
 from beamspread.blender.ui import panels  # noqa: E402
 
 # The slowest step takes a second or two on an idle machine.
@@ -48,7 +48,7 @@ def prepare_panels() -> None:
         count_draws(panel, "draw")
         panel.bl_options = set()
     panels.BEAMSPREAD_PT_node_editor.bl_category = "Node"
-    count_draws(node, "draw_properties")
+    count_draws(draw, "draw_properties")
     count_draws(menu, "_draw")
     draw_warnings = panels.draw_warnings
 

@@ -41,7 +41,7 @@ class Results:
                 image = files.make_image(name if shown else f"{name} {layer}", *size, is_data=not shown)
             paths.append(self._fill(image, bake, texture))
             if shown:
-                link_result(node, image)
+                bake.warnings += link_result(node, image)
         return paths[0]
 
     def _image_beside(self, name: str, size: tuple[int, int]):

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator
 
 from ...core.bake.runner import Bake, Target
 from .. import compat
-from .node import BeamspreadNode, is_linked
+from .node import BeamspreadNode
+from .output import is_linked
 
 NOTHING_FOUND = "No mesh has a material with a Beamspread node: add one in the Shader Editor."
 

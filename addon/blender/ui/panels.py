@@ -11,8 +11,8 @@ from ..images.files import check_image
 from ..jobs.engine import BeamspreadEngine
 from ..jobs.prepare import check_visible
 from ..jobs.state import state
+from ..node.draw import draw_properties
 from ..node.find import find_misplaced, find_node, materials_of
-from ..node.node import draw_properties
 from ..read.visible import render_visible_names
 
 INDIRECT_COST = "Indirect light takes seconds to a minute per object: Cycles finds it first."
