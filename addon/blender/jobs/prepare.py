@@ -17,6 +17,7 @@ from ..node.find import find_node, materials_of
 from ..read.geometry import read_polygons
 from ..read.lights import read_illumination
 from ..read.visible import as_rendered, render_visible_names
+from .texture import with_texture
 
 
 def prepare_scene(context, targets: list[Target], settings: BakeSettings, resolution: int | None = None) -> list[Bake]:
@@ -81,4 +82,5 @@ def _make_job(
         size = tuple(node.image.original.size) if resolution is None else None
     maps = fit_uv_maps(read_polygons(obj, target.material_name))
     size = size or texture_size(maps, resolution or depsgraph.scene.beamspread.resolution)
-    return BakeJob(obj.name, build_receiver(maps, *size), illumination.lighting(obj.name), surface, settings)
+    job = BakeJob(obj.name, build_receiver(maps, *size), illumination.lighting(obj.name), surface, settings)
+    return with_texture(job, node, obj) if node.has_texture() else job

@@ -98,7 +98,7 @@ def bake(
         if settings.distributions == "library":
             raise
         raise BakeError(f"The LDF samples in '{settings.sample_folder}' don't reach this far: {error}.") from error
-    return luminance
+    return luminance if grid.color_out is None else luminance * grid.color_out
 
 
 def _rays(grid: Grid, material: Material, settings: BakeSettings) -> int:
