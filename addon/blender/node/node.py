@@ -259,13 +259,10 @@ def register() -> None:
     if not BeamspreadNode.is_registered:
         bpy.utils.register_class(BeamspreadNode)
     bpy.app.handlers.load_post.append(upgrade_nodes)
-    bpy.app.timers.register(upgrade_nodes)  # of the file that is open; Blender shows none of it while it registers
 
 
 def unregister() -> None:
     bpy.app.handlers.load_post.remove(upgrade_nodes)
-    if bpy.app.timers.is_registered(upgrade_nodes):
-        bpy.app.timers.unregister(upgrade_nodes)
     # Blender 3.4 frees the type but not the evaluated copies of nodes that point to it, and crashes when those go, at
     # the latest on exit: there a class in use stays. In 4.5 a class that stays keeps the process from exiting.
     if bpy.app.version >= (4, 0, 0) or not any(_all_nodes()):
