@@ -9,6 +9,13 @@ import numpy as np
 PATH_OPTIONS = {"ANIMATABLE", "PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else {"ANIMATABLE"}
 
 
+def engine_id(name: str) -> str:
+    """Of CYCLES or EEVEE, whose name differs."""
+    if name == "EEVEE":
+        return "BLENDER_EEVEE_NEXT" if (4, 2, 0) <= bpy.app.version < (5, 0, 0) else "BLENDER_EEVEE"
+    return name
+
+
 def add_output_socket(tree, socket_type: str, name: str) -> None:
     """Give a node group an output (its interface moved in Blender 4.0)."""
     if hasattr(tree, "interface"):

@@ -99,6 +99,15 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         description="Light that arrives by way of other objects counts, too: Cycles finds it before each bake",
         default=True,
     )
+    render_engine: EnumProperty(
+        name="Pictures By",
+        description="What renders pictures (F12) while the render engine is Beamspread, with the baked images in them",
+        items=[
+            ("CYCLES", "Cycles", "Path traced, also where there is no screen", 0),
+            ("EEVEE", "EEVEE", "Faster; needs a screen", 1),
+        ],
+        default="CYCLES",
+    )
     output_dir: StringProperty(
         name="Output",
         description="Folder that a batch writes to",

@@ -113,14 +113,56 @@ def test_viewport_hidden_caster_and_modifiers_render():
     assert np.array_equal(pixels(image), np.zeros((32, 32, 3)))
 
 
-def test_f12_ends_and_says_what_to_do(capfd):
+@pytest.fixture
+def seen():
+    """A camera above a plane that shows a known image, 8 x 8 pixels of Cycles."""
     scene = bpy.context.scene
+    image = bpy.data.images.new("Known", 4, 4, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    image.pixels.foreach_set([0.25, 0.5, 0.75, 1] * 16)
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.type, camera.data.ortho_scale, camera.location.z = "ORTHO", 1.0, 2.0
     scene.collection.objects.link(camera)
     scene.camera = camera
-    scene.render.resolution_x = scene.render.resolution_y = 16
-    bpy.ops.render.render()
-    assert "press Bake" in capfd.readouterr().out
+    scene.render.resolution_x, scene.render.resolution_y = 8, 6
+    scene.cycles.samples, scene.cycles.use_denoising = 4, False
+    return add_plane(material=add_material(image=image, linked=True))
+
+
+def picture(tmp_path):
+    """What F12 gives, (height, width, 3) linear."""
+    scene = bpy.context.scene
+    scene.render.image_settings.file_format, scene.render.filepath = "OPEN_EXR", str(tmp_path / "f12.exr")
+    bpy.ops.render.render(write_still=True)
+    return pixels(bpy.data.images.load(str(tmp_path / "f12.exr")))
+
+
+def test_f12_shows_the_scene_with_its_baked_images(seen, tmp_path):
+    found = picture(tmp_path)
+    assert found.shape == (6, 8, 3)
+    assert found == pytest.approx(np.tile([0.25, 0.5, 0.75], (6, 8, 1)), abs=2e-3)
+    assert bpy.context.scene.render.engine == "BEAMSPREAD"
+
+
+def test_f12_renders_the_frame_the_border_and_each_view_layer(seen, tmp_path):
+    scene = bpy.context.scene
+    seen.location.x = 5
+    seen.keyframe_insert("location", frame=1)
+    seen.location.x = 0
+    seen.keyframe_insert("location", frame=2)
+    scene.frame_set(2)
+    scene.view_layers.new("Second")
+    scene.render.use_border = scene.render.use_crop_to_border = True
+    scene.render.border_max_x = 0.5
+    found = picture(tmp_path)
+    assert found.shape == (6, 4, 3)
+    assert found == pytest.approx(np.tile([0.25, 0.5, 0.75], (6, 4, 1)), abs=2e-3)
+
+
+def test_f12_that_fails_says_why(seen, tmp_path, capfd):
+    bpy.context.scene.camera = None
+    said = messages_of(lambda: picture(tmp_path)) + capfd.readouterr().out
+    assert "camera" in said
 
 
 def test_panels_of_blender_know_the_engine():

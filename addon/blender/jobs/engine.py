@@ -12,12 +12,13 @@ from ...core.bake.settings import COMBINED, BakeSettings
 from ...core.errors import ImageError, sentence
 from .. import compat
 from ..node.find import NOTHING_FOUND, find_misplaced, find_node, materials_of
+from .picture import render_picture, show_by_eevee
 from .prepare import prepare
 from .state import state
 
 
 class BeamspreadEngine(bpy.types.RenderEngine):
-    """Bakes translucent surfaces; pictures are for Cycles and EEVEE."""
+    """Bakes translucent surfaces; pictures come from Cycles or EEVEE, and viewports show what EEVEE does."""
 
     bl_idname = "BEAMSPREAD"
     bl_label = "Beamspread"
@@ -26,19 +27,16 @@ class BeamspreadEngine(bpy.types.RenderEngine):
     bl_use_shading_nodes_custom = False
 
     def render(self, depsgraph) -> None:
-        show_nothing(self, depsgraph)
+        render_picture(self, depsgraph)
+
+    def view_update(self, context, _depsgraph) -> None:
+        show_by_eevee(context)
+
+    def view_draw(self, _context, _depsgraph) -> None:
+        """For a moment, until the viewport shows Material Preview."""
 
     def bake(self, depsgraph, obj, _pass_type, _pass_filter, width, height) -> None:
         bake_active_image(self, depsgraph, obj, width, height)
-
-
-def show_nothing(engine, depsgraph) -> None:
-    """F12: an empty picture and a sentence that says what to do."""
-    scene = depsgraph.scene
-    scale = scene.render.resolution_percentage / 100
-    size = (max(1, int(scene.render.resolution_x * scale)), max(1, int(scene.render.resolution_y * scale)))
-    engine.end_result(engine.begin_result(0, 0, *size))
-    engine.report({"WARNING"}, "Beamspread bakes textures: press Bake, then render with Cycles or EEVEE")
 
 
 def bake_active_image(engine, depsgraph, obj, width: int, height: int) -> None:
