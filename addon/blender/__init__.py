@@ -15,9 +15,9 @@ Each part imports only core and those above it (tests/unit/test_layers.py reads 
 from . import settings
 from .jobs import engine, operator, state
 from .node import menu, node, operators
-from .ui import panels
+from .ui import panels, picture
 
-PARTS = (settings, node, menu, operators, state, engine, operator, panels)
+PARTS = (settings, node, menu, operators, state, engine, operator, panels, picture)
 
 
 def register() -> None:

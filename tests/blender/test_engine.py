@@ -166,4 +166,6 @@ def test_f12_that_fails_says_why(seen, tmp_path, capfd):
 
 
 def test_panels_of_blender_know_the_engine():
-    assert "BEAMSPREAD" in bpy.types.MATERIAL_PT_preview.COMPAT_ENGINES
+    names = ["MATERIAL_PT_preview", "RENDER_PT_color_management", "RENDER_PT_output", "RENDER_PT_format"]
+    for name in names:
+        assert "BEAMSPREAD" in getattr(bpy.types, name).COMPAT_ENGINES

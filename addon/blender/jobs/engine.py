@@ -117,7 +117,7 @@ def _materials_in(obj, passes, width: int, height: int) -> list[str]:
 
 
 # Panels of Blender that make sense with this engine: those for any engine, and EEVEE's for what any engine has.
-HIDDEN_PANEL_PREFIXES = ("RENDER_PT_", "VIEWLAYER_PT_layer_passes", "WORLD_PT_viewport")
+HIDDEN_PANEL_PREFIXES = ("RENDER_PT_freestyle", "VIEWLAYER_PT_layer_passes", "WORLD_PT_viewport")
 EEVEE_PANELS = {
     "DATA_PT_EEVEE_light",
     "EEVEE_MATERIAL_PT_context_material",

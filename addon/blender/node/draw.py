@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import bpy
+
 from .output import former_output, is_shown, plain_of
 from .tree import BASE_COLOR
 
@@ -17,22 +19,21 @@ def readable_lengths(metres) -> str:
     return f"{values[0] if len(set(values)) == 1 else ', '.join(values)} {unit}"
 
 
-def draw_node(node, context, layout) -> None:
+def draw_node(node, layout) -> None:
     """In the node editor: with the Bake button on top."""
     row = layout.row()
     row.scale_y = 1.2
     row.operator("beamspread.bake", text="Bake", icon="RENDER_STILL")
     draw_properties(node, layout)
-    if context is not None and context.scene is not None:
-        lengths = [length * context.scene.unit_settings.scale_length for length in node.mean_free_path]
-        layout.label(text=f"Free path: {readable_lengths(lengths)}")
 
 
 def draw_properties(node, layout) -> None:
     """The node's properties, in the node editor and in panels."""
     layout.prop(node, "preset")
     _draw_color(node, layout)
-    _draw_channels(layout, node, "mean_free_path", "Free Path")
+    _draw_channels(layout, node, "mean_free_path", "Path")
+    metres = bpy.context.scene.unit_settings.scale_length
+    layout.label(text=f"Mean free path {readable_lengths([length * metres for length in node.mean_free_path])}")
     layout.prop(node, "anisotropy")
     layout.prop(node, "ior")
     layout.prop(node, "thickness")
@@ -45,7 +46,7 @@ def _draw_color(node, layout) -> None:
         layout.label(text=f"Color: the texture at {BASE_COLOR}", icon="TEXTURE")
         layout.prop(node, "texture_blur")
         return
-    layout.row().prop(node, "color_mode", expand=True)
+    layout.prop(node, "color_mode")
     if node.color_mode == "BASE_COLOR":
         layout.prop(node, "base_color")
     else:

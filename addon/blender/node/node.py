@@ -221,8 +221,8 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         """Whether the base colour comes from what is linked, and neither from the base colour nor the albedo here."""
         return BASE_COLOR in self.inputs and self.inputs[BASE_COLOR].is_linked
 
-    def draw_buttons(self, context, layout) -> None:
-        draw_node(self, context, layout)
+    def draw_buttons(self, _context, layout) -> None:
+        draw_node(self, layout)
 
     def draw_label(self) -> str:
         return "Beamspread"
