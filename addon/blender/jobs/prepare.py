@@ -13,7 +13,7 @@ from ...core.scene.receiver import build_receiver, texture_size
 from ...core.scene.uv_map import fit_uv_maps
 from ..cycles.light import CyclesLight
 from ..images.files import check_image
-from ..node.find import find_node, materials_of
+from ..node.find import find_place, materials_of
 from ..read.geometry import read_polygons
 from ..read.lights import read_illumination
 from ..read.visible import as_rendered, render_visible_names
@@ -74,7 +74,7 @@ def _make_job(
     depsgraph, target: Target, illumination: Illumination, settings: BakeSettings, resolution, size
 ) -> BakeJob:
     obj = depsgraph.scene.objects[target.object_name].evaluated_get(depsgraph)
-    node = find_node(next(one for one in materials_of(obj) if one.name == target.material_name))
+    node, groups = find_place(next(one for one in materials_of(obj) if one.name == target.material_name))
     surface = node.surface()
     surface.check()
     if size is None and node.image is not None:
@@ -83,4 +83,4 @@ def _make_job(
     maps = fit_uv_maps(read_polygons(obj, target.material_name))
     size = size or texture_size(maps, resolution or depsgraph.scene.beamspread.resolution)
     job = BakeJob(obj.name, build_receiver(maps, *size), illumination.lighting(obj.name), surface, settings)
-    return with_texture(job, node, obj) if node.has_texture() else job
+    return with_texture(job, node, groups, obj) if node.has_texture() else job

@@ -15,13 +15,15 @@ from ..read.node_links import Wanted
 BRIGHTEST = 1.001
 
 
-def with_texture(job: BakeJob, node, obj) -> BakeJob:
+def with_texture(job: BakeJob, node, groups: tuple, obj) -> BakeJob:
     """The job with the mean colour of the node's texture in its surface, and the rest on its receiver.
+
+    `groups` are the group nodes around the node.
 
     What can't be evaluated is said, and then the colour counts that the node has of its own.
     """
     try:
-        colors = read_base_color(Wanted(node.inputs[BASE_COLOR], ()), obj, job.receiver)
+        colors = read_base_color(Wanted(node.inputs[BASE_COLOR], groups), obj, job.receiver)
     except NotUnderstoodError as reason:
         warning = (
             f"The Base Color of '{job.name}' can't be evaluated, because {reason} not understood: the colour or albedo "

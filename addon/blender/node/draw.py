@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from .output import former_output, is_shown, plain_of
+from .output import former_output, is_in_group, is_shown, plain_of
 from .tree import BASE_COLOR
 
 # The largest unit first: metres of one, its name.
@@ -59,7 +59,7 @@ def _draw_actions(node, layout) -> None:
     if is_shown(node):
         if former_output(node) is not None:
             column.operator("beamspread.toggle_result", text="Show Former Shader", icon="LOOP_BACK")
-    elif node.image is not None:
+    elif node.image is not None and not is_in_group(node):
         column.operator("beamspread.toggle_result", text="Show Baked Result", icon="IMAGE_DATA")
     if node.image is not None:
         text = "Make Plain Nodes" if plain_of(node) is None else "Remove Plain Nodes"

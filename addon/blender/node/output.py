@@ -40,8 +40,10 @@ def link_output(node) -> list[str]:
     What was there stays in the tree, and the node remembers it.
     """
     tree = node.id_data
-    if tree.type != "SHADER" or _is_group(tree):
-        return []
+    if is_in_group(node):
+        if is_linked(node):
+            return []
+        return [f"Nothing shows what is baked: link the BSDF of the node in '{tree.name}' to the group's output."]
     output = tree.get_output_node("ALL") or tree.nodes.new("ShaderNodeOutputMaterial")
     surface = output.inputs["Surface"]
     if not surface.is_linked:
@@ -107,8 +109,12 @@ def _surface(tree):
     return output and output.inputs["Surface"]
 
 
+def is_in_group(node) -> bool:
+    """Whether the node is in a node group, and not in the tree of a material itself."""
+    return _is_group(node.id_data)
+
+
 def _is_group(tree) -> bool:
-    """Whether the tree is a node group, and not that of a material."""
     return tree.name in bpy.data.node_groups and bpy.data.node_groups[tree.name] == tree
 
 
