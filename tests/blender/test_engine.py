@@ -93,6 +93,26 @@ def test_failure_is_reported_and_does_not_touch_the_rest():
     assert state.messages() == []
 
 
+@pytest.mark.parametrize("is_active", [True, False])
+def test_a_texture_of_the_node_is_not_baked_to(is_active):
+    """Blender bakes to the first image texture where none is active, and clears it before it asks."""
+    plane = add_plane(material=add_material())
+    add_sun(0)
+    material = plane.data.materials[0]
+    texture = add_active_image(material)
+    texture.pixels.foreach_set([0.5] * len(texture.pixels))
+    texture.pack()
+    source = material.node_tree.nodes.active
+    material.node_tree.links.new(node_of(material).inputs["Base Color"], source.outputs["Color"])
+    if not is_active:
+        material.node_tree.nodes.active = node_of(material)
+    select(plane)
+    messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
+    assert "reload it" in state.messages()[0]
+    texture.reload()
+    assert np.array_equal(pixels(texture), np.full((32, 32, 3), 0.5))
+
+
 def test_plain_material_is_refused():
     plane = add_plane(material=bpy.data.materials.new("Plain"))
     plane.data.materials[0].use_nodes = True

@@ -78,13 +78,38 @@ def _prepare(depsgraph, obj, passes, size: tuple[int, int]) -> list[Bake]:
 
 
 def _check_active_image(material, settings: BakeSettings) -> None:
-    """Raise ImageError if what is baked would be taken for luminance."""
-    active, shown = material.node_tree.nodes.active, find_node(material).image
-    if COMBINED not in settings.layers and shown is not None and getattr(active, "image", None) == shown:
+    """Raise ImageError if what is baked would be taken for luminance, or would replace what the surface is made of."""
+    node, active = find_node(material), _active_image(material)
+    if active is not None and active in _images_read(node):
         raise ImageError(
-            f"The image '{shown.name}' shows luminance in the Beamspread node: choose another active image for "
+            f"The active image '{active.name}' is a texture of the Beamspread node and can't be baked to: if Blender has "
+            "cleared it, reload it (Image > Reload), then add an Image Texture node with another image and select that."
+        )
+    if COMBINED not in settings.layers and active is not None and active == node.image:
+        raise ImageError(
+            f"The image '{active.name}' shows luminance in the Beamspread node: choose another active image for "
             f"{settings.output.lower()}."
         )
+
+
+def _active_image(material):
+    """What Blender's Bake fills: the image of the texture node that was active last, or else of the first one."""
+    textures = [node for node in material.node_tree.nodes if node.type == "TEX_IMAGE"]
+    textures.sort(key=lambda node: not node.show_texture)
+    return textures[0].image if textures else None
+
+
+def _images_read(node) -> set:
+    """Images that the node's inputs come from."""
+    images, waiting, seen = set(), [node], {node}
+    while waiting:
+        for socket in waiting.pop().inputs:
+            for source in (link.from_node for link in socket.links):
+                if source not in seen:
+                    seen.add(source)
+                    waiting.append(source)
+                    images.add(getattr(source, "image", None))
+    return images - {None}
 
 
 def _put(pixels: np.ndarray, bake: Bake) -> str:
