@@ -1,10 +1,13 @@
 """The engine: Blender's own Bake fills the active image through RenderEngine.bake."""
 
 import math
+import time
+from unittest.mock import MagicMock
 
 import bpy
 import numpy as np
 import pytest
+from beamspread.blender.jobs.picture import render_picture
 from beamspread.blender.jobs.state import state
 from mathutils import Matrix
 from scenes import (
@@ -177,6 +180,18 @@ def test_f12_renders_the_frame_the_border_and_each_view_layer(seen, tmp_path):
     found = picture(tmp_path)
     assert found.shape == (6, 4, 3)
     assert found == pytest.approx(np.tile([0.25, 0.5, 0.75], (6, 4, 1)), abs=2e-3)
+
+
+def test_f12_ends_soon_when_it_should_and_keeps_no_picture(seen):
+    engine, scene = MagicMock(resolution_x=1024, resolution_y=1024), bpy.context.scene
+    engine.test_break.side_effect = [False] * 30 + [True] * 1000  # asked ten times a second
+    scene.cycles.samples, scene.cycles.use_adaptive_sampling = 1_000_000, False
+    began = time.monotonic()
+    render_picture(engine, bpy.context.evaluated_depsgraph_get())
+    assert time.monotonic() - began < 30
+    engine.end_result.assert_called_once_with(engine.begin_result.return_value, cancel=True)
+    engine.report.assert_not_called()
+    assert engine.begin_result.return_value.load_from_file.call_count == 0
 
 
 def test_f12_that_fails_says_why(seen, tmp_path, capfd):

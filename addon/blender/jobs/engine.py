@@ -82,7 +82,7 @@ def _check_active_image(material, settings: BakeSettings) -> None:
     node, active = find_node(material), _active_image(material)
     if active is not None and active in _images_read(node):
         raise ImageError(
-            f"The active image '{active.name}' is a texture of the Beamspread node and can't be baked to: if Blender has "
+            f"The active image '{active.name}' is a texture of the Beamspread node and no target: if Blender has "
             "cleared it, reload it (Image > Reload), then add an Image Texture node with another image and select that."
         )
     if COMBINED not in settings.layers and active is not None and active == node.image:
