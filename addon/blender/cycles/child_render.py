@@ -1,7 +1,5 @@
 """A picture of the scene, by another engine. Part of the child process (child.py)."""
 
-import re
-
 import bpy
 import numpy as np
 
@@ -13,10 +11,10 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
     bl_label = "Beamspread"
 
 
-def render(request, scene, progress) -> dict:
+def render(request, scene, _progress) -> dict:
     """The task `render`: one view layer at one frame into the multi-layer EXR file `picture`, by `engine`.
 
-    Compositing and sequencer are left to the process that asked.
+    Compositing and sequencer are left to the process that asked, which hears how far it is from what Cycles prints.
     """
     bpy.utils.register_class(BeamspreadNode)
     scene.render.engine = request["engine"]
@@ -30,12 +28,5 @@ def render(request, scene, progress) -> dict:
     if hasattr(settings, "media_type"):
         settings.media_type = "MULTI_LAYER_IMAGE"
     settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
-    bpy.app.handlers.render_stats.append(lambda *said: progress(_part_done(said)))
     bpy.ops.render.render(write_still=True, scene=scene.name, layer=request["view_layer"])
     return {"frame": np.array(scene.frame_current)}
-
-
-def _part_done(said) -> float:
-    """By "Sample 12/128" in what an engine says."""
-    found = re.search(r"Sample (\d+)/(\d+)", " ".join(part for part in said if isinstance(part, str)))
-    return int(found[1]) / max(int(found[2]), 1) if found else 0.0
