@@ -103,8 +103,8 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         name="Pictures By",
         description="What renders pictures (F12) while the render engine is Beamspread, with the baked images in them",
         items=[
-            ("CYCLES", "Cycles", "Path traced, also where there is no screen", 0),
-            ("EEVEE", "EEVEE", "Faster; needs a screen", 1),
+            ("CYCLES", "Cycles", "Path traced, also where there is no OpenGL", 0),
+            ("EEVEE", "EEVEE", "Faster; needs OpenGL", 1),
         ],
         default="CYCLES",
     )

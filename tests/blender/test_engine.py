@@ -160,7 +160,9 @@ def picture(tmp_path):
     return pixels(bpy.data.images.load(str(tmp_path / "f12.exr")))
 
 
-def test_f12_shows_the_scene_with_its_baked_images(seen, tmp_path):
+@pytest.mark.parametrize("engine", ["CYCLES", "EEVEE"])
+def test_f12_shows_the_scene_with_its_baked_images(seen, tmp_path, engine):
+    bpy.context.scene.beamspread.render_engine = engine
     found = picture(tmp_path)
     assert found.shape == (6, 8, 3)
     assert found == pytest.approx(np.tile([0.25, 0.5, 0.75], (6, 8, 1)), abs=2e-3)
