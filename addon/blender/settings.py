@@ -4,7 +4,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
 from ..core.bake.settings import OUTPUTS, BakeSettings
-from . import compat
+from . import compat, preferences
 
 
 class BeamspreadSettings(bpy.types.PropertyGroup):
@@ -125,6 +125,8 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
             layers=(OUTPUTS[output or self.output],),
             indirect=self.use_indirect if indirect is None else indirect,
             samples=self.samples,
+            threads=preferences.threads(),
+            memory_limit=preferences.memory_limit(),
             margin=self.margin,
             quality=self.quality,
             distributions=self.distributions.lower(),

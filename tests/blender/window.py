@@ -18,13 +18,15 @@ sys.path[:0] = [str(FOLDER), str(FOLDER.parent.parent / "build" / "stage")]
 
 import beamspread  # noqa: E402
 import scenes  # noqa: E402
+from beamspread.blender.jobs import popup  # noqa: E402
 from beamspread.blender.jobs.state import state  # noqa: E402
 from beamspread.blender.node import menu, node  # noqa: E402
 from beamspread.blender.ui import panels  # noqa: E402
+from beamspread.blender.ui import results as shown  # noqa: E402
 
 # The slowest step takes a second or two on an idle machine.
 PATIENCE_SECONDS = 60
-results = {"drawn": {}, "shown": []}
+results = {"drawn": {}, "shown": [], "popups": []}
 
 
 def count_draws(owner, name: str) -> None:
@@ -50,13 +52,20 @@ def prepare_panels() -> None:
     panels.BEAMSPREAD_PT_node_editor.bl_category = "Node"
     count_draws(node, "draw_properties")
     count_draws(menu, "_draw")
-    draw_warnings = panels.draw_warnings
+    draw_sentences = shown.draw_sentences
 
-    def record(layout, context, messages):
+    def record(layout, context, messages, icon):
         results["shown"].extend(message for message in messages if message not in results["shown"])
-        draw_warnings(layout, context, messages)
+        draw_sentences(layout, context, messages, icon)
 
-    panels.draw_warnings = record
+    shown.draw_sentences = record
+    show_soon = popup.show_soon
+
+    def note(title, sentences):
+        results["popups"].append([title, sentences])
+        show_soon(title, sentences)
+
+    popup.show_soon = note
 
 
 def areas() -> list:
@@ -140,7 +149,7 @@ def scenario():
     bpy.ops.ed.undo_push(message="before")
     results["returned"] = sorted(started(objects="ALL"))
     results["can start another"] = can_start()
-    results["running"] = state.progress()[0]
+    results["running"] = str(state.progress.target)
     yield ended
     results["baked"] = [brightness(name) for name in ("First", "Second")]
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
@@ -157,8 +166,8 @@ def scenario():
     before = [brightness(name) for name in ("First", "Second")]
     began = time.monotonic()
     started(objects="ALL")
-    yield lambda: not state.progress()[1].startswith("0%")
-    results["progress"] = state.progress()[1]
+    yield lambda: state.progress.own > 0.02
+    results["progress"] = [state.progress.own, state.progress.everything, state.progress.doing]
     press_escape()
     yield ended
     results["seconds to cancel"] = time.monotonic() - began
@@ -171,7 +180,7 @@ def scenario():
     yield ended
     results["messages of removal"] = state.messages()
     results["baked after removal"] = brightness("Second") / before[1]
-    yield lambda: state.messages()[0] in results["shown"]
+    yield lambda: results["messages of removal"][0].partition(": ")[2] in results["shown"]
 
     try:
         scenes.node_of(bpy.data.materials["Second"]).albedo = (1, 1, 1)

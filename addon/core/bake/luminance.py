@@ -20,8 +20,8 @@ from .convolve import solve as convolve_plane_lights
 from .gather import Gatherer
 from .settings import BakeSettings
 
-# Shares of the time that a bake takes, roughly: simulating an LDF not in the cache, gathering a light, solving for all.
-LIBRARY_WEIGHT, LIGHT_WEIGHT, SOLVE_WEIGHT = 2.0, 1.0, 3.0
+# Shares of the time that a bake takes, roughly: reading an LDF that is known, gathering a light, solving for all.
+LIBRARY_WEIGHT, LIGHT_WEIGHT, SOLVE_WEIGHT = 0.2, 1.0, 3.0
 
 # Of the solvers, see `convolve`: half a per cent in the worst texel is not seen, and below the noise of libraries.
 TOLERANCE = 5e-3
@@ -73,7 +73,7 @@ def bake(
     lights = illumination.lights
     media_progress, light_progress = stages(progress, [LIBRARY_WEIGHT, LIGHT_WEIGHT * len(lights) + SOLVE_WEIGHT])
     if settings.distributions == "library":
-        sources = _libraries(material, thickness, settings.quality, media_progress)
+        sources = _libraries(material, thickness, settings, media_progress)
     else:
         sources = [load_source(settings.sample_folder, settings.distributions)] * 3
     gatherer = Gatherer(grid, illumination, settings, _rays(grid, material, settings))
@@ -165,7 +165,7 @@ def _dark(grid: Grid) -> np.ndarray:
     return np.zeros((grid.height, grid.width, 3), np.float32)
 
 
-def _libraries(material: Material, thickness: float, quality: str, progress: Progress | None) -> list:
+def _libraries(material: Material, thickness: float, settings: BakeSettings, progress: Progress | None) -> list:
     """The LDF library of each channel; channels of the same medium share one."""
     depths = [thickness / length if thickness else math.inf for length in material.mean_free_path]
     channels = list(zip(material.channel_anisotropy, depths))
@@ -173,5 +173,5 @@ def _libraries(material: Material, thickness: float, quality: str, progress: Pro
     by_channel = {}
     for (g, depth), stage in zip(distinct, stages(progress, [1.0] * len(distinct))):
         medium = native.Medium(g=g, ior=material.ior, thickness=depth)
-        by_channel[g, depth] = library(medium, quality=quality, progress=stage)
+        by_channel[g, depth] = library(medium, settings.quality, stage, settings.threads)
     return [by_channel[channel] for channel in channels]
