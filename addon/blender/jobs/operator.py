@@ -184,14 +184,14 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         layers = set(bake.layers)
         bake.keep(self._results.store)
         if bake.status == CANCELLED and self._queue.turn.is_again:
-            self._say("WARNING", f"{bake.target}: the final bake was cancelled, the preview is kept")
+            self._say("WARNING", f"{bake.target}: the final bake was cancelled, a first look is kept")
             return
         state.note(bake)
         if bake.status == WRITTEN:
             self._written.append(bake.target)
             if COMBINED in layers:
-                quality = bake.job.settings.quality
-                stale.keep(bake.target, self._parts.get(bake.target), quality, bake.warnings)
+                parts, is_first_look = self._parts.get(bake.target), self._queue.turn.is_first
+                stale.keep(bake.target, parts, bake.warnings, is_first_look)
             if bake.is_dark:
                 self._problems += bake.warnings
         elif bake.status == CANCELLED:

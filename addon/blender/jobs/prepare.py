@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import bpy
@@ -76,7 +75,6 @@ class Preparation:
     ) -> None:
         self.settings = settings
         self._plans: dict[Target, _Plan | str] = {}
-        self._found: dict[Target, Callable] = {}
         try:
             self._illumination, self._by_cycles = read_illumination(depsgraph), CyclesLight(depsgraph)
         except Exception as error:  # noqa: BLE001 - each bake asked for needs an answer
@@ -101,10 +99,7 @@ class Preparation:
         return [] if isinstance(plan, str) else to_simulate(plan.surface, replace(self.settings, quality=quality))
 
     def bake(self, target: Target, settings: BakeSettings | None = None) -> Bake:
-        """The target's bake, with its job or the reason why there is none; in the main thread.
-
-        What Cycles finds for a target is found once, however often it is baked.
-        """
+        """The target's bake, with its job or the reason why there is none; in the main thread."""
         plan = self._plans[target]
         if isinstance(plan, str):
             return Bake(target, error=plan)
@@ -113,10 +108,7 @@ class Preparation:
             illumination = self._illumination.lighting(target.object_name)
             job = BakeJob(target.object_name, receiver, illumination, plan.surface, settings or self.settings)
             check_memory(job, self.settings.memory_limit)
-            job = self._by_cycles.complete(job)
-            if job.more_light is not None:
-                job = replace(job, more_light=self._found.setdefault(target, _once(job.more_light)))
-            return Bake(target, job)
+            return Bake(target, self._by_cycles.complete(job))
         except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
             return Bake(target, error=sentence(error))
 
@@ -141,18 +133,6 @@ def _read_target(depsgraph, target: Target, resolution: int | None, size: tuple[
     maps = fit_uv_maps(read_polygons(obj, target.material_name))
     size = size or texture_size(maps, resolution or depsgraph.scene.beamspread.resolution)
     return _Plan(maps, size, surface)
-
-
-def _once(find: Callable) -> Callable:
-    """The function, its first answer kept."""
-    answers = []
-
-    def found(receiver, progress):
-        if not answers:
-            answers.append(find(receiver, progress))
-        return answers[0]
-
-    return found
 
 
 def check_memory(job: BakeJob, limit: int) -> None:

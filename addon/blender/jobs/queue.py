@@ -19,7 +19,7 @@ OTHER_SECONDS = 0.5
 
 @dataclass(frozen=True)
 class Turn:
-    """One bake of a target; `is_first`: a better one follows, `is_again`: it is the better one."""
+    """One bake of a target; `is_first`: it is a first look, `is_again`: the bake that follows one."""
 
     target: Target
     quality: str
@@ -31,9 +31,9 @@ class Turn:
 class Queue:
     """Turns in their order, and how far they are.
 
-    With `preview_first` nobody waits for a medium that is not simulated yet: its targets are baked with a quick
-    simulation, and again once all targets have something to show. Those that share an image with them are, too, since
-    a run fills each image as a whole.
+    With `preview_first` nobody waits for a medium that is not simulated yet: its targets get a first look, by a quick
+    simulation and direct light alone, and are baked once all targets have something to show. So are those that share
+    an image with them, since a run fills each image as a whole.
     """
 
     def __init__(self, preparation: Preparation, targets: list[Target], preview_first: bool) -> None:
@@ -55,10 +55,8 @@ class Queue:
             return None
         turn = self._turns[self._next]
         self._next += 1
-        return self._preparation.bake(turn.target, replace(self._preparation.settings, quality=turn.quality))
-
-    def next_target(self) -> Target | None:
-        return self._turns[self._next].target if self._next < len(self._turns) else None
+        changes = {"quality": turn.quality} | ({"indirect": False} if turn.is_first else {})
+        return self._preparation.bake(turn.target, replace(self._preparation.settings, **changes))
 
     def starts_again(self) -> bool:
         """Whether the bake given out last is the first of those made again."""
@@ -83,16 +81,17 @@ def _turns(preparation: Preparation, targets: list[Target], preview_first: bool)
         met.extend((quality, medium) for medium in found)
         return OTHER_SECONDS + simulation_seconds(quality, preparation.settings.threads) * len(found)
 
-    first = [
-        Turn(
-            target,
-            PREVIEW if target in quick else quality,
-            seconds(target, PREVIEW if target in quick else quality) + _indirect_seconds(preparation, target),
-            is_first=target in again,
-        )
-        for target in targets
-    ]
-    return first + [Turn(target, quality, seconds(target, quality), is_again=True) for target in again]
+    turns = []
+    for target in targets:
+        if target in again:
+            chosen = PREVIEW if target in quick else quality
+            turns.append(Turn(target, chosen, seconds(target, chosen), is_first=True))
+        else:
+            turns.append(Turn(target, quality, seconds(target, quality) + _indirect_seconds(preparation, target)))
+    for target in again:
+        took = seconds(target, quality) + _indirect_seconds(preparation, target)
+        turns.append(Turn(target, quality, took, is_again=True))
+    return turns
 
 
 def _indirect_seconds(preparation: Preparation, target: Target) -> float:

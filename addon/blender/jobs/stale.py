@@ -13,13 +13,14 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...core.bake.runner import Target
-from ...core.bake.settings import FINAL, PREVIEW
 from ..node.find import find_node, find_targets
 from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
 from .record import Record, keep_record, record_of
 from .state import Row, Standing, redraw, state
 
 REST_SECONDS = 0.3
+
+FIRST_LOOK = "first look"
 
 fingerprints = Fingerprints()
 _last = {"change": 0.0}
@@ -41,14 +42,14 @@ def parts_of(context, targets: list[Target]) -> dict[Target, Parts]:
     return fingerprints.of(context, targets)
 
 
-def keep(target: Target, parts: Parts | None, quality: str, warnings: list[str]) -> None:
-    """Note in the node's image what the bake in it has read, and the quality of its libraries, if it used any."""
+def keep(target: Target, parts: Parts | None, warnings: list[str], is_first_look: bool) -> None:
+    """Note in the node's image what the bake in it has read."""
     image = _image(target)
     if image is None or parts is None:
         return
     parts = parts | {IMAGE: image_part(image)}  # the bake may have made it
-    if parts[QUALITY] in (PREVIEW, FINAL):
-        parts[QUALITY] = quality
+    if is_first_look:
+        parts[QUALITY] = FIRST_LOOK
     keep_record(image, target, Record(parts, tuple(warnings), image.is_dirty))
 
 
@@ -73,9 +74,14 @@ def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
         return Row(target, Standing.NEVER)
     if changed and changed != [QUALITY]:
         return Row(target, Standing.STALE, (f"Changed since its bake: {', '.join(changed)}.", *record.warnings), True)
-    quality = (f"Baked in {record.parts[QUALITY]} quality, and not yet in {now[QUALITY]}.",) if changed else ()
-    warnings = (*quality, *record.warnings)
+    warnings = (*([_why_again(record.parts[QUALITY], now[QUALITY])] if changed else []), *record.warnings)
     return Row(target, Standing.WARNED if warnings else Standing.BAKED, warnings, bool(changed))
+
+
+def _why_again(baked: str, wanted: str) -> str:
+    if baked == FIRST_LOOK:
+        return "A first look, coarse and by direct light alone: its final bake has not ended."
+    return f"Baked in {baked} quality, and not in {wanted}."
 
 
 def look_soon() -> None:

@@ -99,12 +99,11 @@ def draw_progress(layout, context) -> None:
     progress = state.progress
     column = layout.column(align=True)
     draw_sentences(column, context, [f"{progress.doing or 'Baking'}: {progress.target}"], "RENDER_STILL")
-    row = column.row(align=True)
-    if hasattr(row, "progress"):  # from Blender 4.0 on
-        row.progress(factor=progress.everything, text=progress.in_short())
+    if hasattr(column, "progress"):  # from Blender 4.0 on
+        column.progress(factor=progress.everything, text=progress.in_short())
     else:
-        row.label(text=f"{_bar(progress.everything)} {progress.in_short()}", icon="BLANK1")
-    row.operator("beamspread.cancel", icon="X")
+        column.label(text=f"{_bar(progress.everything)} {progress.in_short()}", icon="BLANK1")
+    column.operator("beamspread.cancel", icon="X")
 
 
 def _bar(fraction: float, length: int = 10) -> str:
@@ -121,7 +120,8 @@ def draw_results(layout, context, material_name: str = "") -> None:
     rows.sort(key=lambda row: row.standing in (Standing.NEVER, Standing.BAKED))
     box, shown = layout.box().column(align=True), set()
     for row in rows[:MOST_OBJECTS]:
-        _draw_row(box, row)
+        standing = _standing(row)
+        draw_sentences(box, context, [f"{row.target.object_name}: {standing.value}"], ICONS[standing])
         sentences = [one for one in row.sentences if one not in shown]
         shown.update(sentences)
         draw_sentences(box, context, sentences, "DOT")
@@ -129,12 +129,9 @@ def draw_results(layout, context, material_name: str = "") -> None:
         box.label(text=f"And {len(rows) - MOST_OBJECTS} more", icon="BLANK1")
 
 
-def _draw_row(layout, row: Row) -> None:
+def _standing(row: Row) -> Standing:
     running = state.progress is not None and state.progress.target == row.target
-    standing = Standing.RUNNING if running else row.standing
-    line = layout.split(factor=0.55)
-    line.label(text=row.target.object_name, icon=ICONS[standing])
-    line.label(text=standing.value)
+    return Standing.RUNNING if running else row.standing
 
 
 def estimates(context) -> list[str]:
