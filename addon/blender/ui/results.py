@@ -146,10 +146,11 @@ def estimates(context) -> list[str]:
         many = f" for {len(sizes)} objects" if len(sizes) > 1 else ""
         found.append(f"Indirect light: about {seconds}{many}, where something stands above them.")
     if settings.solver == "direct" and settings.output == "LUMINANCE":
-        lights = sum(obj.type == "LIGHT" for obj in context.view_layer.objects)
-        seconds = sum(solver_seconds(*size, lights, "direct") for size in sizes)
+        lamps = [obj.data.type for obj in context.view_layer.objects if obj.type == "LIGHT"]
+        suns = lamps.count("SUN")
+        seconds = sum(solver_seconds(*size, suns, len(lamps) - suns, "direct") for size in sizes)
         if seconds > LONG_SECONDS:
-            found.append(f"Direct solver: about {in_words(seconds)}. FFT takes seconds.")
+            found.append(f"Direct solver: at least {in_words(seconds)}. FFT gives the same in seconds.")
     return found
 
 

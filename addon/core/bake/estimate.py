@@ -10,8 +10,8 @@ SIMULATION_SECONDS = {"preview": 3.0, "final": 130.0}
 # Of the fft solver, per texel and light, in seconds of one processor.
 FFT_SECONDS = 1.5e-6
 
-# Of the direct solver, per pair of texels.
-DIRECT_SECONDS = 8e-9
+# Of the direct solver, per pair of texels: for light of its own direction at each, and of one for all as a sun's.
+DIRECT_SECONDS, DIRECT_SUN_SECONDS = 3e-8, 3e-10
 
 # What a bake keeps for each texel, whatever the solver: the grid, light with its directions, the result with margin.
 BYTES = {"fft": 250, "direct": 270, "adaptive": 270}
@@ -26,12 +26,12 @@ def simulation_seconds(quality: str, threads: int = 0) -> float:
     return SIMULATION_SECONDS[quality] / processors(threads)
 
 
-def solver_seconds(width: int, height: int, lights: int, solver: str, threads: int = 0) -> float:
-    """Of all lights on so many texels."""
+def solver_seconds(width: int, height: int, suns: int, others: int, solver: str, threads: int = 0) -> float:
+    """Of so many lights on so many texels; at least, where lights have a size."""
     texels = width * height
     if solver == "direct":
-        return DIRECT_SECONDS * texels**2 * max(1, lights) / processors(threads)
-    return FFT_SECONDS * texels * (1 + lights) / processors(threads)
+        return (DIRECT_SUN_SECONDS * suns + DIRECT_SECONDS * others) * texels**2 / processors(threads)
+    return FFT_SECONDS * texels * (1 + suns + others) / processors(threads)
 
 
 def bake_bytes(width: int, height: int, solver: str) -> int:
