@@ -16,7 +16,10 @@ from . import compat
 # Of the add-on: "beamspread", or "bl_ext.REPOSITORY.beamspread" as an extension.
 PACKAGE = __package__.rpartition(".")[0]
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
+# In the package, or beside it where it is used from its sources.
+DOCS = [folder / "docs" for folder in Path(__file__).resolve().parents[1:3]]
+
+FIRST_PAGES = ("first_bake.md", "method.md")
 
 
 def preferences(context=None):
@@ -37,11 +40,9 @@ def memory_limit() -> int:
 
 
 def documentation() -> str:
-    """Where the documentation is: on this machine, if the package has it; else where the manifest says; or empty."""
-    for page in (DOCS / "first_bake.md", DOCS / "method.md"):
-        if page.is_file():
-            return page.as_uri()
-    return ""
+    """Where the documentation is on this machine, as a URL; empty where it is not."""
+    pages = (folder / name for folder in DOCS for name in FIRST_PAGES)
+    return next((page.as_uri() for page in pages if page.is_file()), "")
 
 
 def _use_cache_folder(own, _context) -> None:
@@ -87,7 +88,7 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
         files = library.cached_files()
         megabytes = sum(file.stat().st_size for file in files if file.is_file()) / 2**20
         row = layout.row()
-        row.label(text=f"{len(files)} media, {megabytes:.1f} MB in {library.cache_folder()}")
+        row.label(text=f"{len(files)} simulated, {megabytes:.1f} MB in {library.cache_folder()}")
         row.operator("beamspread.clear_cache", icon="TRASH")
         if url := documentation():
             layout.operator("wm.url_open", text="Documentation", icon="HELP").url = url
