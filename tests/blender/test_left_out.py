@@ -4,9 +4,10 @@ from unittest.mock import MagicMock
 
 import bpy
 import pytest
+from beamspread.blender.jobs import stale
 from beamspread.blender.jobs.batch import bake_all
 from beamspread.blender.jobs.state import state
-from beamspread.blender.ui import panels
+from beamspread.blender.ui import results
 from beamspread.core.batch import options
 from mathutils import Matrix
 from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
@@ -153,17 +154,18 @@ def test_a_black_bake_says_why(add, words, tmp_path):
 
 def test_a_panel_says_once_what_both_the_object_and_its_last_bake_say(monkeypatch):
     said = []
-    monkeypatch.setattr(panels, "draw_warnings", lambda _layout, _context, messages: said.extend(messages))
+    monkeypatch.setattr(results, "draw_sentences", lambda _layout, _context, messages, _icon: said.extend(messages))
     select(add_grouped())
     messages_of(bpy.ops.beamspread.bake)
     (message,) = state.messages()
-    panels.draw_bake(MagicMock(), bpy.context)
-    assert said == [message.replace("Grouped / Grouped: ", "Grouped: ")]
+    results.draw_bake(MagicMock(), bpy.context)
+    assert said == [message.replace("Grouped / Grouped: ", "Grouped: "), "Grouped: Failed"]
     # Once nothing of it is selected, the bake's own words stay.
     said.clear()
     bpy.ops.object.select_all(action="DESELECT")
-    panels.draw_bake(MagicMock(), bpy.context)
-    assert said == [message]
+    stale.refresh(bpy.context)
+    results.draw_bake(MagicMock(), bpy.context)
+    assert said == ["Grouped: Failed", message.replace("Grouped / Grouped: ", "")]
 
 
 def test_messages_go_with_the_file():

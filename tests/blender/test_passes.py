@@ -211,7 +211,7 @@ class Layout:
     def column(self, **_options):
         return self
 
-    row = column
+    row = box = column
 
     def prop(self, _owner, name, **_options):
         self.properties.append(name)
@@ -223,9 +223,10 @@ class Layout:
         return self
 
 
-def drawn():
+def drawn(*panels_drawn):
     layout = Layout()
-    panels.BEAMSPREAD_PT_render.draw(SimpleNamespace(layout=layout), Context())
+    for panel in panels_drawn:
+        panel.draw(SimpleNamespace(layout=layout), Context())
     return layout
 
 
@@ -240,10 +241,13 @@ class Context:
 
 
 def test_the_panel_shows_what_counts_and_what_it_costs(settings):
-    assert {"output", "use_indirect", "solver", "distributions"} <= set(drawn().properties)
-    assert drawn().text == []
+    plain, expert = panels.BEAMSPREAD_PT_render, panels.BEAMSPREAD_PT_expert
+    select(add_plane(material=add_material()))
+    assert {"output", "use_indirect"} <= set(drawn(plain).properties)
+    assert {"solver", "distributions", "quality", "samples", "margin"} <= set(drawn(expert).properties)
+    assert "Indirect light" not in " ".join(drawn(plain).text)
     settings.use_indirect = True
-    assert "Cycles" in " ".join(drawn().text)
+    assert "Indirect light: about" in " ".join(drawn(plain).text)
     settings.output = "IRRADIANCE"
-    assert {"output", "use_indirect", "samples"} <= set(drawn().properties)
-    assert not {"solver", "distributions", "quality"} & set(drawn().properties)
+    assert {"output", "use_indirect", "samples"} <= set(drawn(plain, expert).properties)
+    assert not {"solver", "distributions", "quality"} & set(drawn(plain, expert).properties)

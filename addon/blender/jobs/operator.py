@@ -139,6 +139,7 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         if not targets and not misplaced:
             self._fail(NOTHING_STALE if self.objects == "STALE" else NOTHING_FOUND)
             return False
+        state.forget_failures()
         self._parts = stale.parts_of(context, targets)
         preparation = read_scene(context, targets, context.scene.beamspread.for_bake())
         self._queue = Queue(preparation, targets, preview_first)

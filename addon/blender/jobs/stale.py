@@ -32,9 +32,8 @@ def refresh(context) -> None:
     recorded = {target: record for target in targets if (record := _record(target)) is not None}
     now = fingerprints.of(context, recorded) if recorded else {}
     state.rows = {target: _row(target, recorded.get(target), now.get(target)) for target in targets}
-    for target in list(state.rows):
-        if (said := state.said_of(Target(target.object_name))) is not None:
-            state.rows[target] = Row(target, said.standing, said.sentences)
+    # What could not be baked at all, as a node inside a group, is no target.
+    state.rows |= {row.target: row for row in state.failures() if row.target not in state.rows}
 
 
 def parts_of(context, targets: list[Target]) -> dict[Target, Parts]:

@@ -127,6 +127,15 @@ class State:
         """How its last bake since the file was opened ended."""
         return self._said.get(target)
 
+    def failures(self) -> list[Row]:
+        """Of the last bakes that failed or were cancelled."""
+        return [row for row in self._said.values() if row.standing in (Standing.FAILED, Standing.CANCELLED)]
+
+    def forget_failures(self) -> None:
+        """Before a run, which says anew what fails."""
+        for row in self.failures():
+            del self._said[row.target]
+
     def messages(self) -> list[str]:
         """Everything said, each sentence once."""
         said = [

@@ -8,7 +8,7 @@ from .. import compat
 from ..jobs.engine import BeamspreadEngine
 from ..node.find import find_node
 from ..node.node import draw_properties
-from .results import draw_bake, draw_results, draw_sentences, estimates
+from .results import draw_bake, draw_sentences, estimates
 
 
 def _use_columns(layout) -> None:
@@ -33,7 +33,6 @@ class BEAMSPREAD_PT_render(RenderPanel, bpy.types.Panel):
         layout = self.layout
         _use_columns(layout)
         draw_bake(layout, context)
-        draw_results(layout, context)
         column = layout.column()
         settings = context.scene.beamspread
         for name in ("output", "resolution", "use_indirect"):
@@ -109,8 +108,7 @@ class MaterialPanel:
         _use_columns(layout)
         material = _active_material(context)
         draw_properties(find_node(material), layout)
-        draw_bake(layout, context)
-        draw_results(layout, context, material.name)
+        draw_bake(layout, context, material.name)
 
 
 def _active_material(context):

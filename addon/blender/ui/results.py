@@ -72,18 +72,33 @@ def draw_sentences(layout, context, messages: list[str], icon: str) -> None:
             column.label(text=line, icon="BLANK1" if number else icon)
 
 
-def draw_bake(layout, context) -> None:
-    """The progress, or problems of the selected objects and the Bake buttons."""
+def draw_bake(layout, context, material_name: str = "") -> None:
+    """The progress, or problems of the selected objects and the Bake buttons; then how targets stand."""
     if native.problem:
         draw_warnings(layout, context, [native.problem])
         return
+    shown: set[str] = set()
     if state.is_running():
         draw_progress(layout, context)
-        return
+    else:
+        shown = draw_problems(layout, context)
+        draw_buttons(layout)
+    draw_results(layout, context, material_name, shown)
+
+
+def draw_problems(layout, context) -> set[str]:
+    """What would keep selected objects from being baked; the sentences."""
     # `context.object` is empty in the render properties.
     chosen, visible = list(context.view_layer.objects.selected), render_visible_names(context.view_layer)
+    shown = set()
     for obj in chosen[:MOST_OBJECTS]:
-        draw_warnings(layout, context, [f"{obj.name}: {message}" for message in warnings_for(obj, visible)])
+        warnings = warnings_for(obj, visible)
+        draw_warnings(layout, context, [f"{obj.name}: {message}" for message in warnings])
+        shown.update(warnings)
+    return shown
+
+
+def draw_buttons(layout) -> None:
     column = layout.column(align=True)
     row = column.row(align=True)
     row.scale_y = 1.4
@@ -111,14 +126,14 @@ def _bar(fraction: float, length: int = 10) -> str:
     return "\u2588" * full + "\u2591" * (length - full)
 
 
-def draw_results(layout, context, material_name: str = "") -> None:
+def draw_results(layout, context, material_name: str, shown: set[str]) -> None:
     """How each target stands, with what there is to say about it; those of one material, or of all."""
     rows = [row for row in state.rows.values() if material_name in ("", row.target.material_name)]
     if not rows:
         return
     # First what needs looking at.
     rows.sort(key=lambda row: row.standing in (Standing.NEVER, Standing.BAKED))
-    box, shown = layout.box().column(align=True), set()
+    box = layout.box().column(align=True)
     for row in rows[:MOST_OBJECTS]:
         standing = _standing(row)
         draw_sentences(box, context, [f"{row.target.object_name}: {standing.value}"], ICONS[standing])
