@@ -1,6 +1,7 @@
 """The operator and the panels in a window: started, watched, cancelled and undone by events, drawn for real."""
 
 import json
+import os
 import subprocess
 from pathlib import Path
 
@@ -20,7 +21,8 @@ def seen(tmp_path_factory):
     options = ["--factory-startup", "--enable-event-simulate", "--window-geometry", "0", "0", "1600", "1000"]
     script = ["--python-exit-code", "1", "--python", str(Path(__file__).with_name("window.py")), "--", str(path)]
     command = [*screen, bpy.app.binary_path, *options, *script]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    environment = os.environ | {"BEAMSPREAD_CACHE": str(path.parent / "cache")}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment)
     assert path.exists(), done.stdout + done.stderr
     results = json.loads(path.read_text())
     assert "error" not in results, results["error"]
@@ -54,9 +56,21 @@ def test_escape_ends_a_bake_of_minutes_and_keeps_the_images(seen):
     assert doing == "Baking"
     # Of two bakes.
     assert everything == pytest.approx(own / 2)
-    assert seen["seconds to cancel"] < 60
+    assert seen["seconds to cancel"] < 2
     assert seen["kept by cancel"]
     assert seen["messages of cancel"] == ["First / First: The bake was cancelled."]
+
+
+def test_escape_ends_what_was_opened_last(seen):
+    assert seen["goes on behind a menu"]
+
+
+def test_a_first_look_is_there_before_the_simulation_and_stays_if_that_is_cancelled(seen):
+    steps = [step for step in seen["steps"] if step != "Baking"]  # which may be over before anyone looks
+    assert steps == ["Simulating the medium, once (preview)", "Simulating the medium, once"]
+    assert seen["first look"][0]
+    assert "first look" in seen["first look"][1]
+    assert seen["out of date"]
 
 
 def test_what_fails_meanwhile_is_said_in_the_panels_and_the_others_are_baked(seen):
