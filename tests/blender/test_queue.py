@@ -1,17 +1,21 @@
 """Turns of a run: first looks at media that are not simulated yet, jobs made when it is their turn, refusals."""
 
+import time
+
 import beamspread
 import bpy
 import pytest
 from beamspread.blender import preferences
 from beamspread.blender.images.results import Results
-from beamspread.blender.jobs import popup, prepare, stale
+from beamspread.blender.jobs import operator, popup, prepare, stale
+from beamspread.blender.jobs.operator import BakeThread
 from beamspread.blender.jobs.prepare import read_scene
 from beamspread.blender.jobs.queue import Queue
 from beamspread.blender.jobs.state import Standing, state
 from beamspread.blender.node.find import find_targets
 from beamspread.blender.ui.results import estimates
 from beamspread.core.bake.estimate import in_words
+from beamspread.core.bake.runner import CANCELLED
 from beamspread.core.ldf import library
 from mathutils import Matrix
 from scenes import add_material, add_plane, add_sun, messages_of, node_of, select
@@ -144,12 +148,50 @@ def test_progress_says_what_is_done_and_how_long_it_lasts(monkeypatch):
     state.begin()
     state.start(bake.target)
     try:
-        now[0] += 30
+        state.update(0.3, 0.15, "Baking")
+        assert state.progress.in_short() == "15%"
+        now[0] += 10
         state.update(0.5, 0.25, "Baking")
-        assert state.progress.in_words() == "Baking 50%, all 25%, about 2 min left"
-        assert state.progress.in_short() == "25%, 2 min left"
+        # Ten per cent in ten seconds, however far it was before.
+        assert state.progress.in_words() == "Baking 50%, all 25%, about 1 min left"
+        assert state.progress.in_short() == "25%, 1 min left"
     finally:
         state.stop()
+
+
+@pytest.mark.parametrize("solver", ["fft", "direct", "adaptive"])
+@pytest.mark.parametrize("seconds", [0.05, 0.5])
+def test_a_bake_stops_within_two_seconds(solver, seconds):
+    settings = bpy.context.scene.beamspread
+    settings.resolution, settings.solver, settings.quality = 1024, solver, "preview"
+    bpy.data.lights["Sun"].type = "POINT"
+    bpy.data.objects["Sun"].location.z = 1.0
+    plane("Plane", **KNOWN)
+    beamspread.library(beamspread.Medium(0.8, 1.0), quality="preview")  # to read it takes most of a second
+    thread = BakeThread(queue().next())
+    thread.start()
+    time.sleep(seconds)
+    thread.cancel()
+    asked = time.monotonic()
+    thread.join()
+    assert time.monotonic() - asked < 2
+    assert thread.bake.status == CANCELLED
+
+
+def test_unregistering_ends_what_runs():
+    """Blender would end with an error if a thread of ours still ran when it quits."""
+    bpy.context.scene.beamspread.solver = "direct"
+    bpy.context.scene.beamspread.resolution = 1024
+    bpy.data.lights["Sun"].type = "POINT"
+    bpy.data.objects["Sun"].location.z = 1.0
+    plane("Plane", **KNOWN)
+    thread = BakeThread(queue().next())
+    thread.start()
+    operator.unregister()
+    try:
+        assert not thread.is_alive()
+    finally:
+        operator.register()
 
 
 def test_estimates_follow_solver_and_sizes():

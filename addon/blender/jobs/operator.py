@@ -91,7 +91,7 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
     def invoke(self, context, _event):
         if bpy.app.background or context.window is None:
             return self.execute(context)
-        self._in_window = True
+        self._in_window, self._shown = True, ""
         if not self._prepare(context, preview_first=True):
             return self._finish(context)
         state.begin()
@@ -175,9 +175,13 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         done = self._queue.fraction(self._thread.fraction)
         doing = "Stopping" if state.should_stop() else self._thread.doing
         state.update(self._thread.fraction, done, doing)
+        shown = state.progress.in_a_line()
+        if shown == self._shown:  # to draw takes time from the bake, and from whoever works on
+            return
+        self._shown = shown
         context.window_manager.progress_update(int(100 * done))
         if context.workspace is not None:
-            context.workspace.status_text_set(state.progress.in_a_line())
+            context.workspace.status_text_set(shown)
         redraw(context)
 
     def _take(self, bake: Bake) -> None:
@@ -266,4 +270,20 @@ class BEAMSPREAD_OT_cancel(bpy.types.Operator):
         return {"FINISHED"}
 
 
-register, unregister = bpy.utils.register_classes_factory((BEAMSPREAD_OT_bake, BEAMSPREAD_OT_cancel))
+_classes = (BEAMSPREAD_OT_bake, BEAMSPREAD_OT_cancel)
+
+
+def register() -> None:
+    for one in _classes:
+        bpy.utils.register_class(one)
+
+
+def unregister() -> None:
+    # A thread that outlives its operator would end Blender with an error when that quits.
+    for thread in threading.enumerate():
+        if isinstance(thread, BakeThread):
+            thread.cancel()
+            thread.join()
+    state.stop()
+    for one in reversed(_classes):
+        bpy.utils.unregister_class(one)

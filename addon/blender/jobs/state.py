@@ -6,6 +6,7 @@ Operators and engines don't outlive their calls, and panels can't ask them; henc
 from __future__ import annotations
 
 import time
+from collections import deque
 from dataclasses import dataclass
 from enum import Enum
 
@@ -38,8 +39,8 @@ class Row:
     is_stale: bool = False
 
 
-# Before, the time that is left can only be guessed.
-FIRST_GUESS_SECONDS, FIRST_GUESS_FRACTION = 2.0, 0.02
+# The time that is left follows from the pace of the last seconds, once there are enough of them to tell.
+PACE_SECONDS, LEAST_PACE_SECONDS = 15.0, 3.0
 
 
 @dataclass
@@ -79,7 +80,8 @@ class State:
     def __init__(self) -> None:
         self.progress: Progress | None = None
         self.rows: dict[Target, Row] = {}
-        self._began, self._stop_asked = 0.0, False
+        self._paces: deque[tuple[float, float]] = deque()
+        self._stop_asked = False
         self._said: dict[Target, Row] = {}
 
     def is_running(self) -> bool:
@@ -87,20 +89,26 @@ class State:
         return self.progress is not None
 
     def begin(self) -> None:
-        """Note that a run begins: its time counts from now on."""
-        self._began, self._stop_asked = time.monotonic(), False
+        """Note that a run begins."""
+        self._paces.clear()
+        self._stop_asked = False
 
     def start(self, subject: Target, everything: float = 0.0) -> None:
-        self.progress = Progress(subject, everything=everything)
+        left = self.progress.seconds_left if self.progress else None
+        self.progress = Progress(subject, everything=everything, seconds_left=left)
 
     def update(self, own: float, everything: float, doing: str = "") -> None:
         """Note how far this bake and all bakes of the run are, 0..1, and what is being done."""
         if self.progress is None:
             return
         self.progress.doing, self.progress.own, self.progress.everything = doing, own, everything
-        passed = time.monotonic() - self._began
-        if passed > FIRST_GUESS_SECONDS and everything > FIRST_GUESS_FRACTION:
-            self.progress.seconds_left = passed * (1 - everything) / everything
+        now = time.monotonic()
+        self._paces.append((now, everything))
+        while now - self._paces[0][0] > PACE_SECONDS:
+            self._paces.popleft()
+        began, before = self._paces[0]
+        if now - began >= LEAST_PACE_SECONDS and everything > before:
+            self.progress.seconds_left = (now - began) * (1 - everything) / (everything - before)
 
     def stop(self) -> None:
         self.progress = None

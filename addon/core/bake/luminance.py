@@ -17,6 +17,7 @@ from ..scene.grid import Grid
 from ..scene.illumination import Illumination
 from ..scene.lights import Light, SunDiskLight, SunLight
 from .convolve import solve as convolve_plane_lights
+from .estimate import solver_seconds
 from .gather import Gatherer
 from .settings import BakeSettings
 
@@ -71,7 +72,8 @@ def bake(
     material.check()
     check_thickness(thickness)
     lights = illumination.lights
-    media_progress, light_progress = stages(progress, [LIBRARY_WEIGHT, LIGHT_WEIGHT * len(lights) + SOLVE_WEIGHT])
+    spreading = LIGHT_WEIGHT * len(lights) + _solve_weight(grid, settings.solver)
+    media_progress, light_progress = stages(progress, [LIBRARY_WEIGHT, spreading])
     if settings.distributions == "library":
         sources = _libraries(material, thickness, settings, media_progress)
     else:
@@ -113,9 +115,15 @@ def _rays(grid: Grid, material: Material, settings: BakeSettings) -> int:
     return round(min(max(wanted, FEWEST_RAYS), MOST_RAYS) * (settings.samples / 4) ** 2) or 1
 
 
+def _solve_weight(grid: Grid, solver: str) -> float:
+    """Of all lights together."""
+    size = grid.width, grid.height
+    return SOLVE_WEIGHT * max(1.0, solver_seconds(*size, 0, 1, solver) / solver_seconds(*size, 0, 1, "fft"))
+
+
 def _spread_together(gatherer: Gatherer, lights: Sequence[Light], medium: dict, solver: str, progress) -> np.ndarray:
     """All lights first, then the solver: for few lights of one direction per texel."""
-    gathering, solving = stages(progress, [LIGHT_WEIGHT * len(lights), SOLVE_WEIGHT])
+    gathering, solving = stages(progress, [LIGHT_WEIGHT * len(lights), _solve_weight(gatherer.grid, solver)])
     arriving = []
     for light, step in zip(lights, stages(gathering, [1.0] * len(lights))):
         arriving += [part for part in gatherer.plane_lights(light, step) if part.mean() > 0]
@@ -128,7 +136,7 @@ def _spread_apart(gatherer: Gatherer, lights: Sequence[Light], medium: dict, sol
     """Light after light, and ray after ray where one has a size: for the solvers that share no work among them."""
     luminance = _dark(gatherer.grid)
     for light, step in zip(lights, stages(progress, [1.0] * len(lights))):
-        gathering, solving = stages(step, [LIGHT_WEIGHT, SOLVE_WEIGHT])
+        gathering, solving = stages(step, [LIGHT_WEIGHT, _solve_weight(gatherer.grid, solver)])
         parts = [part for part in gatherer.layers(light, gathering) if part.mean() > 0]
         for part, part_step in zip(parts, stages(solving, [1.0] * len(parts))):
             luminance += convolve_plane_lights([part], solver=solver, progress=part_step, **medium)
@@ -137,7 +145,8 @@ def _spread_apart(gatherer: Gatherer, lights: Sequence[Light], medium: dict, sol
 
 def _spread_field(gatherer: Gatherer, lights: Sequence[Light], medium: dict, _solver: str, progress) -> np.ndarray:
     """Lights of any number and size, added up as they come."""
-    choosing, *adding, solving = stages(progress, [SOLVE_WEIGHT] + [LIGHT_WEIGHT] * len(lights) + [SOLVE_WEIGHT])
+    weights = [LIGHT_WEIGHT, SOLVE_WEIGHT] + [LIGHT_WEIGHT] * len(lights) + [SOLVE_WEIGHT]
+    looking, choosing, *adding, solving = stages(progress, weights)
     grid = gatherer.grid
     shape, survey, means = gatherer.survey()
     brightest = sorted(range(len(lights)), key=lambda i: means[i], reverse=True)
@@ -147,10 +156,10 @@ def _spread_field(gatherer: Gatherer, lights: Sequence[Light], medium: dict, _so
     later = [i for i in lit if i not in kept]
     # What a survey has missed shines on few texels, and is looked at as it is.
     look_at = [*later[:MOST_STAND_INS], *(i for i in later[MOST_STAND_INS:] if means[i] == 0)]
-    parts = [part for i in kept for part in gatherer.plane_lights(lights[i])]
-    parts = [
-        part for part in parts + [part for i in look_at for part in gatherer.stand_in(lights[i])] if part.mean() > 0
-    ]
+    steps = stages(looking, [1.0] * len(kept + look_at))
+    parts = [part for i, step in zip(kept, steps) for part in gatherer.plane_lights(lights[i], step)]
+    parts += [part for i, step in zip(look_at, steps) for part in gatherer.stand_in(lights[i], step)]
+    parts = [part for part in parts if part.mean() > 0]
     expected = [part for i in lit for part in survey[i]]
     if not parts and not any(means):
         return _dark(grid)
