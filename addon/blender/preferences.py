@@ -5,6 +5,7 @@ Where the package is registered without being an enabled add-on, as batch.py doe
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
 import bpy
@@ -18,8 +19,6 @@ PACKAGE = __package__.rpartition(".")[0]
 
 # In the package, or beside it where it is used from its sources.
 DOCS = [folder / "docs" for folder in Path(__file__).resolve().parents[1:3]]
-
-FIRST_PAGES = ("first_bake.md", "method.md")
 
 
 def preferences(context=None):
@@ -39,10 +38,17 @@ def memory_limit() -> int:
     return own.memory_limit * 2**20 if own else 0
 
 
-def documentation() -> str:
-    """Where the documentation is on this machine, as a URL; empty where it is not."""
-    pages = (folder / name for folder in DOCS for name in FIRST_PAGES)
+@functools.cache
+def documentation(*names: str) -> str:
+    """The first of these pages that is on this machine, as a URL; empty where none is."""
+    pages = (folder / f"{name}.md" for name in names for folder in DOCS)
     return next((page.as_uri() for page in pages if page.is_file()), "")
+
+
+def draw_help(layout, *names: str) -> None:
+    """A button that opens the first of these pages, if there is one."""
+    if url := documentation(*names):
+        layout.operator("wm.url_open", text="", icon="HELP", emboss=False).url = url
 
 
 def _use_cache_folder(own, _context) -> None:
@@ -90,7 +96,7 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
         row = layout.row()
         row.label(text=f"{len(files)} simulated, {megabytes:.1f} MB in {library.cache_folder()}")
         row.operator("beamspread.clear_cache", icon="TRASH")
-        if url := documentation():
+        if url := documentation("first_bake", "method"):
             layout.operator("wm.url_open", text="Documentation", icon="HELP").url = url
 
 

@@ -8,6 +8,7 @@ from .. import compat
 from ..jobs.engine import BeamspreadEngine
 from ..node.find import find_node
 from ..node.node import draw_properties
+from ..preferences import draw_help
 from .results import draw_bake, draw_sentences, estimates
 
 
@@ -29,6 +30,9 @@ class BEAMSPREAD_PT_render(RenderPanel, bpy.types.Panel):
 
     bl_label = "Beamspread"
 
+    def draw_header_preset(self, _context):
+        draw_help(self.layout, "first_bake", "lights")
+
     def draw(self, context):
         layout = self.layout
         _use_columns(layout)
@@ -46,6 +50,9 @@ class BEAMSPREAD_PT_expert(RenderPanel, bpy.types.Panel):
     bl_label = "Expert"
     bl_parent_id = "BEAMSPREAD_PT_render"
     bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header_preset(self, _context):
+        draw_help(self.layout, "performance")
 
     def draw(self, context):
         _use_columns(self.layout)
@@ -86,6 +93,9 @@ class BEAMSPREAD_PT_batch(RenderPanel, bpy.types.Panel):
     bl_parent_id = "BEAMSPREAD_PT_render"
     bl_options = {"DEFAULT_CLOSED"}
 
+    def draw_header_preset(self, _context):
+        draw_help(self.layout, "batch", "cli")
+
     def draw(self, context):
         layout = self.layout
         _use_columns(layout)
@@ -102,6 +112,9 @@ class MaterialPanel:
     def poll(cls, context):
         material = _active_material(context)
         return material is not None and compat.uses_nodes(material) and find_node(material) is not None
+
+    def draw_header_preset(self, _context):
+        draw_help(self.layout, "materials", "libraries")
 
     def draw(self, context):
         layout = self.layout
