@@ -72,8 +72,8 @@ def bake(
     material.check()
     check_thickness(thickness)
     lights = illumination.lights
-    spreading = LIGHT_WEIGHT * len(lights) + _solve_weight(grid, settings.solver)
-    media_progress, light_progress = stages(progress, [LIBRARY_WEIGHT, spreading])
+    light_work = LIGHT_WEIGHT * len(illumination.lights) + _solve_weight(grid, settings.solver)
+    media_progress, light_progress = stages(progress, [LIBRARY_WEIGHT, light_work])
     if settings.distributions == "library":
         sources = _libraries(material, thickness, settings, media_progress)
     else:
@@ -145,8 +145,8 @@ def _spread_apart(gatherer: Gatherer, lights: Sequence[Light], medium: dict, sol
 
 def _spread_field(gatherer: Gatherer, lights: Sequence[Light], medium: dict, _solver: str, progress) -> np.ndarray:
     """Lights of any number and size, added up as they come."""
-    weights = [LIGHT_WEIGHT, SOLVE_WEIGHT] + [LIGHT_WEIGHT] * len(lights) + [SOLVE_WEIGHT]
-    looking, choosing, *adding, solving = stages(progress, weights)
+    works = [LIGHT_WEIGHT, SOLVE_WEIGHT, *[LIGHT_WEIGHT] * len(lights), SOLVE_WEIGHT]
+    looking, choosing, *adding, solving = stages(progress, works)
     grid = gatherer.grid
     shape, survey, means = gatherer.survey()
     brightest = sorted(range(len(lights)), key=lambda i: means[i], reverse=True)
@@ -156,9 +156,9 @@ def _spread_field(gatherer: Gatherer, lights: Sequence[Light], medium: dict, _so
     later = [i for i in lit if i not in kept]
     # What a survey has missed shines on few texels, and is looked at as it is.
     look_at = [*later[:MOST_STAND_INS], *(i for i in later[MOST_STAND_INS:] if means[i] == 0)]
-    steps = stages(looking, [1.0] * len(kept + look_at))
-    parts = [part for i, step in zip(kept, steps) for part in gatherer.plane_lights(lights[i], step)]
-    parts += [part for i, step in zip(look_at, steps) for part in gatherer.stand_in(lights[i], step)]
+    parts = []
+    for i, step in zip([*kept, *look_at], stages(looking, [1.0] * len(kept + look_at))):
+        parts += gatherer.plane_lights(lights[i], step) if i in kept else gatherer.stand_in(lights[i], step)
     parts = [part for part in parts if part.mean() > 0]
     expected = [part for i in lit for part in survey[i]]
     if not parts and not any(means):
