@@ -6,6 +6,7 @@ import bpy
 
 from ...core import native
 from ...core.bake.estimate import in_words, solver_seconds
+from ...core.bake.luminance import MOST_RAYS
 from ...core.errors import BakeError
 from ..cycles.light import seconds_estimate
 from ..images.files import check_image
@@ -165,7 +166,8 @@ def estimates(context) -> list[str]:
         suns = lamps.count("SUN")
         seconds = sum(solver_seconds(*size, suns, len(lamps) - suns, "direct") for size in sizes)
         if seconds > LONG_SECONDS:
-            found.append(f"Direct solver: at least {in_words(seconds)}. FFT gives the same in seconds.")
+            sized = f", up to {MOST_RAYS} times that if lamps have a size" if len(lamps) > suns else ""
+            found.append(f"Direct solver: at least {in_words(seconds)}{sized}. FFT gives the same in seconds.")
     return found
 
 
