@@ -178,6 +178,23 @@ def test_a_bake_stops_within_two_seconds(solver, seconds):
     assert thread.bake.status == CANCELLED
 
 
+def test_the_search_for_indirect_light_stops_within_two_seconds():
+    settings = bpy.context.scene.beamspread
+    settings.quality, settings.use_indirect = "preview", True
+    plane("Plane", **KNOWN)
+    plane("Roof", **KNOWN).location.z = 1.0
+    bpy.context.view_layer.update()
+    thread = BakeThread(queue().next())
+    thread.start()
+    time.sleep(1.0)
+    assert thread.doing == "Finding indirect light"
+    thread.cancel()
+    asked = time.monotonic()
+    thread.join()
+    assert time.monotonic() - asked < 2
+    assert thread.bake.status == CANCELLED
+
+
 def test_unregistering_ends_what_runs():
     """Blender would end with an error if a thread of ours still ran when it quits."""
     bpy.context.scene.beamspread.solver = "direct"
