@@ -237,7 +237,8 @@ def test_nothing_above_a_receiver_means_no_search():
     assert first.job.more_light is None
     assert second.job.more_light is not None  # the floor is above it
     bpy.context.scene.beamspread.use_indirect = False
-    assert jobs_of(below)[0].job.more_light is None
+    (dark,) = jobs_of(below)
+    assert dark.job.more_light is None
 
 
 def state():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from beamspread import Cancelled, Medium, simulate
-from beamspread.core.progress import stages
+from beamspread.core.progress import say, stages
 
 
 def test_stages_join_to_one_range():
@@ -45,3 +45,26 @@ def test_rounding_never_passes_one():
     for stage in stages(seen.append, [0.1] * 3):
         stage(1.0)
     assert max(seen) <= 1
+
+
+def test_stages_pass_on_what_is_said_to_whoever_listens():
+    class Listener:
+        def __init__(self):
+            self.said, self.fractions = [], []
+
+        def __call__(self, fraction):
+            self.fractions.append(fraction)
+
+        def say(self, words):
+            self.said.append(words)
+
+    listener = Listener()
+    _, second = stages(listener, [1.0, 1.0])
+    (inner,) = stages(second, [1.0])
+    say(inner, "Baking")
+    inner(0.5)
+    assert (listener.said, listener.fractions) == (["Baking"], [0.75])
+    # Whoever only wants the fraction hears nothing, and nobody need listen.
+    (plain,) = stages(lambda fraction: True, [1.0])
+    say(plain, "Baking")
+    say(None, "Baking")

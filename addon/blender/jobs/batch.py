@@ -72,6 +72,7 @@ def _bakes(options: BatchOptions) -> Iterator[Bake]:
     with timed("scene"):
         bakes = prepare_scene(bpy.context, targets, settings, options.resolution)
     if options.verbose:
+        bakes = list(bakes)
         for line in inventory(bakes):
             logging.getLogger(__name__).info(line)
     yield from bakes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import bpy
@@ -22,10 +23,12 @@ from ..read.lights import read_illumination
 from ..read.visible import as_rendered, render_visible_names
 
 
-def prepare_scene(context, targets: list[Target], settings: BakeSettings, resolution: int | None = None) -> list[Bake]:
-    """Read the scene as it would render at its current frame and make a job of every target; see `Preparation`."""
+def prepare_scene(
+    context, targets: list[Target], settings: BakeSettings, resolution: int | None = None
+) -> Iterator[Bake]:
+    """Read the scene now, as it would render at its current frame; each target's bake is made when it is asked for."""
     preparation = read_scene(context, targets, settings, resolution)
-    return [preparation.bake(target) for target in targets]
+    return map(preparation.bake, targets)
 
 
 def prepare(
