@@ -9,15 +9,17 @@ Each part imports only core and those above it (tests/unit/test_layers.py reads 
     cycles      what Cycles finds in a process of its own: bounced light, the world's radiance
     images      images of the scene, files, atlases
     jobs        what becomes a job, and what runs it: operator, engine, batch; the state of a run
+    live        images that follow the scene while it is worked on
     ui          panels
 """
 
 from . import settings
 from .jobs import engine, operator, state
+from .live import session
 from .node import menu, node
 from .ui import panels
 
-PARTS = (settings, node, menu, state, engine, operator, panels)
+PARTS = (settings, node, menu, state, engine, operator, session, panels)
 
 
 def register() -> None:

@@ -99,6 +99,14 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         description="Light that arrives by way of other objects counts, too: Cycles finds it before each bake",
         default=True,
     )
+    use_live: BoolProperty(
+        name="Live",
+        description="While lights, things in their way, and materials change, the images of Beamspread nodes follow in "
+        "Material Preview and Rendered view: quickly, then as a bake without indirect light. These pixels are a "
+        "preview that is neither packed nor saved, but renders show them: switched off, images have the pixels of "
+        "their last bake again",
+        default=False,
+    )
     output_dir: StringProperty(
         name="Output",
         description="Folder that a batch writes to",

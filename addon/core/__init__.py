@@ -10,6 +10,7 @@ Each package imports only those above it (tests/unit/test_layers.py reads this l
     material    optical properties, measured presets
     ldf         libraries, samples, the albedo behind a colour
     bake        from a job to its layers, margin included, and what became of it
+    live        pictures that follow a scene while it changes
     batch       command line and report of many bakes
     cli         `python3 -m beamspread`
 """

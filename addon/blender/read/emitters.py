@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 
 from ...core.scene.lights import MeshLight
@@ -61,6 +63,12 @@ class Glow:
         glowing = {slot: light for slot, light in found.items() if light is not None}
         if glowing:
             self._add(obj, glowing)
+
+    def unplaced(self) -> Glow:
+        """The same without any instance."""
+        glow = copy(self)
+        glow._places = []
+        return glow
 
     def place(self, matrix) -> None:
         """Put an instance of it at a 4 x 4 matrix."""

@@ -11,6 +11,7 @@ from ..images.files import check_image
 from ..jobs.engine import BeamspreadEngine
 from ..jobs.prepare import check_visible
 from ..jobs.state import state
+from ..live import session
 from ..node.find import find_misplaced, find_node, materials_of
 from ..node.node import draw_properties
 from ..read.visible import render_visible_names
@@ -91,6 +92,8 @@ def draw_bake(layout, context) -> None:
         row.scale_y = 1.4
         row.operator("beamspread.bake", text="Bake", icon="RENDER_STILL").objects = "SELECTED"
         row.operator("beamspread.bake", text="Bake All").objects = "ALL"
+        layout.prop(context.scene.beamspread, "use_live", toggle=True)
+        draw_sentences(layout, context, session.sentences(), "INFO")
     # A bake that failed for a reason that still stands has said the same.
     news = [message for message in state.messages() if not message.endswith(tuple(shown))]
     draw_warnings(layout, context, news[:MOST_OBJECTS])

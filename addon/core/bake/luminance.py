@@ -70,20 +70,33 @@ def bake(
     """
     material.check()
     check_thickness(thickness)
-    lights = illumination.lights
-    media_progress, light_progress = stages(progress, [LIBRARY_WEIGHT, LIGHT_WEIGHT * len(lights) + SOLVE_WEIGHT])
+    light_work = LIGHT_WEIGHT * len(illumination.lights) + SOLVE_WEIGHT
+    media_progress, light_progress = stages(progress, [LIBRARY_WEIGHT, light_work])
     if settings.distributions == "library":
         sources = _libraries(material, thickness, settings.quality, media_progress)
     else:
         sources = [load_source(settings.sample_folder, settings.distributions)] * 3
+    return spread(grid, illumination, material, sources, settings, light_progress)
+
+
+def spread(
+    grid: Grid,
+    illumination: Illumination,
+    material: Material,
+    sources: list,
+    settings: BakeSettings,
+    progress: Progress | None = None,
+) -> np.ndarray:
+    """`bake` with the LDF of each channel given; the material is checked, and `settings.quality` does not count."""
+    lights = illumination.lights
     gatherer = Gatherer(grid, illumination, settings, _rays(grid, material, settings))
     bytes_waiting = 4 * grid.width * grid.height * len(lights)
     if all(map(gatherer.has_one_direction, lights)) and bytes_waiting <= MOST_WAITING:
-        spread = _spread_together
+        solve = _spread_together
     elif settings.solver == "fft":
-        spread = _spread_field
+        solve = _spread_field
     else:
-        spread = _spread_apart
+        solve = _spread_apart
     medium = {
         "ldf": sources,
         "albedo": material.albedo,
@@ -93,7 +106,7 @@ def bake(
         "threads": settings.threads,
     }
     try:
-        luminance = spread(gatherer, lights, medium, settings.solver, light_progress)
+        luminance = solve(gatherer, lights, medium, settings.solver, progress)
     except ValueError as error:
         if settings.distributions == "library":
             raise

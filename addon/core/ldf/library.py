@@ -159,3 +159,12 @@ def library(medium, quality="final", progress=None):
         known = make(medium, quality, progress)
         _store(known, path)
     return _remember(path, known)
+
+
+def known_library(medium):
+    """The best library of a medium that came with the package or is cached; None where one would be simulated."""
+    for quality in ("final", "preview"):
+        path = _cache_path(medium, quality)
+        if found := _loaded.get(path) or _load_shipped(medium, quality) or _load(path, medium):
+            return _remember(path, found)
+    return None

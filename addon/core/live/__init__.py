@@ -1,0 +1,8 @@
+"""Pictures that follow a scene while it changes: quick first, exact when it rests.
+
+media      the library of a medium, or the nearest one while its own is simulated
+fields     terms and kernels of a medium on a grid, kept for whatever light comes
+subject    what a picture is made of
+picture    luminance at few texels by these, and at all texels as a bake
+painter    the thread that paints
+"""
