@@ -175,7 +175,8 @@ ldf, albedo, mean_free_path, pitch, tolerance, threads, progress
 )")
         .def("solve", &HeldField::solve, py::arg("progress") = py::none(),
              "Luminance, float32 (H, W, C) in W/(m^2 sr).")
-        .def("clear", &HeldField::clear, "Forgets what was added; terms and kernels stay for the light that comes next.")
+        .def("clear", &HeldField::clear,
+             "Forgets what was added; terms and kernels stay for the light that comes next.")
         .def_property_readonly("terms", &HeldField::terms, "int: how many transforms of light `solve` makes.");
 }
 

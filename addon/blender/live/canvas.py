@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 
 from ...core.live.picture import Picture
+from ...core.live.subject import Subject
 from ..images import files
 from ..node.find import find_node
 
@@ -68,6 +69,12 @@ class Canvas:
 
 def _can_be_read_again(image) -> bool:
     return not image.is_dirty and (image.packed_file is not None or image.source == "FILE")
+
+
+def image_name_of(subject: Subject) -> str:
+    """Of the image that shows it; empty without one."""
+    node = find_node(bpy.data.materials.get(subject.target.material_name))
+    return node.image.name if node is not None and node.image is not None else ""
 
 
 def image_of(picture: Picture):

@@ -6,7 +6,8 @@ from collections.abc import Collection
 
 import bpy
 
-SHADING_TYPES = (bpy.types.Material, bpy.types.NodeTree, bpy.types.Texture)
+# Those that use them are told of, too.
+USED = bpy.types.Light | bpy.types.NodeTree | bpy.types.Action | bpy.types.Texture
 
 
 class Marks:
@@ -16,22 +17,24 @@ class Marks:
     ----------
     lamps : names of lamps that moved or shine differently.
     moved, shaped : names of other objects that are elsewhere, and of objects and data of another shape.
-    materials, world : whether any has changed.
-    other : whether anything else has, as what is visible.
+    materials : full names of those that have changed.
+    images : whether any has changed that materials may show.
+    other : whether anything else has, as what is visible, or the world.
     """
 
     def __init__(self) -> None:
         self.lamps: set[str] = set()
         self.moved: set[str] = set()
         self.shaped: set[str] = set()
-        self.materials = self.world = self.other = False
+        self.materials: set[str] = set()
+        self.images = self.world = self.other = False
 
     def __bool__(self) -> bool:
         return bool(self.lamps) or not self.is_lamps_alone()
 
     def is_lamps_alone(self) -> bool:
         """Whether nothing but lamps has changed."""
-        return not (self.moved or self.shaped or self.materials or self.world or self.other)
+        return not (self.moved or self.shaped or self.materials or self.images or self.world or self.other)
 
     def note(self, updates: Collection, own_images: Collection[str]) -> None:
         """Add the updates of a depsgraph; those of `own_images`, and of materials along with them, are no news."""
@@ -41,16 +44,14 @@ class Marks:
             if isinstance(changed, bpy.types.Object):
                 self._note_object(one, changed)
             elif isinstance(changed, bpy.types.Image):
-                self.materials |= changed.name not in own_images
-            elif isinstance(changed, SHADING_TYPES):
-                self.materials |= not is_own
+                self.images |= changed.name not in own_images
+            elif isinstance(changed, bpy.types.Material):
+                self.materials |= set() if is_own else {changed.name_full}
             elif isinstance(changed, bpy.types.World):
                 self.world = True
-            elif isinstance(changed, bpy.types.Light | bpy.types.Action):
-                pass  # its objects are told of, too
             elif isinstance(changed, bpy.types.Scene | bpy.types.Collection):
                 self.other = True
-            else:
+            elif one.is_updated_geometry and not isinstance(changed, USED):
                 self.shaped.add(changed.name)
 
     def _note_object(self, update, obj) -> None:
@@ -60,7 +61,7 @@ class Marks:
             self.shaped.add(obj.name)
         elif update.is_updated_transform:
             self.moved.add(obj.name)
-        elif not update.is_updated_shading:
+        elif obj.type == "LIGHT" or not update.is_updated_shading:
             self.other = True
 
     def places(self, scene) -> list:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 import bpy
+import numpy as np
 
 from ...core.bake.runner import Target
 from ...core.errors import sentence
@@ -23,6 +22,8 @@ from .marks import Marks
 MOST_SUBJECTS = 16
 
 INDIRECT = "indirect light"
+
+OUTPUT = "ShaderNodeOutputMaterial"
 
 
 class Reader:
@@ -44,9 +45,9 @@ class Reader:
         self._targets: list[Target] = []
         self._subjects: dict[Target, Subject] = {}
 
-    def read(self, context, marks: Marks) -> list[Subject]:
+    def read(self, depsgraph, marks: Marks) -> list[Subject]:
         """What to paint, in this order; the same objects as before where nothing has changed."""
-        depsgraph, scene = context.evaluated_depsgraph_get(), context.scene
+        scene = depsgraph.scene.original
         if marks or self._illumination is None:
             self._read_light(depsgraph, marks)
             if self._illumination is None or not marks.is_lamps_alone() or not self._targets:
@@ -68,8 +69,9 @@ class Reader:
         else:
             light = None
         if light is None:
-            if marks.materials:
-                self._kept.forget_materials()
+            if marks.images:
+                self._kept.forget_images()
+            self._kept.forget_materials([name for name in marks.materials if not _shows_medium_alone(name)])
             if marks.world:
                 self._kept.world = None
             self._kept.forget(marks.shaped)
@@ -87,7 +89,7 @@ class Reader:
         changed = marks.moved | marks.shaped
         for target in list(self._polygons):
             obj = layer.objects.get(target.object_name)
-            if marks.other or marks.materials or obj is None or obj.name in changed or obj.data.name in changed:
+            if marks.other or obj is None or obj.name in changed or obj.data.name in changed:
                 self._read_polygons(depsgraph, target)
         for target in self._targets:
             if target not in self._polygons:
@@ -110,7 +112,8 @@ class Reader:
     def _put_in_order(self, scene, marks: Marks) -> None:
         """Those nearest to what has changed first."""
         places = [np.array(place) for place in marks.places(scene)]
-        middles = {target: polygons.corners.mean(axis=0) for target, polygons in self._polygons.items()}
+        known = {target: polygons.corners for target, polygons in self._polygons.items() if len(polygons.corners)}
+        middles = {target: corners.mean(axis=0) for target, corners in known.items()}
         if places:
             self._targets.sort(
                 key=lambda target: min(
@@ -157,6 +160,12 @@ class Reader:
         if before is not None and all(_is_same(getattr(before, name), value) for name, value in parts.items()):
             return before
         return Subject(target, **parts)
+
+
+def _shows_medium_alone(material_name: str) -> bool:
+    """Whether a Beamspread node is all that a material shows: others see nothing of it but its shape."""
+    node = find_node(bpy.data.materials.get(material_name))
+    return node is not None and any(link.to_node.bl_idname == OUTPUT for link in node.outputs["BSDF"].links)
 
 
 def _is_same(one, other) -> bool:

@@ -9,11 +9,12 @@ from bpy.app.handlers import persistent
 
 from ...core import native
 from ...core.bake.runner import Target
+from ...core.errors import sentence
 from ...core.live.painter import Painter
 from ...core.live.picture import Picture
 from ...core.live.subject import Subject
 from ..jobs.state import state
-from .canvas import Canvas, image_of
+from .canvas import Canvas, image_name_of, image_of
 from .marks import Marks
 from .reader import Reader
 
@@ -46,12 +47,15 @@ class Session:
         self._changed_at = time.perf_counter()
         self.seconds = 0.0
 
-    def note(self, updates) -> None:
+    def note(self, depsgraph) -> None:
         """Take the updates of a depsgraph."""
         was_calm = not self._marks
-        self._marks.note(list(updates), self._canvases)
+        self._marks.note(list(depsgraph.updates), self._canvases)
         if was_calm and self._marks:
             self._changed_at = time.perf_counter()
+        if self._marks.lamps and self._marks.is_lamps_alone() and not self._paused and not is_occupied():
+            # At once, so that it is painted while the window is drawn.
+            self._look(depsgraph)
 
     def forget(self) -> None:
         """Read everything again: all data may be others' now, as after undo."""
@@ -65,23 +69,25 @@ class Session:
         if is_occupied():
             self._pause()
             return False
-        if self._paused or self._was_saved():
-            self._adopt(context)
-            return False
-        marks, self._marks = self._marks, Marks()
-        changed_at = self._changed_at
-        subjects = self._reader.read(context, marks)
-        if [*map(id, subjects)] != [*map(id, self._subjects)]:
-            self._subjects = subjects
-            self._painter.show(subjects)
+        self._paused = False
+        self._adopt_bakes(context)
+        has_changed, changed_at = bool(self._marks), self._changed_at
+        self._look(context.evaluated_depsgraph_get())
         shown = self._show_pictures(context)
         if shown:
             self.seconds = time.perf_counter() - changed_at
-        return bool(marks) or shown or self.is_busy()
+        return has_changed or shown or self.is_busy()
+
+    def _look(self, depsgraph) -> None:
+        marks, self._marks = self._marks, Marks()
+        subjects = self._reader.read(depsgraph, marks)
+        if [*map(id, subjects)] != [*map(id, self._subjects)]:
+            self._subjects = subjects
+            self._painter.show(subjects)
 
     def is_busy(self) -> bool:
         """Whether pictures are still to come."""
-        return bool(self._marks) or self._painter.is_busy() or not self._painter.pictures.empty()
+        return bool(self._marks) or self._painter.is_busy()
 
     def sentences(self) -> list[str]:
         """What there is to say."""
@@ -107,30 +113,22 @@ class Session:
             self._subjects = []
             self._painter.show(())
 
-    def _was_saved(self) -> bool:
-        """Whether an image has other pixels than Live's: a bake has filled it, or it was saved or reloaded."""
-        return any(canvas.is_saved() for canvas in self._canvases.values())
-
-    def _adopt(self, context) -> None:
-        """Take images as they are for what the scene looks like now."""
-        self._paused = False
-        self._canvases = {name: canvas for name, canvas in self._canvases.items() if not canvas.is_saved()}
-        context.evaluated_depsgraph_get()  # changes that wait are told of now
-        self._marks.other = True
+    def _adopt_bakes(self, context) -> None:
+        """Take images that have other pixels than Live's, of a bake or a file, for what the scene looks like now."""
+        saved = {name for name, canvas in self._canvases.items() if canvas.is_saved()}
+        if not saved:
+            return
+        depsgraph = context.evaluated_depsgraph_get()  # changes that wait are told of now
         marks, self._marks = self._marks, Marks()
-        self._drain()
-        self._subjects = self._reader.read(context, marks)
-        self._painter.adopt(self._subjects)
-
-    def _drain(self) -> list[Picture]:
-        pictures = []
-        while not self._painter.pictures.empty():
-            pictures.append(self._painter.pictures.get())
-        return pictures
+        marks.other = True
+        subjects = self._reader.read(depsgraph, marks)
+        self._painter.adopt([subject for subject in subjects if image_name_of(subject) in saved])
+        for name in saved:
+            del self._canvases[name]
 
     def _show_pictures(self, context) -> bool:
         """Show the last picture of each subject."""
-        latest = {picture.subject.target: picture for picture in self._drain()}
+        latest = self._painter.take()
         wanted = {subject.target: subject for subject in self._subjects}
         shown = False
         for target, picture in latest.items():
@@ -185,6 +183,7 @@ class _Live:
     def __init__(self) -> None:
         self.session: Session | None = None
         self.scene_name = ""
+        self.failure = ""  # why it was switched off
 
 
 live = _Live()
@@ -192,7 +191,9 @@ live = _Live()
 
 def sentences() -> list[str]:
     """What panels say of Live."""
-    return live.session.sentences() if live.session is not None else []
+    if live.session is not None:
+        return live.session.sentences()
+    return [f"Live was switched off: {live.failure}"] if live.failure else []
 
 
 def step(context) -> float:
@@ -205,7 +206,7 @@ def step(context) -> float:
     if not bpy.app.background and not is_looked_at(context):
         return IDLE_SECONDS
     if live.session is None:
-        live.session, live.scene_name = Session(), scene.name
+        live.session, live.scene_name, live.failure = Session(), scene.name, ""
     return BUSY_SECONDS if live.session.step(context) else IDLE_SECONDS
 
 
@@ -219,17 +220,17 @@ def end(keep_pixels: bool = False) -> None:
 def _tick() -> float:
     try:
         return step(bpy.context)
-    except Exception:
-        # Blender would drop the timer, and Live would be on and dead.
+    except Exception as error:  # noqa: BLE001 - Blender would drop the timer, and Live would be on and dead
+        live.failure = sentence(error)
         end()
         bpy.context.scene.beamspread.use_live = False
-        raise
+        return OFF_SECONDS
 
 
 @persistent
 def _changed(_scene, depsgraph) -> None:
     if live.session is not None and depsgraph.mode == "VIEWPORT":
-        live.session.note(depsgraph.updates)
+        live.session.note(depsgraph)
 
 
 @persistent

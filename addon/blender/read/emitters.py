@@ -40,6 +40,10 @@ class Materials:
             self._known[name] = self._read(material)
         return self._known[name]
 
+    def forget(self, name: str) -> None:
+        """Evaluate a material of that full name again."""
+        self._known.pop(name, None)
+
     def _read(self, material) -> np.ndarray | Wanted | None:
         surface = surface_of(material.node_tree) if compat.uses_nodes(material) else None
         if surface is None or _shows_a_bake(material.node_tree):

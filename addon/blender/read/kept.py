@@ -21,7 +21,7 @@ class Kept:
         self.meshes: dict = {}
         self.glows: dict = {}
         self._keys: dict[str, list[tuple[dict, tuple]]] = {}  # by name of what they depend on
-        self.forget_materials()
+        self.forget_images()
 
     def note(self, kept: dict, key: tuple, instance) -> None:
         """Remember what an entry of `meshes` or `glows` depends on, an instance of the depsgraph."""
@@ -38,8 +38,17 @@ class Kept:
             for kept, key in self._keys.pop(name, ()):
                 kept.pop(key, None)
 
-    def forget_materials(self) -> None:
-        """Read all that depends on materials again, and the world."""
+    def forget_materials(self, names: Collection[str]) -> None:
+        """Read these again, by their full names, and what has them."""
+        for name in names:
+            self.emission.forget(name)
+            self.transparency.forget(name)
+        for key in [key for key in self.meshes if not set(names).isdisjoint(key)]:
+            del self.meshes[key]
+        self.glows.clear()
+
+    def forget_images(self) -> None:
+        """Read all that may depend on images again."""
         self.emission, self.transparency = emitters.Materials(), transparency.Materials()
         self.meshes.clear()
         self.glows.clear()

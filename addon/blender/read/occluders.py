@@ -24,7 +24,11 @@ class OccluderReader:
         if obj.type not in GEOMETRY_TYPES or not all(getattr(owner, "visible_shadow", True) for owner in owners):
             return
         data = obj if obj.data is None else obj.data
-        key = data.as_pointer(), data.name, *(slot.material.name_full if slot.material else None for slot in obj.material_slots)
+        key = (
+            data.as_pointer(),
+            data.name,
+            *(slot.material.name_full if slot.material else None for slot in obj.material_slots),
+        )
         if key not in self._meshes:
             self._meshes[key] = local_mesh(obj, self._kept.transparency)
             self._kept.note(self._meshes, key, instance)

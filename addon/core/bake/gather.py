@@ -139,14 +139,14 @@ class Gatherer:
         )
         return self._covered(irradiance), direction
 
-    def stand_in(self, light: Light) -> list:
+    def stand_in(self, light: Light, progress: Progress | None = None) -> list:
         """The light as far as a `LightField` needs it to look, with the mean direction of each texel.
 
         Harmonics of all directions together are weaker than those of their mean.
         """
         if self.has_one_direction(light):
-            return self.plane_lights(light, directions=True)
-        irradiance, flow = self.totals(light, STAND_IN_RAYS)
+            return self.plane_lights(light, progress, directions=True)
+        irradiance, flow = self.totals(light, STAND_IN_RAYS, progress)
         length = np.linalg.norm(flow, axis=-1, keepdims=True)
         direction = np.divide(flow, length, out=np.full_like(flow, (0, 0, -1)), where=length > 0)
         return native.PlaneLight.of_channels(irradiance * light.rgb(), direction, 3)

@@ -150,7 +150,8 @@ def _spread_apart(gatherer: Gatherer, lights: Sequence[Light], medium: dict, sol
 
 def _spread_field(gatherer: Gatherer, lights: Sequence[Light], medium: dict, _solver: str, progress) -> np.ndarray:
     """Lights of any number and size, added up as they come."""
-    choosing, *adding, solving = stages(progress, [SOLVE_WEIGHT] + [LIGHT_WEIGHT] * len(lights) + [SOLVE_WEIGHT])
+    works = [LIGHT_WEIGHT, SOLVE_WEIGHT, *[LIGHT_WEIGHT] * len(lights), SOLVE_WEIGHT]
+    looking, choosing, *adding, solving = stages(progress, works)
     grid = gatherer.grid
     shape, survey, means = gatherer.survey()
     brightest = sorted(range(len(lights)), key=lambda i: means[i], reverse=True)
@@ -160,10 +161,10 @@ def _spread_field(gatherer: Gatherer, lights: Sequence[Light], medium: dict, _so
     later = [i for i in lit if i not in kept]
     # What a survey has missed shines on few texels, and is looked at as it is.
     look_at = [*later[:MOST_STAND_INS], *(i for i in later[MOST_STAND_INS:] if means[i] == 0)]
-    parts = [part for i in kept for part in gatherer.plane_lights(lights[i])]
-    parts = [
-        part for part in parts + [part for i in look_at for part in gatherer.stand_in(lights[i])] if part.mean() > 0
-    ]
+    parts = []
+    for i, step in zip([*kept, *look_at], stages(looking, [1.0] * len(kept + look_at))):
+        parts += gatherer.plane_lights(lights[i], step) if i in kept else gatherer.stand_in(lights[i], step)
+    parts = [part for part in parts if part.mean() > 0]
     expected = [part for i in lit for part in survey[i]]
     if not parts and not any(means):
         return _dark(grid)

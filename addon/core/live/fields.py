@@ -49,7 +49,7 @@ class Fields:
             field = self._kept[key]
             field.clear()
             return field
-        limit, tolerance = REFRACTED if ior >= LEAST_REFRACTION else STRAIGHT
+        limit, tolerance = STRAIGHT if is_straight(ior) else REFRACTED
         survey = _all_directions(limit)
         lights = survey.by_channel() if is_colored else [survey]
         field = native.LightField(
@@ -60,6 +60,11 @@ class Fields:
         while len(self._kept) > MOST_FIELDS:
             self._kept.popitem(last=False)
         return field
+
+
+def is_straight(ior: float) -> bool:
+    """Whether light enters almost without refraction, which asks for many terms."""
+    return ior < LEAST_REFRACTION
 
 
 def _all_directions(limit: float):

@@ -52,6 +52,10 @@ class Media:
                 self._thread.start()
             self._condition.notify_all()
 
+    def is_busy(self) -> bool:
+        """Whether a simulation is under way, or will be."""
+        return bool(self._wanted)
+
     def end(self) -> None:
         """Stop soon."""
         with self._condition:
@@ -86,9 +90,9 @@ class Media:
         finally:
             self.simulating = ""
         self._known[medium] = found
+        self._on_news()
         with self._condition:
             self._wanted = tuple(one for one in self._wanted if one != medium)
-        self._on_news()
 
 
 def nearest(medium):

@@ -7,28 +7,27 @@ import threading
 import time
 from collections.abc import Sequence
 
+from ..bake.runner import Target
 from ..errors import sentence
 from ..native import native
+from ..progress import Progress
 from .media import Media
+from .pace import SIDES, Pace
 from .picture import Picture, Studio
 from .subject import Subject
 
-# Texels along the longer side of quick pictures, and the seconds that one may take.
-SIDES, BUDGET_SECONDS = (64, 128, 256, 512), 0.08
-FIRST_SIDE = 256
-
 # So long after the last change all texels are painted exactly.
-REST_SECONDS = 0.3
+REST_SECONDS = 0.4
 
 
 class Painter:
-    """Paints what it was last asked to show; `pictures` waits to be taken, from any thread.
+    """Paints what it was last asked to show.
 
     A quick picture is always finished, so that pictures come while changes do; an exact one stops at the next change.
     """
 
     def __init__(self, rest_seconds: float = REST_SECONDS) -> None:
-        self.pictures: queue.SimpleQueue[Picture] = queue.SimpleQueue()
+        self._pictures: queue.SimpleQueue[tuple[int, Picture]] = queue.SimpleQueue()
         self.media = Media(self._repaint)
         self._studio = Studio(self.media)
         self._rest_seconds = rest_seconds
@@ -36,8 +35,11 @@ class Painter:
         self._subjects: tuple[Subject, ...] = ()
         self._generation, self._done = 0, 0
         self._is_ending = False
+        self._epoch = 0  # counts adoptions
+        self._epochs: dict = {}  # by target: of its last adoption
+        self._adopted: dict = {}  # by target: key
         self._painted: dict = {}  # by target: key, whether with libraries of their own, whether exact
-        self._side: dict = {}  # by target
+        self.paces: dict = {}  # by target
         self._thread = threading.Thread(target=self._run, daemon=True, name="Beamspread painter")
         self._thread.start()
 
@@ -49,15 +51,25 @@ class Painter:
             self._condition.notify_all()
 
     def adopt(self, subjects: Sequence[Subject]) -> None:
-        """Take these as painted already, and exactly."""
-        self.show(())
+        """Take these as painted already, and exactly; no older picture of them will come any more."""
         with self._condition:
-            self._painted = {subject.target: (subject.key, True, True) for subject in subjects}
-        self.show(subjects)
+            self._epoch += 1
+            for subject in subjects:
+                self._epochs[subject.target] = self._epoch
+                self._adopted[subject.target] = subject.key
+
+    def take(self) -> dict[Target, Picture]:
+        """The last picture of each target that was painted since the last time."""
+        latest = {}
+        while not self._pictures.empty():
+            epoch, picture = self._pictures.get()
+            if epoch >= self._epochs.get(picture.subject.target, 0):
+                latest[picture.subject.target] = picture
+        return latest
 
     def is_busy(self) -> bool:
         """Whether pictures are still to come."""
-        return self._done < self._generation
+        return self._done < self._generation or not self._pictures.empty() or self.media.is_busy()
 
     def end(self) -> None:
         """Stop soon, whatever is being painted."""
@@ -103,7 +115,10 @@ class Painter:
         for subject in subjects:
             if self._painted[subject.target][2]:
                 continue
-            self._put(subject, lambda subject: self._studio.exact(subject, lambda _: not self._is_stale(generation)))
+            if self.paces[subject.target].side() < SIDES[-1] < max(self._studio.size_of(subject)):
+                # A look before what may take long.
+                self._put(subject, lambda subject: self._studio.quick(subject, SIDES[-1], self._until(generation)))
+            self._put(subject, lambda subject: self._studio.exact(subject, self._until(generation)))
             self._note(subject, is_exact=True)
         return True
 
@@ -111,13 +126,16 @@ class Painter:
         lacking = self._lacking(subject)
         missing.update(dict.fromkeys(lacking))
         known = self._painted.get(subject.target)
+        if self._adopted.pop(subject.target, None) == subject.key:
+            known = self._painted[subject.target] = subject.key, not lacking, True
         if known is not None and known[:2] == (subject.key, not lacking):
             return
-        side, made = self._side.get(subject.target, FIRST_SIDE), self._studio.fields.made
+        pace, made = self.paces.setdefault(subject.target, Pace()), self._studio.fields.made
+        side = pace.side()
         start = time.perf_counter()
         self._put(subject, lambda subject: self._studio.quick(subject, side, lambda _: not self._is_ending))
         if self._studio.fields.made == made:
-            self._side[subject.target] = next_side(side, time.perf_counter() - start)
+            pace.note(side, time.perf_counter() - start)
         self._note(subject, is_exact=False)
 
     def _lacking(self, subject: Subject) -> list:
@@ -130,18 +148,17 @@ class Painter:
         self._painted[subject.target] = subject.key, not self._lacking(subject), is_exact
 
     def _put(self, subject: Subject, paint) -> None:
+        epoch = self._epoch
         try:
-            self.pictures.put(paint(subject))
+            picture = paint(subject)
         except native.Cancelled:
             raise
         except Exception as error:  # noqa: BLE001 - the window says it, and the others are still to be painted
-            self.pictures.put(Picture(subject, error=sentence(error)))
+            picture = Picture(subject, error=sentence(error))
+        self._pictures.put((epoch, picture))
+
+    def _until(self, generation: int) -> Progress:
+        return lambda _fraction: not self._is_stale(generation)
 
     def _is_stale(self, generation: int) -> bool:
         return self._is_ending or self._generation != generation
-
-
-def next_side(side: int, seconds: float) -> int:
-    """Of the next quick picture, after one of `side` texels took so long."""
-    within = [one for one in SIDES if seconds * (one / side) ** 2 <= BUDGET_SECONDS]
-    return max(within, default=SIDES[0])

@@ -18,11 +18,10 @@ from ..material.material import Material
 from ..native import native
 from ..progress import Progress
 from ..scene.grid import Grid
-from ..scene.illumination import Illumination
 from ..scene.lights import Light, SunLight
 from ..scene.receiver import Receiver, build_receiver, texture_size
 from ..scene.uv_map import fit_uv_maps
-from .fields import Fields
+from .fields import Fields, is_straight
 from .media import Media
 from .subject import Subject
 
@@ -31,6 +30,9 @@ FEW_RAYS, FEW_SAMPLES = 4, 2
 
 # Suns that have kernels of their own, as in a `LightField`.
 MOST_SUNS = 4
+
+# Texels from which on their transforms cost more than kernels of suns.
+MANY_TEXELS = 384**2
 
 # Receivers that are kept, those used last.
 MOST_RECEIVERS = 32
@@ -115,8 +117,7 @@ class Studio:
         lights = [light for light in subject.illumination.lights if not light.is_behind(grid)]
         if not lights:
             return np.zeros((grid.height, grid.width, 3), np.float32)
-        few_suns = len(lights) <= MOST_SUNS and all(isinstance(light, SunLight) for light in lights)
-        if few_suns or settings.distributions != "library":
+        if _have_kernels_of_their_own(lights, grid, material) or settings.distributions != "library":
             return spread(grid, subject.illumination, material, sources, settings, progress)
         medium = {
             "ldf": sources,
@@ -205,6 +206,13 @@ def _media(subject: Subject) -> list:
     material, thickness = subject.surface.material, subject.surface.thickness
     depths = [thickness / length if thickness else math.inf for length in material.mean_free_path]
     return [native.Medium(g=g, ior=material.ior, thickness=d) for g, d in zip(material.channel_anisotropy, depths)]
+
+
+def _have_kernels_of_their_own(lights: Sequence[Light], grid: Grid, material: Material) -> bool:
+    """Whether the lights are few suns, and exact kernels for these cost no more than a field."""
+    if len(lights) > MOST_SUNS or not all(isinstance(light, SunLight) for light in lights):
+        return False
+    return is_straight(material.ior) or grid.width * grid.height >= MANY_TEXELS
 
 
 def _common_color(gatherer: Gatherer, lights: Sequence[Light]) -> np.ndarray | None:

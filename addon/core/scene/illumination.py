@@ -87,7 +87,12 @@ class Illumination:
     def shadow_key(self) -> tuple:
         """Equal for those with the same meshes in the same places."""
         return tuple(
-            (one.name, one.mesh.content, tuple(map(id, one.mesh.transmittances)), None if one.placements is None else one.placements.tobytes())
+            (
+                one.name,
+                one.mesh.content,
+                tuple(map(id, one.mesh.transmittances)),
+                None if one.placements is None else one.placements.tobytes(),
+            )
             for one in self._occluders
         )
 

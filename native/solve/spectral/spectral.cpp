@@ -170,7 +170,8 @@ private:
             const std::size_t count = std::min(at_once, terms - first);
             const double part = work * static_cast<double>(count) / static_cast<double>(terms);
             const auto light = grid.spread(texel_rows(), first, count, progress, 0.5 * part);
-            Convolution convolution(*m_coarse_spectra, std::span(m_terms.terms).subspan(first, count), results, for_spectra);
+            Convolution convolution(*m_coarse_spectra, std::span(m_terms.terms).subspan(first, count), results,
+                                    for_spectra);
             const auto rows = [&] { return std::make_unique<NodeRow>(light, plane.width); };
             convolution.solve(rows, add, progress, 0.5 * part);
         }
