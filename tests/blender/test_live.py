@@ -129,7 +129,7 @@ def test_what_was_painted_by_hand_and_never_saved_comes_back():
 
 
 def test_nothing_is_written_or_packed(tmp_path):
-    plane, lamp, material = make_scene()
+    _plane, _lamp, material = make_scene()
     image = scenes.node_of(material).image
     image.colorspace_settings.is_data = True
     image.filepath_raw, image.file_format = str(tmp_path / "target.exr"), "OPEN_EXR"
@@ -137,7 +137,8 @@ def test_nothing_is_written_or_packed(tmp_path):
     image.source = "FILE"
     before = (tmp_path / "target.exr").read_bytes()
     live_pixels(material)
-    assert image.is_dirty and image.packed_file is None
+    assert image.is_dirty
+    assert image.packed_file is None
     assert (tmp_path / "target.exr").read_bytes() == before
     assert len(list(tmp_path.iterdir())) == 1
 
@@ -158,18 +159,19 @@ def test_a_bake_stays_until_something_changes():
 
 
 def test_a_node_without_image_gets_one():
-    plane, lamp, material = make_scene()
+    _plane, _lamp, material = make_scene()
     scenes.node_of(material).image = None
     bpy.context.scene.beamspread.resolution = 48
     live_pixels(material)
     image = scenes.node_of(material).image
-    assert tuple(image.size) == (48, 48) and image.is_float
+    assert tuple(image.size) == (48, 48)
+    assert image.is_float
     assert scenes.pixels(image).max() > 0
 
 
 def test_objects_that_share_an_image_keep_to_their_parts():
     """What is outside of both stays."""
-    plane, lamp, material = make_scene()
+    plane, _lamp, material = make_scene()
     bpy.context.scene.beamspread.margin = 0
     quarter = [(0, 0), (0.5, 0), (0.5, 0.5), (0, 0.5)]
     plane.data.uv_layers.active.data.foreach_set("uv", np.ravel(quarter))
@@ -178,19 +180,20 @@ def test_objects_that_share_an_image_keep_to_their_parts():
     image = scenes.node_of(material).image
     image.pixels.foreach_set(np.full(64 * 64 * 4, 7, np.float32))
     values = live_pixels(material)
-    assert (values[32:, :32] == 7).all() and (values[:32, 32:] == 7).all()
+    assert (values[32:, :32] == 7).all()
+    assert (values[:32, 32:] == 7).all()
     assert values[:32, :32].mean() > values[32:, 32:].mean() > 0
 
 
 def test_what_live_leaves_out_is_said():
-    plane, lamp, material = make_scene()
+    _plane, _lamp, material = make_scene()
     bpy.context.scene.beamspread.use_indirect = True
     live_pixels(material)
     assert session.sentences() == ["Live leaves out indirect light."]
 
 
 def test_what_cannot_follow_is_said_and_the_others_follow():
-    plane, lamp, material = make_scene()
+    _plane, _lamp, material = make_scene()
     bent = scenes.add_plane("Bent", material=scenes.add_material("Other"))
     bent.location.x = 5
     bent.data.vertices[0].co.z = 0.5
@@ -201,7 +204,7 @@ def test_what_cannot_follow_is_said_and_the_others_follow():
 
 def test_a_medium_without_library_is_stood_in_for_and_then_simulated(monkeypatch, tmp_path):
     monkeypatch.setenv("BEAMSPREAD_CACHE", str(tmp_path))
-    plane, lamp, material = make_scene(anisotropy=0.37, ior=1.37)
+    plane, _lamp, material = make_scene(anisotropy=0.37, ior=1.37)
     settle(lambda: session.live.session is not None and scenes.pixels(scenes.node_of(material).image).any())
     assert not list(tmp_path.iterdir())
     settle(lambda: list(tmp_path.iterdir()))
@@ -239,7 +242,7 @@ def test_whatever_happens_to_what_it_shows(happens, is_painting, caplog):
 
 
 def test_it_goes_on_after_undo():
-    plane, lamp, material = make_scene()
+    _plane, lamp, material = make_scene()
     bpy.ops.ed.undo_push(message="before")
     lamp.location.x = -0.4
     bpy.ops.ed.undo_push(message="moved")
@@ -283,7 +286,7 @@ def test_back_to_what_was_baked_is_painted_again():
 
 def test_an_object_that_casts_no_light_is_not_read_again_for_its_node(monkeypatch):
     """While a value of the medium is dragged."""
-    plane, lamp, material = make_scene()
+    _plane, _lamp, material = make_scene()
     live_pixels(material)
     monkeypatch.setattr("beamspread.blender.read.occluders.local_mesh", lambda *_: pytest.fail("a mesh was read"))
     node = scenes.node_of(material)

@@ -76,7 +76,8 @@ class Media:
                 if self._ending:
                     return
                 wanted = self._wanted
-                if self._condition.wait_for(lambda: self._wanted != wanted, PATIENCE_SECONDS):
+                self._condition.wait(PATIENCE_SECONDS)
+                if self._wanted != wanted:
                     continue
             for medium in wanted:
                 self._simulate(medium)

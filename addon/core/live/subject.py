@@ -14,7 +14,7 @@ from ..bake.surface import Surface
 from ..scene.illumination import Illumination
 from ..scene.uv_map import Polygons
 
-# Arrays of more bytes, as of the world, are kept where they are read: they are another one only if they were read again.
+# Arrays of more bytes, as of the world, are kept where they are read: another one was read again.
 LOOK_INSIDE = 1 << 20
 
 

@@ -20,7 +20,7 @@ import beamspread  # noqa: E402
 import scenes  # noqa: E402
 from beamspread.blender.live import canvas, session  # noqa: E402
 
-CHANGES, PAUSE_SECONDS, PATIENCE_SECONDS = 12, 0.05, 20.0
+CHANGES, WARM_UP, PAUSE_SECONDS, PATIENCE_SECONDS = 14, 4, 0.05, 20.0
 times = {"stored": 0.0, "drawn": 0.0, "exact": 0.0}
 results = {}
 
@@ -77,29 +77,63 @@ def shade(shading):
             area.spaces.active.shading.use_scene_lights = True
 
 
-def changes(name, change, context):
+class Stopwatch:
+    """Times of changes and of what follows, in seconds."""
+
+    def __init__(self):
+        self.began, self.stored, self.drawn = 0.0, [], []
+
+    def start(self):
+        self.began = time.perf_counter()
+
+    def is_drawn(self):
+        return times["stored"] > self.began and times["drawn"] > times["stored"]
+
+    def stop(self):
+        self.stored.append(times["stored"] - self.began)
+        self.drawn.append(times["drawn"] - self.began)
+
+    def is_over(self, seconds):
+        return lambda: time.perf_counter() > self.began + seconds
+
+
+def changes(name, change):
     """Make changes one after the other; each waits for the picture of the one before to be drawn."""
-    rows = {"stored": [], "drawn": []}
+    watch = Stopwatch()
     for number in range(CHANGES):
-        began = time.perf_counter()
+        watch.start()
         change(number)
-        yield lambda: times["stored"] > began
-        rows["stored"].append(times["stored"] - began)
-        yield lambda: times["drawn"] > times["stored"]
-        rows["drawn"].append(times["drawn"] - began)
-        paused = time.perf_counter()
-        yield lambda: time.perf_counter() > paused + PAUSE_SECONDS
-    last = time.perf_counter()
-    yield lambda: times["exact"] > began
-    own = [pace.side() for pace in session.live.session._painter.paces.values()]
+        yield watch.is_drawn
+        watch.stop()
+        yield watch.is_over(watch.drawn[-1] + PAUSE_SECONDS)
+    quick = list(session.live.session._painter.paces.values())
+    last = watch.began
+    yield lambda: times["exact"] > last
     results[name] = {
-        "stored": statistics.median(rows["stored"][2:]),
-        "drawn": statistics.median(rows["drawn"][2:]),
-        "worst drawn": max(rows["drawn"][2:]),
+        "stored": statistics.median(watch.stored[WARM_UP:]),
+        "drawn": statistics.median(watch.drawn[WARM_UP:]),
+        "worst drawn": max(watch.drawn[WARM_UP:]),
         "exact": times["exact"] - last,
-        "side": own,
-        "texels": times["texels"],
+        "texels": min(quick[0].side(), times["texels"][0]),
     }
+
+
+def redraws():
+    """How long the window itself takes."""
+    watch, seconds = Stopwatch(), []
+    for _ in range(CHANGES):
+        watch.start()
+        session.redraw(bpy.context)
+        yield lambda: times["drawn"] > watch.began
+        seconds.append(times["drawn"] - watch.began)
+    results["nothing, only drawn again"] = {"drawn": statistics.median(seconds)}
+
+
+def moves(obj):
+    def change(number):
+        obj.location.x = 0.3 * math.sin(number + 1)
+
+    return change
 
 
 def scenario(shading, resolution):
@@ -109,40 +143,22 @@ def scenario(shading, resolution):
     material, monkey = build(resolution)
     shade(shading)
     bpy.context.scene.beamspread.use_live = True
-    node = scenes.node_of(material)
-
-    def move(obj):
-        def change(number):
-            obj.location.x = 0.3 * math.sin(number + 1)
-
-        return change
-
     yield lambda: times["exact"] > 0
-    redraws = []
-    for _ in range(CHANGES):
-        began = time.perf_counter()
-        session.redraw(bpy.context)
-        yield lambda: times["drawn"] > began
-        redraws.append(times["drawn"] - began)
-    results["a redraw alone"] = {"drawn": statistics.median(redraws)}
-    for kind, energy in (("SUN", 3), ("POINT", 50), ("AREA", 50)):
-        obj = lamp(kind.title(), kind, energy)
-        if kind == "SUN":
-            yield from changes(
-                "a sun turned", lambda n, obj=obj: setattr(obj, "rotation_euler", (0.4 + 0.03 * n, 0.2, 0)), None
-            )
-        else:
-            yield from changes(f"{kind.lower()} lamp moved", move(obj), None)
-        if kind == "POINT":
-            yield from changes("monkey moved", move(monkey), None)
+    yield from redraws()
 
-            def albedo(n):
-                node.albedo = (0.99, 0.89 - 0.01 * n, 0.6)
+    sun = lamp("Sun", "SUN", 3)
+    yield from changes("a sun turns", lambda number: setattr(sun, "rotation_euler", (0.4 + 0.03 * number, 0.2, 0)))
+    bpy.data.objects.remove(sun)
 
-            yield from changes("albedo changed", albedo, None)
-            yield from changes("receiver moved", move(bpy.data.objects["Plane"]), None)
-        bpy.data.objects.remove(obj)
-        yield lambda: True
+    point = lamp("Point", "POINT", 50)
+    node = scenes.node_of(material)
+    yield from changes("a lamp moves", moves(point))
+    yield from changes("what throws the shadow moves", moves(monkey))
+    yield from changes("the receiver moves", moves(bpy.data.objects["Plane"]))
+    yield from changes("an albedo", lambda number: setattr(node, "albedo", (0.99, 0.89 - 0.01 * number, 0.6)))
+    bpy.data.objects.remove(point)
+
+    yield from changes("an area lamp moves", moves(lamp("Area", "AREA", 50)))
 
 
 def main():
