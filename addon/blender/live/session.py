@@ -229,7 +229,8 @@ def _tick() -> float:
 
 @persistent
 def _changed(_scene, depsgraph) -> None:
-    if live.session is not None and depsgraph.mode == "VIEWPORT":
+    is_ours = depsgraph.mode == "VIEWPORT" and depsgraph.scene.name == live.scene_name
+    if live.session is not None and is_ours:
         live.session.note(depsgraph)
 
 

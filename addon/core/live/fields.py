@@ -10,10 +10,13 @@ from ..native import native
 from ..scene.grid import Grid
 
 # Up to what angle of incidence, degrees, the kernels of a field are right to what part; light from beyond counts as at
-# that angle. Where light is refracted, 17 terms do; without, kernels change so much towards grazing that 181 would be
-# asked for, and here some 60 are.
-REFRACTED, STRAIGHT = (88.0, 0.02), (84.0, 0.1)
-LEAST_REFRACTION = 1.2
+# that angle. The first that asks for few terms counts: 17 where light is refracted and no boundary returns it. Without
+# refraction kernels change so much towards grazing that 181 would be asked for first, and thin slabs have a thousand.
+EXACTNESS = ((88.0, 0.02), (84.0, 0.1), (80.0, 0.3), (70.0, 4.0))
+MOST_TERMS = 64
+
+# Slabs of so few mean free paths ask for so many terms at first that only to count them takes seconds.
+THIN = 1.0
 
 SURVEY_ANGLES = 256
 
@@ -34,9 +37,10 @@ class Fields:
 
     def __init__(self) -> None:
         self._kept: OrderedDict = OrderedDict()
+        self._choices: dict = {}  # by media: which exactness
         self.made = 0
 
-    def empty(self, grid: Grid, medium: dict, ior: float, is_colored: bool):
+    def empty(self, grid: Grid, medium: dict, is_colored: bool):
         """A field without light, for light of any directions.
 
         `medium` has what `convolve` takes of it: ldf, albedo, mean_free_path; `is_colored`: lights differ in color.
@@ -46,25 +50,31 @@ class Fields:
         key = (*map(id, medium["ldf"]), *values, *shape, is_colored)
         if key in self._kept:
             self._kept.move_to_end(key)
-            field = self._kept[key]
+            field, _ = self._kept[key]
             field.clear()
             return field
-        limit, tolerance = STRAIGHT if is_straight(ior) else REFRACTED
-        survey = _all_directions(limit)
-        lights = survey.by_channel() if is_colored else [survey]
-        field = native.LightField(
-            shape, [], (1, SURVEY_ANGLES), lights, **medium, pitch=pitch, tolerance=tolerance, progress=None
-        )
+        field = self._make(shape, medium | {"pitch": pitch}, is_colored)
         self.made += 1
-        self._kept[key] = field
+        self._kept[key] = field, medium["ldf"]  # with these, so that no others get their numbers
         while len(self._kept) > MOST_FIELDS:
             self._kept.popitem(last=False)
         return field
 
-
-def is_straight(ior: float) -> bool:
-    """Whether light enters almost without refraction, which asks for many terms."""
-    return ior < LEAST_REFRACTION
+    def _make(self, shape: tuple[int, int], medium: dict, is_colored: bool):
+        media = tuple((one.medium.g, one.medium.ior, one.medium.thickness) for one in medium["ldf"])
+        is_thin = any(thickness < THIN and ior > 1 for _, ior, thickness in media)
+        first = len(EXACTNESS) - 1 if is_thin else 0
+        for choice in range(self._choices.get(media, first), len(EXACTNESS)):
+            limit, tolerance = EXACTNESS[choice]
+            survey = _all_directions(limit)
+            lights = survey.by_channel() if is_colored else [survey]
+            field = native.LightField(
+                shape, [], (1, SURVEY_ANGLES), lights, **medium, tolerance=tolerance, progress=None
+            )
+            if field.terms <= MOST_TERMS * (3 if is_colored else 1):
+                break
+        self._choices[media] = choice
+        return field
 
 
 def _all_directions(limit: float):

@@ -10,6 +10,9 @@ from pathlib import Path
 from ..ldf import library as libraries
 from ..native import native
 
+# Libraries in memory, those used last: some megabytes each.
+MOST_KEPT = 12
+
 # A medium that changes again sooner, as under a slider, is not worth a simulation.
 PATIENCE_SECONDS = 0.5
 
@@ -22,7 +25,7 @@ class Media:
 
     def __init__(self, on_news: Callable[[], None] = lambda: None) -> None:
         self._known: dict = {}  # by medium: its own library
-        self._nearest: dict = {}  # by medium: another one's, and the name of it
+        self._stand_ins: dict = {}  # by file: the library in it
         self._on_news = on_news
         self._condition = threading.Condition()
         self._wanted: tuple = ()
@@ -33,13 +36,15 @@ class Media:
     def serve(self, medium) -> tuple[object, bool]:
         """A library, and whether it is the medium's own. Simulates in preview quality if there is none at all."""
         if own := self._known.get(medium) or libraries.known_library(medium):
-            self._known[medium] = own
+            _keep(self._known, medium, own)
             return own, True
-        if medium not in self._nearest:
-            self._nearest[medium] = nearest(medium)
-        if self._nearest[medium] is None:
-            return self._known.setdefault(medium, libraries.library(medium, "preview")), True
-        return self._nearest[medium], False
+        path = nearest(medium)
+        if path is None:
+            _keep(self._known, medium, libraries.library(medium, "preview"))
+            return self._known[medium], True
+        if path not in self._stand_ins:
+            _keep(self._stand_ins, path, native.LdfLibrary.load(path))
+        return self._stand_ins[path], False
 
     def want(self, media: Collection) -> None:
         """Simulate these in the background, and no others any more."""
@@ -90,21 +95,23 @@ class Media:
             return
         finally:
             self.simulating = ""
-        self._known[medium] = found
+        _keep(self._known, medium, found)
         self._on_news()
         with self._condition:
             self._wanted = tuple(one for one in self._wanted if one != medium)
 
 
-def nearest(medium):
-    """The library of the medium most like this one among all files, or None without any."""
-    ranked = sorted((_distance(medium, one), str(path)) for path in _files() if (one := _medium_of(path)) is not None)
-    for _, path in ranked:
-        try:
-            return native.LdfLibrary.load(path)
-        except (OSError, ValueError):
-            continue
-    return None
+def _keep(kept: dict, key, value) -> None:
+    kept.pop(key, None)
+    kept[key] = value
+    while len(kept) > MOST_KEPT:
+        del kept[next(iter(kept))]
+
+
+def nearest(medium) -> Path | None:
+    """The file with the library of the medium most like this one, or None without any."""
+    known = [(_distance(medium, one), path) for path in _files() if (one := _medium_of(path)) is not None]
+    return min(known, default=(0.0, None))[1]
 
 
 def _files() -> list[Path]:

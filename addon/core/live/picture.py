@@ -21,7 +21,7 @@ from ..scene.grid import Grid
 from ..scene.lights import Light, SunLight
 from ..scene.receiver import Receiver, build_receiver, texture_size
 from ..scene.uv_map import fit_uv_maps
-from .fields import Fields, is_straight
+from .fields import Fields
 from .media import Media
 from .subject import Subject
 
@@ -117,7 +117,7 @@ class Studio:
         lights = [light for light in subject.illumination.lights if not light.is_behind(grid)]
         if not lights:
             return np.zeros((grid.height, grid.width, 3), np.float32)
-        if _have_kernels_of_their_own(lights, grid, material) or settings.distributions != "library":
+        if _have_kernels_of_their_own(lights, grid) or settings.distributions != "library":
             return spread(grid, subject.illumination, material, sources, settings, progress)
         medium = {
             "ldf": sources,
@@ -127,7 +127,7 @@ class Studio:
         }
         gatherer = Gatherer(grid, subject.illumination, settings, FEW_RAYS)
         color = _common_color(gatherer, lights)
-        field = self.fields.empty(grid, medium, material.ior, is_colored=color is None)
+        field = self.fields.empty(grid, medium, is_colored=color is None)
         for light in lights:
             if color is not None:
                 light = replace(light, color=(1.0, 1.0, 1.0), strength=float(light.rgb().max()))
@@ -208,11 +208,11 @@ def _media(subject: Subject) -> list:
     return [native.Medium(g=g, ior=material.ior, thickness=d) for g, d in zip(material.channel_anisotropy, depths)]
 
 
-def _have_kernels_of_their_own(lights: Sequence[Light], grid: Grid, material: Material) -> bool:
+def _have_kernels_of_their_own(lights: Sequence[Light], grid: Grid) -> bool:
     """Whether the lights are few suns, and exact kernels for these cost no more than a field."""
     if len(lights) > MOST_SUNS or not all(isinstance(light, SunLight) for light in lights):
         return False
-    return is_straight(material.ior) or grid.width * grid.height >= MANY_TEXELS
+    return grid.width * grid.height >= MANY_TEXELS
 
 
 def _common_color(gatherer: Gatherer, lights: Sequence[Light]) -> np.ndarray | None:

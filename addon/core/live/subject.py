@@ -41,7 +41,8 @@ class Subject:
         """Equal for subjects that look the same."""
         lights = tuple(_content(light) for light in self.illumination.lights)
         shadows = self.illumination.shadow_key()
-        return lights, shadows, id(self.polygons), self.size or self.resolution, self.surface, self.settings
+        arrays = self.polygons.corners, self.polygons.uvs, self.polygons.normals
+        return lights, shadows, *map(_value, arrays), self.size or self.resolution, self.surface, self.settings
 
 
 def _content(light) -> tuple:
