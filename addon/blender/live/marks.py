@@ -36,6 +36,10 @@ class Marks:
         """Whether nothing but lamps has changed."""
         return not (self.moved or self.shaped or self.materials or self.images or self.world or self.other)
 
+    def is_movement_alone(self) -> bool:
+        """Whether objects are elsewhere or lamps shine differently, and nothing has another shape or look."""
+        return not (self.shaped or self.materials or self.images or self.world or self.other)
+
     def note(self, updates: Collection, own_images: Collection[str]) -> None:
         """Add the updates of a depsgraph; those of `own_images`, and of materials along with them, are no news."""
         is_own = any(isinstance(one.id, bpy.types.Image) and one.id.name in own_images for one in updates)

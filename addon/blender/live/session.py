@@ -24,6 +24,9 @@ BUSY_SECONDS, IDLE_SECONDS, OFF_SECONDS = 0.01, 0.05, 0.5
 # How long a thread may take to end: what it can't stop, as one transform, is shorter.
 END_SECONDS = 10.0
 
+# A look that takes so long at most may be had while Blender evaluates a change.
+SMALL_SECONDS = 0.01
+
 SHADED = {"MATERIAL", "RENDERED"}
 
 
@@ -44,6 +47,7 @@ class Session:
         self._canvases: dict[str, Canvas] = {}
         self._errors: dict[Target, str] = {}
         self._paused = False
+        self._look_seconds = 1.0  # of the last look at more than lamps
         self._changed_at = time.perf_counter()
         self.seconds = 0.0
 
@@ -53,7 +57,8 @@ class Session:
         self._marks.note(list(depsgraph.updates), self._canvases)
         if was_calm and self._marks:
             self._changed_at = time.perf_counter()
-        if self._marks.lamps and self._marks.is_lamps_alone() and not self._paused and not is_occupied():
+        is_small = self._look_seconds < SMALL_SECONDS or self._marks.is_lamps_alone()
+        if self._marks and self._marks.is_movement_alone() and is_small and not self._paused and not is_occupied():
             # At once, so that it is painted while the window is drawn.
             self._look(depsgraph)
 
@@ -79,8 +84,11 @@ class Session:
         return has_changed or shown or self.is_busy()
 
     def _look(self, depsgraph) -> None:
+        start = time.perf_counter()
         marks, self._marks = self._marks, Marks()
         subjects = self._reader.read(depsgraph, marks)
+        if marks and not marks.is_lamps_alone():
+            self._look_seconds = time.perf_counter() - start
         if [*map(id, subjects)] != [*map(id, self._subjects)]:
             self._subjects = subjects
             self._painter.show(subjects)
