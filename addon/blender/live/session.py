@@ -146,12 +146,12 @@ class Session:
             if picture.error:
                 self._errors[target] = picture.error
                 continue
-            shown |= self._show(picture)
+            shown |= self._show(picture, context.scene.render.engine)
         if latest:
             redraw(context)
         return shown
 
-    def _show(self, picture: Picture) -> bool:
+    def _show(self, picture: Picture, engine: str) -> bool:
         image = image_of(picture)
         if image is None or tuple(image.size) != picture.texture.shape[1::-1]:
             return False  # removed or resized meanwhile
@@ -159,6 +159,8 @@ class Session:
         if canvas is None or not canvas.fits(image):
             canvas = self._canvases[image.name] = Canvas(image)
         canvas.show(image, picture)
+        if engine == "CYCLES":
+            image.update_tag()  # its viewport reads images again only when it is told of them
         return True
 
 
