@@ -189,7 +189,7 @@ def test_what_live_leaves_out_is_said():
     _plane, _lamp, material = make_scene()
     bpy.context.scene.beamspread.use_indirect = True
     live_pixels(material)
-    assert session.sentences() == ["Live leaves out indirect light."]
+    assert session.sentences() == ["Live leaves out indirect light.", session.IN_CYCLES]
 
 
 def test_what_cannot_follow_is_said_and_the_others_follow():
@@ -198,7 +198,8 @@ def test_what_cannot_follow_is_said_and_the_others_follow():
     bent.location.x = 5
     bent.data.vertices[0].co.z = 0.5
     assert live_pixels(material).max() > 0
-    (said,) = session.sentences()
+    said, in_cycles = session.sentences()
+    assert in_cycles == session.IN_CYCLES
     assert said.startswith("Bent / Other: The faces are not flat")
 
 

@@ -27,6 +27,9 @@ END_SECONDS = 10.0
 # A look that takes so long at most may be had while Blender evaluates a change.
 SMALL_SECONDS = 0.01
 
+# Seen in 3.4, whether it is told of new pixels or not.
+IN_CYCLES = "Rendered view of Cycles may keep the pixels that it began with: look at Material Preview or EEVEE."
+
 SHADED = {"MATERIAL", "RENDERED"}
 
 
@@ -104,6 +107,8 @@ class Session:
             said.append(f"The medium ({self._painter.media.simulating}) is simulated: the most similar one stands in.")
         if self._reader.left_out:
             said.append(f"Live leaves out {', '.join(self._reader.left_out)}.")
+        if bpy.context.scene.render.engine == "CYCLES":
+            said.append(IN_CYCLES)
         return said
 
     def end(self, keep_pixels: bool = False) -> None:
@@ -146,12 +151,12 @@ class Session:
             if picture.error:
                 self._errors[target] = picture.error
                 continue
-            shown |= self._show(picture, context.scene.render.engine)
+            shown |= self._show(picture)
         if latest:
             redraw(context)
         return shown
 
-    def _show(self, picture: Picture, engine: str) -> bool:
+    def _show(self, picture: Picture) -> bool:
         image = image_of(picture)
         if image is None or tuple(image.size) != picture.texture.shape[1::-1]:
             return False  # removed or resized meanwhile
@@ -159,8 +164,6 @@ class Session:
         if canvas is None or not canvas.fits(image):
             canvas = self._canvases[image.name] = Canvas(image)
         canvas.show(image, picture)
-        if engine == "CYCLES":
-            image.update_tag()  # its viewport reads images again only when it is told of them
         return True
 
 
