@@ -841,7 +841,8 @@ class LightField:
     survey_shape : (int, int)
         Of the plane that the survey looks at, as large but of fewer texels.
     survey : sequence of PlaneLight
-        All light to come, on that plane: its angles and colours.
+        All light to come, on that plane: its angles and colours. Without `lights`, terms are chosen for any light of these
+        angles, by the kernels alone: those are off by `tolerance`.
     ldf, albedo, mean_free_path, pitch, tolerance, threads, progress
         As for `convolve`; the progress is that of the choice of terms.
     """
@@ -882,9 +883,13 @@ class LightField:
 
         `color`: factor in each channel; `coverage`: float32 (H, W), part of each texel that receives light.
         """
+    def clear(self) -> None:
+        """
+        Forgets what was added; terms and kernels stay for the light that comes next.
+        """
     def solve(self, progress: typing.Any = None) -> numpy.ndarray:
         """
-        Luminance, float32 (H, W, C) in W/(m^2 sr); once.
+        Luminance, float32 (H, W, C) in W/(m^2 sr).
         """
     @property
     def terms(self) -> int:
@@ -1280,10 +1285,15 @@ def walk_kernels() -> list[str]:
     """
 
 def write_exr(
-    path: str, array: numpy.ndarray, channels: list[str], attributes: dict = {}, compression: str = "zip"
+    path: str,
+    array: numpy.ndarray,
+    channels: list[str],
+    attributes: dict = {},
+    compression: str = "zip",
+    half: bool = False,
 ) -> None:
     """
-    Write an OpenEXR file of 32-bit float channels.
+    Write an OpenEXR file of 32-bit or 16-bit float channels.
 
     The file is written beside `path` and takes its name when it is whole.
 
@@ -1299,6 +1309,8 @@ def write_exr(
         Header attributes: str, int, float, or a sequence of numbers (stored as 32-bit floats).
     compression : {"zip", "none"}
         Both without loss.
+    half : bool
+        Round to 16 bits: 11 bits of precision, up to 65504; what is larger becomes infinite.
 
     Raises
     ------

@@ -41,6 +41,7 @@ def run(arguments: list[str]) -> int:
     from . import blender
     from .blender.jobs import batch
     from .core.batch import options as command_line
+    from .core.batch.stop import listening
     from .core.native import problem
 
     options = command_line.parse(arguments)
@@ -52,19 +53,29 @@ def run(arguments: list[str]) -> int:
         if trouble:
             print(f"Beamspread: {trouble}", file=sys.stderr)
             return 1
-        report = batch.bake_all(options)
-        if options.report:
-            try:
-                report.save(options.report)
-            except OSError as error:
-                print(f"Beamspread: the report {options.report} cannot be written: {error}", file=sys.stderr)
-                return 1
-        return 0 if report.all_written() and (options.allow_dark or not report.dark()) else 1
+        with listening() as stop:
+            report = batch.bake_all(options, stop)
+            is_saved = _save(report, options.report)
+            if stop and not report.all_written():
+                return stop.exit_code
+        return 0 if is_saved and report.all_written() and (options.allow_dark or not report.dark()) else 1
     finally:
         # Classes left registered can keep newer versions from exiting, and so can nodes of a class that is gone.
         if registers:
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
             blender.unregister()
+
+
+def _save(report, path: str | None) -> bool:
+    """Write the report if one is wanted; whether that went well."""
+    if path is None:
+        return True
+    try:
+        report.save(path)
+    except OSError as error:
+        print(f"Beamspread: the report {path} cannot be written: {error}", file=sys.stderr)
+        return False
+    return True
 
 
 def _open(path: str | None) -> str:

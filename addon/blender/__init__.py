@@ -2,22 +2,43 @@
 
 Each part imports only core and those above it (tests/unit/test_layers.py reads this list):
 
-    compat      differences between Blender versions
-    settings    scene.beamspread
-    read        geometry, lights and what a render would show
-    node        the shader node, and where a scene has it
-    cycles      what Cycles finds in a process of its own: bounced light, the world's radiance
-    images      images of the scene, files, atlases
-    jobs        what becomes a job, and what runs it: operator, engine, batch; the state of a run
-    ui          panels
+    compat       differences between Blender versions
+    preferences  what holds for all files of a user
+    settings     scene.beamspread
+    read         geometry, lights and what a render would show
+    node         the shader node, and where a scene has it
+    cycles       what Cycles finds in a process of its own: bounced light, the world's radiance
+    images       images of the scene, whole files, whose result an image holds
+    jobs         what becomes a job, and what runs it: operator, engine, batch; the state of a run
+    live         images that follow the scene while it is worked on
+    ui           panels
 """
 
-from . import settings
-from .jobs import engine, operator, state
+from . import preferences, settings
+from .images import operators as image_operators
+from .images import undo
+from .jobs import engine, operator, stale, state
+from .live import session
 from .node import menu, node
-from .ui import panels
+from .node import operators as node_operators
+from .ui import panels, picture
 
-PARTS = (settings, node, menu, state, engine, operator, panels)
+PARTS = (
+    preferences,
+    settings,
+    image_operators,
+    undo,
+    node,
+    menu,
+    node_operators,
+    state,
+    stale,
+    engine,
+    operator,
+    session,
+    panels,
+    picture,
+)
 
 
 def register() -> None:

@@ -1,6 +1,8 @@
 """Differences between Blender versions, bridged in this one place."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import bpy
 import numpy as np
@@ -9,12 +11,44 @@ import numpy as np
 PATH_OPTIONS = {"ANIMATABLE", "PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else {"ANIMATABLE"}
 
 
+def engine_id(name: str) -> str:
+    """Of CYCLES or EEVEE, whose name differs."""
+    if name == "EEVEE":
+        return "BLENDER_EEVEE_NEXT" if (4, 2, 0) <= bpy.app.version < (5, 0, 0) else "BLENDER_EEVEE"
+    return name
+
+
 def add_output_socket(tree, socket_type: str, name: str) -> None:
     """Give a node group an output (its interface moved in Blender 4.0)."""
     if hasattr(tree, "interface"):
         tree.interface.new_socket(name, in_out="OUTPUT", socket_type=socket_type)
     else:
         tree.outputs.new(socket_type, name)
+
+
+def add_input_socket(tree, socket_type: str, name: str, default=None, hide_value: bool = False) -> None:
+    """Give a node group an input with links alone if `hide_value`, "NodeSocketFloat" being a factor from 0 to 1."""
+    if hasattr(tree, "interface"):
+        socket = tree.interface.new_socket(name, in_out="INPUT", socket_type=socket_type)
+        if socket_type == "NodeSocketFloat":
+            socket.subtype = "FACTOR"
+    else:
+        socket = tree.inputs.new("NodeSocketFloatFactor" if socket_type == "NodeSocketFloat" else socket_type, name)
+    if socket_type == "NodeSocketFloat":
+        socket.min_value, socket.max_value = 0.0, 1.0
+    if default is not None:
+        socket.default_value = default
+    socket.hide_value = hide_value
+
+
+def has_input_socket(tree, name: str) -> bool:
+    """Whether a node group has an input of that name."""
+    if hasattr(tree, "interface"):
+        return any(
+            item.item_type == "SOCKET" and item.in_out == "INPUT" and item.name == name
+            for item in tree.interface.items_tree
+        )
+    return name in tree.inputs
 
 
 def uses_nodes(material) -> bool:
@@ -33,6 +67,27 @@ def has_transparent_shadow(material) -> bool:
 def transparent_bounces(scene) -> int | None:
     """How many see-through surfaces a shadow ray of Cycles crosses; None where Blender comes without Cycles."""
     return getattr(getattr(scene, "cycles", None), "transparent_max_bounces", None)
+
+
+@contextmanager
+def saving_png(scene) -> Iterator[None]:
+    """Have what the scene renders saved as PNG of 8 bits (since Blender 5.0, a kind of media limits the formats)."""
+    settings = scene.render.image_settings
+    names = [name for name in ("media_type", "file_format", "color_mode", "color_depth") if hasattr(settings, name)]
+    before = {name: getattr(settings, name) for name in names}
+    try:
+        for name, value in {
+            "media_type": "IMAGE",
+            "file_format": "PNG",
+            "color_mode": "RGB",
+            "color_depth": "8",
+        }.items():
+            if name in before:
+                setattr(settings, name, value)
+        yield
+    finally:
+        for name, value in before.items():
+            setattr(settings, name, value)
 
 
 def light_casts_shadow(light) -> bool:
@@ -120,3 +175,15 @@ def _foreach(access, values: np.ndarray) -> None:
         access(values.ravel())
     except TypeError:
         access(values)
+
+
+def set_shader_color(tree) -> None:
+    """Have nodes of this group wear the colour of shaders (Blender 4.3 on)."""
+    if hasattr(tree, "color_tag"):
+        tree.color_tag = "SHADER"
+
+
+def has_fixed_radius(principled) -> bool:
+    """Whether Cycles takes a Principled BSDF's radius as it is, whatever its colour (names changed in Blender 4.0)."""
+    other = "RANDOM_WALK_SKIN" if bpy.app.version >= (4, 0, 0) else "RANDOM_WALK"
+    return principled.subsurface_method != other

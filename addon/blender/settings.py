@@ -4,7 +4,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
 from ..core.bake.settings import OUTPUTS, BakeSettings
-from . import compat
+from . import compat, preferences
 
 
 class BeamspreadSettings(bpy.types.PropertyGroup):
@@ -12,7 +12,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
 
     resolution: IntProperty(
         name="Resolution",
-        description="Texels along the longer side of the images that are made where a node has none",
+        description="Texels along the longer side of images that a bake makes. A node's own image keeps its size",
         default=1024,
         min=1,
         soft_min=64,
@@ -22,9 +22,15 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     solver: EnumProperty(
         name="Solver",
+        description="How light is spread inside the medium. The result is the same but for each one's tolerance",
         items=[
-            ("fft", "FFT", "Fast convolution", 0),
-            ("direct", "Direct", "Adds up every beam at every texel: slow, the reference for the others", 1),
+            ("fft", "FFT", "Fast convolution: seconds for any number of lights", 0),
+            (
+                "direct",
+                "Direct",
+                "Adds up every beam at every texel. Under a lamp: minutes for 256 x 256 texels, days for 2048 x 2048",
+                1,
+            ),
             ("adaptive", "Adaptive", "Lights evenly lit squares by one beam each, as Manabe et al. 2012", 2),
         ],
         default="fft",
@@ -33,8 +39,13 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         name="Quality",
         description="Of the light transport simulation, which is made once per material and then kept",
         items=[
-            ("preview", "Preview", "A few seconds, slightly noisy", 0),
-            ("final", "Final", "Up to a minute", 1),
+            ("preview", "Preview", "Simulated in a few seconds; slightly noisy", 0),
+            (
+                "final",
+                "Final",
+                "Simulated in a minute or two, unless it comes with the add-on. A first look is shown meanwhile",
+                1,
+            ),
         ],
         default="final",
     )
@@ -64,7 +75,9 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     samples: IntProperty(
         name="Samples",
-        description="Light and shadow are sampled at this number squared of points in every texel",
+        description="Rays per texel, as the root of their number: 4 makes 16 to each lamp without a size, and up to "
+        "1024 to all lamps with one, glowing meshes and the world together, as many as the medium needs; 8 makes four "
+        "times as many",
         default=4,
         min=1,
         soft_max=16,
@@ -72,7 +85,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     margin: IntProperty(
         name="Margin",
-        description="Extends the result beyond the border of the UV map by this many texels",
+        description="Texels beyond the border of the UV map that continue the result, so that none unbaked shows",
         default=16,
         min=0,
         soft_max=64,
@@ -106,6 +119,49 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         subtype="DIR_PATH",
         options=compat.PATH_OPTIONS,
     )
+    image_storage: EnumProperty(
+        name="Storage",
+        description="Where images are kept that a bake makes because a node has none",
+        items=[
+            ("FILES", "Files", "OpenEXR files; packed as long as the scene was never saved", 0),
+            ("PACKED", "Packed", "In the .blend file, which grows: by 200 MB for 4096 x 4096 texels", 1),
+        ],
+        default="FILES",
+    )
+    image_dir: StringProperty(
+        name="Folder",
+        description="Where the files of new images go",
+        default="//textures/",
+        subtype="DIR_PATH",
+        options=compat.PATH_OPTIONS,
+    )
+    image_name: StringProperty(
+        name="Name",
+        description="Of new images and their files: {object} and {material} stand for what they are called",
+        default="{object}_{material}",
+    )
+    use_view_transform: BoolProperty(
+        name="View Transform",
+        description="PNG files look as a render would: with the view transform, exposure and look of Color Management",
+        default=False,
+    )
+    render_engine: EnumProperty(
+        name="Pictures By",
+        description="What renders pictures (F12) while the render engine is Beamspread, with the baked images in them",
+        items=[
+            ("CYCLES", "Cycles", "Path traced, also where there is no OpenGL", 0),
+            ("EEVEE", "EEVEE", "Faster; needs OpenGL", 1),
+        ],
+        default="CYCLES",
+    )
+    use_live: BoolProperty(
+        name="Live",
+        description="While lights, things in their way, and materials change, the images of Beamspread nodes follow in "
+        "Material Preview and Rendered view: quickly, then as a bake without indirect light. These pixels are a "
+        "preview that is neither packed nor saved, but renders show them: switched off, images have the pixels of "
+        "their last bake again",
+        default=False,
+    )
     format: EnumProperty(
         name="Format",
         description="File format that a batch writes",
@@ -125,6 +181,8 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
             layers=(OUTPUTS[output or self.output],),
             indirect=self.use_indirect if indirect is None else indirect,
             samples=self.samples,
+            threads=preferences.threads(),
+            memory_limit=preferences.memory_limit(),
             margin=self.margin,
             quality=self.quality,
             distributions=self.distributions.lower(),

@@ -5,11 +5,14 @@ Each package imports only those above it (tests/unit/test_layers.py reads this l
     native      the compiled module, and why it is missing if it is
     errors      sentences for the artist
     progress    progress of a job made of stages
+    whole_file  files that are whole or as they were
+    exr_header  what OpenEXR files say of their channels
     arrays      array arguments, converted only where nothing is lost
     scene       receivers (charts on planes), lights, triangles that throw shadows
     material    optical properties, measured presets
     ldf         libraries, samples, the albedo behind a colour
     bake        from a job to its layers, margin included, and what became of it
+    live        pictures that follow a scene while it changes
     batch       command line and report of many bakes
     cli         `python3 -m beamspread`
 """

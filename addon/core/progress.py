@@ -17,12 +17,28 @@ def stages(progress: Progress | None, weights: list[float]) -> Iterator[Progress
         raise ValueError(f"argument 'progress' is {progress!r}; allowed: a function of the finished fraction, or None")
     total, done = sum(weights) or 1.0, 0.0
     for weight in weights:
-        yield _stage(progress, done / total, weight / total) if progress is not None else None
+        yield _Stage(progress, done / total, weight / total) if progress is not None else None
         done += weight
 
 
-def _stage(progress: Progress, start: float, length: float) -> Progress:
-    return lambda fraction: progress(min(1.0, start + length * fraction))
+class _Stage:
+    """A part of the progress, from `start` on; what it does, it says to the whole."""
+
+    def __init__(self, progress: Progress, start: float, length: float) -> None:
+        self._progress, self._start, self._length = progress, start, length
+
+    def __call__(self, fraction: float) -> object:
+        return self._progress(min(1.0, self._start + self._length * fraction))
+
+    def say(self, words: str) -> None:
+        say(self._progress, words)
+
+
+def say(progress: Progress | None, words: str) -> None:
+    """Tell whoever watches what begins now, if the callback has a method `say(words)` beside being called."""
+    listener = getattr(progress, "say", None)
+    if listener is not None:
+        listener(words)
 
 
 @contextmanager

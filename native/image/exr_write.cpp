@@ -101,6 +101,14 @@ void write_pixels(Imf::OutputPart output, const ExrPart& part, Imf::PixelType ty
     output.writePixels(part.height);
 }
 
+template <class T>
+void write_bottom_up(Imf::OutputPart output, const ExrPart& part, Imf::PixelType type, std::span<const T> pixels)
+{
+    const std::size_t values = line_values(part);
+    // OpenEXR only adds strides to addresses: one that wraps around goes back, as Blender's own files are written.
+    write_pixels(output, part, type, pixels.data() + pixels.size() - values, 0 - values * sizeof(T));
+}
+
 void write_part(Imf::OutputPart output, const ExrPart& part)
 {
     if (part.half) {
@@ -168,9 +176,12 @@ void write_exr_bottom_up(const std::string& path, const ExrPart& part, std::span
 {
     check_part(part, pixels.size());
     write_file(path, {&part, 1}, compression, [&](Imf::OutputPart output, const ExrPart&) {
-        const std::size_t values = line_values(part);
-        // OpenEXR only adds strides to addresses: one that wraps around goes back, as Blender's own files are written.
-        write_pixels(output, part, Imf::FLOAT, pixels.data() + pixels.size() - values, 0 - values * sizeof(float));
+        if (part.half) {
+            const std::vector<half> rounded(pixels.begin(), pixels.end());
+            write_bottom_up(output, part, Imf::HALF, std::span<const half>(rounded));
+        } else {
+            write_bottom_up(output, part, Imf::FLOAT, pixels);
+        }
     });
 }
 

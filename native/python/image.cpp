@@ -56,7 +56,7 @@ void flip_rows(const float* from, float* to, std::size_t height, std::size_t row
 }
 
 void write_exr(const std::string& path, const py::array& array, const std::vector<std::string>& channels,
-               const py::dict& attributes, const std::string& compression)
+               const py::dict& attributes, const std::string& compression, bool half)
 {
     const ExrCompression packing = to_compression(compression);
     if (!py::isinstance<Array<float>>(array) || array.ndim() != 3)
@@ -73,6 +73,7 @@ void write_exr(const std::string& path, const py::array& array, const std::vecto
     part.height = static_cast<int>(array.shape(0));
     part.width = static_cast<int>(array.shape(1));
     part.channels = channels;
+    part.half = half;
     part.attributes = to_attributes(attributes);
     const std::span pixels(static_cast<const float*>(array.data()), static_cast<std::size_t>(array.size()));
 
@@ -107,8 +108,8 @@ py::tuple read_exr(const std::string& path, const std::optional<std::string>& pa
 void bind_image(py::module_& m)
 {
     m.def("write_exr", &write_exr, py::arg("path"), py::arg("array"), py::arg("channels"),
-          py::arg("attributes") = py::dict(), py::arg("compression") = "zip",
-          R"(Write an OpenEXR file of 32-bit float channels.
+          py::arg("attributes") = py::dict(), py::arg("compression") = "zip", py::arg("half") = false,
+          R"(Write an OpenEXR file of 32-bit or 16-bit float channels.
 
 The file is written beside `path` and takes its name when it is whole.
 
@@ -124,6 +125,8 @@ attributes : dict, optional
     Header attributes: str, int, float, or a sequence of numbers (stored as 32-bit floats).
 compression : {"zip", "none"}
     Both without loss.
+half : bool
+    Round to 16 bits: 11 bits of precision, up to 65504; what is larger becomes infinite.
 
 Raises
 ------

@@ -80,6 +80,12 @@ public:
         return luminance;
     }
 
+    void clear()
+    {
+        const py::gil_scoped_release release;
+        m_field->clear();
+    }
+
     std::size_t terms() const { return m_field->terms(); }
 
 private:
@@ -139,7 +145,8 @@ lights : sequence of PlaneLight
 survey_shape : (int, int)
     Of the plane that the survey looks at, as large but of fewer texels.
 survey : sequence of PlaneLight
-    All light to come, on that plane: its angles and colours.
+    All light to come, on that plane: its angles and colours. Without `lights`, terms are chosen for any light of these
+    angles, by the kernels alone: those are off by `tolerance`.
 ldf, albedo, mean_free_path, pitch, tolerance, threads, progress
     As for `convolve`; the progress is that of the choice of terms.
 )")
@@ -167,7 +174,9 @@ ldf, albedo, mean_free_path, pitch, tolerance, threads, progress
 `color`: factor in each channel; `coverage`: float32 (H, W), part of each texel that receives light.
 )")
         .def("solve", &HeldField::solve, py::arg("progress") = py::none(),
-             "Luminance, float32 (H, W, C) in W/(m^2 sr); once.")
+             "Luminance, float32 (H, W, C) in W/(m^2 sr).")
+        .def("clear", &HeldField::clear,
+             "Forgets what was added; terms and kernels stay for the light that comes next.")
         .def_property_readonly("terms", &HeldField::terms, "int: how many transforms of light `solve` makes.");
 }
 

@@ -56,4 +56,11 @@ void LightField::solve(Progress& progress, float* luminance)
     progress.finish();
 }
 
+void LightField::clear()
+{
+    m_field.clear();
+    std::fill(m_unscattered.begin(), m_unscattered.end(), 0.0f);
+    m_unscattered_rays.clear();
+}
+
 }  // namespace beamspread

@@ -13,7 +13,7 @@ namespace beamspread {
 class LightField {
 public:
     // `problem.lights` of one direction are kept as they are. Other ones, and a survey of the light to come, only tell
-    // how exactly what will be added is to be kept. Throws InvalidArgument, Cancelled.
+    // how exactly what will be added is to be kept; with a survey alone, any light of its angles. Throws InvalidArgument, Cancelled.
     LightField(const Problem& problem, Progress& progress);
 
     void add(const PlaneLight& light);
@@ -21,8 +21,11 @@ public:
     // Of rows that no other thread adds to.
     void add(const RayBeams& rays, const std::vector<double>& color, bool is_colored);
 
-    // Writes (height, width, channels), radiance in W/(m^2 sr), once.
+    // Writes (height, width, channels), radiance in W/(m^2 sr).
     void solve(Progress& progress, float* luminance);
+
+    // Forgets what was added; terms and kernels stay for the light that comes next.
+    void clear();
 
     const Problem& problem() const { return m_problem; }
     std::size_t terms() const { return m_field.terms(); }

@@ -273,6 +273,11 @@ void UnscatteredRays::add(const RayBeams& rays, const std::vector<double>& color
     }
 }
 
+void UnscatteredRays::clear()
+{
+    std::fill(m_sums.begin(), m_sums.end(), 0);
+}
+
 void UnscatteredRays::add_to(float* luminance) const
 {
     for (std::size_t i = 0; i < m_sums.size(); ++i)

@@ -26,6 +26,7 @@ public:
 
     void add(const RayBeams& rays, const std::vector<double>& color);
     void add_to(float* luminance) const;
+    void clear();
 
 private:
     struct Exits;

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import csv
 import math
+import sys
 from pathlib import Path
 
+import beamspread
 import bpy
 import numpy as np
 from mathutils import Matrix
 
 REFERENCE = Path(__file__).resolve().parent.parent / "reference" / "adding_doubling.csv"
+BATCH = Path(beamspread.__file__).parent / "batch.py"
 SQUARE_UVS = ((0, 0), (1, 0), (1, 1), (0, 1))
 
 
@@ -36,12 +39,15 @@ def add_plane(name="Plane", size=(2.0, 2.0), matrix=None, uvs=SQUARE_UVS, materi
     return obj
 
 
-def add_material(name="Medium", image=None, linked=False, **properties):
-    """A material with a Beamspread node."""
+def add_material(name="Medium", image=None, linked=False, shader=False, **properties):
+    """A material with a Beamspread node; it shows nothing, or with `shader` the Principled BSDF of new materials."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
+    for link in () if shader else list(material.node_tree.links):
+        material.node_tree.links.remove(link)
     node = material.node_tree.nodes.new("BeamspreadNode")
-    for key, value in ({"albedo": (0.9, 0.8, 0.6), "mean_free_path": (0.05,) * 3} | properties).items():
+    values = {"albedo": (0.9, 0.8, 0.6), "mean_free_path": (0.05,) * 3, "ior": 1.0}
+    for key, value in (values | properties).items():
         setattr(node, key, value)
     node.image = image
     if linked:
@@ -66,6 +72,16 @@ def add_sun(angle_deg=0.0, azimuth_deg=0.0, strength=1.0, color=(1, 1, 1), matri
     data.energy, data.color, data.angle = strength, color, 0.0
     obj = bpy.data.objects.new("Sun", data)
     obj.matrix_world = (matrix or Matrix()) @ sun_matrix(angle_deg, azimuth_deg)
+    bpy.context.collection.objects.link(obj)
+    return obj
+
+
+def add_lamp(location, power=100.0):
+    """A point lamp, watts."""
+    data = bpy.data.lights.new("Lamp", "POINT")
+    data.energy, data.shadow_soft_size = power, 0.0
+    obj = bpy.data.objects.new("Lamp", data)
+    obj.location = location
     bpy.context.collection.objects.link(obj)
     return obj
 
@@ -95,6 +111,22 @@ def bake(*objects):
     select(*objects)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
     return [pixels(node_of(obj.data.materials[0]).image) for obj in objects]
+
+
+def save_scene(folder):
+    """Save the current scene; its path."""
+    bpy.context.scene.beamspread.resolution = 32
+    path = folder / "scene.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def batch_command(scene, *arguments, program=()):
+    """The command line of a batch, in this Blender; `program` are options of Blender itself."""
+    start = [sys.executable, BATCH, scene]
+    if bpy.app.binary_path:
+        start = [bpy.app.binary_path, "-b", "--factory-startup", scene, *program, "--python", BATCH, "--"]
+    return [*map(str, start), *map(str, arguments)]
 
 
 def messages_of(callable_):

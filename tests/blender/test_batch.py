@@ -3,40 +3,25 @@
 import json
 import stat
 import subprocess
-import sys
 from pathlib import Path
 
-import beamspread
 import bpy
 import numpy as np
 import pytest
 from beamspread.core.native import native
 from mathutils import Matrix
-from scenes import add_material, add_plane, add_sun, bake, node_of, pixels
+from scenes import BATCH, add_material, add_plane, add_sun, bake, batch_command, node_of, pixels, save_scene
 
-BATCH = Path(beamspread.__file__).parent / "batch.py"
 KEYS = {"object", "material", "frame", "path", "width", "height", "seconds", "status", "message"} | {
     *("output", "lights", "left_out", "indirect", "dark"),
 }
 
 
-def save_scene(folder):
-    """Save the current scene; its path."""
-    bpy.context.scene.beamspread.resolution = 32
-    path = folder / "scene.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return path
-
-
 def run_batch(scene, *arguments, program=()):
     """Run a batch; (exit code, bakes of its report or None, all it printed)."""
     report = scene.parent / "report.json"
-    arguments = [*arguments, "--report", str(report)]
-    if bpy.app.binary_path:
-        start = [bpy.app.binary_path, "-b", "--factory-startup", str(scene), *program, "--python", str(BATCH), "--"]
-    else:
-        start = [sys.executable, str(BATCH), str(scene)]
-    done = subprocess.run([*start, *map(str, arguments)], capture_output=True, text=True, timeout=300)
+    command = batch_command(scene, *arguments, "--report", report, program=program)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     bakes = json.loads(report.read_text())["bakes"] if report.exists() else None
     return done.returncode, bakes, done.stdout + done.stderr
 
@@ -225,14 +210,6 @@ def test_output_folder_that_cannot_be_made(tmp_path):
     assert bakes[0]["status"] == "failed"
     assert "cannot be made" in bakes[0]["message"]
     assert "Traceback" not in output
-
-
-def test_resume_is_refused(tmp_path):
-    add_plane(material=add_material())
-    code, bakes, output = run_batch(save_scene(tmp_path), "--resume")
-    assert code != 0
-    assert bakes is None
-    assert "not supported yet" in output
 
 
 @pytest.mark.skipif(not bpy.app.binary_path, reason="add-ons are installed in Blender's program")

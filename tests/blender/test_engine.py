@@ -1,10 +1,13 @@
 """The engine: Blender's own Bake fills the active image through RenderEngine.bake."""
 
 import math
+import time
+from unittest.mock import MagicMock
 
 import bpy
 import numpy as np
 import pytest
+from beamspread.blender.jobs.picture import render_picture
 from beamspread.blender.jobs.state import state
 from mathutils import Matrix
 from scenes import (
@@ -93,6 +96,26 @@ def test_failure_is_reported_and_does_not_touch_the_rest():
     assert state.messages() == []
 
 
+@pytest.mark.parametrize("is_active", [True, False])
+def test_a_texture_of_the_node_is_not_baked_to(is_active):
+    """Blender bakes to the first image texture where none is active, and clears it before it asks."""
+    plane = add_plane(material=add_material())
+    add_sun(0)
+    material = plane.data.materials[0]
+    texture = add_active_image(material)
+    texture.pixels.foreach_set([0.5] * len(texture.pixels))
+    texture.pack()
+    source = material.node_tree.nodes.active
+    material.node_tree.links.new(node_of(material).inputs["Base Color"], source.outputs["Color"])
+    if not is_active:
+        material.node_tree.nodes.active = node_of(material)
+    select(plane)
+    messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
+    assert "reload it" in state.messages()[0]
+    texture.reload()
+    assert np.array_equal(pixels(texture), np.full((32, 32, 3), 0.5))
+
+
 def test_plain_material_is_refused():
     plane = add_plane(material=bpy.data.materials.new("Plain"))
     plane.data.materials[0].use_nodes = True
@@ -113,15 +136,73 @@ def test_viewport_hidden_caster_and_modifiers_render():
     assert np.array_equal(pixels(image), np.zeros((32, 32, 3)))
 
 
-def test_f12_ends_and_says_what_to_do(capfd):
+@pytest.fixture
+def seen():
+    """A camera above a plane that shows a known image, 8 x 8 pixels of Cycles."""
     scene = bpy.context.scene
+    image = bpy.data.images.new("Known", 4, 4, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    image.pixels.foreach_set([0.25, 0.5, 0.75, 1] * 16)
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.type, camera.data.ortho_scale, camera.location.z = "ORTHO", 1.0, 2.0
     scene.collection.objects.link(camera)
     scene.camera = camera
-    scene.render.resolution_x = scene.render.resolution_y = 16
-    bpy.ops.render.render()
-    assert "press Bake" in capfd.readouterr().out
+    scene.render.resolution_x, scene.render.resolution_y = 8, 6
+    scene.cycles.samples, scene.cycles.use_denoising = 4, False
+    return add_plane(material=add_material(image=image, linked=True))
+
+
+def picture(tmp_path):
+    """What F12 gives, (height, width, 3) linear."""
+    scene = bpy.context.scene
+    scene.render.image_settings.file_format, scene.render.filepath = "OPEN_EXR", str(tmp_path / "f12.exr")
+    bpy.ops.render.render(write_still=True)
+    return pixels(bpy.data.images.load(str(tmp_path / "f12.exr")))
+
+
+@pytest.mark.parametrize("engine", ["CYCLES", "EEVEE"])
+def test_f12_shows_the_scene_with_its_baked_images(seen, tmp_path, engine):
+    bpy.context.scene.beamspread.render_engine = engine
+    found = picture(tmp_path)
+    assert found.shape == (6, 8, 3)
+    assert found == pytest.approx(np.tile([0.25, 0.5, 0.75], (6, 8, 1)), abs=2e-3)
+    assert bpy.context.scene.render.engine == "BEAMSPREAD"
+
+
+def test_f12_renders_the_frame_the_border_and_each_view_layer(seen, tmp_path):
+    scene = bpy.context.scene
+    seen.location.x = 5
+    seen.keyframe_insert("location", frame=1)
+    seen.location.x = 0
+    seen.keyframe_insert("location", frame=2)
+    scene.frame_set(2)
+    scene.view_layers.new("Second")
+    scene.render.use_border = scene.render.use_crop_to_border = True
+    scene.render.border_max_x = 0.5
+    found = picture(tmp_path)
+    assert found.shape == (6, 4, 3)
+    assert found == pytest.approx(np.tile([0.25, 0.5, 0.75], (6, 4, 1)), abs=2e-3)
+
+
+def test_f12_ends_soon_when_it_should_and_keeps_no_picture(seen):
+    engine, scene = MagicMock(resolution_x=1024, resolution_y=1024), bpy.context.scene
+    engine.test_break.side_effect = [False] * 30 + [True] * 1000  # asked ten times a second
+    scene.cycles.samples, scene.cycles.use_adaptive_sampling = 1_000_000, False
+    began = time.monotonic()
+    render_picture(engine, bpy.context.evaluated_depsgraph_get())
+    assert time.monotonic() - began < 30
+    engine.end_result.assert_called_once_with(engine.begin_result.return_value, cancel=True)
+    engine.report.assert_not_called()
+    assert engine.begin_result.return_value.load_from_file.call_count == 0
+
+
+def test_f12_that_fails_says_why(seen, tmp_path, capfd):
+    bpy.context.scene.camera = None
+    said = messages_of(lambda: picture(tmp_path)) + capfd.readouterr().out
+    assert "camera" in said
 
 
 def test_panels_of_blender_know_the_engine():
-    assert "BEAMSPREAD" in bpy.types.MATERIAL_PT_preview.COMPAT_ENGINES
+    names = ["MATERIAL_PT_preview", "RENDER_PT_color_management", "RENDER_PT_output", "RENDER_PT_format"]
+    for name in names:
+        assert "BEAMSPREAD" in getattr(bpy.types, name).COMPAT_ENGINES

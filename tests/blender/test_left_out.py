@@ -4,9 +4,11 @@ from unittest.mock import MagicMock
 
 import bpy
 import pytest
+from beamspread.blender.compat import add_input_socket
+from beamspread.blender.jobs import stale
 from beamspread.blender.jobs.batch import bake_all
 from beamspread.blender.jobs.state import state
-from beamspread.blender.ui import panels
+from beamspread.blender.ui import results
 from beamspread.core.batch import options
 from mathutils import Matrix
 from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
@@ -30,7 +32,10 @@ def add_group_material():
 
 
 def add_grouped():
-    return add_plane("Grouped", material=add_group_material())
+    """Its group is another material's, too."""
+    plane = add_plane("Grouped", material=add_group_material())
+    plane.data.materials[0].copy()
+    return plane
 
 
 def add_instance():
@@ -57,7 +62,7 @@ def add_curve():
 
 
 MISPLACED = [
-    (add_grouped, "Grouped", ["'Grouped' can't be baked inside the node group 'Inner'", "Ctrl Alt G"]),
+    (add_grouped, "Grouped", ["'Grouped' is in the node group 'Outer'", "Ctrl Alt G"]),
     (add_instance, "Instance of Outer", ["'Shown'", "instance", "'Outer'", "Make Instances Real"]),
     (add_curve, "Spline", ["'Spline' is no mesh", "Convert"]),
 ]
@@ -85,6 +90,42 @@ def test_the_others_are_baked(add):
     add_sun(0)
     assert messages_of(lambda: bpy.ops.beamspread.bake(objects="ALL")).count("Error") == 1
     assert (pixels(node_of(plane.data.materials[0]).image) > 0).all()
+
+
+def test_a_node_in_a_group_of_its_own_is_baked():
+    plane = add_plane(material=add_group_material())
+    add_sun(0)
+    select(plane)
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    inner = bpy.data.node_groups["Inner"]
+    node = next(node for node in inner.nodes if node.bl_idname == "BeamspreadNode")
+    assert (pixels(node.image) > 0).all()
+    assert "link the BSDF of the node in 'Inner'" in state.messages()[0]
+    assert [one.bl_idname for one in inner.nodes] == ["BeamspreadNode"]
+
+
+def test_a_texture_reaches_a_group_by_its_input():
+    material = add_group_material()
+    outer, inner = bpy.data.node_groups["Outer"], bpy.data.node_groups["Inner"]
+    node = next(node for node in inner.nodes if node.bl_idname == "BeamspreadNode")
+    node.texture_blur, node.ior = 0.0, 1.0
+    for tree in (outer, inner):
+        add_input_socket(tree, "NodeSocketColor", "Tint")
+    given = inner.nodes.new("NodeGroupInput")
+    inner.links.new(node.inputs["Base Color"], given.outputs["Tint"])
+    within = next(one for one in outer.nodes if one.bl_idname == "ShaderNodeGroup")
+    outer.links.new(within.inputs["Tint"], outer.nodes.new("NodeGroupInput").outputs["Tint"])
+    checker = material.node_tree.nodes.new("ShaderNodeTexCoord")
+    group = next(one for one in material.node_tree.nodes if one.bl_idname == "ShaderNodeGroup")
+    material.node_tree.links.new(group.inputs["Tint"], checker.outputs["UV"])
+    plane = add_plane(material=material)
+    add_sun(0)
+    select(plane)
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    found = pixels(node.image)
+    # Red is u and green v: with the texture on top, the ratio of opposite texels is that of their colours.
+    assert found[8, 15, 0] / found[8, 0, 0] == pytest.approx(15.5 / 0.5, rel=1e-3)
+    assert found[15, 8, 1] / found[0, 8, 1] == pytest.approx(15.5 / 0.5, rel=1e-3)
 
 
 def test_an_instance_of_what_was_baked_is_no_mistake():
@@ -187,17 +228,18 @@ def test_a_black_bake_says_why(add, words, tmp_path):
 
 def test_a_panel_says_once_what_both_the_object_and_its_last_bake_say(monkeypatch):
     said = []
-    monkeypatch.setattr(panels, "draw_warnings", lambda _layout, _context, messages: said.extend(messages))
+    monkeypatch.setattr(results, "draw_sentences", lambda _layout, _context, messages, _icon: said.extend(messages))
     select(add_grouped())
     messages_of(bpy.ops.beamspread.bake)
     (message,) = state.messages()
-    panels.draw_bake(MagicMock(), bpy.context)
-    assert said == [message.replace("Grouped / Grouped: ", "Grouped: ")]
+    results.draw_bake(MagicMock(), bpy.context)
+    assert said == [message.replace("Grouped / Grouped: ", "Grouped: "), "Grouped: Failed"]
     # Once nothing of it is selected, the bake's own words stay.
     said.clear()
     bpy.ops.object.select_all(action="DESELECT")
-    panels.draw_bake(MagicMock(), bpy.context)
-    assert said == [message]
+    stale.refresh(bpy.context)
+    results.draw_bake(MagicMock(), bpy.context)
+    assert said == ["Grouped: Failed", message.replace("Grouped / Grouped: ", "")]
 
 
 def test_messages_go_with_the_file():

@@ -68,7 +68,7 @@ def test_baking_again_replaces_the_pixels():
 
 
 def test_an_artists_own_use_of_the_node_is_kept():
-    material = add_material()
+    material = add_material(shader=True)
     tree = material.node_tree
     principled = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeBsdfPrincipled")
     tree.links.new(principled.inputs["Base Color"], node_of(material).outputs["Color"])
@@ -352,7 +352,7 @@ def test_other_layers_have_images_and_files_beside_the_combined_one(monkeypatch,
     image = node_of(plane.data.materials[0]).image
     assert pixels(bpy.data.images[f"{image.name} Half"]) == pytest.approx(combined / 2)
     bake(plane)
-    assert sorted(one.name for one in bpy.data.images) == ["Beamspread Plane", "Beamspread Plane Half"]
+    assert sorted(one.name for one in bpy.data.images) == ["Plane_Medium", "Plane_Medium Half"]
     report = bake_all(options.parse(["--output", str(tmp_path)]))
     assert [Path(one.path).name for one in report.bakes] == ["Plane_Medium.exr"]
     assert native.read_exr(str(tmp_path / "Plane_Medium_Half.exr"))[0] == pytest.approx(combined / 2)

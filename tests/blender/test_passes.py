@@ -95,7 +95,7 @@ def test_direction_follows_the_texture(settings):
     )
     across = np.array([-along[1], along[0]])
     expected = [along @ (x, y), across @ (x, y), z]
-    baked = pixels(bpy.data.images["Beamspread Plane Direction"])
+    baked = pixels(bpy.data.images["Plane_Medium Direction"])
     assert baked == pytest.approx(np.broadcast_to(expected, baked.shape), abs=1e-6)
 
 
@@ -112,7 +112,7 @@ def test_passes_go_into_images_of_their_own_and_leave_the_nodes_alone(settings):
     for output, value in expected.items():
         settings.output = output
         assert np.array_equal(bake(plane)[0], luminance)
-        image = bpy.data.images[f"Beamspread Plane {output.capitalize()}"]
+        image = bpy.data.images[f"Plane_Medium {output.capitalize()}"]
         assert image.is_float
         assert image.colorspace_settings.is_data
         shown = pixels(image)
@@ -123,10 +123,10 @@ def test_passes_go_into_images_of_their_own_and_leave_the_nodes_alone(settings):
     node.image.scale(16, 8)
     bake(plane)
     assert sorted(one.name for one in bpy.data.images) == [
-        f"Beamspread Plane{end}" for end in ("", " Direction", " Irradiance")
+        f"Plane_Medium{end}" for end in ("", " Direction", " Irradiance")
     ]
-    assert tuple(bpy.data.images["Beamspread Plane Direction"].size) == (16, 8)
-    assert tuple(bpy.data.images["Beamspread Plane Irradiance"].size) == (32, 32)
+    assert tuple(bpy.data.images["Plane_Medium Direction"].size) == (16, 8)
+    assert tuple(bpy.data.images["Plane_Medium Irradiance"].size) == (32, 32)
 
 
 def test_a_pass_alone_links_nothing(settings):
@@ -211,7 +211,7 @@ class Layout:
     def column(self, **_options):
         return self
 
-    row = column
+    row = box = column
 
     def prop(self, _owner, name, **_options):
         self.properties.append(name)
@@ -223,9 +223,10 @@ class Layout:
         return self
 
 
-def drawn():
+def drawn(*panels_drawn):
     layout = Layout()
-    panels.BEAMSPREAD_PT_render.draw(SimpleNamespace(layout=layout), Context())
+    for panel in panels_drawn:
+        panel.draw(SimpleNamespace(layout=layout), Context())
     return layout
 
 
@@ -240,10 +241,13 @@ class Context:
 
 
 def test_the_panel_shows_what_counts_and_what_it_costs(settings):
-    assert {"output", "use_indirect", "solver", "distributions"} <= set(drawn().properties)
-    assert drawn().text == []
+    plain, expert = panels.BEAMSPREAD_PT_render, panels.BEAMSPREAD_PT_expert
+    select(add_plane(material=add_material()))
+    assert {"output", "use_indirect"} <= set(drawn(plain).properties)
+    assert {"solver", "distributions", "quality", "samples", "margin"} <= set(drawn(expert).properties)
+    assert "Indirect light" not in " ".join(drawn(plain).text)
     settings.use_indirect = True
-    assert "Cycles" in " ".join(drawn().text)
+    assert "Indirect light: about" in " ".join(drawn(plain).text)
     settings.output = "IRRADIANCE"
-    assert {"output", "use_indirect", "samples"} <= set(drawn().properties)
-    assert not {"solver", "distributions", "quality"} & set(drawn().properties)
+    assert {"output", "use_indirect", "samples"} <= set(drawn(plain, expert).properties)
+    assert not {"solver", "distributions", "quality"} & set(drawn(plain, expert).properties)

@@ -1,6 +1,7 @@
 """The operator and the panels in a window: started, watched, cancelled and undone by events, drawn for real."""
 
 import json
+import os
 import subprocess
 from pathlib import Path
 
@@ -20,7 +21,8 @@ def seen(tmp_path_factory):
     options = ["--factory-startup", "--enable-event-simulate", "--window-geometry", "0", "0", "1600", "1000"]
     script = ["--python-exit-code", "1", "--python", str(Path(__file__).with_name("window.py")), "--", str(path)]
     command = [*screen, bpy.app.binary_path, *options, *script]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    environment = os.environ | {"BEAMSPREAD_CACHE": str(path.parent / "cache")}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment)
     assert path.exists(), done.stdout + done.stderr
     results = json.loads(path.read_text())
     assert "error" not in results, results["error"]
@@ -31,12 +33,12 @@ def seen(tmp_path_factory):
 
 
 def test_every_panel_the_node_and_its_menu_are_drawn(seen):
-    assert set(seen["drawn"]) == {panel.__name__ for panel in panels._classes} | {"node", "menu"}
+    assert set(seen["drawn"]) == {panel.__name__ for panel in panels._classes} | {"draw", "menu"}
 
 
 def test_a_bake_runs_beside_the_user_and_one_at_a_time(seen):
     assert seen["returned"] == ["RUNNING_MODAL"]
-    assert seen["running"] == "Baking First / First"
+    assert seen["running"] == "First / First"
     assert not seen["can start another"]
     first, second = seen["baked"]
     # The same plane under the same sun twice.
@@ -49,19 +51,34 @@ def test_a_bake_is_one_step_of_undo(seen):
 
 
 def test_escape_ends_a_bake_of_minutes_and_keeps_the_images(seen):
-    own, everything = (int(part.split("%")[0].split()[-1]) for part in seen["progress"].split(","))
-    assert 0 < own < 100
-    # Of two bakes, rounded apart.
-    assert everything == pytest.approx(own / 2, abs=1)
-    assert seen["seconds to cancel"] < 60
+    own, everything, doing = seen["progress"]
+    assert 0 < own < 1
+    assert doing == "Baking"
+    # Of two bakes.
+    assert everything == pytest.approx(own / 2)
+    # Drawn by software beside other processes, the window answers slowly; test_queue.py times the bake alone.
+    assert seen["seconds to cancel"] < 10
     assert seen["kept by cancel"]
     assert seen["messages of cancel"] == ["First / First: The bake was cancelled."]
+
+
+def test_escape_ends_what_was_opened_last(seen):
+    assert seen["goes on behind a menu"]
+
+
+def test_a_first_look_is_there_before_the_simulation_and_stays_if_that_is_cancelled(seen):
+    steps = [step for step in seen["steps"] if step != "Baking"]  # which may be over before anyone looks
+    assert steps == ["Simulating the medium, once (preview)", "Simulating the medium, once"]
+    assert seen["first look"][0]
+    assert "first look" in seen["first look"][1]
+    assert seen["out of date"]
 
 
 def test_what_fails_meanwhile_is_said_in_the_panels_and_the_others_are_baked(seen):
     sentence = "First / First: The material or its Beamspread node was removed during the bake."
     assert sentence in seen["messages of removal"]
-    assert sentence in seen["shown"]
+    assert sentence.partition(": ")[2] in seen["shown"]
+    assert any(sentence in sentences for _, sentences in seen["popups"])
     # The sun became 100 times as strong; 512 instead of 32 texels see the border a little differently.
     assert seen["baked after removal"] == pytest.approx(100, rel=0.05)
 

@@ -18,13 +18,16 @@ sys.path[:0] = [str(FOLDER), str(FOLDER.parent.parent / "build" / "stage")]
 
 import beamspread  # noqa: E402
 import scenes  # noqa: E402
+from beamspread.blender.jobs import popup  # noqa: E402
 from beamspread.blender.jobs.state import state  # noqa: E402
-from beamspread.blender.node import menu, node  # noqa: E402
+from beamspread.blender.node import draw, menu  # noqa: E402
 from beamspread.blender.ui import panels  # noqa: E402
+from beamspread.blender.ui import results as shown  # noqa: E402
+from beamspread.core.bake.runner import Target  # noqa: E402
 
 # The slowest step takes a second or two on an idle machine.
 PATIENCE_SECONDS = 60
-results = {"drawn": {}, "shown": []}
+results = {"drawn": {}, "shown": [], "popups": []}
 
 
 def count_draws(owner, name: str) -> None:
@@ -48,15 +51,22 @@ def prepare_panels() -> None:
         count_draws(panel, "draw")
         panel.bl_options = set()
     panels.BEAMSPREAD_PT_node_editor.bl_category = "Node"
-    count_draws(node, "draw_properties")
+    count_draws(draw, "draw_properties")
     count_draws(menu, "_draw")
-    draw_warnings = panels.draw_warnings
+    draw_sentences = shown.draw_sentences
 
-    def record(layout, context, messages):
+    def record(layout, context, messages, icon):
         results["shown"].extend(message for message in messages if message not in results["shown"])
-        draw_warnings(layout, context, messages)
+        draw_sentences(layout, context, messages, icon)
 
-    panels.draw_warnings = record
+    shown.draw_sentences = record
+    show_soon = popup.show_soon
+
+    def note(title, sentences):
+        results["popups"].append([title, sentences])
+        show_soon(title, sentences)
+
+    popup.show_soon = note
 
 
 def areas() -> list:
@@ -113,6 +123,13 @@ def brightness(name: str) -> float:
     return -1.0 if image is None else float(scenes.pixels(image).mean())
 
 
+def note_step() -> bool:
+    """Keep what the run says that it does, each once; True."""
+    if state.progress is not None and state.progress.doing not in ("", *results["steps"]):
+        results["steps"].append(state.progress.doing)
+    return True
+
+
 def scenario():
     bpy.ops.wm.read_homefile(use_empty=False, use_factory_startup=True, load_ui=True)
     yield lambda: True
@@ -140,7 +157,7 @@ def scenario():
     bpy.ops.ed.undo_push(message="before")
     results["returned"] = sorted(started(objects="ALL"))
     results["can start another"] = can_start()
-    results["running"] = state.progress()[0]
+    results["running"] = str(state.progress.target)
     yield ended
     results["baked"] = [brightness(name) for name in ("First", "Second")]
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
@@ -155,10 +172,19 @@ def scenario():
     for name in ("First", "Second"):
         image_of(name).scale(512, 512)
     before = [brightness(name) for name in ("First", "Second")]
-    began = time.monotonic()
     started(objects="ALL")
-    yield lambda: not state.progress()[1].startswith("0%")
-    results["progress"] = state.progress()[1]
+    yield lambda: state.progress.own > 0.02
+    results["progress"] = [state.progress.own, state.progress.everything, state.progress.doing]
+    opened = []
+    bpy.types.TOPBAR_MT_file.append(lambda _menu, _context: opened.append(True))
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        bpy.ops.wm.call_menu("INVOKE_DEFAULT", name="TOPBAR_MT_file")
+    yield lambda: opened
+    press_escape()
+    for _ in range(10):  # ticks of the operator's timer
+        yield lambda: True
+    results["goes on behind a menu"] = state.is_running() and not state.should_stop()
+    began = time.monotonic()
     press_escape()
     yield ended
     results["seconds to cancel"] = time.monotonic() - began
@@ -171,7 +197,24 @@ def scenario():
     yield ended
     results["messages of removal"] = state.messages()
     results["baked after removal"] = brightness("Second") / before[1]
-    yield lambda: state.messages()[0] in results["shown"]
+    yield lambda: results["messages of removal"][0].partition(": ")[2] in results["shown"]
+
+    # A medium that takes a minute: what a quick simulation gives is there long before.
+    target = Target("Second", "Second")
+    settings.quality, scenes.node_of(bpy.data.materials["Second"]).ior = "final", 1.234
+    scenes.select(bpy.data.objects["Second"])
+    old = brightness("Second")
+    results["steps"] = []
+    started()
+    yield lambda: note_step() and brightness("Second") != old
+    yield lambda: note_step() and results["steps"][-1] == "Simulating the medium, once" and state.progress.own > 0
+    looked = brightness("Second")
+    bpy.ops.beamspread.cancel()
+    yield ended
+    yield lambda: state.rows[target].sentences
+    results["first look"] = [looked == brightness("Second"), state.rows[target].sentences[0]]
+    results["out of date"] = state.rows[target].is_stale
+    settings.quality = "preview"
 
     try:
         scenes.node_of(bpy.data.materials["Second"]).albedo = (1, 1, 1)

@@ -48,7 +48,6 @@ def test_a_single_frame():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--resume"], "not supported yet"),
         (["--frames", "5-2"], "ends before it starts"),
         (["--frames", "a-b"], "not a frame"),
         (["--frames", "-"], "--frames"),

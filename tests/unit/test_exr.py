@@ -5,6 +5,7 @@ import struct
 
 import numpy as np
 import pytest
+from beamspread.core.exr_header import is_half
 from beamspread.core.native import native
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -84,6 +85,31 @@ def test_reads_half_float_and_unsigned_channels(tmp_path, origin):
     pixels, channels, _ = native.read_exr(str(path))
     assert channels == ["R", "G", "B", "A"]
     np.testing.assert_array_equal(pixels[::-1], values[..., ::-1])
+
+
+@pytest.mark.parametrize("compression", ["zip", "none"])
+def test_writes_half_float(tmp_path, compression):
+    path, pixels = tmp_path / "a.exr", image(37, 21)
+    native.write_exr(str(path), pixels, ["R", "G", "B"], compression=compression, half=True)
+    np.testing.assert_array_equal(native.read_exr(str(path))[0], pixels.astype(np.float16))
+    assert is_half(path)
+    assert path.stat().st_size < pixels.nbytes
+    native.write_exr(str(path), pixels, ["R", "G", "B"], compression=compression)
+    assert not is_half(path)
+
+
+def test_half_is_told_by_the_header(tmp_path):
+    path = tmp_path / "a.exr"
+    assert not is_half(path)
+    for channels, expected in (([("A", HALF), ("B", HALF)], True), ([("A", HALF), ("B", FLOAT)], False)):
+        path.write_bytes(plain_exr(image(4, 6, 2), channels))
+        assert is_half(path) == expected
+    path.write_bytes(plain_multi_part({"a": (image(3, 4, 1), [("Y", HALF)]), "b": (image(3, 4, 1), [("Y", HALF)])}))
+    assert is_half(path)
+    whole = path.read_bytes()
+    for damaged in (b"", b"nothing of the kind", whole[:9], whole[:40]):
+        path.write_bytes(damaged)
+        assert not is_half(path)
 
 
 def test_layers_keep_together(tmp_path):

@@ -2,7 +2,7 @@
 
 import json
 
-from beamspread.core.batch.report import BakeRecord, Report, file_name
+from beamspread.core.batch.report import BakeRecord, Report
 
 KEYS = {"object", "material", "frame", "path", "width", "height", "seconds", "status", "message"}
 KEYS |= {"output", "lights", "left_out", "indirect", "dark"}
@@ -22,18 +22,11 @@ def test_all_written_needs_at_least_one_bake():
     assert not Report().all_written()
     assert Report([BakeRecord("A", status="written")]).all_written()
     assert not Report([BakeRecord("A", status="written"), BakeRecord("B", status="failed")]).all_written()
-    assert not Report([BakeRecord("A", status="skipped")]).all_written()
+    assert Report([BakeRecord("A", status="written"), BakeRecord("B", status="skipped")]).all_written()
+    assert not Report([BakeRecord("A", status="written"), BakeRecord("B", status="cancelled")]).all_written()
 
 
 def test_a_record_reads_as_a_line():
     written = BakeRecord("Floor", "Marble", 3, "f.exr", 4, 5, 0.25, "written")
     assert str(written) == "Floor / Marble, frame 3: written f.exr (4 x 5, 0.2 s)"
     assert str(BakeRecord("Floor", frame=1, message="No.")) == "Floor, frame 1: failed: No."
-
-
-def test_file_names_are_safe_and_distinct():
-    taken = set()
-    assert file_name(["Floor", "Marble"], None, ".exr", taken) == "Floor_Marble.exr"
-    assert file_name(["floor", "marble"], None, ".exr", taken) == "floor_marble_2.exr"
-    assert file_name(["../a/b", "c:d"], 12, ".png", taken) == "a_b_c_d_0012.png"
-    assert file_name(["..", "Größe"], None, ".exr", taken) == "unnamed_Größe.exr"

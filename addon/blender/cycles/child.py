@@ -15,9 +15,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import child_fields
+import child_render
 import child_world
 
-TASKS = {"world": child_world.panorama, "fields": child_fields.fields}
+TASKS = {"world": child_world.panorama, "fields": child_fields.fields, "render": child_render.render}
 
 
 def restore_images(file: Path) -> None:

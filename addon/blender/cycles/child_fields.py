@@ -113,7 +113,7 @@ class Mean:
         self._samples = self._samples + samples * np.isfinite(pixels)
 
     def values(self) -> np.ndarray:
-        return self._total / np.maximum(self._samples, 1)
+        return np.float32(self._total / np.maximum(self._samples, 1))
 
 
 class Baker:

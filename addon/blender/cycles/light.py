@@ -19,6 +19,7 @@ from ...core.progress import Progress, stages
 from ...core.scene.illumination import Illumination
 from ...core.scene.lights import STRATA, Field, FieldLight, LampFieldLight, Light, WorldLight
 from ...core.scene.receiver import Receiver
+from .. import compat
 from ..node.find import find_node
 from ..read.visible import render_visible_names, renders
 from .process import run
@@ -53,41 +54,40 @@ class CyclesLight:
     """Completes the jobs of one scene, which share a copy of it. Make it, and call `complete`, in the main thread."""
 
     def __init__(self, depsgraph) -> None:
-        self._scene = bpy.data.scenes[depsgraph.scene.name]
-        self._view_layer = self._scene.view_layers[depsgraph.view_layer.name]
+        # By name: undo between two jobs brings other data-blocks.
+        self._names = depsgraph.scene.name, depsgraph.view_layer.name
+        world = compat.world_of(depsgraph)
+        self._world = world.name if world else ""
         self._corners = _corners_of_solids(depsgraph)
-        self._lamps = {obj.name: _place(obj) for obj in self._scene.objects if obj.type == "LIGHT"}
+        self._lamps = {obj.name: _place(obj) for obj in bpy.data.scenes[self._names[0]].objects if obj.type == "LIGHT"}
         self._copy: SceneCopy | None = None
         self._surfaces: dict = {}
         self._panorama: WorldLight | None = None
 
     def complete(self, job: BakeJob) -> BakeJob:
         """The job, with what finds the light that it still lacks."""
-        illumination = job.illumination
-        world = self._world_name() if self._world_name() in illumination.by_cycles else ""
+        illumination, scene = job.illumination, bpy.data.scenes[self._names[0]]
+        world = self._world if self._world in illumination.by_cycles else ""
         bounced = job.settings.indirect and bool(illumination.lights or illumination.by_cycles)
         bounced = bounced and self._is_below_something(job.receiver)
-        others = [name for name in illumination.by_cycles if name != world and name in self._scene.objects]
+        others = [name for name in illumination.by_cycles if name != world and name in scene.objects]
         if not (world or bounced or others):
             return job
         if threading.current_thread() is not threading.main_thread():
             missing = "Blender's own Bake leaves out what Cycles finds, as bounced light: use Bake Beamspread."
             return replace(job, illumination=illumination.warning(missing))
         if self._copy is None:
-            self._copy = SceneCopy(self._scene, self._view_layer)
+            self._copy = SceneCopy(scene, scene.view_layers[self._names[1]])
             self._surfaces = {one.name: find_node(one).surface() for one in bpy.data.materials if find_node(one)}
         illumination = illumination.found({world, *others} - {""}).warning(*self._copy.warnings)
         return replace(
             job,
             illumination=illumination,
+            more_seconds=seconds_estimate(job.receiver.width, job.receiver.height) * (bounced + len(others)),
             more_light=lambda receiver, progress: self._find(
                 receiver, illumination.lights, world, others, bounced, progress
             ),
         )
-
-    def _world_name(self) -> str:
-        world = getattr(self._view_layer, "world_override", None) or self._scene.world
-        return world.name if world else ""
 
     def _is_below_something(self, receiver: Receiver) -> bool:
         for grid in (chart.grid for chart in receiver.charts):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 import threading
@@ -22,6 +23,9 @@ CHILD = Path(__file__).with_name("child.py")
 
 # Begins the lines by which the child says how far it is; Blender prints many others.
 MARK = "BEAMSPREAD-PROGRESS"
+
+# What Cycles prints of a picture that it renders.
+SAMPLES = re.compile(r"\bSample (\d+)/(\d+)")
 
 POLL_SECONDS = 0.1
 
@@ -53,7 +57,7 @@ def run(copy: SceneCopy, task: str, request: dict, progress: Progress | None = N
     name = uuid.uuid4().hex
     output, file = copy.folder / f"{name}.npz", copy.folder / f"{name}.json"
     file.write_text(json.dumps({**copy.request, **request, "task": task, "output": str(output), "mark": MARK}))
-    child = _Child(_command(copy, file))
+    child = _Child(_command(copy, file), counts_samples=task == "render")
     try:
         while child.is_running(POLL_SECONDS):
             answer = None if progress is None else progress(child.fraction)
@@ -79,9 +83,10 @@ def _command(copy: SceneCopy, request: Path) -> list[str]:
 
 
 class _Child:
-    """A process, and what it says."""
+    """A process, and what it says: how far it is by lines of its own, or by the samples that Cycles counts."""
 
-    def __init__(self, command: list[str]) -> None:
+    def __init__(self, command: list[str], counts_samples: bool = False) -> None:
+        self._counts_samples = counts_samples
         pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
         self._process = subprocess.Popen(command, text=True, errors="replace", **pipes)
         self.fraction, self.heard = 0.0, time.monotonic()
@@ -114,5 +119,7 @@ class _Child:
             self.heard = time.monotonic()
             if line.startswith(MARK):
                 self.fraction = float(line.split()[1])
+            elif self._counts_samples and (found := SAMPLES.search(line)):
+                self.fraction = int(found[1]) / max(int(found[2]), 1)
             elif line.strip():
                 self.last_lines.append(line.strip())

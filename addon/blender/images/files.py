@@ -1,4 +1,4 @@
-"""Images of the scene, and image files."""
+"""Images of the scene: what can be baked into, and filling them."""
 
 from __future__ import annotations
 
@@ -9,9 +9,11 @@ import bpy
 import numpy as np
 
 from ...core.errors import ImageError
-from ...core.native import native
+from . import undo
+from .writing import is_read_only, pixels_of, save_image, scene_linear, set_pixels, write_exr
 
-EXTENSIONS = {"EXR": ".exr", "PNG": ".png"}
+# Formats of files that keep values above 1.
+WITH_RANGE = {".exr", ".hdr"}
 
 
 def file_of(image) -> Path | None:
@@ -40,16 +42,6 @@ def check_image(image) -> None:
         raise ImageError(f"{name} has no pixels: its file may be damaged, so choose another image in the node.")
 
 
-def is_read_only(path: Path) -> bool:
-    """Whether a file or folder is write-protected, also for an administrator, whom the system lets write anyway."""
-    return not os.access(path, os.W_OK) or not path.stat().st_mode & 0o222
-
-
-def make_image(name: str, width: int, height: int, is_data: bool = False):
-    """A new float image, of plain numbers or in the colour space that Blender gives it: scene-linear."""
-    return bpy.data.images.new(name, width, height, alpha=False, float_buffer=True, is_data=is_data)
-
-
 def fill_image(image, texture: np.ndarray) -> str:
     """Put linear RGB (height, width, 3) into an image and keep it; the path of its file, "" where it is packed.
 
@@ -59,71 +51,56 @@ def fill_image(image, texture: np.ndarray) -> str:
     if tuple(image.size) != texture.shape[1::-1]:
         raise ImageError(f"The image '{image.name}' changed its size during the bake: bake it again.")
     path = file_of(image)
-    if path is not None and path.suffix.lower() == ".exr":
-        write_exr(path, texture)
-        image.reload()
-        return str(path)
-    encode = not image.is_float and not image.colorspace_settings.is_data
-    set_pixels(image, to_srgb(texture) if encode else texture)
+    stored = to_srgb(texture) if _is_encoded(image) else texture
     if path is None:
+        set_pixels(image, stored)
         image.pack()
+        undo.stamp(image)
         return ""
-    try:
-        image.save()
-    except RuntimeError as error:
-        image.reload()
-        raise ImageError(f"The image '{image.name}' cannot be saved to {path}: {error}") from error
+    if path.suffix.lower() == ".exr":
+        write_exr(path, texture)
+        if not image.colorspace_settings.is_data:
+            image.colorspace_settings.name = scene_linear()  # which it now is, whatever it was
+    else:
+        _write_like(image, stored, path)
+    image.reload()
     return str(path)
 
 
-def set_pixels(image, texture: np.ndarray) -> None:
-    """Replace all pixels; `texture` float (height, width, 3), row 0 at the bottom, in the image's own encoding."""
-    pixels = np.ones(texture.shape[:2] + (4,), np.float32)
-    pixels[..., :3] = texture
-    image.pixels.foreach_set(pixels.ravel())
-    image.update()
-
-
-def write_file(path: Path, texture: np.ndarray, file_format: str) -> None:
-    """Write linear RGB (height, width, 3), row 0 at the bottom, as EXR or PNG."""
-    folder = path.parent
+def _write_like(image, stored: np.ndarray, path: Path) -> None:
+    """Write pixels to a file of the image's own format."""
+    copy = image.copy()
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ImageError(f"The output folder {folder} cannot be made: {error.strerror}.") from error
-    protected = next((part for part in (path, folder) if part.exists() and is_read_only(part)), None)
-    if protected is not None:
-        raise ImageError(f"The output cannot be written because {protected} is read-only.")
-    if file_format == "EXR":
-        write_exr(path, texture)
-    else:
-        write_png(path, texture)
-
-
-def write_exr(path: Path, texture: np.ndarray) -> None:
-    """Linear 32-bit float RGB, not packed, as Blender saves float images by itself."""
-    try:
-        native.write_exr(str(path), np.ascontiguousarray(texture, np.float32), ["R", "G", "B"], compression="none")
-    except OSError as error:
-        raise ImageError(f"The file {path} cannot be written: {error}") from error
-
-
-def write_png(path: Path, texture: np.ndarray) -> None:
-    """PNG for looking at; from a float image, Blender itself converts to the colour space of its byte images."""
-    height, width = texture.shape[:2]
-    image = make_image("Beamspread PNG", width, height)
-    try:
-        set_pixels(image, texture)
-        image.file_format = "PNG"
-        image.filepath_raw = str(path)
-        image.save()
-    except RuntimeError as error:
-        raise ImageError(f"The file {path} cannot be written: {error}") from error
+        if copy.size[:] != image.size[:]:
+            copy.scale(*image.size)  # as the image was since it was loaded
+        set_pixels(copy, stored)
+        save_image(copy, path)
     finally:
-        bpy.data.images.remove(image)
+        bpy.data.images.remove(copy)
 
 
 def to_srgb(linear: np.ndarray) -> np.ndarray:
     """Encode linear values with the sRGB transfer function (IEC 61966-2-1), clipped to 0..1."""
     clipped = np.clip(linear, 0, 1)
     return np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055).astype(np.float32)
+
+
+def linear_pixels(image) -> np.ndarray:
+    """What an image shows, linear RGB (height, width, 3)."""
+    stored = pixels_of(image)
+    return from_srgb(stored) if _is_encoded(image) else stored
+
+
+def clips(image) -> bool:
+    """Whether an image, or its file, holds no values above 1."""
+    path = file_of(image)
+    return not image.is_float or (path is not None and path.suffix.lower() not in WITH_RANGE)
+
+
+def _is_encoded(image) -> bool:
+    return not image.is_float and not image.colorspace_settings.is_data
+
+
+def from_srgb(encoded: np.ndarray) -> np.ndarray:
+    """Linear values from those of `to_srgb`."""
+    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4).astype(np.float32)

@@ -5,70 +5,165 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...core.bake.margin import WHOLE, extend_margin
-from ...core.bake.runner import Bake
+from ...core.bake.margin import extend_margin
+from ...core.bake.runner import Bake, Target
 from ...core.bake.settings import COMBINED
 from ...core.errors import BakeError
 from ..node.find import find_node
 from ..node.node import link_result
 from . import files
-
-# Texels wholly inside two charts, as a part of one of them: more than rounding at a common border.
-OVERLAP_TOLERANCE = 0.01
+from .new_image import keep_new, name_for
+from .owners import Parts, note_owner, others_in, overlaps, parts_of, read_parts, users_of, within
 
 
 class Results:
     """The images filled in one run; objects that share an image each fill their own part of it."""
 
     def __init__(self) -> None:
-        self._filled: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        self._planned: dict[str, list[Target]] = {}  # by the name of the image, in the order of the run
+        self._parts: dict[tuple, Parts] = {}  # by target and size
+
+    def admit(self, bake: Bake) -> Bake:
+        """The bake, if its result can be kept; else one that says why not, before it has run for hours."""
+        if bake.job is None:
+            return bake
+        try:
+            material = bpy.data.materials[bake.target.material_name]
+            if COMBINED in bake.job.settings.layers:
+                check_editable(material)
+            self._plan(find_node(material).image, bake)
+        except BakeError as error:
+            return Bake(bake.target, error=str(error))
+        return bake
+
+    def _plan(self, image, bake: Bake) -> None:
+        """Reserve the bake's part of an image; BakeError if another has it and there can't be two images."""
+        if image is not None:
+            self._check_room(image, bake)
+            self._planned.setdefault(image.name, []).append(bake.target)
+            receiver = bake.job.receiver
+            self._parts[bake.target, receiver.width, receiver.height] = parts_of(receiver)
 
     def store(self, bake: Bake) -> str:
         """Fill the image of the target's node, or a new one, and link it back; other layers have images beside it.
 
-        The path of the first layer's file, "" where it is packed; BakeError if it can't be kept, or if another object
-        of this run has filled the same part of it.
+        The path of the first layer's file, "" where it is packed; BakeError if it can't be kept. Where the node's
+        image holds the result of another target, this one gets an image of its own.
         """
         node = find_node(bpy.data.materials.get(bake.target.material_name))
         if node is None:
             raise BakeError("The material or its Beamspread node was removed during the bake.")
-        name = node.image.name if node.image else f"Beamspread {bake.target.object_name}"
+        if COMBINED in bake.layers:
+            check_editable(bpy.data.materials[bake.target.material_name])
         paths = []
         for layer, texture in bake.layers.items():
-            shown, size = layer == COMBINED, texture.shape[1::-1]
-            image = node.image if shown else self._image_beside(f"{name} {layer}", size)
-            if image is None:
-                image = files.make_image(name if shown else f"{name} {layer}", *size, is_data=not shown)
-            paths.append(self._fill(image, bake, texture))
-            if shown:
-                link_result(node, image)
+            if layer == COMBINED:
+                path, image = self._store_shown(node, bake, texture)
+                bake.warnings += link_result(node, image)
+            else:
+                path = self._store_beside(node, bake, layer, texture)
+            paths.append(path)
         return paths[0]
 
-    def _image_beside(self, name: str, size: tuple[int, int]):
-        """The image of that name, if an earlier bake has made one; its size follows that of the node's."""
-        image = bpy.data.images.get(name)
-        if image is not None and image.name not in self._filled and tuple(image.size) != size and 0 not in image.size:
-            image.scale(*size)
-        return image
+    def fill(self, image, bake: Bake, texture: np.ndarray, shown=None) -> str | None:
+        """Fill the bake's part of an image, and leave that of others; None if theirs is the same.
 
-    def _fill(self, image, bake: Bake, texture: np.ndarray) -> str:
-        covered = bake.job.receiver.coverage
-        if image.name in self._filled:
-            covered, texture = self._merge(image.name, bake, texture)
-        path = files.fill_image(image, texture)
-        self._filled[image.name] = (covered, texture)
+        `shown` is the image of the node, whose owners count, where that is another.
+        """
+        receiver, others = bake.job.receiver, self._others(shown or image, bake.target)
+        if others:
+            parts = [part for other in others for part in self._parts_of(other, image)]
+            if overlaps(receiver, parts):
+                return None
+            covered = receiver.coverage.copy()
+            for part in parts:
+                there = within(covered, *part)
+                np.maximum(there, part[2], out=there)
+            merged = np.where(receiver.inside()[..., None], texture, files.linear_pixels(image))
+            texture = extend_margin(merged, covered, bake.job.settings.margin)
+        return files.fill_image(image, texture)
+
+    def fill_shown(self, image, bake: Bake, texture: np.ndarray) -> str | None:
+        """Fill the bake's part of its node's image, and note whose it is; None if it is another's."""
+        size = texture.shape[1::-1]
+        if tuple(image.size) != size and 0 not in image.size:
+            image.scale(*size)
+            bake.warnings.append(
+                f"The image '{image.name}' changed its size during the bake: now it has that of before."
+            )
+        path = self.fill(image, bake, texture)
+        if path is not None:
+            note_owner(image, bake.target)
+            if texture.max() > 1 and files.clips(image):
+                bake.warnings.append(f"The image '{image.name}' clips values above 1: Make Float keeps them.")
         return path
 
-    def _merge(self, image_name: str, bake: Bake, texture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        covered, merged = self._filled[image_name]
-        receiver, inside = bake.job.receiver, bake.job.receiver.inside()
-        overlap = 1.0
-        if inside.shape == covered.shape:
-            overlap = ((receiver.coverage > WHOLE) & (covered > 0)).sum() / inside.sum()
-        if overlap > OVERLAP_TOLERANCE:
-            raise BakeError(
-                f"Another object is baked to the same part of the image '{image_name}': "
-                "give each object a material and an image of its own, or move its UVs."
-            )
-        merged, covered = np.where(inside[..., None], texture, merged), np.maximum(covered, receiver.coverage)
-        return covered, extend_margin(merged, covered, bake.job.settings.margin)
+    def _store_shown(self, node, bake: Bake, texture: np.ndarray) -> tuple[str, bpy.types.Image]:
+        image = node.image
+        if image is None:
+            return self._new(bake, texture)
+        path = self.fill_shown(image, bake, texture)
+        if path is not None:
+            return path, image
+        self._check_room(image, bake)
+        owners = " and ".join(f"'{other}'" for other in self._others(image, bake.target))
+        path, new = self._new(bake, texture)
+        bake.warnings.append(
+            f"The image '{image.name}' keeps the result of {owners}: '{bake.target}' now has '{new.name}'."
+        )
+        return path, new
+
+    def _new(self, bake: Bake, texture: np.ndarray) -> tuple[str, bpy.types.Image]:
+        path, image = keep_new(name_for(bake.target), texture, bake)
+        note_owner(image, bake.target)
+        return path, image
+
+    def _store_beside(self, node, bake: Bake, layer: str, texture: np.ndarray) -> str:
+        """Fill the image of a layer that no node shows, named after the one that is shown."""
+        names = [f"{node.image.name} {layer}"] if node.image else []
+        for name in [*names, f"{name_for(bake.target)} {layer}"]:
+            image, size = bpy.data.images.get(name), texture.shape[1::-1]
+            if image is None:
+                return keep_new(name, texture, bake, is_data=True)[0]
+            if tuple(image.size) != size and 0 not in image.size:
+                image.scale(*size)
+            path = self.fill(image, bake, texture, node.image)
+            if path is not None:
+                return path
+        raise BakeError(f"Another object is baked to the same part of the image '{name}'.")
+
+    def _others(self, image, target: Target) -> list[Target]:
+        """Those whose results the image holds, or will by the end of this run because they came first."""
+        planned = self._planned.get(image.name, [])
+        first = planned[: planned.index(target)] if target in planned else planned
+        users = users_of(image)
+        return list(dict.fromkeys([*others_in(image, target), *(other for other in first if other in users)]))
+
+    def _parts_of(self, target: Target, image) -> Parts:
+        """Where the target's charts lie in the image."""
+        key = target, *image.size
+        if key not in self._parts:
+            self._parts[key] = read_parts(*key)
+        return self._parts[key]
+
+    def _check_room(self, image, bake: Bake) -> None:
+        """Raise BakeError if the image is another's who has the same material, and so can't have two images."""
+        receiver, target = bake.job.receiver, bake.target
+        if receiver.coverage.shape != tuple(image.size)[::-1]:
+            return
+        for other in self._others(image, target):
+            if other.material_name == target.material_name and overlaps(receiver, self._parts_of(other, image)):
+                raise BakeError(
+                    f"'{other.object_name}' is baked to the same part of the image '{image.name}' by the same "
+                    f"material: give '{target.object_name}' a material of its own (Object > Relations > Make "
+                    "Single User > Materials), or move its UVs."
+                )
+
+
+def check_editable(material) -> None:
+    """Raise BakeError if what is changed in the material is lost when the file is closed."""
+    if material.library is not None or material.override_library is not None:
+        raise BakeError(
+            f"The material '{material.name}' belongs to another .blend file, so this one can't keep its image: make it "
+            "local (Object > Relations > Make Local > Selected Objects, Data and Materials), or bake in that file."
+        )

@@ -9,36 +9,37 @@ from pathlib import Path
 
 import bpy
 
-from ...core.bake.runner import CANCELLED, WRITTEN, Bake, Target
-from ...core.bake.settings import COMBINED, DIRECTION
-from ...core.batch.inventory import inventory
+from ...core.bake.runner import CANCELLED, SKIPPED, WRITTEN, Bake, Target
+from ...core.batch.inventory import Inventory
 from ...core.batch.options import BatchOptions
-from ...core.batch.report import BakeRecord, Report, file_name
-from ...core.errors import ImageError
+from ...core.batch.report import BakeRecord, Report
+from ...core.batch.resume import Earlier
+from ...core.batch.stop import Stop
+from ...core.errors import BakeError
 from ...core.progress import timed
-from ..images import files
-from ..node.find import NOTHING_FOUND, find_misplaced, find_node, find_targets
+from ..images.files import file_of
+from ..images.outputs import Outputs
+from ..images.writing import size_of
+from ..node.find import NOTHING_FOUND, find_misplaced, find_targets
 from .prepare import prepare_scene
 
 
-def bake_all(options: BatchOptions) -> Report:
-    """Bake every frame asked for and print what becomes of each bake; goes on when one fails."""
+def bake_all(options: BatchOptions, stop: Stop | None = None) -> Report:
+    """Bake every frame asked for and print what becomes of each bake; goes on when one fails.
+
+    Once asked to stop, it notes what is left as cancelled.
+    """
     if options.verbose:
         _show_log()
-    scene = bpy.context.scene
-    first, last = options.frames or (scene.frame_current, scene.frame_current)
-    report, output = Report(), _Output(options)
-    for frame in range(first, last + 1):
-        if options.frames:
-            scene.frame_set(frame)
-        for bake in _bakes(options):
-            bake.run(_Printer(bake.target))
-            bake.keep(lambda bake, frame=frame: output.write(bake, frame))
-            record = BakeRecord.of(bake, frame)
-            report.bakes.append(record)
-            print(f"Beamspread: {record}", file=sys.stdout if bake.status == WRITTEN else sys.stderr, flush=True)
-            if bake.status == CANCELLED:
-                return report
+    report, batch = Report(), _Batch(options, Stop() if stop is None else stop)
+    for record in batch.run():
+        report.bakes.append(record)
+        if record.status != CANCELLED:
+            stream = sys.stdout if record.status in (WRITTEN, SKIPPED) else sys.stderr
+            print(f"Beamspread: {record}", file=stream, flush=True)
+    left = sum(record.status == CANCELLED for record in report.bakes)
+    if left:
+        print(f"Beamspread: stopped, {left} of {len(report.bakes)} bakes are left.", file=sys.stderr)
     if not report.bakes:
         print(f"Beamspread: {NOTHING_FOUND}", file=sys.stderr)
     if report.dark() and not options.allow_dark:
@@ -57,76 +58,108 @@ def _show_log() -> None:
     log.setLevel(logging.INFO)
 
 
-def _bakes(options: BatchOptions) -> Iterator[Bake]:
-    """What to bake at the current frame, and what can't be."""
-    scene, targets = bpy.context.scene, []
-    for name in options.objects or [obj.name for obj in scene.objects]:
-        obj = scene.objects.get(name)
-        found, misplaced = (find_targets([obj]), find_misplaced([obj])) if obj else ([], [])
-        if options.objects and not found and not misplaced:
-            missing = "has no material with a Beamspread node" if obj else "is not in the scene"
-            yield Bake(Target(name), error=f"The object '{name}' {missing}.")
-        yield from misplaced
-        targets += found
-    settings = scene.beamspread.for_bake(options.solver, options.pass_name, options.indirect)
-    with timed("scene"):
-        bakes = prepare_scene(bpy.context, targets, settings, options.resolution)
-    if options.verbose:
-        for line in inventory(bakes):
-            logging.getLogger(__name__).info(line)
-    yield from bakes
+class _Batch:
+    """One run."""
+
+    def __init__(self, options: BatchOptions, stop: Stop) -> None:
+        self._options, self._stop, self._scene = options, stop, bpy.context.scene
+        self._settings = self._scene.beamspread.for_bake(options.solver, options.pass_name, options.indirect)
+        self._outputs = Outputs(self._scene, options)
+        self._earlier = Earlier(options.report, _saved()) if options.resume else None
+
+    def run(self) -> Iterator[BakeRecord]:
+        """Bake frame by frame."""
+        current = self._scene.frame_current
+        first, last = self._options.frames or (current, current)
+        for frame in range(first, last + 1):
+            if self._options.frames and not self._stop:
+                self._scene.frame_set(frame)
+            yield from self._bake_frame(frame)
+
+    def _bake_frame(self, frame: int) -> Iterator[BakeRecord]:
+        targets, impossible = self._find()
+        yield from (BakeRecord.of(bake, frame) for bake in impossible)
+        left = []
+        for target in targets:
+            record = self._skipped(target, frame)
+            if record is None:
+                left.append(target)
+            else:
+                yield record
+        for bake in self._prepared(left):
+            self._bake(bake, frame)
+            yield BakeRecord.of(bake, frame)
+
+    def _find(self) -> tuple[list[Target], list[Bake]]:
+        """What to bake, and what can't be."""
+        targets, impossible, objects = [], [], self._scene.objects
+        for name in self._options.objects or [obj.name for obj in objects]:
+            obj = objects.get(name)
+            found, misplaced = (find_targets([obj]), find_misplaced([obj])) if obj else ([], [])
+            if self._options.objects and not found and not misplaced:
+                missing = "has no material with a Beamspread node" if obj else "is not in the scene"
+                impossible.append(Bake(Target(name), error=f"The object '{name}' {missing}."))
+            impossible += misplaced
+            targets += found
+        return targets, impossible
+
+    def _skipped(self, target: Target, frame: int) -> BakeRecord | None:
+        """The record of what an earlier run has written."""
+        if self._earlier is None or self._stop:
+            return None
+        settings, resolution = self._settings, self._options.resolution
+        layer = settings.layers[0]
+        own = self._outputs.own_image(target, layer)
+        try:
+            path = self._outputs.path(target, layer, frame) if own is None else file_of(own)
+        except BakeError:
+            return None  # and preparing says why
+        size = size_of(path)
+        if size is None or (resolution is not None and max(size) != resolution):
+            return None
+        wanted = BakeRecord(target.object_name, target.material_name, frame, str(path), *size)
+        wanted.output, wanted.indirect = settings.output, settings.indirect
+        return self._earlier.skipped(wanted, needs_record=own is not None)
+
+    def _prepared(self, targets: list[Target]) -> Iterator[Bake]:
+        """A bake for each target, prepared when its turn comes; once asked to stop, no more are."""
+        if not targets:
+            return
+        prepared, inventory = iter(()), Inventory()
+        if not self._stop:
+            with timed("scene"):
+                prepared = iter(prepare_scene(bpy.context, targets, self._settings, self._options.resolution))
+        for target in targets:
+            bake = _cancelled(target) if self._stop else next(prepared)
+            if self._options.verbose:
+                for line in inventory.lines(bake):
+                    logging.getLogger(__name__).info(line)
+            yield bake
+
+    def _bake(self, bake: Bake, frame: int) -> None:
+        bake.run(_Printer(bake.target, self._stop))
+        if self._stop and bake.job is not None and not bake.layers:
+            # Also where it failed: a terminal's Ctrl-C ends the Blender that looks for bounced light, too.
+            bake.cancel()
+        bake.keep(lambda bake: self._outputs.write(bake, frame))
 
 
-class _Output:
-    """Writes bakes to --output, else to the file of the node's image, else to the scene's folder."""
+def _cancelled(target: Target) -> Bake:
+    bake = Bake(target)
+    bake.cancel()
+    return bake
 
-    def __init__(self, options: BatchOptions) -> None:
-        self._options = options
-        self._taken: set[str] = set()
 
-    def write(self, bake: Bake, frame: int) -> str:
-        """Write all layers; the path of the first."""
-        paths = [self._write_layer(bake, frame, layer, texture) for layer, texture in bake.layers.items()]
-        return paths[0]
-
-    def _write_layer(self, bake: Bake, frame: int, layer: str, texture) -> str:
-        options, settings = self._options, bpy.context.scene.beamspread
-        if options.output is None and layer == COMBINED:
-            image = find_node(bpy.data.materials[bake.target.material_name]).image
-            if image is not None and self._belongs_in(image, bake):
-                return self._note_clipping(files.fill_image(image, texture), bake, texture)
-        file_format = options.format or settings.format
-        folder = options.output or settings.output_dir
-        if folder.startswith("//") and not bpy.data.filepath:
-            raise ImageError("The scene was never saved, so there is no folder to write to: give one with --output.")
-        parts = [bake.target.object_name, bake.target.material_name, *([] if layer == COMBINED else [layer])]
-        if layer == DIRECTION and file_format == "PNG":
-            raise ImageError("A PNG can't hold directions, which have negative parts: choose EXR.")
-        name = file_name(parts, frame if options.frames else None, files.EXTENSIONS[file_format], self._taken)
-        path = Path(bpy.path.abspath(folder)).absolute() / name
-        files.write_file(path, texture, file_format)
-        return self._note_clipping(str(path), bake, texture)
-
-    def _belongs_in(self, image, bake: Bake) -> bool:
-        """Whether a bake can go to the file that its image already has: one frame, same size and format."""
-        path, receiver, file_format = files.file_of(image), bake.job.receiver, self._options.format
-        size = receiver.width, receiver.height
-        if path is None or self._options.frames is not None or tuple(image.size) != size:
-            return False
-        return file_format is None or path.suffix.lower() == files.EXTENSIONS[file_format]
-
-    @staticmethod
-    def _note_clipping(path: str, bake: Bake, texture) -> str:
-        if path.lower().endswith(".png") and texture.max() > 1:
-            bake.warnings.append("Values above 1 were clipped: EXR keeps them.")
-        return path
+def _saved() -> float:
+    """When the scene was saved, as files' times are."""
+    return Path(bpy.data.filepath).stat().st_mtime if bpy.data.filepath else 0.0
 
 
 class _Printer:
-    """Progress in lines of ten percent."""
+    """Progress in lines of ten percent, until the batch is asked to stop."""
 
-    def __init__(self, subject: Target) -> None:
-        self._subject = subject
+    def __init__(self, subject: Target, stop: Stop) -> None:
+        self._subject, self._stop = subject, stop
         self._shown = 0
 
     def __call__(self, fraction: float) -> bool:
@@ -134,4 +167,4 @@ class _Printer:
         if tenth > self._shown:
             self._shown = tenth
             print(f"Beamspread: {self._subject}: {10 * tenth} %", flush=True)
-        return True
+        return not self._stop

@@ -12,12 +12,13 @@ from ...core.bake.settings import COMBINED, BakeSettings
 from ...core.errors import ImageError, sentence
 from .. import compat
 from ..node.find import NOTHING_FOUND, find_misplaced, find_node, materials_of
+from .picture import render_picture, show_by_eevee
 from .prepare import prepare
 from .state import state
 
 
 class BeamspreadEngine(bpy.types.RenderEngine):
-    """Bakes translucent surfaces; pictures are for Cycles and EEVEE."""
+    """Bakes translucent surfaces; pictures come from Cycles or EEVEE, and viewports show what EEVEE does."""
 
     bl_idname = "BEAMSPREAD"
     bl_label = "Beamspread"
@@ -26,19 +27,16 @@ class BeamspreadEngine(bpy.types.RenderEngine):
     bl_use_shading_nodes_custom = False
 
     def render(self, depsgraph) -> None:
-        show_nothing(self, depsgraph)
+        render_picture(self, depsgraph)
+
+    def view_update(self, context, _depsgraph) -> None:
+        show_by_eevee(context)
+
+    def view_draw(self, _context, _depsgraph) -> None:
+        """For a moment, until the viewport shows Material Preview."""
 
     def bake(self, depsgraph, obj, _pass_type, _pass_filter, width, height) -> None:
         bake_active_image(self, depsgraph, obj, width, height)
-
-
-def show_nothing(engine, depsgraph) -> None:
-    """F12: an empty picture and a sentence that says what to do."""
-    scene = depsgraph.scene
-    scale = scene.render.resolution_percentage / 100
-    size = (max(1, int(scene.render.resolution_x * scale)), max(1, int(scene.render.resolution_y * scale)))
-    engine.end_result(engine.begin_result(0, 0, *size))
-    engine.report({"WARNING"}, "Beamspread bakes textures: press Bake, then render with Cycles or EEVEE")
 
 
 def bake_active_image(engine, depsgraph, obj, width: int, height: int) -> None:
@@ -80,13 +78,38 @@ def _prepare(depsgraph, obj, passes, size: tuple[int, int]) -> list[Bake]:
 
 
 def _check_active_image(material, settings: BakeSettings) -> None:
-    """Raise ImageError if what is baked would be taken for luminance."""
-    active, shown = material.node_tree.nodes.active, find_node(material).image
-    if COMBINED not in settings.layers and shown is not None and getattr(active, "image", None) == shown:
+    """Raise ImageError if what is baked would be taken for luminance, or would replace what the surface is made of."""
+    node, active = find_node(material), _active_image(material)
+    if active is not None and active in _images_read(node):
         raise ImageError(
-            f"The image '{shown.name}' shows luminance in the Beamspread node: choose another active image for "
+            f"The active image '{active.name}' is a texture of the Beamspread node and no target: if Blender has "
+            "cleared it, reload it (Image > Reload), then add an Image Texture node with another image and select that."
+        )
+    if COMBINED not in settings.layers and active is not None and active == node.image:
+        raise ImageError(
+            f"The image '{active.name}' shows luminance in the Beamspread node: choose another active image for "
             f"{settings.output.lower()}."
         )
+
+
+def _active_image(material):
+    """What Blender's Bake fills: the image of the texture node that was active last, or else of the first one."""
+    textures = [node for node in material.node_tree.nodes if node.type == "TEX_IMAGE"]
+    textures.sort(key=lambda node: not node.show_texture)
+    return textures[0].image if textures else None
+
+
+def _images_read(node) -> set:
+    """Images that the node's inputs come from."""
+    images, waiting, seen = set(), [node], {node}
+    while waiting:
+        for socket in waiting.pop().inputs:
+            for source in (link.from_node for link in socket.links):
+                if source not in seen:
+                    seen.add(source)
+                    waiting.append(source)
+                    images.add(getattr(source, "image", None))
+    return images - {None}
 
 
 def _put(pixels: np.ndarray, bake: Bake) -> str:
@@ -119,7 +142,7 @@ def _materials_in(obj, passes, width: int, height: int) -> list[str]:
 
 
 # Panels of Blender that make sense with this engine: those for any engine, and EEVEE's for what any engine has.
-HIDDEN_PANEL_PREFIXES = ("RENDER_PT_", "VIEWLAYER_PT_layer_passes", "WORLD_PT_viewport")
+HIDDEN_PANEL_PREFIXES = ("RENDER_PT_freestyle", "VIEWLAYER_PT_layer_passes", "WORLD_PT_viewport")
 EEVEE_PANELS = {
     "DATA_PT_EEVEE_light",
     "EEVEE_MATERIAL_PT_context_material",

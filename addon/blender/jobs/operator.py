@@ -8,26 +8,31 @@ import bpy
 from bpy.props import EnumProperty
 
 from ...core import native
-from ...core.bake.runner import CANCELLED, WRITTEN, Bake
+from ...core.bake.runner import CANCELLED, WRITTEN, Bake, Target
+from ...core.bake.settings import COMBINED
 from ..images.results import Results
 from ..node.find import NOTHING_FOUND, find_misplaced, find_targets
-from .prepare import prepare_scene
+from . import popup, stale
+from .prepare import read_scene
+from .queue import Queue
 from .state import redraw, state
 
 TIMER_SECONDS = 0.1
 
+NOTHING_STALE = "Nothing is out of date."
+
 
 class BakeThread(threading.Thread):
-    """Runs one bake; poll `fraction` until it has ended."""
+    """Runs one bake; poll `fraction` and `doing` until it has ended."""
 
     def __init__(self, bake: Bake) -> None:
         super().__init__(daemon=True)
         self.bake = bake
-        self.fraction = 0.0
+        self.fraction, self.doing = 0.0, ""
         self._stop_asked = threading.Event()
 
     def run(self) -> None:
-        self.bake.run(self._step)
+        self.bake.run(self)
         if self._stop_asked.is_set():
             # Also where it ended just before it saw that it should.
             self.bake.cancel()
@@ -36,9 +41,12 @@ class BakeThread(threading.Thread):
         """Ask the bake to stop; it ends soon after."""
         self._stop_asked.set()
 
-    def _step(self, fraction: float) -> bool:
+    def __call__(self, fraction: float) -> bool:
         self.fraction = fraction
         return not self._stop_asked.is_set()
+
+    def say(self, words: str) -> None:
+        self.doing = words
 
 
 class BEAMSPREAD_OT_bake(bpy.types.Operator):
@@ -53,9 +61,14 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         items=[
             ("SELECTED", "Selected", "The selected objects that have a Beamspread node; all if there are none", 0),
             ("ALL", "All", "All objects of the scene that have a Beamspread node", 1),
+            ("STALE", "Out of Date", "Those baked before whose light, shape, material or settings changed since", 2),
         ],
         default="SELECTED",
     )
+
+    @classmethod
+    def description(cls, _context, properties):
+        return properties.bl_rna.properties["objects"].enum_items[properties.objects].description
 
     @classmethod
     def poll(cls, context):
@@ -68,9 +81,10 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         return True
 
     def execute(self, context):
-        if not self._prepare(context):
+        if not self._prepare(context, preview_first=False):
             return {"CANCELLED"}
-        for bake in self._queue:
+        while (bake := self._queue.next()) is not None:
+            bake = self._results.admit(bake)
             bake.run()
             self._take(bake)
         return self._finish(context)
@@ -78,31 +92,33 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
     def invoke(self, context, _event):
         if bpy.app.background or context.window is None:
             return self.execute(context)
-        if not self._prepare(context):
-            return {"CANCELLED"}
-        if not self._queue:
+        self._in_window, self._shown = True, ""
+        if not self._prepare(context, preview_first=True):
+            return self._finish(context)
+        state.begin()
+        if not self._start_next():
             return self._finish(context)
         manager = context.window_manager
         self._timer = manager.event_timer_add(TIMER_SECONDS, window=context.window)
         manager.progress_begin(0, 100)
         manager.modal_handler_add(self)
-        self._next = 0
-        self._start()
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
-        if event.type == "ESC" and event.value == "PRESS":
-            self._thread.cancel()
-            return {"RUNNING_MODAL"}
-        if event.type != "TIMER":
+        if event.type == "ESC" and event.value == "PRESS" and _is_ours(context, event):
+            state.ask_to_stop()
+        elif event.type != "TIMER":
             return {"PASS_THROUGH"}
+        if state.should_stop():
+            self._thread.cancel()
+        if event.type == "ESC":
+            return {"RUNNING_MODAL"}
         if self._thread.is_alive():
             self._show_progress(context)
             return {"PASS_THROUGH"}
         bake = self._thread.bake
         self._take(bake)
-        if bake.status != CANCELLED and self._next < len(self._queue):
-            self._start()
+        if bake.status != CANCELLED and self._start_next():
             return {"PASS_THROUGH"}
         self._end_modal(context)
         return self._finish(context)
@@ -113,56 +129,92 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         self._thread.join()
         self._end_modal(context)
 
-    def _prepare(self, context) -> bool:
+    def _prepare(self, context, preview_first: bool) -> bool:
         """Make the queue of bakes; False if there is nothing to do at all."""
         self._written, self._said, self._results = [], set(), Results()
+        self._problems: list[str] = []
         if native.problem:
-            self.report({"ERROR"}, native.problem)
+            self._fail(native.problem)
             return False
+        targets, misplaced = self._chosen(context)
+        if not targets and not misplaced:
+            self._fail(NOTHING_STALE if self.objects == "STALE" else NOTHING_FOUND)
+            return False
+        state.forget_failures()
+        self._parts = stale.parts_of(context, targets)
+        preparation = read_scene(context, targets, context.scene.beamspread.for_bake())
+        self._queue = Queue(preparation, targets, preview_first)
+        for bake in misplaced:
+            self._take(bake)
+        return True
+
+    def _chosen(self, context) -> tuple[list[Target], list[Bake]]:
+        if self.objects == "STALE":
+            stale.refresh(context)
+            return [row.target for row in state.rows.values() if row.is_stale], []
         for objects in (context.selected_objects if self.objects == "SELECTED" else (), context.scene.objects):
             targets, misplaced = find_targets(objects), find_misplaced(objects)
             if targets or misplaced:
                 break
-        else:
-            self.report({"ERROR"}, NOTHING_FOUND)
-            return False
-        bakes = misplaced + prepare_scene(context, targets, context.scene.beamspread.for_bake())
-        self._queue = [bake for bake in bakes if bake.job is not None]
-        for bake in bakes:
-            state.note(bake)
+        return targets, misplaced
+
+    def _start_next(self) -> bool:
+        """Start the next bake that can be; False if there is none."""
+        while (bake := self._queue.next()) is not None:
+            if self._queue.starts_again():
+                self._results = Results()  # the same parts of the same images are filled anew
+            bake = self._results.admit(bake)
             if bake.job is None:
                 self._take(bake)
-        return True
-
-    def _start(self) -> None:
-        bake = self._queue[self._next]
-        self._thread = BakeThread(bake)
-        self._thread.start()
-        self._next += 1
-        state.start(bake.target)
+                continue
+            state.start(bake.target, self._queue.fraction(0.0))
+            self._thread = BakeThread(bake)
+            self._thread.start()
+            return True
+        return False
 
     def _show_progress(self, context) -> None:
-        done = (self._next - 1 + self._thread.fraction) / len(self._queue)
-        state.update(self._thread.fraction, done)
+        done = self._queue.fraction(self._thread.fraction)
+        doing = "Stopping" if state.should_stop() else self._thread.doing
+        state.update(self._thread.fraction, done, doing)
+        shown = state.progress.in_a_line()
+        if shown == self._shown:  # to draw takes time from the bake, and from whoever works on
+            return
+        self._shown = shown
         context.window_manager.progress_update(int(100 * done))
-        context.workspace.status_text_set(": ".join(state.progress()))
+        if context.workspace is not None:
+            context.workspace.status_text_set(shown)
         redraw(context)
 
     def _take(self, bake: Bake) -> None:
         """Store what a bake has made, and say what there is to say."""
+        layers = set(bake.layers)
         bake.keep(self._results.store)
+        if bake.status == CANCELLED and self._queue.turn.is_again:
+            self._say("WARNING", f"{bake.target}: the final bake was cancelled, a first look is kept")
+            return
         state.note(bake)
         if bake.status == WRITTEN:
             self._written.append(bake.target)
+            if COMBINED in layers:
+                parts, is_first_look = self._parts.get(bake.target), self._queue.turn.is_first
+                stale.keep(bake.target, parts, bake.warnings, is_first_look)
+            if bake.is_dark:
+                self._problems += bake.warnings
         elif bake.status == CANCELLED:
             self._say("WARNING", "Bake cancelled: the image keeps what it had")
         else:
-            self._say("ERROR", f"{bake.target}: {bake.error}")
+            self._fail(f"{bake.target}: {bake.error}")
         for warning in bake.warnings:
             self._say("WARNING", warning)
 
+    def _fail(self, message: str) -> None:
+        self._say("ERROR", message)
+        self._problems.append(message)
+
     def _say(self, level: str, message: str) -> None:
         if message not in self._said:
+            # In the window a report of an error opens a popup of its own where it can, but not while modal.
             self.report({level}, message)
             self._said.add(message)
 
@@ -174,16 +226,66 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         state.stop()
 
     def _finish(self, context):
+        stale.look_soon()
         redraw(context)
+        problems = list(dict.fromkeys(self._problems))
+        if problems and getattr(self, "_in_window", False):
+            title = "Beamspread: not all is well" if self._written else "Beamspread: nothing was baked"
+            popup.show_soon(title, problems)
         if not self._written:
             return {"CANCELLED"}
-        self.report({"INFO"}, f"Baked {', '.join(map(str, self._written))}")
+        self.report({"INFO"}, f"Baked {', '.join(map(str, dict.fromkeys(self._written)))}")
         return {"FINISHED"}
 
 
+def _is_ours(context, event) -> bool:
+    """Whether Esc is meant for the bake: menus, fields and operators started later get it before us anyway."""
+    if event.ctrl or event.alt or event.shift or event.oskey:
+        return False
+    if context.screen is not None and context.screen.is_animation_playing:
+        return False
+    area = _area_under(context.screen, event)
+    return area is None or area.type not in {"FILE_BROWSER", "PREFERENCES"}
+
+
+def _area_under(screen, event):
+    """Where the mouse is: a modal operator's own context stays where it was started."""
+    for area in screen.areas if screen is not None else ():
+        if 0 <= event.mouse_x - area.x < area.width and 0 <= event.mouse_y - area.y < area.height:
+            return area
+    return None
+
+
+class BEAMSPREAD_OT_cancel(bpy.types.Operator):
+    """Stop the bake that is running: images keep what they had (Esc)"""
+
+    bl_idname = "beamspread.cancel"
+    bl_label = "Cancel"
+    bl_options = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, _context):
+        return state.is_running()
+
+    def execute(self, _context):
+        state.ask_to_stop()
+        return {"FINISHED"}
+
+
+_classes = (BEAMSPREAD_OT_bake, BEAMSPREAD_OT_cancel)
+
+
 def register() -> None:
-    bpy.utils.register_class(BEAMSPREAD_OT_bake)
+    for one in _classes:
+        bpy.utils.register_class(one)
 
 
 def unregister() -> None:
-    bpy.utils.unregister_class(BEAMSPREAD_OT_bake)
+    # A thread that outlives its operator would end Blender with an error when that quits.
+    for thread in threading.enumerate():
+        if isinstance(thread, BakeThread):
+            thread.cancel()
+            thread.join()
+    state.stop()
+    for one in reversed(_classes):
+        bpy.utils.unregister_class(one)

@@ -2,25 +2,50 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
 import bpy
 
-from ...core.bake.job import BakeJob
+from ...core.bake.estimate import bake_bytes, machine_bytes
+from ...core.bake.job import BakeJob, to_simulate
 from ...core.bake.runner import Bake, Target
 from ...core.bake.settings import BakeSettings
+from ...core.bake.surface import Surface
 from ...core.errors import BakeError, sentence
-from ...core.scene.illumination import Illumination
 from ...core.scene.receiver import build_receiver, texture_size
 from ...core.scene.uv_map import fit_uv_maps
 from ..cycles.light import CyclesLight
 from ..images.files import check_image
-from ..node.find import find_node, materials_of
+from ..node.find import find_place, materials_of
 from ..read.geometry import read_polygons
 from ..read.lights import read_illumination
 from ..read.visible import as_rendered, render_visible_names
+from .texture import BaseColor, read_texture
 
 
-def prepare_scene(context, targets: list[Target], settings: BakeSettings, resolution: int | None = None) -> list[Bake]:
-    """Read the scene as it would render at its current frame and make a job of every target.
+def prepare_scene(
+    context, targets: list[Target], settings: BakeSettings, resolution: int | None = None
+) -> Iterator[Bake]:
+    """Read the scene as it would render at its current frame; a bake for each target, as they are asked for."""
+    return map(read_scene(context, targets, settings, resolution).bake, targets)
+
+
+def prepare(
+    depsgraph,
+    targets: list[Target],
+    settings: BakeSettings,
+    resolution: int | None = None,
+    size: tuple[int, int] | None = None,
+    visible: set[str] | None = None,
+) -> list[Bake]:
+    """A bake for each target; see `Preparation`."""
+    preparation = Preparation(depsgraph, targets, settings, resolution, size, visible)
+    return [preparation.bake(target) for target in targets]
+
+
+def read_scene(context, targets: list[Target], settings: BakeSettings, resolution: int | None = None) -> Preparation:
+    """Read what bakes of the targets need, as the scene would render at its current frame.
 
     Parameters
     ----------
@@ -32,32 +57,103 @@ def prepare_scene(context, targets: list[Target], settings: BakeSettings, resolu
         bpy.data.materials[target.material_name].node_tree.update_tag()
     with as_rendered(context.view_layer):
         visible = render_visible_names(context.view_layer)
-        return prepare(context.evaluated_depsgraph_get(), targets, settings, resolution, visible=visible)
+        return Preparation(context.evaluated_depsgraph_get(), targets, settings, resolution, visible=visible)
 
 
-def prepare(
-    depsgraph,
-    targets: list[Target],
-    settings: BakeSettings,
-    resolution: int | None = None,
-    size: tuple[int, int] | None = None,
-    visible: set[str] | None = None,
-) -> list[Bake]:
-    """A bake for each target; `size` overrides all other sizes, `visible` names the objects that render, None: all."""
-    try:
-        illumination, by_cycles = read_illumination(depsgraph), CyclesLight(depsgraph)
-    except Exception as error:  # noqa: BLE001 - each bake asked for needs an answer
-        return [Bake(target, error=sentence(error)) for target in targets]
-    bakes = []
-    for target in targets:
+class Preparation:
+    """What was read of a scene at one time, from which each target's job is made when it is its turn: jobs are large.
+
+    `size` overrides all other sizes, `visible` names the objects that render, None: all. Afterwards the depsgraph is
+    no longer needed, but for the copy of the scene that Cycles gets: the first job that needs one makes it.
+    """
+
+    def __init__(
+        self,
+        depsgraph,
+        targets: list[Target],
+        settings: BakeSettings,
+        resolution: int | None = None,
+        size: tuple[int, int] | None = None,
+        visible: set[str] | None = None,
+    ) -> None:
+        self.settings = settings
+        self._plans: dict[Target, _Plan | str] = {}
         try:
-            if visible is not None:
-                check_visible(target.object_name, visible)
-            job = _make_job(depsgraph, target, illumination, settings, resolution, size)
-            bakes.append(Bake(target, by_cycles.complete(job)))
+            self._illumination, self._by_cycles = read_illumination(depsgraph), CyclesLight(depsgraph)
+        except Exception as error:  # noqa: BLE001 - each bake asked for needs an answer
+            self._plans = dict.fromkeys(targets, sentence(error))
+            return
+        for target in targets:
+            try:
+                if visible is not None:
+                    check_visible(target.object_name, visible)
+                self._plans[target] = _read_target(depsgraph, target, resolution, size)
+            except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
+                self._plans[target] = sentence(error)
+
+    def size(self, target: Target) -> tuple[int, int] | None:
+        """Of the target's image, in texels."""
+        plan = self._plans[target]
+        return None if isinstance(plan, str) else plan.size
+
+    def to_simulate(self, target: Target, quality: str) -> list:
+        """The media that its bake would have to simulate first."""
+        plan = self._plans[target]
+        return [] if isinstance(plan, str) else to_simulate(plan.surface, replace(self.settings, quality=quality))
+
+    def bake(self, target: Target, settings: BakeSettings | None = None) -> Bake:
+        """The target's bake, with its job or the reason why there is none; in the main thread."""
+        plan = self._plans[target]
+        if isinstance(plan, str):
+            return Bake(target, error=plan)
+        try:
+            receiver = build_receiver(plan.maps, *plan.size)
+            illumination = self._illumination.lighting(target.object_name)
+            job = BakeJob(target.object_name, receiver, illumination, plan.surface, settings or self.settings)
+            check_memory(job, self.settings.memory_limit)
+            if plan.texture is not None:
+                job = plan.texture.in_job(job)
+            return Bake(target, self._by_cycles.complete(job))
         except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
-            bakes.append(Bake(target, error=sentence(error)))
-    return bakes
+            return Bake(target, error=sentence(error))
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """What is kept of a target until it is its turn."""
+
+    maps: list
+    size: tuple[int, int]
+    surface: Surface
+    texture: BaseColor | None = None
+
+
+def _read_target(depsgraph, target: Target, resolution: int | None, size: tuple[int, int] | None) -> _Plan:
+    obj = depsgraph.scene.objects[target.object_name].evaluated_get(depsgraph)
+    node, groups = find_place(next(one for one in materials_of(obj) if one.name == target.material_name))
+    surface = node.surface()
+    surface.check()
+    if size is None and node.image is not None:
+        check_image(node.image.original)
+        size = tuple(node.image.original.size) if resolution is None else None
+    maps = fit_uv_maps(read_polygons(obj, target.material_name))
+    size = size or texture_size(maps, resolution or depsgraph.scene.beamspread.resolution)
+    if not node.has_texture():
+        return _Plan(maps, size, surface)
+    texture = read_texture(node, groups, obj, build_receiver(maps, *size))
+    return _Plan(maps, size, texture.on(surface), texture)
+
+
+def check_memory(job: BakeJob, limit: int) -> None:
+    """Raise BakeError if a bake would take more bytes than allowed; 0: than the machine has."""
+    limit = limit or machine_bytes()
+    width, height = job.receiver.width, job.receiver.height
+    needed = bake_bytes(width, height, job.settings.solver)
+    if limit and needed > limit:
+        raise BakeError(
+            f"{width} x {height} texels take about {needed / 2**30:.1f} GB of memory, and {limit / 2**30:.1f} GB are "
+            "allowed: lower the resolution, or raise the memory limit in the add-on's preferences."
+        )
 
 
 def check_visible(object_name: str, visible: set[str]) -> None:
@@ -67,18 +163,3 @@ def check_visible(object_name: str, visible: set[str]) -> None:
             f"The object '{object_name}' is hidden from render: turn on its camera icon, and its collections', "
             "in the Outliner."
         )
-
-
-def _make_job(
-    depsgraph, target: Target, illumination: Illumination, settings: BakeSettings, resolution, size
-) -> BakeJob:
-    obj = depsgraph.scene.objects[target.object_name].evaluated_get(depsgraph)
-    node = find_node(next(one for one in materials_of(obj) if one.name == target.material_name))
-    surface = node.surface()
-    surface.check()
-    if size is None and node.image is not None:
-        check_image(node.image.original)
-        size = tuple(node.image.original.size) if resolution is None else None
-    maps = fit_uv_maps(read_polygons(obj, target.material_name))
-    size = size or texture_size(maps, resolution or depsgraph.scene.beamspread.resolution)
-    return BakeJob(obj.name, build_receiver(maps, *size), illumination.lighting(obj.name), surface, settings)

@@ -1,53 +1,163 @@
-"""What panels show of bakes: the one that runs, and what was said of each target when it was last baked.
+"""What panels show of bakes: the one that runs, and how each target stands.
 
 Operators and engines don't outlive their calls, and panels can't ask them; hence one object for the whole process.
 """
 
 from __future__ import annotations
 
+import time
+from collections import deque
+from dataclasses import dataclass
+from enum import Enum
+
 import bpy
 from bpy.app.handlers import persistent
 
-from ...core.bake.runner import Bake, Target
+from ...core.bake.estimate import in_words
+from ...core.bake.runner import CANCELLED, WRITTEN, Bake, Target
+
+
+class Standing(Enum):
+    """How a target stands, in the words of the panels."""
+
+    NEVER = "Never baked"
+    BAKED = "Baked"
+    WARNED = "Baked, with warnings"
+    FAILED = "Failed"
+    CANCELLED = "Cancelled"
+    STALE = "Out of date"
+    RUNNING = "Baking"
+
+
+@dataclass(frozen=True)
+class Row:
+    """A target, how it stands, what there is to say about it, and whether what its image holds is out of date."""
+
+    target: Target
+    standing: Standing
+    sentences: tuple[str, ...] = ()
+    is_stale: bool = False
+
+
+# The time that is left follows from the pace of the last seconds, once there are enough of them to tell.
+PACE_SECONDS, LEAST_PACE_SECONDS = 15.0, 3.0
+
+
+@dataclass
+class Progress:
+    """Of the run in the window.
+
+    Attributes
+    ----------
+    doing : in words.
+    own, everything : how far this bake and the run are, 0..1.
+    seconds_left : of the run; None while nobody knows.
+    """
+
+    target: Target
+    doing: str = ""
+    own: float = 0.0
+    everything: float = 0.0
+    seconds_left: float | None = None
+
+    def in_short(self) -> str:
+        """How far the run is, and how long it will last."""
+        left = f", {in_words(self.seconds_left)} left" if self.seconds_left is not None else ""
+        return f"{self.everything:.0%}{left}"
+
+    def in_words(self) -> str:
+        """What is being done, and how long the run will last."""
+        left = f", about {in_words(self.seconds_left)} left" if self.seconds_left is not None else ""
+        return f"{self.doing or 'Baking'} {self.own:.0%}, all {self.everything:.0%}{left}"
+
+    def in_a_line(self) -> str:
+        return f"{self.target}: {self.in_words()} (Esc cancels)"
 
 
 class State:
-    """Progress and messages."""
+    """Progress, rows and messages."""
 
     def __init__(self) -> None:
-        self._subject, self._own, self._all = "", 0.0, 0.0
-        self._messages: dict[str, list[str]] = {}
+        self.progress: Progress | None = None
+        self.rows: dict[Target, Row] = {}
+        self._paces: deque[tuple[float, float]] = deque()
+        self._stop_asked = False
+        self._said: dict[Target, Row] = {}
 
     def is_running(self) -> bool:
         """Whether a bake runs in the window."""
-        return bool(self._subject)
+        return self.progress is not None
 
-    def start(self, subject: Target) -> None:
-        self._subject, self._own = str(subject), 0.0
+    def begin(self) -> None:
+        """Note that a run begins."""
+        self._paces.clear()
+        self._stop_asked = False
 
-    def update(self, own: float, everything: float) -> None:
-        """Note how far this bake and all bakes of the run are, 0..1."""
-        self._own, self._all = own, everything
+    def start(self, subject: Target, everything: float = 0.0) -> None:
+        left = self.progress.seconds_left if self.progress else None
+        self.progress = Progress(subject, everything=everything, seconds_left=left)
+
+    def update(self, own: float, everything: float, doing: str = "") -> None:
+        """Note how far this bake and all bakes of the run are, 0..1, and what is being done."""
+        if self.progress is None:
+            return
+        self.progress.doing, self.progress.own, self.progress.everything = doing, own, everything
+        now = time.monotonic()
+        self._paces.append((now, everything))
+        while now - self._paces[0][0] > PACE_SECONDS:
+            self._paces.popleft()
+        began, before = self._paces[0]
+        if now - began >= LEAST_PACE_SECONDS and everything > before:
+            self.progress.seconds_left = (now - began) * (1 - everything) / (everything - before)
 
     def stop(self) -> None:
-        self._subject, self._own, self._all = "", 0.0, 0.0
+        self.progress = None
 
-    def progress(self) -> tuple[str, str]:
-        """What is running, and how far it is."""
-        return f"Baking {self._subject}", f"{self._own:.0%}, all {self._all:.0%} (Esc cancels)"
+    def ask_to_stop(self) -> None:
+        """Have the run end soon."""
+        self._stop_asked = True
+
+    def should_stop(self) -> bool:
+        return self._stop_asked
 
     def note(self, bake: Bake) -> None:
         """Keep what there is to say of a bake in place of what was said of its target before."""
-        self._messages.pop(bake.target.object_name, None)  # what was said while nothing of it could be baked
-        error = [f"{bake.target}: {bake.error}"] if bake.error else []
-        self._messages[str(bake.target)] = error + bake.warnings
+        self._said.pop(Target(bake.target.object_name), None)  # while nothing of it could be baked
+        standing = {WRITTEN: Standing.BAKED, CANCELLED: Standing.CANCELLED}.get(bake.status, Standing.FAILED)
+        if bake.status != WRITTEN and not bake.error:
+            return  # it is still to run
+        if standing == Standing.BAKED and bake.warnings:
+            standing = Standing.WARNED
+        row = Row(bake.target, standing, tuple(bake.messages()))
+        self._said[bake.target] = self.rows[bake.target] = row
+
+    def said_of(self, target: Target) -> Row | None:
+        """How its last bake since the file was opened ended."""
+        return self._said.get(target)
+
+    def failures(self) -> list[Row]:
+        """Of the last bakes that failed or were cancelled."""
+        return [row for row in self._said.values() if row.standing in (Standing.FAILED, Standing.CANCELLED)]
+
+    def forget_failures(self) -> None:
+        """Before a run, which says anew what fails."""
+        for row in self.failures():
+            del self._said[row.target]
 
     def messages(self) -> list[str]:
         """Everything said, each sentence once."""
-        return list(dict.fromkeys(message for said in self._messages.values() for message in said))
+        said = [
+            f"{row.target}: {sentence}"
+            if not number and row.standing in (Standing.FAILED, Standing.CANCELLED)
+            else sentence
+            for row in self._said.values()
+            for number, sentence in enumerate(row.sentences)
+        ]
+        return list(dict.fromkeys(said))
 
     def forget(self) -> None:
-        self._messages.clear()
+        self._said.clear()
+        self.rows.clear()
 
 
 state = State()

@@ -6,18 +6,40 @@ from collections.abc import Iterable, Iterator
 
 from ...core.bake.runner import Bake, Target
 from .. import compat
-from .node import BeamspreadNode, is_linked
+from .node import BeamspreadNode
+from .output import is_linked
 
 NOTHING_FOUND = "No mesh has a material with a Beamspread node: add one in the Shader Editor."
 
 
 def find_node(material):
     """The material's Beamspread node (one that is linked rather than one that is not), or None."""
+    found = find_place(material)
+    return found and found[0]
+
+
+def find_place(material) -> tuple | None:
+    """The node, and the group nodes around it: a node group counts if nothing else uses it, since it has one image."""
     if material is None or not compat.uses_nodes(material):
         return None
-    nodes = [node for node in material.node_tree.nodes if node.bl_idname == BeamspreadNode.bl_idname]
-    linked = [node for node in nodes if is_linked(node)]
-    return next(iter(linked + nodes), None)
+    found = [one for one in _nodes_in(material.node_tree) if all(map(_is_own, one[1]))]
+    found.sort(key=lambda one: (len(one[1]) > 0, not is_linked(one[0])))
+    return next(iter(found), None)
+
+
+def _nodes_in(tree, groups: tuple = ()) -> Iterator[tuple]:
+    """Beamspread nodes, each with the group nodes around it, in a tree and its groups (which can't form circles)."""
+    for node in tree.nodes:
+        if node.bl_idname == BeamspreadNode.bl_idname:
+            yield node, groups
+        elif node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
+            yield from _nodes_in(node.node_tree, (*groups, node))
+
+
+def _is_own(group) -> bool:
+    """Whether a group node alone shows its tree."""
+    tree = group.node_tree.original
+    return tree.users - tree.use_fake_user <= 1
 
 
 def materials_of(obj) -> list:
@@ -43,10 +65,9 @@ def _misplaced(obj) -> Iterator[tuple]:
         node = find_node(material)
         if node is not None and obj.type != "MESH" and node.image is None:
             yield material, f"'{obj.name}' is no mesh: convert it to one (Object > Convert > Mesh)."
-        group = "" if node is not None or not compat.uses_nodes(material) else _group_with_node(material.node_tree)
-        if group:
-            why = f"The Beamspread node of '{material.name}' can't be baked inside the node group '{group}': "
-            yield material, why + "put it into the material itself (select the group, Ctrl Alt G)."
+        if node is None and compat.uses_nodes(material):
+            for _, groups in _nodes_in(material.node_tree):
+                yield material, _why_not_in_group(material, groups)
     if obj.instance_type != "COLLECTION" or obj.instance_collection is None:
         return
     for inner in _objects_shown_by(obj.instance_collection):
@@ -70,14 +91,9 @@ def _objects_shown_by(collection) -> Iterator:
             yield from _objects_shown_by(obj.instance_collection)
 
 
-def _group_with_node(tree) -> str:
-    """Name of the innermost node group of the tree that holds a Beamspread node without an image."""
-    for node in tree.nodes:
-        if node.bl_idname != "ShaderNodeGroup" or node.node_tree is None:
-            continue
-        inner = node.node_tree
-        if any(one.bl_idname == BeamspreadNode.bl_idname and one.image is None for one in inner.nodes):
-            return inner.name
-        if deeper := _group_with_node(inner):
-            return deeper
-    return ""
+def _why_not_in_group(material, groups: tuple) -> str:
+    shared = next(group.node_tree.name for group in groups if not _is_own(group))
+    return (
+        f"The Beamspread node of '{material.name}' is in the node group '{shared}', used several times, though "
+        "a node has one image: make it single-user (click the number beside its name), or ungroup it (Ctrl Alt G)."
+    )

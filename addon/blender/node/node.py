@@ -1,15 +1,22 @@
 """The shader node that makes a material translucent and shows its baked image."""
 
+import contextlib
+
 import bpy
-from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty
+from bpy.app.handlers import persistent
+from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty, StringProperty
 
 from ...core.bake.surface import Surface
 from ...core.material.material import Material
 from ...core.material.presets import presets
-from .. import compat
+from .draw import draw_node
+from .output import link_output, plain_of
+from .tree import BASE_COLOR, ROUGHNESS, ROUGHNESS_BEFORE, add_missing_inputs, make_inner_tree, show_values
 
 CUSTOM_PRESET = "CUSTOM"
-IMAGE, FRESNEL, COAT = "Image", "Fresnel", "Coat"
+
+# What new nodes have. The properties' own defaults stand for what older files, which don't hold them, were baked with.
+NEW_IOR = 1.4
 
 
 def _preset_items() -> list[tuple]:
@@ -21,6 +28,20 @@ def _preset_items() -> list[tuple]:
     return [(CUSTOM_PRESET, "Custom", "Values set by hand", 0), *sorted(items)]
 
 
+_nodes_being_filled: set[int] = set()
+
+
+@contextlib.contextmanager
+def filling(node):
+    """While values are set that leave the preset's name as it is."""
+    key = node.as_pointer()
+    _nodes_being_filled.add(key)
+    try:
+        yield
+    finally:
+        _nodes_being_filled.discard(key)
+
+
 def _apply_preset(node, context) -> None:
     if node.preset == CUSTOM_PRESET:
         return
@@ -28,11 +49,23 @@ def _apply_preset(node, context) -> None:
     material = presets()[node.preset].with_one_anisotropy()
     # Lengths are stored in scene units, which `scale_length` metres make one of.
     metres_per_unit = context.scene.unit_settings.scale_length if context and context.scene else 1.0
-    node.color_mode = "ALBEDO"
-    node.albedo = material.albedo
-    node.mean_free_path = [length / metres_per_unit for length in material.mean_free_path]
-    node.anisotropy = material.anisotropy
-    node.ior = material.ior
+    with filling(node):
+        node.color_mode = "ALBEDO"
+        node.albedo = material.albedo
+        node.mean_free_path = [length / metres_per_unit for length in material.mean_free_path]
+        node.anisotropy = material.anisotropy
+        node.ior = material.ior
+
+
+def _edited(node, _context) -> None:
+    """What a preset has filled in is no longer its own."""
+    if node.as_pointer() not in _nodes_being_filled and node.preset != CUSTOM_PRESET:
+        node.preset = CUSTOM_PRESET
+
+
+def _ior_edited(node, context) -> None:
+    _edited(node, context)
+    _show(node, context)
 
 
 def _show(node, _context) -> None:
@@ -41,58 +74,33 @@ def _show(node, _context) -> None:
     A copied node shares the original's tree until then: assigning another in `copy()`, while Blender has not counted
     the users of the new node yet, leaves the original's with too few, and Blender drops it when it saves.
     """
-    if node.node_tree is None:
-        return
-    if _is_shared(node.node_tree):
-        node.node_tree = node.node_tree.copy()
-        node.node_tree.use_fake_user = True
     tree = node.node_tree
-    tree.nodes[IMAGE].image = node.image
-    tree.nodes[FRESNEL].inputs["IOR"].default_value = max(node.ior, 1.0)
-    # Without a step in refraction there is no coat, whatever the renderer's Fresnel node says at grazing angles.
-    tree.nodes[COAT].inputs[1].default_value = 1.0 if node.ior > 1 else 0.0
+    if tree is None:
+        return
+    plain = plain_of(node)
+    if _is_shared(tree, plain):
+        tree = tree.copy()
+        tree.use_fake_user = True
+        node.node_tree = tree
+        if plain is not None:
+            plain.node_tree = tree
+    _upgrade(tree)
+    show_values(tree, node.image, node.ior)
 
 
-def _is_shared(tree) -> bool:
-    """Whether more than one node shows the tree; its fake user counts as a user."""
-    return tree.users - tree.use_fake_user > 1
+def _is_shared(tree, plain=None) -> bool:
+    """Whether nodes of other materials show the tree, too; its fake user counts as a user."""
+    own = 1 + (plain is not None and plain.node_tree == tree)
+    return tree.users - tree.use_fake_user > own
 
 
-def make_inner_tree() -> bpy.types.ShaderNodeTree:
-    """Image -> Color; image as emission, with a Fresnel-weighted glossy coat added -> BSDF.
-
-    The image already is what leaves the surface, so the coat adds to it and takes nothing away.
-    """
-    # The dot hides it in menus. A Blender without this add-on drops a tree that has no fake user when it saves.
-    tree = bpy.data.node_groups.new(".Beamspread", "ShaderNodeTree")
-    tree.use_fake_user = True
-    compat.add_output_socket(tree, "NodeSocketColor", "Color")
-    compat.add_output_socket(tree, "NodeSocketShader", "BSDF")
-    image = _add(tree, "ShaderNodeTexImage", IMAGE, (-600, 0))
-    image.extension = "EXTEND"
-    fresnel = _add(tree, "ShaderNodeFresnel", FRESNEL, (-600, -300))
-    coat = _add(tree, "ShaderNodeMath", COAT, (-400, -300))
-    coat.operation = "MULTIPLY"
-    glossy = _add(tree, "ShaderNodeBsdfGlossy", "Glossy", (-200, -300))
-    glossy.inputs["Roughness"].default_value = 0.1
-    emission = _add(tree, "ShaderNodeEmission", "Emission", (-200, 0))
-    total = _add(tree, "ShaderNodeAddShader", "Total", (0, -100))
-    output = _add(tree, "NodeGroupOutput", "Output", (200, 0))
-    link = tree.links.new
-    link(output.inputs["Color"], image.outputs["Color"])
-    link(emission.inputs["Color"], image.outputs["Color"])
-    link(coat.inputs[0], fresnel.outputs[0])
-    link(glossy.inputs["Color"], coat.outputs[0])
-    link(total.inputs[0], emission.outputs[0])
-    link(total.inputs[1], glossy.outputs[0])
-    link(output.inputs["BSDF"], total.outputs[0])
-    return tree
-
-
-def _add(tree, kind: str, name: str, location: tuple[int, int]):
-    node = tree.nodes.new(kind)
-    node.name, node.location = name, location
-    return node
+def link_result(node, image) -> list[str]:
+    """Show `image` in the node, and the node at its material's output; sentences on what that replaces."""
+    if node.node_tree is None:
+        node.node_tree = make_inner_tree()
+    node.image = image
+    _show(node, None)
+    return link_output(node)
 
 
 class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
@@ -112,6 +120,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
             ("ALBEDO", "Albedo", "Single-scattering albedo: what one scattering leaves of the light", 1),
         ],
         default="ALBEDO",
+        update=_edited,
     )
     base_color: FloatVectorProperty(
         name="Base Color",
@@ -131,6 +140,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         soft_max=0.9999,
         precision=4,
         step=1,
+        update=_edited,
     )
     mean_free_path: FloatVectorProperty(
         name="Mean Free Path",
@@ -143,6 +153,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         soft_max=10.0,
         precision=5,
         step=1,
+        update=_edited,
     )
     anisotropy: FloatProperty(
         name="Anisotropy",
@@ -150,6 +161,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         default=0.8,
         soft_min=-0.95,
         soft_max=0.95,
+        update=_edited,
     )
     ior: FloatProperty(
         name="IOR",
@@ -157,7 +169,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         default=1.0,
         soft_min=1.0,
         soft_max=2.0,
-        update=_show,
+        update=_ior_edited,
     )
     thickness: FloatProperty(
         name="Thickness",
@@ -171,11 +183,23 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
     image: PointerProperty(
         name="Image", description="Target of the bake; none: one is made", type=bpy.types.Image, update=_show
     )
+    texture_blur: FloatProperty(
+        name="Texture Blur",
+        description="Part of the texture at Base Color that light meets on its way in, and that is blurred with it; "
+        "the rest it meets on its way out, sharp",
+        subtype="FACTOR",
+        default=0.5,
+        min=0.0,
+        max=1.0,
+    )
+    former_node: StringProperty(options={"HIDDEN"}, description="What the material showed before the bake")
+    former_socket: StringProperty(options={"HIDDEN"}, description="The output of that node")
+    plain_node: StringProperty(options={"HIDDEN"}, description="The group that shows the bake without this add-on")
 
-    def init(self, context) -> None:
-        self.width = 220
+    def init(self, _context) -> None:
+        self.width = 240
         self.node_tree = make_inner_tree()
-        _show(self, context)
+        self.ior = NEW_IOR
 
     def free(self) -> None:
         # Removing the tree here crashes on undo; without its fake user it goes when the file is saved.
@@ -193,50 +217,15 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         base_color = tuple(map(_decimal, self.base_color)) if self.color_mode == "BASE_COLOR" else None
         return Surface(material, _decimal(self.thickness), base_color)
 
+    def has_texture(self) -> bool:
+        """Whether the base colour comes from what is linked, and neither from the base colour nor the albedo here."""
+        return BASE_COLOR in self.inputs and self.inputs[BASE_COLOR].is_linked
+
     def draw_buttons(self, _context, layout) -> None:
-        draw_properties(self, layout)
+        draw_node(self, layout)
 
     def draw_label(self) -> str:
         return "Beamspread"
-
-
-def draw_properties(node, layout) -> None:
-    """The node's properties, in the node editor and in panels."""
-    layout.prop(node, "preset")
-    layout.row().prop(node, "color_mode", expand=True)
-    if node.color_mode == "BASE_COLOR":
-        layout.prop(node, "base_color")
-    else:
-        _draw_channels(layout, node, "albedo", "Albedo")
-    _draw_channels(layout, node, "mean_free_path", "Free Path")
-    layout.prop(node, "anisotropy")
-    layout.prop(node, "ior")
-    layout.prop(node, "thickness")
-    layout.template_ID(node, "image", new="image.new", open="image.open")
-
-
-def _draw_channels(layout, node, name: str, label: str) -> None:
-    column = layout.column(align=True)
-    for index, channel in enumerate(("Red", "Green", "Blue")):
-        column.prop(node, name, index=index, text=channel if index else f"{label} {channel}")
-
-
-def is_linked(node) -> bool:
-    """Whether anything uses the node's outputs."""
-    return any(socket.is_linked for socket in node.outputs)
-
-
-def link_result(node, image) -> None:
-    """Show `image` in the node, and the node at its material's output if nothing uses it yet."""
-    tree = node.id_data
-    if node.node_tree is None:
-        node.node_tree = make_inner_tree()
-    node.image = image
-    _show(node, None)
-    output = tree.get_output_node("ALL") or tree.nodes.new("ShaderNodeOutputMaterial")
-    surface = output.inputs["Surface"]
-    if not surface.is_linked or not is_linked(node):
-        tree.links.new(surface, node.outputs["BSDF"])
 
 
 def _decimal(value: float) -> float:
@@ -244,19 +233,37 @@ def _decimal(value: float) -> float:
     return float(f"{value:.7g}")
 
 
-def _is_used() -> bool:
-    """Whether any material or group of the file has the node."""
+def _all_nodes():
+    """Every Beamspread node of the file, in materials and in groups."""
     trees = [material.node_tree for material in bpy.data.materials if material.node_tree] + list(bpy.data.node_groups)
-    return any(node.bl_idname == BeamspreadNode.bl_idname for tree in trees for node in tree.nodes)
+    return (node for tree in trees for node in tree.nodes if node.bl_idname == BeamspreadNode.bl_idname)
+
+
+@persistent
+def upgrade_nodes(*_arguments) -> None:
+    """Give nodes of older files the inputs that they have today; links and values stay."""
+    for tree in {node.node_tree for node in _all_nodes()} - {None}:
+        _upgrade(tree)
+
+
+def _upgrade(tree) -> None:
+    if tree.library is not None or not add_missing_inputs(tree):
+        return
+    # Nodes that are there get a new input before it has a default.
+    for node in _all_nodes():
+        if node.node_tree == tree:
+            node.inputs[ROUGHNESS].default_value = ROUGHNESS_BEFORE
 
 
 def register() -> None:
     if not BeamspreadNode.is_registered:
         bpy.utils.register_class(BeamspreadNode)
+    bpy.app.handlers.load_post.append(upgrade_nodes)
 
 
 def unregister() -> None:
+    bpy.app.handlers.load_post.remove(upgrade_nodes)
     # Blender 3.4 frees the type but not the evaluated copies of nodes that point to it, and crashes when those go, at
     # the latest on exit: there a class in use stays. In 4.5 a class that stays keeps the process from exiting.
-    if bpy.app.version >= (4, 0, 0) or not _is_used():
+    if bpy.app.version >= (4, 0, 0) or not any(_all_nodes()):
         bpy.utils.unregister_class(BeamspreadNode)

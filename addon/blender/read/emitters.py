@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 
 from ...core.scene.lights import MeshLight
@@ -38,6 +40,10 @@ class Materials:
             self._known[name] = self._read(material)
         return self._known[name]
 
+    def forget(self, name: str) -> None:
+        """Evaluate a material of that full name again."""
+        self._known.pop(name, None)
+
     def _read(self, material) -> np.ndarray | Wanted | None:
         surface = surface_of(material.node_tree) if compat.uses_nodes(material) else None
         if surface is None or _shows_a_bake(material.node_tree):
@@ -61,6 +67,12 @@ class Glow:
         glowing = {slot: light for slot, light in found.items() if light is not None}
         if glowing:
             self._add(obj, glowing)
+
+    def unplaced(self) -> Glow:
+        """The same without any instance."""
+        glow = copy(self)
+        glow._places = []
+        return glow
 
     def place(self, matrix) -> None:
         """Put an instance of it at a 4 x 4 matrix."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import bpy
@@ -9,8 +10,9 @@ import bpy
 from ...core.scene.illumination import Illumination
 from ...core.scene.lights import Light
 from .. import compat
-from .emitters import Glow, Materials
+from .emitters import Glow
 from .geometry import GEOMETRY_TYPES
+from .kept import Kept
 from .lamps import fault, is_portal, read_lamp
 from .left_out import left_out, left_out_of_world
 from .linking import links_of
@@ -19,10 +21,11 @@ from .visible import render_visible_names, renders
 from .world import read_world
 
 
-def read_illumination(depsgraph) -> Illumination:
-    """Lights and shadow casters of all objects and instances that render."""
+def read_illumination(depsgraph, kept: Kept | None = None) -> Illumination:
+    """Lights and shadow casters of all objects and instances that render; nothing that is `kept` is read again."""
+    kept = kept or Kept()
     visible = render_visible_names(depsgraph.view_layer)
-    lights, occluders = _Lights(depsgraph), OccluderReader()
+    lights, occluders = _Lights(depsgraph, kept), OccluderReader(kept)
     for instance in depsgraph.object_instances:
         if not renders(instance, visible):
             continue
@@ -33,7 +36,7 @@ def read_illumination(depsgraph) -> Illumination:
         if obj.type == "LIGHT" and lights_surfaces:
             lights.add_lamp(obj, instance.matrix_world)
         elif obj.type in GEOMETRY_TYPES and lights_surfaces:
-            lights.add_mesh(obj, instance.matrix_world)
+            lights.add_mesh(instance)
         occluders.add(instance)
     world = compat.world_of(depsgraph)
     lights.add_world(depsgraph.view_layer, world)
@@ -47,15 +50,32 @@ def read_illumination(depsgraph) -> Illumination:
     )
 
 
+def with_lamps(depsgraph, illumination: Illumination, names: Collection[str]) -> Illumination | None:
+    """The same with these lamps read again; None where more has changed than a look at each can tell."""
+    lights = list(illumination.lights)
+    for name in names:
+        places = [place for place, light in enumerate(lights) if light.name == name]
+        obj = depsgraph.view_layer.objects.get(name)
+        if len(places) != 1 or obj is None or name in illumination.by_cycles:
+            return None
+        evaluated = obj.evaluated_get(depsgraph)
+        light, reason = read_lamp(evaluated, evaluated.matrix_world)
+        if light is None or reason or fault(light):
+            return None
+        old = lights[places[0]]
+        lights[places[0]] = replace(light, blockers=old.blockers, receivers=old.receivers)
+    return illumination.with_lights(lights)
+
+
 class _Lights:
     """What was read so far, and what there is to say about it."""
 
-    def __init__(self, depsgraph) -> None:
+    def __init__(self, depsgraph, kept: Kept) -> None:
+        self._kept = kept
         self._names = {one.name for one in depsgraph.ids if isinstance(one, bpy.types.Object)}
         self._lights: list[Light] = []
         self._glows: dict[tuple[str, int], Glow] = {}  # by name and mesh: geometry nodes may give an object several
         self._links: dict[str, dict] = {}
-        self._materials = Materials()
         self.warnings: dict[str, None] = {}  # in order, each once
         self.by_cycles: dict[str, str] = {}  # see Illumination
 
@@ -78,18 +98,25 @@ class _Lights:
         if light is not None:
             self._add(light, links_of(obj, self._names))
 
-    def add_mesh(self, obj, matrix) -> None:
+    def add_mesh(self, instance) -> None:
         """Instances of a mesh become one light."""
+        obj = instance.object
         key = obj.name, obj.data.as_pointer()
         if key not in self._glows:
-            self._glows[key] = glow = Glow(obj, self._materials)
+            if key not in self._kept.glows:
+                self._kept.glows[key] = Glow(obj, self._kept.emission)
+                self._kept.note(self._kept.glows, key, instance)
+            self._glows[key] = glow = self._kept.glows[key].unplaced()
             self._links[obj.name] = links_of(obj, self._names)
             if glow.reason:
                 self.by_cycles[obj.name] = f"What glows of '{obj.name}' is left out: {glow.reason} not understood."
-        self._glows[key].place(matrix)
+        self._glows[key].place(instance.matrix_world)
 
     def add_world(self, view_layer, world) -> None:
-        light, reason = read_world(view_layer, world, self._materials.images)
+        known = world and (world.name, view_layer.use_sky)
+        if self._kept.world is None or self._kept.world[0] != known:
+            self._kept.world = known, read_world(view_layer, world, self._kept.emission.images)
+        light, reason = self._kept.world[1]
         if reason:
             self.by_cycles[world.name] = f"The world '{world.name}' is left out: {reason} not understood."
         if light is not None:

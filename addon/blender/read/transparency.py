@@ -51,6 +51,10 @@ class Materials:
             self._known[name] = self._read(material)
         return self._known[name]
 
+    def forget(self, name: str) -> None:
+        """Evaluate a material of that full name again."""
+        self._known.pop(name, None)
+
     def _read(self, material) -> LetThrough:
         if not (compat.uses_nodes(material) and compat.has_transparent_shadow(material)):
             return plain(0)

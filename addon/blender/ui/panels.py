@@ -4,96 +4,13 @@ from __future__ import annotations
 
 import bpy
 
-from ...core import native
-from ...core.errors import BakeError
 from .. import compat
-from ..images.files import check_image
 from ..jobs.engine import BeamspreadEngine
-from ..jobs.prepare import check_visible
-from ..jobs.state import state
-from ..node.find import find_misplaced, find_node, materials_of
-from ..node.node import draw_properties
-from ..read.visible import render_visible_names
-
-INDIRECT_COST = "Indirect light takes seconds to a minute per object: Cycles finds it first."
-
-# Objects whose warnings, and messages of bakes, that a panel shows; it is drawn often.
-MOST_OBJECTS = 8
-
-
-def warnings_for(obj, visible: set[str]) -> list[str]:
-    """What would keep the object from being baked, as far as it is known without baking."""
-    # A collection instance may show thousands of objects.
-    messages = [bake.error for bake in find_misplaced([obj] if obj.instance_type == "NONE" else [])]
-    materials = materials_of(obj)
-    if not materials:
-        return messages
-    if not obj.data.uv_layers:
-        messages.append("The mesh has no UV map: unwrap it first.")
-    checks = [lambda: check_visible(obj.name, visible)]
-    for node in map(find_node, materials):
-        checks.append(lambda node=node: node.surface().check())
-        if node.image is not None:
-            checks.append(lambda node=node: check_image(node.image))
-    for check in checks:
-        try:
-            check()
-        except BakeError as error:
-            messages.append(str(error))
-    return messages
-
-
-# Of a panel beside its text, and of a letter on average, at a user-interface scale of 1.
-BORDER_PIXELS, LETTER_PIXELS = 60, 6.4
-
-
-def draw_warnings(layout, context, messages: list[str]) -> None:
-    draw_sentences(layout, context, messages, "ERROR")
-
-
-def draw_sentences(layout, context, messages: list[str], icon: str) -> None:
-    """Wrapped to the panel's width, each after an icon."""
-    pixels = context.region.width / context.preferences.system.ui_scale
-    width = max(20, int((pixels - BORDER_PIXELS) / LETTER_PIXELS))
-    for message in messages:
-        column = layout.column(align=True)
-        for number, line in enumerate(_wrap(message, width)):
-            column.label(text=line, icon="BLANK1" if number else icon)
-
-
-def _wrap(text: str, width: int) -> list[str]:
-    lines = [""]
-    for word in text.split():
-        if lines[-1] and len(lines[-1]) + len(word) >= width:
-            lines.append("")
-        lines[-1] = f"{lines[-1]} {word}".strip()
-    return lines
-
-
-def draw_bake(layout, context) -> None:
-    """The progress, or problems of the selected objects and the Bake buttons; then what the last bakes said."""
-    if native.problem:
-        draw_warnings(layout, context, [native.problem])
-        return
-    shown = []
-    if state.is_running():
-        column = layout.column(align=True)
-        for line, icon in zip(state.progress(), ("RENDER_STILL", "BLANK1")):
-            column.label(text=line, icon=icon)
-    else:
-        # `context.object` is empty in the render properties.
-        chosen, visible = list(context.view_layer.objects.selected), render_visible_names(context.view_layer)
-        for obj in chosen[:MOST_OBJECTS]:
-            warnings = warnings_for(obj, visible)
-            draw_warnings(layout, context, [f"{obj.name}: {message}" for message in warnings])
-            shown += warnings
-        row = layout.row(align=True)
-        row.scale_y = 1.4
-        row.operator("beamspread.bake", text="Bake", icon="RENDER_STILL").objects = "SELECTED"
-        row.operator("beamspread.bake", text="Bake All").objects = "ALL"
-    # A bake that failed for a reason that still stands has said the same.
-    news = [message for message in state.messages() if not message.endswith(tuple(shown))]
-    draw_warnings(layout, context, news[:MOST_OBJECTS])
+from ..node.draw import draw_properties
+from ..node.find import find_node
+from ..preferences import draw_help
+from .image_buttons import draw_image_buttons
+from .results import draw_bake, draw_sentences, estimates
 
 
 def _use_columns(layout) -> None:
@@ -114,17 +31,36 @@ class BEAMSPREAD_PT_render(RenderPanel, bpy.types.Panel):
 
     bl_label = "Beamspread"
 
+    def draw_header_preset(self, _context):
+        draw_help(self.layout, "first_bake", "lights")
+
     def draw(self, context):
         layout = self.layout
         _use_columns(layout)
         draw_bake(layout, context)
         column = layout.column()
         settings = context.scene.beamspread
-        for name in ("output", "resolution", "margin", "samples"):
+        for name in ("output", "resolution", "use_indirect"):
             column.prop(settings, name)
-        column.prop(settings, "use_indirect")
-        if settings.use_indirect:
-            draw_sentences(column, context, [INDIRECT_COST], "INFO")
+        draw_sentences(column, context, estimates(context), "TIME")
+
+
+class BEAMSPREAD_PT_expert(RenderPanel, bpy.types.Panel):
+    """What is well as it is for most."""
+
+    bl_label = "Expert"
+    bl_parent_id = "BEAMSPREAD_PT_render"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header_preset(self, _context):
+        draw_help(self.layout, "performance")
+
+    def draw(self, context):
+        _use_columns(self.layout)
+        column = self.layout.column()
+        settings = context.scene.beamspread
+        column.prop(settings, "margin")
+        column.prop(settings, "samples")
         if settings.output != "LUMINANCE":
             return  # no medium, no solver
         column.prop(settings, "solver")
@@ -151,6 +87,22 @@ class BEAMSPREAD_PT_active_image(RenderPanel, bpy.types.Panel):
         layout.prop(context.scene.render.bake, "use_clear", text="Clear Image")
 
 
+class BEAMSPREAD_PT_images(RenderPanel, bpy.types.Panel):
+    """Where the images go that bakes make."""
+
+    bl_label = "New Images"
+    bl_parent_id = "BEAMSPREAD_PT_render"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout, settings = self.layout, context.scene.beamspread
+        _use_columns(layout)
+        layout.prop(settings, "image_storage")
+        if settings.image_storage == "FILES":
+            layout.prop(settings, "image_dir")
+        layout.prop(settings, "image_name")
+
+
 class BEAMSPREAD_PT_batch(RenderPanel, bpy.types.Panel):
     """Where a batch writes."""
 
@@ -158,11 +110,16 @@ class BEAMSPREAD_PT_batch(RenderPanel, bpy.types.Panel):
     bl_parent_id = "BEAMSPREAD_PT_render"
     bl_options = {"DEFAULT_CLOSED"}
 
+    def draw_header_preset(self, _context):
+        draw_help(self.layout, "batch", "cli")
+
     def draw(self, context):
         layout = self.layout
         _use_columns(layout)
         layout.prop(context.scene.beamspread, "output_dir")
         layout.prop(context.scene.beamspread, "format")
+        if context.scene.beamspread.format == "PNG":
+            layout.prop(context.scene.beamspread, "use_view_transform")
 
 
 class MaterialPanel:
@@ -175,11 +132,16 @@ class MaterialPanel:
         material = _active_material(context)
         return material is not None and compat.uses_nodes(material) and find_node(material) is not None
 
+    def draw_header_preset(self, _context):
+        draw_help(self.layout, "materials", "libraries")
+
     def draw(self, context):
         layout = self.layout
         _use_columns(layout)
-        draw_properties(find_node(_active_material(context)), layout)
-        draw_bake(layout, context)
+        material = _active_material(context)
+        draw_properties(find_node(material), layout)
+        draw_image_buttons(layout, context)
+        draw_bake(layout, context, material.name)
 
 
 def _active_material(context):
@@ -204,7 +166,9 @@ class BEAMSPREAD_PT_node_editor(MaterialPanel, bpy.types.Panel):
 
 _classes = (
     BEAMSPREAD_PT_render,
+    BEAMSPREAD_PT_expert,
     BEAMSPREAD_PT_active_image,
+    BEAMSPREAD_PT_images,
     BEAMSPREAD_PT_batch,
     BEAMSPREAD_PT_material,
     BEAMSPREAD_PT_node_editor,

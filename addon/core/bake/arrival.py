@@ -28,7 +28,8 @@ def arrive(
         along which it travels, in the plane's frame. Its direction is the mean one.
     """
     rays = min(RAYS_PER_SAMPLE * settings.samples**2, MOST_RAYS)
-    gatherer = Gatherer(replace(grid, coverage=np.ones_like(grid.coverage)), illumination, settings)
+    whole = replace(grid, coverage=np.ones_like(grid.coverage), color_in=None)
+    gatherer = Gatherer(whole, illumination, settings)
     irradiance, flow = np.zeros((2, grid.height, grid.width, 3), np.float32)
     for light, step in zip(illumination.lights, stages(progress, [1.0] * len(illumination.lights))):
         if light.is_behind(grid):

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..native import native
-from ..progress import Progress
+from ..progress import Progress, stages
 from ..scene.grid import Grid
 from ..scene.illumination import Illumination
 from ..scene.lights import ExtendedLight, FieldLight, Light, SunDiskLight
@@ -52,7 +52,9 @@ class Gatherer:
         return not isinstance(light, FieldLight)
 
     def is_colored(self, light: Light) -> bool:
-        """Whether the light differs in color from ray to ray, be it by what it shines through."""
+        """Whether the light differs in color from ray to ray, be it by what it shines through or falls on."""
+        if self.grid.color_in is not None:
+            return True
         caster = self._caster(light)
         return getattr(light, "is_colored", False) or (caster is not None and caster.is_colored)
 
@@ -90,7 +92,7 @@ class Gatherer:
         else:
             arriving = native.ray_layers(*self._traced(light), **self._options(self.rays, progress))
         for irradiance, direction in arriving:
-            yield from native.PlaneLight.of_channels(self._covered(irradiance) * light.rgb(), direction, 3)
+            yield from native.PlaneLight.of_channels(self._received(irradiance) * light.rgb(), direction, 3)
 
     def add_to(self, field, light: Light, rays: int, progress: Progress | None = None) -> None:
         """Add the light to a native `LightField`."""
@@ -100,7 +102,9 @@ class Gatherer:
             return
         grid, shape, caster = self._traced(light)
         options = self._options(rays, progress) | self._even_rays(rays)
-        field.add_rays(grid, shape, light.rgb().tolist(), self.grid.coverage, caster, **options)
+        parts = self._channels_received(light.rgb())
+        for (color, received), options["progress"] in zip(parts, stages(progress, [1.0] * len(parts))):
+            field.add_rays(grid, shape, color, received, caster, **options)
 
     def totals(self, light: Light, rays: int, progress: Progress | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Irradiance (H, W, 3) of the light at strength 1 and color 1, W/m^2 on the covered part of each texel.
@@ -111,13 +115,13 @@ class Gatherer:
         if isinstance(light, ExtendedLight):
             options = self._options(rays, progress) | self._even_rays(rays)
             irradiance, flow = native.gather_rays(*self._traced(light), **options)
-            return self._covered(irradiance), self._covered(flow)
+            return self._received(irradiance), self._covered(flow)
         if isinstance(light, FieldLight):
             irradiance, flow = np.zeros((2, self.grid.height, self.grid.width, 3), np.float32)
             for part, direction in light.layers(self.grid):
                 irradiance += part
                 flow += part.mean(axis=2, keepdims=True) * direction
-            return self._covered(irradiance), self._covered(flow)
+            return self._received(irradiance), self._covered(flow)
         irradiance, direction = self.beams(light, progress)
         if irradiance.ndim == 2:
             irradiance = np.repeat(irradiance[..., None], 3, axis=2)
@@ -126,7 +130,7 @@ class Gatherer:
     def beams(self, light: Light, progress: Progress | None = None, directions: bool = True):
         """Irradiance of a light without size at strength 1 and color 1, and its direction; see `Light.gather`.
 
-        (H, W), or (H, W, 3) behind what colors light; W/m^2 with cosine, visibility and coverage.
+        (H, W), or (H, W, 3) behind what colors light or on a texture; W/m^2 with cosine, visibility and coverage.
         """
         irradiance, direction = light.gather(
             self.grid,
@@ -137,16 +141,16 @@ class Gatherer:
             clearance=self.grid.clearance,
             directions=directions,
         )
-        return self._covered(irradiance), direction
+        return self._received(irradiance), direction
 
-    def stand_in(self, light: Light) -> list:
+    def stand_in(self, light: Light, progress: Progress | None = None) -> list:
         """The light as far as a `LightField` needs it to look, with the mean direction of each texel.
 
         Harmonics of all directions together are weaker than those of their mean.
         """
         if self.has_one_direction(light):
-            return self.plane_lights(light, directions=True)
-        irradiance, flow = self.totals(light, STAND_IN_RAYS)
+            return self.plane_lights(light, progress, directions=True)
+        irradiance, flow = self.totals(light, STAND_IN_RAYS, progress)
         length = np.linalg.norm(flow, axis=-1, keepdims=True)
         direction = np.divide(flow, length, out=np.full_like(flow, (0, 0, -1)), where=length > 0)
         return native.PlaneLight.of_channels(irradiance * light.rgb(), direction, 3)
@@ -163,7 +167,7 @@ class Gatherer:
         width, height = min(grid.width, SURVEY_TEXELS), min(grid.height, SURVEY_TEXELS)
         pitch = {"pitch_x": grid.pitch_x * grid.width / width, "pitch_y": grid.pitch_y * grid.height / height}
         whole = np.ones((height, width), np.float32)
-        coarse = replace(grid, width=width, height=height, coverage=whole, **pitch)
+        coarse = replace(grid, width=width, height=height, coverage=whole, color_in=None, **pitch)
         settings = replace(self._settings, samples=1)
         bare = Gatherer(coarse, Illumination(()), settings, SURVEY_RAYS)
         lights, means = [], []
@@ -196,6 +200,22 @@ class Gatherer:
 
     def _in_plane(self, direction) -> np.ndarray:
         return np.array([np.dot(direction, axis) for axis in (self.grid.x_axis, self.grid.y_axis, self.grid.normal)])
+
+    def _received(self, irradiance: np.ndarray) -> np.ndarray:
+        """Of (H, W) or (H, W, 3), what the covered part of each texel lets in by its color."""
+        covered, color = self._covered(irradiance), self.grid.color_in
+        if color is None:
+            return covered
+        return covered[..., None] * color if covered.ndim == 2 else covered * color
+
+    def _channels_received(self, rgb: np.ndarray) -> list[tuple[list[float], np.ndarray]]:
+        """Colors of light, and the part (H, W) of it that each texel receives; together they are all."""
+        color, coverage = self.grid.color_in, self.grid.coverage
+        if color is None:
+            return [(rgb.tolist(), coverage)]
+        if (color[..., :1] == color).all():
+            return [(rgb.tolist(), coverage * color[..., 0])]
+        return [((rgb * np.eye(3)[i]).tolist(), np.ascontiguousarray(coverage * color[..., i])) for i in range(3)]
 
     def _covered(self, values: np.ndarray) -> np.ndarray:
         values *= self.grid.coverage if values.ndim == 2 else self.grid.coverage[..., None]

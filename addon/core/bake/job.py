@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import BakeError
-from ..progress import Progress, stages, timed
+from ..ldf.library import is_known, library
+from ..progress import Progress, say, stages, timed
 from ..scene.illumination import Illumination
-from ..scene.lights import Light
+from ..scene.lights import Light, SunLight
 from ..scene.receiver import Receiver
+from .estimate import simulation_seconds, solver_seconds
 from .layers import LAYERS, WITHOUT_MEDIUM
-from .luminance import LIBRARY_WEIGHT, LIGHT_WEIGHT, SOLVE_WEIGHT
 from .margin import extend_margin
 from .settings import COMBINED, BakeSettings
 from .surface import Surface
@@ -23,7 +24,8 @@ from .surface import Surface
 class BakeJob:
     """A receiver with its light and its surface; `name` is what to call the receiver in messages.
 
-    `more_light` finds what `illumination` lacks, as bounced light, when the job runs, in whatever thread.
+    `more_light` finds what `illumination` lacks, as bounced light, when the job runs, in whatever thread; that takes
+    about `more_seconds`.
     """
 
     name: str
@@ -32,26 +34,27 @@ class BakeJob:
     surface: Surface
     settings: BakeSettings
     more_light: Callable[[Receiver, Progress | None], Sequence[Light]] | None = None
+    more_seconds: float = 0.0
 
     def run(self, progress: Progress | None = None) -> dict[str, np.ndarray]:
         """The layers: name -> float32 (height, width, 3), margin included, row 0 at the bottom."""
         self.surface.check()
+        finding, baking = stages(progress, [self.more_seconds if self.more_light else 0.0, self._seconds()])
         if self.more_light is not None:
-            finding, baking = stages(progress, [LIBRARY_WEIGHT, LIBRARY_WEIGHT + SOLVE_WEIGHT])
+            say(finding, "Finding indirect light")
             with timed(f"bounced light of '{self.name}'"):
                 illumination = self.illumination.lit_by(self.more_light(self.receiver, finding))
             return replace(self, illumination=illumination, more_light=None).run(baking)
         if self._surely_dark():  # at once: to simulate the medium may take half a minute
             return {name: np.zeros((*self.receiver.coverage.shape, 3), np.float32) for name in self.settings.layers}
-        needs_medium = not WITHOUT_MEDIUM.issuperset(self.settings.layers)
-        needs_albedo = LIBRARY_WEIGHT if needs_medium and self.surface.base_color is not None else 0.0
-        one = LIBRARY_WEIGHT + SOLVE_WEIGHT + LIGHT_WEIGHT * len(self.illumination.lights)
         parts = len(self.settings.layers) * len(self.receiver.charts)
-        resolving, *baking = stages(progress, [needs_albedo] + [one] * parts)
-        material, steps = self.surface.material, iter(baking)
-        if needs_medium:
+        simulating, *solving = stages(baking, [self._simulation_seconds()] + [self._solver_seconds() / parts] * parts)
+        self._simulate(simulating)
+        say(baking, "Baking")
+        material, steps = self.surface.material, iter(solving)
+        if needs_medium(self.settings):
             with timed(f"albedo of '{self.name}'"):
-                material = self.surface.resolve(self.settings.quality, resolving)
+                material = self.surface.resolve(self.settings.quality, None, self.settings.threads)
         layers = {}
         for name in self.settings.layers:
             with timed(f"{name} of '{self.name}'"):
@@ -62,6 +65,25 @@ class BakeJob:
             del values  # large
             layers[name] = extend_margin(texture, self.receiver.coverage, self.settings.margin)
         return layers
+
+    def _simulate(self, progress: Progress | None) -> None:
+        media = to_simulate(self.surface, self.settings)
+        for medium, step in zip(media, stages(progress, [1.0] * len(media))):
+            library(medium, self.settings.quality, step, self.settings.threads)
+
+    def _seconds(self) -> float:
+        return self._simulation_seconds() + self._solver_seconds()
+
+    def _simulation_seconds(self) -> float:
+        return simulation_seconds(self.settings.quality, self.settings.threads) * len(
+            to_simulate(self.surface, self.settings)
+        )
+
+    def _solver_seconds(self) -> float:
+        shape, settings = self.receiver.coverage.shape, self.settings
+        suns = sum(isinstance(light, SunLight) for light in self.illumination.lights)
+        others = len(self.illumination.lights) - suns
+        return 0.1 + solver_seconds(*shape, suns, others, settings.solver, settings.threads) * len(settings.layers)
 
     def warnings(self) -> list[str]:
         """What the artist should know before it runs."""
@@ -111,3 +133,16 @@ class BakeJob:
             return []
         in_the_way = f"No light reaches '{self.name}', so it is black: look for what stands in its way."
         return [self._dark_by_lights() or in_the_way]
+
+
+def needs_medium(settings: BakeSettings) -> bool:
+    """Whether what the surface is made of matters to a bake."""
+    return not WITHOUT_MEDIUM.issuperset(settings.layers)
+
+
+def to_simulate(surface: Surface, settings: BakeSettings) -> list:
+    """The media that a bake has to simulate first, which takes long."""
+    uses_library = settings.distributions == "library" or surface.base_color is not None
+    if not (needs_medium(settings) and uses_library):
+        return []
+    return [medium for medium in surface.media() if not is_known(medium, settings.quality)]

@@ -17,11 +17,12 @@ from ..scene.grid import Grid
 from ..scene.illumination import Illumination
 from ..scene.lights import Light, SunDiskLight, SunLight
 from .convolve import solve as convolve_plane_lights
+from .estimate import solver_seconds
 from .gather import Gatherer
 from .settings import BakeSettings
 
-# Shares of the time that a bake takes, roughly: simulating an LDF not in the cache, gathering a light, solving for all.
-LIBRARY_WEIGHT, LIGHT_WEIGHT, SOLVE_WEIGHT = 2.0, 1.0, 3.0
+# Shares of the time that a bake takes, roughly: reading an LDF that is known, gathering a light, solving for all.
+LIBRARY_WEIGHT, LIGHT_WEIGHT, SOLVE_WEIGHT = 0.2, 1.0, 3.0
 
 # Of the solvers, see `convolve`: half a per cent in the worst texel is not seen, and below the noise of libraries.
 TOLERANCE = 5e-3
@@ -70,20 +71,33 @@ def bake(
     """
     material.check()
     check_thickness(thickness)
-    lights = illumination.lights
-    media_progress, light_progress = stages(progress, [LIBRARY_WEIGHT, LIGHT_WEIGHT * len(lights) + SOLVE_WEIGHT])
+    light_work = LIGHT_WEIGHT * len(illumination.lights) + _solve_weight(grid, settings.solver)
+    media_progress, light_progress = stages(progress, [LIBRARY_WEIGHT, light_work])
     if settings.distributions == "library":
-        sources = _libraries(material, thickness, settings.quality, media_progress)
+        sources = _libraries(material, thickness, settings, media_progress)
     else:
         sources = [load_source(settings.sample_folder, settings.distributions)] * 3
+    return spread(grid, illumination, material, sources, settings, light_progress)
+
+
+def spread(
+    grid: Grid,
+    illumination: Illumination,
+    material: Material,
+    sources: list,
+    settings: BakeSettings,
+    progress: Progress | None = None,
+) -> np.ndarray:
+    """`bake` with the LDF of each channel given; the material is checked, and `settings.quality` does not count."""
+    lights = illumination.lights
     gatherer = Gatherer(grid, illumination, settings, _rays(grid, material, settings))
     bytes_waiting = 4 * grid.width * grid.height * len(lights)
     if all(map(gatherer.has_one_direction, lights)) and bytes_waiting <= MOST_WAITING:
-        spread = _spread_together
+        solve = _spread_together
     elif settings.solver == "fft":
-        spread = _spread_field
+        solve = _spread_field
     else:
-        spread = _spread_apart
+        solve = _spread_apart
     medium = {
         "ldf": sources,
         "albedo": material.albedo,
@@ -93,12 +107,12 @@ def bake(
         "threads": settings.threads,
     }
     try:
-        luminance = spread(gatherer, lights, medium, settings.solver, light_progress)
+        luminance = solve(gatherer, lights, medium, settings.solver, progress)
     except ValueError as error:
         if settings.distributions == "library":
             raise
         raise BakeError(f"The LDF samples in '{settings.sample_folder}' don't reach this far: {error}.") from error
-    return luminance
+    return luminance if grid.color_out is None else luminance * grid.color_out
 
 
 def _rays(grid: Grid, material: Material, settings: BakeSettings) -> int:
@@ -113,9 +127,15 @@ def _rays(grid: Grid, material: Material, settings: BakeSettings) -> int:
     return round(min(max(wanted, FEWEST_RAYS), MOST_RAYS) * (settings.samples / 4) ** 2) or 1
 
 
+def _solve_weight(grid: Grid, solver: str) -> float:
+    """Of all lights together."""
+    size = grid.width, grid.height
+    return SOLVE_WEIGHT * max(1.0, solver_seconds(*size, 0, 1, solver) / solver_seconds(*size, 0, 1, "fft"))
+
+
 def _spread_together(gatherer: Gatherer, lights: Sequence[Light], medium: dict, solver: str, progress) -> np.ndarray:
     """All lights first, then the solver: for few lights of one direction per texel."""
-    gathering, solving = stages(progress, [LIGHT_WEIGHT * len(lights), SOLVE_WEIGHT])
+    gathering, solving = stages(progress, [LIGHT_WEIGHT * len(lights), _solve_weight(gatherer.grid, solver)])
     arriving = []
     for light, step in zip(lights, stages(gathering, [1.0] * len(lights))):
         arriving += [part for part in gatherer.plane_lights(light, step) if part.mean() > 0]
@@ -128,7 +148,7 @@ def _spread_apart(gatherer: Gatherer, lights: Sequence[Light], medium: dict, sol
     """Light after light, and ray after ray where one has a size: for the solvers that share no work among them."""
     luminance = _dark(gatherer.grid)
     for light, step in zip(lights, stages(progress, [1.0] * len(lights))):
-        gathering, solving = stages(step, [LIGHT_WEIGHT, SOLVE_WEIGHT])
+        gathering, solving = stages(step, [LIGHT_WEIGHT, _solve_weight(gatherer.grid, solver)])
         parts = [part for part in gatherer.layers(light, gathering) if part.mean() > 0]
         for part, part_step in zip(parts, stages(solving, [1.0] * len(parts))):
             luminance += convolve_plane_lights([part], solver=solver, progress=part_step, **medium)
@@ -137,7 +157,8 @@ def _spread_apart(gatherer: Gatherer, lights: Sequence[Light], medium: dict, sol
 
 def _spread_field(gatherer: Gatherer, lights: Sequence[Light], medium: dict, _solver: str, progress) -> np.ndarray:
     """Lights of any number and size, added up as they come."""
-    choosing, *adding, solving = stages(progress, [SOLVE_WEIGHT] + [LIGHT_WEIGHT] * len(lights) + [SOLVE_WEIGHT])
+    works = [LIGHT_WEIGHT, SOLVE_WEIGHT, *[LIGHT_WEIGHT] * len(lights), SOLVE_WEIGHT]
+    looking, choosing, *adding, solving = stages(progress, works)
     grid = gatherer.grid
     shape, survey, means = gatherer.survey()
     brightest = sorted(range(len(lights)), key=lambda i: means[i], reverse=True)
@@ -147,10 +168,10 @@ def _spread_field(gatherer: Gatherer, lights: Sequence[Light], medium: dict, _so
     later = [i for i in lit if i not in kept]
     # What a survey has missed shines on few texels, and is looked at as it is.
     look_at = [*later[:MOST_STAND_INS], *(i for i in later[MOST_STAND_INS:] if means[i] == 0)]
-    parts = [part for i in kept for part in gatherer.plane_lights(lights[i])]
-    parts = [
-        part for part in parts + [part for i in look_at for part in gatherer.stand_in(lights[i])] if part.mean() > 0
-    ]
+    parts = []
+    for i, step in zip([*kept, *look_at], stages(looking, [1.0] * len(kept + look_at))):
+        parts += gatherer.plane_lights(lights[i], step) if i in kept else gatherer.stand_in(lights[i], step)
+    parts = [part for part in parts if part.mean() > 0]
     expected = [part for i in lit for part in survey[i]]
     if not parts and not any(means):
         return _dark(grid)
@@ -165,7 +186,7 @@ def _dark(grid: Grid) -> np.ndarray:
     return np.zeros((grid.height, grid.width, 3), np.float32)
 
 
-def _libraries(material: Material, thickness: float, quality: str, progress: Progress | None) -> list:
+def _libraries(material: Material, thickness: float, settings: BakeSettings, progress: Progress | None) -> list:
     """The LDF library of each channel; channels of the same medium share one."""
     depths = [thickness / length if thickness else math.inf for length in material.mean_free_path]
     channels = list(zip(material.channel_anisotropy, depths))
@@ -173,5 +194,5 @@ def _libraries(material: Material, thickness: float, quality: str, progress: Pro
     by_channel = {}
     for (g, depth), stage in zip(distinct, stages(progress, [1.0] * len(distinct))):
         medium = native.Medium(g=g, ior=material.ior, thickness=depth)
-        by_channel[g, depth] = library(medium, quality=quality, progress=stage)
+        by_channel[g, depth] = library(medium, settings.quality, stage, settings.threads)
     return [by_channel[channel] for channel in channels]

@@ -39,20 +39,38 @@ def extend_margin(texture: np.ndarray, coverage: np.ndarray, margin: int) -> np.
 
 def _add_rings(texture: np.ndarray, known: np.ndarray, count: int) -> np.ndarray:
     """A copy with `count` rings around the known texels filled."""
-    result, filled = texture.astype(np.float32, copy=True), known.copy()
+    # A frame of unknown texels spares questions at the borders.
+    result = np.pad(texture.astype(np.float32, copy=False), ((1, 1), (1, 1), (0, 0)))
+    filled = np.pad(known, 1)
+    rows, columns = np.nonzero(_touched(filled))
     for _ in range(count):
-        if filled.all() or not filled.any():
+        if not len(rows):
             break
-        weight = _neighbour_sum(filled.astype(np.float32)[..., None])[..., 0]
-        ring = (weight > 0) & ~filled
-        total = _neighbour_sum(np.where(filled[..., None], result, 0))
-        result[ring] = total[ring] / weight[ring, None]
-        filled |= ring
-    return result
+        weight, total = np.zeros((len(rows), 1), np.float32), np.zeros((len(rows), result.shape[2]), np.float32)
+        for dy, dx in NEIGHBOURS:
+            counts = filled[rows + dy, columns + dx, None]
+            weight += counts
+            total += np.where(counts, result[rows + dy, columns + dx], 0)
+        result[rows, columns] = total / weight
+        filled[rows, columns] = True
+        rows, columns = _around(filled, rows, columns)
+    return result[1:-1, 1:-1]
 
 
-def _neighbour_sum(values: np.ndarray) -> np.ndarray:
-    """Sum over the eight neighbours of each texel, those outside the texture counting 0."""
-    height, width = values.shape[:2]
-    padded = np.pad(values, ((1, 1), (1, 1), (0, 0)))
-    return sum(padded[1 + dy : 1 + dy + height, 1 + dx : 1 + dx + width] for dy, dx in NEIGHBOURS)
+def _touched(filled: np.ndarray) -> np.ndarray:
+    """Unknown texels beside known ones, without the frame."""
+    height, width = filled.shape[0] - 2, filled.shape[1] - 2
+    near = np.zeros_like(filled)
+    for dy, dx in NEIGHBOURS:
+        near[1:-1, 1:-1] |= filled[1 + dy : 1 + dy + height, 1 + dx : 1 + dx + width]
+    return near & ~filled
+
+
+def _around(filled: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The unknown texels beside the given ones, without the frame."""
+    height, width = filled.shape
+    places = np.unique(np.concatenate([(rows + dy) * width + columns + dx for dy, dx in NEIGHBOURS]))
+    rows, columns = np.divmod(places, width)
+    inside = (rows > 0) & (rows < height - 1) & (columns > 0) & (columns < width - 1)
+    wanted = inside & ~filled[rows, columns]
+    return rows[wanted], columns[wanted]

@@ -13,7 +13,7 @@ from ..native import native
 from ..progress import Progress
 from .job import BakeJob
 
-WRITTEN, FAILED, CANCELLED = "written", "failed", "cancelled"
+WRITTEN, SKIPPED, FAILED, CANCELLED = "written", "skipped", "failed", "cancelled"
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 COMBINED, IRRADIANCE, DIRECTION = "Combined", "Irradiance", "Direction"
 """Layers: the one that materials show, luminance under all lights; and what arrives, see `arrive`."""
 
+PREVIEW, FINAL = "preview", "final"
+"""Qualities of simulated libraries."""
+
 OUTPUTS = {"LUMINANCE": COMBINED, "IRRADIANCE": IRRADIANCE, "DIRECTION": DIRECTION}
 """What users choose from, and its layer."""
 
@@ -25,6 +28,7 @@ class BakeSettings:
         interpolated: "angular", "adaptive" or "planar". Samples stand for anisotropy, index of refraction and
         thickness of every material.
     threads : 0 for all.
+    memory_limit : bytes that a bake may take, about; 0: all of the machine's.
     indirect : whether light counts that other objects return.
     layers : names of results wanted, see layers.py.
     """
@@ -36,6 +40,7 @@ class BakeSettings:
     distributions: str = "library"
     sample_folder: str = ""
     threads: int = 0
+    memory_limit: int = 0
     indirect: bool = True
     layers: tuple[str, ...] = (COMBINED,)
 

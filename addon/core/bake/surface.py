@@ -56,7 +56,15 @@ class Surface:
     def _depth(self, mean_free_path: float) -> float:
         return self.thickness / mean_free_path if self.thickness else math.inf
 
-    def resolve(self, quality: str, progress: Progress | None = None) -> Material:
+    def media(self) -> list:
+        """The native `Medium`s that its bake needs libraries of, each once."""
+        found = []
+        for length, g in zip(self.material.mean_free_path, self.material.channel_anisotropy):
+            medium = native.Medium(g=g, ior=self.material.ior, thickness=self._depth(length))
+            found += [] if medium in found else [medium]
+        return found
+
+    def resolve(self, quality: str, progress: Progress | None = None, threads: int = 0) -> Material:
         """The material, its albedo worked out from the base colour if there is one."""
         self.check()
         if self.base_color is None:
@@ -65,5 +73,5 @@ class Surface:
         albedo = []
         for (color, length, g), stage in zip(channels, stages(progress, [1.0] * len(self.base_color))):
             medium = native.Medium(g=g, ior=self.material.ior, thickness=self._depth(length))
-            albedo.append(albedo_from_color(color, medium, quality, stage)[0])
+            albedo.append(albedo_from_color(color, medium, quality, stage, threads)[0])
         return replace(self.material, albedo=tuple(albedo))

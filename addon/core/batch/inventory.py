@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from ..bake.runner import Bake
 from ..scene.illumination import Illumination
 from ..scene.lights import Light
 
 
-def inventory(bakes: Sequence[Bake]) -> Iterator[str]:
-    """The light that bakes share, each line of it once, then each bake."""
-    jobs = [bake.job for bake in bakes if bake.job is not None]
-    yield from dict.fromkeys(line for job in jobs for line in _light(job.illumination))
-    for job in jobs:
+class Inventory:
+    """Says of the light that bakes share each line once."""
+
+    def __init__(self) -> None:
+        self._said: set[str] = set()
+
+    def lines(self, bake: Bake) -> Iterator[str]:
+        """What is new of the light of this bake, then the bake."""
+        job = bake.job
+        if job is None:
+            return
+        for line in _light(job.illumination):
+            if line not in self._said:
+                self._said.add(line)
+                yield line
         receiver, grids = job.receiver, [chart.grid for chart in job.receiver.charts]
         sizes = [f"{one.width * one.pitch_x:.4g} x {one.height * one.pitch_y:.4g}" for one in grids]
         yield f"'{job.name}': {receiver.width} x {receiver.height} texels, {', '.join(sizes)} scene units"

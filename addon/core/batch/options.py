@@ -29,6 +29,7 @@ class BatchOptions:
     indirect: bool | None
     allow_dark: bool
     verbose: bool
+    resume: bool
 
 
 def arguments_for_script(argv: Sequence[str], inside_blender: bool) -> list[str]:
@@ -42,10 +43,7 @@ def parse(arguments: Sequence[str]) -> BatchOptions:
     """Read the command line; a mistake ends the program with exit code 2 and one line that says why."""
     parser = _parser()
     values = parser.parse_args(list(arguments))
-    if values.resume:
-        parser.error("--resume is not supported yet: run without it to bake everything again")
     values.objects = tuple(dict.fromkeys(name for group in values.objects for name in group))
-    del values.resume
     return BatchOptions(**vars(values))
 
 
@@ -94,7 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--report", metavar="FILE.json", help="write what became of each bake")
     parser.add_argument("--allow-dark", action="store_true", help="exit code 0 also where no light arrives")
     parser.add_argument("--verbose", action="store_true", help="print what is read, and how long each stage takes")
-    parser.add_argument("--resume", action="store_true", help="not supported yet")
+    parser.add_argument("--resume", action="store_true", help="leave out what an earlier run has written")
     return parser
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from ..bake.runner import FAILED, WRITTEN, Bake
+from ..bake.runner import FAILED, SKIPPED, WRITTEN, Bake
+from ..whole_file import whole_file
 
 
 @dataclass
@@ -66,8 +65,8 @@ class Report:
     bakes: list[BakeRecord] = field(default_factory=list)
 
     def all_written(self) -> bool:
-        """Whether there was something to bake and every bake was written."""
-        return bool(self.bakes) and all(bake.status == WRITTEN for bake in self.bakes)
+        """Whether there was something to bake and every bake was written, be it by an earlier run."""
+        return bool(self.bakes) and all(bake.status in (WRITTEN, SKIPPED) for bake in self.bakes)
 
     def dark(self) -> list[BakeRecord]:
         """Those that no light reached."""
@@ -79,19 +78,6 @@ class Report:
 
         target = Path(path)
         target.parent.mkdir(parents=True, exist_ok=True)
-        temporary = target.with_name(target.name + ".part")
         text = json.dumps({"bakes": [asdict(bake) for bake in self.bakes]}, indent=2, ensure_ascii=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
-        temporary.replace(target)
-
-
-def file_name(names: Sequence[str], frame: int | None, extension: str, taken: set[str]) -> str:
-    """A file name of letters that every file system takes, distinct from those in `taken` (which it joins)."""
-    parts = [*names, *([] if frame is None else [f"{frame:04d}"])]
-    stem = "_".join(re.sub(r"[^\w.-]+", "_", part).strip("._") or "unnamed" for part in parts)
-    name, number = f"{stem}{extension}", 1
-    while name.lower() in taken:
-        number += 1
-        name = f"{stem}_{number}{extension}"
-    taken.add(name.lower())
-    return name
+        with whole_file(target) as temporary:
+            temporary.write_text(text + "\n", encoding="utf-8")

@@ -15,7 +15,7 @@ HIGHEST_ALBEDO = 0.99999
 """What a colour too bright for its medium becomes: simulations follow light for enough scatterings up to here."""
 
 
-def albedo_from_color(color, medium, quality: str = "final", progress: Progress | None = None) -> RGB:
+def albedo_from_color(color, medium, quality: str = "final", progress: Progress | None = None, threads: int = 0) -> RGB:
     """Single-scattering albedo whose reflectance under uniform diffuse light is `color`.
 
     It grows with the colour, from 0 for black. No medium reflects everything: some light is reflected before it
@@ -40,7 +40,7 @@ def albedo_from_color(color, medium, quality: str = "final", progress: Progress 
         `progress` returned False.
     """
     channels = _channels(color)
-    reflectance = library(medium, quality=quality, progress=progress).diffuse_reflectance
+    reflectance = library(medium, quality=quality, progress=progress, threads=threads).diffuse_reflectance
     albedos = {value: albedo_from_reflectance(value, reflectance) for value in set(channels)}
     return tuple(albedos[value] for value in channels)
 

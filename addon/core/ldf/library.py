@@ -6,9 +6,13 @@ import sys
 from pathlib import Path
 
 from ..native import native
+from ..progress import say
 
 PHOTONS = {"preview": 80_000, "final": 4_000_000}
 """Photons per angle for a medium with g .8 and ior 1; see `photons_for`."""
+
+SIMULATING = "Simulating the medium, once"
+"""What takes so long, for whoever watches the progress."""
 
 _MAX_PHOTONS = 4_000_000
 
@@ -41,9 +45,17 @@ def angles_for(medium):
     return (0.0, 9.0, 18.0, 27.0, 36.0, 44.5, 52.0, 58.5, 64.5, 70.0, 74.5, 78.5, 82.0, 85.0, 87.0, 89.0)
 
 
+_chosen = {"folder": ""}
+
+
+def choose_cache_folder(folder):
+    """Keep libraries in a folder of the user's from now on; empty: where `cache_folder` has it otherwise."""
+    _chosen["folder"] = str(folder)
+
+
 def cache_folder():
-    """Folder of cached libraries: ``$BEAMSPREAD_CACHE``, or the user's cache folder."""
-    if folder := os.environ.get("BEAMSPREAD_CACHE"):
+    """Folder of cached libraries: ``$BEAMSPREAD_CACHE``, the one chosen, or the user's cache folder."""
+    if folder := os.environ.get("BEAMSPREAD_CACHE") or _chosen["folder"]:
         return Path(folder)
     if sys.platform == "win32":
         base = os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local"
@@ -64,10 +76,11 @@ def photons_for(medium, quality):
     return round(min(5.0 * PHOTONS[quality] / scatterings / medium.ior**2, _MAX_PHOTONS))
 
 
-def make(medium, quality, progress=None, kernel=""):
+def make(medium, quality, progress=None, kernel="", threads=0):
     """Simulate the library of a medium and make its totals exact."""
     photons = photons_for(medium, quality)
-    return native.simulate(medium, angles_for(medium), photons, progress=progress, kernel=kernel).calibrated()
+    simulated = native.simulate(medium, angles_for(medium), photons, progress=progress, kernel=kernel, threads=threads)
+    return simulated.calibrated()
 
 
 def file_name(medium, quality):
@@ -111,6 +124,35 @@ def _store(result, path):
         pass
 
 
+def cached_files():
+    """The files of the cache, which hold libraries only: whatever else lies in the folder is not ours."""
+    try:
+        return sorted(path for path in cache_folder().glob("g*_ior*_thickness*_*.exr") if path.is_file())
+    except OSError:
+        return []
+
+
+def clear_cache():
+    """Remove the libraries from the cache, and forget those in memory; the bytes freed."""
+    freed = 0
+    for path in cached_files():
+        try:
+            size = path.stat().st_size
+            path.unlink()
+            freed += size
+        except OSError:  # another process has it, or it is gone
+            continue
+    _loaded.clear()
+    return freed
+
+
+def is_known(medium, quality):
+    """Whether `library` need not simulate, as far as names of files tell: a damaged file is made again."""
+    path = _cache_path(medium, quality)
+    shipped = (SHIPPED_FOLDER / file_name(medium, name) for name in (quality, "final"))
+    return path in _loaded or path.is_file() or any(one.is_file() for one in shipped)
+
+
 _loaded = {}
 """The libraries used last, by path, oldest first."""
 
@@ -125,7 +167,7 @@ def _remember(path, result):
     return result
 
 
-def library(medium, quality="final", progress=None):
+def library(medium, quality="final", progress=None, threads=0):
     """LDF library of a medium for every angle of incidence and albedo.
 
     Parameters
@@ -136,6 +178,8 @@ def library(medium, quality="final", progress=None):
         `LdfLibrary.image_standard_error`.
     progress : callable, optional
         Called with the finished fraction while a simulation runs; only the answer False (or NumPy's) stops.
+    threads : int
+        0: all. The result does not depend on it.
 
     Returns
     -------
@@ -156,6 +200,16 @@ def library(medium, quality="final", progress=None):
     path = _cache_path(medium, quality)
     known = _loaded.get(path) or _load_shipped(medium, quality) or _load(path, medium)
     if known is None:
-        known = make(medium, quality, progress)
+        say(progress, SIMULATING + (" (preview)" if quality == "preview" else ""))
+        known = make(medium, quality, progress, threads=threads)
         _store(known, path)
     return _remember(path, known)
+
+
+def known_library(medium):
+    """The best library of a medium that came with the package or is cached; None where one would be simulated."""
+    for quality in ("final", "preview"):
+        path = _cache_path(medium, quality)
+        if found := _loaded.get(path) or _load_shipped(medium, quality) or _load(path, medium):
+            return _remember(path, found)
+    return None

@@ -29,6 +29,8 @@ class Grid:
     width, height : number of texels.
     coverage : float32 (height, width), part of each texel inside the mesh, 0..1.
     clearance : how far the mesh departs from the plane at most, scene units: shadow rays start above that.
+    color_in, color_out : float32 (height, width, 3), factors of light on its way in and of light that leaves, by the
+        texture of the surface; None without one.
     """
 
     origin: Vector
@@ -41,12 +43,20 @@ class Grid:
     height: int
     coverage: np.ndarray
     clearance: float = 0.0
+    color_in: np.ndarray | None = None
+    color_out: np.ndarray | None = None
 
     @property
     def centre(self) -> np.ndarray:
         """World position."""
         across = 0.5 * self.width * self.pitch_x * np.array(self.x_axis)
         return self.origin + across + 0.5 * self.height * self.pitch_y * np.array(self.y_axis)
+
+    def positions(self, at: tuple[float, float] = (0.5, 0.5)) -> np.ndarray:
+        """World positions, float64 (height, width, 3), `at` columns and rows from each texel's corner."""
+        columns = (np.arange(self.width) + at[0])[None, :, None] * self.pitch_x * np.array(self.x_axis)
+        rows = (np.arange(self.height) + at[1])[:, None, None] * self.pitch_y * np.array(self.y_axis)
+        return np.array(self.origin) + columns + rows
 
     def height_of(self, point: Vector) -> float:
         """How far a world point lies outward of the plane; negative behind it."""

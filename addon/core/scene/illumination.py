@@ -72,6 +72,30 @@ class Illumination:
         more.lights = (*self.lights, *lights)
         return more
 
+    def with_lights(self, lights: Sequence[Light]) -> Illumination:
+        """The same with these lights instead; shares the hierarchies."""
+        other = copy(self)
+        other.lights = tuple(lights)
+        return other
+
+    def with_light_of(self, other: Illumination) -> Illumination:
+        """The other, which has equal things in the way, with the hierarchies of this one."""
+        same = copy(other)
+        same._occluders, same._casters = self._occluders, self._casters
+        return same
+
+    def shadow_key(self) -> tuple:
+        """Equal for those with the same meshes in the same places."""
+        return tuple(
+            (
+                one.name,
+                one.mesh.content,
+                tuple(map(id, one.mesh.transmittances)),
+                None if one.placements is None else one.placements.tobytes(),
+            )
+            for one in self._occluders
+        )
+
     @property
     def triangle_count(self) -> int:
         """Of all that can stand in the light's way, those of instances each counted."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -29,6 +31,12 @@ class Mesh:
     transmittances: tuple = ()
     materials: np.ndarray | None = None
     uvs: np.ndarray | None = None
+
+    @cached_property
+    def content(self) -> int:
+        """A number that tells meshes apart, but for what their materials let through."""
+        arrays = (self.vertices, self.triangles, self.materials, self.uvs)
+        return zlib.crc32(b"".join(np.ascontiguousarray(one).tobytes() for one in arrays if one is not None))
 
     def native(self, placements: np.ndarray | None):
         """The native `OccluderMesh`, in the world as it is or once for each of (K, 3, 4) matrices."""

@@ -43,6 +43,19 @@ class Chart:
     offset: tuple[int, int] = (0, 0)
     texel_to_grid: np.ndarray | None = None
 
+    def uvs(self, width: int, height: int, at: tuple[float, float] = (0.5, 0.5)) -> np.ndarray:
+        """Float64 (grid height, grid width, 2): where places of the grid lie in a texture of that size, 0..1.
+
+        `at`: columns and rows from each texel's corner, its centre by default.
+        """
+        columns, rows = np.meshgrid(np.arange(self.grid.width) + at[0], np.arange(self.grid.height) + at[1])
+        if self.texel_to_grid is None:
+            columns, rows = columns + self.offset[0], rows + self.offset[1]
+        else:
+            matrix, shift = self.texel_to_grid[:, :2], self.texel_to_grid[:, 2]
+            columns, rows = np.moveaxis((np.stack([columns, rows], -1) - shift) @ np.linalg.inv(matrix).T, -1, 0)
+        return np.stack([columns / width, rows / height], axis=-1)
+
     def part_of(self, texture: np.ndarray) -> np.ndarray:
         """The part of the texture around the chart, a view."""
         (column, row), (rows, columns) = self.offset, self.coverage.shape

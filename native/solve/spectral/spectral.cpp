@@ -105,6 +105,12 @@ public:
         (*lease).add(m_terms, rays, color, is_colored);
     }
 
+    void clear()
+    {
+        for (std::vector<float>& moments : m_terms.moments)
+            std::fill(moments.begin(), moments.end(), 0.0f);
+    }
+
     void solve(Progress& progress, float* luminance)
     {
         if (m_terms.terms.empty()) {  // nothing is lit
@@ -118,8 +124,9 @@ public:
             share /= share + nodes(m_levels.coarse->plane);
             coarse.emplace(solve_coarse(*m_levels.coarse, progress, 1.0 - share));
         }
-        const KernelSpectra spectra(m_levels.texels, m_terms.profiles, m_levels.outside_centre);
-        Convolution convolution(spectra, m_terms.terms, m_terms.sets.results.size(), m_problem.memory);
+        if (!m_spectra)
+            m_spectra.emplace(m_levels.texels, m_terms.profiles, m_levels.outside_centre);
+        Convolution convolution(*m_spectra, m_terms.terms, m_terms.sets.results.size(), m_problem.memory);
         const auto store = [&](std::size_t result, const RowSpan& span, float* values, double factor) {
             if (coarse) {
                 const auto lease = m_scratch.lend();
@@ -147,7 +154,8 @@ private:
         const CoarseGrid grid(plane, m_problem.plane.width, m_problem.plane.height);
         const std::size_t results = m_terms.sets.results.size();
         std::vector<std::vector<float>> sums(results, std::vector<float>(grid.nodes(), 0.0f));
-        const KernelSpectra spectra(level, m_terms.profiles, std::nullopt);
+        if (!m_coarse_spectra)
+            m_coarse_spectra.emplace(level, m_terms.profiles, std::nullopt);
         const double size = nodes(m_levels.texels.plane);
         const auto add = [&](std::size_t result, const RowSpan& span, const float* values, double factor) {
             add_scaled(sums[result].data() + span.y * plane.width + span.x, values, static_cast<float>(factor * size),
@@ -162,7 +170,8 @@ private:
             const std::size_t count = std::min(at_once, terms - first);
             const double part = work * static_cast<double>(count) / static_cast<double>(terms);
             const auto light = grid.spread(texel_rows(), first, count, progress, 0.5 * part);
-            Convolution convolution(spectra, std::span(m_terms.terms).subspan(first, count), results, for_spectra);
+            Convolution convolution(*m_coarse_spectra, std::span(m_terms.terms).subspan(first, count), results,
+                                    for_spectra);
             const auto rows = [&] { return std::make_unique<NodeRow>(light, plane.width); };
             convolution.solve(rows, add, progress, 0.5 * part);
         }
@@ -183,6 +192,8 @@ private:
     Problem m_problem;
     LightTerms m_terms;
     Levels m_levels;
+    std::optional<KernelSpectra> m_spectra;  // of the texels, kept for the next time
+    std::optional<KernelSpectra> m_coarse_spectra;
     Pool<MomentSum> m_sums;
     Pool<CoarseGrid::Scratch> m_scratch;
 };
@@ -207,6 +218,11 @@ void SpectralField::add(const RayBeams& rays, const std::vector<double>& color, 
 void SpectralField::solve(Progress& progress, float* luminance)
 {
     m_solver->solve(progress, luminance);
+}
+
+void SpectralField::clear()
+{
+    m_solver->clear();
 }
 
 std::size_t SpectralField::terms() const

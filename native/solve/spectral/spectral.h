@@ -32,6 +32,9 @@ public:
     // Writes (height, width, channels) in W/(m^2 sr).
     void solve(Progress& progress, float* luminance);
 
+    // Forgets the light that was added, and keeps what does not depend on it.
+    void clear();
+
     // How many there are; what is solved costs in proportion to them.
     std::size_t terms() const;
 

@@ -135,6 +135,10 @@ std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const 
 {
     std::vector<std::size_t> candidates(kernels.terms().size());
     std::iota(candidates.begin(), candidates.end(), std::size_t{0});
+    if (light.changing.empty()) {  // all is to come
+        progress.advance(work);
+        return kernels.within(tolerance);
+    }
     if (candidates.empty() || light.plane.texels() <= small_plane * small_plane)
         return candidates;
 

@@ -15,7 +15,8 @@ namespace beamspread {
 //
 // Errors of kernels cancel over light that varies smoothly and add up in the dark beside it, so the radiance decides,
 // at some texels: what every term brings there is found first, and then terms are left out as long as all that is left
-// out stays within a share of the tolerance. Small planes keep all. Advances the progress by `work`.
+// out stays within a share of the tolerance. Small planes keep all. Without any light to look at, the kernels decide: they
+// are off by `tolerance`. Advances the progress by `work`.
 std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const Incidence& incidence,
                                       const LightTerms& light, double tolerance, Progress& progress, double work);
 

@@ -1,0 +1,32 @@
+"""A picture of the scene, by another engine. Part of the child process (child.py)."""
+
+import bpy
+import numpy as np
+
+
+class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
+    """Enough of the node for its inner tree to be seen: the add-on is not registered here."""
+
+    bl_idname = "BeamspreadNode"
+    bl_label = "Beamspread"
+
+
+def render(request, scene, _progress) -> dict:
+    """The task `render`: one view layer at one frame into the multi-layer EXR file `picture`, by `engine`.
+
+    Compositing and sequencer are left to the process that asked, which hears how far it is from what Cycles prints.
+    """
+    bpy.utils.register_class(BeamspreadNode)
+    scene.render.engine = request["engine"]
+    scene.frame_set(request["frame"], subframe=request["subframe"])
+    scene.render.use_compositing = scene.render.use_sequencer = False
+    # The picture has the size of the border where there is one.
+    scene.render.use_crop_to_border = True
+    scene.render.use_overwrite, scene.render.use_placeholder = True, False
+    scene.render.filepath, scene.render.use_file_extension = request["picture"], False
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "MULTI_LAYER_IMAGE"
+    settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
+    bpy.ops.render.render(write_still=True, scene=scene.name, layer=request["view_layer"])
+    return {"frame": np.array(scene.frame_current)}

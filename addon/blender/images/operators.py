@@ -1,0 +1,81 @@
+"""Buttons that change the image of a node: to float, and to the scene's resolution."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...core.bake.runner import Bake, Target
+from ..node.find import find_node
+from . import files
+from .new_image import keep_new
+from .owners import KEY
+
+
+def image_in(context):
+    """The image of the active material's Beamspread node, or None."""
+    material = getattr(context, "material", None) or getattr(context.object, "active_material", None)
+    node = find_node(material)
+    return None if node is None or material.library is not None else node.image
+
+
+def wanted_size(image, resolution: int) -> tuple[int, int]:
+    """Of an image of the same shape with `resolution` texels along its longer side."""
+    return tuple(max(1, round(resolution * side / max(image.size))) for side in image.size)
+
+
+class ImageOperator:
+    """Works on the image of the active material's node."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        image = image_in(context)
+        return image is not None and 0 not in image.size and image.library is None and cls.needed(context, image)
+
+
+class BEAMSPREAD_OT_make_float(ImageOperator, bpy.types.Operator):
+    """Put a float image with the same pixels in place of this one, which holds no values above 1. Its file stays"""
+
+    bl_idname = "beamspread.make_float"
+    bl_label = "Make Float"
+
+    @classmethod
+    def needed(cls, _context, image) -> bool:
+        return files.clips(image)
+
+    def execute(self, context):
+        image = image_in(context)
+        name, owners = image.name, image.get(KEY)
+        said = Bake(Target(""))
+        _path, new = keep_new(name, files.linear_pixels(image), said, image.colorspace_settings.is_data)
+        image.user_remap(new)
+        image.name, new.name = f"{name} (8 bit)", name
+        if owners is not None:
+            new[KEY] = owners
+        for material in bpy.data.materials:
+            node = find_node(material)
+            if node is not None and node.image == new:
+                node.image = new  # shows it
+        for warning in said.warnings:
+            self.report({"WARNING"}, warning)
+        return {"FINISHED"}
+
+
+class BEAMSPREAD_OT_resize_image(ImageOperator, bpy.types.Operator):
+    """Scale the image to the scene's resolution, until the next bake fills and keeps it"""
+
+    bl_idname = "beamspread.resize_image"
+    bl_label = "Resize Image"
+
+    @classmethod
+    def needed(cls, context, image) -> bool:
+        return tuple(image.size) != wanted_size(image, context.scene.beamspread.resolution)
+
+    def execute(self, context):
+        image = image_in(context)
+        image.scale(*wanted_size(image, context.scene.beamspread.resolution))
+        return {"FINISHED"}
+
+
+register, unregister = bpy.utils.register_classes_factory((BEAMSPREAD_OT_make_float, BEAMSPREAD_OT_resize_image))

@@ -1,0 +1,79 @@
+"""Where a batch writes: its folder, else the file of the node's image, else the scene's folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.bake.layers import LAYERS
+from ...core.bake.runner import Bake, Target
+from ...core.bake.settings import COMBINED, DIRECTION
+from ...core.batch.names import file_stems
+from ...core.batch.options import BatchOptions
+from ...core.errors import ImageError
+from ..node.find import find_node, find_targets
+from . import files, writing
+from .results import Results
+
+
+class Outputs:
+    """The files of a run. Their names depend on the scene alone, whatever of it is baked."""
+
+    def __init__(self, scene, options: BatchOptions) -> None:
+        self._options, self._settings, self._results = options, scene.beamspread, Results()
+        self._view_of = scene if scene.beamspread.use_view_transform else None
+        targets = find_targets(scene.objects)
+        self._stems = file_stems(_names(target, layer) for target in targets for layer in LAYERS)
+
+    def write(self, bake: Bake, frame: int) -> str:
+        """Write all layers; the path of the first."""
+        paths = [self._write_layer(bake, frame, layer, texture) for layer, texture in bake.layers.items()]
+        return paths[0]
+
+    def path(self, target: Target, layer: str, frame: int) -> Path:
+        """The file of a layer in a folder of outputs; ImageError where it can't have one."""
+        options = self._options
+        file_format, folder = options.format or self._settings.format, options.output or self._settings.output_dir
+        if folder.startswith("//") and not bpy.data.filepath:
+            raise ImageError("The scene was never saved, so there is no folder to write to: give one with --output.")
+        if layer == DIRECTION and file_format == "PNG":
+            raise ImageError("A PNG can't hold directions, which have negative parts: choose EXR.")
+        number = f"_{frame:04d}" if options.frames else ""
+        name = f"{self._stems[_names(target, layer)]}{number}{writing.EXTENSIONS[file_format]}"
+        return Path(bpy.path.abspath(folder)).absolute() / name
+
+    def own_image(self, target: Target, layer: str):
+        """The node's image, if it has a file that this layer of one frame can go to; else None."""
+        options = self._options
+        if options.output is not None or options.frames is not None or layer != COMBINED:
+            return None
+        image = find_node(bpy.data.materials[target.material_name]).image
+        path = None if image is None else files.file_of(image)
+        if path is None or options.format not in (None, _format_of(path)):
+            return None
+        return image
+
+    def _write_layer(self, bake: Bake, frame: int, layer: str, texture: np.ndarray) -> str:
+        image = self.own_image(bake.target, layer)
+        if image is not None and tuple(image.size) == texture.shape[1::-1]:
+            filled = self._results.fill_shown(image, bake, texture)
+            if filled is not None:
+                return filled
+            bake.warnings.append(
+                f"The image '{image.name}' keeps the result of another: this one has a file of its own."
+            )
+        path = self.path(bake.target, layer, frame)
+        writing.write_file(path, texture, _format_of(path), view_of=self._view_of)
+        if path.suffix == writing.EXTENSIONS["PNG"] and texture.max() > 1 and self._view_of is None:
+            bake.warnings.append("Values above 1 were clipped: EXR keeps them.")
+        return str(path)
+
+
+def _names(target: Target, layer: str) -> tuple[str, ...]:
+    return target.object_name, target.material_name, *([] if layer == COMBINED else [layer])
+
+
+def _format_of(path: Path) -> str | None:
+    return next((name for name, ending in writing.EXTENSIONS.items() if path.suffix.lower() == ending), None)

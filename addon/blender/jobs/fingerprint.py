@@ -1,0 +1,284 @@
+"""What bakes read of a scene, as short digests: where they still are the same, so is what would be baked.
+
+They are made from the scene as the window has it, so that they cost little. Not in them: what geometry nodes and
+particles scatter (their settings are), pixels of textures (their names and files are), how often light may bounce.
+Another version of Blender may make others: after a change of version a bake counts as stale.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+
+import bpy
+import numpy as np
+
+from ...core.bake.runner import Target
+from ...core.errors import sentence
+from .. import compat
+from ..node.find import find_node
+from ..read.visible import render_visible_names
+
+Parts = dict[str, str]
+"""By a name that artists understand, the digest of one part of what a bake reads."""
+
+IMAGE, QUALITY = "size of the image", "quality"
+
+GEOMETRY = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+SOLID = GEOMETRY | {"CURVES", "VOLUME", "POINTCLOUD"}
+
+# Sockets of our node that change how it looks in a render and not what is baked.
+LOOKS = {"Roughness", "Normal"}
+
+_NODE_LOOKS = set(bpy.types.Node.bl_rna.properties.keys()) - {"mute"}
+_ID_LOOKS = set(bpy.types.ID.bl_rna.properties.keys()) | {"animation_data", "node_tree"}
+_DEEPEST = 4
+
+
+def digest(*values) -> str:
+    """Eight bytes of a hash, in hexadecimal."""
+    return hashlib.blake2b(repr(values).encode(), digest_size=8).hexdigest()
+
+
+def values_of(struct, skipped: Iterable[str] = (), depth: int = 0) -> list:
+    """All properties of something of Blender's, nested ones included; other data-blocks by their names."""
+    found = []
+    for prop in struct.bl_rna.properties:
+        name = prop.identifier
+        if name in skipped or name in ("rna_type", "name", "show_expanded", "is_active") or depth > _DEEPEST:
+            continue
+        value = getattr(struct, name, None)
+        if prop.type == "COLLECTION":
+            value = [values_of(one, (), depth + 1) for one in value or () if one is not None]
+        elif isinstance(value, bpy.types.ID):
+            value = value.name_full, getattr(value, "filepath", "")
+        elif isinstance(value, bpy.types.bpy_struct):
+            value = values_of(value, (), depth + 1)
+        elif prop.type == "POINTER":
+            continue
+        elif getattr(prop, "is_array", False):
+            value = np.array(value).tolist()
+        found.append((name, value))
+    return found
+
+
+def tree_values(tree) -> list:
+    """Nodes with their values, and links; groups from inside. Names and places in the editor don't count."""
+    numbers = {node.name: number for number, node in enumerate(tree.nodes)}
+    nodes = [_node_values(node) for node in tree.nodes]
+    links = [
+        (
+            numbers[link.from_node.name],
+            link.from_socket.identifier,
+            numbers[link.to_node.name],
+            link.to_socket.identifier,
+        )
+        for link in tree.links
+    ]
+    return [nodes, sorted(links)]
+
+
+def _node_values(node) -> list:
+    inner = getattr(node, "node_tree", None)
+    inputs = []
+    for socket in node.inputs:
+        if not socket.is_linked and hasattr(socket, "default_value"):
+            value = socket.default_value
+            inputs.append(value if isinstance(value, int | float | str) else _plain(value))
+    skipped = _NODE_LOOKS | {"node_tree"}
+    return [node.bl_idname, values_of(node, skipped), inputs, tree_values(inner) if inner else None]
+
+
+def _plain(value) -> object:
+    if value is None or isinstance(value, bpy.types.ID):
+        return value and value.name_full
+    return np.array(value).tolist()
+
+
+class Fingerprints:
+    """Digests of the targets of a scene; those of meshes, lamps and trees are kept until `forget` names them."""
+
+    def __init__(self) -> None:
+        self._kept: dict[int, str] = {}
+        self._sees_media = True
+
+    def forget(self, identifiers: Iterable[int] | None = None) -> None:
+        """What was kept of these data-blocks (of the original ones, `as_pointer()`); None: of all."""
+        if identifiers is None:
+            self._kept.clear()
+            return
+        for identifier in identifiers:
+            self._kept.pop(identifier, None)
+
+    def of(self, context, targets: Iterable[Target]) -> dict[Target, Parts]:
+        """The parts of each target of the context's scene; those that are no longer there are left out."""
+        scene, view_layer = context.scene, context.view_layer
+        depsgraph = context.evaluated_depsgraph_get()
+        visible = render_visible_names(view_layer)
+        self._sees_media = scene.beamspread.use_indirect
+        lamps, solids, own = 0, 0, {}
+        for obj in scene.objects:
+            if obj.name not in visible:
+                continue
+            if obj.type == "LIGHT":
+                lamps += _number(self._lamp(obj))
+            elif obj.type in SOLID or obj.instance_type != "NONE":
+                own[obj.name] = self._solid(obj, depsgraph)
+                solids += _number(self._with_materials(obj, own[obj.name]))
+        shared = {
+            "lights": f"{lamps % 2**64:x}",
+            "world": self._world(scene, view_layer),
+        }
+        found = {}
+        for target in targets:
+            obj, node = scene.objects.get(target.object_name), None
+            if obj is not None:
+                node = find_node(bpy.data.materials.get(target.material_name))
+            if node is None:
+                continue
+            mine = own.get(obj.name, "")
+            others = solids - _number(self._with_materials(obj, mine)) if mine else solids
+            found[target] = {
+                "object": mine,
+                "other objects": f"{others % 2**64:x}",
+                **shared,
+                "material": digest(self._surface(node)),
+                "settings": digest(_settings(scene)),
+                QUALITY: _quality(scene),
+                IMAGE: image_part(node.image),
+            }
+        return found
+
+    def _keep(self, block, make) -> str:
+        key = block.as_pointer()
+        if key not in self._kept:
+            self._kept[key] = make()
+        return self._kept[key]
+
+    def _lamp(self, obj) -> str:
+        data = obj.data
+        kept = self._keep(data, lambda: digest(values_of(data, _ID_LOOKS), _tree_of(data)))
+        return digest(kept, _matrix(obj), obj.visible_diffuse, _links(obj))
+
+    def _solid(self, obj, depsgraph) -> str:
+        """Its shape and place, without its materials."""
+        seen = obj.visible_diffuse, obj.visible_shadow, obj.show_instancer_for_render, obj.instance_type, _links(obj)
+        inner = obj.instance_collection if obj.instance_type == "COLLECTION" else None
+        instanced = sorted(self._instanced(one, depsgraph) for one in inner.all_objects) if inner else ()
+        shape = self._keep(obj, lambda: self._shape(obj, depsgraph))
+        return digest(shape, _matrix(obj), seen, instanced)
+
+    def _instanced(self, obj, depsgraph) -> str:
+        if obj.type == "LIGHT":
+            return self._lamp(obj)
+        return self._with_materials(obj, self._solid(obj, depsgraph))
+
+    def _shape(self, obj, depsgraph) -> str:
+        modifiers = [(modifier.show_render, modifier.type, _modifier(modifier)) for modifier in obj.modifiers]
+        particles = [values_of(one.settings, _ID_LOOKS) for one in obj.particle_systems]
+        return digest(_mesh(obj, depsgraph), modifiers, particles)
+
+    def _with_materials(self, obj, shape: str) -> str:
+        return digest(shape, [self._material(slot.material) for slot in obj.material_slots])
+
+    def _material(self, material) -> str:
+        """As others see it: of a Beamspread node only the medium, whose light may bounce, and not the baked image."""
+        if material is None:
+            return ""
+        node = find_node(material)
+        if node is not None:
+            return digest(self._surface(node)) if self._sees_media else ""
+        return self._keep(material, lambda: digest(_tree_of(material), compat.has_transparent_shadow(material)))
+
+    def _surface(self, node) -> list:
+        inputs = [
+            (socket.identifier, _upstream(socket), _plain(getattr(socket, "default_value", None)))
+            for socket in node.inputs
+            if socket.name not in LOOKS
+        ]
+        return [repr(node.surface()), getattr(node, "side", ""), inputs]
+
+    def _world(self, scene, view_layer) -> str:
+        world = getattr(view_layer, "world_override", None) or scene.world
+        if world is None or not view_layer.use_sky:
+            return ""
+        return self._keep(world, lambda: digest(tuple(world.color), _tree_of(world), world.cycles_visibility.diffuse))
+
+
+def _number(text: str) -> int:
+    return int(text, 16)
+
+
+def _matrix(obj) -> list:
+    return np.array(obj.matrix_world, np.float32).tolist()
+
+
+def _links(obj) -> list:
+    """Collections of light linking (Blender 4.0 on), by name."""
+    linking = getattr(obj, "light_linking", None)
+    return values_of(linking) if linking is not None else []
+
+
+def _tree_of(owner) -> list | None:
+    return tree_values(owner.node_tree) if owner.node_tree and compat.uses_nodes(owner) else None
+
+
+def _upstream(socket) -> list:
+    """The tree before a socket, if it is linked: all of it, as a part is not worth the search."""
+    tree = socket.id_data
+    if not socket.is_linked:
+        return []
+    return [_node_values(node) for node in tree.nodes if node.bl_idname not in LEFT_OUT] if tree else []
+
+
+def image_part(image) -> str:
+    """Of the image that a node shows; None: it has none."""
+    return digest(tuple(image.size)) if image is not None else ""
+
+
+# Of a material with our node, what a first bake itself adds or links.
+LEFT_OUT = {"BeamspreadNode", "ShaderNodeOutputMaterial"}
+
+
+def _modifier(modifier) -> object:
+    return values_of(modifier, {"execution_time", "show_viewport", "levels", "persistent_uid", "object", "is_active"})
+
+
+def _mesh(obj, depsgraph) -> str:
+    """Of the corners, faces and UV maps, with modifiers where the window shows the object."""
+    if obj.type not in GEOMETRY:
+        return obj.data.name_full if obj.data else ""
+    evaluated = obj.evaluated_get(depsgraph)
+    try:
+        mesh = evaluated.to_mesh()
+    except RuntimeError as error:
+        return sentence(error)
+    if mesh is None:
+        return ""
+    try:
+        hashed = hashlib.blake2b(digest_size=8)
+        for values, name, kind, size in [
+            (mesh.vertices, "co", np.float32, 3),
+            (mesh.loops, "vertex_index", np.int32, 1),
+            (mesh.polygons, "loop_total", np.int32, 1),
+            (mesh.polygons, "material_index", np.int32, 1),
+            *((layer.data, "uv", np.float32, 2) for layer in mesh.uv_layers),
+        ]:
+            array = np.empty(len(values) * size, kind)
+            values.foreach_get(name, array)
+            hashed.update(array.tobytes())
+        hashed.update(repr([layer.active_render for layer in mesh.uv_layers]).encode())
+        return hashed.hexdigest()
+    finally:
+        evaluated.to_mesh_clear()
+
+
+def _settings(scene) -> list:
+    names = ("solver", "distributions", "samples", "margin", "use_indirect")
+    return [getattr(scene.beamspread, name) for name in names]
+
+
+def _quality(scene) -> str:
+    """Of the distributions; not shortened, as a bake may know better than the scene what it has used."""
+    own = scene.beamspread
+    return own.quality if own.distributions == "LIBRARY" else bpy.path.abspath(own.sample_folder)

@@ -1,0 +1,94 @@
+"""Pictures of the scene while the engine is Beamspread: by Cycles or EEVEE, in another Blender on a copy of the scene.
+
+An engine may not start another one's render in its own process.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+import bpy
+
+from ...core.errors import BakeError, sentence
+from ...core.native import native
+from .. import compat
+from ..cycles.process import run
+from ..cycles.scene_copy import SceneCopy
+
+# The window's main thread, which alone may read the scene, may be busy with a long step of the user's.
+PATIENCE_SECONDS = 60.0
+
+
+def render_picture(engine, depsgraph) -> None:
+    """Fill the engine's result for one view layer."""
+    scene, layer = depsgraph.scene, depsgraph.view_layer.name
+    name = scene.beamspread.render_engine
+    engine.update_stats("Beamspread", f"{name.title()} renders a copy of the scene")
+    result = engine.begin_result(0, 0, engine.resolution_x, engine.resolution_y, layer=layer)
+    filled = False
+    try:
+        with _in_main_thread(lambda: _copy(scene.name, layer)) as copy:
+            picture = copy.folder / "picture.exr"
+            request = {
+                "engine": compat.engine_id(name),
+                "frame": scene.frame_current,
+                "subframe": scene.frame_subframe,
+                "picture": str(picture),
+            }
+            run(copy, "render", request, lambda fraction: _step(engine, fraction))
+            result.load_from_file(str(picture))
+            filled = True
+    except native.Cancelled:
+        pass
+    except Exception as error:  # noqa: BLE001 - Blender would swallow it
+        remedy = " EEVEE needs OpenGL: try Cycles (Render > Beamspread > Pictures)." if name == "EEVEE" else ""
+        engine.report({"ERROR"}, sentence(error) + remedy)
+    finally:
+        engine.end_result(result, cancel=not filled)
+
+
+def _copy(scene_name: str, layer: str) -> SceneCopy:
+    scene = bpy.data.scenes[scene_name]
+    return SceneCopy(scene, scene.view_layers[layer])
+
+
+def _step(engine, fraction: float) -> bool:
+    engine.update_progress(fraction)
+    return not engine.test_break()
+
+
+def _in_main_thread(function: Callable):
+    """What the function returns; F12 in a window renders in a thread of its own, where the scene may not be read."""
+    if threading.current_thread() is threading.main_thread():
+        return function()
+    outcome: dict[str, object] = {}
+    done = threading.Event()
+
+    def call() -> None:
+        try:
+            outcome["value"] = function()
+        except Exception as error:  # noqa: BLE001 - raised where it was asked for
+            outcome["error"] = error
+        done.set()
+
+    bpy.app.timers.register(call)
+    if not done.wait(PATIENCE_SECONDS):
+        raise BakeError("Blender's window was busy for a minute, so that no picture was begun: render again.")
+    if "error" in outcome:
+        raise outcome["error"]
+    return outcome["value"]
+
+
+def show_by_eevee(context) -> None:
+    """Have a viewport in Rendered mode show Material Preview with the scene's own light, soon: not while it draws."""
+    space = context.space_data
+    if space is None or space.type != "VIEW_3D" or space.shading.type != "RENDERED":
+        return
+    shading = space.shading
+
+    def change() -> None:
+        shading.type = "MATERIAL"
+        shading.use_scene_lights = shading.use_scene_world = True
+
+    bpy.app.timers.register(change)

@@ -1,0 +1,43 @@
+"""What an image remembers of the bakes in it, saved with the file: what each has read, and what there was to say."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+
+from ...core.bake.runner import Target
+from .fingerprint import Parts
+
+# Text, since names of objects may be longer than Blender's own keys.
+KEY = "beamspread_bakes"
+
+
+@dataclass(frozen=True)
+class Record:
+    """One bake in an image: digests of what it read, its warnings, and whether its pixels were not saved then."""
+
+    parts: Parts
+    warnings: tuple[str, ...] = ()
+    is_dirty: bool = False
+
+    def changed(self, now: Parts) -> list[str]:
+        """Names of the parts that are no longer the same."""
+        return [name for name, digest in now.items() if self.parts.get(name) != digest]
+
+
+def record_of(image, target: Target) -> Record | None:
+    """Of the target's bake in the image, or None if it has none."""
+    found = _all(image).get(str(target))
+    return Record(found["parts"], tuple(found["warnings"]), found["is_dirty"]) if found else None
+
+
+def keep_record(image, target: Target, record: Record) -> None:
+    image[KEY] = json.dumps(_all(image) | {str(target): asdict(record)})
+
+
+def _all(image) -> dict:
+    try:
+        known = json.loads(image.get(KEY, "{}"))
+    except (TypeError, ValueError):
+        return {}
+    return known if isinstance(known, dict) else {}

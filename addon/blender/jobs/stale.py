@@ -1,0 +1,145 @@
+"""Keeps the rows of `state` true: looks at what a scene's bakes have read once changes to the scene come to rest.
+
+Handlers only note what changed; the look follows in a timer of the window. In background nobody waits for it, and
+whoever needs the rows calls `refresh`.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ...core.bake.runner import Target
+from ..node.find import find_node, find_targets
+from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
+from .record import Record, keep_record, record_of
+from .state import Row, Standing, redraw, state
+
+REST_SECONDS = 0.3
+
+FIRST_LOOK = "first look"
+
+fingerprints = Fingerprints()
+_last = {"change": 0.0}
+
+
+def refresh(context) -> None:
+    """Bring the rows of all targets of the context's scene up to date."""
+    targets = find_targets(context.scene.objects)
+    recorded = {target: record for target in targets if (record := _record(target)) is not None}
+    now = fingerprints.of(context, recorded) if recorded else {}
+    state.rows = {target: _row(target, recorded.get(target), now.get(target)) for target in targets}
+    # What could not be baked at all, as a node inside a group, is no target.
+    state.rows |= {row.target: row for row in state.failures() if row.target not in state.rows}
+
+
+def parts_of(context, targets: list[Target]) -> dict[Target, Parts]:
+    """What bakes of the targets read now, to be kept with what they make; see `keep`."""
+    return fingerprints.of(context, targets)
+
+
+def keep(target: Target, parts: Parts | None, warnings: list[str], is_first_look: bool) -> None:
+    """Note in the node's image what the bake in it has read."""
+    image = _image(target)
+    if image is None or parts is None:
+        return
+    parts = parts | {IMAGE: image_part(image)}  # the bake may have made it
+    if is_first_look:
+        parts[QUALITY] = FIRST_LOOK
+    keep_record(image, target, Record(parts, tuple(warnings), image.is_dirty))
+
+
+def _image(target: Target):
+    node = find_node(bpy.data.materials.get(target.material_name))
+    return None if node is None else node.image
+
+
+def _record(target: Target) -> Record | None:
+    image = _image(target)
+    return None if image is None else record_of(image, target)
+
+
+def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
+    changed = [] if record is None or now is None else record.changed(now)
+    if record is not None and _image(target).is_dirty and not record.is_dirty:
+        changed.append("pixels of the image")
+    said = state.said_of(target)
+    if said is not None and said.standing in (Standing.FAILED, Standing.CANCELLED):
+        return replace(said, is_stale=bool(changed))
+    if record is None:
+        return Row(target, Standing.NEVER)
+    if changed and changed != [QUALITY]:
+        return Row(target, Standing.STALE, (f"Changed since its bake: {', '.join(changed)}.", *record.warnings), True)
+    warnings = (*([_why_again(record.parts[QUALITY], now[QUALITY])] if changed else []), *record.warnings)
+    return Row(target, Standing.WARNED if warnings else Standing.BAKED, warnings, bool(changed))
+
+
+def _why_again(baked: str, wanted: str) -> str:
+    if baked == FIRST_LOOK:
+        return "A first look, coarse and by direct light alone: its final bake has not ended."
+    return f"Baked in {baked} quality, and not in {wanted}."
+
+
+def look_soon() -> None:
+    """Have the rows refreshed once nothing changes any more."""
+    _last["change"] = time.monotonic()
+    if not bpy.app.background and not bpy.app.timers.is_registered(_look):
+        bpy.app.timers.register(_look, first_interval=REST_SECONDS)
+
+
+def _look() -> float | None:
+    waiting = _last["change"] + REST_SECONDS - time.monotonic()
+    if waiting > 0:
+        return waiting
+    context = bpy.context
+    if context.window is not None or context.window_manager.windows:
+        window = context.window or context.window_manager.windows[0]
+        with context.temp_override(window=window):
+            refresh(bpy.context)
+        redraw(bpy.context)
+    return None
+
+
+@persistent
+def _on_update(_scene, depsgraph) -> None:
+    changed = [
+        update.id.original.as_pointer()
+        for update in depsgraph.updates
+        if update.is_updated_geometry or not isinstance(update.id, bpy.types.Object)
+    ]
+    fingerprints.forget(changed)
+    if len(depsgraph.updates):
+        look_soon()
+
+
+@persistent
+def _on_all(*_arguments) -> None:
+    """Undo and loading bring other data-blocks, of which nothing is known."""
+    fingerprints.forget()
+    look_soon()
+
+
+HANDLERS = {
+    "depsgraph_update_post": _on_update,
+    "frame_change_post": _on_update,
+    "undo_post": _on_all,
+    "redo_post": _on_all,
+    "load_post": _on_all,
+}
+
+
+def register() -> None:
+    for name, function in HANDLERS.items():
+        getattr(bpy.app.handlers, name).append(function)
+    look_soon()
+
+
+def unregister() -> None:
+    for name, function in HANDLERS.items():
+        getattr(bpy.app.handlers, name).remove(function)
+    if bpy.app.timers.is_registered(_look):
+        bpy.app.timers.unregister(_look)
+    fingerprints.forget()

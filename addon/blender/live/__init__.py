@@ -1,0 +1,7 @@
+"""Images that follow the scene while it is worked on.
+
+marks      what has changed
+reader     the scene as subjects of pictures; reads only what has changed
+canvas     pixels of images, which get their own back
+session    steps of a timer: look, have it painted, show
+"""

@@ -1,0 +1,282 @@
+"""Live: steps of a timer that look what has changed, have it painted beside the window, and show what was painted."""
+
+from __future__ import annotations
+
+import time
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ...core import native
+from ...core.bake.runner import Target
+from ...core.errors import sentence
+from ...core.live.painter import Painter
+from ...core.live.picture import Picture
+from ...core.live.subject import Subject
+from ..jobs.state import state
+from .canvas import Canvas, image_name_of, image_of
+from .marks import Marks
+from .reader import Reader
+
+# Between steps while something changes or is painted, while nothing does, and while Live is off.
+BUSY_SECONDS, IDLE_SECONDS, OFF_SECONDS = 0.01, 0.05, 0.5
+
+# How long a thread may take to end: what it can't stop, as one transform, is shorter.
+END_SECONDS = 10.0
+
+# A look that takes so long at most may be had while Blender evaluates a change.
+SMALL_SECONDS = 0.01
+
+# Seen in 3.4, whether it is told of new pixels or not.
+IN_CYCLES = "Rendered view of Cycles may keep the pixels that it began with: look at Material Preview or EEVEE."
+
+SHADED = {"MATERIAL", "RENDERED"}
+
+
+class Session:
+    """From switching Live on to switching it off.
+
+    Attributes
+    ----------
+    seconds : from the change that was last looked at to its picture, as measured.
+    """
+
+    def __init__(self) -> None:
+        self._painter = Painter()
+        self._reader = Reader()
+        self._marks = Marks()
+        self._marks.other = True
+        self._subjects: list[Subject] = []
+        self._canvases: dict[str, Canvas] = {}
+        self._errors: dict[Target, str] = {}
+        self._paused = False
+        self._look_seconds = 1.0  # of the last look at more than lamps
+        self._changed_at = time.perf_counter()
+        self.seconds = 0.0
+
+    def note(self, depsgraph) -> None:
+        """Take the updates of a depsgraph."""
+        was_calm = not self._marks
+        self._marks.note(list(depsgraph.updates), self._canvases)
+        if was_calm and self._marks:
+            self._changed_at = time.perf_counter()
+        is_small = self._look_seconds < SMALL_SECONDS or self._marks.is_lamps_alone()
+        if self._marks and self._marks.is_movement_alone() and is_small and not self._paused and not is_occupied():
+            # At once, so that it is painted while the window is drawn.
+            self._look(depsgraph)
+
+    def forget(self) -> None:
+        """Read everything again: all data may be others' now, as after undo."""
+        self._reader, self._marks = Reader(), Marks()
+        self._marks.other = True
+        for canvas in self._canvases.values():
+            canvas.refresh()
+
+    def step(self, context) -> bool:
+        """Look, have it painted, show; whether there is more to come soon."""
+        if is_occupied():
+            self._pause()
+            return False
+        self._paused = False
+        self._adopt_bakes(context)
+        has_changed, changed_at = bool(self._marks), self._changed_at
+        self._look(context.evaluated_depsgraph_get())
+        shown = self._show_pictures(context)
+        if shown:
+            self.seconds = time.perf_counter() - changed_at
+        return has_changed or shown or self.is_busy()
+
+    def _look(self, depsgraph) -> None:
+        start = time.perf_counter()
+        marks, self._marks = self._marks, Marks()
+        subjects = self._reader.read(depsgraph, marks)
+        if marks and not marks.is_lamps_alone():
+            self._look_seconds = time.perf_counter() - start
+        if [*map(id, subjects)] != [*map(id, self._subjects)]:
+            self._subjects = subjects
+            self._painter.show(subjects)
+
+    def is_busy(self) -> bool:
+        """Whether pictures are still to come."""
+        return bool(self._marks) or self._painter.is_busy()
+
+    def sentences(self) -> list[str]:
+        """What there is to say."""
+        said = [f"{target}: {why}" for target, why in (self._reader.errors | self._errors).items()]
+        if self._painter.media.simulating:
+            said.append(f"The medium ({self._painter.media.simulating}) is simulated: the most similar one stands in.")
+        if self._reader.left_out:
+            said.append(f"Live leaves out {', '.join(self._reader.left_out)}.")
+        if bpy.context.scene.render.engine == "CYCLES":
+            said.append(IN_CYCLES)
+        return said
+
+    def end(self, keep_pixels: bool = False) -> None:
+        """Stop, and give images their own pixels back unless there are other ones by now."""
+        self._painter.end()
+        if not keep_pixels:
+            for canvas in self._canvases.values():
+                canvas.restore()
+        self._canvases.clear()
+        self._painter.join(END_SECONDS)
+
+    def _pause(self) -> None:
+        if not self._paused:
+            self._paused = True
+            self._subjects = []
+            self._painter.show(())
+
+    def _adopt_bakes(self, context) -> None:
+        """Take images that have other pixels than Live's, of a bake or a file, for what the scene looks like now."""
+        saved = {name for name, canvas in self._canvases.items() if canvas.is_saved()}
+        if not saved:
+            return
+        depsgraph = context.evaluated_depsgraph_get()  # changes that wait are told of now
+        marks, self._marks = self._marks, Marks()
+        marks.other = True
+        subjects = self._reader.read(depsgraph, marks)
+        self._painter.adopt([subject for subject in subjects if image_name_of(subject) in saved])
+        for name in saved:
+            del self._canvases[name]
+
+    def _show_pictures(self, context) -> bool:
+        """Show the last picture of each subject."""
+        latest = self._painter.take()
+        wanted = {subject.target: subject for subject in self._subjects}
+        shown = False
+        for target, picture in latest.items():
+            self._errors.pop(target, None)
+            if target not in wanted:
+                continue
+            if picture.error:
+                self._errors[target] = picture.error
+                continue
+            shown |= self._show(picture)
+        if latest:
+            redraw(context)
+        return shown
+
+    def _show(self, picture: Picture) -> bool:
+        image = image_of(picture)
+        if image is None or tuple(image.size) != picture.texture.shape[1::-1]:
+            return False  # removed or resized meanwhile
+        canvas = self._canvases.get(image.name)
+        if canvas is None or not canvas.fits(image):
+            canvas = self._canvases[image.name] = Canvas(image)
+        canvas.show(image, picture)
+        return True
+
+
+def is_occupied() -> bool:
+    """Whether a bake or a render has the scene."""
+    return state.is_running() or any(map(bpy.app.is_job_running, ("RENDER", "OBJECT_BAKE")))
+
+
+def is_looked_at(context) -> bool:
+    """Whether a window shows materials: a 3D View in Material Preview or Rendered, or an Image Editor."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            space = area.spaces.active
+            if area.type == "IMAGE_EDITOR" or (area.type == "VIEW_3D" and space.shading.type in SHADED):
+                return True
+    return False
+
+
+def redraw(context) -> None:
+    """Have every area that shows images or says something of Live show the new state."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in {"VIEW_3D", "IMAGE_EDITOR", "PROPERTIES", "NODE_EDITOR"}:
+                area.tag_redraw()
+
+
+class _Live:
+    """The session of the process, if Live is on."""
+
+    def __init__(self) -> None:
+        self.session: Session | None = None
+        self.scene_name = ""
+        self.failure = ""  # why it was switched off
+
+
+live = _Live()
+
+
+def sentences() -> list[str]:
+    """What panels say of Live."""
+    if live.session is not None:
+        return live.session.sentences()
+    return [f"Live was switched off: {live.failure}"] if live.failure else []
+
+
+def step(context) -> float:
+    """What the timer does; seconds to the next time."""
+    scene = context.scene
+    if native.problem or scene is None or not scene.beamspread.use_live or scene.name != live.scene_name:
+        end()
+        if native.problem or scene is None or not scene.beamspread.use_live:
+            return OFF_SECONDS
+    if not bpy.app.background and not is_looked_at(context):
+        return IDLE_SECONDS
+    if live.session is None:
+        live.session, live.scene_name, live.failure = Session(), scene.name, ""
+    return BUSY_SECONDS if live.session.step(context) else IDLE_SECONDS
+
+
+def end(keep_pixels: bool = False) -> None:
+    """Switch off."""
+    session, live.session = live.session, None
+    if session is not None:
+        session.end(keep_pixels)
+
+
+def _tick() -> float:
+    try:
+        return step(bpy.context)
+    except Exception as error:  # noqa: BLE001 - Blender would drop the timer, and Live would be on and dead
+        live.failure = sentence(error)
+        end()
+        bpy.context.scene.beamspread.use_live = False
+        return OFF_SECONDS
+
+
+@persistent
+def _changed(_scene, depsgraph) -> None:
+    is_ours = depsgraph.mode == "VIEWPORT" and depsgraph.scene.name == live.scene_name
+    if live.session is not None and is_ours:
+        live.session.note(depsgraph)
+
+
+@persistent
+def _undone(*_arguments) -> None:
+    if live.session is not None:
+        live.session.forget()
+
+
+@persistent
+def _leave_file(*_arguments) -> None:
+    end(keep_pixels=True)
+
+
+HANDLERS = {
+    "depsgraph_update_post": _changed,
+    "frame_change_post": _changed,
+    "undo_post": _undone,
+    "redo_post": _undone,
+    "load_pre": _leave_file,
+}
+
+
+def register() -> None:
+    for name, function in HANDLERS.items():
+        getattr(bpy.app.handlers, name).append(function)
+    if not bpy.app.background:
+        bpy.app.timers.register(_tick, first_interval=OFF_SECONDS, persistent=True)
+
+
+def unregister() -> None:
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+    end()
+    for name, function in HANDLERS.items():
+        getattr(bpy.app.handlers, name).remove(function)

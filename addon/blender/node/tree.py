@@ -1,0 +1,96 @@
+"""The node's inner tree: what a renderer sees of it, made of nodes that every Blender has."""
+
+import bpy
+
+from .. import compat
+
+BASE_COLOR, ROUGHNESS, NORMAL = "Base Color", "Roughness", "Normal"
+IMAGE, FRESNEL, COAT, GLOSSY = "Image", "Fresnel", "Coat", "Glossy"
+FACING = "Facing"
+
+# Of the coat where no input has changed it; older trees have it in their Glossy node.
+ROUGHNESS_BEFORE = 0.1
+
+
+def make_inner_tree() -> bpy.types.ShaderNodeTree:
+    """Image -> Color; image as emission, with a Fresnel-weighted glossy coat added -> BSDF.
+
+    The image already is what leaves the surface, so the coat adds to it and takes nothing away.
+    """
+    # The dot hides it in menus. A Blender without this add-on drops a tree that has no fake user when it saves.
+    tree = bpy.data.node_groups.new(".Beamspread", "ShaderNodeTree")
+    tree.use_fake_user = True
+    compat.add_output_socket(tree, "NodeSocketColor", "Color")
+    compat.add_output_socket(tree, "NodeSocketShader", "BSDF")
+    image = _add(tree, "ShaderNodeTexImage", IMAGE, (-600, 0))
+    image.extension = "EXTEND"
+    fresnel = _add(tree, "ShaderNodeFresnel", FRESNEL, (-600, -300))
+    coat = _add(tree, "ShaderNodeMath", COAT, (-400, -300))
+    coat.operation = "MULTIPLY"
+    glossy = _add(tree, "ShaderNodeBsdfGlossy", GLOSSY, (-200, -300))
+    glossy.inputs["Roughness"].default_value = ROUGHNESS_BEFORE
+    emission = _add(tree, "ShaderNodeEmission", "Emission", (-200, 0))
+    total = _add(tree, "ShaderNodeAddShader", "Total", (0, -100))
+    output = _add(tree, "NodeGroupOutput", "Output", (200, 0))
+    link = tree.links.new
+    link(output.inputs["Color"], image.outputs["Color"])
+    link(emission.inputs["Color"], image.outputs["Color"])
+    link(coat.inputs[0], fresnel.outputs[0])
+    link(glossy.inputs["Color"], coat.outputs[0])
+    link(total.inputs[0], emission.outputs[0])
+    link(total.inputs[1], glossy.outputs[0])
+    link(output.inputs["BSDF"], total.outputs[0])
+    add_missing_inputs(tree)
+    return tree
+
+
+def add_missing_inputs(tree) -> bool:
+    """Give a tree, perhaps one of an older file, the inputs that nodes have today; whether it lacked them."""
+    compat.set_shader_color(tree)
+    if compat.has_input_socket(tree, NORMAL) or any(name not in tree.nodes for name in (FRESNEL, GLOSSY)):
+        return False
+    glossy, fresnel = tree.nodes[GLOSSY], tree.nodes[FRESNEL]
+    compat.add_input_socket(tree, "NodeSocketColor", BASE_COLOR, hide_value=True)
+    compat.add_input_socket(tree, "NodeSocketFloat", ROUGHNESS, default=ROUGHNESS_BEFORE)
+    compat.add_input_socket(tree, "NodeSocketVector", NORMAL, hide_value=True)
+    given = _add(tree, "NodeGroupInput", "Input", (-1400, -450))
+    normal = _normal_or_plain(tree, given.outputs[NORMAL])
+    tree.links.new(glossy.inputs["Roughness"], given.outputs[ROUGHNESS])
+    tree.links.new(glossy.inputs["Normal"], normal)
+    tree.links.new(fresnel.inputs["Normal"], normal)
+    return True
+
+
+def _normal_or_plain(tree, given):
+    """The given normal, or the surface's own where nothing is linked: a group's input is the null vector then."""
+    link = tree.links.new
+    geometry = _add(tree, "ShaderNodeNewGeometry", FACING, (-1400, -650))
+    length = _add(tree, "ShaderNodeVectorMath", "Length", (-1200, -450))
+    length.operation = "LENGTH"
+    missing = _add(tree, "ShaderNodeMath", "Missing", (-1000, -450))
+    missing.operation = "LESS_THAN"
+    missing.inputs[1].default_value = 0.5
+    own = _add(tree, "ShaderNodeVectorMath", "Own", (-1000, -650))
+    own.operation = "SCALE"
+    total = _add(tree, "ShaderNodeVectorMath", "Normal", (-800, -450))
+    link(length.inputs[0], given)
+    link(missing.inputs[0], length.outputs["Value"])
+    link(own.inputs[0], geometry.outputs["Normal"])
+    link(own.inputs["Scale"], missing.outputs[0])
+    link(total.inputs[0], given)
+    link(total.inputs[1], own.outputs[0])
+    return total.outputs[0]
+
+
+def show_values(tree, image, ior: float) -> None:
+    """Bring an image and an index of refraction into the tree."""
+    tree.nodes[IMAGE].image = image
+    tree.nodes[FRESNEL].inputs["IOR"].default_value = max(ior, 1.0)
+    # Without a step in refraction there is no coat, whatever the renderer's Fresnel node says at grazing angles.
+    tree.nodes[COAT].inputs[1].default_value = 1.0 if ior > 1 else 0.0
+
+
+def _add(tree, kind: str, name: str, location: tuple[int, int]):
+    node = tree.nodes.new(kind)
+    node.name, node.location = name, location
+    return node

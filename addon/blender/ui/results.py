@@ -1,0 +1,180 @@
+"""What panels show of bakes: progress or buttons, how each target stands, what is in the way, how long it will take."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...core import native
+from ...core.bake.estimate import in_words, solver_seconds
+from ...core.bake.luminance import MOST_RAYS
+from ...core.errors import BakeError
+from ..cycles.light import seconds_estimate
+from ..images.files import check_image
+from ..jobs.popup import wrap
+from ..jobs.prepare import check_visible
+from ..jobs.state import Row, Standing, state
+from ..live import session
+from ..node.find import find_misplaced, find_node, find_targets, materials_of
+from ..read.visible import render_visible_names
+
+# Objects whose warnings, and rows, that a panel shows; it is drawn often.
+MOST_OBJECTS = 8
+
+ICONS = {
+    Standing.NEVER: "RADIOBUT_OFF",
+    Standing.BAKED: "CHECKMARK",
+    Standing.WARNED: "ERROR",
+    Standing.FAILED: "CANCEL",
+    Standing.CANCELLED: "PANEL_CLOSE",
+    Standing.STALE: "FILE_REFRESH",
+    Standing.RUNNING: "RENDER_STILL",
+}
+
+# A direct solver of fewer seconds needs no warning.
+LONG_SECONDS = 10.0
+
+
+def warnings_for(obj, visible: set[str]) -> list[str]:
+    """What would keep the object from being baked, as far as it is known without baking."""
+    # A collection instance may show thousands of objects.
+    messages = [bake.error for bake in find_misplaced([obj] if obj.instance_type == "NONE" else [])]
+    materials = materials_of(obj)
+    if not materials:
+        return messages
+    if not obj.data.uv_layers:
+        messages.append("The mesh has no UV map: unwrap it first.")
+    checks = [lambda: check_visible(obj.name, visible)]
+    for node in map(find_node, materials):
+        checks.append(lambda node=node: node.surface().check())
+        if node.image is not None:
+            checks.append(lambda node=node: check_image(node.image))
+    for check in checks:
+        try:
+            check()
+        except BakeError as error:
+            messages.append(str(error))
+    return messages
+
+
+# Of a panel beside its text, and of a letter on average, at a user-interface scale of 1.
+BORDER_PIXELS, LETTER_PIXELS = 60, 6.4
+
+
+def draw_warnings(layout, context, messages: list[str]) -> None:
+    draw_sentences(layout, context, messages, "ERROR")
+
+
+def draw_sentences(layout, context, messages: list[str], icon: str) -> None:
+    """Wrapped to the panel's width, each after an icon."""
+    pixels = context.region.width / context.preferences.system.ui_scale
+    width = max(20, int((pixels - BORDER_PIXELS) / LETTER_PIXELS))
+    for message in messages:
+        column = layout.column(align=True)
+        for number, line in enumerate(wrap(message, width)):
+            column.label(text=line, icon="BLANK1" if number else icon)
+
+
+def draw_bake(layout, context, material_name: str = "") -> None:
+    """The progress, or problems of the selected objects and the Bake buttons; then how targets stand."""
+    if native.problem:
+        draw_warnings(layout, context, [native.problem])
+        return
+    shown: set[str] = set()
+    if state.is_running():
+        draw_progress(layout, context)
+    else:
+        shown = draw_problems(layout, context)
+        draw_buttons(layout)
+        layout.prop(context.scene.beamspread, "use_live", toggle=True)
+        draw_sentences(layout, context, session.sentences(), "INFO")
+    draw_results(layout, context, material_name, shown)
+
+
+def draw_problems(layout, context) -> set[str]:
+    """What would keep selected objects from being baked; the sentences."""
+    # `context.object` is empty in the render properties.
+    chosen, visible = list(context.view_layer.objects.selected), render_visible_names(context.view_layer)
+    shown = set()
+    for obj in chosen[:MOST_OBJECTS]:
+        warnings = warnings_for(obj, visible)
+        draw_warnings(layout, context, [f"{obj.name}: {message}" for message in warnings])
+        shown.update(warnings)
+    return shown
+
+
+def draw_buttons(layout) -> None:
+    column = layout.column(align=True)
+    row = column.row(align=True)
+    row.scale_y = 1.4
+    row.operator("beamspread.bake", text="Bake", icon="RENDER_STILL").objects = "SELECTED"
+    row.operator("beamspread.bake", text="Bake All").objects = "ALL"
+    stale = sum(row.is_stale for row in state.rows.values())
+    if stale:
+        column.operator("beamspread.bake", text=f"Bake {stale} Out of Date", icon="FILE_REFRESH").objects = "STALE"
+
+
+def draw_progress(layout, context) -> None:
+    """What is being done, a bar where Blender has one, the time left, and Cancel."""
+    progress = state.progress
+    column = layout.column(align=True)
+    draw_sentences(column, context, [f"{progress.doing or 'Baking'}: {progress.target}"], "RENDER_STILL")
+    if hasattr(column, "progress"):  # from Blender 4.0 on
+        column.progress(factor=progress.everything, text=progress.in_short())
+    else:
+        column.label(text=f"{_bar(progress.everything)} {progress.in_short()}", icon="BLANK1")
+    column.operator("beamspread.cancel", icon="X")
+
+
+def _bar(fraction: float, length: int = 10) -> str:
+    full = round(fraction * length)
+    return "\u2588" * full + "\u2591" * (length - full)
+
+
+def draw_results(layout, context, material_name: str, shown: set[str]) -> None:
+    """How each target stands, with what there is to say about it; those of one material, or of all."""
+    rows = [row for row in state.rows.values() if material_name in ("", row.target.material_name)]
+    if not rows:
+        return
+    # First what needs looking at.
+    rows.sort(key=lambda row: row.standing in (Standing.NEVER, Standing.BAKED))
+    box = layout.box().column(align=True)
+    for row in rows[:MOST_OBJECTS]:
+        standing = _standing(row)
+        draw_sentences(box, context, [f"{row.target.object_name}: {standing.value}"], ICONS[standing])
+        sentences = [one for one in row.sentences if one not in shown]
+        shown.update(sentences)
+        draw_sentences(box, context, sentences, "DOT")
+    if len(rows) > MOST_OBJECTS:
+        box.label(text=f"And {len(rows) - MOST_OBJECTS} more", icon="BLANK1")
+
+
+def _standing(row: Row) -> Standing:
+    running = state.progress is not None and state.progress.target == row.target
+    return Standing.RUNNING if running else row.standing
+
+
+def estimates(context) -> list[str]:
+    """How long what takes long will take for the objects that Bake would bake, in sentences."""
+    settings, found = context.scene.beamspread, []
+    chosen = find_targets(context.view_layer.objects.selected) or list(state.rows)
+    sizes = [_size(target, settings.resolution) for target in chosen]
+    if not sizes:
+        return []
+    if settings.use_indirect:
+        seconds = in_words(sum(seconds_estimate(*size) for size in sizes))
+        many = f" for {len(sizes)} objects" if len(sizes) > 1 else ""
+        found.append(f"Indirect light: about {seconds}{many}, where something stands above them.")
+    if settings.solver == "direct" and settings.output == "LUMINANCE":
+        lamps = [obj.data.type for obj in context.view_layer.objects if obj.type == "LIGHT"]
+        suns = lamps.count("SUN")
+        seconds = sum(solver_seconds(*size, suns, len(lamps) - suns, "direct") for size in sizes)
+        if seconds > LONG_SECONDS:
+            sized = f", up to {MOST_RAYS} times that if lamps have a size" if len(lamps) > suns else ""
+            found.append(f"Direct solver: at least {in_words(seconds)}{sized}. FFT gives the same in seconds.")
+    return found
+
+
+def _size(target, resolution: int) -> tuple[int, int]:
+    """Of the target's image; one that is still to be made counts as a square."""
+    node = find_node(bpy.data.materials.get(target.material_name))
+    return tuple(node.image.size) if node is not None and node.image else (resolution, resolution)

@@ -1,0 +1,90 @@
+"""How soon the picture follows in a window, and how far it is off while it does.
+
+    PYTHONPATH=build/stage build/venv/bin/python tests/bench/live.py [--resolution N]
+
+In Blender's window under Xvfb: seconds from a change to the texture, and until the 3D View has drawn it. There the
+processor draws, too: what drawing alone takes stands above. Then, without Blender, quick pictures beside bakes.
+"""
+
+import argparse
+import json
+import shutil
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from beamspread import Medium, library
+from beamspread.core.bake.runner import Target
+from beamspread.core.bake.settings import BakeSettings
+from beamspread.core.bake.surface import Surface
+from beamspread.core.live.media import Media
+from beamspread.core.live.picture import Studio, for_live
+from beamspread.core.live.subject import Subject
+from beamspread.core.material.material import Material
+from beamspread.core.scene.illumination import Illumination
+from beamspread.core.scene.lights import PointLight, SunLight
+from beamspread.core.scene.occluders import Mesh
+from beamspread.core.scene.uv_map import Polygons
+
+INSIDE = Path(__file__).resolve().parent / "in_blender" / "live.py"
+SCREEN = ["xvfb-run", "-a", "-s", "-screen 0 1600x1000x24 +extension GLX"]
+WINDOW = ["--factory-startup", "--window-geometry", "0", "0", "640", "480"]
+
+CORNERS = np.array([(-1.0, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
+FLOOR = Polygons(CORNERS, CORNERS[:, :2] / 2 + 0.5, np.array([0, 4]), np.array([(0.0, 0, 1)]))
+CARD = Mesh(np.array([(-0.2, -0.2, 0.15), (0.2, -0.2, 0.15), (0, 0.3, 0.15)]), np.array([(0, 1, 2)], np.uint32))
+LIGHTS = {
+    "a sun": SunLight("Sun", 3.0, (1.0, 1.0, 1.0), True, (0.6, 0.0, -0.8)),
+    "a lamp, .1 above": PointLight("Low", 10.0, (1.0, 1.0, 1.0), True, (0.3, 0.2, 0.1)),
+    "a lamp, .5 above": PointLight("Lamp", 10.0, (1.0, 1.0, 1.0), True, (0.3, 0.2, 0.5)),
+}
+
+
+def in_window(resolution):
+    for shading in ("MATERIAL", "RENDERED"):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "results.json"
+            command = [*SCREEN, shutil.which("blender"), *WINDOW, "--python", str(INSIDE), "--"]
+            done = subprocess.run([*command, str(path), shading, str(resolution)], capture_output=True, text=True)
+            results = json.loads(path.read_text()) if path.exists() else {"error": done.stdout + done.stderr}
+        if "error" in results:
+            raise RuntimeError(results["error"])
+        print(f"{shading}, {resolution} x {resolution}: seconds to the texture, to the drawn picture, worst, exact")
+        for name, row in results.items():
+            numbers = " ".join(f"{row[key]:6.3f}" if key in row else 6 * " " for key in
+                               ("stored", "drawn", "worst drawn", "exact"))  # fmt: skip
+            print(f"  {name:28} {numbers}  {row.get('texels', '')}")
+
+
+def beside_bakes(resolution):
+    print("quick pictures beside bakes: sum of all errors over the sum, worst texel over the brightest, seconds")
+    for ior in (1.4, 1.0):
+        library(Medium(0.8, ior))
+        for name, light in LIGHTS.items():
+            material = Material(albedo=(0.99, 0.9, 0.6), mean_free_path=(0.02,) * 3, anisotropy=0.8, ior=ior)
+            rest = Illumination([light], CARD), Surface(material), for_live(BakeSettings())
+            subject = Subject(Target("Floor"), FLOOR, (resolution, resolution), resolution, *rest)
+            studio = Studio(Media())
+            exact = studio.exact(subject).texture
+            for side in (512, 256, 128, 64):
+                studio.quick(subject, side)
+                start, cpu = time.perf_counter(), time.process_time()
+                quick = studio.quick(subject, side).texture
+                seconds = time.perf_counter() - start, time.process_time() - cpu
+                error = np.abs(quick - exact)
+                total, worst = (error.sum((0, 1)) / exact.sum((0, 1))).max(), (error / exact.max((0, 1))).max()
+                row = f"{total:8.2%} {worst:8.2%} {seconds[0]:7.3f} wall {seconds[1]:7.3f} CPU"
+                print(f"  ior {ior}, {name:18} {side:4d}: {row}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--resolution", type=int, default=512)
+    options = parser.parse_args()
+    beside_bakes(options.resolution)
+    in_window(options.resolution)
+
+
+main()

@@ -1,0 +1,121 @@
+"""What test_kept_undo.py runs inside a Blender with a window: undo of bakes, and in the middle of one.
+
+xvfb-run blender --factory-startup --python THIS -- RESULTS.json
+"""
+
+import json
+import sys
+import time
+import traceback
+from pathlib import Path
+
+import bpy
+
+FOLDER = Path(__file__).resolve().parent
+sys.path[:0] = [str(FOLDER), str(FOLDER.parent.parent / "build" / "stage")]
+
+import beamspread  # noqa: E402
+import scenes  # noqa: E402
+from beamspread.blender.jobs.state import state  # noqa: E402
+
+PATIENCE_SECONDS = 60
+results = {}
+
+
+def in_window(operator, *arguments):
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        return operator(*arguments)
+
+
+def image():
+    return scenes.node_of(bpy.data.materials["Medium"]).image
+
+
+def shown_and_packed():
+    """Brightness of what is shown and of what a saved file would show."""
+    if image() is None:
+        return [-1.0, -1.0]
+    shown = float(scenes.pixels(image()).mean())
+    image().buffers_free()
+    return [shown, float(scenes.pixels(image()).mean())]
+
+
+def noted(name):
+    results[name] = shown_and_packed()
+
+
+def ended():
+    return not state.is_running()
+
+
+def scenario():
+    bpy.ops.wm.read_homefile(use_empty=False, use_factory_startup=True, load_ui=True)
+    yield lambda: True
+    settings = bpy.context.scene.beamspread
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    bpy.context.scene.world = None
+    settings.quality, settings.resolution, settings.use_indirect = "preview", 32, False
+    scenes.add_plane(material=scenes.add_material())
+    scenes.add_sun(0)
+    bpy.ops.ed.undo_push(message="before")
+    for strength in (1.0, 3.0):
+        bpy.data.objects["Sun"].data.energy = strength
+        bpy.ops.ed.undo_push(message="light")
+        in_window(bpy.ops.beamspread.bake, "INVOKE_DEFAULT")
+        yield ended
+        noted(f"baked {strength:.0f}")
+    for name in ("undone", "undone light", "undone all"):
+        in_window(bpy.ops.ed.undo)
+        yield lambda: True
+        noted(name)
+    for name in ("redone", "redone light", "redone all"):
+        in_window(bpy.ops.ed.redo)
+        yield lambda: True
+        noted(name)
+
+    # In the middle of a bake that takes a while.
+    settings = bpy.context.scene.beamspread
+    settings.solver = "direct"
+    image().scale(256, 256)
+    bpy.data.objects["Sun"].data.energy = 7.0
+    bpy.ops.ed.undo_push(message="light and size")
+    in_window(bpy.ops.beamspread.bake, "INVOKE_DEFAULT")
+    results["runs"] = state.is_running()
+    in_window(bpy.ops.ed.undo)
+    results["still runs"] = state.is_running()
+    yield ended
+    results["said"] = state.messages()
+    noted("baked across undo")
+    in_window(bpy.ops.ed.undo)
+    yield lambda: True
+    noted("undone at last")
+    drawn = time.monotonic()
+    yield lambda: time.monotonic() > drawn + 1
+
+
+def main() -> None:
+    beamspread.register()
+    steps = scenario()
+    waiting = {"for": lambda: True, "since": time.monotonic()}
+
+    def step():
+        try:
+            if not waiting["for"]():
+                if time.monotonic() - waiting["since"] < PATIENCE_SECONDS:
+                    return 0.05
+                raise TimeoutError(f"line {steps.gi_frame.f_lineno} waited in vain")
+            waiting.update({"for": next(steps), "since": time.monotonic()})
+            return 0.1
+        except StopIteration:
+            results["complete"] = True
+        except BaseException:  # noqa: BLE001 - the test shows it
+            results["error"] = traceback.format_exc()
+        Path(sys.argv[-1]).write_text(json.dumps(results))
+        bpy.ops.wm.quit_blender()
+        return None
+
+    bpy.app.timers.register(step, first_interval=0.1, persistent=True)
+
+
+main()

@@ -1,0 +1,450 @@
+"""An image belongs to one result, or to charts side by side; where new images are kept; undo; linked data."""
+
+import json
+
+import bpy
+import numpy as np
+import pytest
+from beamspread.blender.images import files, owners
+from beamspread.blender.images.results import Results
+from beamspread.blender.jobs import batch
+from beamspread.blender.jobs.prepare import prepare_scene
+from beamspread.blender.jobs.state import state
+from beamspread.blender.node.find import find_targets
+from beamspread.core.batch import options
+from beamspread.core.native import native
+from mathutils import Matrix
+from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, save_scene, select
+
+HALVES = {"Left": [(0, 0), (0.5, 0), (0.5, 1), (0, 1)], "Right": [(0.5, 0), (1, 0), (1, 1), (0.5, 1)]}
+
+
+@pytest.fixture(autouse=True)
+def settings():
+    bpy.context.scene.beamspread.resolution = 32
+    return bpy.context.scene.beamspread
+
+
+def image_of(obj):
+    return node_of(obj.material_slots[0].material).image
+
+
+def duplicate(obj, own_material, turned=0.8):
+    """Shift+D, turned so that it is lit otherwise, and maybe Make Single User > Materials."""
+    copy = obj.copy()
+    copy.data = obj.data.copy()
+    copy.matrix_world = Matrix.Translation((9, 0, 0)) @ Matrix.Rotation(turned, 4, "X")
+    bpy.context.collection.objects.link(copy)
+    if own_material:
+        copy.data.materials[0] = obj.data.materials[0].copy()
+    return copy
+
+
+def warnings_of(obj):
+    """What the last bake said of the object."""
+    return [line for line in state.messages() if f"'{obj.name}" in line]
+
+
+def test_a_copy_with_a_material_of_its_own_gets_an_image_of_its_own():
+    plane = add_plane(material=add_material())
+    add_sun(0)
+    (before,) = bake(plane)
+    copy = duplicate(plane, own_material=True)
+    assert image_of(copy) == image_of(plane)
+    (other,) = bake(copy)
+    assert image_of(copy) != image_of(plane)
+    assert np.array_equal(pixels(image_of(plane)), before)
+    assert not np.allclose(other, before)
+    (sentence,) = warnings_of(copy)
+    assert sentence.startswith(f"The image '{image_of(plane).name}' keeps the result of 'Plane / Medium': ")
+    # From here on each has its own, in whatever order, and in one run.
+    assert np.array_equal(bake(plane)[0], before)
+    assert np.array_equal(bake(copy)[0], other)
+    assert [*map(np.ndarray.tolist, bake(copy, plane))] == [other.tolist(), before.tolist()]
+    assert len(bpy.data.images) == 2
+    assert not warnings_of(copy)
+
+
+def test_copies_that_are_baked_in_one_run_part_as_well():
+    image = bpy.data.images.new("Own", 16, 16, float_buffer=True)
+    plane = add_plane(material=add_material(image=image))
+    copy = duplicate(plane, own_material=True)
+    add_sun(0)
+    first, second = bake(plane, copy)
+    assert image_of(plane) == image
+    assert image_of(copy) != image
+    assert not np.allclose(first, second)
+
+
+@pytest.mark.parametrize("rename", ["objects", "materials"])
+def test_owners_are_known_by_their_new_names(rename, tmp_path):
+    plane = add_plane(material=add_material())
+    add_sun(0)
+    (before,) = bake(plane)
+    copy = duplicate(plane, own_material=True)
+    (plane if rename == "objects" else plane.data.materials[0]).name = "Renamed"
+    names = plane.name, copy.name
+    path = str(tmp_path / "saved.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    plane, copy = (bpy.data.objects[name] for name in names)
+    bake(copy)
+    assert image_of(copy) != image_of(plane)
+    assert pixels(image_of(plane)) == pytest.approx(before, rel=1e-3)
+
+
+@pytest.mark.parametrize("removed", [True, False])
+def test_a_removed_owners_image_is_free(removed):
+    plane = add_plane(material=add_material())
+    add_sun(0)
+    bake(plane)
+    copy = duplicate(plane, own_material=False)
+    image = image_of(plane)
+    if removed:
+        bpy.data.objects.remove(plane)
+    else:
+        bpy.context.collection.objects.unlink(plane)
+    bake(copy)
+    assert image_of(copy) == image
+    assert json.loads(image[owners.KEY]) == [["Plane.001", "Medium"]]
+
+
+def test_a_shared_material_is_refused_before_the_bake_and_says_what_to_do():
+    plane = add_plane(material=add_material())
+    add_sun(0)
+    (before,) = bake(plane)
+    copy = duplicate(plane, own_material=False)
+    select(copy)
+    message = messages_of(bpy.ops.beamspread.bake)
+    assert "'Plane' is baked to the same part of the image" in message
+    assert "give 'Plane.001' a material of its own" in message
+    assert np.array_equal(pixels(image_of(plane)), before)
+    assert np.array_equal(bake(plane)[0], before)
+
+
+def test_an_atlas_is_baked_part_by_part():
+    image = bpy.data.images.new("Atlas", 32, 16, float_buffer=True)
+    material = add_material(image=image)
+    planes = [add_plane(name, uvs=uvs, material=material) for name, uvs in HALVES.items()]
+    planes[1].location.x = 5
+    sun = add_sun(0)
+    (together,) = bake(*planes)[:1]
+    image.pixels.foreach_set(np.zeros(32 * 16 * 4, np.float32))
+    del image[owners.KEY]
+    for plane in planes:
+        bake(plane)
+    assert pixels(image) == pytest.approx(together, abs=1e-5)
+    sun.data.energy = 2.0
+    bake(planes[1])
+    assert pixels(image)[:, 16:] == pytest.approx(2 * together[:, 16:], rel=1e-4)
+    assert pixels(image)[:, :16] == pytest.approx(together[:, :16], abs=1e-5)
+
+
+def test_a_batch_leaves_the_file_of_an_image_to_its_owner(tmp_path):
+    path = tmp_path / "own.exr"
+    native.write_exr(str(path), np.zeros((16, 16, 3), np.float32), ["R", "G", "B"])
+    plane = add_plane(material=add_material(image=bpy.data.images.load(str(path))))
+    add_sun(0)
+    bake(plane)
+    before = path.read_bytes()
+    duplicate(plane, own_material=True)
+    save_scene(tmp_path)
+    own, other = batch.bake_all(options.parse(["--object", "Plane", "Plane.001"])).bakes
+    assert (own.path, other.path) == (str(path), str(tmp_path / "beamspread" / "Plane.001_Medium.001.exr"))
+    assert "keeps the result of another" in other.message
+    assert path.read_bytes() == before
+
+
+def test_a_batch_fills_an_atlas_together(tmp_path):
+    path = tmp_path / "atlas.exr"
+    native.write_exr(str(path), np.zeros((16, 32, 3), np.float32), ["R", "G", "B"])
+    material = add_material(image=bpy.data.images.load(str(path)))
+    for number, (name, uvs) in enumerate(HALVES.items()):
+        add_plane(name, matrix=Matrix.Translation((5 * number, 0, 0)), uvs=uvs, material=material)
+    add_sun(0)
+    save_scene(tmp_path)
+    report = batch.bake_all(options.parse([]))
+    assert [one.path for one in report.bakes] == [str(path)] * 2
+    assert (native.read_exr(str(path))[0] > 0).all()
+
+
+def test_new_images_are_float_files_beside_a_saved_scene(tmp_path, settings):
+    plane = add_plane("A/b", material=add_material("M"))
+    add_sun(0, strength=100.0)
+    save_scene(tmp_path)
+    (shown,) = bake(plane)
+    image, path = image_of(plane), tmp_path / "textures" / "A_b_M.exr"
+    assert image.name == "A/b_M"
+    assert image.is_float
+    assert (image.filepath, image.packed_file) == ("//textures/A_b_M.exr", None)
+    assert native.read_exr(str(path))[0] == pytest.approx(shown)
+    assert shown.max() > 1
+    # Undone and baked again, it is the same file; what another has made is not touched.
+    node_of(plane.data.materials[0]).image = None
+    bpy.data.images.remove(image)
+    bake(plane)
+    assert [one.name for one in path.parent.iterdir()] == [path.name]
+    native.write_exr(str(path), np.zeros((4, 4, 3), np.float32), ["R", "G", "B"])
+    node_of(plane.data.materials[0]).image = None
+    before = path.read_bytes()
+    bake(plane)
+    assert path.read_bytes() == before
+    assert image_of(plane).filepath == "//textures/A_b_M_2.exr"
+    assert image_of(plane).name == "A/b_M.001"
+
+
+def test_folder_name_and_storage_are_settings(tmp_path, settings):
+    plane = add_plane(material=add_material())
+    add_sun(0)
+    settings.image_dir, settings.image_name = str(tmp_path / "mine"), "light of {object}"
+    bake(plane)
+    assert (image_of(plane).name, image_of(plane).packed_file) == ("light of Plane", None)
+    assert (tmp_path / "mine" / "light_of_Plane.exr").exists()
+    node_of(plane.data.materials[0]).image = None
+    save_scene(tmp_path)
+    settings.image_storage = "PACKED"
+    bake(plane)
+    assert image_of(plane).packed_file is not None
+    node_of(plane.data.materials[0]).image = None
+    settings.image_storage, settings.image_dir = "FILES", str(tmp_path / "mine" / "light_of_Plane.exr")
+    bake(plane)
+    assert image_of(plane).packed_file is not None
+    assert any("packed into the .blend file instead" in line for line in state.messages())
+
+
+def test_an_exr_file_that_was_read_as_srgb_is_read_as_what_it_is(tmp_path):
+    path = tmp_path / "own.exr"
+    native.write_exr(str(path), np.ones((16, 16, 3), np.float32), ["R", "G", "B"])
+    image = bpy.data.images.load(str(path))
+    plane = add_plane(material=add_material(image=image))
+    add_sun(0)
+    (expected,) = bake(plane)
+    image.colorspace_settings.name = "sRGB"
+    assert bake(plane)[0] == pytest.approx(expected, abs=1e-6)
+    image.colorspace_settings.is_data = True
+    assert bake(plane)[0] == pytest.approx(expected, abs=1e-6)
+    assert image.colorspace_settings.is_data
+
+
+def test_half_floats_stay_half_where_the_values_fit(tmp_path):
+    path = tmp_path / "half.exr"
+    native.write_exr(str(path), np.ones((16, 16, 3), np.float32), ["R", "G", "B"], compression="none", half=True)
+    size = path.stat().st_size
+    plane = add_plane(material=add_material(image=bpy.data.images.load(str(path))))
+    sun = add_sun(0)
+    (shown,) = bake(plane)
+    assert path.stat().st_size == size
+    assert np.array_equal(native.read_exr(str(path))[0], shown)
+    assert np.array_equal(shown, shown.astype(np.float16))
+    sun.data.energy = 1e7
+    (shown,) = bake(plane)
+    assert shown.max() > 65504
+    assert path.stat().st_size > 1.5 * size
+
+
+def test_what_clips_is_said_and_make_float_mends_it(tmp_path):
+    image = bpy.data.images.new("Bytes", 16, 16)
+    plane = add_plane(material=add_material(image=image))
+    sun = add_sun(0)
+    bake(plane)
+    assert not any("clips" in line for line in state.messages())
+    linear = files.linear_pixels(image)
+    sun.data.energy = 100.0
+    bake(plane)
+    assert any("'Bytes' clips values above 1: Make Float" in line for line in state.messages())
+    sun.data.energy = 1.0
+    bake(plane)
+    select(plane)
+    assert bpy.ops.beamspread.make_float() == {"FINISHED"}
+    image = image_of(plane)
+    assert image.name == "Bytes"
+    assert image.is_float
+    assert node_of(plane.data.materials[0]).node_tree.nodes["Image"].image == image
+    assert pixels(image) == pytest.approx(linear, abs=1e-5)
+    assert json.loads(image[owners.KEY]) == [["Plane", "Medium"]]
+    sun.data.energy = 100.0
+    assert bake(plane)[0].max() > 1
+    assert not any("clips" in line for line in state.messages())
+    assert not bpy.ops.beamspread.make_float.poll()
+
+
+def test_an_image_is_resized_only_when_asked(tmp_path, settings):
+    plane = add_plane(size=(2, 1), material=add_material())
+    add_sun(0)
+    save_scene(tmp_path)
+    select(plane)
+    assert bake(plane)[0].shape == (16, 32, 3)
+    assert not bpy.ops.beamspread.resize_image.poll()
+    settings.resolution = 64
+    assert bake(plane)[0].shape == (16, 32, 3)
+    assert bpy.ops.beamspread.resize_image() == {"FINISHED"}
+    assert bake(plane)[0].shape == (32, 64, 3)
+    assert native.read_exr(str(tmp_path / "textures" / "Plane_Medium.exr"))[0].shape == (32, 64, 3)
+
+
+@pytest.mark.parametrize("file_format", ["FFMPEG", "OPEN_EXR"])
+def test_a_png_has_the_view_transform_where_that_is_asked_for(tmp_path, settings, file_format):
+    plane = add_plane(material=add_material())
+    add_sun(0, strength=5.0)
+    (linear,) = bake(plane)
+    scene = bpy.context.scene
+    scene.view_settings.view_transform, scene.view_settings.exposure = "Standard", 1.0
+    if hasattr(scene.render.image_settings, "media_type"):
+        scene.render.image_settings.media_type = "VIDEO" if file_format == "FFMPEG" else "IMAGE"
+    scene.render.image_settings.file_format = file_format
+    shown = {}
+    for use in (False, True):
+        settings.use_view_transform = use
+        (record,) = batch.bake_all(options.parse(["--format", "PNG", "--output", str(tmp_path / str(use))])).bakes
+        image = bpy.data.images.load(record.path)
+        image.colorspace_settings.is_data = True
+        shown[use] = pixels(image)
+    assert shown[False] == pytest.approx(files.to_srgb(linear), abs=0.005)
+    assert shown[True] == pytest.approx(files.to_srgb(2 * linear), abs=0.005)
+    assert scene.render.image_settings.file_format == file_format
+    scene.view_settings.view_transform = "Filmic"
+    batch.bake_all(options.parse(["--format", "PNG", "--output", str(tmp_path / "filmic")]))
+    filmic = bpy.data.images.load(str(tmp_path / "filmic" / "Plane_Medium.png"))
+    assert np.abs(pixels(filmic) - shown[True]).max() > 0.03
+
+
+def link_from_library(folder):
+    """Link a plane with a material, and a sun, from another file; the plane."""
+    add_plane(material=add_material())
+    add_sun(0)
+    path = save_scene(folder)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.scene.beamspread.quality, bpy.context.scene.beamspread.use_indirect = "preview", False
+    bpy.context.scene.beamspread.resolution = 32
+    with bpy.data.libraries.load(str(path), link=True) as (_, wanted):
+        wanted.objects = ["Plane", "Sun"]
+    for obj in wanted.objects:
+        bpy.context.collection.objects.link(obj)
+    return wanted.objects[0]
+
+
+def test_a_linked_material_is_refused_before_the_bake(tmp_path):
+    plane = link_from_library(tmp_path)
+    select(plane)
+    message = messages_of(bpy.ops.beamspread.bake)
+    assert "The material 'Medium' belongs to another .blend file" in message
+    assert image_of(plane) is None
+    (late,) = prepare_scene(bpy.context, find_targets([plane]), for_bake())
+    late.run()
+    late.keep(Results().store)
+    assert "belongs to another .blend file" in late.error
+    # A batch changes nothing in it.
+    report = batch.bake_all(options.parse(["--output", str(tmp_path / "out")]))
+    assert [one.status for one in report.bakes] == ["written"]
+    # Made local, as the sentence says, it keeps its result.
+    bpy.ops.object.make_local(type="SELECT_OBDATA_MATERIAL")
+    plane = bpy.data.objects["Plane"]
+    bake(plane)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "user.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "user.blend"))
+    assert pixels(image_of(bpy.data.objects["Plane"])).any()
+
+
+def test_a_linked_object_with_a_local_material_is_baked(tmp_path):
+    linked = link_from_library(tmp_path)
+    plane = linked.override_create()
+    bpy.context.collection.objects.link(plane)
+    bpy.context.collection.objects.unlink(linked)
+    plane.material_slots[0].link = "OBJECT"
+    plane.material_slots[0].material = add_material("Own")
+    select(plane)
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    assert pixels(image_of(plane)).any()
+
+
+def test_an_appended_image_is_no_ones(tmp_path):
+    plane = add_plane(material=add_material())
+    add_sun(0)
+    bake(plane)
+    path = str(tmp_path / "copy.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+    with bpy.data.libraries.load(path) as (_, wanted):
+        wanted.materials = ["Medium"]
+    other = add_plane("Other", matrix=Matrix.Translation((5, 0, 0)), material=wanted.materials[0])
+    image = image_of(other)
+    assert image != image_of(plane)
+    assert json.loads(image[owners.KEY]) == [["Plane", "Medium"]]
+    bake(other)
+    assert image_of(other) == image
+
+
+def test_nothing_is_stored_where_the_part_is_anothers():
+    """As where the charts were moved while the bake ran."""
+    plane = add_plane(material=add_material())
+    add_sun(0)
+    (before,) = bake(plane)
+    copy = duplicate(plane, own_material=False)
+    (refused,) = (Results().admit(one) for one in prepare_scene(bpy.context, find_targets([copy]), for_bake()))
+    assert refused.job is None
+    (late,) = prepare_scene(bpy.context, find_targets([copy]), for_bake())
+    late.run()
+    late.keep(Results().store)
+    assert late.status == "failed"
+    assert "same part" in late.error
+    assert np.array_equal(pixels(image_of(plane)), before)
+
+
+def test_undo_leaves_what_was_painted_on_an_older_bake(tmp_path):
+    plane = add_plane(material=add_material())
+    add_sun(0)
+    bake(plane)
+    name = image_of(plane).name
+    path = str(tmp_path / "saved.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    bpy.ops.ed.undo_push(message="before")
+    bpy.data.images[name].pixels[0] = 9.0
+    bpy.data.objects["Sun"].data.energy = 3.0
+    bpy.ops.ed.undo_push(message="light")
+    bpy.ops.ed.undo()
+    assert bpy.data.objects["Sun"].data.energy == 1
+    assert bpy.data.images[name].pixels[0] == 9
+
+
+def test_a_result_is_kept_where_the_image_was_resized_meanwhile():
+    """As undo does."""
+    plane = add_plane(material=add_material(image=bpy.data.images.new("Own", 16, 16, float_buffer=True)))
+    add_sun(0)
+    (one,) = prepare_scene(bpy.context, find_targets([plane]), for_bake())
+    one.run()
+    image_of(plane).scale(8, 4)
+    one.keep(Results().store)
+    assert one.status == "written"
+    assert "changed its size during the bake" in one.warnings[-1]
+    assert pixels(image_of(plane)).shape == (16, 16, 3)
+
+
+def for_bake():
+    return bpy.context.scene.beamspread.for_bake()
+
+
+@pytest.mark.parametrize("has_file", [False, True])
+def test_undo_in_background_shows_what_is_packed(has_file, tmp_path):
+    """Also where a packed image has a file, which is none of this."""
+    image = None
+    if has_file:
+        native.write_exr(str(tmp_path / "a.exr"), np.zeros((16, 16, 3), np.float32), ["R", "G", "B"])
+        image = bpy.data.images.load(str(tmp_path / "a.exr"))
+        image.pack()
+    plane = add_plane(material=add_material(image=image))
+    sun = add_sun(0)
+    bake(plane)
+    name = image_of(plane).name
+    bpy.ops.ed.undo_push(message="first")
+    first = pixels(image_of(plane))
+    sun.data.energy = 3.0
+    bake(plane)
+    bpy.ops.ed.undo_push(message="second")
+    second = pixels(image_of(plane))
+    for operator, expected in ((bpy.ops.ed.undo, first), (bpy.ops.ed.redo, second)):
+        operator()
+        image = bpy.data.images[name]
+        assert pixels(image) == pytest.approx(expected, rel=2**-10)
+        image.buffers_free()
+        assert pixels(image) == pytest.approx(expected, rel=2**-10)
+        assert expected.any()

@@ -1,0 +1,296 @@
+"""Live: images follow the scene. In background no timer runs: these tests take its steps."""
+
+import threading
+import time
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+from beamspread.blender.live import session
+
+PATIENCE_SECONDS = 30
+
+
+@pytest.fixture(autouse=True)
+def switched_off_at_the_end():
+    yield
+    session.end()
+    assert not [thread.name for thread in threading.enumerate() if thread.name.startswith("Beamspread")]
+
+
+def settle(until=None):
+    """Take steps until all is painted, or until a condition holds."""
+    began = time.monotonic()
+    bpy.context.view_layer.update()
+    while True:
+        session.step(bpy.context)
+        live = session.live.session
+        calm = live is not None and not live.is_busy()
+        if until() if until else calm:
+            return
+        assert time.monotonic() < began + PATIENCE_SECONDS
+        time.sleep(0.005)
+
+
+def make_scene(image_size=64, **properties):
+    """A plane under a lamp, and its material; Live is on."""
+    image = bpy.data.images.new("Target", image_size, image_size, float_buffer=True, alpha=False)
+    material = scenes.add_material(image=image, linked=True, **({"ior": 1.4} | properties))
+    plane = scenes.add_plane(material=material)
+    data = bpy.data.lights.new("Lamp", "POINT")
+    data.energy, data.shadow_soft_size = 50, 0
+    lamp = bpy.data.objects.new("Lamp", data)
+    lamp.location = (0.3, 0.2, 0.5)
+    bpy.context.collection.objects.link(lamp)
+    bpy.context.scene.beamspread.use_live = True
+    return plane, lamp, material
+
+
+def live_pixels(material):
+    settle()
+    return scenes.pixels(scenes.node_of(material).image)
+
+
+def baked_pixels(plane):
+    bpy.context.scene.beamspread.use_live = False
+    session.step(bpy.context)
+    return scenes.bake(plane)[0]
+
+
+def test_at_rest_the_picture_is_the_bake():
+    plane, lamp, material = make_scene()
+    live_pixels(material)
+    lamp.location.x = -0.4
+    live = live_pixels(material)
+    np.testing.assert_allclose(live, baked_pixels(plane), rtol=1e-4)
+
+
+def test_a_moved_lamp_reads_no_mesh(monkeypatch):
+    _, lamp, material = make_scene()
+    first = live_pixels(material)
+    monkeypatch.setattr("beamspread.blender.read.occluders.local_mesh", lambda *_: pytest.fail("a mesh was read"))
+    monkeypatch.setattr("beamspread.blender.live.reader.read_polygons", lambda *_: pytest.fail("a mesh was read"))
+    lamp.location.x = -0.4
+    assert np.abs(live_pixels(material) - first).max() > 0.1 * first.max()
+
+
+CHANGES = {
+    "power": lambda plane, lamp, material: setattr(lamp.data, "energy", 100),
+    "place of the receiver": lambda plane, lamp, material: setattr(plane, "location", (0.3, 0, 0)),
+    "node": lambda plane, lamp, material: setattr(scenes.node_of(material), "albedo", (0.5, 0.5, 0.5)),
+    "shadow": lambda plane, lamp, material: scenes.add_blocker(0.3),
+    "world": lambda plane, lamp, material: setattr(bpy.context.scene.world, "color", (0.5, 0.5, 0.5)),
+    "another lamp": lambda plane, lamp, material: scenes.add_sun(30),
+    "lamp hidden": lambda plane, lamp, material: setattr(lamp, "hide_render", True),
+    "mesh": lambda plane, lamp, material: widen(plane.data),
+}
+
+
+def widen(mesh):
+    for vertex in mesh.vertices:
+        vertex.co *= 1.5
+    mesh.update()
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+def test_every_change_is_followed(change):
+    plane, lamp, material = make_scene()
+    world = bpy.data.worlds.new("World")
+    world.color = (0, 0, 0)
+    bpy.context.scene.world = world
+    live_pixels(material)
+    change(plane, lamp, material)
+    live = live_pixels(material)
+    np.testing.assert_allclose(live, baked_pixels(plane), rtol=1e-4, atol=1e-5)
+
+
+def test_switched_off_images_have_their_bakes_again():
+    plane, lamp, material = make_scene()
+    baked = scenes.bake(plane)[0]
+    lamp.location.x = -0.4
+    assert np.abs(live_pixels(material) - baked).max() > 0.1 * baked.max()
+    bpy.context.scene.beamspread.use_live = False
+    session.step(bpy.context)
+    image = scenes.node_of(material).image
+    np.testing.assert_array_equal(scenes.pixels(image), baked)
+    assert not image.is_dirty
+
+
+def test_what_was_painted_by_hand_and_never_saved_comes_back():
+    _, _, material = make_scene()
+    image = scenes.node_of(material).image
+    by_hand = np.random.default_rng(1).random(64 * 64 * 4).astype(np.float32)
+    image.pixels.foreach_set(by_hand)
+    before = scenes.pixels(image)
+    live_pixels(material)
+    session.end()
+    np.testing.assert_array_equal(scenes.pixels(image), before)
+
+
+def test_nothing_is_written_or_packed(tmp_path):
+    _plane, _lamp, material = make_scene()
+    image = scenes.node_of(material).image
+    image.colorspace_settings.is_data = True
+    image.filepath_raw, image.file_format = str(tmp_path / "target.exr"), "OPEN_EXR"
+    image.save()
+    image.source = "FILE"
+    before = (tmp_path / "target.exr").read_bytes()
+    live_pixels(material)
+    assert image.is_dirty
+    assert image.packed_file is None
+    assert (tmp_path / "target.exr").read_bytes() == before
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_a_bake_stays_until_something_changes():
+    plane, lamp, material = make_scene()
+    scenes.add_blocker(0.3)
+    live_pixels(material)
+    baked = scenes.bake(plane)[0]
+    image = scenes.node_of(material).image
+    for _ in range(5):
+        live_pixels(material)
+        bpy.context.view_layer.update()
+    assert not image.is_dirty
+    np.testing.assert_array_equal(scenes.pixels(image), baked)
+    lamp.location.x = -0.4
+    assert np.abs(live_pixels(material) - baked).max() > 0.1 * baked.max()
+
+
+def test_a_node_without_image_gets_one():
+    _plane, _lamp, material = make_scene()
+    scenes.node_of(material).image = None
+    bpy.context.scene.beamspread.resolution = 48
+    live_pixels(material)
+    image = scenes.node_of(material).image
+    assert tuple(image.size) == (48, 48)
+    assert image.is_float
+    assert scenes.pixels(image).max() > 0
+
+
+def test_objects_that_share_an_image_keep_to_their_parts():
+    """What is outside of both stays."""
+    plane, _lamp, material = make_scene()
+    bpy.context.scene.beamspread.margin = 0
+    quarter = [(0, 0), (0.5, 0), (0.5, 0.5), (0, 0.5)]
+    plane.data.uv_layers.active.data.foreach_set("uv", np.ravel(quarter))
+    other = scenes.add_plane("Other", material=material, uvs=np.add(quarter, 0.5))
+    other.location.x = 2.5
+    image = scenes.node_of(material).image
+    image.pixels.foreach_set(np.full(64 * 64 * 4, 7, np.float32))
+    values = live_pixels(material)
+    assert (values[32:, :32] == 7).all()
+    assert (values[:32, 32:] == 7).all()
+    assert values[:32, :32].mean() > values[32:, 32:].mean() > 0
+
+
+def test_what_live_leaves_out_is_said():
+    _plane, _lamp, material = make_scene()
+    bpy.context.scene.beamspread.use_indirect = True
+    live_pixels(material)
+    assert session.sentences() == ["Live leaves out indirect light.", session.IN_CYCLES]
+
+
+def test_what_cannot_follow_is_said_and_the_others_follow():
+    _plane, _lamp, material = make_scene()
+    bent = scenes.add_plane("Bent", material=scenes.add_material("Other"))
+    bent.location.x = 5
+    bent.data.vertices[0].co.z = 0.5
+    assert live_pixels(material).max() > 0
+    said, in_cycles = session.sentences()
+    assert in_cycles == session.IN_CYCLES
+    assert said.startswith("Bent / Other: The faces are not flat")
+
+
+def test_a_medium_without_library_is_stood_in_for_and_then_simulated(monkeypatch, tmp_path):
+    monkeypatch.setenv("BEAMSPREAD_CACHE", str(tmp_path))
+    plane, _lamp, material = make_scene(anisotropy=0.37, ior=1.37)
+    settle(lambda: session.live.session is not None and scenes.pixels(scenes.node_of(material).image).any())
+    assert not list(tmp_path.iterdir())
+    settle(lambda: list(tmp_path.iterdir()))
+    np.testing.assert_allclose(live_pixels(material), baked_pixels(plane), rtol=1e-4)
+
+
+ABUSE = {
+    "object": lambda plane, lamp, material: bpy.data.objects.remove(plane),
+    "material": lambda plane, lamp, material: bpy.data.materials.remove(material),
+    "node": lambda plane, lamp, material: material.node_tree.nodes.remove(scenes.node_of(material)),
+    "image": lambda plane, lamp, material: bpy.data.images.remove(scenes.node_of(material).image),
+    "lamp": lambda plane, lamp, material: bpy.data.objects.remove(lamp),
+    "mesh": lambda plane, lamp, material: plane.data.clear_geometry(),
+    "scene": lambda plane, lamp, material: bpy.ops.scene.new(),
+    "image's size": lambda plane, lamp, material: scenes.node_of(material).image.scale(32, 16),
+    "names": lambda plane, lamp, material: [setattr(one, "name", "New") for one in (plane, lamp, material)],
+    "edit mode": lambda plane, lamp, material: (scenes.select(plane), bpy.ops.object.mode_set(mode="EDIT")),
+}
+
+
+@pytest.mark.parametrize("happens", ABUSE.values(), ids=ABUSE)
+@pytest.mark.parametrize("is_painting", [False, True], ids=["at rest", "while painting"])
+def test_whatever_happens_to_what_it_shows(happens, is_painting, caplog):
+    plane, lamp, material = make_scene()
+    live_pixels(material)
+    if is_painting:
+        lamp.location.x = -0.4
+        bpy.context.view_layer.update()
+        session.step(bpy.context)
+    happens(plane, lamp, material)
+    for _ in range(20):
+        session.step(bpy.context)
+        time.sleep(0.01)
+    assert not caplog.records
+
+
+def test_it_goes_on_after_undo():
+    _plane, lamp, material = make_scene()
+    bpy.ops.ed.undo_push(message="before")
+    lamp.location.x = -0.4
+    bpy.ops.ed.undo_push(message="moved")
+    moved = live_pixels(material)
+    bpy.ops.ed.undo()
+    material = bpy.data.materials["Medium"]
+    undone = live_pixels(material)
+    assert np.abs(undone - moved).max() > 0.1 * moved.max()
+    np.testing.assert_allclose(undone, baked_pixels(bpy.data.objects["Plane"]), rtol=1e-4)
+
+
+def test_another_file_ends_it():
+    make_scene()
+    settle()
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    assert session.live.session is None
+
+
+def test_frames_of_an_animation_are_followed():
+    plane, lamp, material = make_scene()
+    for frame, x in ((1, 0.3), (10, -0.4)):
+        lamp.location.x = x
+        lamp.keyframe_insert("location", frame=frame)
+    bpy.context.scene.frame_set(1)
+    first = live_pixels(material)
+    bpy.context.scene.frame_set(10)
+    last = live_pixels(material)
+    assert np.abs(last - first).max() > 0.1 * first.max()
+    np.testing.assert_allclose(last, baked_pixels(plane), rtol=1e-4)
+
+
+def test_back_to_what_was_baked_is_painted_again():
+    plane, lamp, material = make_scene()
+    live_pixels(material)
+    baked = scenes.bake(plane)[0]
+    for x in (-0.4, 0.3):
+        lamp.location.x = x
+        live = live_pixels(material)
+    np.testing.assert_allclose(live, baked, rtol=1e-4)
+
+
+def test_an_object_that_casts_no_light_is_not_read_again_for_its_node(monkeypatch):
+    """While a value of the medium is dragged."""
+    _plane, _lamp, material = make_scene()
+    live_pixels(material)
+    monkeypatch.setattr("beamspread.blender.read.occluders.local_mesh", lambda *_: pytest.fail("a mesh was read"))
+    node = scenes.node_of(material)
+    node.ior = 1.3  # tells handlers, unlike other values that scripts set
+    bpy.context.view_layer.update()
+    live_pixels(material)

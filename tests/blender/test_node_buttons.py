@@ -1,0 +1,287 @@
+"""What the node's buttons do, and what a first bake does to a material's output."""
+
+import math
+import subprocess
+import sys
+
+import bpy
+import numpy as np
+import pytest
+from beamspread.blender.node import draw, principled
+from beamspread.core.material.principled import ior_of_reflectance, transport_length
+from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
+
+IS_BEFORE_4 = bpy.app.version < (4, 0, 0)
+
+
+def surface_of(material):
+    return material.node_tree.get_output_node("ALL").inputs["Surface"].links[0].from_node
+
+
+def principled_of(material):
+    return next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+
+
+def set_input(node, value, *names):
+    next(node.inputs[name] for name in names if name in node.inputs).default_value = value
+
+
+@pytest.fixture
+def plane():
+    bpy.context.scene.beamspread.resolution = 16
+    add_sun(0)
+    obj = add_plane(material=add_material(shader=True))
+    select(obj)
+    return obj
+
+
+class TestPreset:
+    @pytest.mark.parametrize(
+        ("name", "value"),
+        [
+            ("albedo", (0.5, 0.5, 0.5)),
+            ("mean_free_path", (0.1, 0.1, 0.1)),
+            ("anisotropy", 0.3),
+            ("ior", 1.2),
+            ("color_mode", "BASE_COLOR"),
+        ],
+    )
+    def test_becomes_custom_by_editing(self, name, value):
+        node = node_of(add_material())
+        node.preset = "marble"
+        assert node.preset == "marble"
+        setattr(node, name, value)
+        assert node.preset == "CUSTOM"
+
+    def test_stays_where_nothing_of_it_is_edited(self, tmp_path):
+        material = add_material()
+        material.use_fake_user = True
+        node = node_of(material)
+        node.preset = "marble"
+        node.thickness, node.image = 0.1, bpy.data.images.new("Baked", 4, 4)
+        node.preset = "cream"
+        assert node.preset == "cream"
+        path = str(tmp_path / "preset.blend")
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path)
+        assert node_of(bpy.data.materials["Medium"]).preset == "cream"
+
+    def test_comes_back_by_undo(self):
+        if bpy.app.background and not bpy.context.preferences.edit.use_global_undo:
+            pytest.skip("no undo here")
+        add_material().use_fake_user = True
+        node_of(bpy.data.materials["Medium"]).preset = "marble"
+        bpy.ops.ed.undo_push(message="preset")
+        node_of(bpy.data.materials["Medium"]).ior = 1.2
+        bpy.ops.ed.undo_push(message="edited")
+        bpy.ops.ed.undo()
+        assert node_of(bpy.data.materials["Medium"]).preset == "marble"
+        bpy.ops.ed.redo()
+        assert node_of(bpy.data.materials["Medium"]).preset == "CUSTOM"
+
+
+class TestFormerShader:
+    def test_first_bake_keeps_it_says_so_and_gives_it_back(self, plane, capfd, tmp_path):
+        material = plane.data.materials[0]
+        bake(plane)
+        said = capfd.readouterr().out
+        assert "'Medium' now shows the baked result; 'Principled BSDF' is kept" in said
+        assert surface_of(material) == node_of(material)
+        path = str(tmp_path / "swapped.blend")
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path)
+        plane, material = bpy.data.objects["Plane"], bpy.data.materials["Medium"]
+        select(plane)
+        assert bpy.ops.beamspread.toggle_result() == {"FINISHED"}
+        assert surface_of(material) == principled_of(material)
+        capfd.readouterr()
+        bake(plane)
+        assert "Show Baked Result" in capfd.readouterr().out
+        assert surface_of(material) == principled_of(material), "the choice stays"
+        assert bpy.ops.beamspread.toggle_result() == {"FINISHED"}
+        assert surface_of(material) == node_of(material)
+        capfd.readouterr()
+        bake(plane)
+        assert "shows" not in capfd.readouterr().out
+
+    def test_a_node_in_use_is_left_alone(self, plane):
+        material = plane.data.materials[0]
+        bsdf = principled_of(material)
+        material.node_tree.links.new(bsdf.inputs["Base Color"], node_of(material).outputs["Color"])
+        bake(plane)
+        assert surface_of(material) == bsdf
+
+    def test_one_that_was_deleted_is_an_error(self, plane):
+        bake(plane)
+        material = plane.data.materials[0]
+        material.node_tree.nodes.remove(principled_of(material))
+        assert "is gone" in messages_of(bpy.ops.beamspread.toggle_result)
+
+    def test_without_a_node_the_buttons_are_off(self):
+        add_plane(material=bpy.data.materials.new("Plain"))
+        assert not bpy.ops.beamspread.toggle_result.poll()
+        assert not bpy.ops.beamspread.from_principled.poll()
+
+
+class TestFromPrincipled:
+    @pytest.fixture
+    def bsdf(self, plane):
+        bsdf = principled_of(plane.data.materials[0])
+        set_input(bsdf, 0.5, "Subsurface Weight", "Subsurface")
+        set_input(bsdf, (0.8, 0.4, 0.2), "Subsurface Radius")
+        for name in ("Base Color", "Subsurface Color"):
+            if name in bsdf.inputs:
+                bsdf.inputs[name].default_value = (0.7, 0.5, 0.3, 1)
+        set_input(bsdf, 0.3, "Roughness")
+        set_input(bsdf, 0.5, "Specular IOR Level", "Specular")
+        if IS_BEFORE_4:
+            bsdf.subsurface_method = "RANDOM_WALK_FIXED_RADIUS"
+        else:
+            set_input(bsdf, 0.05, "Subsurface Scale")
+            set_input(bsdf, 1.5, "IOR")
+            bsdf.subsurface_method = "RANDOM_WALK"
+        return bsdf
+
+    def scale(self):
+        return 0.5 if IS_BEFORE_4 else 0.05
+
+    def test_values(self, plane, bsdf):
+        assert bpy.ops.beamspread.from_principled() == {"FINISHED"}
+        node = node_of(plane.data.materials[0])
+        assert (node.color_mode, node.preset) == ("BASE_COLOR", "CUSTOM")
+        assert list(node.base_color) == pytest.approx([0.7, 0.5, 0.3])
+        expected = [radius * self.scale() / (4 * math.pi) for radius in (0.8, 0.4, 0.2)]
+        assert list(node.mean_free_path) == pytest.approx(expected)
+        assert node.anisotropy == 0
+        assert node.ior == pytest.approx(1.5)
+        assert node.inputs["Roughness"].default_value == pytest.approx(0.3)
+
+    def test_radius_that_depends_on_the_color_and_anisotropy(self, plane, bsdf):
+        bsdf.subsurface_method = "RANDOM_WALK" if IS_BEFORE_4 else "RANDOM_WALK_SKIN"
+        bsdf.inputs["Subsurface Anisotropy"].default_value = 0.5
+        bsdf.inputs["Subsurface IOR"].default_value = 1.4
+        bpy.ops.beamspread.from_principled()
+        node = node_of(plane.data.materials[0])
+        lengths = [
+            0.5 * transport_length(radius * self.scale(), "walk", color, 1.4)
+            for radius, color in zip((0.8, 0.4, 0.2), (0.7, 0.5, 0.3))
+        ]
+        assert list(node.mean_free_path) == pytest.approx(lengths, rel=1e-5)
+        assert node.anisotropy == 0.5
+
+    def test_links(self, plane, bsdf):
+        material = plane.data.materials[0]
+        tree, node = material.node_tree, node_of(material)
+        image, bump = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeNormalMap")
+        for name in ("Base Color", "Subsurface Color"):
+            if name in bsdf.inputs:
+                tree.links.new(bsdf.inputs[name], image.outputs["Color"])
+        tree.links.new(bsdf.inputs["Roughness"], image.outputs["Alpha"])
+        tree.links.new(bsdf.inputs["Normal"], bump.outputs["Normal"])
+        bpy.ops.beamspread.from_principled()
+        sources = [node.inputs[name].links[0].from_socket for name in ("Base Color", "Roughness", "Normal")]
+        assert sources == [image.outputs["Color"], image.outputs["Alpha"], bump.outputs["Normal"]]
+        assert bsdf.inputs["Normal"].is_linked
+        assert node.has_texture()
+
+    def test_after_a_bake_it_is_the_former_shader(self, plane, bsdf):
+        bake(plane)
+        material = plane.data.materials[0]
+        other = material.node_tree.nodes.new("ShaderNodeBsdfPrincipled")
+        assert principled.find_principled(node_of(material)) == bsdf != other
+
+    def test_without_subsurface_the_mean_free_path_stays_and_it_is_said(self, plane, bsdf, capfd):
+        set_input(bsdf, 0.0, "Subsurface Weight", "Subsurface")
+        bsdf.inputs["Metallic"].default_value = 1.0
+        bpy.ops.beamspread.from_principled()
+        said = capfd.readouterr().out
+        assert "no subsurface scattering" in said
+        assert "no Metallic" in said
+        assert list(node_of(plane.data.materials[0]).mean_free_path) == pytest.approx([0.05] * 3)
+
+    def test_material_without_one(self, plane):
+        material = plane.data.materials[0]
+        material.node_tree.nodes.remove(principled_of(material))
+        assert "no Principled BSDF" in messages_of(bpy.ops.beamspread.from_principled)
+
+
+def test_specular_of_half_is_an_ior_of_1_5():
+    assert ior_of_reflectance(0.08 * 0.5) == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "text"),
+    [((4e-4, 4e-4, 4e-4), "0.4 mm"), ((2e-5, 1e-5, 5e-6), "20, 10, 5 µm"), ((0.05, 0.2, 0.1), "0.05, 0.2, 0.1 m")],
+)
+def test_lengths_are_readable(lengths, text):
+    assert draw.readable_lengths(lengths) == text
+
+
+RENDERED_WITHOUT_ADDON = """
+import bpy, sys
+path, picture = sys.argv[sys.argv.index("--") + 1:]
+bpy.ops.wm.open_mainfile(filepath=path)
+assert bpy.types.Node.bl_rna_get_subclass_py("BeamspreadNode") is None
+scene = bpy.context.scene
+scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 4, False
+scene.render.resolution_x = scene.render.resolution_y = 8
+scene.render.image_settings.file_format, scene.render.filepath = "OPEN_EXR", picture
+bpy.ops.render.render(write_still=True)
+"""
+
+
+class TestPlainNodes:
+    @pytest.fixture
+    def baked(self, plane):
+        """Seen from above, with an image of a known colour that is packed."""
+        node = node_of(plane.data.materials[0])
+        node.image = bpy.data.images.new("Baked", 4, 4, float_buffer=True)
+        node.image.colorspace_settings.name = "Non-Color"
+        node.image.pixels.foreach_set([0.25, 0.5, 0.75, 1] * 16)
+        node.image.pack()
+        camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+        camera.data.type, camera.data.ortho_scale, camera.location.z = "ORTHO", 1.0, 2.0
+        bpy.context.collection.objects.link(camera)
+        bpy.context.scene.camera = camera
+        bpy.data.objects["Sun"].hide_render = True
+        material = plane.data.materials[0]
+        surface = material.node_tree.get_output_node("ALL").inputs["Surface"]
+        material.node_tree.links.new(surface, node.outputs["BSDF"])
+        return plane
+
+    def render_without_add_on(self, tmp_path):
+        path, script, picture = (tmp_path / name for name in ("farm.blend", "script.py", "farm.exr"))
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        script.write_text(RENDERED_WITHOUT_ADDON)
+        program = [bpy.app.binary_path, "-b", "--factory-startup", "--python-exit-code", "1", "--python"]
+        command = [*program, str(script)] if bpy.app.binary_path else [sys.executable, str(script)]
+        subprocess.run([*command, "--", str(path), str(picture)], capture_output=True, text=True, check=True)
+        return pixels(bpy.data.images.load(str(picture)))[4, 4]
+
+    def test_a_blender_without_the_add_on_shows_them_alone(self, baked, tmp_path):
+        assert np.array_equal(self.render_without_add_on(tmp_path), [0, 0, 0])
+        assert bpy.ops.beamspread.make_plain() == {"FINISHED"}
+        assert self.render_without_add_on(tmp_path) == pytest.approx([0.25, 0.5, 0.75], abs=1e-3)
+
+    def test_a_bake_after_them_changes_both_and_they_can_go_again(self, baked):
+        material = baked.data.materials[0]
+        bpy.ops.beamspread.make_plain()
+        plain = surface_of(material)
+        assert plain.bl_idname == "ShaderNodeGroup"
+        node = node_of(material)
+        node.image, node.ior = None, 1.3
+        bake(baked)
+        assert node.image.name == plain.node_tree.nodes["Image"].image.name
+        assert plain.node_tree.nodes["Fresnel"].inputs["IOR"].default_value == pytest.approx(1.3)
+        assert surface_of(material) == plain
+        bpy.ops.beamspread.make_plain()
+        assert surface_of(material) == node
+        assert "ShaderNodeGroup" not in [one.bl_idname for one in material.node_tree.nodes]
+
+    def test_copies_of_the_material_part(self, baked):
+        bpy.ops.beamspread.make_plain()
+        material = baked.data.materials[0]
+        copy = material.copy()
+        node_of(copy).ior = 1.6
+        iors = [surface_of(one).node_tree.nodes["Fresnel"].inputs["IOR"].default_value for one in (material, copy)]
+        assert iors == pytest.approx([1.0, 1.6])

@@ -1,0 +1,167 @@
+"""The node's life: older files, copy and paste, linked and overridden materials, new inputs of the inner tree."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from scenes import add_material, add_plane, add_sun, bake, node_of, pixels, select
+
+OLDER_FILE = str(Path(__file__).with_name("files") / "node_before_sockets.blend")
+INPUTS = ["Base Color", "Roughness", "Normal"]
+
+
+def inner(node, name):
+    return node.node_tree.nodes[name]
+
+
+class TestOlderFile:
+    """Made by the first version of the node, which had neither inputs nor an IOR of its own other than 1."""
+
+    @pytest.fixture(autouse=True)
+    def opened(self):
+        bpy.ops.wm.open_mainfile(filepath=OLDER_FILE)
+        bpy.context.scene.beamspread.quality, bpy.context.scene.beamspread.use_indirect = "preview", False
+
+    def test_values_links_and_image_stay_and_inputs_come(self):
+        nodes = {name: node_of(bpy.data.materials[name]) for name in ("Untouched", "Marble", "Set", "Shared")}
+        assert [round(nodes[name].ior, 4) for name in nodes] == [1.0, 1.5, 1.3, 1.0]
+        assert nodes["Marble"].preset == "marble"
+        untouched = nodes["Untouched"]
+        assert inner(untouched, "Image").image.name == untouched.image.name == "Baked"
+        assert pixels(untouched.image)[0, 0] == pytest.approx([0.25, 0.5, 0.75])
+        output = bpy.data.materials["Untouched"].node_tree.get_output_node("ALL")
+        assert output.inputs["Surface"].links[0].from_node == untouched
+        for node in nodes.values():
+            assert [socket.name for socket in node.inputs] == INPUTS
+            assert [socket.name for socket in node.outputs] == ["Color", "BSDF"]
+            assert inner(node, "Glossy").inputs["Roughness"].is_linked
+            assert node.inputs["Roughness"].default_value == pytest.approx(0.1)
+
+    def test_saved_and_opened_again_nothing_is_added_twice(self, tmp_path):
+        path = str(tmp_path / "again.blend")
+        counts = [len(tree.nodes) for tree in bpy.data.node_groups]
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path)
+        assert [len(tree.nodes) for tree in bpy.data.node_groups] == counts
+        assert [socket.name for socket in node_of(bpy.data.materials["Set"]).inputs] == INPUTS
+
+    def test_bakes_as_it_did(self):
+        plane = bpy.data.objects["Plane"]
+        while len(plane.data.materials) > 1:
+            plane.data.materials.pop()
+        add_sun(0)
+        bake(plane)
+        assert (pixels(node_of(plane.data.materials[0]).image) > 0).all()
+        assert node_of(plane.data.materials[0]).ior == 1.0
+
+
+def test_append_from_an_older_file():
+    with bpy.data.libraries.load(OLDER_FILE) as (_, target):
+        target.materials = ["Untouched"]
+    node = node_of(target.materials[0])
+    node.ior = 1.2
+    assert [socket.name for socket in node.inputs] == INPUTS
+    assert inner(node, "Image").image.name == "Baked"
+
+
+def test_new_nodes_have_an_ior_and_old_defaults_stay_those_of_files():
+    material = bpy.data.materials.new("New")
+    material.use_nodes = True
+    node = material.node_tree.nodes.new("BeamspreadNode")
+    assert node.ior == pytest.approx(1.4)
+    assert node.bl_rna.properties["ior"].default == 1.0
+    assert [socket.name for socket in node.inputs] == INPUTS
+    assert node.inputs["Roughness"].default_value == pytest.approx(0.1)
+    assert node.preset == "CUSTOM"
+
+
+def test_links_of_the_inputs_outlive_a_bake_and_a_save(tmp_path):
+    plane = add_plane(material=add_material(linked=True))
+    add_sun(0)
+    tree = plane.data.materials[0].node_tree
+    bump, value = tree.nodes.new("ShaderNodeNormalMap"), tree.nodes.new("ShaderNodeValue")
+    tree.links.new(node_of(plane.data.materials[0]).inputs["Normal"], bump.outputs["Normal"])
+    tree.links.new(node_of(plane.data.materials[0]).inputs["Roughness"], value.outputs[0])
+    bpy.context.scene.beamspread.resolution = 16
+    bake(plane)
+    path = str(tmp_path / "linked.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    node = node_of(bpy.data.materials["Medium"])
+    sources = [node.inputs[name].links[0].from_node.bl_idname for name in ("Roughness", "Normal")]
+    assert sources == ["ShaderNodeValue", "ShaderNodeNormalMap"]
+
+
+def test_linked_and_overridden_materials(tmp_path):
+    path = str(tmp_path / "library.blend")
+    add_plane("Asset", material=add_material(ior=1.3))
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(path, link=True) as (_, target):
+        target.objects = ["Asset"]
+    (asset,) = target.objects
+    bpy.context.collection.objects.link(asset)
+    node = node_of(asset.data.materials[0])
+    assert node.ior == pytest.approx(1.3)
+    select(asset)
+    assert not bpy.ops.beamspread.toggle_result.poll()
+    override = asset.override_create(remap_local_usages=True)
+    material = asset.data.materials[0].copy()
+    override.material_slots[0].link = "OBJECT"
+    override.material_slots[0].material = material
+    node_of(material).ior = 1.6
+    assert inner(node_of(material), "Fresnel").inputs["IOR"].default_value == pytest.approx(1.6)
+    assert inner(node, "Fresnel").inputs["IOR"].default_value == pytest.approx(1.3)
+
+
+def test_undo_of_a_first_bake_gives_the_shader_back():
+    if bpy.app.background and not bpy.context.preferences.edit.use_global_undo:
+        pytest.skip("no undo here")
+    plane = add_plane(material=add_material(shader=True))
+    add_sun(0)
+    bpy.context.scene.beamspread.resolution = 16
+    bpy.ops.ed.undo_push(message="made")
+    bake(plane)
+    bpy.ops.ed.undo_push(message="baked")
+    bpy.ops.ed.undo()
+    material = bpy.data.materials["Medium"]
+    surface = material.node_tree.get_output_node("ALL").inputs["Surface"]
+    assert surface.links[0].from_node.type == "BSDF_PRINCIPLED"
+    assert node_of(material).former_node == ""
+    bpy.ops.ed.redo()
+    material = bpy.data.materials["Medium"]
+    assert material.node_tree.get_output_node("ALL").inputs["Surface"].links[0].from_node == node_of(material)
+
+
+def rendered(material, tmp_path):
+    """Pixels of a picture by Cycles of a plane in front of a bright world, seen at a slant."""
+    scene = bpy.context.scene
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 0.5
+    camera.location, camera.rotation_euler = (0, -2, 2), (0.7854, 0, 0)
+    scene.collection.objects.link(camera)
+    scene.camera, scene.world = camera, bpy.data.worlds.new("World")
+    scene.world.use_nodes = True
+    scene.cycles.samples, scene.cycles.use_denoising = 64, False
+    scene.render.resolution_x = scene.render.resolution_y = 8
+    path = tmp_path / f"{material.name}.exr"
+    scene.render.image_settings.file_format, scene.render.filepath = "OPEN_EXR", str(path)
+    bpy.ops.render.render(write_still=True)
+    return pixels(bpy.data.images.load(str(path)))
+
+
+def test_the_coat_is_that_of_glossy_without_a_normal_and_turns_with_one(tmp_path):
+    """An unlinked input of a group is the null vector, of which some renderers would make no coat at all."""
+    black = bpy.data.images.new("Black", 4, 4, float_buffer=True)
+    material = add_material(image=black, ior=1.5, linked=True)
+    add_plane(material=material)
+    node = node_of(material)
+    plain = rendered(material, tmp_path)
+    # Under an even world of .0509 the coat returns Fresnel's part at 45 degrees.
+    assert plain.mean() / 0.05088 == pytest.approx(0.0502, rel=0.03)
+    combine = material.node_tree.nodes.new("ShaderNodeCombineXYZ")
+    combine.inputs[1].default_value, combine.inputs[2].default_value = -np.sqrt(0.5), np.sqrt(0.5)
+    material.node_tree.links.new(node.inputs["Normal"], combine.outputs[0])
+    bent = rendered(material, tmp_path)
+    assert bent.mean() / 0.05088 == pytest.approx(0.04, rel=0.03)

@@ -1,0 +1,294 @@
+"""Turns of a run: first looks at media that are not simulated yet, jobs made when it is their turn, refusals."""
+
+import time
+
+import beamspread
+import bpy
+import pytest
+from beamspread.blender import preferences
+from beamspread.blender.images.results import Results
+from beamspread.blender.jobs import operator, popup, prepare, stale
+from beamspread.blender.jobs.operator import BakeThread
+from beamspread.blender.jobs.prepare import read_scene
+from beamspread.blender.jobs.queue import Queue
+from beamspread.blender.jobs.state import Standing, state
+from beamspread.blender.node.find import find_targets
+from beamspread.blender.ui.results import estimates
+from beamspread.core.bake.estimate import in_words
+from beamspread.core.bake.runner import CANCELLED
+from beamspread.core.ldf import library
+from mathutils import Matrix
+from scenes import add_material, add_plane, add_sun, messages_of, node_of, select
+
+KNOWN, UNKNOWN = {"anisotropy": 0.8, "ior": 1.0}, {"anisotropy": 0.8, "ior": 1.37}
+
+
+@pytest.fixture(autouse=True)
+def small(tmp_path, monkeypatch):
+    monkeypatch.setenv("BEAMSPREAD_CACHE", str(tmp_path / "cache"))
+    settings = bpy.context.scene.beamspread
+    settings.resolution, settings.quality = 32, "final"
+    add_sun(0)
+
+
+def plane(name, x=0.0, **properties):
+    made = add_plane(name, matrix=Matrix.Translation((x, 0, 0)), material=add_material(name, **properties))
+    bpy.context.view_layer.update()
+    return made
+
+
+def queue(preview_first=True):
+    targets = find_targets(bpy.context.scene.objects)
+    return Queue(read_scene(bpy.context, targets, bpy.context.scene.beamspread.for_bake()), targets, preview_first)
+
+
+def turns(made):
+    found = []
+    while (bake := made.next()) is not None:
+        found.append((bake.target.object_name, bake.job.settings.quality, bake.job.settings.indirect))
+    return found
+
+
+def test_media_that_are_not_there_get_a_first_look_and_their_bake_after_all():
+    plane("Unknown", **UNKNOWN)
+    plane("Known", 5.0, **KNOWN)
+    bpy.context.scene.beamspread.use_indirect = True
+    assert turns(queue()) == [
+        ("Unknown", "preview", False),
+        ("Known", "final", True),
+        ("Unknown", "final", True),
+    ]
+    assert turns(queue(preview_first=False)) == [("Unknown", "final", True), ("Known", "final", True)]
+    bpy.context.scene.beamspread.quality = "preview"
+    assert [turn[1] for turn in turns(queue())] == ["preview", "preview"]
+
+
+def test_those_that_share_an_image_are_baked_together_again():
+    image = bpy.data.images.new("Atlas", 32, 32, float_buffer=True)
+    plane("Unknown", image=image, **UNKNOWN)
+    plane("Known", 5.0, image=image, **KNOWN)
+    plane("Apart", 9.0, **KNOWN)
+    assert [turn[0] for turn in turns(queue())] == ["Unknown", "Known", "Apart", "Unknown", "Known"]
+    made = queue()
+    again = []
+    while made.next() is not None:
+        again.append(made.starts_again())
+    assert again == [False, False, False, True, False]
+
+
+def test_nothing_is_simulated_for_passes_without_a_medium():
+    plane("Unknown", **UNKNOWN)
+    bpy.context.scene.beamspread.output = "IRRADIANCE"
+    assert len(queue()) == 1
+
+
+def test_the_fraction_of_a_run_never_falls():
+    plane("Unknown", **UNKNOWN)
+    plane("Known", 5.0, **KNOWN)
+    made, seen = queue(), [0.0]
+    while made.next() is not None:
+        seen += [made.fraction(0.0), made.fraction(0.5), made.fraction(1.0)]
+    assert seen == sorted(seen)
+    assert seen[-1] == pytest.approx(1)
+    # The final simulation is what takes long.
+    assert made.turn.is_again
+    assert made.fraction(0.0) < 0.3
+
+
+def test_jobs_are_made_when_it_is_their_turn(monkeypatch):
+    for number in range(3):
+        plane(f"Plane {number}", 5.0 * number)
+    made = []
+    build = prepare.build_receiver
+    monkeypatch.setattr(prepare, "build_receiver", lambda *arguments: made.append(1) or build(*arguments))
+    waiting = queue()
+    assert len(made) == 0
+    waiting.next()
+    assert len(made) == 1
+
+
+def test_what_is_read_is_of_one_time():
+    """The scene may change while others are baked."""
+    planes = [plane(f"Plane {number}", 5.0 * number) for number in range(2)]
+    waiting = queue()
+    waiting.next()
+    bpy.data.objects.remove(planes[1])
+    bpy.data.lights["Sun"].energy = 7.0
+    bake = waiting.next()
+    assert bake.job.receiver.charts[0].grid.origin[0] == pytest.approx(4.0)
+    assert bake.job.illumination.lights[0].strength == 1.0
+
+
+def test_a_bake_beyond_the_memory_limit_is_refused(monkeypatch):
+    one = plane("Plane")
+    monkeypatch.setattr(preferences, "memory_limit", lambda: 1000)
+    select(one)
+    message = messages_of(bpy.ops.beamspread.bake)
+    assert "32 x 32 texels take about" in message
+    assert "raise the memory limit" in message
+    assert state.rows[find_targets([one])[0]].standing == Standing.FAILED
+
+
+def test_progress_says_what_is_done_and_how_long_it_lasts(monkeypatch):
+    words = []
+
+    class Listener:
+        def __call__(self, fraction):
+            return True
+
+        def say(self, said):
+            words.append(said)
+
+    plane("Unknown", **UNKNOWN)
+    bake = queue().next()
+    bake.run(Listener())
+    assert words == ["Simulating the medium, once (preview)", "Baking"]
+    now = [100.0]
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    state.begin()
+    state.start(bake.target)
+    try:
+        state.update(0.3, 0.15, "Baking")
+        assert state.progress.in_short() == "15%"
+        now[0] += 10
+        state.update(0.5, 0.25, "Baking")
+        # Ten per cent in ten seconds, however far it was before.
+        assert state.progress.in_words() == "Baking 50%, all 25%, about 1 min left"
+        assert state.progress.in_short() == "25%, 1 min left"
+    finally:
+        state.stop()
+
+
+@pytest.mark.parametrize("solver", ["fft", "direct", "adaptive"])
+@pytest.mark.parametrize("seconds", [0.05, 0.5])
+def test_a_bake_stops_within_two_seconds(solver, seconds):
+    settings = bpy.context.scene.beamspread
+    settings.resolution, settings.solver, settings.quality = 1024, solver, "preview"
+    bpy.data.lights["Sun"].type = "POINT"
+    bpy.data.objects["Sun"].location.z = 1.0
+    plane("Plane", **KNOWN)
+    beamspread.library(beamspread.Medium(0.8, 1.0), quality="preview")  # to read it takes most of a second
+    thread = BakeThread(queue().next())
+    thread.start()
+    time.sleep(seconds)
+    thread.cancel()
+    asked = time.monotonic()
+    thread.join()
+    assert time.monotonic() - asked < 2
+    assert thread.bake.status == CANCELLED
+
+
+def test_the_search_for_indirect_light_stops_within_two_seconds():
+    settings = bpy.context.scene.beamspread
+    settings.quality, settings.use_indirect = "preview", True
+    plane("Plane", **KNOWN)
+    plane("Roof", **KNOWN).location.z = 1.0
+    bpy.context.view_layer.update()
+    thread = BakeThread(queue().next())
+    thread.start()
+    time.sleep(1.0)
+    assert thread.doing == "Finding indirect light"
+    thread.cancel()
+    asked = time.monotonic()
+    thread.join()
+    assert time.monotonic() - asked < 2
+    assert thread.bake.status == CANCELLED
+
+
+def test_unregistering_ends_what_runs():
+    """Blender would end with an error if a thread of ours still ran when it quits."""
+    bpy.context.scene.beamspread.solver = "direct"
+    bpy.context.scene.beamspread.resolution = 1024
+    bpy.data.lights["Sun"].type = "POINT"
+    bpy.data.objects["Sun"].location.z = 1.0
+    plane("Plane", **KNOWN)
+    thread = BakeThread(queue().next())
+    thread.start()
+    operator.unregister()
+    try:
+        assert not thread.is_alive()
+    finally:
+        operator.register()
+
+
+def test_estimates_follow_solver_and_sizes():
+    one, other = plane("One"), plane("Other", 5.0)
+    settings = bpy.context.scene.beamspread
+    select(one)
+    assert estimates(bpy.context) == []
+    settings.use_indirect = True
+    (alone,) = estimates(bpy.context)
+    assert alone.startswith("Indirect light: about ")
+    select(one, other)
+    (both,) = estimates(bpy.context)
+    assert "for 2 objects" in both
+    settings.use_indirect, settings.solver = False, "direct"
+    assert estimates(bpy.context) == []
+    settings.resolution = 2048
+    (sun,) = estimates(bpy.context)
+    bpy.data.lights["Sun"].type = "POINT"
+    (lamp,) = estimates(bpy.context)
+    assert sun.startswith("Direct solver: at least ")
+    assert " h." in sun
+    assert " days, up to 1024 times that if lamps have a size." in lamp
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"), [(0.2, "1 s"), (59, "59 s"), (90, "2 min"), (7200, "2 h"), (259200, "3 days")]
+)
+def test_times_in_words(seconds, words):
+    assert in_words(seconds) == words
+
+
+def test_preferences_have_defaults_where_the_add_on_is_not_enabled():
+    assert preferences.preferences() is None
+    assert (preferences.threads(), preferences.memory_limit()) == (0, 0)
+    assert preferences.PACKAGE == "beamspread"
+
+
+def test_the_cache_is_cleared_of_its_own_files_alone(tmp_path):
+    beamspread.library(beamspread.Medium(0.1, 1.2), quality="preview")
+    folder = library.cache_folder()
+    (folder / "mine.txt").write_text("mine")
+    assert len(library.cached_files()) == 1
+    assert bpy.ops.beamspread.clear_cache() == {"FINISHED"}
+    assert [path.name for path in folder.iterdir()] == ["mine.txt"]
+    assert not library.is_known(beamspread.Medium(0.1, 1.2), "preview")
+
+
+def test_a_chosen_cache_folder(tmp_path, monkeypatch):
+    monkeypatch.delenv("BEAMSPREAD_CACHE")
+    library.choose_cache_folder(tmp_path / "chosen")
+    try:
+        assert library.cache_folder() == tmp_path / "chosen"
+    finally:
+        library.choose_cache_folder("")
+    assert library.cache_folder() != tmp_path / "chosen"
+
+
+def test_threads_reach_the_bake(monkeypatch):
+    monkeypatch.setattr(preferences, "threads", lambda: 3)
+    assert bpy.context.scene.beamspread.for_bake().threads == 3
+
+
+def test_long_sentences_are_wrapped():
+    lines = popup.wrap("one two three four five", 10)
+    assert lines == ["one two", "three four", "five"]
+
+
+def test_a_first_look_is_kept_with_its_sentence():
+    """What the window does in two turns; the second one never comes."""
+    one = plane("Unknown", **UNKNOWN)
+    waiting = queue()
+    bake = waiting.next()
+    parts = stale.parts_of(bpy.context, [bake.target])
+    bake.run()
+    bake.keep(Results().store)
+    state.note(bake)
+    stale.keep(bake.target, parts[bake.target], bake.warnings, waiting.turn.is_first)
+    stale.refresh(bpy.context)
+    row = state.rows[bake.target]
+    assert row.is_stale
+    assert row.standing == Standing.WARNED
+    assert "first look" in row.sentences[0]
+    assert node_of(one.data.materials[0]).image is not None

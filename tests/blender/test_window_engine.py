@@ -1,0 +1,42 @@
+"""The engine in a window: F12 beside the window's own thread, viewports; and the node by copy, paste and undo."""
+
+import json
+import subprocess
+from pathlib import Path
+
+import bpy
+import pytest
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory):
+    """What window_engine.py noted."""
+    if not bpy.app.binary_path:
+        pytest.skip("the bpy module opens no window")
+    path = tmp_path_factory.mktemp("window") / "results.json"
+    screen = ["xvfb-run", "-a", "-s", "-screen 0 1600x1000x24 +extension GLX"]
+    options = ["--factory-startup", "--window-geometry", "0", "0", "1600", "1000"]
+    script = ["--python", str(Path(__file__).with_name("window_engine.py")), "--", str(path)]
+    done = subprocess.run(
+        [*screen, bpy.app.binary_path, *options, *script], capture_output=True, text=True, timeout=300
+    )
+    assert path.exists(), done.stdout + done.stderr
+    results = json.loads(path.read_text())
+    assert "error" not in results, results["error"]
+    assert results["complete"]
+    assert done.returncode == 0, done.stderr
+    return results
+
+
+def test_f12_shows_the_baked_image(seen):
+    assert seen["f12"] == ["complete"]
+    assert seen["picture"] == pytest.approx([0.25, 0.5, 0.75], abs=2e-3)
+
+
+def test_rendered_viewports_show_the_scene_by_eevee(seen):
+    assert seen["scene light"]
+
+
+def test_a_pasted_node_parts_from_the_first_and_outlives_undo(seen):
+    assert seen["pasted"] == [1.0, 1.7]
+    assert seen["after undo and redo"] == [1.0, 1.7]

@@ -1,0 +1,134 @@
+"""What test_window_engine.py runs inside a Blender with a window: F12, viewports, and nodes by copy and paste.
+
+xvfb-run blender --factory-startup --python THIS -- RESULTS.json
+"""
+
+import json
+import sys
+import time
+import traceback
+from pathlib import Path
+
+import bpy
+
+FOLDER = Path(__file__).resolve().parent
+sys.path[:0] = [str(FOLDER), str(FOLDER.parent.parent / "build" / "stage")]
+
+import beamspread  # noqa: E402
+import scenes  # noqa: E402
+
+PATIENCE_SECONDS = 90
+results = {}
+ended = []
+
+
+def window():
+    return bpy.context.window_manager.windows[0]
+
+
+def area_of(kind: str):
+    return next(area for area in window().screen.areas if area.type == kind)
+
+
+def f12() -> None:
+    with bpy.context.temp_override(window=window()):
+        bpy.ops.render.render("INVOKE_DEFAULT")
+
+
+def in_editor(operator, **options):
+    """Call an operator as the Shader Editor does."""
+    area = area_of("NODE_EDITOR")
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window(), area=area, region=region):
+        return operator(**options)
+
+
+def add_scene():
+    """A plane that shows a known image, from above."""
+    scene = bpy.context.scene
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    image = bpy.data.images.new("Known", 4, 4, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    image.pixels.foreach_set([0.25, 0.5, 0.75, 1] * 16)
+    plane = scenes.add_plane(size=(9, 9), material=scenes.add_material(image=image, linked=True))
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location.z = 5
+    scene.collection.objects.link(camera)
+    scene.camera, scene.world = camera, None
+    scene.render.engine = "BEAMSPREAD"
+    scene.render.resolution_x = scene.render.resolution_y = 16
+    scene.cycles.samples, scene.cycles.use_denoising = 4, False
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scenes.select(plane)
+    return plane
+
+
+def scenario():
+    bpy.app.handlers.render_complete.append(lambda *_: ended.append("complete"))
+    plane = add_scene()
+    area_of("DOPESHEET_EDITOR").ui_type = "ShaderNodeTree"
+    viewport = area_of("VIEW_3D").spaces.active.shading
+    viewport.type = "RENDERED"
+    yield lambda: viewport.type == "MATERIAL"
+    results["scene light"] = viewport.use_scene_lights and viewport.use_scene_world
+
+    f12()
+    yield lambda: ended
+    results["f12"] = list(ended)
+    path = str(Path(sys.argv[-1]).with_name("f12.exr"))
+    bpy.data.images["Render Result"].save_render(path)
+    results["picture"] = scenes.pixels(bpy.data.images.load(path))[8, 8].tolist()
+
+    tree = plane.data.materials[0].node_tree
+    for node in tree.nodes:
+        node.select = node.bl_idname == "BeamspreadNode"
+    in_editor(bpy.ops.node.clipboard_copy)
+    in_editor(bpy.ops.node.clipboard_paste)
+    bpy.ops.ed.undo_push(message="pasted")
+    pasted = [node for node in tree.nodes if node.bl_idname == "BeamspreadNode"][-1]
+    pasted.ior = 1.7
+    bpy.ops.ed.undo_push(message="changed")
+    yield lambda: True
+    iors = lambda: sorted(  # noqa: E731
+        round(node.node_tree.nodes["Fresnel"].inputs["IOR"].default_value, 3)
+        for node in bpy.data.materials["Medium"].node_tree.nodes
+        if node.bl_idname == "BeamspreadNode"
+    )
+    results["pasted"] = iors()
+    for name in ("undo", "undo", "redo", "redo"):
+        with bpy.context.temp_override(window=window()):
+            getattr(bpy.ops.ed, name)()
+        yield lambda: True
+    results["after undo and redo"] = iors()
+    began = time.monotonic()
+    yield lambda: time.monotonic() > began + 1
+
+
+def main() -> None:
+    beamspread.register()
+    steps = scenario()
+    waiting = {"for": lambda: True, "since": time.monotonic()}
+
+    def step():
+        try:
+            if not waiting["for"]():
+                if time.monotonic() - waiting["since"] < PATIENCE_SECONDS:
+                    return 0.05
+                raise TimeoutError(f"line {steps.gi_frame.f_lineno} waited in vain")
+            waiting.update({"for": next(steps), "since": time.monotonic()})
+            return 0.05
+        except StopIteration:
+            results["complete"] = True
+        except BaseException:  # noqa: BLE001 - the test shows it
+            results["error"] = traceback.format_exc()
+        Path(sys.argv[-1]).write_text(json.dumps(results))
+        bpy.ops.wm.quit_blender()
+        return None
+
+    bpy.app.timers.register(step, first_interval=1.0, persistent=True)
+
+
+bpy.context.preferences.view.show_splash = False
+bpy.context.preferences.view.render_display_type = "NONE"
+main()
