@@ -25,6 +25,8 @@ INDIRECT = "indirect light"
 
 OUTPUT = "ShaderNodeOutputMaterial"
 
+SEEN_BY_BAKES = {"LIGHT", "MESH", "CURVE", "SURFACE", "FONT", "META"}
+
 
 class Reader:
     """Keeps what it has read.
@@ -53,7 +55,7 @@ class Reader:
             if self._illumination is None or not marks.is_lamps_alone() or not self._targets:
                 self._read_receivers(depsgraph, marks)
             self._put_in_order(scene, marks)
-            self._say_what_is_left_out(scene)
+            self._say_what_is_left_out(depsgraph)
         subjects = {}
         for target in self._targets[:MOST_SUBJECTS]:
             subject = self._subject(scene, target)
@@ -122,10 +124,13 @@ class Reader:
                 )
             )
 
-    def _say_what_is_left_out(self, scene) -> None:
+    def _say_what_is_left_out(self, depsgraph) -> None:
         names = [f"what only Cycles knows of '{name}'" for name in self._illumination.by_cycles]
-        if scene.beamspread.use_indirect:
+        if depsgraph.scene.beamspread.use_indirect:
             names.insert(0, INDIRECT)
+        textured = dict.fromkeys(target.material_name for target in self._targets if _has_texture(target))
+        names += [f"the texture at Base Color of '{name}'" for name in textured]
+        names += _hidden(depsgraph.view_layer)
         if len(self._targets) > MOST_SUBJECTS:
             names.append(f"{len(self._targets) - MOST_SUBJECTS} objects farther away")
         self.left_out = names
@@ -160,6 +165,19 @@ class Reader:
         if before is not None and all(_is_same(getattr(before, name), value) for name, value in parts.items()):
             return before
         return Subject(target, **parts)
+
+
+def _has_texture(target: Target) -> bool:
+    node = find_node(bpy.data.materials.get(target.material_name))
+    return node is not None and node.has_texture()
+
+
+def _hidden(view_layer) -> list[str]:
+    """What a bake would see and the viewport does not."""
+    rendered = render_visible_names(view_layer)
+    objects = (obj for obj in view_layer.objects if obj.type in SEEN_BY_BAKES and obj.name in rendered)
+    names = [f"'{obj.name}'" for obj in objects if not obj.visible_get(view_layer=view_layer)]
+    return [f"what the viewport hides: {', '.join(names)}"] if names else []
 
 
 def _shows_medium_alone(material_name: str) -> bool:
