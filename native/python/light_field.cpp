@@ -5,16 +5,13 @@
 
 #include "base/error.h"
 #include "base/pool.h"
-#include "python/plane_light.h"
+#include "python/problem.h"
 #include "scene/ray_gather.h"
 #include "solve/light_field.h"
 
 namespace beamspread {
 
 namespace {
-
-using Lights = std::vector<const HeldLight*>;
-using Sources = std::vector<std::shared_ptr<LdfSource>>;
 
 // A field and what it looks at.
 class HeldField {
@@ -24,25 +21,18 @@ public:
               std::array<double, 2> pitch, double tolerance, int threads, const py::object& progress)
         : m_sources(ldf)
     {
-        Problem problem;
+        Problem problem = problem_of(lights, ldf, albedo, mean_free_path, tolerance);
         problem.plane = plane_of(shape, pitch);
         problem.to_come.plane = plane_of(survey_shape, pitch);
         problem.to_come.plane.pitch_x *=
             static_cast<double>(problem.plane.width) / static_cast<double>(problem.to_come.plane.width);
         problem.to_come.plane.pitch_y *=
             static_cast<double>(problem.plane.height) / static_cast<double>(problem.to_come.plane.height);
-        problem.tolerance = tolerance;
         problem.threads = threads;
-        for (const HeldLight* held : lights) {
-            problem.lights.push_back(held->light);
+        for (const HeldLight* held : lights)
             m_lights.push_back(*held);
-        }
         for (const HeldLight* held : survey)
             problem.to_come.lights.push_back(held->light);
-        if (ldf.size() != albedo.size() || mean_free_path.size() != albedo.size())
-            reject("ldf", "of another number of channels than albedo", "one per channel");
-        for (std::size_t c = 0; c < albedo.size(); ++c)
-            problem.channels.push_back({ldf[c].get(), albedo[c], mean_free_path[c]});
         Progress report(progress_callback(progress));
         const py::gil_scoped_release release;
         m_field = std::make_unique<LightField>(problem, report);

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "python/plane_light.h"
+#include "python/problem.h"
 #include "solve/adaptive/mask_pyramid.h"
 #include "solve/solve.h"
 #include "solve/spectral/spectral.h"
@@ -114,25 +114,13 @@ std::vector<HeldLight> by_channel(const HeldLight& held)
     return lights;
 }
 
-using Lights = std::vector<const HeldLight*>;
-using Sources = std::vector<std::shared_ptr<LdfSource>>;
-
-Problem problem_of(const Lights& lights, const Sources& ldf, const std::vector<double>& albedo,
-                   const std::vector<double>& mean_free_path, std::array<double, 2> pitch, double tolerance)
+// That of all lights; without any, none.
+Plane plane_of(const Lights& lights, std::array<double, 2> pitch)
 {
-    const std::size_t channels = albedo.size();
-    if (ldf.size() != channels || mean_free_path.size() != channels)
-        reject("ldf", "of another number of channels than albedo", "one per channel");
-    Problem problem;
-    problem.tolerance = tolerance;
-    for (const HeldLight* held : lights)
-        problem.lights.push_back(held->light);
-    if (!lights.empty())
-        problem.plane = {lights.front()->light.irradiance.width, lights.front()->light.irradiance.height, pitch[0],
-                         pitch[1]};
-    for (std::size_t c = 0; c < channels; ++c)
-        problem.channels.push_back({ldf[c].get(), albedo[c], mean_free_path[c]});
-    return problem;
+    if (lights.empty())
+        return {};
+    const View2D<const float>& irradiance = lights.front()->light.irradiance;
+    return {irradiance.width, irradiance.height, pitch[0], pitch[1]};
 }
 
 Array<float> convolve(const Lights& lights, const Sources& ldf, const std::vector<double>& albedo,
@@ -140,7 +128,8 @@ Array<float> convolve(const Lights& lights, const Sources& ldf, const std::vecto
                       double tolerance, int threads, const py::object& progress, std::size_t memory,
                       std::size_t coarsening)
 {
-    Problem problem = problem_of(lights, ldf, albedo, mean_free_path, pitch, tolerance);
+    Problem problem = problem_of(lights, ldf, albedo, mean_free_path, tolerance);
+    problem.plane = plane_of(lights, pitch);
     problem.solver = solver_named(solver);
     problem.threads = threads;
     problem.memory = memory;
@@ -156,7 +145,8 @@ Array<float> convolve(const Lights& lights, const Sources& ldf, const std::vecto
 std::size_t transforms(const Lights& lights, const Sources& ldf, const std::vector<double>& albedo,
                        const std::vector<double>& mean_free_path, std::array<double, 2> pitch, double tolerance)
 {
-    const Problem problem = problem_of(lights, ldf, albedo, mean_free_path, pitch, tolerance);
+    Problem problem = problem_of(lights, ldf, albedo, mean_free_path, tolerance);
+    problem.plane = plane_of(lights, pitch);
     Progress unseen;
     const py::gil_scoped_release release;
     validate(problem);

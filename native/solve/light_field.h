@@ -13,7 +13,8 @@ namespace beamspread {
 class LightField {
 public:
     // `problem.lights` of one direction are kept as they are. Other ones, and a survey of the light to come, only tell
-    // how exactly what will be added is to be kept; with a survey alone, any light of its angles. Throws InvalidArgument, Cancelled.
+    // how exactly what will be added is to be kept; with a survey alone, any light of its angles. Throws
+    // InvalidArgument, Cancelled.
     LightField(const Problem& problem, Progress& progress);
 
     void add(const PlaneLight& light);
