@@ -12,7 +12,7 @@ from ...core.bake.runner import Bake, Target
 from ...core.batch.names import stem
 from ...core.errors import ImageError
 from ...core.native import native
-from . import files, writing
+from . import files, undo, writing
 
 # What a file of ours says of itself, so that another scene's file of the same name is not taken for it.
 MADE_FOR = "beamspread:madeFor"
@@ -54,6 +54,7 @@ def _in_file(name: str, texture: np.ndarray, is_data: bool) -> tuple[str, bpy.ty
     image.colorspace_settings.is_data = is_data
     if bpy.data.filepath:
         image.filepath = bpy.path.relpath(str(path))
+    undo.stamp(image)
     return str(path), image
 
 

@@ -11,7 +11,7 @@ from ...core.bake.settings import COMBINED
 from ...core.errors import BakeError
 from ..node.find import find_node
 from ..node.node import link_result
-from . import files
+from . import files, previews
 from .new_image import keep_new, name_for
 from .owners import Parts, note_owner, others_in, overlaps, parts_of, read_parts, users_of, within
 
@@ -100,6 +100,9 @@ class Results:
 
     def _store_shown(self, node, bake: Bake, texture: np.ndarray) -> tuple[str, bpy.types.Image]:
         image = node.image
+        if image is not None and previews.MADE_FOR_PREVIEWS in image:
+            bpy.data.images.remove(image)  # which brings no settings of the user's
+            image = None
         if image is None:
             return self._new(bake, texture)
         path = self.fill_shown(image, bake, texture)

@@ -13,6 +13,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...core.bake.runner import Target
+from ..images import previews
 from ..node.find import find_node, find_targets
 from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
 from .record import Record, keep_record, record_of
@@ -64,7 +65,7 @@ def _record(target: Target) -> Record | None:
 
 def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
     changed = [] if record is None or now is None else record.changed(now)
-    if record is not None and _image(target).is_dirty and not record.is_dirty:
+    if record is not None and not record.is_dirty and _is_painted(_image(target)):
         changed.append("pixels of the image")
     said = state.said_of(target)
     if said is not None and said.standing in (Standing.FAILED, Standing.CANCELLED):
@@ -75,6 +76,10 @@ def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
         return Row(target, Standing.STALE, (f"Changed since its bake: {', '.join(changed)}.", *record.warnings), True)
     warnings = (*([_why_again(record.parts[QUALITY], now[QUALITY])] if changed else []), *record.warnings)
     return Row(target, Standing.WARNED if warnings else Standing.BAKED, warnings, bool(changed))
+
+
+def _is_painted(image) -> bool:
+    return image.is_dirty and not previews.covers(image)
 
 
 def _why_again(baked: str, wanted: str) -> str:
