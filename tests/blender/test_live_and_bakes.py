@@ -183,3 +183,20 @@ def test_a_change_during_a_bake_is_shown_after_it():
     baked = scenes.bake(plane)[0].copy()
     lamp.data.energy = 5
     assert live_pixels(material).mean() < 0.5 * baked.mean()
+
+
+@pytest.mark.parametrize("has_own_material", [False, True])
+def test_a_copy_leaves_the_image_to_the_original_and_live_says_so(has_own_material):
+    plane, lamp, material = make_scene()
+    baked = scenes.bake(plane)[0].copy()
+    copy = plane.copy()
+    copy.name, copy.location.x = "A copy", 2.5
+    bpy.context.collection.objects.link(copy)
+    if has_own_material:
+        copy.data = plane.data.copy()
+        copy.data.materials[0] = material.copy()
+    lamp.location.x = 0.29
+    for _ in range(3):
+        live = live_pixels(material)
+    assert live.mean() == pytest.approx(baked.mean(), rel=0.1)
+    assert [said for said in session.sentences() if "A copy" in said and "of its own" in said]

@@ -14,6 +14,7 @@ from bpy.app.handlers import persistent
 
 from ...core.bake.runner import Target
 from ..images import previews
+from ..images.owners import noted_as
 from ..node.find import find_node, find_targets
 from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
 from .record import Record, keep_record, record_of
@@ -60,7 +61,7 @@ def _image(target: Target):
 
 def _record(target: Target) -> Record | None:
     image = _image(target)
-    return None if image is None else record_of(image, target)
+    return None if image is None else record_of(image, noted_as(image, target))
 
 
 def _row(target: Target, record: Record | None, now: Parts | None) -> Row:

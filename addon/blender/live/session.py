@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 
 import bpy
+import numpy as np
 from bpy.app.handlers import persistent
 
 from ...core import native
@@ -13,6 +14,7 @@ from ...core.errors import sentence
 from ...core.live.painter import Painter
 from ...core.live.picture import Picture
 from ...core.live.subject import Subject
+from ..images.owners import owners_of
 from ..images.previews import MADE_FOR_PREVIEWS, previews
 from ..jobs.state import state
 from .canvas import Canvas, image_for, image_name_of
@@ -30,6 +32,9 @@ SMALL_SECONDS = 0.01
 
 # Seen in 3.4, whether it is told of new pixels or not.
 IN_CYCLES = "Rendered view of Cycles may keep the pixels that it began with: look at Material Preview or EEVEE."
+
+# Of an object's texels, those that it shares with another in the same image: more than margins do.
+SAME_PLACE = 0.5
 
 SHADED = {"MATERIAL", "RENDERED"}
 
@@ -50,6 +55,7 @@ class Session:
         self._subjects: list[Subject] = []
         self._canvases: list[Canvas] = []
         self._errors: dict[Target, str] = {}
+        self._regions: dict[Target, np.ndarray] = {}  # of the last pictures
         self._paused = False
         self._given_back: list[Subject] | None = None  # as the scene was then
         self._look_seconds = 1.0  # of the last look at more than lamps
@@ -184,12 +190,35 @@ class Session:
         image = image_for(target, width, height)
         if image is None or tuple(image.size) != picture.texture.shape[1::-1]:
             return False  # removed or resized meanwhile
+        self._regions[target] = picture.region
+        other = self._in_the_way(picture, image)
+        if other is not None:
+            self._errors[target] = (
+                f"it shares its place in the image '{image.name}' with '{other.object_name}', which Live shows: "
+                "give it a material and an image of its own."
+            )
+            return False
         canvas = next((one for one in self._canvases if one.fits(image)), None)
         if canvas is None:
             canvas = Canvas(image, target if MADE_FOR_PREVIEWS in image else None)
             self._canvases = [one for one in self._canvases if one.image() != image] + [canvas]
         canvas.show(image, picture)
         return True
+
+    def _in_the_way(self, picture: Picture, image) -> Target | None:
+        """Who else is shown in the same place of an image: whose result it holds, else the first by name."""
+        owners, target = owners_of(image), picture.subject.target
+
+        def rank(one: Target) -> tuple:
+            return one not in owners, str(one)
+
+        for other in (subject.target for subject in self._subjects if image_name_of(subject) == image.name):
+            region = self._regions.get(other)
+            if region is None or region.shape != picture.region.shape or rank(other) >= rank(target):
+                continue
+            if (region & picture.region).sum() > SAME_PLACE * picture.region.sum():
+                return other
+        return None
 
 
 def is_occupied() -> bool:
