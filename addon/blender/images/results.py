@@ -12,7 +12,7 @@ from ...core.errors import BakeError
 from ..node.find import find_node
 from ..node.node import link_result
 from . import files, previews
-from .new_image import keep_new, name_for
+from .new_image import keep_new, name_for, part_from_others
 from .owners import Parts, note_owner, others_in, overlaps, parts_of, read_parts, users_of, within
 
 
@@ -105,6 +105,7 @@ class Results:
             image = None
         if image is None:
             return self._new(bake, texture)
+        bake.warnings += filter(None, [part_from_others(image)])
         path = self.fill_shown(image, bake, texture)
         if path is not None:
             return path, image
