@@ -60,3 +60,17 @@ def test_undo_leaves_a_file_and_what_is_known_of_it(tmp_path):
     assert standings() == [Standing.STALE]
     bpy.ops.ed.redo()
     assert standings() == [Standing.BAKED]
+
+
+def test_a_file_that_is_gone_is_said(tmp_path):
+    bpy.context.scene.beamspread.image_storage = "FILES"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    make_baked()
+    bpy.ops.wm.save_mainfile()
+    next((tmp_path / "textures").iterdir()).unlink()
+    assert standings() == [Standing.STALE]
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
+    assert standings() == [Standing.STALE]
+    assert [row.sentences[0] for row in state.rows.values()] == [
+        "Changed since its bake: file of the image, which is gone."
+    ]

@@ -207,12 +207,16 @@ class Session:
 
     def _in_the_way(self, picture: Picture, image) -> Target | None:
         """Who else is shown in the same place of an image: whose result it holds, else the first by name."""
-        owners, target = owners_of(image), picture.subject.target
+        target = picture.subject.target
+        others = [one.target for one in self._subjects if one.target != target and image_name_of(one) == image.name]
+        if not others:
+            return None
+        owners = owners_of(image)
 
         def rank(one: Target) -> tuple:
             return one not in owners, str(one)
 
-        for other in (subject.target for subject in self._subjects if image_name_of(subject) == image.name):
+        for other in others:
             region = self._regions.get(other)
             if region is None or region.shape != picture.region.shape or rank(other) >= rank(target):
                 continue
