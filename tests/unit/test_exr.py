@@ -5,7 +5,7 @@ import struct
 
 import numpy as np
 import pytest
-from beamspread.core.exr_header import is_half
+from beamspread.core.exr_header import is_half, text_of
 from beamspread.core.native import native
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -110,6 +110,18 @@ def test_half_is_told_by_the_header(tmp_path):
     for damaged in (b"", b"nothing of the kind", whole[:9], whole[:40]):
         path.write_bytes(damaged)
         assert not is_half(path)
+
+
+def test_a_text_is_told_by_the_header(tmp_path):
+    path = tmp_path / "a.exr"
+    assert text_of(path, "owner") == ""
+    native.write_exr(str(path), image(), ["R", "G", "B"], {"owner": "näme"})
+    assert text_of(path, "owner") == "näme"
+    assert text_of(path, "other") == ""
+    whole = path.read_bytes()
+    for damaged in (b"", b"nothing of the kind", whole[:9], whole[:40]):
+        path.write_bytes(damaged)
+        assert text_of(path, "owner") == ""
 
 
 def test_layers_keep_together(tmp_path):

@@ -64,6 +64,7 @@ def fill_image(image, texture: np.ndarray) -> str:
     else:
         _write_like(image, stored, path)
     image.reload()
+    undo.stamp(image)
     return str(path)
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import os
+import shutil
 from pathlib import Path
 
 import bpy
@@ -11,11 +13,8 @@ import numpy as np
 from ...core.bake.runner import Bake, Target
 from ...core.batch.names import stem
 from ...core.errors import ImageError
-from ...core.native import native
-from . import files, writing
-
-# What a file of ours says of itself, so that another scene's file of the same name is not taken for it.
-MADE_FOR = "beamspread:madeFor"
+from ...core.whole_file import whole_file
+from . import files, undo, writing
 
 
 def name_for(target: Target) -> str:
@@ -45,16 +44,62 @@ def uses_files() -> bool:
 
 
 def _in_file(name: str, texture: np.ndarray, is_data: bool) -> tuple[str, bpy.types.Image]:
-    folder = Path(bpy.path.abspath(bpy.context.scene.beamspread.image_dir)).absolute()
-    made_for = f"{Path(bpy.data.filepath).name}: {name}"
-    path = _free_path(folder, stem([name]), made_for)
-    writing.write_file(path, texture, "EXR", {MADE_FOR: made_for})
+    path, made_for = _place(name)
+    writing.write_file(path, texture, "EXR", {writing.MADE_FOR: made_for})
     image = bpy.data.images.load(str(path))
     image.name = _free_name(name)
     image.colorspace_settings.is_data = is_data
-    if bpy.data.filepath:
-        image.filepath = bpy.path.relpath(str(path))
+    _point_to(image, path)
+    undo.stamp(image)
     return str(path), image
+
+
+def part_from_others(image) -> str:
+    """Give the image a file of its own where it shows that of another .blend file, as after Save As; a sentence then.
+
+    ImageError where that can't be written.
+    """
+    path = files.file_of(image)
+    other = _scene_of(path) if path is not None and bpy.data.filepath else None
+    if other is None or other == Path(bpy.data.filepath).resolve() or not other.exists():
+        return ""  # renamed or moved, else
+    own, made_for = _place(image.name)
+    try:
+        own.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(own) as temporary:
+            shutil.copyfile(path, temporary)
+    except OSError as error:
+        raise ImageError(f"The file {own} cannot be written: {error.strerror}.") from error
+    size = tuple(image.size)
+    _point_to(image, own)
+    writing.write_exr(own, files.linear_pixels(image), {writing.MADE_FOR: made_for})
+    image.reload()
+    if tuple(image.size) != size:
+        image.scale(*size)
+    return f"'{path.name}' is the file of '{other.name}' and stays: the image '{image.name}' now has '{own.name}'."
+
+
+def _scene_of(path: Path) -> Path | None:
+    """The .blend file for which a file was made, from where it lies."""
+    scene, separator, _name = writing.made_for(path).partition(": ")
+    return (path.parent / scene).resolve() if separator else None
+
+
+def _place(name: str) -> tuple[Path, str]:
+    """A file for a new image in the scene's folder, and what it is to say of itself."""
+    folder = Path(bpy.path.abspath(bpy.context.scene.beamspread.image_dir)).absolute()
+    scene = bpy.data.filepath
+    if scene:
+        try:
+            scene = Path(os.path.relpath(scene, folder)).as_posix()
+        except ValueError:  # on another drive
+            scene = Path(scene).as_posix()
+    made_for = f"{scene}: {name}"
+    return _free_path(folder, stem([name]), made_for), made_for
+
+
+def _point_to(image, path: Path) -> None:
+    image.filepath = bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
 
 
 def _free_path(folder: Path, plain: str, made_for: str) -> Path:
@@ -62,18 +107,11 @@ def _free_path(folder: Path, plain: str, made_for: str) -> Path:
     taken = {files.file_of(image) for image in bpy.data.images}
     stems = itertools.chain([plain], (f"{plain}_{number}" for number in itertools.count(2)))
     paths = (folder / f"{one}.exr" for one in stems)
-    return next(path for path in paths if path not in taken and (not path.exists() or _says(path) == made_for))
+    free = (path for path in paths if path not in taken)
+    return next(path for path in free if not path.exists() or writing.made_for(path) == made_for)
 
 
 def _free_name(name: str) -> str:
     """As Blender names new images; where one is renamed to what another is called, 3.4 renames the other."""
     numbered = (f"{name}.{number:03d}" for number in itertools.count(1))
     return next(one for one in itertools.chain([name], numbered) if one not in bpy.data.images)
-
-
-def _says(path: Path) -> str:
-    """For what a file was made, as far as it says."""
-    try:
-        return native.read_exr(str(path))[2].get(MADE_FOR, "")
-    except OSError:
-        return ""

@@ -6,7 +6,7 @@ import bpy
 
 from ...core.bake.runner import Bake, Target
 from ..node.find import find_node
-from . import files
+from . import files, previews
 from .new_image import keep_new
 from .owners import KEY
 
@@ -31,7 +31,9 @@ class ImageOperator:
     @classmethod
     def poll(cls, context):
         image = image_in(context)
-        return image is not None and 0 not in image.size and image.library is None and cls.needed(context, image)
+        if image is None or previews.MADE_FOR_PREVIEWS in image:
+            return False
+        return 0 not in image.size and image.library is None and cls.needed(context, image)
 
 
 class BEAMSPREAD_OT_make_float(ImageOperator, bpy.types.Operator):
@@ -45,6 +47,7 @@ class BEAMSPREAD_OT_make_float(ImageOperator, bpy.types.Operator):
         return files.clips(image)
 
     def execute(self, context):
+        previews.give_back()
         image = image_in(context)
         name, owners = image.name, image.get(KEY)
         said = Bake(Target(""))
@@ -73,6 +76,7 @@ class BEAMSPREAD_OT_resize_image(ImageOperator, bpy.types.Operator):
         return tuple(image.size) != wanted_size(image, context.scene.beamspread.resolution)
 
     def execute(self, context):
+        previews.give_back()
         image = image_in(context)
         image.scale(*wanted_size(image, context.scene.beamspread.resolution))
         return {"FINISHED"}

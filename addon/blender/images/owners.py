@@ -36,9 +36,19 @@ def note_owner(image, target: Target) -> None:
 
 def owners_of(image) -> list[Target]:
     """The targets whose results the image holds and that still show it; renamed ones under their new names."""
-    noted = [Target(*names) for names in json.loads(image.get(KEY, "[]"))]
+    noted = _noted(image)
     users = users_of(image) if noted else []
     return list(dict.fromkeys(user for one in noted for user in _known_as(one, users)))
+
+
+def noted_as(image, target: Target) -> Target:
+    """Under what names the image knows the target, which may have been renamed since its bake."""
+    noted = _noted(image)
+    if target in noted:
+        return target
+    users = users_of(image) if noted else []
+    former = (one for one in noted if one not in users and _known_as(one, users) == [target])
+    return next(former, target)
 
 
 def others_in(image, target: Target) -> list[Target]:
@@ -53,6 +63,10 @@ def users_of(image) -> list[Target]:
         for target in find_targets(obj for obj in bpy.data.objects if obj.users_scene)
         if find_node(bpy.data.materials[target.material_name]).image == image
     ]
+
+
+def _noted(image) -> list[Target]:
+    return [Target(*names) for names in json.loads(image.get(KEY, "[]"))]
 
 
 def _known_as(noted: Target, users: list[Target]) -> list[Target]:

@@ -11,8 +11,8 @@ from ...core.bake.settings import COMBINED
 from ...core.errors import BakeError
 from ..node.find import find_node
 from ..node.node import link_result
-from . import files
-from .new_image import keep_new, name_for
+from . import files, previews
+from .new_image import keep_new, name_for, part_from_others
 from .owners import Parts, note_owner, others_in, overlaps, parts_of, read_parts, users_of, within
 
 
@@ -100,8 +100,12 @@ class Results:
 
     def _store_shown(self, node, bake: Bake, texture: np.ndarray) -> tuple[str, bpy.types.Image]:
         image = node.image
+        if image is not None and previews.MADE_FOR_PREVIEWS in image:
+            bpy.data.images.remove(image)  # which brings no settings of the user's
+            image = None
         if image is None:
             return self._new(bake, texture)
+        bake.warnings += filter(None, [part_from_others(image)])
         path = self.fill_shown(image, bake, texture)
         if path is not None:
             return path, image

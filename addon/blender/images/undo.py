@@ -1,4 +1,7 @@
-"""Undo brings back what an image has packed, but not the pixels that are shown: here they are loaded again."""
+"""Undo brings back what an image has packed, but not the pixels that are shown: here they are loaded again.
+
+A file is not undone: what its image says of the bakes in it stays, too.
+"""
 
 from __future__ import annotations
 
@@ -7,27 +10,51 @@ import uuid
 import bpy
 from bpy.app.handlers import persistent
 
-# Of an image: a number of what is packed, which travels with undo as the packed file does.
-KEY = "beamspread_stamp"
+OURS = "beamspread_"
+"""How the names of all that an image says of bakes begin."""
+
+# Of an image: a number of the last bake in it, which travels with undo as the packed file does.
+KEY = f"{OURS}stamp"
 
 _shown: dict[str, str] = {}
 """Stamp of the pixels that an image shows, by its name, where this session baked them: others may be painted."""
 
+_in_files: dict[str, dict[str, str]] = {}
+"""What images with files say of their bakes, by name, while undo goes on."""
+
 
 def stamp(image) -> None:
-    """Note that the image shows what it has just packed."""
+    """Note that the image shows what it has just packed, or what has just been written to its file."""
     image[KEY] = _shown[image.name] = uuid.uuid4().hex
+
+
+@persistent
+def _note_files(*_arguments) -> None:
+    _in_files.clear()
+    _in_files.update({image.name: _said(image) for image in bpy.data.images if _has_file(image)})
 
 
 @persistent
 def _show_what_is_kept(*_arguments) -> None:
     for image in bpy.data.images:
+        if image.name in _in_files and _has_file(image):
+            for key, text in _in_files[image.name].items():
+                image[key] = text
         kept = image.get(KEY, "")
         if _shown.get(image.name, kept) != kept:
             # Not `reload`: it would pack the image's file anew, where there is one.
             image.buffers_free()
             image.gl_free()
             _shown[image.name] = kept
+    _in_files.clear()
+
+
+def _has_file(image) -> bool:
+    return KEY in image and image.source == "FILE" and image.packed_file is None
+
+
+def _said(image) -> dict[str, str]:
+    return {key: value for key, value in image.items() if key.startswith(OURS)}
 
 
 @persistent
@@ -35,7 +62,13 @@ def _forget(*_arguments) -> None:
     _shown.clear()
 
 
-HANDLERS = {"undo_post": _show_what_is_kept, "redo_post": _show_what_is_kept, "load_pre": _forget}
+HANDLERS = {
+    "undo_pre": _note_files,
+    "redo_pre": _note_files,
+    "undo_post": _show_what_is_kept,
+    "redo_post": _show_what_is_kept,
+    "load_pre": _forget,
+}
 
 
 def register() -> None:

@@ -11,12 +11,15 @@ import bpy
 import numpy as np
 
 from ...core.errors import ImageError
-from ...core.exr_header import is_half
+from ...core.exr_header import is_half, text_of
 from ...core.native import native
 from ...core.whole_file import whole_file
 from .. import compat
 
 EXTENSIONS = {"EXR": ".exr", "PNG": ".png"}
+
+# What a file of ours says of itself, so that another scene's file of the same name is not taken for it.
+MADE_FOR = "beamspread:madeFor"
 
 # How whole files end: Blender shows a JPEG that breaks off, and a PNG without its last bytes, as if they were whole.
 ENDS = {"PNG": b"IEND\xae\x42\x60\x82", "JPEG": b"\xff\xd9"}
@@ -82,16 +85,25 @@ def write_file(
 
 
 def write_exr(path: Path, texture: np.ndarray, attributes: dict[str, str] | None = None) -> None:
-    """Linear RGB, not packed, as Blender saves float images by itself: 32 bits, or 16 where the file has had these."""
+    """Linear RGB, not packed, as Blender saves float images by itself: 32 bits, or 16 where the file has had these.
+
+    For whom the file was made stays.
+    """
+    said = {MADE_FOR: made_for(path)} if made_for(path) else {}
     texture = np.ascontiguousarray(texture, np.float32)
     half = is_half(path) and np.abs(texture).max() <= np.finfo(np.float16).max
     kept = texture.astype(np.float16) if half else texture
     with _kept(path) as temporary:
         native.write_exr(
-            str(temporary), texture, ["R", "G", "B"], attributes or {}, compression="none", half=bool(half)
+            str(temporary), texture, ["R", "G", "B"], said | (attributes or {}), compression="none", half=bool(half)
         )
         if not np.array_equal(native.read_exr(str(temporary))[0], kept):
             raise OSError("it can't be read back")
+
+
+def made_for(path: Path) -> str:
+    """What a file says of itself, as far as it does."""
+    return text_of(path, MADE_FOR)
 
 
 def write_png(path: Path, texture: np.ndarray, view_of=None) -> None:

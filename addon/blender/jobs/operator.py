@@ -10,6 +10,7 @@ from bpy.props import EnumProperty
 from ...core import native
 from ...core.bake.runner import CANCELLED, WRITTEN, Bake, Target
 from ...core.bake.settings import COMBINED
+from ..images import previews
 from ..images.results import Results
 from ..node.find import NOTHING_FOUND, find_misplaced, find_targets
 from . import popup, stale
@@ -140,6 +141,7 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         if not targets and not misplaced:
             self._fail(NOTHING_STALE if self.objects == "STALE" else NOTHING_FOUND)
             return False
+        previews.give_back()  # what is only shown is neither kept nor written beside a result
         state.forget_failures()
         self._parts = stale.parts_of(context, targets)
         preparation = read_scene(context, targets, context.scene.beamspread.for_bake())

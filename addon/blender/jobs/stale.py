@@ -13,6 +13,9 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...core.bake.runner import Target
+from ..images import previews
+from ..images.files import file_of
+from ..images.owners import noted_as
 from ..node.find import find_node, find_targets
 from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
 from .record import Record, keep_record, record_of
@@ -59,13 +62,15 @@ def _image(target: Target):
 
 def _record(target: Target) -> Record | None:
     image = _image(target)
-    return None if image is None else record_of(image, target)
+    return None if image is None else record_of(image, noted_as(image, target))
 
 
 def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
     changed = [] if record is None or now is None else record.changed(now)
-    if record is not None and _image(target).is_dirty and not record.is_dirty:
+    if record is not None and not record.is_dirty and _is_painted(_image(target)):
         changed.append("pixels of the image")
+    if record is not None and _has_lost_its_file(_image(target)):
+        changed = [*(name for name in changed if name != IMAGE), "file of the image, which is gone"]
     said = state.said_of(target)
     if said is not None and said.standing in (Standing.FAILED, Standing.CANCELLED):
         return replace(said, is_stale=bool(changed))
@@ -75,6 +80,15 @@ def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
         return Row(target, Standing.STALE, (f"Changed since its bake: {', '.join(changed)}.", *record.warnings), True)
     warnings = (*([_why_again(record.parts[QUALITY], now[QUALITY])] if changed else []), *record.warnings)
     return Row(target, Standing.WARNED if warnings else Standing.BAKED, warnings, bool(changed))
+
+
+def _has_lost_its_file(image) -> bool:
+    path = file_of(image)
+    return path is not None and not path.is_file()
+
+
+def _is_painted(image) -> bool:
+    return image.is_dirty and not previews.covers(image)
 
 
 def _why_again(baked: str, wanted: str) -> str:

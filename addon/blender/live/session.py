@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 
 import bpy
+import numpy as np
 from bpy.app.handlers import persistent
 
 from ...core import native
@@ -13,8 +14,10 @@ from ...core.errors import sentence
 from ...core.live.painter import Painter
 from ...core.live.picture import Picture
 from ...core.live.subject import Subject
+from ..images.owners import owners_of
+from ..images.previews import MADE_FOR_PREVIEWS, previews
 from ..jobs.state import state
-from .canvas import Canvas, image_name_of, image_of
+from .canvas import Canvas, image_for, image_name_of
 from .marks import Marks
 from .reader import Reader
 
@@ -29,6 +32,9 @@ SMALL_SECONDS = 0.01
 
 # Seen in 3.4, whether it is told of new pixels or not.
 IN_CYCLES = "Rendered view of Cycles may keep the pixels that it began with: look at Material Preview or EEVEE."
+
+# Of an object's texels, those that it shares with another in the same image: more than margins do.
+SAME_PLACE = 0.5
 
 SHADED = {"MATERIAL", "RENDERED"}
 
@@ -47,9 +53,11 @@ class Session:
         self._marks = Marks()
         self._marks.other = True
         self._subjects: list[Subject] = []
-        self._canvases: dict[str, Canvas] = {}
+        self._canvases: list[Canvas] = []
         self._errors: dict[Target, str] = {}
+        self._regions: dict[Target, np.ndarray] = {}  # of the last pictures
         self._paused = False
+        self._given_back: list[Subject] | None = None  # as the scene was then
         self._look_seconds = 1.0  # of the last look at more than lamps
         self._changed_at = time.perf_counter()
         self.seconds = 0.0
@@ -57,7 +65,8 @@ class Session:
     def note(self, depsgraph) -> None:
         """Take the updates of a depsgraph."""
         was_calm = not self._marks
-        self._marks.note(list(depsgraph.updates), self._canvases)
+        own = {image.name for canvas in self._canvases if (image := canvas.image()) is not None}
+        self._marks.note(list(depsgraph.updates), own)
         if was_calm and self._marks:
             self._changed_at = time.perf_counter()
         is_small = self._look_seconds < SMALL_SECONDS or self._marks.is_lamps_alone()
@@ -69,7 +78,7 @@ class Session:
         """Read everything again: all data may be others' now, as after undo."""
         self._reader, self._marks = Reader(), Marks()
         self._marks.other = True
-        for canvas in self._canvases.values():
+        for canvas in self._canvases:
             canvas.refresh()
 
     def step(self, context) -> bool:
@@ -79,6 +88,9 @@ class Session:
             return False
         self._paused = False
         self._adopt_bakes(context)
+        self._given_back = None
+        for canvas in self._canvases:
+            canvas.show_again()
         has_changed, changed_at = bool(self._marks), self._changed_at
         self._look(context.evaluated_depsgraph_get())
         shown = self._show_pictures(context)
@@ -111,14 +123,27 @@ class Session:
             said.append(IN_CYCLES)
         return said
 
+    def give_back(self) -> None:
+        """Have all images show their own pixels until the next step that finds nobody at work on them."""
+        self._restore()
+        if self._given_back is None:
+            self._given_back = self._read(bpy.context.evaluated_depsgraph_get())
+
+    def covers(self, image) -> bool:
+        """Whether the image shows a picture."""
+        return any(canvas.covers(image) for canvas in self._canvases)
+
     def end(self, keep_pixels: bool = False) -> None:
         """Stop, and give images their own pixels back unless there are other ones by now."""
         self._painter.end()
         if not keep_pixels:
-            for canvas in self._canvases.values():
-                canvas.restore()
+            self._restore()
         self._canvases.clear()
         self._painter.join(END_SECONDS)
+
+    def _restore(self) -> None:
+        for canvas in self._canvases:
+            canvas.give_back()
 
     def _pause(self) -> None:
         if not self._paused:
@@ -128,16 +153,20 @@ class Session:
 
     def _adopt_bakes(self, context) -> None:
         """Take images that have other pixels than Live's, of a bake or a file, for what the scene looks like now."""
-        saved = {name for name, canvas in self._canvases.items() if canvas.is_saved()}
-        if not saved:
+        adopted = [canvas for canvas in self._canvases if canvas.is_saved()]
+        if not adopted:
             return
-        depsgraph = context.evaluated_depsgraph_get()  # changes that wait are told of now
-        marks, self._marks = self._marks, Marks()
-        marks.other = True
-        subjects = self._reader.read(depsgraph, marks)
+        saved = {canvas.image().name for canvas in adopted}
+        # A bake has read the scene as it was when Live gave the images back.
+        subjects = self._given_back or self._read(context.evaluated_depsgraph_get())
         self._painter.adopt([subject for subject in subjects if image_name_of(subject) in saved])
-        for name in saved:
-            del self._canvases[name]
+        self._canvases = [canvas for canvas in self._canvases if canvas not in adopted]
+
+    def _read(self, depsgraph) -> list[Subject]:
+        """All subjects as the scene is now."""
+        marks, self._marks = self._marks, Marks()  # after the depsgraph has told of changes that wait
+        marks.other = True
+        return self._reader.read(depsgraph, marks)
 
     def _show_pictures(self, context) -> bool:
         """Show the last picture of each subject."""
@@ -157,14 +186,43 @@ class Session:
         return shown
 
     def _show(self, picture: Picture) -> bool:
-        image = image_of(picture)
+        target, (height, width) = picture.subject.target, picture.texture.shape[:2]
+        image = image_for(target, width, height)
         if image is None or tuple(image.size) != picture.texture.shape[1::-1]:
             return False  # removed or resized meanwhile
-        canvas = self._canvases.get(image.name)
-        if canvas is None or not canvas.fits(image):
-            canvas = self._canvases[image.name] = Canvas(image)
+        self._regions[target] = picture.region
+        other = self._in_the_way(picture, image)
+        if other is not None:
+            self._errors[target] = (
+                f"it shares its place in the image '{image.name}' with '{other.object_name}', which Live shows: "
+                "give it a material and an image of its own."
+            )
+            return False
+        canvas = next((one for one in self._canvases if one.fits(image)), None)
+        if canvas is None:
+            canvas = Canvas(image, target if MADE_FOR_PREVIEWS in image else None)
+            self._canvases = [one for one in self._canvases if one.image() != image] + [canvas]
         canvas.show(image, picture)
         return True
+
+    def _in_the_way(self, picture: Picture, image) -> Target | None:
+        """Who else is shown in the same place of an image: whose result it holds, else the first by name."""
+        target = picture.subject.target
+        others = [one.target for one in self._subjects if one.target != target and image_name_of(one) == image.name]
+        if not others:
+            return None
+        owners = owners_of(image)
+
+        def rank(one: Target) -> tuple:
+            return one not in owners, str(one)
+
+        for other in others:
+            region = self._regions.get(other)
+            if region is None or region.shape != picture.region.shape or rank(other) >= rank(target):
+                continue
+            if (region & picture.region).sum() > SAME_PLACE * picture.region.sum():
+                return other
+        return None
 
 
 def is_occupied() -> bool:
@@ -220,6 +278,7 @@ def step(context) -> float:
         return IDLE_SECONDS
     if live.session is None:
         live.session, live.scene_name, live.failure = Session(), scene.name, ""
+        previews.holder = live.session
     return BUSY_SECONDS if live.session.step(context) else IDLE_SECONDS
 
 
@@ -228,6 +287,7 @@ def end(keep_pixels: bool = False) -> None:
     session, live.session = live.session, None
     if session is not None:
         session.end(keep_pixels)
+        previews.holder = None
 
 
 def _tick() -> float:

@@ -86,7 +86,10 @@ def draw_bake(layout, context, material_name: str = "") -> None:
         shown = draw_problems(layout, context)
         draw_buttons(layout)
         layout.prop(context.scene.beamspread, "use_live", toggle=True)
-        draw_sentences(layout, context, session.sentences(), "INFO")
+        # What keeps an object from being baked keeps it from following, too.
+        said = [one for one in session.sentences() if one.partition(": ")[2] not in shown]
+        draw_sentences(layout, context, said, "INFO")
+        shown.update(one.partition(": ")[2] for one in said)
     draw_results(layout, context, material_name, shown)
 
 
@@ -141,7 +144,8 @@ def draw_results(layout, context, material_name: str, shown: set[str]) -> None:
     for row in rows[:MOST_OBJECTS]:
         standing = _standing(row)
         draw_sentences(box, context, [f"{row.target.object_name}: {standing.value}"], ICONS[standing])
-        sentences = [one for one in row.sentences if one not in shown]
+        # Why it is out of date is said of each, other sentences once.
+        sentences = [one for one in row.sentences if one not in shown or (row.is_stale and one == row.sentences[0])]
         shown.update(sentences)
         draw_sentences(box, context, sentences, "DOT")
     if len(rows) > MOST_OBJECTS:

@@ -1,0 +1,63 @@
+"""What panels say of bakes, drawn into a layout that keeps the lines."""
+
+from types import SimpleNamespace
+
+import bpy
+from beamspread.blender.jobs.state import Row, Standing, state
+from beamspread.blender.live import session
+from beamspread.blender.ui import results
+from beamspread.core.bake.runner import Target
+
+
+class Layout:
+    """Takes labels alone."""
+
+    def __init__(self):
+        self.said = ""
+
+    def box(self):
+        return self
+
+    def column(self, **_options):
+        return self
+
+    def row(self, **_options):
+        return self
+
+    def operator(self, *_arguments, **_options):
+        return SimpleNamespace()
+
+    def prop(self, *_arguments, **_options):
+        pass
+
+    def label(self, text, icon):
+        self.said += f"{text} "
+
+
+def context():
+    """That of a panel of Blender's own width."""
+    preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
+    region = SimpleNamespace(width=280)
+    return SimpleNamespace(
+        region=region, preferences=preferences, scene=bpy.context.scene, view_layer=bpy.context.view_layer
+    )
+
+
+def test_each_row_says_why_it_is_out_of_date_and_other_sentences_come_once():
+    layout = Layout()
+    sentences = ("Changed since its bake: lights.", "A lamp was left out.")
+    targets = [Target("First", "One"), Target("Second", "Two")]
+    state.rows = {target: Row(target, Standing.STALE, sentences, True) for target in targets}
+    results.draw_results(layout, context(), "", set())
+    assert layout.said.count(sentences[0]) == 2
+    assert layout.said.count(sentences[1]) == 1
+
+
+def test_what_keeps_live_from_following_is_said_once(monkeypatch):
+    layout, why = Layout(), "It is not flat."
+    target = Target("First", "One")
+    state.rows = {target: Row(target, Standing.FAILED, (why,))}
+    monkeypatch.setattr(session, "sentences", lambda: [f"{target}: {why}", "Live leaves out indirect light."])
+    results.draw_bake(layout, context())
+    assert layout.said.count(why) == 1
+    assert "indirect" in layout.said

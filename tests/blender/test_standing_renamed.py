@@ -1,0 +1,76 @@
+"""What stays known of a bake when names change, and when a bake with a file is undone."""
+
+import bpy
+import pytest
+import scenes
+from beamspread.blender.jobs import stale
+from beamspread.blender.jobs.state import Standing, state
+
+
+def make_baked():
+    bpy.context.scene.beamspread.resolution = 32
+    plane = scenes.add_plane(material=scenes.add_material())
+    scenes.add_sun(0)
+    scenes.bake(plane)
+    return plane
+
+
+def standings():
+    stale.refresh(bpy.context)
+    return [row.standing for row in state.rows.values()]
+
+
+@pytest.mark.parametrize("rename", ["objects", "materials", "images"])
+def test_a_bake_is_known_under_a_new_name(rename):
+    plane = make_baked()
+    for one in getattr(bpy.data, rename):
+        one.name = f"New {rename}"
+    assert standings() == [Standing.BAKED]
+    plane.location.z = 1
+    bpy.context.view_layer.update()
+    assert standings() == [Standing.STALE]
+    scenes.bake(plane)
+    assert standings() == [Standing.BAKED]
+
+
+def test_a_copy_is_not_taken_for_the_renamed_original():
+    plane = make_baked()
+    copy = plane.copy()
+    bpy.context.collection.objects.link(copy)
+    plane.name = "Renamed"
+    copy.name = "Copy"
+    bpy.context.view_layer.update()
+    assert Standing.BAKED not in standings()
+
+
+def test_undo_leaves_a_file_and_what_is_known_of_it(tmp_path):
+    bpy.context.scene.beamspread.image_storage = "FILES"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    plane = make_baked()
+    bpy.ops.ed.undo_push(message="first")
+    bpy.data.objects["Sun"].data.energy = 3
+    bpy.ops.ed.undo_push(message="brighter")
+    second = scenes.bake(plane)[0].copy()
+    bpy.ops.ed.undo_push(message="second")
+    bpy.ops.ed.undo()
+    image = scenes.node_of(bpy.data.materials["Medium"]).image
+    assert scenes.pixels(image).mean() == pytest.approx(second.mean())
+    assert standings() == [Standing.BAKED]  # the light is that of the file
+    bpy.ops.ed.undo()
+    assert standings() == [Standing.STALE]
+    bpy.ops.ed.redo()
+    assert standings() == [Standing.BAKED]
+
+
+def test_a_file_that_is_gone_is_said(tmp_path):
+    bpy.context.scene.beamspread.image_storage = "FILES"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    make_baked()
+    bpy.ops.wm.save_mainfile()
+    next((tmp_path / "textures").iterdir()).unlink()
+    assert standings() == [Standing.STALE]
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
+    assert standings() == [Standing.STALE]
+    assert [row.sentences[0] for row in state.rows.values()] == [
+        "Changed since its bake: file of the image, which is gone."
+    ]
