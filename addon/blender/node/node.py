@@ -9,6 +9,7 @@ from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, PointerP
 from ...core.bake.surface import Surface
 from ...core.material.material import Material
 from ...core.material.presets import presets
+from .. import compat
 from .draw import draw_node
 from .output import link_output, plain_of
 from .tree import BASE_COLOR, ROUGHNESS, ROUGHNESS_BEFORE, add_missing_inputs, make_inner_tree, show_values
@@ -198,7 +199,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
 
     def init(self, _context) -> None:
         self.width = 240
-        self.node_tree = make_inner_tree()
+        compat.give_new_node_its_tree(self, make_inner_tree())
         self.ior = NEW_IOR
 
     def free(self) -> None:
