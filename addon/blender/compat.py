@@ -18,6 +18,15 @@ def engine_id(name: str) -> str:
     return name
 
 
+def register_node_class(node_class, base: str) -> None:
+    """Register a class of nodes derived from the type `base`, also again.
+
+    Blender (4.2 to 5.0, measured) makes a new Python class of that type meanwhile, and takes subclasses of that alone.
+    """
+    node_class.__bases__ = (getattr(bpy.types, base),)
+    bpy.utils.register_class(node_class)
+
+
 def give_new_node_its_tree(node, tree) -> None:
     """In `init`, after which Blender 5.0 counts the node as a user of its tree once more."""
     node.node_tree = tree

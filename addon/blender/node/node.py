@@ -79,7 +79,7 @@ def _show(node, _context) -> None:
     if tree is None:
         return
     plain = plain_of(node)
-    if _is_shared(tree, plain):
+    if _is_shared(tree, plain) and sum(node.node_tree == tree for node in _all_nodes()) > 1:
         tree = tree.copy()
         tree.use_fake_user = True
         node.node_tree = tree
@@ -90,7 +90,10 @@ def _show(node, _context) -> None:
 
 
 def _is_shared(tree, plain=None) -> bool:
-    """Whether nodes of other materials show the tree, too; its fake user counts as a user."""
+    """Whether nodes of other materials show the tree, too; its fake user counts as a user.
+
+    Before Blender 4.5, a copied material counts one user too many until the file is opened again.
+    """
     own = 1 + (plain is not None and plain.node_tree == tree)
     return tree.users - tree.use_fake_user > own
 
@@ -258,7 +261,7 @@ def _upgrade(tree) -> None:
 
 def register() -> None:
     if not BeamspreadNode.is_registered:
-        bpy.utils.register_class(BeamspreadNode)
+        compat.register_node_class(BeamspreadNode, "ShaderNodeCustomGroup")
     bpy.app.handlers.load_post.append(upgrade_nodes)
 
 
