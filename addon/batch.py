@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -112,5 +114,20 @@ def main() -> int:
         return 1
 
 
+def leave(code: int) -> None:
+    """End the process with this exit code.
+
+    Blender as a module crashes (4.2.23) once Python is gone if an add-on's properties had callbacks, as ours have.
+    """
+    import bpy
+
+    if bpy.app.binary_path or bpy.app.version >= (4, 5, 0):
+        sys.exit(code)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    shutil.rmtree(bpy.app.tempdir, ignore_errors=True)
+    os._exit(code)
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    leave(main())

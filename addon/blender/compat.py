@@ -18,6 +18,24 @@ def engine_id(name: str) -> str:
     return name
 
 
+def register_node_class(node_class, base: str) -> None:
+    """Register a class of nodes derived from the type `base`, also again.
+
+    Blender (4.2 to 5.0, measured) makes a new Python class of that type meanwhile, and takes subclasses of that alone.
+    """
+    node_class.__bases__ = (getattr(bpy.types, base),)
+    bpy.utils.register_class(node_class)
+
+
+def give_new_node_its_tree(node, tree) -> None:
+    """In `init`, after which Blender 5.0 counts the node as a user of its tree once more."""
+    node.node_tree = tree
+    if bpy.app.version >= (5, 0, 0):
+        has_fake_user = tree.use_fake_user
+        tree.user_clear()
+        tree.use_fake_user = has_fake_user
+
+
 def add_output_socket(tree, socket_type: str, name: str) -> None:
     """Give a node group an output (its interface moved in Blender 4.0)."""
     if hasattr(tree, "interface"):

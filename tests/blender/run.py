@@ -46,5 +46,6 @@ def main() -> int:
 
 if __name__ == "__main__":
     code = main()
-    sys.stdout.flush()
-    sys.exit(code)
+    from beamspread.batch import leave
+
+    leave(code)

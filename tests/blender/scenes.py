@@ -56,6 +56,17 @@ def add_material(name="Medium", image=None, linked=False, shader=False, **proper
     return material
 
 
+def add_group_material():
+    """A material whose Beamspread node sits in a group within a group."""
+    groups = [bpy.data.node_groups.new(name, "ShaderNodeTree") for name in ("Outer", "Inner")]
+    material = bpy.data.materials.new("Grouped")
+    material.use_nodes = True
+    for tree, group in zip((material.node_tree, groups[0]), groups):
+        tree.nodes.new("ShaderNodeGroup").node_tree = group
+    groups[1].nodes.new("BeamspreadNode")
+    return material
+
+
 def node_of(material):
     """Its Beamspread node."""
     return next(node for node in material.node_tree.nodes if node.bl_idname == "BeamspreadNode")

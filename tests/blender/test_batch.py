@@ -10,7 +10,18 @@ import numpy as np
 import pytest
 from beamspread.core.native import native
 from mathutils import Matrix
-from scenes import BATCH, add_material, add_plane, add_sun, bake, batch_command, node_of, pixels, save_scene
+from scenes import (
+    BATCH,
+    add_group_material,
+    add_material,
+    add_plane,
+    add_sun,
+    bake,
+    batch_command,
+    node_of,
+    pixels,
+    save_scene,
+)
 
 KEYS = {"object", "material", "frame", "path", "width", "height", "seconds", "status", "message"} | {
     *("output", "lights", "left_out", "indirect", "dark"),
@@ -238,6 +249,13 @@ def test_node_is_read_from_the_file(tmp_path):
     assert not texture[..., :2].any()
     assert texture[..., 2].all()
     assert node_of(material).image is None
+
+
+def test_node_in_groups_is_read_from_the_file(tmp_path):
+    add_plane(material=add_group_material())
+    add_sun(0)
+    code, _, printed = run_batch(save_scene(tmp_path), "--output", tmp_path)
+    assert code == 0, printed
 
 
 def behind():

@@ -11,24 +11,13 @@ from beamspread.blender.jobs.state import state
 from beamspread.blender.ui import results
 from beamspread.core.batch import options
 from mathutils import Matrix
-from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
+from scenes import add_group_material, add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
 
 
 @pytest.fixture(autouse=True)
 def small():
     bpy.context.scene.beamspread.resolution = 16
     state.forget()
-
-
-def add_group_material():
-    """A material whose Beamspread node sits in a group within a group."""
-    groups = [bpy.data.node_groups.new(name, "ShaderNodeTree") for name in ("Outer", "Inner")]
-    material = bpy.data.materials.new("Grouped")
-    material.use_nodes = True
-    for tree, group in zip((material.node_tree, groups[0]), groups):
-        tree.nodes.new("ShaderNodeGroup").node_tree = group
-    groups[1].nodes.new("BeamspreadNode")
-    return material
 
 
 def add_grouped():

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import beamspread
 import bpy
 import numpy as np
 import pytest
@@ -165,3 +166,21 @@ def test_the_coat_is_that_of_glossy_without_a_normal_and_turns_with_one(tmp_path
     material.node_tree.links.new(node.inputs["Normal"], combine.outputs[0])
     bent = rendered(material, tmp_path)
     assert bent.mean() / 0.05088 == pytest.approx(0.04, rel=0.03)
+
+
+def test_the_add_on_can_be_switched_off_and_on_again():
+    material = add_material(ior=1.3, linked=True)
+    for _ in range(2):
+        beamspread.unregister()
+        assert not hasattr(bpy.types.Scene, "beamspread")
+        beamspread.register()
+    assert node_of(material).ior == pytest.approx(1.3)
+    assert node_of(add_material("Another", ior=1.2)).ior == pytest.approx(1.2)
+
+
+def test_copies_that_part_leave_no_tree_behind():
+    first = add_material(ior=1.3)
+    second = first.copy()
+    node_of(second).ior = 1.2
+    node_of(first).ior = 1.4
+    assert len(bpy.data.node_groups) == 2

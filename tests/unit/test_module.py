@@ -43,6 +43,12 @@ grid = native.ReceiverGrid((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), pitch_x=1
 native.gather_beams(grid, native.SunLight((0, 0, -1)), occluders)
 """
 
+NUMPY_2 = """
+import numpy as np
+np.__version__ = "2.4.6"
+import beamspread
+"""
+
 
 def run_python(code, **environment):
     """Stdout of a fresh interpreter that can import beamspread; its stderr has to stay empty."""
@@ -117,3 +123,9 @@ def test_embree_4_of_the_host_would_win_without_deepbind():
     """Shows that the two tests above can fail."""
     code = "from beamspread.core.native import native; print(native.embree_version())"
     assert run_python(code, LD_PRELOAD=str(WHEEL_EMBREE), BEAMSPREAD_NO_DEEPBIND="1").startswith("4")
+
+
+@pytest.mark.skipif(native.reads_numpy_2, reason="built with a newer pybind11")
+def test_a_numpy_that_the_module_misreads_is_refused():
+    with pytest.raises(AssertionError, match=r"can't read arrays of numpy 2\.4\.6: install numpy 1\.26"):
+        run_python(NUMPY_2)

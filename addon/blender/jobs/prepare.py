@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-import bpy
-
 from ...core.bake.estimate import bake_bytes, machine_bytes
 from ...core.bake.job import BakeJob, to_simulate
 from ...core.bake.runner import Bake, Target
@@ -52,9 +50,11 @@ def read_scene(context, targets: list[Target], settings: BakeSettings, resolutio
     resolution : texels along the longer side; None keeps the size of the node's image, or the scene's setting where
         there is none.
     """
-    for target in targets:
-        # Evaluated before the node's class was registered, it would still be of an unknown class.
-        bpy.data.materials[target.material_name].node_tree.update_tag()
+    for name in {target.object_name for target in targets}:
+        for material in materials_of(context.scene.objects[name]):
+            # Evaluated before the node's class was registered, it would still be of an unknown class.
+            for tree in [material.node_tree, *(group.node_tree for group in find_place(material)[1])]:
+                tree.update_tag()
     with as_rendered(context.view_layer):
         visible = render_visible_names(context.view_layer)
         return Preparation(context.evaluated_depsgraph_get(), targets, settings, resolution, visible=visible)

@@ -9,6 +9,7 @@ from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, PointerP
 from ...core.bake.surface import Surface
 from ...core.material.material import Material
 from ...core.material.presets import presets
+from .. import compat
 from .draw import draw_node
 from .output import link_output, plain_of
 from .tree import BASE_COLOR, ROUGHNESS, ROUGHNESS_BEFORE, add_missing_inputs, make_inner_tree, show_values
@@ -78,7 +79,7 @@ def _show(node, _context) -> None:
     if tree is None:
         return
     plain = plain_of(node)
-    if _is_shared(tree, plain):
+    if _is_shared(tree, plain) and sum(node.node_tree == tree for node in _all_nodes()) > 1:
         tree = tree.copy()
         tree.use_fake_user = True
         node.node_tree = tree
@@ -89,7 +90,10 @@ def _show(node, _context) -> None:
 
 
 def _is_shared(tree, plain=None) -> bool:
-    """Whether nodes of other materials show the tree, too; its fake user counts as a user."""
+    """Whether nodes of other materials show the tree, too; its fake user counts as a user.
+
+    Before Blender 4.5, a copied material counts one user too many until the file is opened again.
+    """
     own = 1 + (plain is not None and plain.node_tree == tree)
     return tree.users - tree.use_fake_user > own
 
@@ -198,7 +202,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
 
     def init(self, _context) -> None:
         self.width = 240
-        self.node_tree = make_inner_tree()
+        compat.give_new_node_its_tree(self, make_inner_tree())
         self.ior = NEW_IOR
 
     def free(self) -> None:
@@ -257,7 +261,7 @@ def _upgrade(tree) -> None:
 
 def register() -> None:
     if not BeamspreadNode.is_registered:
-        bpy.utils.register_class(BeamspreadNode)
+        compat.register_node_class(BeamspreadNode, "ShaderNodeCustomGroup")
     bpy.app.handlers.load_post.append(upgrade_nodes)
 
 
