@@ -49,7 +49,6 @@ __all__: list[str] = [
     "interpolate",
     "ray_layers",
     "read_exr",
-    "reads_numpy_2",
     "real_lines",
     "real_transform",
     "simulate",
@@ -1322,4 +1321,3 @@ def write_exr(
     """
 
 __version__: str = "0.1.0"
-reads_numpy_2: bool = False

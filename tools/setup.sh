@@ -12,7 +12,7 @@ for argument in "$@"; do
     esac
 done
 
-packages=(g++ cmake ninja-build ccache pybind11-dev libembree-dev libtbb-dev libopenexr-dev libglm-dev libeigen3-dev libhwy-dev
+packages=(g++ cmake ninja-build ccache libembree-dev libtbb-dev libopenexr-dev libglm-dev libeigen3-dev libhwy-dev
           python3 python3-dev python3-venv python3-numpy blender)
 # The X libraries are what the official bpy wheel links to; it never opens a window here. Debian's Blender opens one, for
 # tests/blender/test_window.py, on a screen in memory.
@@ -88,15 +88,15 @@ fetch_ducc() {
     touch "$folder/$name/.complete"
 }
 
-# 1 GB, hence fetched once per version and kept whatever else changes.
-fetch_bpy() {
-    local folder=build/bpy-4.5
-    [ ! -f "$folder/.complete" ] || ! cmp -s "$folder/.complete" tools/requirements-bpy.txt || return 0
-    say "fetching the official Blender module into $folder (1 GB)"
+# fetch_into FOLDER REQUIREMENTS WHAT: packages beside the venv, fetched once per version and kept whatever else changes.
+fetch_into() {
+    local folder=$1 requirements=$2
+    [ ! -f "$folder/.complete" ] || ! cmp -s "$folder/.complete" "$requirements" || return 0
+    say "fetching $3 into $folder"
     rm -rf "$folder" "$folder.partial"
     "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps --target "$folder.partial" \
-        -r tools/requirements-bpy.txt >&2
-    cp tools/requirements-bpy.txt "$folder.partial/.complete"
+        -r "$requirements" >&2
+    cp "$requirements" "$folder.partial/.complete"
     mv "$folder.partial" "$folder"
 }
 
@@ -111,8 +111,8 @@ print("%d.%d" % sys.version_info[:2], all(u.find_spec(name) for name in ("numpy"
         "$ours True") ;;
         "$ours False")
             say "installing numpy and matplotlib for $(command -v python3)"
-            # The oldest numpy that is supported here is Debian's; 2.x needs a newer pybind11 than Debian has.
-            python3 -m pip install --quiet --disable-pip-version-check 'numpy>=1.24,<2' 'matplotlib>=3.6' >&2 ||
+            # The oldest numpy that is supported here is Debian's.
+            python3 -m pip install --quiet --disable-pip-version-check 'numpy>=1.24' 'matplotlib>=3.6' >&2 ||
                 say "note: $(command -v python3) has no numpy or matplotlib and pip could not install them: use $debian_python to import beamspread" ;;
         *) say "note: $(command -v python3) is Python ${other% *}; the module is built for $ours: use $debian_python to import beamspread" ;;
     esac
@@ -130,7 +130,7 @@ stamp=base
 if [ "$tests" = 1 ]; then
     wanted+=("${test_packages[@]}")
     requirements+=(tools/requirements-tests.txt)
-    inputs+=(tools/requirements-tests.txt tools/requirements-bpy.txt)
+    inputs+=(tools/requirements-tests.txt tools/requirements-bpy.txt tools/requirements-numpy2.txt)
     stamp=tests
 fi
 install_packages "${wanted[@]}"
@@ -138,12 +138,15 @@ install_packages "${wanted[@]}"
 # The folder belongs to the key because a venv can't be moved; the interpreter because an upgrade replaces it.
 key=$( (pwd; readlink -f "$debian_python"; command -v python3; cat "${inputs[@]}") | sha256sum | cut -d' ' -f1)
 if [ "$(cat build/.setup/$stamp 2>/dev/null)" = "$key" ] && [ -x "$venv/bin/python" ] &&
-    [ -f "build/deps/ducc0-$ducc_version/.complete" ] && { [ "$tests" = 0 ] || [ -f build/bpy-4.5/.complete ]; }; then
+    [ -f "build/deps/ducc0-$ducc_version/.complete" ] && { [ "$tests" = 0 ] || [ -f build/numpy-2/.complete ]; }; then
     exit 0
 fi
 make_venv "${requirements[@]}"
 fetch_ducc
-[ "$tests" = 0 ] || fetch_bpy
+if [ "$tests" = 1 ]; then
+    fetch_into build/bpy-4.5 tools/requirements-bpy.txt "the official Blender module (1 GB)"
+    fetch_into build/numpy-2 tools/requirements-numpy2.txt "numpy 2"
+fi
 prepare_other_python
 echo "$key" >build/.setup/$stamp
 say "ready"

@@ -8,8 +8,9 @@ made=build/.stubs/beamspread/_native.pyi
 
 PYTHONPATH=build/stage build/venv/bin/pybind11-stubgen --exit-code --numpy-array-remove-parameters \
     --output-dir build/.stubs beamspread._native
-# What pybind11 says of std::array is no type.
-sed -i 's/list\[float\[\([0-9]\)\]\]/typing.Sequence[float]/g' "$made"
+# Of a std::array it is enough to know that any sequence does.
+sed -i -e 's/typing.Annotated\[list\[float\], pybind11_stubgen.typing_ext.FixedSize([0-9])\]/typing.Sequence[float]/g' \
+    -e '/^import pybind11_stubgen.typing_ext$/d' "$made"
 build/venv/bin/ruff format --quiet --isolated --line-length 120 "$made"
 if [ "${1:-}" = --update ]; then
     cp "$made" "$checked_in"

@@ -32,21 +32,8 @@ class _Missing:
 problem = ""
 """Why the module is missing, in one sentence; empty when all is well."""
 
-
-def _check_numpy(module) -> None:
-    """Raise ImportError where arrays would come out wrong."""
-    import numpy as np
-
-    if int(np.__version__.partition(".")[0]) >= 2 and not module.reads_numpy_2:
-        raise ImportError(
-            f"it was built with a pybind11 before 2.12, which can't read arrays of numpy {np.__version__}: "
-            "install numpy 1.26 (pip install 'numpy<2'), or build with a newer pybind11"
-        )
-
-
 try:
     native = _load()
-    _check_numpy(native)
 except ImportError as error:
     folder = Path(__file__).resolve().parents[1]
     version = f"{sys.version_info.major}.{sys.version_info.minor}"

@@ -24,8 +24,6 @@ PYBIND11_MODULE(_native, m)
     using namespace beamspread;
     m.doc() = "Light transport of beamspread; import the package `beamspread` instead.";
     m.attr("__version__") = BEAMSPREAD_VERSION;
-    // Earlier ones read numpy 2's types by the layout of numpy 1: sizes and strides come out wrong, silently.
-    m.attr("reads_numpy_2") = PYBIND11_VERSION_HEX >= 0x020C0000;
     py::register_exception<Cancelled>(m, "Cancelled").doc() = "A progress callback returned False.";
     py::register_local_exception_translator(&translate);
     bind_medium(m);
