@@ -3,10 +3,8 @@
 xvfb-run blender --factory-startup --python THIS -- RESULTS.json
 """
 
-import json
 import sys
 import time
-import traceback
 from pathlib import Path
 
 import bpy
@@ -17,6 +15,7 @@ sys.path[:0] = [str(FOLDER), str(FOLDER.parent.parent / "build" / "stage")]
 import beamspread  # noqa: E402
 import scenes  # noqa: E402
 from beamspread.blender.jobs.state import state  # noqa: E402
+from scenario_player import play  # noqa: E402
 
 PATIENCE_SECONDS = 60
 results = {}
@@ -96,26 +95,7 @@ def scenario():
 
 def main() -> None:
     beamspread.register()
-    steps = scenario()
-    waiting = {"for": lambda: True, "since": time.monotonic()}
-
-    def step():
-        try:
-            if not waiting["for"]():
-                if time.monotonic() - waiting["since"] < PATIENCE_SECONDS:
-                    return 0.05
-                raise TimeoutError(f"line {steps.gi_frame.f_lineno} waited in vain")
-            waiting.update({"for": next(steps), "since": time.monotonic()})
-            return 0.1
-        except StopIteration:
-            results["complete"] = True
-        except BaseException:  # noqa: BLE001 - the test shows it
-            results["error"] = traceback.format_exc()
-        Path(sys.argv[-1]).write_text(json.dumps(results))
-        bpy.ops.wm.quit_blender()
-        return None
-
-    bpy.app.timers.register(step, first_interval=0.1, persistent=True)
+    play(scenario(), results, PATIENCE_SECONDS)
 
 
 main()

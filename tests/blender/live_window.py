@@ -3,12 +3,10 @@
 xvfb-run blender --factory-startup --python THIS -- RESULTS.json
 """
 
-import json
 import math
 import sys
 import threading
 import time
-import traceback
 from pathlib import Path
 
 import bpy
@@ -20,6 +18,7 @@ import beamspread  # noqa: E402
 import scenes  # noqa: E402
 from beamspread.blender.jobs.state import state  # noqa: E402
 from beamspread.blender.live import canvas, session  # noqa: E402
+from scenario_player import play  # noqa: E402
 
 PATIENCE_SECONDS, DRAG_SECONDS = 60, 2.0
 results = {"painted": 0, "painted during the bake": 0, "exact": 0}
@@ -131,27 +130,7 @@ def scenario():
 def main():
     beamspread.register()
     count_pictures()
-    steps = scenario()
-    waiting = {"for": lambda: True, "since": time.monotonic()}
-
-    def step():
-        """Go on if what the scenario waits for has come; called by a timer."""
-        try:
-            if not waiting["for"]():
-                if time.monotonic() - waiting["since"] < PATIENCE_SECONDS:
-                    return 0.02
-                raise TimeoutError(f"line {steps.gi_frame.f_lineno} waited in vain")
-            waiting.update({"for": next(steps), "since": time.monotonic()})
-            return 0.02
-        except StopIteration:
-            results["complete"] = True
-        except BaseException:  # noqa: BLE001 - the test shows it
-            results["error"] = traceback.format_exc()
-        Path(sys.argv[-1]).write_text(json.dumps(results))
-        bpy.ops.wm.quit_blender()
-        return None
-
-    bpy.app.timers.register(step, first_interval=0.1, persistent=True)
+    play(scenario(), results, PATIENCE_SECONDS, pause=0.02)
 
 
 main()

@@ -5,7 +5,6 @@
 Each step of the scenario waits for what it yields, and notes what it saw.
 """
 
-import json
 import sys
 import time
 import traceback
@@ -24,6 +23,7 @@ from beamspread.blender.node import draw, menu  # noqa: E402
 from beamspread.blender.ui import panels  # noqa: E402
 from beamspread.blender.ui import results as shown  # noqa: E402
 from beamspread.core.bake.runner import Target  # noqa: E402
+from scenario_player import play  # noqa: E402
 
 # The slowest step takes a second or two on an idle machine.
 PATIENCE_SECONDS = 60
@@ -235,27 +235,7 @@ def scenario():
 def main() -> None:
     prepare_panels()
     beamspread.register()
-    steps = scenario()
-    waiting = {"for": lambda: True, "since": time.monotonic()}
-
-    def step():
-        """Go on if what the scenario waits for has come; called by a timer."""
-        try:
-            if not waiting["for"]():
-                if time.monotonic() - waiting["since"] < PATIENCE_SECONDS:
-                    return 0.05
-                raise TimeoutError(f"line {steps.gi_frame.f_lineno} waited in vain")
-            waiting.update({"for": next(steps), "since": time.monotonic()})
-            return 0.05
-        except StopIteration:
-            results["complete"] = True
-        except BaseException:  # noqa: BLE001 - the test shows it
-            results["error"] = traceback.format_exc()
-        Path(sys.argv[-1]).write_text(json.dumps(results))
-        bpy.ops.wm.quit_blender()
-        return None
-
-    bpy.app.timers.register(step, first_interval=0.1, persistent=True)
+    play(scenario(), results, PATIENCE_SECONDS)
 
 
 main()
