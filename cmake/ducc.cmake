@@ -1,12 +1,11 @@
 # DUCC's FFT (BSD-3 part of its PyPI source package), compiled for several instruction sets into one static library.
-if(NOT EXISTS ${DUCC_SOURCE_DIR}/src/ducc0/fft/fft.h)
-  message(FATAL_ERROR "DUCC's sources are not at ${DUCC_SOURCE_DIR}: run tools/setup.sh, or set DUCC_SOURCE_DIR")
-endif()
-set(ducc_src ${DUCC_SOURCE_DIR}/src)
+set(ducc_src ${BEAMSPREAD_DEPENDENCIES}/include)
 
-# What templates and inline functions become for a newer processor must not be what the linker keeps for the rest of
-# the program: each is linked into one object file, where the groups that linkers merge by name are dissolved
-# (--force-group-allocation) and every symbol but the one that it is found by is local, which unique ones could not be.
+# What templates and inline functions become for a newer processor must not be what the linker keeps for the rest of the
+# program; that everything is static and hidden doesn't help, as it is one program. So each is linked into one object
+# file, where the groups that linkers merge by name are dissolved (--force-group-allocation) and every symbol but the one
+# that it is found by is local, which unique ones could not be. Only Linux's linker does that: elsewhere there is the
+# baseline alone.
 set(ducc_objects)
 function(ducc_instruction_set name)
   add_library(ducc_${name} OBJECT ${CMAKE_SOURCE_DIR}/native/fft/instruction_sets/fft.cpp ${ducc_src}/ducc0/infra/mav.cc
@@ -22,6 +21,10 @@ function(ducc_instruction_set name)
     # Minutes to compile otherwise, and not what a sanitizer is here to check.
     target_compile_options(ducc_${name} PRIVATE -fno-sanitize=all)
   endif()
+  if(NOT linux)
+    set(ducc_objects ${ducc_objects} $<TARGET_OBJECTS:ducc_${name}> PARENT_SCOPE)
+    return()
+  endif()
   set(object ${CMAKE_BINARY_DIR}/ducc_${name}.o)
   add_custom_command(OUTPUT ${object}
                      COMMAND ${CMAKE_LINKER} -r --force-group-allocation -o ${object} $<TARGET_OBJECTS:ducc_${name}>
@@ -32,7 +35,7 @@ function(ducc_instruction_set name)
 endfunction()
 
 ducc_instruction_set(baseline)
-if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+if(linux AND x86_64)
   ducc_instruction_set(avx2 -march=x86-64-v3)
   ducc_instruction_set(avx512 -march=x86-64-v4)
 endif()

@@ -29,14 +29,14 @@ finish() {
 }
 
 # The native smoke test in a module built with AddressSanitizer and UBSan.
-# (ThreadSanitizer takes every hand-over between threads for a race, as it can't see into Debian's TBB.)
+# (ThreadSanitizer takes every hand-over between threads for a race, as it can't see into TBB.)
 sanitized() {
     local runtime
     # It has to come first; libstdc++ with it, because its functions for exceptions are looked up when the process starts.
     runtime="$(c++ -print-file-name=libasan.so) $(c++ -print-file-name=libstdc++.so.6)"
     tools/build.sh asan || return
     # Leaks: Python keeps much until it exits.
-    env LD_PRELOAD="$runtime" PYTHONPATH="$PWD/build/asan/stage" BEAMSPREAD_NO_DEEPBIND=1 PYTHONMALLOC=malloc \
+    env LD_PRELOAD="$runtime" PYTHONPATH="$PWD/build/asan/stage" PYTHONMALLOC=malloc \
         ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 "$python" tests/smoke.py
 }
 

@@ -6,9 +6,12 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 preset=${1:-release}
 
 tools/setup.sh
+# Objects are the same wherever the clone lies.
+export CCACHE_BASEDIR=$PWD CCACHE_NOHASHDIR=1
 
-# ninja re-runs cmake by itself when a CMake file changes, but doesn't know of the presets, the folder and the compiler.
-key=$( (pwd; c++ --version; cat CMakePresets.json) | sha256sum | cut -d' ' -f1)
+# ninja re-runs cmake by itself when a CMake file changes, but doesn't know of the presets, the folder and the compiler,
+# and would keep the libraries that it once found.
+key=$( (pwd; c++ --version; cat CMakePresets.json cmake/dependencies/*) | sha256sum | cut -d' ' -f1)
 stamp=build/$preset/.configured
 if [ ! -f "build/$preset/build.ninja" ] || [ "$(cat "$stamp" 2>/dev/null)" != "$key" ]; then
     # A cache made elsewhere or by another compiler can't be re-used.
@@ -16,6 +19,4 @@ if [ ! -f "build/$preset/build.ninja" ] || [ "$(cat "$stamp" 2>/dev/null)" != "$
     cmake --preset "$preset" >&2
     echo "$key" >"$stamp"
 fi
-# Objects are the same wherever the clone lies.
-export CCACHE_BASEDIR=$PWD CCACHE_NOHASHDIR=1
 exec cmake --build "build/$preset" >&2

@@ -12,14 +12,11 @@ for argument in "$@"; do
     esac
 done
 
-packages=(g++ cmake ninja-build ccache libembree-dev libtbb-dev libopenexr-dev libglm-dev libeigen3-dev libhwy-dev
-          python3 python3-dev python3-venv python3-numpy blender)
+packages=(g++ cmake ninja-build ccache python3 python3-dev python3-venv python3-numpy blender)
 # The X libraries are what the official bpy wheel links to; it never opens a window here. Debian's Blender opens one, for
 # tests/blender/test_window.py, on a screen in memory.
 test_packages=(binutils libegl1 libgl1 libgomp1 libsm6 libx11-6 libxfixes3 libxi6 libxkbcommon0 libxrender1 libxxf86vm1
                xvfb xauth libgl1-mesa-dri)
-ducc_version=0.42.0
-ducc_sha256=4e11c59b53a43355b053aebb2a62ee16eebeed026575f7d216cf09d437ce52ef
 debian_python=/usr/bin/python3
 venv=build/venv
 
@@ -72,22 +69,6 @@ make_venv() {
     "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps "${arguments[@]}" >&2
 }
 
-fetch_ducc() {
-    local folder=build/deps name="ducc0-$ducc_version" archive
-    archive=$folder/$name.tar.gz
-    [ ! -f "$folder/$name/.complete" ] || return 0
-    mkdir -p "$folder"
-    if ! echo "$ducc_sha256  $archive" | sha256sum --check --status 2>/dev/null; then
-        say "fetching the sources of $name"
-        "$venv/bin/python" -m pip download --quiet --disable-pip-version-check --no-deps --no-binary ducc0 \
-            --dest "$folder" "ducc0==$ducc_version" >&2
-        echo "$ducc_sha256  $archive" | sha256sum --check --status || die "$archive is not the file that it should be (sha256)"
-    fi
-    rm -rf "${folder:?}/$name"
-    tar -xzf "$archive" -C "$folder"
-    touch "$folder/$name/.complete"
-}
-
 # fetch_into FOLDER REQUIREMENTS WHAT: packages beside the venv, fetched once per version and kept whatever else changes.
 fetch_into() {
     local folder=$1 requirements=$2
@@ -138,11 +119,10 @@ install_packages "${wanted[@]}"
 # The folder belongs to the key because a venv can't be moved; the interpreter because an upgrade replaces it.
 key=$( (pwd; readlink -f "$debian_python"; command -v python3; cat "${inputs[@]}") | sha256sum | cut -d' ' -f1)
 if [ "$(cat build/.setup/$stamp 2>/dev/null)" = "$key" ] && [ -x "$venv/bin/python" ] &&
-    [ -f "build/deps/ducc0-$ducc_version/.complete" ] && { [ "$tests" = 0 ] || [ -f build/numpy-2/.complete ]; }; then
+    { [ "$tests" = 0 ] || [ -f build/numpy-2/.complete ]; }; then
     exit 0
 fi
 make_venv "${requirements[@]}"
-fetch_ducc
 if [ "$tests" = 1 ]; then
     fetch_into build/bpy-4.5 tools/requirements-bpy.txt "the official Blender module (1 GB)"
     fetch_into build/numpy-2 tools/requirements-numpy2.txt "numpy 2"

@@ -1,25 +1,8 @@
-"""The native module, loaded so that its own libraries win over those of the host process.
-
-Embree's functions have the same names in versions 3 and 4: inside a Blender that brings Embree 4, a
-module linked to Embree 3 would call version 4 and crash later. RTLD_DEEPBIND makes the module
-look up symbols in its own dependencies first.
-"""
+"""The native module, which carries its libraries: nothing of the host's is taken for them, or the other way round."""
 
 import importlib
-import os
 import sys
 from pathlib import Path
-
-
-def _load():
-    if not hasattr(os, "RTLD_DEEPBIND") or os.environ.get("BEAMSPREAD_NO_DEEPBIND"):  # for sanitizers
-        return importlib.import_module(".._native", __package__)
-    flags = sys.getdlopenflags()
-    sys.setdlopenflags(os.RTLD_NOW | os.RTLD_LOCAL | os.RTLD_DEEPBIND)
-    try:
-        return importlib.import_module(".._native", __package__)
-    finally:
-        sys.setdlopenflags(flags)
 
 
 class _Missing:
@@ -33,7 +16,7 @@ problem = ""
 """Why the module is missing, in one sentence; empty when all is well."""
 
 try:
-    native = _load()
+    native = importlib.import_module(".._native", __package__)
 except ImportError as error:
     folder = Path(__file__).resolve().parents[1]
     version = f"{sys.version_info.major}.{sys.version_info.minor}"

@@ -2,12 +2,9 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdlib>
 #include <new>
 
-#ifdef __linux__
-#include <sys/mman.h>
-#endif
+#include "base/platform.h"
 
 namespace beamspread {
 
@@ -26,16 +23,13 @@ struct HugePageAllocator {
     {
         constexpr std::size_t huge_page = std::size_t{1} << 21;
         const std::size_t bytes = (count * sizeof(T) + huge_page - 1) / huge_page * huge_page;
-        void* memory = std::aligned_alloc(huge_page, bytes);
+        void* memory = allocate_pages(bytes, huge_page);
         if (memory == nullptr)
             throw std::bad_alloc();
-#ifdef __linux__
-        madvise(memory, bytes, MADV_HUGEPAGE);  // a hint: it may fail
-#endif
         return static_cast<T*>(memory);
     }
 
-    void deallocate(T* memory, std::size_t /*count*/) { std::free(memory); }
+    void deallocate(T* memory, std::size_t /*count*/) { free_pages(memory); }
 
     friend bool operator==(const HugePageAllocator&, const HugePageAllocator&) = default;
 };

@@ -1,6 +1,6 @@
 #include "fft/complex_loops.h"
 
-#include "simd/target_clones.h"
+#include "base/platform.h"
 
 namespace beamspread {
 

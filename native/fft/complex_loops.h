@@ -1,4 +1,4 @@
-// Inner loops over complex numbers, see simd/target_clones.h.
+// Inner loops over complex numbers, see base/platform.h.
 #pragma once
 
 #include <cstddef>

@@ -1,13 +1,12 @@
 #include "image/pending_file.h"
 
-#include <unistd.h>
-
 #include <atomic>
 #include <filesystem>
 #include <system_error>
 #include <utility>
 
 #include "base/error.h"
+#include "base/platform.h"
 
 namespace beamspread {
 
@@ -24,7 +23,7 @@ namespace {
 std::string temporary_name(const std::string& target)
 {
     static std::atomic<unsigned> counter{0};
-    return target + "." + std::to_string(getpid()) + "-" + std::to_string(counter++) + ".tmp";
+    return target + "." + std::to_string(process_id()) + "-" + std::to_string(counter++) + ".tmp";
 }
 
 }  // namespace
@@ -40,7 +39,7 @@ PendingFile::PendingFile(std::string target) : m_target(std::move(target)), m_pa
         fail(m_target, "it is a folder");
     // The permission bits, not access(2): root may write everywhere, yet a file was made read-only for a reason.
     constexpr fs::perms any_write = fs::perms::owner_write | fs::perms::group_write | fs::perms::others_write;
-    if (fs::exists(status) && ((status.permissions() & any_write) == fs::perms::none || access(m_target.c_str(), W_OK)))
+    if (fs::exists(status) && ((status.permissions() & any_write) == fs::perms::none || !may_write(m_target)))
         fail(m_target, "the file is read-only");
 }
 

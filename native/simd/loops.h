@@ -1,4 +1,4 @@
-// Inner loops over arrays, see simd/target_clones.h.
+// Inner loops over arrays, see base/platform.h.
 #pragma once
 
 #include <cstddef>

@@ -6,7 +6,7 @@
 
 #include "base/threads.h"
 #include "simd/loops.h"
-#include "simd/target_clones.h"
+#include "base/platform.h"
 
 namespace beamspread {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "simd/target_clones.h"
+#include "base/platform.h"
 
 namespace beamspread {
 

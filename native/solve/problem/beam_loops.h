@@ -1,4 +1,4 @@
-// Inner loops of directions and of light, see simd/target_clones.h.
+// Inner loops of directions and of light, see base/platform.h.
 #pragma once
 
 #include <cstddef>

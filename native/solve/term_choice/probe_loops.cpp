@@ -3,7 +3,7 @@
 #include <array>
 #include <cstring>
 
-#include "simd/target_clones.h"
+#include "base/platform.h"
 
 namespace beamspread {
 

@@ -1,4 +1,4 @@
-// Inner loops of the radiance probe, see simd/target_clones.h.
+// Inner loops of the radiance probe, see base/platform.h.
 #pragma once
 
 #include <cstddef>

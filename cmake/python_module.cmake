@@ -1,0 +1,37 @@
+# The module, once per Python; all link the same libraries. The one of the Python that builds goes into the stage.
+# Those of other Pythons whose headers are there are made by the target `modules`, for the package, where they lie
+# beside it, each named by the tag that its Python looks for. (Python's stable interface would make one file of them,
+# but binding libraries know it from Python 3.12 on, and most Blenders have an older one.)
+file(GLOB headers ${BEAMSPREAD_DEPENDENCIES_DIR}/python/usr/include/python3.*)
+set(BEAMSPREAD_OTHER_PYTHONS "${headers}" CACHE STRING "Folders with the headers of further Pythons: tools/python_headers.sh")
+file(GLOB python_sources CONFIGURE_DEPENDS native/python/*.cpp)
+
+# python_module(TARGET TAG FOLDER INCLUDES...)
+function(python_module target tag folder)
+  add_library(${target} MODULE ${python_sources})
+  target_link_libraries(${target} PRIVATE ${beamspread_libraries})
+  target_include_directories(${target} SYSTEM PRIVATE ${ARGN})
+  target_compile_definitions(${target} PRIVATE BEAMSPREAD_VERSION="${PROJECT_VERSION}")
+  set_target_properties(${target} PROPERTIES PREFIX "" OUTPUT_NAME _native SUFFIX .${tag}
+                        LIBRARY_OUTPUT_DIRECTORY ${folder})
+  beamspread_keep_apart(${target})
+endfunction()
+
+execute_process(COMMAND ${Python_EXECUTABLE} -c "import sysconfig; print(sysconfig.get_config_var('EXT_SUFFIX'))"
+                OUTPUT_VARIABLE suffix OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+string(SUBSTRING ${suffix} 1 -1 own_tag)
+python_module(_native ${own_tag} ${BEAMSPREAD_STAGE_DIR}/beamspread ${Python_INCLUDE_DIRS})
+# What pip takes, beside the package's own files.
+install(TARGETS _native LIBRARY DESTINATION beamspread COMPONENT python)
+install(DIRECTORY ${BEAMSPREAD_DEPENDENCIES}/licenses DESTINATION beamspread COMPONENT python)
+add_custom_target(modules DEPENDS _native)
+foreach(includes IN LISTS BEAMSPREAD_OTHER_PYTHONS)
+  file(STRINGS ${includes}/patchlevel.h version REGEX "#define PY_(MAJOR|MINOR)_VERSION")
+  string(REGEX REPLACE "[^0-9]*([0-9]+);[^0-9]*([0-9]+)" "\\1\\2" digits "${version}")
+  string(REGEX REPLACE "cpython-[0-9]+" cpython-${digits} tag ${own_tag})
+  if(NOT tag STREQUAL own_tag)
+    python_module(_native_${digits} ${tag} ${CMAKE_BINARY_DIR}/modules ${includes} ${includes}/..)
+    set_target_properties(_native_${digits} PROPERTIES EXCLUDE_FROM_ALL ON)
+    add_dependencies(modules _native_${digits})
+  endif()
+endforeach()
