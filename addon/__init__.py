@@ -63,6 +63,8 @@ else:
 def register():
     from . import blender
 
+    if problem:
+        print(f"Beamspread: {problem}", file=sys.stderr)
     blender.register()
 
 

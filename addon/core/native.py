@@ -10,6 +10,8 @@ import os
 import sys
 from pathlib import Path
 
+from . import missing
+
 
 def _load():
     if not hasattr(os, "RTLD_DEEPBIND") or os.environ.get("BEAMSPREAD_NO_DEEPBIND"):  # for sanitizers
@@ -30,15 +32,13 @@ class _Missing:
 
 
 problem = ""
-"""Why the module is missing, in one sentence; empty when all is well."""
+"""Why the module is missing, in a few sentences; empty when all is well."""
+
+_FOLDER = Path(__file__).resolve().parents[1]
 
 try:
+    missing.check(_FOLDER)
     native = _load()
-except ImportError as error:
-    folder = Path(__file__).resolve().parents[1]
-    version = f"{sys.version_info.major}.{sys.version_info.minor}"
-    problem = (
-        f"beamspread has no working native module for Python {version} in {folder} "
-        f"(looked for _native.cpython-{version.replace('.', '')}-*.so): {error}"
-    )
+except (ImportError, OSError) as error:
+    problem = missing.problem_of(_FOLDER, error)
     native = _Missing()
