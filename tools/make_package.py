@@ -69,6 +69,11 @@ def write(path: Path, files: dict[str, bytes]) -> None:
     """A zip of these files in one folder, whole or not at all."""
     partial = path.with_suffix(".partial")
     with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        # Without an entry of its own Blender's legacy installer leaves an older version's folder where it is and writes
+        # into its files: even into the native module that is in use, which ends the process.
+        folder = zipfile.ZipInfo(f"{FOLDER}/", TIME)
+        folder.create_system, folder.external_attr = 3, (0o40755 << 16) | 0x10
+        archive.writestr(folder, b"")
         for name in sorted(files):
             entry = zipfile.ZipInfo(f"{FOLDER}/{name}", TIME)
             entry.create_system = 3  # Unix, wherever this runs

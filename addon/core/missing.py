@@ -25,8 +25,14 @@ _GLIBC = re.compile(r"version [`']GLIBC_([0-9.]+)' not found")
 _LIBRARY = re.compile(r"^(\S+\.so\S*): cannot open shared object file")
 
 
+class AnotherVersion(ImportError):
+    """The module in the process is of another version than the package: its text is for the artist."""
+
+
 def problem_of(folder: Path, error: Exception) -> str:
     """A few sentences for the artist about the error that loading the module of this package ended with."""
+    if isinstance(error, AnotherVersion):
+        return str(error)
     python = _python()
     found = ", ".join(sorted(_said_of(path.name) for path in modules(folder))) or "none at all"
     return (
@@ -60,6 +66,19 @@ def check(folder: Path) -> None:
             raise ImportError(f"{path.name} is damaged: it is not the file that was packed")
     if not _is_whole(path):
         raise ImportError(f"{path.name} is damaged: its end is missing")
+
+
+def check_version(folder: Path, loaded: str) -> None:
+    """Refuse a module of another version: a process can't exchange one, so that it is the former one's after an update.
+
+    Raises AnotherVersion.
+    """
+    version = _read(folder / "VERSION").strip()
+    if loaded != version:
+        raise AnotherVersion(
+            f"Beamspread {version} was installed while {loaded} was in use: restart Blender to go on with it. Until then "
+            "nothing can be baked; nodes, settings and baked images stay as they are."
+        )
 
 
 def _is_whole(path: Path) -> bool:

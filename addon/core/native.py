@@ -39,6 +39,7 @@ _FOLDER = Path(__file__).resolve().parents[1]
 try:
     missing.check(_FOLDER)
     native = _load()
+    missing.check_version(_FOLDER, native.__version__)
 except (ImportError, OSError) as error:
     problem = missing.problem_of(_FOLDER, error)
     native = _Missing()

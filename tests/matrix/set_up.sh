@@ -62,7 +62,7 @@ chroot_of() {
     printf '#!/bin/sh\nexit 101\n' >"$place/usr/sbin/policy-rc.d"
     chmod +x "$place/usr/sbin/policy-rc.d"
     # In a mount namespace of its own, so that no mount outlives this.
-    unshare -m bash -c 'mount -t proc proc "$1/proc"
+    unshare -m bash -ec 'mount -t proc proc "$1/proc"
         chroot "$1" apt-get -o Acquire::Check-Valid-Until=false -q update
         DEBIAN_FRONTEND=noninteractive chroot "$1" apt-get -q install -y --no-install-recommends ${*:2}
         chroot "$1" apt-get clean' - "$place" $missing >"$place.log" 2>&1 || { tail "$place.log" >&2; return 1; }
@@ -95,8 +95,8 @@ for name in "$@"; do
         5.0) venv 5.0 bpy==5.0.1 ;;
         5.2) chroot_of trixie python3 "${libraries[@]}"; wheel_in trixie 3.13 bpy==5.2.3 ;;
         debian13) chroot_of trixie blender python3-numpy ;;
-        # sid's python3-cattrs and python3-requests serve the extension commands; Blender only recommends them.
-        sid) chroot_of sid blender python3-numpy python3-cattrs python3-requests ;;
+        # sid's python3-cattr and python3-requests serve the extension commands; Blender only recommends them.
+        sid) chroot_of sid blender python3-numpy python3-cattr python3-requests ;;
         *) die "there is no Blender named $name" ;;
     esac
 done
