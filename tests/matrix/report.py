@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "build" / "stage"))
-from beamspread.core.native import native  # noqa: E402
+from beamspread.core.native import native
 
 TOLERANCE = 1e-4
 
