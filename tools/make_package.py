@@ -2,8 +2,8 @@
 
     tools/make_package.py STAGED_PACKAGE OUTPUT_FOLDER
 
-makes OUTPUT_FOLDER/beamspread-VERSION-PLATFORM.zip with one folder, `beamspread`: at the archive's root Blender 3.4 could not
-install it. The same files give the same bytes. CMake's target `package` calls this.
+makes OUTPUT_FOLDER/beamspread-VERSION-PLATFORM.zip with one folder, `beamspread`: Blender 3.4 can't install files at
+the archive's root. The same files give the same bytes. CMake's target `package` calls this.
 """
 
 import hashlib

@@ -1,11 +1,12 @@
 """The version of Beamspread: `tools/version.py` says it, `tools/version.py 0.2.0` changes it everywhere.
 
-addon/VERSION is the one that counts: CMake, the native module, the wheel and the zip read it. Blender reads two more without
-running anything, so that they must be written out: bl_info of addon/__init__.py (legacy add-on) and the extension's
-manifest. tests/unit/test_version.py compares them, and no zip is made while they differ.
+addon/VERSION is the one that counts: CMake, the native module, the wheel and the zip read it. Blender reads two more
+without running anything, so that they must be written out: bl_info of addon/__init__.py (legacy add-on) and the
+extension's manifest. tests/unit/test_version.py compares them, and no zip is made while they differ.
 
 Formats of files have numbers of their own, which say when old files can't be read, not what is new: libraries
-(native/ldf/library/library_format.h) and what their simulation was asked for (_FILE_VERSION of addon/core/ldf/library.py).
+(native/ldf/library/library_format.h) and what their simulation was asked for (_FILE_VERSION of
+addon/core/ldf/library.py).
 """
 
 import ast

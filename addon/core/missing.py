@@ -25,13 +25,13 @@ _GLIBC = re.compile(r"version [`']GLIBC_([0-9.]+)' not found")
 _LIBRARY = re.compile(r"^(\S+\.so\S*): cannot open shared object file")
 
 
-class AnotherVersion(ImportError):
+class AnotherVersionError(ImportError):
     """The module in the process is of another version than the package: its text is for the artist."""
 
 
 def problem_of(folder: Path, error: Exception) -> str:
     """A few sentences for the artist about the error that loading the module of this package ended with."""
-    if isinstance(error, AnotherVersion):
+    if isinstance(error, AnotherVersionError):
         return str(error)
     python = _python()
     found = ", ".join(sorted(_said_of(path.name) for path in modules(folder))) or "none at all"
@@ -53,9 +53,9 @@ def wanted() -> str:
 
 
 def check(folder: Path) -> None:
-    """Refuse a module that was damaged on its way: to run it could end the process. Without checksums its length is looked at.
+    """Refuse a module that was damaged on its way: to run it could end the process.
 
-    Raises ImportError.
+    Without checksums only its length is looked at. Raises ImportError.
     """
     path = folder / wanted()
     if not path.is_file():
@@ -71,13 +71,13 @@ def check(folder: Path) -> None:
 def check_version(folder: Path, loaded: str) -> None:
     """Refuse a module of another version: a process can't exchange one, so that it is the former one's after an update.
 
-    Raises AnotherVersion.
+    Raises AnotherVersionError.
     """
     version = _read(folder / "VERSION").strip()
     if loaded != version:
-        raise AnotherVersion(
-            f"Beamspread {version} was installed while {loaded} was in use: restart Blender to go on with it. Until then "
-            "nothing can be baked; nodes, settings and baked images stay as they are."
+        raise AnotherVersionError(
+            f"Beamspread {version} was installed while {loaded} was in use: restart Blender to go on with it. "
+            "Until then nothing can be baked; nodes, settings and baked images stay as they are."
         )
 
 
@@ -114,8 +114,8 @@ def _remedy(folder: Path) -> str:
     blenders = [f"Blender {_BLENDERS[python]}" for python in pythons if python in _BLENDERS and python != _python()]
     instead = f", or use {' or '.join(blenders)} from blender.org, which suits the files found" if blenders else ""
     return (
-        f"To mend it: get the zip of Beamspread {version} that is made for {_machine()} and this Python from where this one "
-        f"came from, install it over this one and restart Blender{instead}."
+        f"To mend it: get the zip of Beamspread {version} that is made for {_machine()} and this Python from where "
+        f"this one came from, install it over this one and restart Blender{instead}."
     )
 
 

@@ -1,4 +1,4 @@
-"""A copy of the package whose native module is missing or useless: one clear message, never a traceback, and nothing lost.
+"""A package whose native module is missing or useless: one clear message, never a traceback, and nothing lost.
 
 tests/unit/test_missing.py has more ways in which a module can be of no use.
 """
@@ -32,7 +32,7 @@ node = next(node for node in material.node_tree.nodes if node.bl_idname == "Beam
 shown = node.node_tree.nodes["Image"].image
 surface = material.node_tree.get_output_node("ALL").inputs["Surface"]
 print("SEEN", json.dumps(dict(
-    type=type(node).__name__, ior=node.ior, anisotropy=node.anisotropy, preset=node.preset, image=node.image.name, shown=shown.name,
+    type=type(node).__name__, image=node.image.name, shown=shown.name,
     size=list(shown.size), pixels=list(shown.pixels)[:8], linked=surface.links[0].from_node == node)))
 copied = material.copy()
 bpy.data.materials.remove(copied)

@@ -1,7 +1,7 @@
 """The line of one Blender in tests/matrix.sh: report.py NAME FOLDER REFERENCE_FOLDER SECONDS [WHAT FAILED]
 
-Compares the images of FOLDER/out with those of the reference, by the one reader of the module of this Python: no texel may
-differ by more than 1e-4 of the image's maximum. Exit code 0 if all is well.
+Compares the images of FOLDER/out with those of the reference, by one reader, of the staged module: no texel may differ
+by more than 1e-4 of the image's maximum. Exit code 0 if all is well.
 """
 
 import json
