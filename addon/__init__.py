@@ -5,6 +5,13 @@ Outside Blender this package is the Python interface of the native module; insid
 
 import sys
 
+if "bl_info" in globals():
+    # Read anew: an update was installed, and the former one's parts are still there. A native module can't be
+    # exchanged: core/native.py sees whether it is the right one.
+    for _name in [name for name in sys.modules if name.startswith(f"{__name__}.") and not name.endswith("._native")]:
+        del sys.modules[_name]
+        globals().pop(_name[len(__name__) + 1 :], None)  # `from . import blender` would find the former one here
+
 from .core.native import native, problem
 
 bl_info = {
@@ -63,6 +70,8 @@ else:
 def register():
     from . import blender
 
+    if problem:
+        sys.stderr.write(f"Beamspread: {problem}\n")
     blender.register()
 
 

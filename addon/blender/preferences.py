@@ -6,11 +6,13 @@ Where the package is registered without being an enabled add-on, as batch.py doe
 from __future__ import annotations
 
 import functools
+import textwrap
 from pathlib import Path
 
 import bpy
 from bpy.props import IntProperty, StringProperty
 
+from ..core import native
 from ..core.ldf import library
 from . import compat
 
@@ -84,8 +86,13 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
         step=512,
     )
 
-    def draw(self, _context) -> None:
+    def draw(self, context) -> None:
         layout = self.layout
+        if native.problem:
+            characters = max(40, int(context.region.width / context.preferences.system.ui_scale / 7))
+            column = layout.column(align=True)
+            for number, line in enumerate(textwrap.wrap(native.problem, characters)):
+                column.label(text=line, icon="BLANK1" if number else "ERROR")
         layout.use_property_split = True
         layout.use_property_decorate = False
         layout.prop(self, "threads")

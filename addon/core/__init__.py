@@ -2,7 +2,8 @@
 
 Each package imports only those above it (tests/unit/test_layers.py reads this list):
 
-    native      the compiled module, and why it is missing if it is
+    missing     why the compiled module can't be loaded
+    native      the compiled module, or what stands for it where it is missing
     errors      sentences for the artist
     progress    progress of a job made of stages
     whole_file  files that are whole or as they were

@@ -1,8 +1,9 @@
 """The native module, which carries its libraries: nothing of the host's is taken for them, or the other way round."""
 
 import importlib
-import sys
 from pathlib import Path
+
+from . import missing
 
 
 class _Missing:
@@ -13,15 +14,14 @@ class _Missing:
 
 
 problem = ""
-"""Why the module is missing, in one sentence; empty when all is well."""
+"""Why the module is missing, in a few sentences; empty when all is well."""
+
+_FOLDER = Path(__file__).resolve().parents[1]
 
 try:
+    missing.check(_FOLDER)
     native = importlib.import_module(".._native", __package__)
-except ImportError as error:
-    folder = Path(__file__).resolve().parents[1]
-    version = f"{sys.version_info.major}.{sys.version_info.minor}"
-    problem = (
-        f"beamspread has no working native module for Python {version} in {folder} "
-        f"(looked for _native.cpython-{version.replace('.', '')}-*.so): {error}"
-    )
+    missing.check_version(_FOLDER, native.__version__)
+except (ImportError, OSError) as error:
+    problem = missing.problem_of(_FOLDER, error)
     native = _Missing()

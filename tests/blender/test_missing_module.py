@@ -1,5 +1,9 @@
-"""A copy of the package without its native module: one clear message, never a traceback."""
+"""A package whose native module is missing or useless: one clear message, never a traceback, and nothing lost.
 
+tests/unit/test_missing.py has more ways in which a module can be of no use.
+"""
+
+import json
 import shutil
 import subprocess
 import sys
@@ -8,10 +12,13 @@ from pathlib import Path
 import beamspread
 import bpy
 import pytest
-from scenes import add_material, add_plane
+from scenes import add_material, add_plane, add_sun, bake, node_of, pixels
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+from spoilt_modules import remove, zeros_within
 
 IN_BLENDER = """
-import sys
+import json, sys
 sys.path.insert(0, {folder!r})
 import bpy, beamspread
 beamspread.register()
@@ -19,8 +26,32 @@ try:
     bpy.ops.beamspread.bake()
 except RuntimeError as error:
     print("MESSAGE", error)
+bpy.ops.wm.open_mainfile(filepath={scene!r})
+material = bpy.data.materials["Medium"]
+node = next(node for node in material.node_tree.nodes if node.bl_idname == "BeamspreadNode")
+shown = node.node_tree.nodes["Image"].image
+surface = material.node_tree.get_output_node("ALL").inputs["Surface"]
+print("SEEN", json.dumps(dict(
+    type=type(node).__name__, image=node.image.name, shown=shown.name,
+    size=list(shown.size), pixels=list(shown.pixels)[:8], linked=surface.links[0].from_node == node)))
+copied = material.copy()
+bpy.data.materials.remove(copied)
+try:
+    bpy.ops.beamspread.bake(objects="ALL")
+except RuntimeError as error:
+    print("AGAIN", error)
+bpy.ops.wm.save_as_mainfile(filepath={scene!r})
+bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
 beamspread.unregister()
 """
+
+
+@pytest.fixture(params=[remove, zeros_within], ids=lambda damage: damage.__name__)
+def spoilt(request, tmp_path):
+    """Folder that holds the package with a module of no use, and what is said of it."""
+    source = Path(beamspread.__file__).parent
+    shutil.copytree(source, tmp_path / "beamspread", ignore=shutil.ignore_patterns("__pycache__"))
+    return tmp_path, request.param(tmp_path / "beamspread")
 
 
 @pytest.fixture
@@ -39,13 +70,47 @@ def blender_command(script, *arguments, scene=None):
     return [sys.executable, str(script), *([str(scene)] if scene else []), *arguments]
 
 
-def test_add_on_registers_and_says_what_is_missing(incomplete):
-    script = incomplete / "script.py"
-    script.write_text(IN_BLENDER.format(folder=str(incomplete)))
+def baked_scene(path):
+    """A file with a baked, packed image; what its node holds."""
+    material = add_material(ior=1.3, linked=True)
+    plane = add_plane(material=material)
+    add_sun(0)
+    bpy.context.scene.beamspread.resolution = 16
+    bake(plane)
+    node_of(material).anisotropy = 0.7
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return pixels(node_of(material).image)
+
+
+def test_add_on_registers_says_what_is_missing_and_loses_nothing(spoilt):
+    folder, said = spoilt
+    scene = folder / "baked.blend"
+    before = baked_scene(scene)
+    assert before.max() > 0
+    script = folder / "script.py"
+    script.write_text(IN_BLENDER.format(folder=str(folder), scene=str(scene)))
     done = subprocess.run(blender_command(script), capture_output=True, text=True, timeout=120)
     output = done.stdout + done.stderr
-    assert "MESSAGE Error: beamspread has no working native module for Python" in output
     assert "Traceback" not in output
+    (message,) = [line for line in output.splitlines() if line.startswith("MESSAGE")]
+    assert message.startswith("MESSAGE Error: beamspread has no working native module for Python")
+    # In the log as well, for those who don't see the panel.
+    (logged,) = [line for line in done.stderr.splitlines() if line.startswith("Beamspread: ")]
+    for text in (message, logged):
+        assert said in text
+        assert f"Needed: _native.cpython-{sys.version_info[0]}{sys.version_info[1]}-" in text
+        assert "To mend it: get the zip" in text
+    assert "AGAIN Error: beamspread has no working native module" in output
+    (seen,) = [json.loads(line[5:]) for line in output.splitlines() if line.startswith("SEEN ")]
+    assert seen["type"] == "BeamspreadNode"
+    assert seen["linked"]
+    assert (seen["shown"], seen["size"]) == (seen["image"], [16, 16])
+    assert max(seen["pixels"][:3]) > 0
+    # And with the module again, all is as it was.
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    node = node_of(bpy.data.materials["Medium"])
+    assert (node.ior, node.anisotropy) == (pytest.approx(1.3), pytest.approx(0.7))
+    assert (pixels(node.image) == before).all()
 
 
 def test_batch_says_what_is_missing(incomplete):

@@ -184,3 +184,17 @@ def test_copies_that_part_leave_no_tree_behind():
     node_of(second).ior = 1.2
     node_of(first).ior = 1.4
     assert len(bpy.data.node_groups) == 2
+
+
+def test_a_removed_material_leaves_no_tree_in_the_file(tmp_path):
+    first = add_material(ior=1.3)
+    add_plane(material=first)
+    second = first.copy()
+    node_of(second).ior = 1.2
+    bpy.data.materials.remove(second)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "removed.blend"))
+    assert len(bpy.data.node_groups) == 2  # undo may bring its material back
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "removed.blend"))
+    (tree,) = bpy.data.node_groups
+    assert node_of(bpy.data.materials["Medium"]).node_tree == tree
+    assert tree.use_fake_user

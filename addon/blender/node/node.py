@@ -12,7 +12,15 @@ from ...core.material.presets import presets
 from .. import compat
 from .draw import draw_node
 from .output import link_output, plain_of
-from .tree import BASE_COLOR, ROUGHNESS, ROUGHNESS_BEFORE, add_missing_inputs, make_inner_tree, show_values
+from .tree import (
+    BASE_COLOR,
+    ROUGHNESS,
+    ROUGHNESS_BEFORE,
+    add_missing_inputs,
+    is_inner_tree,
+    make_inner_tree,
+    show_values,
+)
 
 CUSTOM_PRESET = "CUSTOM"
 
@@ -250,6 +258,20 @@ def upgrade_nodes(*_arguments) -> None:
         _upgrade(tree)
 
 
+@persistent
+def release_unused_trees(*_arguments) -> None:
+    """Let inner trees go that no node shows any more: those of a material that was removed, of which no node is told.
+
+    To remove them here would crash on undo; without their fake user they are not saved.
+    """
+    trees = [
+        tree for tree in bpy.data.node_groups if is_inner_tree(tree) and tree.library is None and tree.use_fake_user
+    ]
+    for tree, users in bpy.data.user_map(subset=set(trees)).items() if trees else ():
+        if not users:
+            tree.use_fake_user = False
+
+
 def _upgrade(tree) -> None:
     if tree.library is not None or not add_missing_inputs(tree):
         return
@@ -263,10 +285,12 @@ def register() -> None:
     if not BeamspreadNode.is_registered:
         compat.register_node_class(BeamspreadNode, "ShaderNodeCustomGroup")
     bpy.app.handlers.load_post.append(upgrade_nodes)
+    bpy.app.handlers.save_pre.append(release_unused_trees)
 
 
 def unregister() -> None:
     bpy.app.handlers.load_post.remove(upgrade_nodes)
+    bpy.app.handlers.save_pre.remove(release_unused_trees)
     # Blender 3.4 frees the type but not the evaluated copies of nodes that point to it, and crashes when those go, at
     # the latest on exit: there a class in use stays. In 4.5 a class that stays keeps the process from exiting.
     if bpy.app.version >= (4, 0, 0) or not any(_all_nodes()):

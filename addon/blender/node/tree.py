@@ -4,6 +4,7 @@ import bpy
 
 from .. import compat
 
+NAME = ".Beamspread"
 BASE_COLOR, ROUGHNESS, NORMAL = "Base Color", "Roughness", "Normal"
 IMAGE, FRESNEL, COAT, GLOSSY = "Image", "Fresnel", "Coat", "Glossy"
 FACING = "Facing"
@@ -18,7 +19,7 @@ def make_inner_tree() -> bpy.types.ShaderNodeTree:
     The image already is what leaves the surface, so the coat adds to it and takes nothing away.
     """
     # The dot hides it in menus. A Blender without this add-on drops a tree that has no fake user when it saves.
-    tree = bpy.data.node_groups.new(".Beamspread", "ShaderNodeTree")
+    tree = bpy.data.node_groups.new(NAME, "ShaderNodeTree")
     tree.use_fake_user = True
     compat.add_output_socket(tree, "NodeSocketColor", "Color")
     compat.add_output_socket(tree, "NodeSocketShader", "BSDF")
@@ -42,6 +43,11 @@ def make_inner_tree() -> bpy.types.ShaderNodeTree:
     link(output.inputs["BSDF"], total.outputs[0])
     add_missing_inputs(tree)
     return tree
+
+
+def is_inner_tree(tree) -> bool:
+    """Whether it was made here."""
+    return tree.name.startswith(NAME) and {IMAGE, FRESNEL, GLOSSY} <= set(tree.nodes.keys())
 
 
 def add_missing_inputs(tree) -> bool:

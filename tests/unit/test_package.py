@@ -1,0 +1,117 @@
+"""The zip that artists install."""
+
+import ast
+import hashlib
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import beamspread
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+STAGED = Path(beamspread.__file__).resolve().parent
+OTHER_MODULE = "_native.cpython-313-x86_64-linux-gnu.so"
+
+
+LIBRARIES = {"ducc", "eigen", "embree", "glm", "highway", "imath", "openexr", "pybind11", "tbb", "zlib"}
+
+
+def packed(folder, staged=STAGED):
+    """The module of another Python is made up: what is in it isn't looked at."""
+    modules = folder / "modules"
+    modules.mkdir(exist_ok=True)
+    (modules / OTHER_MODULE).write_bytes(b"another Python's")
+    licences = max(ROOT.glob("build/deps/*/licenses"), key=lambda path: path.stat().st_mtime)
+    return subprocess.run(
+        [sys.executable, "-B", ROOT / "tools" / "make_package.py", staged, modules, licences, folder],
+        capture_output=True,
+        text=True,
+    )
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("package")
+    done = packed(folder)
+    assert done.returncode == 0, done.stderr
+    (path,) = folder.glob("*.zip")
+    return path
+
+
+@pytest.fixture(scope="module")
+def files(path):
+    """Name -> bytes."""
+    with zipfile.ZipFile(path) as archive:
+        assert archive.testzip() is None
+        return {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
+
+
+def test_its_name_and_size(path):
+    version = (STAGED / "VERSION").read_text().strip()
+    assert path.name == f"beamspread-{version}-linux-x64.zip"
+    assert path.stat().st_size <= 40_000_000
+
+
+def test_all_of_it_is_in_one_folder_which_is_named(path, files):
+    assert {name.split("/")[0] for name in files} == {"beamspread"}
+    with zipfile.ZipFile(path) as archive:  # Blender 3.4 removes an older version's folder only then
+        assert archive.namelist()[0] == "beamspread/"
+
+
+def test_it_holds_what_was_staged_and_licences_and_nothing_else(files):
+    names = {name.removeprefix("beamspread/") for name in files}
+    staged = {path.relative_to(STAGED).as_posix() for path in STAGED.rglob("*") if path.is_file()}
+    staged = {name for name in staged if "__pycache__" not in name and not name.endswith((".pyi", "py.typed"))}
+    licences = {name for name in names if name.startswith("LICENSES/")}
+    assert names == staged | licences | {"LICENSE", "native.sha256", OTHER_MODULE}
+    assert licences == {f"LICENSES/{name}.txt" for name in LIBRARIES}
+    for name in ("__init__.py", "blender_manifest.toml", "batch.py", "data/materials.csv", "VERSION"):
+        assert f"beamspread/{name}" in files
+    assert sum(name.startswith("library/") for name in names) == 12
+    assert all(files[f"beamspread/{name}"] == (STAGED / name).read_bytes() for name in staged)
+
+
+def test_every_module_has_its_checksum(files):
+    sums = dict(reversed(line.split("  ")) for line in files["beamspread/native.sha256"].decode().splitlines())
+    modules = {name.removeprefix("beamspread/") for name in files if name.endswith((".so", ".pyd"))}
+    assert set(sums) == modules
+    for name in modules:
+        assert sums[name] == hashlib.sha256(files[f"beamspread/{name}"]).hexdigest()
+
+
+def test_blender_reads_its_bl_info_without_running_it(files):
+    tree = ast.parse(files["beamspread/__init__.py"])
+    (info,) = [node.value for node in tree.body if isinstance(node, ast.Assign) and node.targets[0].id == "bl_info"]
+    assert ast.literal_eval(info)["blender"] == (3, 4, 0)
+
+
+def test_the_same_files_give_the_same_bytes(path, tmp_path):
+    assert packed(tmp_path).returncode == 0
+    assert (tmp_path / path.name).read_bytes() == path.read_bytes()
+
+
+def test_strange_files_and_versions_that_differ_are_refused(tmp_path):
+    import shutil
+
+    staged = tmp_path / "beamspread"
+    shutil.copytree(STAGED, staged, ignore=shutil.ignore_patterns("__pycache__", "library"))
+    (staged / "data" / "notes.txt").write_text("left behind")
+    done = packed(tmp_path, staged)
+    assert "notes.txt: no such file belongs into a package" in done.stderr
+    (staged / "data" / "notes.txt").unlink()
+    (staged / "VERSION").write_text("7.0.0\n")
+    done = packed(tmp_path, staged)
+    assert "versions differ" in done.stderr
+    assert list(tmp_path.glob("*.zip")) == []
+
+
+BLENDER_EXT = ROOT / "build/bpy-4.5/bpy/4.5/scripts/addons_core/bl_pkg/cli/blender_ext.py"
+
+
+@pytest.mark.skipif(not BLENDER_EXT.exists(), reason="tools/setup.sh --tests fetches the official Blender")
+def test_blender_finds_it_a_valid_extension(path):
+    done = subprocess.run([sys.executable, "-B", BLENDER_EXT, "validate", path], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "error" not in (done.stdout + done.stderr).lower()

@@ -1,0 +1,99 @@
+"""Packs the staged package into one zip that Blender installs, as a legacy add-on and as an extension.
+
+    tools/make_package.py STAGED_PACKAGE MODULES LICENCES OUTPUT_FOLDER
+
+takes the modules for further Pythons and the licences of the libraries in them from their folders, and
+makes OUTPUT_FOLDER/beamspread-VERSION-PLATFORM.zip with one folder, `beamspread`: Blender 3.4 can't install files at
+the archive's root. The same files give the same bytes. CMake's target `package` calls this.
+"""
+
+import hashlib
+import re
+import sys
+import zipfile
+from pathlib import Path
+
+from version import versions
+
+ROOT = Path(__file__).resolve().parent.parent
+FOLDER = "beamspread"
+CHECKSUMS = "native.sha256"
+# The earliest that a zip knows.
+TIME = (1980, 1, 1, 0, 0, 0)
+MOST_BYTES = 40_000_000
+# Type stubs are for editors: the wheel has them.
+LEFT_OUT = re.compile(r"(^|/)__pycache__/|\.pyc$|\.pyi$|^py\.typed$|/\.|^\.|^CMakeFiles/")
+SUFFIXES = {".py", ".exr", ".csv", ".toml", ".so", ".pyd"}
+MODULE = re.compile(r"^_native\.(?P<abi>cpython-3\d+|cp3\d+|abi3)[^/]*\.(so|pyd)$")
+
+
+def platform_of(manifest: str) -> str:
+    """The one platform that the manifest names."""
+    (name,) = re.search(r"^platforms = \[(.*)\]$", manifest, re.MULTILINE)[1].split(",")
+    return name.strip().strip('"')
+
+
+def licences(folder: Path) -> dict[str, bytes]:
+    """File in the zip -> text: of Beamspread, and of each library that is in the modules."""
+    texts = {path.name: path.read_bytes() for path in sorted(folder.glob("*.txt"))}
+    if not texts:
+        sys.exit(f"{folder} has no licences: build first")
+    return {"LICENSE": (ROOT / "LICENSE").read_bytes()} | {f"LICENSES/{name}": text for name, text in texts.items()}
+
+
+def content(staged: Path, further_modules: Path, licences_folder: Path) -> dict[str, bytes]:
+    """Name in the package -> bytes."""
+    files = {path.name: path.read_bytes() for path in further_modules.glob("_native.*")}
+    for path in sorted(staged.rglob("*")):
+        name = path.relative_to(staged).as_posix()
+        if path.is_dir() or LEFT_OUT.search(name):
+            continue
+        if path.suffix not in SUFFIXES and name != "VERSION":
+            sys.exit(f"{path}: no such file belongs into a package; tools/make_package.py lists what does")
+        files[name] = path.read_bytes()
+    modules = [name for name in files if MODULE.match(name)]
+    if not modules:
+        sys.exit(f"{staged} has no native module: build first")
+    # So that a file that was damaged on its way is found before it is run.
+    sums = "".join(f"{hashlib.sha256(files[name]).hexdigest()}  {name}\n" for name in sorted(modules))
+    return {**files, **licences(licences_folder), CHECKSUMS: sums.encode()}
+
+
+def write(path: Path, files: dict[str, bytes]) -> None:
+    """A zip of these files in one folder, whole or not at all."""
+    partial = path.with_suffix(".partial")
+    with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        # Without an entry of its own Blender's legacy installer leaves an older version's folder where it is and writes
+        # into its files: even into the native module that is in use, which ends the process.
+        folder = zipfile.ZipInfo(f"{FOLDER}/", TIME)
+        folder.create_system, folder.external_attr = 3, (0o40755 << 16) | 0x10
+        archive.writestr(folder, b"")
+        for name in sorted(files):
+            entry = zipfile.ZipInfo(f"{FOLDER}/{name}", TIME)
+            entry.create_system = 3  # Unix, wherever this runs
+            entry.external_attr = 0o644 << 16
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, files[name])
+    if partial.stat().st_size > MOST_BYTES:
+        sys.exit(f"{partial} has {partial.stat().st_size} bytes, more than {MOST_BYTES}")
+    partial.replace(path)
+
+
+def main(staged: Path, further_modules: Path, licences_folder: Path, output: Path) -> Path:
+    said = versions(staged)
+    if len(set(said.values())) > 1:
+        sys.exit(f"versions differ: {said}; tools/version.py writes them anew")
+    files = content(staged, further_modules, licences_folder)
+    path = output / f"beamspread-{said['VERSION']}-{platform_of(files['blender_manifest.toml'].decode())}.zip"
+    for old in output.glob("beamspread-*.zip"):
+        old.unlink()
+    write(path, files)
+    modules = [MODULE.match(name)["abi"] for name in sorted(files) if MODULE.match(name)]
+    print(f"{path}: {path.stat().st_size / 1e6:.1f} MB, {len(files)} files, modules {', '.join(modules)}")
+    return path
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 5:
+        sys.exit(__doc__)
+    main(*map(Path, sys.argv[1:]))
