@@ -8,6 +8,7 @@ the archive's root. The same files give the same bytes. CMake's target `package`
 """
 
 import hashlib
+import platform
 import re
 import sys
 import zipfile
@@ -27,10 +28,18 @@ SUFFIXES = {".py", ".exr", ".csv", ".toml", ".so", ".pyd"}
 MODULE = re.compile(r"^_native\.(?P<abi>cpython-3\d+|cp3\d+|abi3)[^/]*\.(so|pyd)$")
 
 
-def platform_of(manifest: str) -> str:
-    """The one platform that the manifest names."""
-    (name,) = re.search(r"^platforms = \[(.*)\]$", manifest, re.MULTILINE)[1].split(",")
-    return name.strip().strip('"')
+def platform_here() -> str:
+    """This system in the words of Blender's manifests: what is packed was built here."""
+    system = {"linux": "linux", "darwin": "macos", "win32": "windows"}[sys.platform]
+    return f"{system}-{'arm64' if platform.machine().lower() in {'arm64', 'aarch64'} else 'x64'}"
+
+
+def of_platform(manifest: bytes, name: str) -> bytes:
+    """The manifest, for this platform alone."""
+    changed, count = re.subn(rb"^platforms = .*$", b'platforms = ["%b"]' % name.encode(), manifest, flags=re.MULTILINE)
+    if count != 1:
+        sys.exit("the manifest names no platforms")
+    return changed
 
 
 def licences(folder: Path) -> dict[str, bytes]:
@@ -84,7 +93,8 @@ def main(staged: Path, further_modules: Path, licences_folder: Path, output: Pat
     if len(set(said.values())) > 1:
         sys.exit(f"versions differ: {said}; tools/version.py writes them anew")
     files = content(staged, further_modules, licences_folder)
-    path = output / f"beamspread-{said['VERSION']}-{platform_of(files['blender_manifest.toml'].decode())}.zip"
+    files["blender_manifest.toml"] = of_platform(files["blender_manifest.toml"], platform_here())
+    path = output / f"beamspread-{said['VERSION']}-{platform_here()}.zip"
     for old in output.glob("beamspread-*.zip"):
         old.unlink()
     write(path, files)

@@ -76,9 +76,7 @@ def phase_install(folder):
     expect(MODULE in bpy.context.preferences.addons, "the add-on is not on after its installation")
     expect(installed_version() == version_of(older), f"{installed_version()} is installed, not {version_of(older)}")
     expect(sorted(in_zip(older)) == sorted(on_disk()), "the folder doesn't hold what the zip does")
-    for name, value in SETTINGS.items():
-        setattr(preferences(), name, value)
-    preferences().cache_folder = str(folder / "cache")
+    set_preferences(folder)
     if not problem():
         scene_with_node()
         bpy.context.scene.beamspread.resolution = 16
@@ -200,6 +198,22 @@ def kept_file(folder):
     expect(sorted((folder / "cache").glob("*.exr")) == cached, "the medium was simulated anew")
     expect([path.stat().st_mtime_ns for path in cached] == times, "the medium was written anew")
     expect(preferences().cache_folder == str(folder / "cache"), "the cache folder was forgotten")
+
+
+def user_preferences(folder):
+    """Read them, as programs do by themselves: Blender as a module starts from factory settings."""
+    if bpy.app.version >= (4, 5, 0):
+        bpy.ops.wm.read_userpref()
+        return
+    # That ends the process of 4.2.23, whatever is installed: here what was saved is set once more.
+    bpy.ops.preferences.addon_enable(module=MODULE)
+    set_preferences(folder)
+
+
+def set_preferences(folder):
+    for name, value in SETTINGS.items():
+        setattr(preferences(), name, value)
+    preferences().cache_folder = str(folder / "cache")
 
 
 def write_facts(folder):
@@ -385,8 +399,7 @@ def copies_and_undo():
 def main():
     phase, folder = sys.argv[-2], Path(sys.argv[-1])
     if not bpy.app.binary_path and phase != "install":
-        # The module starts from factory settings; programs read the user's by themselves.
-        bpy.ops.wm.read_userpref()
+        user_preferences(folder)
     try:
         globals()[f"phase_{phase}"](folder)
         code = 0

@@ -88,7 +88,9 @@ class _Child:
     def __init__(self, command: list[str], counts_samples: bool = False) -> None:
         self._counts_samples = counts_samples
         pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
-        self._process = subprocess.Popen(command, text=True, errors="replace", **pipes)
+        # Windows would open a console for it.
+        hidden = getattr(subprocess, "CREATE_NO_WINDOW", 0)
+        self._process = subprocess.Popen(command, encoding="utf-8", errors="replace", creationflags=hidden, **pipes)
         self.fraction, self.heard = 0.0, time.monotonic()
         self.last_lines: deque[str] = deque(maxlen=LAST_LINES)
         self._listener = threading.Thread(target=self._listen, daemon=True)

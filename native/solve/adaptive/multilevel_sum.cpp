@@ -4,9 +4,9 @@
 #include <array>
 #include <limits>
 
+#include "base/platform.h"
 #include "base/threads.h"
 #include "simd/loops.h"
-#include "base/platform.h"
 
 namespace beamspread {
 
