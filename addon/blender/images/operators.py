@@ -31,7 +31,7 @@ class ImageOperator:
     @classmethod
     def poll(cls, context):
         image = image_in(context)
-        if image is None or previews.MADE_FOR_PREVIEWS in image:
+        if image is None or previews.holds_previews_alone(image):
             return False
         return 0 not in image.size and image.library is None and cls.needed(context, image)
 

@@ -100,7 +100,7 @@ class Results:
 
     def _store_shown(self, node, bake: Bake, texture: np.ndarray) -> tuple[str, bpy.types.Image]:
         image = node.image
-        if image is not None and previews.MADE_FOR_PREVIEWS in image:
+        if image is not None and previews.holds_previews_alone(image):
             bpy.data.images.remove(image)  # which brings no settings of the user's
             image = None
         if image is None:
