@@ -59,7 +59,9 @@ class Results:
         for layer, texture in bake.layers.items():
             if layer == COMBINED:
                 path, image = self._store_shown(node, bake, texture)
-                bake.warnings += link_result(node, image)
+                warnings, notes = link_result(node, image)
+                bake.warnings += warnings
+                bake.notes += notes
             else:
                 path = self._store_beside(node, bake, layer, texture)
             paths.append(path)

@@ -52,7 +52,8 @@ def bake_active_image(engine, depsgraph, obj, width: int, height: int) -> None:
             bake.keep(lambda bake: _put(pixels, bake))
             state.note(bake)
         for bake in bakes:
-            for level, message in [("ERROR", bake.error), *(("WARNING", warning) for warning in bake.warnings)]:
+            warnings, notes = [("WARNING", one) for one in bake.warnings], [("INFO", one) for one in bake.notes]
+            for level, message in [("ERROR", bake.error), *warnings, *notes]:
                 if message:
                     engine.report({level}, f"{bake.target}: {message}")
         if all(bake.status == WRITTEN for bake in bakes):

@@ -12,7 +12,7 @@ from dataclasses import replace
 import bpy
 from bpy.app.handlers import persistent
 
-from ...core.bake.runner import Target
+from ...core.bake.runner import Bake, Target
 from ..images import previews
 from ..images.files import file_of
 from ..images.owners import noted_as
@@ -44,15 +44,15 @@ def parts_of(context, targets: list[Target]) -> dict[Target, Parts]:
     return fingerprints.of(context, targets)
 
 
-def keep(target: Target, parts: Parts | None, warnings: list[str], is_first_look: bool) -> None:
-    """Note in the node's image what the bake in it has read."""
-    image = _image(target)
+def keep(bake: Bake, parts: Parts | None, is_first_look: bool = False) -> None:
+    """Note in the node's image what the bake in it has read and said."""
+    image = _image(bake.target)
     if image is None or parts is None:
         return
     parts = parts | {IMAGE: image_part(image)}  # the bake may have made it
     if is_first_look:
         parts[QUALITY] = FIRST_LOOK
-    keep_record(image, target, Record(parts, tuple(warnings), image.is_dirty))
+    keep_record(image, bake.target, Record(parts, tuple(bake.warnings), image.is_dirty, tuple(bake.notes)))
 
 
 def _image(target: Target):
@@ -77,9 +77,11 @@ def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
     if record is None:
         return Row(target, Standing.NEVER)
     if changed and changed != [QUALITY]:
-        return Row(target, Standing.STALE, (f"Changed since its bake: {', '.join(changed)}.", *record.warnings), True)
+        why = f"Changed since its bake: {', '.join(changed)}."
+        return Row(target, Standing.STALE, (why, *record.warnings, *record.notes), True)
     warnings = (*([_why_again(record.parts[QUALITY], now[QUALITY])] if changed else []), *record.warnings)
-    return Row(target, Standing.WARNED if warnings else Standing.BAKED, warnings, bool(changed))
+    standing = Standing.WARNED if warnings else Standing.BAKED
+    return Row(target, standing, (*warnings, *record.notes), bool(changed))
 
 
 def _has_lost_its_file(image) -> bool:

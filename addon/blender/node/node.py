@@ -98,8 +98,8 @@ def _is_shared(tree, plain=None) -> bool:
     return tree.users - tree.use_fake_user > own
 
 
-def link_result(node, image) -> list[str]:
-    """Show `image` in the node, and the node at its material's output; sentences on what that replaces."""
+def link_result(node, image) -> tuple[list[str], list[str]]:
+    """Show `image` in the node, and the node at its material's output; warnings and notes, see `link_output`."""
     if node.node_tree is None:
         node.node_tree = make_inner_tree()
     node.image = image
