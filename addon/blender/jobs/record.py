@@ -14,7 +14,7 @@ KEY = "beamspread_bakes"
 
 @dataclass(frozen=True)
 class Record:
-    """One bake in an image: digests of what it read, its warnings and notes, and whether its pixels were not saved then."""
+    """One bake in an image: digests of what it read, what it said, and whether its pixels were not saved then."""
 
     parts: Parts
     warnings: tuple[str, ...] = ()
@@ -22,8 +22,8 @@ class Record:
     notes: tuple[str, ...] = ()
 
     def changed(self, now: Parts) -> list[str]:
-        """Names of the parts that are no longer the same."""
-        return [name for name, digest in now.items() if self.parts.get(name) != digest]
+        """Names of the parts that are no longer the same; of those that older files don't know nothing is said."""
+        return [name for name, digest in now.items() if self.parts.get(name, digest) != digest]
 
 
 def record_of(image, target: Target) -> Record | None:

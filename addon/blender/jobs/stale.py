@@ -21,12 +21,13 @@ from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
 from .record import Record, keep_record, record_of
 from .state import Row, Standing, redraw, state
 
-REST_SECONDS = 0.3
+# After the last change; longer where a look takes long, which happens between two changes at most once.
+REST_SECONDS, MOST_OF_THE_TIME = 0.3, 0.05
 
 FIRST_LOOK = "first look"
 
 fingerprints = Fingerprints()
-_last = {"change": 0.0}
+_last = {"change": 0.0, "seconds": 0.0, "is looking": False}
 
 
 def refresh(context) -> None:
@@ -107,14 +108,20 @@ def look_soon() -> None:
 
 
 def _look() -> float | None:
-    waiting = _last["change"] + REST_SECONDS - time.monotonic()
+    rest = max(REST_SECONDS, _last["seconds"] / MOST_OF_THE_TIME)
+    began = time.monotonic()
+    waiting = _last["change"] + rest - began
     if waiting > 0:
         return waiting
     context = bpy.context
     if context.window is not None or context.window_manager.windows:
         window = context.window or context.window_manager.windows[0]
-        with context.temp_override(window=window):
-            refresh(bpy.context)
+        _last["is looking"] = True
+        try:
+            with context.temp_override(window=window):
+                refresh(bpy.context)
+        finally:
+            _last["is looking"], _last["seconds"] = False, time.monotonic() - began
         redraw(bpy.context)
     return None
 
@@ -127,8 +134,10 @@ def _on_update(_scene, depsgraph) -> None:
         if update.is_updated_geometry or not isinstance(update.id, bpy.types.Object)
     ]
     fingerprints.forget(changed)
-    if len(depsgraph.updates):
-        look_soon()
+    if any(update.is_updated_geometry and isinstance(update.id, bpy.types.Object) for update in depsgraph.updates):
+        fingerprints.forget_scatter()
+    if not _last["is looking"]:
+        look_soon()  # also where there is no update: Blender 3.4 names none for strokes on images
 
 
 @persistent
