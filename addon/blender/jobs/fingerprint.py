@@ -314,7 +314,9 @@ def settings_part(scene, solver: str | None = None, indirect: bool | None = None
     """Of what decides how is baked; arguments go before the scene's."""
     own = scene.beamspread
     use_indirect = own.use_indirect if indirect is None else indirect
-    bounces = [getattr(scene.cycles, name, None) for name in BOUNCES] if use_indirect and hasattr(scene, "cycles") else []
+    bounces = (
+        [getattr(scene.cycles, name, None) for name in BOUNCES] if use_indirect and hasattr(scene, "cycles") else []
+    )
     return digest([solver or own.solver, own.distributions, own.samples, own.margin, use_indirect], *bounces)
 
 

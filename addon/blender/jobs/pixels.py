@@ -63,7 +63,7 @@ def _hash(content: bytes | np.ndarray) -> str:
 
 
 def images_of(owner) -> set:
-    """Textures in the nodes of a material, lamp or world: of one with our node, those that its base colour comes from."""
+    """Textures in the nodes of a material, lamp or world; with our node, where its base colour comes from some."""
     tree = owner.node_tree
     if tree is None:
         return set()
