@@ -2,9 +2,10 @@
 
 import bpy
 import pytest
-from beamspread.blender.jobs import stale
+from beamspread.blender.jobs import batch, stale
 from beamspread.blender.jobs.state import Standing, state
 from beamspread.core.bake.runner import Bake, Target
+from beamspread.core.batch import options
 from mathutils import Matrix
 from scenes import add_blocker, add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
 
@@ -324,3 +325,20 @@ def test_how_often_light_may_bounce_counts_where_it_may(plane):
     assert row().standing == Standing.BAKED
     cycles.diffuse_bounces += 1
     assert "settings" in row().sentences[0]
+
+
+@pytest.mark.parametrize("arguments", [[], ["--solver", "direct"], ["--pass", "IRRADIANCE"]])
+def test_a_batch_that_fills_the_nodes_image_is_a_bake(arguments, tmp_path):
+    bpy.context.scene.beamspread.resolution, bpy.context.scene.beamspread.image_storage = 16, "FILES"
+    plane = add_plane(material=add_material())
+    add_sun(20)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    bake(plane)
+    del node_of(plane.data.materials[0]).image["beamspread_bakes"]
+    state.forget()
+    assert row().standing == Standing.NEVER
+    assert batch.bake_all(options.parse(arguments)).all_written()
+    expected = Standing.NEVER if "--pass" in arguments else Standing.STALE if arguments else Standing.BAKED
+    assert row().standing == expected
+    if expected == Standing.STALE:
+        assert row().sentences[0] == "Changed since its bake: settings."

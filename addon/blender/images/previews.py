@@ -8,6 +8,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..node.node import BeamspreadNode
+from ..registration import all_or_nothing, handlers
 
 # Of an image that was made to show previews, and holds nothing else: as if the node had none.
 MADE_FOR_PREVIEWS = "beamspread_preview"
@@ -85,19 +86,6 @@ def _forget_made(*_arguments) -> None:
             leave(image)
 
 
-HANDLERS = {
-    "save_pre": _before_saving,
-    "undo_post": _forget_made,
-    "redo_post": _forget_made,
-    "load_post": _forget_made,
-}
-
-
-def register() -> None:
-    for name, handler in HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(handler)
-
-
-def unregister() -> None:
-    for name, handler in HANDLERS.items():
-        getattr(bpy.app.handlers, name).remove(handler)
+register, unregister = all_or_nothing(
+    *handlers(save_pre=_before_saving, undo_post=_forget_made, redo_post=_forget_made, load_post=_forget_made)
+)

@@ -13,6 +13,7 @@ from ...core.bake.settings import COMBINED
 from ..images import previews
 from ..images.results import Results
 from ..node.find import NOTHING_FOUND, find_misplaced, find_targets
+from ..registration import all_or_nothing, classes
 from . import popup, stale
 from .prepare import read_scene
 from .queue import Queue
@@ -277,20 +278,13 @@ class BEAMSPREAD_OT_cancel(bpy.types.Operator):
         return {"FINISHED"}
 
 
-_classes = (BEAMSPREAD_OT_bake, BEAMSPREAD_OT_cancel)
-
-
-def register() -> None:
-    for one in _classes:
-        bpy.utils.register_class(one)
-
-
-def unregister() -> None:
-    # A thread that outlives its operator would end Blender with an error when that quits.
+def _end_threads() -> None:
+    """One that outlives its operator would end Blender with an error when that quits."""
     for thread in threading.enumerate():
         if isinstance(thread, BakeThread):
             thread.cancel()
             thread.join()
     state.stop()
-    for one in reversed(_classes):
-        bpy.utils.unregister_class(one)
+
+
+register, unregister = all_or_nothing(*classes(BEAMSPREAD_OT_bake, BEAMSPREAD_OT_cancel), (lambda: None, _end_threads))

@@ -22,6 +22,9 @@ from ..node.tree import BASE_COLOR
 # Files of more bytes would take more than about 10 ms to read.
 LARGE = 8 << 20
 
+# Of what is painted and not saved: to read more takes longer than .2 s. More of it counts as painted, however often.
+MOST_VALUES = 4 * 2048**2
+
 
 class Pixels:
     """Marks of images; those of files are kept until they change."""
@@ -37,6 +40,8 @@ class Pixels:
     def mark(self, image) -> str:
         """Of what the image shows."""
         if image.is_dirty:
+            if len(image.pixels) > MOST_VALUES:
+                return "painted"
             values = np.empty(len(image.pixels), np.float32)
             image.pixels.foreach_get(values)
             return _hash(values)

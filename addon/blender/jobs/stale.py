@@ -17,6 +17,7 @@ from ..images import previews
 from ..images.files import file_of
 from ..images.owners import noted_as
 from ..node.find import find_node, find_targets
+from ..registration import all_or_nothing, handlers
 from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
 from .record import Record, keep_record, record_of
 from .state import Row, Standing, redraw, state
@@ -27,11 +28,13 @@ REST_SECONDS, MOST_OF_THE_TIME = 0.3, 0.05
 FIRST_LOOK = "first look"
 
 fingerprints = Fingerprints()
+_waiting: list[tuple[Bake, Parts | None]] = []
 _last = {"change": 0.0, "seconds": 0.0, "is looking": False}
 
 
 def refresh(context) -> None:
     """Bring the rows of all targets of the context's scene up to date."""
+    _keep_waiting()
     targets = find_targets(context.scene.objects)
     recorded = {target: record for target in targets if (record := _record(target)) is not None}
     now = fingerprints.of(context, recorded) if recorded else {}
@@ -54,6 +57,16 @@ def keep(bake: Bake, parts: Parts | None, is_first_look: bool = False) -> None:
     if is_first_look:
         parts[QUALITY] = FIRST_LOOK
     keep_record(image, bake.target, Record(parts, tuple(bake.warnings), image.is_dirty, tuple(bake.notes)))
+
+
+def keep_later(bake: Bake, parts: Parts | None) -> None:
+    """As `keep`, once Blender has put the bake's pixels into the image; from any thread."""
+    _waiting.append((bake, parts))
+
+
+def _keep_waiting() -> None:
+    while _waiting:
+        keep(*_waiting.pop(0))
 
 
 def _image(target: Target):
@@ -141,30 +154,37 @@ def _on_update(_scene, depsgraph) -> None:
 
 
 @persistent
+def _before_saving(*_arguments) -> None:
+    _keep_waiting()
+
+
+@persistent
+def _before_loading(*_arguments) -> None:
+    _waiting.clear()
+
+
+@persistent
 def _on_all(*_arguments) -> None:
     """Undo and loading bring other data-blocks, of which nothing is known."""
     fingerprints.forget()
     look_soon()
 
 
-HANDLERS = {
-    "depsgraph_update_post": _on_update,
-    "frame_change_post": _on_update,
-    "undo_post": _on_all,
-    "redo_post": _on_all,
-    "load_post": _on_all,
-}
-
-
-def register() -> None:
-    for name, function in HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(function)
-    look_soon()
-
-
-def unregister() -> None:
-    for name, function in HANDLERS.items():
-        getattr(bpy.app.handlers, name).remove(function)
+def _stop_looking() -> None:
     if bpy.app.timers.is_registered(_look):
         bpy.app.timers.unregister(_look)
     fingerprints.forget()
+
+
+register, unregister = all_or_nothing(
+    *handlers(
+        depsgraph_update_post=_on_update,
+        frame_change_post=_on_update,
+        undo_post=_on_all,
+        redo_post=_on_all,
+        save_pre=_before_saving,
+        load_pre=_before_loading,
+        load_post=_on_all,
+    ),
+    (look_soon, _stop_looking),
+)

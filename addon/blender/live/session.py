@@ -17,6 +17,7 @@ from ...core.live.subject import Subject
 from ..images.owners import owners_of
 from ..images.previews import holds_previews_alone, leave, previews
 from ..jobs.state import state
+from ..registration import all_or_nothing, handlers
 from .canvas import Canvas, image_for, image_name_of
 from .marks import Marks
 from .painting import painted_results
@@ -351,25 +352,24 @@ def _leave_file(*_arguments) -> None:
     end(keep_pixels=True)
 
 
-HANDLERS = {
-    "depsgraph_update_post": _changed,
-    "frame_change_post": _changed,
-    "undo_post": _undone,
-    "redo_post": _undone,
-    "load_pre": _leave_file,
-}
-
-
-def register() -> None:
-    for name, function in HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(function)
+def _start() -> None:
     if not bpy.app.background:
         bpy.app.timers.register(_tick, first_interval=OFF_SECONDS, persistent=True)
 
 
-def unregister() -> None:
+def _stop() -> None:
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     end()
-    for name, function in HANDLERS.items():
-        getattr(bpy.app.handlers, name).remove(function)
+
+
+register, unregister = all_or_nothing(
+    *handlers(
+        depsgraph_update_post=_changed,
+        frame_change_post=_changed,
+        undo_post=_undone,
+        redo_post=_undone,
+        load_pre=_leave_file,
+    ),
+    (_start, _stop),
+)

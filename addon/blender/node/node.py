@@ -10,6 +10,7 @@ from ...core.bake.surface import Surface
 from ...core.material.material import Material
 from ...core.material.presets import presets
 from .. import compat
+from ..registration import all_or_nothing, handlers
 from .draw import draw_node
 from .output import link_output, plain_of
 from .tree import BASE_COLOR, ROUGHNESS, ROUGHNESS_BEFORE, add_missing_inputs, make_inner_tree, show_values
@@ -259,15 +260,16 @@ def _upgrade(tree) -> None:
             node.inputs[ROUGHNESS].default_value = ROUGHNESS_BEFORE
 
 
-def register() -> None:
+def _add_class() -> None:
     if not BeamspreadNode.is_registered:
         compat.register_node_class(BeamspreadNode, "ShaderNodeCustomGroup")
-    bpy.app.handlers.load_post.append(upgrade_nodes)
 
 
-def unregister() -> None:
-    bpy.app.handlers.load_post.remove(upgrade_nodes)
+def _remove_class() -> None:
     # Blender 3.4 frees the type but not the evaluated copies of nodes that point to it, and crashes when those go, at
     # the latest on exit: there a class in use stays. In 4.5 a class that stays keeps the process from exiting.
     if bpy.app.version >= (4, 0, 0) or not any(_all_nodes()):
         bpy.utils.unregister_class(BeamspreadNode)
+
+
+register, unregister = all_or_nothing((_add_class, _remove_class), *handlers(load_post=upgrade_nodes))
