@@ -25,7 +25,7 @@ def handlers(**functions: Callable) -> list[Step]:
 
 
 def all_or_nothing(*steps: Step) -> tuple[Callable[[], None], Callable[[], None]]:
-    """`register` and `unregister` of a part: where a step fails, those before it are taken back and the error surfaces."""
+    """`register` and `unregister` of a part: where a step fails, those before go again and the error surfaces."""
 
     def register() -> None:
         for number, (add, _) in enumerate(steps):

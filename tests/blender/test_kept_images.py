@@ -194,6 +194,29 @@ def test_new_images_are_float_files_beside_a_saved_scene(tmp_path, settings):
     assert image_of(plane).name == "A/b_M.001"
 
 
+def test_a_node_whose_image_was_cleared_gets_its_file_again(tmp_path):
+    """And not where something shows the image, or it was painted on."""
+    plane = add_plane(material=add_material())
+    sun = add_sun(0)
+    save_scene(tmp_path)
+    bake(plane)
+    first = image_of(plane)
+    node_of(plane.data.materials[0]).image = None
+    sun.data.energy = 3
+    bake(plane)
+    assert [one.name for one in (tmp_path / "textures").iterdir()] == ["Plane_Medium.exr"]
+    assert [one.name for one in bpy.data.images] == ["Plane_Medium"]
+    first = image_of(plane)
+    first.use_fake_user = True
+    node_of(plane.data.materials[0]).image = None
+    before = pixels(first)
+    sun.data.energy = 1
+    bake(plane)
+    assert image_of(plane) != first
+    assert sorted(one.name for one in (tmp_path / "textures").iterdir()) == ["Plane_Medium.exr", "Plane_Medium_2.exr"]
+    np.testing.assert_array_equal(pixels(first), before)
+
+
 def test_folder_name_and_storage_are_settings(tmp_path, settings):
     plane = add_plane(material=add_material())
     add_sun(0)

@@ -108,8 +108,8 @@ def _fills_own_image(bake: Bake) -> bool:
 class _Fillings:
     """Bakes whose pixels Blender is about to put into images of nodes, and what they have read.
 
-    The window calls `begin` before it bakes and `end` after it, in the main thread; between them the engine adds bakes in
-    another. Scripts call neither, and bake in the main thread.
+    The window calls `begin` before it bakes and `end` after it, in the main thread; between them the engine adds bakes
+    in another. Scripts call neither, and bake in the main thread.
     """
 
     def __init__(self) -> None:
