@@ -123,7 +123,7 @@ def test_its_own_embree_is_version_3():
 
 
 def test_takes_nothing_but_python_from_a_host():
-    """Symbols that it would look up in its process are Python's and the system's C library's, none of its libraries'."""
+    """Symbols that it looks up in its process are Python's and the C library's, none of its own libraries'."""
     symbols = subprocess.run(
         ["nm", "--dynamic", "--undefined-only", native_file()], capture_output=True, text=True, check=True
     ).stdout

@@ -294,4 +294,6 @@ def _remove_class() -> None:
         bpy.utils.unregister_class(BeamspreadNode)
 
 
-register, unregister = all_or_nothing((_add_class, _remove_class), *handlers(load_post=upgrade_nodes, save_pre=release_unused_trees))
+register, unregister = all_or_nothing(
+    (_add_class, _remove_class), *handlers(load_post=upgrade_nodes, save_pre=release_unused_trees)
+)
