@@ -25,8 +25,9 @@ execute_process(COMMAND ${Python_EXECUTABLE} -c "import sysconfig; print(sysconf
                 OUTPUT_VARIABLE suffix OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
 string(SUBSTRING ${suffix} 1 -1 own_tag)
 python_module(_native ${own_tag} ${BEAMSPREAD_STAGE_DIR}/beamspread ${Python_INCLUDE_DIRS})
-# What pip takes, beside the package's own files.
+# What pip takes.
 install(TARGETS _native LIBRARY DESTINATION beamspread COMPONENT python)
+install(DIRECTORY addon/ DESTINATION beamspread COMPONENT python PATTERN __pycache__ EXCLUDE PATTERN "*.pyc" EXCLUDE)
 install(DIRECTORY ${BEAMSPREAD_DEPENDENCIES}/licenses DESTINATION beamspread COMPONENT python)
 add_custom_target(modules DEPENDS _native)
 foreach(includes IN LISTS BEAMSPREAD_OTHER_PYTHONS)
