@@ -57,7 +57,7 @@ class Chart:
         return np.stack([columns / width, rows / height], axis=-1)
 
     def grid_places(self, uvs: np.ndarray, receiver: Receiver) -> tuple[np.ndarray, np.ndarray]:
-        """Columns and rows of its grid, flat, centres at half-integers, of places (..., 2) in its receiver's texture."""
+        """Columns and rows of its grid, flat, centres at half-integers; of UVs (..., 2) of the receiver's texture."""
         texels = uvs.reshape(-1, 2) * [receiver.width, receiver.height]
         if self.texel_to_grid is None:
             return tuple((texels - self.offset).T)
