@@ -17,7 +17,7 @@ Each part imports only core and those above it (tests/unit/test_layers.py reads 
 
 from . import preferences, settings
 from .images import operators as image_operators
-from .images import previews, undo
+from .images import previews, sequence, undo
 from .jobs import engine, operator, stale, state
 from .live import session
 from .node import menu, node
@@ -29,6 +29,7 @@ PARTS = (
     preferences,
     settings,
     image_operators,
+    sequence,
     previews,
     undo,
     node,

@@ -294,3 +294,47 @@ def test_an_object_that_casts_no_light_is_not_read_again_for_its_node(monkeypatc
     node.ior = 1.3  # tells handlers, unlike other values that scripts set
     bpy.context.view_layer.update()
     live_pixels(material)
+
+
+def add_stripes(material, values=(0.2, 0.7)):
+    """Image of upright stripes at the Base Color."""
+    colors = np.ones((4, 8, 4), np.float32)
+    colors[..., :3] = np.resize(np.repeat(values, 2), 8)[None, :, None]
+    image = bpy.data.images.new("Stripes", 8, 4, float_buffer=True)
+    image.pixels.foreach_set(colors.ravel())
+    image.pack()
+    texture = material.node_tree.nodes.new("ShaderNodeTexImage")
+    texture.image, texture.interpolation = image, "Closest"
+    material.node_tree.links.new(scenes.node_of(material).inputs["Base Color"], texture.outputs["Color"])
+    return texture
+
+
+def test_a_texture_at_base_color_is_followed(monkeypatch):
+    plane, lamp, material = make_scene()
+    plain = live_pixels(material).copy()
+    node = scenes.node_of(material)
+    texture = add_stripes(material)
+    live = live_pixels(material).copy()
+    assert np.abs(live - plain).max() > 0.1 * plain.max()
+    assert session.sentences() == [session.IN_CYCLES]
+    node.texture_blur = 0.1
+    sharper = live_pixels(material).copy()
+    assert np.abs(sharper - live).max() > 0.05 * live.max()
+    texture.extension, texture.image = "CLIP", bpy.data.images.new("Black", 4, 4, float_buffer=True)
+    assert np.abs(live_pixels(material) - sharper).max() > 0.1 * live.max()
+    material.node_tree.nodes.remove(texture)
+    add_stripes(material, (0.3, 0.5))
+    live_pixels(material)
+    with monkeypatch.context() as patched:
+        patched.setattr("beamspread.blender.live.textures.read_texture", lambda *_: pytest.fail("it was read again"))
+        lamp.location.x = -0.4
+        live = live_pixels(material).copy()
+    np.testing.assert_allclose(live, baked_pixels(plane), rtol=1e-4, atol=1e-6)
+
+
+def test_a_texture_that_is_not_understood_is_said():
+    _plane, _lamp, material = make_scene()
+    noise = material.node_tree.nodes.new("ShaderNodeTexNoise")
+    material.node_tree.links.new(scenes.node_of(material).inputs["Base Color"], noise.outputs["Color"])
+    assert live_pixels(material).max() > 0
+    assert "Base Color of 'Plane' can't be evaluated" in session.sentences()[0]

@@ -3,10 +3,12 @@
 import math
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from beamspread import Medium, library
+from beamspread.core.bake.job import BakeJob
 from beamspread.core.bake.runner import Target
 from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.bake.surface import Surface
@@ -18,8 +20,9 @@ from beamspread.core.live.subject import Subject
 from beamspread.core.material.material import Material
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import AreaLight, PointLight, SunLight
-from beamspread.core.scene.receiver import Receiver
-from beamspread.core.scene.uv_map import Polygons
+from beamspread.core.scene.receiver import Receiver, build_receiver
+from beamspread.core.scene.texture import Texture
+from beamspread.core.scene.uv_map import Polygons, fit_uv_maps
 
 CORNERS = np.array([(-1.0, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
 FLOOR = Polygons(CORNERS, CORNERS[:, :2] / 2 + 0.5, np.array([0, 4]), np.array([(0.0, 0, 1)]))
@@ -231,3 +234,23 @@ def test_media_of_many_terms_are_quick_too(ior, total, worst):
     assert time.process_time() < began + 0.5
     assert errors[0] < total
     assert errors[1] < worst
+
+
+@pytest.mark.parametrize("blur", [0.0, 0.5])
+def test_a_texture_is_in_quick_pictures_with_all_its_detail(blur):
+    """Squares of two colours, of 8 texels of 256; the quick picture has 64."""
+    plain = subject(LAMP)
+    receiver = build_receiver(fit_uv_maps(FLOOR), 256, 256)
+    bright = np.add.outer(np.arange(256) // 8, np.arange(256) // 8) % 2
+    colors = np.repeat(np.where(bright, 0.7, 0.3)[..., None], 3, axis=2).astype(np.float32)
+    texture = Texture(receiver, (colors,), blur)
+    textured = replace(plain, texture=texture, surface=replace(plain.surface, base_color=(0.5, 0.5, 0.5)))
+    assert textured.key != plain.key
+    assert textured.key != replace(textured, texture=replace(texture, blur=1.0)).key
+    studio = Studio(media.Media())
+    quick, exact = studio.quick(textured, 64), studio.exact(textured)
+    job = BakeJob("Floor", texture.on(receiver), textured.illumination, textured.surface, textured.settings)
+    np.testing.assert_allclose(exact.texture, job.run()["Combined"], rtol=1e-4, atol=1e-6)
+    total, worst = off(quick, exact)
+    assert total < (0.01 if blur == 0 else 0.05)
+    assert worst < (0.02 if blur == 0 else 0.1)

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import ImageError
+from ..node.tree import FRAMES
 from . import undo
 from .writing import is_read_only, pixels_of, save_image, scene_linear, set_pixels, write_exr
 
@@ -28,6 +29,8 @@ def check_image(image) -> None:
     name = f"The image '{image.name}'"
     if image.source == "TILED":
         raise ImageError(f"{name} has UDIM tiles, which cannot be baked yet: choose a single image in the node.")
+    if image.source == "SEQUENCE" and FRAMES in image:
+        raise ImageError(f"{name} is the frames of a batch: Show Single Images (Render > Beamspread > Batch) first.")
     if image.source not in {"FILE", "GENERATED"}:
         raise ImageError(f"{name} is a sequence, movie or viewer: choose a single image in the node.")
     if image.library is not None:

@@ -50,7 +50,7 @@ class Outputs:
         if options.output is not None or options.frames is not None or layer != COMBINED:
             return None
         image = find_node(bpy.data.materials[target.material_name]).image
-        path = None if image is None else files.file_of(image)
+        path = None if image is None or image.source != "FILE" else files.file_of(image)
         if path is None or options.format not in (None, _format_of(path)):
             return None
         return image

@@ -39,6 +39,7 @@ class Results:
     def _plan(self, image, bake: Bake) -> None:
         """Reserve the bake's part of an image; BakeError if another has it and there can't be two images."""
         if image is not None:
+            files.check_image(image)
             self._check_room(image, bake)
             self._planned.setdefault(image.name, []).append(bake.target)
             receiver = bake.job.receiver

@@ -15,6 +15,7 @@ from ...core.scene.receiver import build_receiver, texture_size
 from ...core.scene.uv_map import fit_uv_maps
 from ..cycles.light import CyclesLight
 from ..images.files import check_image
+from ..images.sequence import is_sequence, size_of_frames
 from ..node.find import find_place, materials_of
 from ..read.geometry import read_polygons
 from ..read.lights import read_illumination
@@ -134,8 +135,11 @@ def _read_target(depsgraph, target: Target, resolution: int | None, size: tuple[
     surface = node.surface()
     surface.check()
     if size is None and node.image is not None:
-        check_image(node.image.original)
-        size = tuple(node.image.original.size) if resolution is None else None
+        image = node.image.original
+        if not is_sequence(image):  # a batch fills its files
+            check_image(image)
+        own = size_of_frames(image) if is_sequence(image) else tuple(image.size)
+        size = own if resolution is None else None
     maps = fit_uv_maps(read_polygons(obj, target.material_name))
     size = size or texture_size(maps, resolution or depsgraph.scene.beamspread.resolution)
     if not node.has_texture():

@@ -16,7 +16,9 @@ from ...core.bake.runner import Bake, Target
 from ..images import previews
 from ..images.files import file_of
 from ..images.owners import noted_as
+from ..images.sequence import is_sequence
 from ..node.find import find_node, find_targets
+from ..node.tree import FRAMES
 from ..registration import all_or_nothing, handlers
 from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
 from .record import Record, keep_record, record_of
@@ -80,6 +82,9 @@ def _record(target: Target) -> Record | None:
 
 
 def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
+    if is_sequence(_image(target)):
+        first, last, *_ = _image(target)[FRAMES]
+        return Row(target, Standing.BAKED, (f"Shows the frames {first} to {last} of a batch.",))
     changed = [] if record is None or now is None else record.changed(now)
     if record is not None and not record.is_dirty and _is_painted(_image(target)):
         changed.append("pixels of the image")

@@ -1,6 +1,7 @@
 """Images that follow the scene while it is worked on.
 
 marks      what has changed
+textures   base colours, read again where their nodes change
 reader     the scene as subjects of pictures; reads only what has changed
 saved      what an image was last saved as
 painting   images on which the user can paint: Live waits

@@ -17,6 +17,7 @@ from ..read.kept import Kept
 from ..read.lights import read_illumination, with_lamps
 from ..read.visible import render_visible_names
 from .marks import Marks
+from .textures import Textures
 
 # Objects that follow, those nearest to what changed: more would wait for each other.
 MOST_SUBJECTS = 16
@@ -46,10 +47,13 @@ class Reader:
         self._polygons: dict[Target, object] = {}
         self._targets: list[Target] = []
         self._subjects: dict[Target, Subject] = {}
+        self._textures = Textures()
 
     def read(self, depsgraph, marks: Marks) -> list[Subject]:
         """What to paint, in this order; the same objects as before where nothing has changed."""
         scene = depsgraph.scene.original
+        if marks.images or marks.other or marks.materials:
+            self._textures.forget(None if marks.images or marks.other else marks.materials)
         if marks or self._illumination is None:
             self._read_light(depsgraph, marks)
             if self._illumination is None or not marks.is_lamps_alone() or not self._targets:
@@ -58,11 +62,15 @@ class Reader:
             self._say_what_is_left_out(depsgraph)
         subjects = {}
         for target in self._targets[:MOST_SUBJECTS]:
-            subject = self._subject(scene, target)
+            subject = self._subject(depsgraph, target)
             if subject is not None:
                 subjects[target] = subject
         self._subjects = subjects
         return list(subjects.values())
+
+    def sentences(self) -> list[str]:
+        """What there is to say of textures."""
+        return self._textures.sentences()
 
     def _read_light(self, depsgraph, marks: Marks) -> None:
         light = self._illumination
@@ -128,14 +136,12 @@ class Reader:
         names = [f"what only Cycles knows of '{name}'" for name in self._illumination.by_cycles]
         if depsgraph.scene.beamspread.use_indirect:
             names.insert(0, INDIRECT)
-        textured = dict.fromkeys(target.material_name for target in self._targets if _has_texture(target))
-        names += [f"the texture at Base Color of '{name}'" for name in textured]
         names += _hidden(depsgraph.view_layer)
         if len(self._targets) > MOST_SUBJECTS:
             names.append(f"{len(self._targets) - MOST_SUBJECTS} objects farther away")
         self.left_out = names
 
-    def _subject(self, scene, target: Target) -> Subject | None:
+    def _subject(self, depsgraph, target: Target) -> Subject | None:
         """The one of before unless something that handlers don't tell of has changed: values of nodes and settings."""
         if target not in self._polygons:
             return None
@@ -152,24 +158,25 @@ class Reader:
             size = tuple(node.image.size)
         if target.object_name not in self._lit:
             self._lit[target.object_name] = self._illumination.lighting(target.object_name)
-        settings = scene.beamspread
+        settings = depsgraph.scene.original.beamspread
+        try:
+            texture = self._textures.read(depsgraph, target, self._polygons[target], size or settings.resolution)
+        except Exception as error:  # noqa: BLE001 - the others are still to be read
+            self.errors[target] = sentence(error)
+            return None
         parts = {
             "polygons": self._polygons[target],
             "size": size,
             "resolution": settings.resolution,
             "illumination": self._lit[target.object_name],
-            "surface": node.surface(),
+            "surface": node.surface() if texture is None else texture.base_color.on(node.surface()),
+            "texture": None if texture is None else texture.texture,
             "settings": for_live(settings.for_bake()),
         }
         before = self._subjects.get(target)
         if before is not None and all(_is_same(getattr(before, name), value) for name, value in parts.items()):
             return before
         return Subject(target, **parts)
-
-
-def _has_texture(target: Target) -> bool:
-    node = find_node(bpy.data.materials.get(target.material_name))
-    return node is not None and node.has_texture()
 
 
 def _hidden(view_layer) -> list[str]:

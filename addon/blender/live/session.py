@@ -136,6 +136,7 @@ class Session:
         said += [f"{target}: {why}" for target, why in (self._reader.errors | self._errors).items()]
         if self._painter.media.simulating:
             said.append(f"The medium ({self._painter.media.simulating}) is simulated: the most similar one stands in.")
+        said += self._reader.sentences()
         if self._reader.left_out:
             said.append(f"Live leaves out {', '.join(self._reader.left_out)}.")
         if bpy.context.scene.render.engine == "CYCLES":

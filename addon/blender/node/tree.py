@@ -9,6 +9,9 @@ BASE_COLOR, ROUGHNESS, NORMAL = "Base Color", "Roughness", "Normal"
 IMAGE, FRESNEL, COAT, GLOSSY = "Image", "Fresnel", "Coat", "Glossy"
 FACING = "Facing"
 
+# Of an image sequence: its first and last frame, width and height.
+FRAMES = "beamspread_frames"
+
 # Of the coat where no input has changed it; older trees have it in their Glossy node.
 ROUGHNESS_BEFORE = 0.1
 
@@ -89,8 +92,12 @@ def _normal_or_plain(tree, given):
 
 
 def show_values(tree, image, ior: float) -> None:
-    """Bring an image and an index of refraction into the tree."""
+    """Bring an image and an index of refraction into the tree; a sequence follows the frame."""
     tree.nodes[IMAGE].image = image
+    if image is not None and image.source == "SEQUENCE" and FRAMES in image:
+        (first, last, *_), user = image[FRAMES], tree.nodes[IMAGE].image_user
+        user.frame_start, user.frame_duration, user.frame_offset = first, last - first + 1, first - 1
+        user.use_auto_refresh = True
     tree.nodes[FRESNEL].inputs["IOR"].default_value = max(ior, 1.0)
     # Without a step in refraction there is no coat, whatever the renderer's Fresnel node says at grazing angles.
     tree.nodes[COAT].inputs[1].default_value = 1.0 if ior > 1 else 0.0

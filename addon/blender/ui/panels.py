@@ -121,6 +121,9 @@ class BEAMSPREAD_PT_batch(RenderPanel, bpy.types.Panel):
         layout.prop(context.scene.beamspread, "format")
         if context.scene.beamspread.format == "PNG":
             layout.prop(context.scene.beamspread, "use_view_transform")
+        row = layout.row(align=True)
+        row.operator("beamspread.show_frames", icon="RENDER_ANIMATION")
+        row.operator("beamspread.show_single", icon="IMAGE_DATA")
 
 
 class MaterialPanel:

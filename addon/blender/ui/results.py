@@ -185,4 +185,5 @@ def estimates(context) -> list[str]:
 def _size(target, resolution: int) -> tuple[int, int]:
     """Of the target's image; one that is still to be made counts as a square."""
     node = find_node(bpy.data.materials.get(target.material_name))
-    return tuple(node.image.size) if node is not None and node.image else (resolution, resolution)
+    size = tuple(node.image.size) if node is not None and node.image else (0, 0)
+    return (resolution, resolution) if 0 in size else size

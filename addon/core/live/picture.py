@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -75,11 +76,14 @@ class Studio:
         settings = replace(subject.settings, samples=min(FEW_SAMPLES, subject.settings.samples))
         material, sources = self._material(subject)
         values = [
-            self._quick_luminance(chart.grid, subject, material, sources, settings, progress)
+            self._quick_luminance(replace(chart.grid, color_out=None), subject, material, sources, settings, progress)
             for chart in receiver.receiver.charts
         ]
-        texture = receiver.continued(receiver.receiver.to_texture(values))
-        return Picture(subject, enlarged(texture, *size), self._receiver(subject, size).region)
+        texture, whole = receiver.continued(receiver.receiver.to_texture(values)), self._receiver(subject, size)
+        texture = enlarged(texture, *size)
+        if whole.color_out is not None:
+            texture *= whole.color_out  # which keeps all detail
+        return Picture(subject, texture, whole.region)
 
     def exact(self, subject: Subject, progress: Progress | None = None) -> Picture:
         """As a bake, with the libraries at hand."""
@@ -144,12 +148,15 @@ class Studio:
         return self._maps[key][1]
 
     def _receiver(self, subject: Subject, size: tuple[int, int]) -> FramedReceiver:
-        key = id(subject.polygons), size, subject.settings.margin
+        key = id(subject.polygons), id(subject.texture), size, subject.settings.margin
         if key not in self._receivers:
             receiver = build_receiver(self._uv_maps(subject), *size)
-            self._receivers[key] = subject.polygons, FramedReceiver(receiver, subject.settings.margin)
+            if subject.texture is not None:
+                receiver = subject.texture.on(receiver)
+            framed = FramedReceiver(receiver, subject.settings.margin)
+            self._receivers[key] = framed, subject.polygons, subject.texture
             _drop_oldest(self._receivers, MOST_RECEIVERS)
-        return self._receivers[key][1]
+        return self._receivers[key][0]
 
 
 class FramedReceiver:
@@ -162,6 +169,12 @@ class FramedReceiver:
         source = _nearest_texels(whole if whole.any() else baked, margin + 2)
         self._source = None if whole.all() else source
         self.region = baked | _reached(baked, margin)
+
+    @cached_property
+    def color_out(self) -> np.ndarray | None:
+        """Float32 (height, width, 3): factors of light that leaves, those of the charts continued; or None."""
+        factors = [chart.grid.color_out for chart in self.receiver.charts]
+        return None if factors[0] is None else self.continued(self.receiver.to_texture(factors))
 
     def continued(self, texture: np.ndarray) -> np.ndarray:
         """With the values of texels wholly inside for those around."""

@@ -12,6 +12,7 @@ from ..bake.runner import Target
 from ..bake.settings import BakeSettings
 from ..bake.surface import Surface
 from ..scene.illumination import Illumination
+from ..scene.texture import Texture
 from ..scene.uv_map import Polygons
 
 # Arrays of more bytes, as of the world, are kept where they are read: another one was read again.
@@ -26,6 +27,7 @@ class Subject:
     ----------
     polygons : of the receiver, in the world.
     size : width and height of its image; None: `resolution` texels along the longer side.
+    texture : what light meets on its way in and out; the surface then has its mean colour.
     """
 
     target: Target
@@ -35,6 +37,7 @@ class Subject:
     illumination: Illumination
     surface: Surface
     settings: BakeSettings
+    texture: Texture | None = None
 
     @cached_property
     def key(self) -> tuple:
@@ -42,7 +45,8 @@ class Subject:
         lights = tuple(_content(light) for light in self.illumination.lights)
         shadows = self.illumination.shadow_key()
         arrays = self.polygons.corners, self.polygons.uvs, self.polygons.normals
-        return lights, shadows, *map(_value, arrays), self.size or self.resolution, self.surface, self.settings
+        texture = () if self.texture is None else (self.texture.blur, *map(_value, self.texture.colors))
+        return lights, shadows, *map(_value, arrays), self.size or self.resolution, self.surface, self.settings, texture
 
 
 def _content(light) -> tuple:

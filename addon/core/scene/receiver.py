@@ -56,6 +56,13 @@ class Chart:
             columns, rows = np.moveaxis((np.stack([columns, rows], -1) - shift) @ np.linalg.inv(matrix).T, -1, 0)
         return np.stack([columns / width, rows / height], axis=-1)
 
+    def grid_places(self, uvs: np.ndarray, receiver: Receiver) -> tuple[np.ndarray, np.ndarray]:
+        """Columns and rows of its grid, flat, centres at half-integers; of UVs (..., 2) of the receiver's texture."""
+        texels = uvs.reshape(-1, 2) * [receiver.width, receiver.height]
+        if self.texel_to_grid is None:
+            return tuple((texels - self.offset).T)
+        return tuple(self.texel_to_grid @ np.column_stack([texels, np.ones(len(texels))]).T)
+
     def part_of(self, texture: np.ndarray) -> np.ndarray:
         """The part of the texture around the chart, a view."""
         (column, row), (rows, columns) = self.offset, self.coverage.shape
@@ -70,7 +77,7 @@ class Chart:
         rows, columns = np.nonzero(inside)
         centres = columns + self.offset[0] + 0.5, rows + self.offset[1] + 0.5, np.ones(len(rows))
         x, y = self.texel_to_grid @ np.stack(centres)
-        part[rows, columns] = _bilinear(values, x - 0.5, y - 0.5)
+        part[rows, columns] = bilinear(values, x - 0.5, y - 0.5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +171,7 @@ def _coverage(faces: list[np.ndarray], width: int, height: int) -> np.ndarray:
     return native.coverage(corners, counts, width, height)
 
 
-def _bilinear(values: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def bilinear(values: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Values (H, W, C) at fractional columns x and rows y, held constant beyond the border."""
     height, width = values.shape[:2]
     x, y = np.clip(x, 0, width - 1), np.clip(y, 0, height - 1)

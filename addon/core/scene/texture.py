@@ -8,11 +8,14 @@ between two places of different albedo takes on both. docs/method.md says how fa
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .receiver import Receiver
+from .receiver import Chart, Receiver, bilinear
+
+# Places along a texel, at most, where a finer texture is looked at.
+MOST_PLACES = 4
 
 
 def mean_color(receiver: Receiver, colors: Sequence[np.ndarray]) -> tuple[float, float, float]:
@@ -41,3 +44,34 @@ def textured(receiver: Receiver, colors: Sequence[np.ndarray], blur: float) -> R
         color_in, color_out = (np.float32(relative**power) for power in (blur, 1 - blur))
         charts.append(replace(chart, grid=replace(chart.grid, color_in=color_in, color_out=color_out)))
     return replace(receiver, charts=tuple(charts))
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """Colours on a receiver, for receivers of the same charts with any number of texels.
+
+    Attributes
+    ----------
+    colors : float32 (grid height, grid width, 3) of each of its charts, not below 0.
+    blur : see `textured`.
+    """
+
+    receiver: Receiver
+    colors: tuple[np.ndarray, ...]
+    blur: float
+
+    def on(self, receiver: Receiver) -> Receiver:
+        """The receiver with the texture."""
+        pairs = zip(self.receiver.charts, self.colors, receiver.charts)
+        return textured(receiver, [self._seen_by(*pair, receiver) for pair in pairs], self.blur)
+
+    def _seen_by(self, chart: Chart, color: np.ndarray, other: Chart, receiver: Receiver) -> np.ndarray:
+        """The colours of a chart at the texels of another's grid."""
+        finer = max(self.receiver.width / receiver.width, self.receiver.height / receiver.height)
+        count = int(np.clip(np.ceil(finer - 0.01), 1, MOST_PLACES))
+        middles = (np.arange(count) + 0.5) / count
+        total = np.zeros((other.grid.height * other.grid.width, 3), np.float32)
+        for at in ((across, up) for across in middles for up in middles):
+            x, y = chart.grid_places(other.uvs(receiver.width, receiver.height, at), self.receiver)
+            total += bilinear(color, x - 0.5, y - 0.5)
+        return (total / count**2).reshape(other.grid.height, other.grid.width, 3)

@@ -1,0 +1,99 @@
+"""Frames of a batch as a sequence in the node, which follows the frame by itself."""
+
+import bpy
+import numpy as np
+import pytest
+from beamspread.blender.images.sequence import is_sequence
+from beamspread.blender.jobs import batch, stale
+from beamspread.blender.jobs.state import state
+from beamspread.core.batch import options
+from beamspread.core.native import native
+from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, save_scene, select
+
+
+@pytest.fixture
+def plane(tmp_path):
+    """Baked once, and at the frames 3 to 5 under a sun that grows stronger."""
+    plane = add_plane(material=add_material())
+    sun = add_sun(20)
+    for frame in (1, 10):
+        sun.data.energy = frame
+        sun.data.keyframe_insert("energy", frame=frame)
+    save_scene(tmp_path)
+    bake(plane)
+    assert batch.bake_all(options.parse(["--frames", "3-5"])).all_written()
+    return plane
+
+
+def file_shown(tree, frame):
+    """Number of the file that the inner tree's texture shows at a frame, as Blender counts."""
+    user = tree.nodes["Image"].image_user
+    assert user.use_auto_refresh
+    return min(max(frame - user.frame_start + 1, 1), user.frame_duration) + user.frame_offset
+
+
+def test_it_follows_the_frame(plane, tmp_path):
+    node = node_of(plane.data.materials[0])
+    own = node.image
+    assert bpy.ops.beamspread.show_frames() == {"FINISHED"}
+    assert is_sequence(node.image)
+    stale.refresh(bpy.context)
+    (row,) = state.rows.values()
+    assert row.sentences == ("Shows the frames 3 to 5 of a batch.",)
+    assert [file_shown(node.node_tree, frame) for frame in (1, 3, 4, 5, 9)] == [3, 3, 4, 5, 5]
+    rendered = [render_brightness(plane, frame, tmp_path) for frame in (3, 4, 5)]
+    written = [native.read_exr(str(path))[0].mean() for path in sorted((tmp_path / "beamspread").iterdir())]
+    assert written[0] < written[1] < written[2]
+    assert np.divide(rendered, rendered[0]) == pytest.approx(np.divide(written, written[0]), rel=0.02)
+    # After the file is opened again, with the former image, which nothing else shows.
+    name = own.name
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
+    node = node_of(bpy.data.materials["Medium"])
+    assert is_sequence(node.image)
+    assert bpy.ops.beamspread.show_single() == {"FINISHED"}
+    assert node.image.name == name
+    assert pixels(node.image).any()
+
+
+def render_brightness(plane, frame, folder):
+    """Mean of a picture of the plane from above by Cycles, linear."""
+    scene = bpy.context.scene
+    if scene.camera is None:
+        camera = bpy.data.cameras.new("Camera")
+        camera.type, camera.ortho_scale = "ORTHO", 1.0
+        scene.camera = bpy.data.objects.new("Camera", camera)
+        scene.camera.location.z = 3
+        bpy.context.collection.objects.link(scene.camera)
+        scene.render.resolution_x = scene.render.resolution_y = 8
+        scene.cycles.samples, scene.cycles.use_denoising = 1, False
+        scene.render.image_settings.file_format = "OPEN_EXR"
+        node_of(plane.data.materials[0]).ior = 1.0
+    scene.frame_set(frame)
+    scene.render.filepath = str(folder / f"picture{frame}.exr")
+    bpy.ops.render.render(write_still=True)
+    return native.read_exr(scene.render.filepath)[0][..., :3].mean()
+
+
+def test_it_is_not_baked_into_and_a_batch_writes_its_frames_again(plane, tmp_path):
+    bpy.ops.beamspread.show_frames()
+    before = {path: path.read_bytes() for path in (tmp_path / "beamspread").iterdir()}
+    select(plane)
+    assert "Show Single Images" in messages_of(bpy.ops.beamspread.bake)
+    bpy.data.lights["Sun"].animation_data_clear()
+    bpy.data.lights["Sun"].energy = 20
+    report = batch.bake_all(options.parse([]))
+    assert [one.path for one in report.bakes] == [str(tmp_path / "beamspread" / "Plane_Medium.exr")]
+    assert before == {path: path.read_bytes() for path in before}
+    assert batch.bake_all(options.parse(["--frames", "3-5"])).all_written()
+    assert all(path.read_bytes() != content for path, content in before.items())
+
+
+def test_gaps_and_no_frames_are_said(plane, tmp_path, capfd):
+    (tmp_path / "beamspread" / "Plane_Medium_0004.exr").unlink()
+    bpy.ops.beamspread.show_frames()
+    assert "1 are missing" in capfd.readouterr().out
+    for path in (tmp_path / "beamspread").iterdir():
+        path.unlink()
+    bpy.ops.beamspread.show_single()
+    assert f"no frames of a batch in {tmp_path / 'beamspread'}" in messages_of(bpy.ops.beamspread.show_frames)
