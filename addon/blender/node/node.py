@@ -291,7 +291,8 @@ def register() -> None:
 def unregister() -> None:
     bpy.app.handlers.load_post.remove(upgrade_nodes)
     bpy.app.handlers.save_pre.remove(release_unused_trees)
-    # Blender 3.4 frees the type but not the evaluated copies of nodes that point to it, and crashes when those go, at
-    # the latest on exit: there a class in use stays. In 4.5 a class that stays keeps the process from exiting.
-    if bpy.app.version >= (4, 0, 0) or not any(_all_nodes()):
+    # Blender up to 4.3 (3.4.1 and 4.3.2 were seen to) frees the type but not the evaluated copies of nodes that point to
+    # it, and crashes when those go, at the latest on exit: there a class in use stays. In 4.5 a class that stays keeps
+    # the process from exiting.
+    if bpy.app.version >= (4, 5, 0) or not any(_all_nodes()):
         bpy.utils.unregister_class(BeamspreadNode)
