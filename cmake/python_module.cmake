@@ -2,8 +2,12 @@
 # Those of other Pythons whose headers are there are made by the target `modules`, for the package, where they lie
 # beside it, each named by the tag that its Python looks for. (Python's stable interface would make one file of them,
 # but binding libraries know it from Python 3.12 on, and most Blenders have an older one.)
+option(BEAMSPREAD_FETCH_PYTHON_HEADERS "Fetch headers of further Pythons (tools/python_headers.sh)" OFF)
+if(BEAMSPREAD_FETCH_PYTHON_HEADERS)
+  execute_process(COMMAND ${CMAKE_SOURCE_DIR}/tools/python_headers.sh ${BEAMSPREAD_DEPENDENCIES_DIR}/python)
+endif()
 file(GLOB headers ${BEAMSPREAD_DEPENDENCIES_DIR}/python/usr/include/python3.*)
-set(BEAMSPREAD_OTHER_PYTHONS "${headers}" CACHE STRING "Folders with the headers of further Pythons: tools/python_headers.sh")
+set(BEAMSPREAD_OTHER_PYTHONS "${headers}" CACHE STRING "Folders with the headers of further Pythons")
 file(GLOB python_sources CONFIGURE_DEPENDS native/python/*.cpp)
 
 # python_module(TARGET TAG FOLDER INCLUDES...)

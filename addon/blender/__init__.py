@@ -2,16 +2,17 @@
 
 Each part imports only core and those above it (tests/unit/test_layers.py reads this list):
 
-    compat       differences between Blender versions
-    preferences  what holds for all files of a user
-    settings     scene.beamspread
-    read         geometry, lights and what a render would show
-    node         the shader node, and where a scene has it
-    cycles       what Cycles finds in a process of its own: bounced light, the world's radiance
-    images       images of the scene, whole files, whose result an image holds
-    jobs         what becomes a job, and what runs it: operator, engine, batch; the state of a run
-    live         images that follow the scene while it is worked on
-    ui           panels
+    compat        differences between Blender versions
+    registration  what parts add to Blender, all of it or nothing
+    preferences   what holds for all files of a user
+    settings      scene.beamspread
+    read          geometry, lights and what a render would show
+    node          the shader node, and where a scene has it
+    cycles        what Cycles finds in a process of its own: bounced light, the world's radiance
+    images        images of the scene, whole files, whose result an image holds
+    jobs          what becomes a job, and what runs it: operator, engine, batch; the state of a run
+    live          images that follow the scene while it is worked on
+    ui            panels
 """
 
 from . import preferences, settings
@@ -21,6 +22,7 @@ from .jobs import engine, operator, stale, state
 from .live import session
 from .node import menu, node
 from .node import operators as node_operators
+from .registration import all_or_nothing
 from .ui import panels, picture
 
 PARTS = (
@@ -42,11 +44,4 @@ PARTS = (
 )
 
 
-def register() -> None:
-    for part in PARTS:
-        part.register()
-
-
-def unregister() -> None:
-    for part in reversed(PARTS):
-        part.unregister()
+register, unregister = all_or_nothing(*((part.register, part.unregister) for part in PARTS))

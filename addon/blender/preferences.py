@@ -15,6 +15,7 @@ from bpy.props import IntProperty, StringProperty
 from ..core import native
 from ..core.ldf import library
 from . import compat
+from .registration import all_or_nothing, classes
 
 # Of the add-on: "beamspread", or "bl_ext.REPOSITORY.beamspread" as an extension.
 PACKAGE = __package__.rpartition(".")[0]
@@ -123,17 +124,13 @@ class BEAMSPREAD_OT_clear_cache(bpy.types.Operator):
         return {"FINISHED"}
 
 
-_classes = (BeamspreadPreferences, BEAMSPREAD_OT_clear_cache)
-
-
-def register() -> None:
-    for one in _classes:
-        bpy.utils.register_class(one)
+def _choose_folder() -> None:
     if own := preferences():
         _use_cache_folder(own, None)
 
 
-def unregister() -> None:
-    for one in reversed(_classes):
-        bpy.utils.unregister_class(one)
-    library.choose_cache_folder("")
+register, unregister = all_or_nothing(
+    (lambda: None, lambda: library.choose_cache_folder("")),
+    *classes(BeamspreadPreferences, BEAMSPREAD_OT_clear_cache),
+    (_choose_folder, lambda: None),
+)

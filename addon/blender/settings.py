@@ -5,6 +5,7 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, 
 
 from ..core.bake.settings import OUTPUTS, BakeSettings
 from . import compat, preferences
+from .registration import all_or_nothing, classes
 
 
 class BeamspreadSettings(bpy.types.PropertyGroup):
@@ -190,11 +191,12 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         )
 
 
-def register() -> None:
-    bpy.utils.register_class(BeamspreadSettings)
+def _add_to_scenes() -> None:
     bpy.types.Scene.beamspread = PointerProperty(type=BeamspreadSettings)
 
 
-def unregister() -> None:
+def _take_from_scenes() -> None:
     del bpy.types.Scene.beamspread
-    bpy.utils.unregister_class(BeamspreadSettings)
+
+
+register, unregister = all_or_nothing(*classes(BeamspreadSettings), (_add_to_scenes, _take_from_scenes))

@@ -7,8 +7,10 @@ from unittest.mock import MagicMock
 import bpy
 import numpy as np
 import pytest
+from beamspread.blender.jobs import stale
 from beamspread.blender.jobs.picture import render_picture
-from beamspread.blender.jobs.state import state
+from beamspread.blender.jobs.state import Standing, state
+from beamspread.core.bake.runner import Target
 from mathutils import Matrix
 from scenes import (
     add_material,
@@ -206,3 +208,29 @@ def test_panels_of_blender_know_the_engine():
     names = ["MATERIAL_PT_preview", "RENDER_PT_color_management", "RENDER_PT_output", "RENDER_PT_format"]
     for name in names:
         assert "BEAMSPREAD" in getattr(bpy.types, name).COMPAT_ENGINES
+
+
+def test_its_own_bake_is_known_of_in_the_image_that_the_node_shows(tmp_path):
+    """And not where another image is active; known again when the file is opened."""
+    plane = add_plane(material=add_material())
+    sun = add_sun(0)
+    image = add_active_image(plane.data.materials[0])
+    select(plane)
+    bpy.ops.object.bake(type="COMBINED")
+    assert row().standing == Standing.NEVER
+    node_of(plane.data.materials[0]).image = image
+    bpy.ops.object.bake(type="COMBINED")
+    assert row().standing == Standing.BAKED
+    sun.data.energy = 3
+    bpy.context.view_layer.update()
+    assert row().standing == Standing.STALE
+    sun.data.energy = 1
+    image.pack()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
+    assert row().standing == Standing.BAKED
+
+
+def row():
+    stale.refresh(bpy.context)
+    return state.rows[Target("Plane", "Medium")]

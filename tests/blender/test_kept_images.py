@@ -11,6 +11,7 @@ from beamspread.blender.jobs import batch
 from beamspread.blender.jobs.prepare import prepare_scene
 from beamspread.blender.jobs.state import state
 from beamspread.blender.node.find import find_targets
+from beamspread.blender.ui.results import warnings_for
 from beamspread.core.batch import options
 from beamspread.core.native import native
 from mathutils import Matrix
@@ -193,6 +194,29 @@ def test_new_images_are_float_files_beside_a_saved_scene(tmp_path, settings):
     assert image_of(plane).name == "A/b_M.001"
 
 
+def test_a_node_whose_image_was_cleared_gets_its_file_again(tmp_path):
+    """And not where something shows the image, or it was painted on."""
+    plane = add_plane(material=add_material())
+    sun = add_sun(0)
+    save_scene(tmp_path)
+    bake(plane)
+    first = image_of(plane)
+    node_of(plane.data.materials[0]).image = None
+    sun.data.energy = 3
+    bake(plane)
+    assert [one.name for one in (tmp_path / "textures").iterdir()] == ["Plane_Medium.exr"]
+    assert [one.name for one in bpy.data.images] == ["Plane_Medium"]
+    first = image_of(plane)
+    first.use_fake_user = True
+    node_of(plane.data.materials[0]).image = None
+    before = pixels(first)
+    sun.data.energy = 1
+    bake(plane)
+    assert image_of(plane) != first
+    assert sorted(one.name for one in (tmp_path / "textures").iterdir()) == ["Plane_Medium.exr", "Plane_Medium_2.exr"]
+    np.testing.assert_array_equal(pixels(first), before)
+
+
 def test_folder_name_and_storage_are_settings(tmp_path, settings):
     plane = add_plane(material=add_material())
     add_sun(0)
@@ -343,6 +367,30 @@ def test_a_linked_material_is_refused_before_the_bake(tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "user.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "user.blend"))
     assert pixels(image_of(bpy.data.objects["Plane"])).any()
+
+
+def test_an_overridden_material_is_refused_and_the_sentence_helps(tmp_path):
+    linked = link_from_library(tmp_path)
+    plane = linked.override_create(remap_local_usages=True)
+    plane.data.override_create(remap_local_usages=True)
+    material = plane.material_slots[0].material.override_create(remap_local_usages=True)
+    assert plane.material_slots[0].material == material
+    assert material.override_library is not None
+    select(plane)
+    message = messages_of(bpy.ops.beamspread.bake)
+    assert "The material 'Medium' belongs to another .blend file" in message
+    assert "Make Local > Selected Objects, Data and Materials" in message
+    said = " ".join(warnings_for(plane, {"Plane"}))
+    assert "belongs to another .blend file" in said  # before the bake, in the panel
+    assert image_of(plane) is None
+    bpy.ops.object.make_local(type="SELECT_OBDATA_MATERIAL")
+    plane = next(obj for obj in bpy.context.scene.objects if obj.type == "MESH")
+    assert warnings_for(plane, {plane.name}) == []
+    bake(plane)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "user.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "user.blend"))
+    plane = next(obj for obj in bpy.context.scene.objects if obj.type == "MESH")
+    assert pixels(image_of(plane)).any()
 
 
 def test_a_linked_object_with_a_local_material_is_baked(tmp_path):

@@ -7,6 +7,8 @@ import sys
 import bpy
 import numpy as np
 import pytest
+from beamspread.blender.jobs import stale
+from beamspread.blender.jobs.state import Standing, state
 from beamspread.blender.node import draw, principled
 from beamspread.core.material.principled import ior_of_reflectance, transport_length
 from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
@@ -85,7 +87,14 @@ class TestFormerShader:
         material = plane.data.materials[0]
         bake(plane)
         said = capfd.readouterr().out
-        assert "'Medium' now shows the baked result; 'Principled BSDF' is kept" in said
+        sentence = "'Medium' now shows the baked result; 'Principled BSDF' is kept"
+        assert f"Info: {sentence}" in said
+        row = next(iter(state.rows.values()))
+        for _ in range(2):  # as the bake has said it, and as its image remembers it
+            assert row.standing == Standing.BAKED
+            assert sentence in row.sentences[0]
+            stale.refresh(bpy.context)
+            row = next(iter(state.rows.values()))
         assert surface_of(material) == node_of(material)
         path = str(tmp_path / "swapped.blend")
         bpy.ops.wm.save_as_mainfile(filepath=path)

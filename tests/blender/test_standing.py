@@ -2,9 +2,10 @@
 
 import bpy
 import pytest
-from beamspread.blender.jobs import stale
+from beamspread.blender.jobs import batch, stale
 from beamspread.blender.jobs.state import Standing, state
-from beamspread.core.bake.runner import Target
+from beamspread.core.bake.runner import Bake, Target
+from beamspread.core.batch import options
 from mathutils import Matrix
 from scenes import add_blocker, add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
 
@@ -205,3 +206,139 @@ def test_it_costs_little_to_look(plane):
         assert hashed == ["Wall"]
     finally:
         del stale.fingerprints._shape
+
+
+def test_what_geometry_nodes_scatter(plane):
+    """Moved in the tree, and another shape of what stands for points."""
+    cube = add_plane("Leaf", size=(0.1, 0.1))
+    cube.hide_render = True
+    wall, group = bpy.data.objects["Wall"], scatter_group(cube)
+    wall.modifiers.new("Scatter", "NODES").node_group = group
+    update()
+    bake(plane)
+    assert row().standing == Standing.BAKED
+    group.nodes["Move"].inputs["Translation"].default_value = (0, 0, 0.2)
+    update()
+    assert "other objects" in row().sentences[0]
+    bake(plane)
+    cube.data.vertices[0].co.x -= 0.5
+    cube.data.update()
+    update()
+    assert "other objects" in row().sentences[0]
+
+
+def scatter_group(obj):
+    """Instances of an object on the vertices of a mesh, moved."""
+    tree = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
+    if hasattr(tree, "interface"):
+        tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+        tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    else:
+        tree.inputs.new("NodeSocketGeometry", "Geometry")
+        tree.outputs.new("NodeSocketGeometry", "Geometry")
+    names = ("NodeGroupInput", "GeometryNodeInstanceOnPoints", "GeometryNodeTranslateInstances", "NodeGroupOutput")
+    given, points, move, result = (tree.nodes.new(name) for name in names)
+    info = tree.nodes.new("GeometryNodeObjectInfo")
+    info.inputs["Object"].default_value, info.inputs["As Instance"].default_value = obj, True
+    move.name = "Move"
+    tree.links.new(points.inputs["Points"], given.outputs[0])
+    tree.links.new(points.inputs["Instance"], info.outputs["Geometry"])
+    tree.links.new(move.inputs[0], points.outputs[0])
+    tree.links.new(result.inputs[0], move.outputs[0])
+    return tree
+
+
+def test_what_particles_scatter(plane):
+    wall, leaf = bpy.data.objects["Wall"], add_plane("Leaf", size=(0.1, 0.1))
+    wall.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    settings = wall.particle_systems[0].settings
+    settings.type, settings.render_type, settings.instance_object, settings.count = "HAIR", "OBJECT", leaf, 20
+    update()
+    bake(plane)
+    assert row().standing == Standing.BAKED
+    wall.particle_systems[0].seed = 5
+    update()
+    assert "other objects" in row().sentences[0]
+
+
+def add_texture(material, socket, folder):
+    """An image file of one colour at an input."""
+    image = bpy.data.images.new("Veil", 8, 8)
+    image.filepath_raw, image.file_format = str(folder / "veil.png"), "PNG"
+    image.save()
+    image.source = "FILE"
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    material.node_tree.links.new(socket, node.outputs["Color"])
+    return image
+
+
+def paint(image, value):
+    image.pixels.foreach_set([value] * len(image.pixels))
+    image.update()
+    update()
+
+
+@pytest.mark.parametrize("kind", ["alpha", "base color"])
+def test_pixels_of_textures(plane, kind, tmp_path):
+    if kind == "alpha":
+        see_through(plane)
+        material = bpy.data.materials["Veil"]
+        image = add_texture(material, material.node_tree.nodes["Principled BSDF"].inputs["Alpha"], tmp_path)
+    else:
+        image = add_texture(plane.data.materials[0], node_of(plane.data.materials[0]).inputs["Base Color"], tmp_path)
+    bake(plane)
+    assert row().standing == Standing.BAKED
+    paint(image, 0.5)
+    assert "textures" in row().sentences[0]
+    bake(plane)
+    assert row().standing == Standing.BAKED
+    paint(image, 0.7)  # not saved between, and dirty before as after
+    assert "textures" in row().sentences[0]
+    image.save()
+    bake(plane)
+    assert row().standing == Standing.BAKED
+    (tmp_path / "veil.png").write_bytes((tmp_path / "veil.png").read_bytes()[:-1] + b"x")  # by another program
+    assert "textures" in row().sentences[0]
+    image.pack()
+    update()
+    bake(plane)
+    assert row().standing == Standing.BAKED
+
+
+def test_a_copy_of_a_file_is_no_other_texture(plane, tmp_path):
+    image = add_texture(plane.data.materials[0], node_of(plane.data.materials[0]).inputs["Base Color"], tmp_path)
+    bake(plane)
+    content = (tmp_path / "veil.png").read_bytes()
+    (tmp_path / "veil.png").unlink()
+    (tmp_path / "veil.png").write_bytes(content)
+    assert not image.is_dirty
+    assert row().standing == Standing.BAKED
+
+
+def test_how_often_light_may_bounce_counts_where_it_may(plane):
+    cycles = bpy.context.scene.cycles
+    cycles.diffuse_bounces += 1
+    assert row().standing == Standing.BAKED  # without indirect light
+    bpy.context.scene.beamspread.use_indirect = True
+    stale.keep(Bake(PLANE), stale.parts_of(bpy.context, [PLANE])[PLANE])
+    assert row().standing == Standing.BAKED
+    cycles.diffuse_bounces += 1
+    assert "settings" in row().sentences[0]
+
+
+@pytest.mark.parametrize("arguments", [[], ["--solver", "direct"], ["--pass", "IRRADIANCE"]])
+def test_a_batch_that_fills_the_nodes_image_is_a_bake(arguments, tmp_path):
+    bpy.context.scene.beamspread.resolution, bpy.context.scene.beamspread.image_storage = 16, "FILES"
+    plane = add_plane(material=add_material())
+    add_sun(20)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    bake(plane)
+    del node_of(plane.data.materials[0]).image["beamspread_bakes"]
+    state.forget()
+    assert row().standing == Standing.NEVER
+    assert batch.bake_all(options.parse(arguments)).all_written()
+    expected = Standing.NEVER if "--pass" in arguments else Standing.STALE if arguments else Standing.BAKED
+    assert row().standing == expected
+    if expected == Standing.STALE:
+        assert row().sentences[0] == "Changed since its bake: settings."

@@ -83,8 +83,11 @@ def test_what_fails_meanwhile_is_said_in_the_panels_and_the_others_are_baked(see
     assert seen["baked after removal"] == pytest.approx(100, rel=0.05)
 
 
-def test_what_cannot_start_is_an_error(seen):
-    assert "albedo's red is 1" in seen["refused"]
+def test_what_cannot_start_is_said_in_one_popup(seen):
+    assert seen["refused"] == ["CANCELLED"]
+    ((title, (sentence,)),) = seen["popups of refusal"]
+    assert title == "Beamspread: nothing was baked"
+    assert "albedo's red is 1" in sentence
 
 
 def test_loading_another_file_ends_the_bake(seen):

@@ -20,7 +20,7 @@ LIBRARIES = {"ducc", "eigen", "embree", "glm", "highway", "imath", "openexr", "p
 
 def packed(folder, staged=STAGED):
     """The module of another Python is made up: what is in it isn't looked at."""
-    modules = folder / "modules"
+    modules = folder / "more"
     modules.mkdir(exist_ok=True)
     (modules / OTHER_MODULE).write_bytes(b"another Python's")
     licences = max(ROOT.glob("build/deps/*/licenses"), key=lambda path: path.stat().st_mtime)

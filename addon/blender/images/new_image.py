@@ -46,6 +46,8 @@ def uses_files() -> bool:
 def _in_file(name: str, texture: np.ndarray, is_data: bool) -> tuple[str, bpy.types.Image]:
     path, made_for = _place(name)
     writing.write_file(path, texture, "EXR", {writing.MADE_FOR: made_for})
+    for unused in [one for one in bpy.data.images if files.file_of(one) == path]:
+        bpy.data.images.remove(unused)
     image = bpy.data.images.load(str(path))
     image.name = _free_name(name)
     image.colorspace_settings.is_data = is_data
@@ -103,8 +105,11 @@ def _point_to(image, path: Path) -> None:
 
 
 def _free_path(folder: Path, plain: str, made_for: str) -> Path:
-    """A file that neither an image of this scene nor anything else has; one made before for the same is free."""
-    taken = {files.file_of(image) for image in bpy.data.images}
+    """A file that neither an image of this scene nor anything else has; one made before for the same is free.
+
+    So is that of an image that nothing shows any more, as when a node's image was cleared.
+    """
+    taken = {files.file_of(image) for image in bpy.data.images if image.users or image.is_dirty}
     stems = itertools.chain([plain], (f"{plain}_{number}" for number in itertools.count(2)))
     paths = (folder / f"{one}.exr" for one in stems)
     free = (path for path in paths if path not in taken)

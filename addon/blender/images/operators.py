@@ -6,6 +6,7 @@ import bpy
 
 from ...core.bake.runner import Bake, Target
 from ..node.find import find_node
+from ..registration import all_or_nothing, classes
 from . import files, previews
 from .new_image import keep_new
 from .owners import KEY
@@ -31,7 +32,7 @@ class ImageOperator:
     @classmethod
     def poll(cls, context):
         image = image_in(context)
-        if image is None or previews.MADE_FOR_PREVIEWS in image:
+        if image is None or previews.holds_previews_alone(image):
             return False
         return 0 not in image.size and image.library is None and cls.needed(context, image)
 
@@ -82,4 +83,4 @@ class BEAMSPREAD_OT_resize_image(ImageOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-register, unregister = bpy.utils.register_classes_factory((BEAMSPREAD_OT_make_float, BEAMSPREAD_OT_resize_image))
+register, unregister = all_or_nothing(*classes(BEAMSPREAD_OT_make_float, BEAMSPREAD_OT_resize_image))

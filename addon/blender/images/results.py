@@ -59,7 +59,9 @@ class Results:
         for layer, texture in bake.layers.items():
             if layer == COMBINED:
                 path, image = self._store_shown(node, bake, texture)
-                bake.warnings += link_result(node, image)
+                warnings, notes = link_result(node, image)
+                bake.warnings += warnings
+                bake.notes += notes
             else:
                 path = self._store_beside(node, bake, layer, texture)
             paths.append(path)
@@ -100,7 +102,7 @@ class Results:
 
     def _store_shown(self, node, bake: Bake, texture: np.ndarray) -> tuple[str, bpy.types.Image]:
         image = node.image
-        if image is not None and previews.MADE_FOR_PREVIEWS in image:
+        if image is not None and previews.holds_previews_alone(image):
             bpy.data.images.remove(image)  # which brings no settings of the user's
             image = None
         if image is None:

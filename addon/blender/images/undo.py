@@ -10,6 +10,8 @@ import uuid
 import bpy
 from bpy.app.handlers import persistent
 
+from ..registration import all_or_nothing, handlers
+
 OURS = "beamspread_"
 """How the names of all that an image says of bakes begin."""
 
@@ -62,20 +64,12 @@ def _forget(*_arguments) -> None:
     _shown.clear()
 
 
-HANDLERS = {
-    "undo_pre": _note_files,
-    "redo_pre": _note_files,
-    "undo_post": _show_what_is_kept,
-    "redo_post": _show_what_is_kept,
-    "load_pre": _forget,
-}
-
-
-def register() -> None:
-    for name, handler in HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(handler)
-
-
-def unregister() -> None:
-    for name, handler in HANDLERS.items():
-        getattr(bpy.app.handlers, name).remove(handler)
+register, unregister = all_or_nothing(
+    *handlers(
+        undo_pre=_note_files,
+        redo_pre=_note_files,
+        undo_post=_show_what_is_kept,
+        redo_post=_show_what_is_kept,
+        load_pre=_forget,
+    )
+)

@@ -21,6 +21,8 @@ from ..images.files import file_of
 from ..images.outputs import Outputs
 from ..images.writing import size_of
 from ..node.find import NOTHING_FOUND, find_misplaced, find_targets
+from . import stale
+from .fingerprint import SETTINGS, Parts, settings_part
 from .prepare import prepare_scene
 
 
@@ -86,8 +88,10 @@ class _Batch:
                 left.append(target)
             else:
                 yield record
+        parts = self._parts_of(left)
         for bake in self._prepared(left):
             self._bake(bake, frame)
+            self._remember(bake, parts.get(bake.target))
             yield BakeRecord.of(bake, frame)
 
     def _find(self) -> tuple[list[Target], list[Bake]]:
@@ -120,6 +124,27 @@ class _Batch:
         wanted = BakeRecord(target.object_name, target.material_name, frame, str(path), *size)
         wanted.output, wanted.indirect = settings.output, settings.indirect
         return self._earlier.skipped(wanted, needs_record=own is not None)
+
+    def _parts_of(self, targets: list[Target]) -> dict[Target, Parts]:
+        """What bakes read that go to images which nodes show."""
+        shown = [target for target in targets if self._own_image(target) is not None]
+        if not shown or self._stop:
+            return {}
+        own = settings_part(self._scene, self._options.solver, self._options.indirect)
+        found = stale.parts_of(bpy.context, shown)
+        return {target: parts | {SETTINGS: own} for target, parts in found.items()}
+
+    def _own_image(self, target: Target):
+        try:
+            return self._outputs.own_image(target, self._settings.layers[0])
+        except BakeError:
+            return None
+
+    def _remember(self, bake: Bake, parts: Parts | None) -> None:
+        """Note what the image that the node shows has read, for a scene that goes on or is saved afterwards."""
+        own = self._own_image(bake.target) if bake.status == WRITTEN else None
+        if own is not None and bake.path == str(file_of(own)):
+            stale.keep(bake, parts)
 
     def _prepared(self, targets: list[Target]) -> Iterator[Bake]:
         """A bake for each target, prepared when its turn comes; once asked to stop, no more are."""

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import threading
 import uuid
 
 import bpy
 import numpy as np
+from bpy.app.handlers import persistent
 
 from ...core.bake.runner import WRITTEN, Bake, Target
 from ...core.bake.settings import COMBINED, BakeSettings
 from ...core.errors import ImageError, sentence
 from .. import compat
-from ..node.find import NOTHING_FOUND, find_misplaced, find_node, materials_of
+from ..node.find import NOTHING_FOUND, find_misplaced, find_node, find_targets, materials_of
+from ..registration import all_or_nothing, classes, handlers
+from . import stale
+from .fingerprint import Parts
 from .picture import render_picture, show_by_eevee
 from .prepare import prepare
 from .state import state
@@ -52,12 +57,14 @@ def bake_active_image(engine, depsgraph, obj, width: int, height: int) -> None:
             bake.keep(lambda bake: _put(pixels, bake))
             state.note(bake)
         for bake in bakes:
-            for level, message in [("ERROR", bake.error), *(("WARNING", warning) for warning in bake.warnings)]:
+            warnings, notes = [("WARNING", one) for one in bake.warnings], [("INFO", one) for one in bake.notes]
+            for level, message in [("ERROR", bake.error), *warnings, *notes]:
                 if message:
                     engine.report({level}, f"{bake.target}: {message}")
         if all(bake.status == WRITTEN for bake in bakes):
             compat.write_pass(passes["Combined"], pixels)
             filled = True
+            fillings.add([bake for bake in bakes if _fills_own_image(bake)])
     except Exception as error:  # noqa: BLE001 - Blender would swallow it
         engine.report({"ERROR"}, sentence(error))
     finally:
@@ -90,6 +97,52 @@ def _check_active_image(material, settings: BakeSettings) -> None:
             f"The image '{active.name}' shows luminance in the Beamspread node: choose another active image for "
             f"{settings.output.lower()}."
         )
+
+
+def _fills_own_image(bake: Bake) -> bool:
+    """Whether the image that Blender bakes to is the one that the node shows as luminance."""
+    material = bpy.data.materials[bake.target.material_name]
+    return COMBINED in bake.job.settings.layers and find_node(material).image == _active_image(material)
+
+
+class _Fillings:
+    """Bakes whose pixels Blender is about to put into images of nodes, and what they have read.
+
+    The window calls `begin` before it bakes and `end` after it, in the main thread; between them the engine adds bakes
+    in another. Scripts call neither, and bake in the main thread.
+    """
+
+    def __init__(self) -> None:
+        self._parts: dict[Target, Parts] | None = None
+
+    def begin(self) -> None:
+        targets = find_targets(bpy.context.selected_objects)
+        self._parts = stale.parts_of(bpy.context, targets) if targets else {}
+
+    def add(self, bakes: list[Bake]) -> None:
+        parts = self._parts
+        if bakes and parts is None and threading.current_thread() is threading.main_thread():
+            parts = stale.parts_of(bpy.context, [bake.target for bake in bakes])
+        for bake in bakes:
+            stale.keep_later(bake, (parts or {}).get(bake.target))
+
+    def end(self) -> None:
+        self._parts = None
+        stale.look_soon()
+
+
+fillings = _Fillings()
+
+
+@persistent
+def _before_bake(*_arguments) -> None:
+    if bpy.context.scene.render.engine == BeamspreadEngine.bl_idname:
+        fillings.begin()
+
+
+@persistent
+def _after_bake(*_arguments) -> None:
+    fillings.end()
 
 
 def _active_image(material):
@@ -163,14 +216,19 @@ def _is_compatible(panel) -> bool:
     return any_engine and not panel.__name__.startswith(HIDDEN_PANEL_PREFIXES)
 
 
-def register() -> None:
-    bpy.utils.register_class(BeamspreadEngine)
+def _use_panels() -> None:
     for panel in _compatible_panels():
         panel.COMPAT_ENGINES.add(BeamspreadEngine.bl_idname)
 
 
-def unregister() -> None:
+def _leave_panels() -> None:
     for panel in bpy.types.Panel.__subclasses__():
         if BeamspreadEngine.bl_idname in getattr(panel, "COMPAT_ENGINES", ()):
             panel.COMPAT_ENGINES.remove(BeamspreadEngine.bl_idname)
-    bpy.utils.unregister_class(BeamspreadEngine)
+
+
+register, unregister = all_or_nothing(
+    *classes(BeamspreadEngine),
+    (_use_panels, _leave_panels),
+    *handlers(object_bake_pre=_before_bake, object_bake_complete=_after_bake),
+)

@@ -1,8 +1,7 @@
 """What bakes read of a scene, as short digests: where they still are the same, so is what would be baked.
 
-They are made from the scene as the window has it, so that they cost little. Not in them: what geometry nodes and
-particles scatter (their settings are), pixels of textures (their names and files are), how often light may bounce.
-Another version of Blender may make others: after a change of version a bake counts as stale.
+They are made from the scene as the window has it, so that they cost little. Another version of Blender may make
+others: after a change of version a bake counts as stale.
 """
 
 from __future__ import annotations
@@ -18,11 +17,19 @@ from ...core.errors import sentence
 from .. import compat
 from ..node.find import find_node
 from ..read.visible import render_visible_names
+from .pixels import Pixels, images_of, results
+from .scatter import Scatter, scatters
 
 Parts = dict[str, str]
 """By a name that artists understand, the digest of one part of what a bake reads."""
 
-IMAGE, QUALITY = "size of the image", "quality"
+IMAGE, QUALITY, SETTINGS = "size of the image", "quality", "settings"
+
+# Of Cycles, for light that other objects return.
+BOUNCES = (
+    *("max_bounces", "diffuse_bounces", "glossy_bounces", "transmission_bounces", "volume_bounces"),
+    *("transparent_max_bounces", "caustics_reflective", "caustics_refractive"),
+)
 
 GEOMETRY = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 SOLID = GEOMETRY | {"CURVES", "VOLUME", "POINTCLOUD"}
@@ -100,15 +107,25 @@ class Fingerprints:
 
     def __init__(self) -> None:
         self._kept: dict[int, str] = {}
+        self._images: dict[int, list[str]] = {}  # by owner of nodes: names of its textures
+        self._pixels, self._scatter = Pixels(), Scatter()
         self._sees_media = True
 
     def forget(self, identifiers: Iterable[int] | None = None) -> None:
         """What was kept of these data-blocks (of the original ones, `as_pointer()`); None: of all."""
         if identifiers is None:
             self._kept.clear()
+            self._images.clear()
+            self._pixels.forget()
+            self._scatter.forget()
             return
         for identifier in identifiers:
             self._kept.pop(identifier, None)
+            self._images.pop(identifier, None)
+
+    def forget_scatter(self) -> None:
+        """What objects scatter, since some geometry is another."""
+        self._scatter.forget()
 
     def of(self, context, targets: Iterable[Target]) -> dict[Target, Parts]:
         """The parts of each target of the context's scene; those that are no longer there are left out."""
@@ -116,10 +133,11 @@ class Fingerprints:
         depsgraph = context.evaluated_depsgraph_get()
         visible = render_visible_names(view_layer)
         self._sees_media = scene.beamspread.use_indirect
-        lamps, solids, own = 0, 0, {}
-        for obj in scene.objects:
-            if obj.name not in visible:
-                continue
+        lamps, solids, own, owners = 0, 0, {}, []
+        shown = [obj for obj in scene.objects if obj.name in visible]
+        self._scatter.look(depsgraph, [obj for obj in shown if scatters(obj)])
+        for obj in shown:
+            owners += [obj.data] if obj.type == "LIGHT" else [slot.material for slot in obj.material_slots]
             if obj.type == "LIGHT":
                 lamps += _number(self._lamp(obj))
             elif obj.type in SOLID or obj.instance_type != "NONE":
@@ -128,6 +146,7 @@ class Fingerprints:
         shared = {
             "lights": f"{lamps % 2**64:x}",
             "world": self._world(scene, view_layer),
+            "textures": self._textures([*owners, scene.world]),
         }
         found = {}
         for target in targets:
@@ -143,7 +162,7 @@ class Fingerprints:
                 "other objects": f"{others % 2**64:x}",
                 **shared,
                 "material": digest(self._surface(node)),
-                "settings": digest(_settings(scene)),
+                SETTINGS: settings_part(scene),
                 QUALITY: _quality(scene),
                 IMAGE: image_part(node.image),
             }
@@ -166,7 +185,12 @@ class Fingerprints:
         inner = obj.instance_collection if obj.instance_type == "COLLECTION" else None
         instanced = sorted(self._instanced(one, depsgraph) for one in inner.all_objects) if inner else ()
         shape = self._keep(obj, lambda: self._shape(obj, depsgraph))
-        return digest(shape, _matrix(obj), seen, instanced)
+        scattered = ()
+        if scatters(obj):
+            self._scatter.look(depsgraph, [obj])
+            text, materials = self._scatter.of(obj)
+            scattered = text, [self._material(material) for material in materials]
+        return digest(shape, _matrix(obj), seen, instanced, *scattered)
 
     def _instanced(self, obj, depsgraph) -> str:
         if obj.type == "LIGHT":
@@ -189,6 +213,19 @@ class Fingerprints:
         if node is not None:
             return digest(self._surface(node)) if self._sees_media else ""
         return self._keep(material, lambda: digest(_tree_of(material), compat.has_transparent_shadow(material)))
+
+    def _textures(self, owners: Iterable) -> str:
+        """Of the pixels of all textures but those that bakes have made."""
+        names = {name for owner in dict.fromkeys(owners) if owner is not None for name in self._names_in(owner)}
+        own = {image.name_full for image in results() if image is not None}
+        images = {image.name_full: image for image in bpy.data.images} if names - own else {}
+        return digest([(name, self._pixels.mark(images[name])) for name in sorted(names - own) if name in images])
+
+    def _names_in(self, owner) -> list[str]:
+        key = owner.as_pointer()
+        if key not in self._images:
+            self._images[key] = [image.name_full for image in images_of(owner)]
+        return self._images[key]
 
     def _surface(self, node) -> list:
         inputs = [
@@ -273,9 +310,14 @@ def _mesh(obj, depsgraph) -> str:
         evaluated.to_mesh_clear()
 
 
-def _settings(scene) -> list:
-    names = ("solver", "distributions", "samples", "margin", "use_indirect")
-    return [getattr(scene.beamspread, name) for name in names]
+def settings_part(scene, solver: str | None = None, indirect: bool | None = None) -> str:
+    """Of what decides how is baked; arguments go before the scene's."""
+    own = scene.beamspread
+    use_indirect = own.use_indirect if indirect is None else indirect
+    bounces = (
+        [getattr(scene.cycles, name, None) for name in BOUNCES] if use_indirect and hasattr(scene, "cycles") else []
+    )
+    return digest([solver or own.solver, own.distributions, own.samples, own.margin, use_indirect], *bounces)
 
 
 def _quality(scene) -> str:

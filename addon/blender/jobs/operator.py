@@ -13,6 +13,7 @@ from ...core.bake.settings import COMBINED
 from ..images import previews
 from ..images.results import Results
 from ..node.find import NOTHING_FOUND, find_misplaced, find_targets
+from ..registration import all_or_nothing, classes
 from . import popup, stale
 from .prepare import read_scene
 from .queue import Queue
@@ -66,6 +67,8 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         ],
         default="SELECTED",
     )
+
+    _in_window = False
 
     @classmethod
     def description(cls, _context, properties):
@@ -200,23 +203,24 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
             self._written.append(bake.target)
             if COMBINED in layers:
                 parts, is_first_look = self._parts.get(bake.target), self._queue.turn.is_first
-                stale.keep(bake.target, parts, bake.warnings, is_first_look)
+                stale.keep(bake, parts, is_first_look)
             if bake.is_dark:
                 self._problems += bake.warnings
         elif bake.status == CANCELLED:
             self._say("WARNING", "Bake cancelled: the image keeps what it had")
         else:
             self._fail(f"{bake.target}: {bake.error}")
-        for warning in bake.warnings:
-            self._say("WARNING", warning)
+        for level, sentences in (("WARNING", bake.warnings), ("INFO", bake.notes)):
+            for sentence in sentences:
+                self._say(level, sentence)
 
     def _fail(self, message: str) -> None:
-        self._say("ERROR", message)
+        # In the window a popup of ours says it: for an error Blender would open one of its own beside that.
+        self._say("WARNING" if self._in_window else "ERROR", message)
         self._problems.append(message)
 
     def _say(self, level: str, message: str) -> None:
         if message not in self._said:
-            # In the window a report of an error opens a popup of its own where it can, but not while modal.
             self.report({level}, message)
             self._said.add(message)
 
@@ -231,7 +235,7 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         stale.look_soon()
         redraw(context)
         problems = list(dict.fromkeys(self._problems))
-        if problems and getattr(self, "_in_window", False):
+        if problems and self._in_window:
             title = "Beamspread: not all is well" if self._written else "Beamspread: nothing was baked"
             popup.show_soon(title, problems)
         if not self._written:
@@ -274,20 +278,13 @@ class BEAMSPREAD_OT_cancel(bpy.types.Operator):
         return {"FINISHED"}
 
 
-_classes = (BEAMSPREAD_OT_bake, BEAMSPREAD_OT_cancel)
-
-
-def register() -> None:
-    for one in _classes:
-        bpy.utils.register_class(one)
-
-
-def unregister() -> None:
-    # A thread that outlives its operator would end Blender with an error when that quits.
+def _end_threads() -> None:
+    """One that outlives its operator would end Blender with an error when that quits."""
     for thread in threading.enumerate():
         if isinstance(thread, BakeThread):
             thread.cancel()
             thread.join()
     state.stop()
-    for one in reversed(_classes):
-        bpy.utils.unregister_class(one)
+
+
+register, unregister = all_or_nothing(*classes(BEAMSPREAD_OT_bake, BEAMSPREAD_OT_cancel), (lambda: None, _end_threads))

@@ -14,21 +14,24 @@ KEY = "beamspread_bakes"
 
 @dataclass(frozen=True)
 class Record:
-    """One bake in an image: digests of what it read, its warnings, and whether its pixels were not saved then."""
+    """One bake in an image: digests of what it read, what it said, and whether its pixels were not saved then."""
 
     parts: Parts
     warnings: tuple[str, ...] = ()
     is_dirty: bool = False
+    notes: tuple[str, ...] = ()
 
     def changed(self, now: Parts) -> list[str]:
-        """Names of the parts that are no longer the same."""
-        return [name for name, digest in now.items() if self.parts.get(name) != digest]
+        """Names of the parts that are no longer the same; of those that older files don't know nothing is said."""
+        return [name for name, digest in now.items() if self.parts.get(name, digest) != digest]
 
 
 def record_of(image, target: Target) -> Record | None:
     """Of the target's bake in the image, or None if it has none."""
     found = _all(image).get(str(target))
-    return Record(found["parts"], tuple(found["warnings"]), found["is_dirty"]) if found else None
+    if not found:
+        return None
+    return Record(found["parts"], tuple(found["warnings"]), found["is_dirty"], tuple(found.get("notes", ())))
 
 
 def keep_record(image, target: Target, record: Record) -> None:

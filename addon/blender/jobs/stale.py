@@ -12,25 +12,29 @@ from dataclasses import replace
 import bpy
 from bpy.app.handlers import persistent
 
-from ...core.bake.runner import Target
+from ...core.bake.runner import Bake, Target
 from ..images import previews
 from ..images.files import file_of
 from ..images.owners import noted_as
 from ..node.find import find_node, find_targets
+from ..registration import all_or_nothing, handlers
 from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
 from .record import Record, keep_record, record_of
 from .state import Row, Standing, redraw, state
 
-REST_SECONDS = 0.3
+# After the last change; longer where a look takes long, which happens between two changes at most once.
+REST_SECONDS, MOST_OF_THE_TIME = 0.3, 0.05
 
 FIRST_LOOK = "first look"
 
 fingerprints = Fingerprints()
-_last = {"change": 0.0}
+_waiting: list[tuple[Bake, Parts | None]] = []
+_last = {"change": 0.0, "seconds": 0.0, "is looking": False}
 
 
 def refresh(context) -> None:
     """Bring the rows of all targets of the context's scene up to date."""
+    _keep_waiting()
     targets = find_targets(context.scene.objects)
     recorded = {target: record for target in targets if (record := _record(target)) is not None}
     now = fingerprints.of(context, recorded) if recorded else {}
@@ -44,15 +48,25 @@ def parts_of(context, targets: list[Target]) -> dict[Target, Parts]:
     return fingerprints.of(context, targets)
 
 
-def keep(target: Target, parts: Parts | None, warnings: list[str], is_first_look: bool) -> None:
-    """Note in the node's image what the bake in it has read."""
-    image = _image(target)
+def keep(bake: Bake, parts: Parts | None, is_first_look: bool = False) -> None:
+    """Note in the node's image what the bake in it has read and said."""
+    image = _image(bake.target)
     if image is None or parts is None:
         return
     parts = parts | {IMAGE: image_part(image)}  # the bake may have made it
     if is_first_look:
         parts[QUALITY] = FIRST_LOOK
-    keep_record(image, target, Record(parts, tuple(warnings), image.is_dirty))
+    keep_record(image, bake.target, Record(parts, tuple(bake.warnings), image.is_dirty, tuple(bake.notes)))
+
+
+def keep_later(bake: Bake, parts: Parts | None) -> None:
+    """As `keep`, once Blender has put the bake's pixels into the image; from any thread."""
+    _waiting.append((bake, parts))
+
+
+def _keep_waiting() -> None:
+    while _waiting:
+        keep(*_waiting.pop(0))
 
 
 def _image(target: Target):
@@ -77,9 +91,11 @@ def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
     if record is None:
         return Row(target, Standing.NEVER)
     if changed and changed != [QUALITY]:
-        return Row(target, Standing.STALE, (f"Changed since its bake: {', '.join(changed)}.", *record.warnings), True)
+        why = f"Changed since its bake: {', '.join(changed)}."
+        return Row(target, Standing.STALE, (why, *record.warnings, *record.notes), True)
     warnings = (*([_why_again(record.parts[QUALITY], now[QUALITY])] if changed else []), *record.warnings)
-    return Row(target, Standing.WARNED if warnings else Standing.BAKED, warnings, bool(changed))
+    standing = Standing.WARNED if warnings else Standing.BAKED
+    return Row(target, standing, (*warnings, *record.notes), bool(changed))
 
 
 def _has_lost_its_file(image) -> bool:
@@ -105,14 +121,20 @@ def look_soon() -> None:
 
 
 def _look() -> float | None:
-    waiting = _last["change"] + REST_SECONDS - time.monotonic()
+    rest = max(REST_SECONDS, _last["seconds"] / MOST_OF_THE_TIME)
+    began = time.monotonic()
+    waiting = _last["change"] + rest - began
     if waiting > 0:
         return waiting
     context = bpy.context
     if context.window is not None or context.window_manager.windows:
         window = context.window or context.window_manager.windows[0]
-        with context.temp_override(window=window):
-            refresh(bpy.context)
+        _last["is looking"] = True
+        try:
+            with context.temp_override(window=window):
+                refresh(bpy.context)
+        finally:
+            _last["is looking"], _last["seconds"] = False, time.monotonic() - began
         redraw(bpy.context)
     return None
 
@@ -125,8 +147,20 @@ def _on_update(_scene, depsgraph) -> None:
         if update.is_updated_geometry or not isinstance(update.id, bpy.types.Object)
     ]
     fingerprints.forget(changed)
-    if len(depsgraph.updates):
-        look_soon()
+    if any(update.is_updated_geometry and isinstance(update.id, bpy.types.Object) for update in depsgraph.updates):
+        fingerprints.forget_scatter()
+    if not _last["is looking"]:
+        look_soon()  # also where there is no update: Blender 3.4 names none for strokes on images
+
+
+@persistent
+def _before_saving(*_arguments) -> None:
+    _keep_waiting()
+
+
+@persistent
+def _before_loading(*_arguments) -> None:
+    _waiting.clear()
 
 
 @persistent
@@ -136,24 +170,21 @@ def _on_all(*_arguments) -> None:
     look_soon()
 
 
-HANDLERS = {
-    "depsgraph_update_post": _on_update,
-    "frame_change_post": _on_update,
-    "undo_post": _on_all,
-    "redo_post": _on_all,
-    "load_post": _on_all,
-}
-
-
-def register() -> None:
-    for name, function in HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(function)
-    look_soon()
-
-
-def unregister() -> None:
-    for name, function in HANDLERS.items():
-        getattr(bpy.app.handlers, name).remove(function)
+def _stop_looking() -> None:
     if bpy.app.timers.is_registered(_look):
         bpy.app.timers.unregister(_look)
     fingerprints.forget()
+
+
+register, unregister = all_or_nothing(
+    *handlers(
+        depsgraph_update_post=_on_update,
+        frame_change_post=_on_update,
+        undo_post=_on_all,
+        redo_post=_on_all,
+        save_pre=_before_saving,
+        load_pre=_before_loading,
+        load_post=_on_all,
+    ),
+    (look_soon, _stop_looking),
+)

@@ -10,11 +10,11 @@ from collections import deque
 from dataclasses import dataclass
 from enum import Enum
 
-import bpy
 from bpy.app.handlers import persistent
 
 from ...core.bake.estimate import in_words
 from ...core.bake.runner import CANCELLED, WRITTEN, Bake, Target
+from ..registration import all_or_nothing, handlers
 
 
 class Standing(Enum):
@@ -176,9 +176,4 @@ def _forget(*_arguments) -> None:
     state.forget()
 
 
-def register() -> None:
-    bpy.app.handlers.load_pre.append(_forget)
-
-
-def unregister() -> None:
-    bpy.app.handlers.load_pre.remove(_forget)
+register, unregister = all_or_nothing(*handlers(load_pre=_forget))

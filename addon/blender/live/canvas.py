@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
-import weakref
-from pathlib import Path
-
 import bpy
 import numpy as np
 
 from ...core.bake.runner import Target
 from ...core.live.picture import Picture
 from ...core.live.subject import Subject
-from ...core.whole_file import whole_file
 from ..images import files, undo
 from ..images.new_image import name_for
-from ..images.previews import MADE_FOR_PREVIEWS
+from ..images.previews import MADE_FOR_PREVIEWS, holds_previews_alone, leave
 from ..images.writing import make_image
 from ..node.find import find_node
+from .saved import Saved, can_be_read_again, reread
 
 # Of pixels that went through 8 bits.
 ROUNDING = 1 / 255
@@ -28,18 +23,32 @@ class Canvas:
     """An image that shows pictures of subjects, each in its own region.
 
     Nothing is packed, and no file is written: what the image was last saved with stays. `made_for` is the target whose
-    node had no image.
+    node had no image. What others draw into pictures becomes part of the image's own pixels.
+
+    Attributes
+    ----------
+    said : a sentence once the image keeps what somebody has drawn into its pictures, else "".
     """
 
     def __init__(self, image, made_for: Target | None = None) -> None:
         self._is_shown = self._is_given_back = False
         self._made_for = made_for
+        self.said = ""
         self._know(image)
-        self._pixels = np.empty(self.size[0] * self.size[1] * image.channels, np.float32)
-        image.pixels.foreach_get(self._pixels)
-        # What was never saved is only in these pixels.
-        self._before = None if _can_be_read_again(image) else self._pixels.copy()
-        self._saved = _Saved(image) if self._before is None else None
+        self._pixels = _values(image)
+        self._region = np.zeros(self.size[::-1], bool)  # of pictures
+        self._before, self._saved = None, None
+        self._take_own(image, self._pixels)
+
+    def _take_own(self, image, values: np.ndarray) -> None:
+        """Note what the image shows as its own pixels."""
+        if not can_be_read_again(image):
+            # What was never saved is only in these pixels.
+            self._before, self._saved = values.copy(), None
+            return
+        self._before = None
+        if self._saved is None or not self._saved.is_current(image):
+            self._saved = Saved(image)
 
     def _know(self, image) -> None:
         self.name, self.size, self._pointer = image.name, tuple(image.size), image.as_pointer()
@@ -60,6 +69,7 @@ class Canvas:
 
     def show(self, image, picture: Picture) -> None:
         """Put a picture into the image."""
+        self._keep_edits(image)
         texture = picture.texture
         if not image.is_float and not image.colorspace_settings.is_data:
             texture = files.to_srgb(texture)
@@ -68,12 +78,19 @@ class Canvas:
         np.copyto(pixels[..., :channels], texture[..., :channels], where=picture.region[..., None])
         if pixels.shape[2] == 4:
             pixels[picture.region, 3] = 1
+        self._region |= picture.region
         self._put(image)
 
     def _put(self, image) -> None:
         image.pixels.foreach_set(self._pixels)
         image.update()
+        self._put_there = self._pixels if image.is_float else _values(image)
         self._is_shown, self._is_given_back = True, False
+
+    def _lay_on(self, own: np.ndarray) -> None:
+        """Have the pictures on other pixels than before."""
+        texels = self._pixels.reshape(*self._region.shape, -1)
+        np.copyto(texels, own.reshape(texels.shape), where=~self._region[..., None])
 
     def show_again(self) -> None:
         """Put the pictures back that others wanted to see gone for a while."""
@@ -86,7 +103,34 @@ class Canvas:
                 return  # it has one of its own by now
             self._know(image)
         if image is not None and self.fits(image):
+            own = _values(image)  # somebody may have drawn meanwhile
+            self._take_own(image, own)
+            self._lay_on(own)
             self._put(image)
+
+    def is_edited(self, image) -> bool:
+        """Whether others have drawn into what it shows."""
+        if not self._is_shown or self._is_given_back or not image.is_dirty or not self.fits(image):
+            return False
+        return not _are_equal(_values(image), self._put_there)
+
+    def _keep_edits(self, image) -> bool:
+        """Take the texels that others have drawn for the image's own; whether there are any."""
+        if self._made_for is not None or not self.is_edited(image):
+            return False
+        now, shown = _values(image), self._put_there.copy()
+        self._restore(image)
+        own = _values(image)
+        is_drawn = (now != shown).reshape(-1, image.channels).any(axis=1)
+        merged = np.where(is_drawn[:, None], now.reshape(-1, image.channels), own.reshape(-1, image.channels)).ravel()
+        if _are_equal(merged, own):
+            return False
+        self._before, self._saved = merged, None
+        self._lay_on(merged)
+        self.said = (
+            f"The image '{image.name}' was changed while Live showed it: it keeps the change, which is not saved yet."
+        )
+        return True
 
     def is_saved(self) -> bool:
         """Whether the image was filled or saved by somebody else since pictures were put into it."""
@@ -103,19 +147,42 @@ class Canvas:
             image.pixels.foreach_get(self._pixels)
         self._is_shown = False
 
+    def leave_to_painter(self) -> None:
+        """Have the image show its own pixels to somebody who can paint on it; one made for previews stays as it is."""
+        image = self.image()
+        if self._is_given_back or image is None:
+            return
+        if self._made_for is None:
+            self.give_back()
+            return
+        self._is_given_back = True
+        self._leave(image)
+
+    def _leave(self, image) -> None:
+        """Leave an image that was made for previews to whoever has made it his own."""
+        leave(image)
+        self._made_for = None
+        self.said = f"The image '{image.name}', which Live has made, stays: it is painted on, saved or used elsewhere."
+
     def give_back(self) -> None:
         """Give the image the pixels back that it had, until they are shown again."""
         if self._is_given_back:
             return
-        self._is_given_back = True
         image = self.image()
         if image is None:
+            self._is_given_back = True
             return
+        is_edited, is_kept = self.is_edited(image), self._keep_edits(image)
+        self._is_given_back = True
         if self._made_for is not None:
-            if MADE_FOR_PREVIEWS in image:
+            if holds_previews_alone(image) and not is_edited:
                 self.name = image.name
                 bpy.data.images.remove(image)
-        elif image.is_dirty and self.fits(image):
+            else:
+                if image.source == "GENERATED" and image.packed_file is None:
+                    image.pack()
+                self._leave(image)
+        elif self.fits(image) and (is_kept or image.is_dirty):
             self._restore(image)
         elif self._is_shown and self.fits(image) and self._is_of_pictures(image):
             # Blender offers to save changed images as it closes a file.
@@ -136,51 +203,23 @@ class Canvas:
             image.pack()
 
     def _is_of_pictures(self, image) -> bool:
-        values = np.empty_like(self._pixels)
-        if len(image.pixels) != len(values):
+        if len(image.pixels) != len(self._pixels):
             return False
-        image.pixels.foreach_get(values)
+        values = _values(image)
         shown = self._pixels if image.is_float else self._pixels.clip(0, 1)
         return np.allclose(values, shown, rtol=1e-3, atol=ROUNDING)
 
 
-class _Saved:
-    """What an image was last saved as: bytes of its packed file, or a copy of its file."""
-
-    def __init__(self, image) -> None:
-        self._path = files.file_of(image)
-        if self._path is None:
-            self._packed = bytes(image.packed_file.data)
-        else:
-            folder = tempfile.mkdtemp(prefix="beamspread-")
-            weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
-            self._copy = Path(folder) / self._path.name
-            shutil.copyfile(self._path, self._copy)
-
-    def put_back(self, image) -> None:
-        if self._path is None:
-            image.pack(data=self._packed, data_len=len(self._packed))
-        elif files.file_of(image) == self._path:
-            with whole_file(self._path) as temporary:
-                shutil.copyfile(self._copy, temporary)
-        reread(image)
+def _values(image) -> np.ndarray:
+    """All channels of all pixels, float32, flat."""
+    values = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(values)
+    return values
 
 
-def reread(image) -> None:
-    """Show what the image was last saved with."""
-    if image.packed_file is None:
-        image.reload()
-        return
-    # Not `reload`: it would pack the image's file anew, where there is one.
-    image.buffers_free()
-    image.gl_free()
-    image.update_tag()
-
-
-def _can_be_read_again(image) -> bool:
-    path = files.file_of(image)
-    is_kept = image.packed_file is not None if path is None else path.is_file()
-    return is_kept and not image.is_dirty
+def _are_equal(one: np.ndarray, other: np.ndarray) -> bool:
+    """Bit by bit, as some may be no numbers."""
+    return np.array_equal(one.view(np.uint32), other.view(np.uint32))
 
 
 def image_name_of(subject: Subject) -> str:

@@ -15,10 +15,12 @@ from ...core.live.painter import Painter
 from ...core.live.picture import Picture
 from ...core.live.subject import Subject
 from ..images.owners import owners_of
-from ..images.previews import MADE_FOR_PREVIEWS, previews
+from ..images.previews import holds_previews_alone, leave, previews
 from ..jobs.state import state
+from ..registration import all_or_nothing, handlers
 from .canvas import Canvas, image_for, image_name_of
 from .marks import Marks
+from .painting import painted_results
 from .reader import Reader
 
 # Between steps while something changes or is painted, while nothing does, and while Live is off.
@@ -57,6 +59,8 @@ class Session:
         self._errors: dict[Target, str] = {}
         self._regions: dict[Target, np.ndarray] = {}  # of the last pictures
         self._paused = False
+        self._painted_on: list[str] = []  # names of images
+        self._said: list[str] = []  # of canvases that are no more
         self._given_back: list[Subject] | None = None  # as the scene was then
         self._look_seconds = 1.0  # of the last look at more than lamps
         self._changed_at = time.perf_counter()
@@ -86,6 +90,8 @@ class Session:
         if is_occupied():
             self._pause()
             return False
+        if self.waits_for_painter(context):
+            return False
         self._paused = False
         self._adopt_bakes(context)
         self._given_back = None
@@ -97,6 +103,18 @@ class Session:
         if shown:
             self.seconds = time.perf_counter() - changed_at
         return has_changed or shown or self.is_busy()
+
+    def waits_for_painter(self, context) -> bool:
+        """Whether the user can paint on an image of a Beamspread node: it has its own pixels then."""
+        painted = painted_results(context)
+        self._painted_on = [image.name for image in painted]
+        if not painted:
+            return False
+        self._pause()
+        for canvas in self._canvases:
+            if canvas.image() in painted:
+                canvas.leave_to_painter()
+        return True
 
     def _look(self, depsgraph) -> None:
         start = time.perf_counter()
@@ -114,14 +132,19 @@ class Session:
 
     def sentences(self) -> list[str]:
         """What there is to say."""
-        said = [f"{target}: {why}" for target, why in (self._reader.errors | self._errors).items()]
+        said = [f"Live waits while the image '{name}' can be painted on." for name in self._painted_on]
+        said += [f"{target}: {why}" for target, why in (self._reader.errors | self._errors).items()]
         if self._painter.media.simulating:
             said.append(f"The medium ({self._painter.media.simulating}) is simulated: the most similar one stands in.")
         if self._reader.left_out:
             said.append(f"Live leaves out {', '.join(self._reader.left_out)}.")
         if bpy.context.scene.render.engine == "CYCLES":
             said.append(IN_CYCLES)
-        return said
+        return said + self.kept()
+
+    def kept(self) -> list[str]:
+        """What images keep of what others have drawn into pictures, in sentences."""
+        return list(dict.fromkeys([*self._said, *(canvas.said for canvas in self._canvases if canvas.said)]))
 
     def give_back(self) -> None:
         """Have all images show their own pixels until the next step that finds nobody at work on them."""
@@ -138,8 +161,12 @@ class Session:
         self._painter.end()
         if not keep_pixels:
             self._restore()
-        self._canvases.clear()
+        self._drop(self._canvases)
         self._painter.join(END_SECONDS)
+
+    def _drop(self, canvases: list[Canvas]) -> None:
+        self._said += [canvas.said for canvas in canvases if canvas.said]
+        self._canvases = [one for one in self._canvases if one not in canvases]
 
     def _restore(self) -> None:
         for canvas in self._canvases:
@@ -160,7 +187,9 @@ class Session:
         # A bake has read the scene as it was when Live gave the images back.
         subjects = self._given_back or self._read(context.evaluated_depsgraph_get())
         self._painter.adopt([subject for subject in subjects if image_name_of(subject) in saved])
-        self._canvases = [canvas for canvas in self._canvases if canvas not in adopted]
+        for canvas in adopted:
+            leave(canvas.image())
+        self._drop(adopted)
 
     def _read(self, depsgraph) -> list[Subject]:
         """All subjects as the scene is now."""
@@ -200,8 +229,9 @@ class Session:
             return False
         canvas = next((one for one in self._canvases if one.fits(image)), None)
         if canvas is None:
-            canvas = Canvas(image, target if MADE_FOR_PREVIEWS in image else None)
-            self._canvases = [one for one in self._canvases if one.image() != image] + [canvas]
+            canvas = Canvas(image, target if holds_previews_alone(image) else None)
+            self._drop([one for one in self._canvases if one.image() == image])
+            self._canvases.append(canvas)
         canvas.show(image, picture)
         return True
 
@@ -255,6 +285,7 @@ class _Live:
         self.session: Session | None = None
         self.scene_name = ""
         self.failure = ""  # why it was switched off
+        self.kept: list[str] = []  # what there was to say of images then
 
 
 live = _Live()
@@ -264,7 +295,7 @@ def sentences() -> list[str]:
     """What panels say of Live."""
     if live.session is not None:
         return live.session.sentences()
-    return [f"Live was switched off: {live.failure}"] if live.failure else []
+    return [*([f"Live was switched off: {live.failure}"] if live.failure else []), *live.kept]
 
 
 def step(context) -> float:
@@ -274,10 +305,12 @@ def step(context) -> float:
         end()
         if native.problem or scene is None or not scene.beamspread.use_live:
             return OFF_SECONDS
+    if live.session is not None and not is_occupied() and live.session.waits_for_painter(context):
+        return IDLE_SECONDS
     if not bpy.app.background and not is_looked_at(context):
         return IDLE_SECONDS
     if live.session is None:
-        live.session, live.scene_name, live.failure = Session(), scene.name, ""
+        live.session, live.scene_name, live.failure, live.kept = Session(), scene.name, "", []
         previews.holder = live.session
     return BUSY_SECONDS if live.session.step(context) else IDLE_SECONDS
 
@@ -287,6 +320,7 @@ def end(keep_pixels: bool = False) -> None:
     session, live.session = live.session, None
     if session is not None:
         session.end(keep_pixels)
+        live.kept = [] if keep_pixels else session.kept()
         previews.holder = None
 
 
@@ -318,25 +352,24 @@ def _leave_file(*_arguments) -> None:
     end(keep_pixels=True)
 
 
-HANDLERS = {
-    "depsgraph_update_post": _changed,
-    "frame_change_post": _changed,
-    "undo_post": _undone,
-    "redo_post": _undone,
-    "load_pre": _leave_file,
-}
-
-
-def register() -> None:
-    for name, function in HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(function)
+def _start() -> None:
     if not bpy.app.background:
         bpy.app.timers.register(_tick, first_interval=OFF_SECONDS, persistent=True)
 
 
-def unregister() -> None:
+def _stop() -> None:
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     end()
-    for name, function in HANDLERS.items():
-        getattr(bpy.app.handlers, name).remove(function)
+
+
+register, unregister = all_or_nothing(
+    *handlers(
+        depsgraph_update_post=_changed,
+        frame_change_post=_changed,
+        undo_post=_undone,
+        redo_post=_undone,
+        load_pre=_leave_file,
+    ),
+    (_start, _stop),
+)

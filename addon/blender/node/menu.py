@@ -2,6 +2,7 @@
 
 import bpy
 
+from ..registration import all_or_nothing
 from .node import BeamspreadNode
 
 # Blender 3.4 makes its menus from a list of categories; later versions, by hand.
@@ -20,9 +21,4 @@ def _draw(self, context) -> None:
         operator.use_transform = True
 
 
-def register() -> None:
-    _menu().append(_draw)
-
-
-def unregister() -> None:
-    _menu().remove(_draw)
+register, unregister = all_or_nothing((lambda: _menu().append(_draw), lambda: _menu().remove(_draw)))

@@ -10,6 +10,7 @@ from ...core.bake.surface import Surface
 from ...core.material.material import Material
 from ...core.material.presets import presets
 from .. import compat
+from ..registration import all_or_nothing, handlers
 from .draw import draw_node
 from .output import link_output, plain_of
 from .tree import (
@@ -106,8 +107,8 @@ def _is_shared(tree, plain=None) -> bool:
     return tree.users - tree.use_fake_user > own
 
 
-def link_result(node, image) -> list[str]:
-    """Show `image` in the node, and the node at its material's output; sentences on what that replaces."""
+def link_result(node, image) -> tuple[list[str], list[str]]:
+    """Show `image` in the node, and the node at its material's output; warnings and notes, see `link_output`."""
     if node.node_tree is None:
         node.node_tree = make_inner_tree()
     node.image = image
@@ -281,18 +282,19 @@ def _upgrade(tree) -> None:
             node.inputs[ROUGHNESS].default_value = ROUGHNESS_BEFORE
 
 
-def register() -> None:
+def _add_class() -> None:
     if not BeamspreadNode.is_registered:
         compat.register_node_class(BeamspreadNode, "ShaderNodeCustomGroup")
-    bpy.app.handlers.load_post.append(upgrade_nodes)
-    bpy.app.handlers.save_pre.append(release_unused_trees)
 
 
-def unregister() -> None:
-    bpy.app.handlers.load_post.remove(upgrade_nodes)
-    bpy.app.handlers.save_pre.remove(release_unused_trees)
-    # Blender up to 4.3 (3.4.1 and 4.3.2 were seen to) frees the type but not the evaluated copies of nodes that point to
-    # it, and crashes when those go, at the latest on exit: there a class in use stays. In 4.5 a class that stays keeps
-    # the process from exiting.
+def _remove_class() -> None:
+    # Blender up to 4.3 (3.4.1 and 4.3.2 were seen to) frees the type but not the evaluated copies of nodes that point
+    # to it, and crashes when those go, at the latest on exit: there a class in use stays. In 4.5 a class that stays
+    # keeps the process from exiting.
     if bpy.app.version >= (4, 5, 0) or not any(_all_nodes()):
         bpy.utils.unregister_class(BeamspreadNode)
+
+
+register, unregister = all_or_nothing(
+    (_add_class, _remove_class), *handlers(load_post=upgrade_nodes, save_pre=release_unused_trees)
+)

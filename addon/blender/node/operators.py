@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..registration import all_or_nothing, classes
 from . import output, principled
 from .find import find_node
 
@@ -88,6 +89,6 @@ on the color (Skin, in 3.x Random Walk), times sqrt(3 (1 - reduced albedo)). Len
         return {"FINISHED"}
 
 
-register, unregister = bpy.utils.register_classes_factory(
-    (BEAMSPREAD_OT_toggle_result, BEAMSPREAD_OT_make_plain, BEAMSPREAD_OT_from_principled)
+register, unregister = all_or_nothing(
+    *classes(BEAMSPREAD_OT_toggle_result, BEAMSPREAD_OT_make_plain, BEAMSPREAD_OT_from_principled)
 )

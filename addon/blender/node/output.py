@@ -34,29 +34,31 @@ def is_shown(node) -> bool:
     return surface.links[0].from_node in (node, plain_of(node))
 
 
-def link_output(node) -> list[str]:
-    """Put the node at its material's output, unless something uses it or the user has chosen; says what it replaces.
+def link_output(node) -> tuple[list[str], list[str]]:
+    """Put the node at its material's output, unless something uses it or the user has chosen.
 
-    What was there stays in the tree, and the node remembers it.
+    What was there stays in the tree, and the node remembers it. Sentences: warnings, where the bake is not shown, and
+    notes on what it replaces.
     """
     tree = node.id_data
     if is_in_group(node):
         if is_linked(node):
-            return []
-        return [f"Nothing shows what is baked: link the BSDF of the node in '{tree.name}' to the group's output."]
+            return [], []
+        return [f"Nothing shows what is baked: link the BSDF of the node in '{tree.name}' to the group's output."], []
     output = tree.get_output_node("ALL") or tree.nodes.new("ShaderNodeOutputMaterial")
     surface = output.inputs["Surface"]
     if not surface.is_linked:
         _link(surface, node)
-        return []
+        return [], []
     if is_linked(node):
-        return []
+        return [], []
     name, shader = _owner_name(tree), surface.links[0].from_node
     if former_output(node) is not None:
-        return [f"'{name}' shows '{shader.name}', and not what is baked: Show Baked Result in its node changes that."]
+        hidden = f"'{name}' shows '{shader.name}', and not what is baked: Show Baked Result in its node changes that."
+        return [hidden], []
     _remember(node, surface.links[0])
     _link(surface, node)
-    return [f"'{name}' now shows the baked result; '{shader.name}' is kept: Show Former Shader brings it back."]
+    return [], [f"'{name}' now shows the baked result; '{shader.name}' is kept: Show Former Shader brings it back."]
 
 
 def toggle(node) -> str:

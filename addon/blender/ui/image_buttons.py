@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from ..images.files import clips
 from ..images.operators import image_in, wanted_size
-from ..images.previews import MADE_FOR_PREVIEWS
+from ..images.previews import holds_previews_alone
 
 
 def draw_image_buttons(layout, context) -> None:
     """Make Float where it clips, Resize where the scene's resolution is another."""
     image = image_in(context)
-    if image is None or MADE_FOR_PREVIEWS in image or 0 in image.size or image.library is not None:
+    if image is None or holds_previews_alone(image) or 0 in image.size or image.library is not None:
         return
     if clips(image):
         layout.operator("beamspread.make_float", text="Make Float: it clips values above 1", icon="IMAGE_DATA")

@@ -9,6 +9,7 @@ from ..jobs.engine import BeamspreadEngine
 from ..node.draw import draw_properties
 from ..node.find import find_node
 from ..preferences import draw_help
+from ..registration import all_or_nothing, classes
 from .image_buttons import draw_image_buttons
 from .results import draw_bake, draw_sentences, estimates
 
@@ -173,4 +174,4 @@ _classes = (
     BEAMSPREAD_PT_material,
     BEAMSPREAD_PT_node_editor,
 )
-register, unregister = bpy.utils.register_classes_factory(_classes)
+register, unregister = all_or_nothing(*classes(*_classes))

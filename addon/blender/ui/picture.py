@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..jobs.engine import BeamspreadEngine
+from ..registration import all_or_nothing, classes
 
 
 class BEAMSPREAD_PT_picture(bpy.types.Panel):
@@ -28,4 +29,4 @@ class BEAMSPREAD_PT_picture(bpy.types.Panel):
         layout.label(text="Viewports show Material Preview", icon="INFO")
 
 
-register, unregister = bpy.utils.register_classes_factory((BEAMSPREAD_PT_picture,))
+register, unregister = all_or_nothing(*classes(BEAMSPREAD_PT_picture))

@@ -10,6 +10,7 @@ from ...core.bake.luminance import MOST_RAYS
 from ...core.errors import BakeError
 from ..cycles.light import seconds_estimate
 from ..images.files import check_image
+from ..images.results import check_editable
 from ..jobs.popup import wrap
 from ..jobs.prepare import check_visible
 from ..jobs.state import Row, Standing, state
@@ -44,7 +45,10 @@ def warnings_for(obj, visible: set[str]) -> list[str]:
     if not obj.data.uv_layers:
         messages.append("The mesh has no UV map: unwrap it first.")
     checks = [lambda: check_visible(obj.name, visible)]
-    for node in map(find_node, materials):
+    for material in materials:
+        if bpy.context.scene.beamspread.output == "LUMINANCE":
+            checks.append(lambda material=material: check_editable(material))
+        node = find_node(material)
         checks.append(lambda node=node: node.surface().check())
         if node.image is not None:
             checks.append(lambda node=node: check_image(node.image))

@@ -38,6 +38,7 @@ class Bake:
     seconds : that run and keep took.
     error : one sentence unless `status` is "written".
     warnings : sentences that hold whatever the status.
+    notes : sentences on what it has changed as planned.
     is_dark : once it has run, whether no light arrived.
     """
 
@@ -49,6 +50,7 @@ class Bake:
         self.is_dark = False
         self.seconds = 0.0
         self.warnings = job.warnings() if job else []
+        self.notes: list[str] = []
 
     def run(self, progress: Progress | None = None) -> None:
         """Make the layers. Touches nothing of the host's, so that it may run in any thread."""
@@ -84,5 +86,5 @@ class Bake:
         self.seconds += time.monotonic() - start
 
     def messages(self) -> list[str]:
-        """The error, if there is one, and the warnings."""
-        return [*filter(None, [self.error]), *self.warnings]
+        """The error, if there is one, the warnings and the notes."""
+        return [*filter(None, [self.error]), *self.warnings, *self.notes]
