@@ -24,7 +24,7 @@ MODULE = "bl_ext.user_default.beamspread" if IS_EXTENSION else "beamspread"
 SETTINGS = {"threads": 2, "memory_limit": 12345}
 NODE = {
     "ior": 1.3,
-    "anisotropy": 0.7,
+    "anisotropy": 0.8,  # with this ior of a shipped medium: nothing is to be simulated
     "color_mode": "ALBEDO",
     "albedo": (0.9, 0.8, 0.6),
     "mean_free_path": (0.05, 0.05, 0.05),

@@ -288,9 +288,10 @@ def _add_class() -> None:
 
 
 def _remove_class() -> None:
-    # Blender 3.4 frees the type but not the evaluated copies of nodes that point to it, and crashes when those go, at
-    # the latest on exit: there a class in use stays. In 4.5 a class that stays keeps the process from exiting.
-    if bpy.app.version >= (4, 0, 0) or not any(_all_nodes()):
+    # Blender up to 4.3 (3.4.1 and 4.3.2 were seen to) frees the type but not the evaluated copies of nodes that point
+    # to it, and crashes when those go, at the latest on exit: there a class in use stays. In 4.5 a class that stays
+    # keeps the process from exiting.
+    if bpy.app.version >= (4, 5, 0) or not any(_all_nodes()):
         bpy.utils.unregister_class(BeamspreadNode)
 
 
