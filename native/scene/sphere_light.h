@@ -24,6 +24,7 @@ public:
 
     double distance_from(const Vec3& point) const override { return glm::distance(point, m_position) - m_radius; }
 
+    const Vec3& position() const { return m_position; }
     bool is_inside(const Vec3& point) const;
 
     // How it looks from a point outside.

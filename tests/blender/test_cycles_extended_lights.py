@@ -159,18 +159,23 @@ MODELS = [True] if IS_OLD else [True, False]
 @pytest.mark.parametrize("place", [(0.3, -0.2, 1.1), (0.3, -0.2, 0.35), (0.3, -0.2, 0.1), (0.2, 0, -0.1)], ids=str)
 @pytest.mark.parametrize("kind", ["POINT", "SPOT"])
 def test_radius(kind, place, soft):
-    """Also where the lamp is partly below the plane, and texels within it; not for spots that cut the plane: Cycles'
-    light there differs by up to a quarter, has texels that are no numbers, and changes from Blender to Blender.
+    """Also where the lamp is partly below the plane, and texels within it.
+
+    Around a ball whose centre is below, a spot's light, a tenth of that inside, differs by up to a fifth.
     """
-    if kind == "SPOT" and place[2] < 0.3:
-        pytest.skip("spots with a radius that cut the plane don't agree, as docs/lights.md says")
+    if kind == "SPOT" and place[2] < 0 and soft:
+        place = (*place[:2], 0.03)  # lower down, as a disk it lights the plane by a thousandth at most
     plane, image = add_receiver(PLANES["plain"])
     options = {"spot_size": 1.6, "spot_blend": 0.5} if kind == "SPOT" else {}
     if not IS_OLD:
         options["use_soft_falloff"] = soft
     lamp = add_light(kind, plane, place=place, shadow_soft_size=0.3, **options)
     # Cycles is noisy where the lamp cuts the plane.
-    assert_agree(plane, image, core_light(lamp), samples=1024, worst=0.1, most=0.04 if place[2] < 0.1 else TOLERANCE)
+    cuts = place[2] <= 0.1 and (kind == "SPOT" or place[2] < 0)
+    options = {"least": 0.05, "total": 6e-3, "worst": 0.15, "most": 0.04} if cuts else {"worst": 0.1}
+    if kind == "SPOT" and place[2] < 0:
+        options["least"] = 0.3
+    assert_agree(plane, image, core_light(lamp), samples=1024, **options)
 
 
 @pytest.mark.parametrize("soft", MODELS)

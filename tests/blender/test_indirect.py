@@ -14,6 +14,7 @@ from beamspread.blender.cycles import light, process
 from beamspread.blender.cycles.scene_copy import PREFIX, SceneCopy, remove_stale
 from beamspread.blender.cycles.world import world_panorama
 from beamspread.blender.jobs.prepare import prepare_scene
+from beamspread.blender.node.find import find_node
 from beamspread.core.bake.runner import CANCELLED, FAILED, Target
 from beamspread.core.native import native
 from beamspread.core.scene.lights import DIRECTIONS, STRATA, WEIGHTS
@@ -62,6 +63,24 @@ def glowing_material(strength):
     emission.inputs["Strength"].default_value = strength
     material.node_tree.links.new(nodes["Material Output"].inputs["Surface"], emission.outputs[0])
     return material
+
+
+def add_halves(tree, socket):
+    """Link what is .9, .5, .1 where x < 0, and .1, .5, .9 beyond."""
+    place, split = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeSeparateXYZ")
+    join = tree.nodes.new("ShaderNodeCombineXYZ")
+    step, red, blue = (tree.nodes.new("ShaderNodeMath") for _ in range(3))
+    step.operation, red.operation, blue.operation = "GREATER_THAN", "MULTIPLY_ADD", "MULTIPLY_ADD"
+    step.inputs[1].default_value = 0.0
+    for node, slope, begin in ((red, -0.8, 0.9), (blue, 0.8, 0.1)):
+        node.inputs[1].default_value, node.inputs[2].default_value = slope, begin
+        tree.links.new(node.inputs[0], step.outputs[0])
+    join.inputs[1].default_value = 0.5
+    tree.links.new(split.inputs[0], place.outputs["Object"])
+    tree.links.new(step.inputs[0], split.outputs[0])
+    tree.links.new(join.inputs[0], red.outputs[0])
+    tree.links.new(join.inputs[2], blue.outputs[0])
+    tree.links.new(socket, join.outputs[0])
 
 
 def add_wall(color=(0.9, 0.6, 0.3)):
@@ -133,6 +152,27 @@ def test_a_wall_returns_light_as_in_cycles():
     assert truth[..., 0].sum() > 2 * truth[..., 2].sum()  # orange
 
 
+@pytest.mark.parametrize("in_group", [False, True])
+def test_a_textured_floor_returns_its_colours(in_group):
+    """Red on one side, blue on the other, the node's own colour black: against a diffuse floor of the same nodes.
+
+    All of each colour within 2 %; means of 4 x 4 texels within 2.5 % of the brightest, at the median of those lit.
+    """
+    floor = add_scene(scenes.add_group_material() if in_group else None)
+    node = find_node(floor.data.materials[0])
+    node.color_mode, node.base_color = "BASE_COLOR", (0, 0, 0)
+    add_halves(node.id_data, node.inputs["Base Color"])
+    ours = blocks(irradiance(floor, True) - irradiance(floor, False))
+    material, image = target_material((0, 0, 0), TEXELS)
+    add_halves(material.node_tree, material.node_tree.nodes["Diffuse BSDF"].inputs["Color"])
+    floor.data.materials[0] = material
+    both, direct = (cycles_bake(floor, image, passes, 512) for passes in ({"DIRECT", "INDIRECT"}, {"DIRECT"}))
+    truth = blocks(both - direct)
+    np.testing.assert_allclose(ours.sum(axis=(0, 1)), truth.sum(axis=(0, 1)), rtol=0.02)
+    lit = truth > 0.1 * truth.max()
+    assert np.median((np.abs(ours - truth) / truth.max())[lit]) < 0.025
+
+
 def test_bounced_light_spreads_as_any_other():
     """The base colour is what returns of even light. That of a leaning wall is not even, and some leaves at the border:
     of all of it, as much as of even light but for 10 %."""
@@ -182,6 +222,7 @@ def test_directions_of_a_glowing_square(world, mirrored):
         "only": [],
         "by_lamps": False,
         "reflectances": {},
+        "textures": {},
         "noise": (0.002, 0.002),
         "noise_of_all": 0.0,
         "direct": 0.0,

@@ -25,6 +25,7 @@ LIGHTS = {
     "sphere around": native.SphereLight((0.3, 0.2, 0.3), 0.9, "sphere"),
     "disk": native.SphereLight((0.3, 0.2, 0.7), 0.5, "disk"),
     "spot": native.SphereSpotLight((0.3, 0.2, 0.9), TILTED, 1.6, 0.6, "scaled", 0.3, "sphere"),
+    "spot around": native.SphereSpotLight((0.3, 0.2, 0.3), TILTED, 1.6, 0.6, "scaled", 0.9, "sphere"),
     "old spot": native.SphereSpotLight((0.3, 0.2, 0.9), TILTED, 1.6, 0.6, "legacy", 0.3, "disk"),
     "area": native.AreaLight((0.2, 0.1, 0.4), TILTED, 1.5, 0.8),
     "far area": native.AreaLight((3.0, 0.9, 6.0), TILTED, 1.5, 0.8),

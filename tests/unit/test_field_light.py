@@ -16,6 +16,7 @@ from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight, LampFieldLight, WorldLight
 from beamspread.core.scene.lights.field import spline_weights
+from beamspread.core.scene.reach import Reach
 from beamspread.core.scene.receiver import Chart, Receiver
 
 WHITE = 1.0, (1.0, 1.0, 1.0), True
@@ -28,6 +29,10 @@ def grid_of(height, width, origin=(1.0, 2.0, 3.0)):
 
 def light_of(grid, radiance):
     return FieldLight("Bounced", *WHITE, (Field(grid.origin, grid.normal, radiance.astype(np.float32)),))
+
+
+def reach_of(grid):
+    return Reach(grid, None, samples=1, rays=1)
 
 
 def totals(grid, light):
@@ -81,7 +86,7 @@ def test_no_negatives_and_no_overshoot_at_steps():
     radiance = np.zeros((len(STRATA), 8, 8, 3)) + 0.1
     radiance[:, :, 4:], radiance[:, 3, 1] = 5.0, 40.0
     radiance[:, :, 0] = 0.0001
-    layers = list(light_of(grid, radiance).layers(grid))
+    layers = list(light_of(grid, radiance).parts(reach_of(grid)))
     assert len(layers) == len(STRATA)
     for (irradiance, _), weight in zip(layers, WEIGHTS):
         assert irradiance.min() >= 0
@@ -93,7 +98,7 @@ def test_dark_nodes_don_t_darken_what_is_beside_them():
     grid = grid_of(64, 64)
     radiance = np.ones((len(STRATA), 16, 16, 3))
     radiance[:, 6:10, 6:10] = 0  # inside a box that covers rows and columns 24 to 40
-    irradiance = sum(part for part, _ in light_of(grid, radiance).layers(grid))
+    irradiance = sum(part for part, _ in light_of(grid, radiance).parts(reach_of(grid)))
     box = np.zeros((64, 64), bool)
     box[24:40, 24:40] = True
     np.testing.assert_allclose(irradiance[~box], np.pi, rtol=1e-5)

@@ -26,7 +26,7 @@ def fields(request, scene, progress) -> dict:
     all nodes, as part of its mean.
     """
     for name, color in request["reflectances"].items():
-        make_diffuse(bpy.data.materials[name], color)
+        make_diffuse(bpy.data.materials[name], color, request["textures"].get(name))
     set_up(scene, request["light"])
     if request["only"]:
         shine_alone(scene, request["only"])
@@ -54,14 +54,63 @@ def fields(request, scene, progress) -> dict:
     return result
 
 
-def make_diffuse(material, color) -> None:
-    """A plain diffuse surface, as bright as the medium under it."""
+def make_diffuse(material, color, texture) -> None:
+    """A plain diffuse surface, as bright as the medium under it, or as what its texture shows.
+
+    `texture` names an input: the group nodes around a node, the node, the socket. None: there is none.
+    """
     tree = material.node_tree
-    tree.nodes.clear()
+    source = texture and linked_source(tree, *texture)
+    if source is None:
+        tree.nodes.clear()
+    else:
+        for node in [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL"]:
+            tree.nodes.remove(node)
     diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
     diffuse.inputs["Color"].default_value = (*color, 1)
+    if source is not None:
+        tree.links.new(diffuse.inputs["Color"], within_one(tree, source))
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     tree.links.new(output.inputs["Surface"], diffuse.outputs[0])
+
+
+def linked_source(tree, groups, node: str, socket: str):
+    """What the input of a node in nested groups is linked to, led out to the tree; None if it has no link."""
+    around = []
+    for name in groups:
+        around.append((tree, tree.nodes[name]))
+        tree = tree.nodes[name].node_tree
+    # The add-on is not at work here: its node is one of an unknown kind.
+    links = (one for one in tree.links if one.to_node == tree.nodes[node] and one.to_socket.name == socket)
+    source = next((link.from_socket for link in links), None)
+    for outer, group in reversed(around if source is not None else []):
+        add_output(tree, socket)
+        for end in [one for one in tree.nodes if one.type == "GROUP_OUTPUT"]:
+            # The last one is empty, for what is to come.
+            tree.links.new([one for one in end.inputs if one.name == socket][-1], source)
+        source = [one for one in group.outputs if one.name == socket][-1]
+        tree = outer
+    return source
+
+
+def add_output(tree, name: str) -> None:
+    if hasattr(tree, "interface"):  # from Blender 4.0 on
+        tree.interface.new_socket(name, in_out="OUTPUT", socket_type="NodeSocketColor")
+    else:
+        tree.outputs.new("NodeSocketColor", name)
+    if not any(node.type == "GROUP_OUTPUT" for node in tree.nodes):
+        tree.nodes.new("NodeGroupOutput")
+
+
+def within_one(tree, source):
+    """The colour, from 0 to 1: what is brighter would reflect more than arrives."""
+    for operation, limit in (("MINIMUM", 1.0), ("MAXIMUM", 0.0)):
+        cut = tree.nodes.new("ShaderNodeVectorMath")
+        cut.operation = operation
+        cut.inputs[1].default_value = (limit,) * 3
+        tree.links.new(cut.inputs[0], source)
+        source = cut.outputs[0]
+    return source
 
 
 def shine_alone(scene, names) -> None:

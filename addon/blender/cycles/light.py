@@ -20,7 +20,8 @@ from ...core.scene.illumination import Illumination
 from ...core.scene.lights import STRATA, Field, FieldLight, LampFieldLight, Light, WorldLight
 from ...core.scene.receiver import Receiver
 from .. import compat
-from ..node.find import find_node
+from ..node.find import find_place
+from ..node.tree import BASE_COLOR
 from ..read.visible import render_visible_names, renders
 from .process import run
 from .scene_copy import SceneCopy
@@ -62,6 +63,7 @@ class CyclesLight:
         self._lamps = {obj.name: _place(obj) for obj in bpy.data.scenes[self._names[0]].objects if obj.type == "LIGHT"}
         self._copy: SceneCopy | None = None
         self._surfaces: dict = {}
+        self._textures: dict = {}
         self._panorama: WorldLight | None = None
 
     def complete(self, job: BakeJob) -> BakeJob:
@@ -78,7 +80,14 @@ class CyclesLight:
             return replace(job, illumination=illumination.warning(missing))
         if self._copy is None:
             self._copy = SceneCopy(scene, scene.view_layers[self._names[1]])
-            self._surfaces = {one.name: find_node(one).surface() for one in bpy.data.materials if find_node(one)}
+            places = {one.name: find_place(one) for one in bpy.data.materials}
+            places = {name: place for name, place in places.items() if place is not None}
+            self._surfaces = {name: node.surface() for name, (node, _) in places.items()}
+            self._textures = {
+                name: ([group.name for group in groups], node.name, BASE_COLOR)
+                for name, (node, groups) in places.items()
+                if node.has_texture()
+            }
         illumination = illumination.found({world, *others} - {""}).warning(*self._copy.warnings)
         return replace(
             job,
@@ -139,6 +148,7 @@ class CyclesLight:
             "only": [],
             "by_lamps": False,
             "reflectances": {name: _reflectance(surface) for name, surface in self._surfaces.items()},
+            "textures": self._textures,
             "noise": (LEAST_NOISE, MOST_NOISE),
             "noise_of_all": NOISE_OF_ALL,
             "direct": 0.0,

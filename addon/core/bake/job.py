@@ -11,7 +11,7 @@ from ..errors import BakeError
 from ..ldf.library import is_known, library
 from ..progress import Progress, say, stages, timed
 from ..scene.illumination import Illumination
-from ..scene.lights import Light, SunLight
+from ..scene.lights import Light
 from ..scene.receiver import Receiver
 from .estimate import simulation_seconds, solver_seconds
 from .layers import LAYERS, WITHOUT_MEDIUM
@@ -81,7 +81,7 @@ class BakeJob:
 
     def _solver_seconds(self) -> float:
         shape, settings = self.receiver.coverage.shape, self.settings
-        suns = sum(isinstance(light, SunLight) for light in self.illumination.lights)
+        suns = sum(light.is_parallel for light in self.illumination.lights)
         others = len(self.illumination.lights) - suns
         return 0.1 + solver_seconds(*shape, suns, others, settings.solver, settings.threads) * len(settings.layers)
 

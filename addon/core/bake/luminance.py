@@ -15,7 +15,7 @@ from ..native import native
 from ..progress import Progress, stages
 from ..scene.grid import Grid
 from ..scene.illumination import Illumination
-from ..scene.lights import Light, SunDiskLight, SunLight
+from ..scene.lights import Light
 from .convolve import solve as convolve_plane_lights
 from .estimate import solver_seconds
 from .gather import Gatherer
@@ -92,7 +92,7 @@ def spread(
     lights = illumination.lights
     gatherer = Gatherer(grid, illumination, settings, _rays(grid, material, settings))
     bytes_waiting = 4 * grid.width * grid.height * len(lights)
-    if all(map(gatherer.has_one_direction, lights)) and bytes_waiting <= MOST_WAITING:
+    if all(light.has_one_direction for light in lights) and bytes_waiting <= MOST_WAITING:
         solve = _spread_together
     elif settings.solver == "fft":
         solve = _spread_field
@@ -163,7 +163,7 @@ def _spread_field(gatherer: Gatherer, lights: Sequence[Light], medium: dict, _so
     shape, survey, means = gatherer.survey()
     brightest = sorted(range(len(lights)), key=lambda i: means[i], reverse=True)
     lit = [i for i in brightest if not lights[i].is_behind(grid)]
-    suns = [i for i in lit if isinstance(lights[i], SunLight | SunDiskLight) and gatherer.has_one_direction(lights[i])]
+    suns = [i for i in lit if lights[i].is_parallel]
     kept = suns if len(suns) <= MOST_KEPT else []
     later = [i for i in lit if i not in kept]
     # What a survey has missed shines on few texels, and is looked at as it is.

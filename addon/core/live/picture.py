@@ -19,7 +19,7 @@ from ..material.material import Material
 from ..native import native
 from ..progress import Progress
 from ..scene.grid import Grid
-from ..scene.lights import Light, SunLight
+from ..scene.lights import Light
 from ..scene.receiver import Receiver, build_receiver, texture_size
 from ..scene.uv_map import fit_uv_maps
 from .fields import Fields
@@ -223,7 +223,7 @@ def _media(subject: Subject) -> list:
 
 def _have_kernels_of_their_own(lights: Sequence[Light], grid: Grid) -> bool:
     """Whether the lights are few suns, and exact kernels for these cost no more than a field."""
-    if len(lights) > MOST_SUNS or not all(isinstance(light, SunLight) for light in lights):
+    if len(lights) > MOST_SUNS or not all(light.is_parallel and not light.has_size for light in lights):
         return False
     return grid.width * grid.height >= MANY_TEXELS
 

@@ -10,7 +10,8 @@ namespace beamspread {
 
 namespace {
 
-// Closer nodes would only amplify the simulation's noise.
+// Closer nodes would only amplify the simulation's noise: at this distance 1e-3 of it are a slope of 1 per radian, which is
+// about that of the LDFs.
 constexpr double closest_deg = 0.06;
 
 }  // namespace

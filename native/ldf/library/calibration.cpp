@@ -33,19 +33,18 @@ constexpr double next_to_one = 1.0 - 1e-12;
 // At this albedo light has decayed to 1/e where walks are given up.
 constexpr double deepest = 1.0 - 1.0 / max_order;
 
-// No bin is scaled by more than this or by less than its inverse.
-constexpr double max_scale = 50.0;
-
 // Fewer leave so many orders empty that totals can be 10 % off; measured over twelve media, 100 are within 3 %.
 constexpr std::uint64_t fewest_photons = 100;
 
 // Of Newton's method below. The last is in squares of tolerances. Twelve media of 1 to 10,000 photons took at most 400
-// rounds; to stop before the end may leave totals far from exact.
+// rounds; to stop before the end may leave totals far from exact. Damping a thousand times as strong, and an end a thousand
+// times as early, change no total in the third digit of its error (five media of 100 to 10,000 photons).
 constexpr int max_rounds = 10'000;
 constexpr double least_damping = 1e-9;
 constexpr double settled = 1e-6;
 
-// Part of the light that enters. Simulations know nothing of less, and no picture shows it.
+// Part of the light that enters. Simulations know nothing of less, and no picture shows it; a hundred times as much is as
+// good to 2 % of the errors of totals.
 constexpr double negligible_power = 1e-9;
 
 // Totals of the angles and of the middles between them, alternating: [angle][albedo], the compared albedos and then
@@ -103,9 +102,9 @@ struct Observation {
     VectorXd tolerance;  // [albedo]
 };
 
-// The likeliest scale of each bin's power, around 1 with this relative variance, given the totals and within the
-// limits: a quadratic programme with bounds. Its dual has a variable per total, is convex, smooth and piecewise
-// quadratic: solved by Newton's method, damped where bins meet or leave their limits (Levenberg, Marquardt 1963,
+// The likeliest scale of each bin's power, around 1 with this relative variance, given the totals; none is negative: a
+// quadratic programme with bounds. Its dual has a variable per total, is convex, smooth and piecewise
+// quadratic: solved by Newton's method, damped where bins meet or leave 0 (Levenberg, Marquardt 1963,
 // doi:10.1137/0111030) by the Hessian for all bins free, than which the dual is nowhere more curved: so damped a step
 // always goes down.
 VectorXd likeliest_scale(const VectorXd& power, const VectorXd& relative, const Observation& observed)
@@ -113,9 +112,7 @@ VectorXd likeliest_scale(const VectorXd& power, const VectorXd& relative, const 
     const MatrixXd of_scale = observed.tolerance.cwiseInverse().asDiagonal() * observed.weights * power.asDiagonal();
     const VectorXd totals = observed.totals.cwiseQuotient(observed.tolerance);
     const auto scale_of = [&](const VectorXd& pull) -> VectorXd {
-        return (VectorXd::Ones(bins) + relative.cwiseProduct(of_scale.transpose() * pull))
-            .cwiseMax(1.0 / max_scale)
-            .cwiseMin(max_scale);
+        return (VectorXd::Ones(bins) + relative.cwiseProduct(of_scale.transpose() * pull)).cwiseMax(0.0);
     };
     const auto dual = [&](const VectorXd& pull) {
         const VectorXd force = of_scale.transpose() * pull;
@@ -139,7 +136,7 @@ VectorXd likeliest_scale(const VectorXd& power, const VectorXd& relative, const 
         const VectorXd gradient = of_scale * scale + pull - totals;
         VectorXd free = relative;
         for (Eigen::Index b = 0; b < bins; ++b)
-            if (scale(b) <= 1.0 / max_scale || scale(b) >= max_scale)
+            if (scale(b) <= 0.0)
                 free(b) = 0.0;
         const MatrixXd curvature = hessian(free);
         const auto damped_step = [&]() -> VectorXd {

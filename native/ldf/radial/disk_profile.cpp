@@ -12,8 +12,12 @@ namespace beamspread {
 
 namespace {
 
-// So many radii away the disk is a point: g changes by less than 1e-4 where it matters, while the border integral
-// would be a small difference of large numbers.
+// The constants of this file were measured by images of twelve disks of .0002 to 300 mean free paths against ones made with
+// rings of 1.02 and four times as many points: as they are, no texel is off by more than
+// 2.2e-4 of the brightest, and of those of disks wider than .01 by 7e-6.
+
+// So many radii away the disk is a point: g changes by less than 1e-4 where it matters, while the border integral would be a
+// small difference of large numbers. Ten times as far changes nothing, a tenth of it is off by 1.3e-5.
 constexpr double far_in_radii = 1000.0;
 
 // c_m at r, from the slope of C_m across a thousandth of r.
@@ -38,10 +42,12 @@ Harmonics disk_mean(const RadialFunction& point, double radius, double s)
     const bool near = s < 2.0 * radius;
     // tau: angle at the disk's centre from the point nearest to the pole. With tau = a sinh(x) the steps are short
     // there.
+    // At the edge itself any width from 1e-6 to 1e-2 gives the same to 1e-8.
     const double a = std::max(1e-4, std::abs(radius - s) / std::sqrt(std::max(s, 1e-12 * radius) * radius));
     const double last = std::asinh(pi / a);
-    // As along the borders of texels: half a period of the shortest harmonic at most.
-    const double step = std::min(0.2, 3.2 / static_cast<double>(point.harmonics()));
+    // As along the borders of texels: half a period of the shortest harmonic at most. Where harmonics are few, 16 panels: 8
+    // give the same to 1e-8, a single one is off by 9e-4.
+    const double step = 3.2 / static_cast<double>(point.harmonics());
     const int panels = std::max(16, static_cast<int>(std::ceil(last / step)));
     const double half = 0.5 * last / panels;
     for (int i = 0; i < panels; ++i) {
@@ -83,6 +89,7 @@ std::vector<double> breakpoints(double radius, double support)
             if (r > 0.0 && r < radius + support)
                 radii.push_back(r);
     };
+    // Of 2, the worst texel is off by 8e-4, of 4 by 1e-2; with bins' edges alone, which end at 2^-10, by 1e-1.
     constexpr double ratio = 1.2;
     const double finest = std::max(1e-6 * radius, std::min(1e-3 * radius, 1e-3));
     const int steps = static_cast<int>(std::ceil(std::log(std::max(1.0, support / finest)) / std::log(ratio)));
@@ -94,6 +101,7 @@ std::vector<double> breakpoints(double radius, double support)
             radii.push_back(radial_edge(k));
     }
     std::sort(radii.begin(), radii.end());
+    // Closer radii, which come from sums of the same numbers, would make rings of nothing.
     constexpr double rounding = 1e-9;
     radii.erase(
         std::unique(radii.begin(), radii.end(), [&](double a, double b) { return b - a < rounding * (radius + b); }),

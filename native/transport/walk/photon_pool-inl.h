@@ -27,7 +27,7 @@ struct Photons {
 // Photons that wait for their next flights, without gaps.
 class PhotonPool {
 public:
-    static constexpr std::size_t capacity = 512;
+    static constexpr std::size_t capacity = 512;  // 256 and 1024 take as long, within 10 %
 
     std::size_t count() const { return m_count; }
     void clear() { m_count = 0; }

@@ -1,6 +1,6 @@
 """The kinds of light that can be baked; strengths follow Cycles (see each class).
 
-A new kind is one class here, and its reader in blender/read/.
+A new kind is one class here, which extends the way in which it arrives (light.py), and its reader in blender/read/.
 """
 
 from .area import AreaLight
@@ -8,13 +8,14 @@ from .field import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight, LampFieldLigh
 from .light import ExtendedLight, Light, TracedLight
 from .mesh import MeshLight
 from .point_like import PointLight, SpotLight, SunLight
-from .round import SphereLight, SphereSpotLight, SunDiskLight
+from .round import WIDEST_SUN, SphereLight, SphereSpotLight, SunDiskLight
 from .world import WorldLight
 
 __all__ = [
     "DIRECTIONS",
     "STRATA",
     "WEIGHTS",
+    "WIDEST_SUN",
     "AreaLight",
     "ExtendedLight",
     "Field",

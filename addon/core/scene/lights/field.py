@@ -114,16 +114,22 @@ class _ComputedLight(Light):
 class FieldLight(_ComputedLight):
     """Light from all over the hemisphere; its fields have the parts `STRATA`."""
 
-    def layers(self, grid: Grid) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Irradiance float32 (H, W, 3) on the whole of each texel, at strength and color 1, and where it travels.
+    has_one_direction = False
 
-        Together the layers make up the light.
-        """
+    def parts(self, reach):
+        grid = reach.grid
         field = self.field_of(grid)
         if field is not None:
             for values, part, weight, direction in zip(field.at_texels(grid), field.radiance, WEIGHTS, DIRECTIONS):
                 if part.any():
                     yield values * np.float32(np.pi * weight), direction
+
+    def totals(self, reach):
+        irradiance, flow = np.zeros((2, reach.grid.height, reach.grid.width, 3), np.float32)
+        for part, direction in self.parts(reach):
+            irradiance += part
+            flow += part.mean(axis=2, keepdims=True) * direction
+        return reach.received(irradiance), reach.covered(flow)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +145,7 @@ class LampFieldLight(_ComputedLight):
     is_sun: bool = False
 
     def gather(self, grid: Grid, _caster, **_options) -> tuple[np.ndarray, np.ndarray]:
-        """As `TracedLight.gather`; the irradiance, (H, W, 3), has its shadows."""
+        """The irradiance, (H, W, 3), has its shadows."""
         field = self.field_of(grid)
         axes = np.array((grid.x_axis, grid.y_axis, grid.normal))
         if field is None:

@@ -21,6 +21,7 @@ class SunLight(TracedLight):
     """
 
     direction: Vector
+    is_parallel = True
 
     def native(self):
         return native.SunLight(self.direction)

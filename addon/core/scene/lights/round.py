@@ -11,6 +11,10 @@ from ...native import native
 from ..grid import Vector
 from .light import ExtendedLight
 
+# Of a sun up to so wide, radians, all light counts as coming from its middle but for its shadows: that leaves out what
+# grows with the square of the angle, of the luminance 6e-4 at 80 degrees of incidence and 5e-3 at 85.
+WIDEST_SUN = math.radians(2.0)
+
 
 @dataclass(frozen=True)
 class SunDiskLight(ExtendedLight):
@@ -29,6 +33,19 @@ class SunDiskLight(ExtendedLight):
 
     def native(self):
         return native.SunDiskLight(self.direction, self.angle, self.disk)
+
+    @property
+    def has_one_direction(self):
+        return self.angle <= WIDEST_SUN
+
+    @property
+    def is_parallel(self):
+        return self.has_one_direction
+
+    def beams(self, reach, _directions=True):
+        irradiance, _ = self.totals(reach)
+        is_colored = reach.is_colored or reach.grid.color_in is not None
+        return irradiance if is_colored else irradiance[..., 0], reach.in_plane(self.direction)
 
     def is_behind(self, grid):
         return bool(np.dot(self.direction, grid.normal) >= math.sin(min(0.5 * self.angle, 0.5 * math.pi)))
