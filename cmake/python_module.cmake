@@ -6,8 +6,10 @@ option(BEAMSPREAD_FETCH_PYTHON_HEADERS "Fetch headers of further Pythons (tools/
 if(BEAMSPREAD_FETCH_PYTHON_HEADERS)
   execute_process(COMMAND ${CMAKE_SOURCE_DIR}/tools/python_headers.sh ${BEAMSPREAD_DEPENDENCIES_DIR}/python)
 endif()
-file(GLOB headers ${BEAMSPREAD_DEPENDENCIES_DIR}/python/usr/include/python3.*)
-set(BEAMSPREAD_OTHER_PYTHONS "${headers}" CACHE STRING "Folders with the headers of further Pythons")
+# Or given: a list of folders with headers.
+if(NOT DEFINED BEAMSPREAD_OTHER_PYTHONS)
+  file(GLOB BEAMSPREAD_OTHER_PYTHONS ${BEAMSPREAD_DEPENDENCIES_DIR}/python/usr/include/python3.*)
+endif()
 file(GLOB python_sources CONFIGURE_DEPENDS native/python/*.cpp)
 
 # python_module(TARGET TAG FOLDER INCLUDES...)

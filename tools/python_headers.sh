@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Fetches the headers of Pythons that Debian 12 doesn't have, for modules that newer Blenders load:
-# tools/python_headers.sh [FOLDER]. apt checks the packages' signatures; nothing is installed.
+# tools/python_headers.sh [FOLDER]. apt checks its packages' signatures; nothing is installed.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 folder=$(realpath -m "${1:-build/deps/python}")
@@ -20,8 +20,37 @@ fetch() {
     dpkg-deb --fsys-tarfile "$package" | tar -x -C "$folder" ./usr/include
 }
 
+# Python 3.10, of Blender 3.4 to 4.0, is in no Debian any more. TensorFlow's wheel for it carries CPython's headers, but
+# for the file of this platform's sizes, which is the same in 3.11.
+fetch_3_10() {
+    local wheel=tensorflow_cpu-2.10.0-cp310-cp310-manylinux_2_17_x86_64.manylinux2014_x86_64.whl
+    local sha256=eaeabba8e8b462ab6a1465ccc1f569692e73f5f312a0061309275a433e23dd23
+    local include=$folder/usr/include
+    mkdir -p "$folder/.apt"
+    /usr/bin/python3 -m venv "$folder/.apt/venv"
+    "$folder/.apt/venv/bin/pip" download --quiet --disable-pip-version-check --no-deps --only-binary :all: --python-version 3.10 \
+        --platform manylinux2014_x86_64 --dest "$folder/.apt" tensorflow-cpu==2.10.0 >&2 || return
+    echo "$sha256  $folder/.apt/$wheel" | sha256sum --check --status || return
+    mkdir -p "$include/x86_64-linux-gnu/python3.10"
+    cp /usr/include/x86_64-linux-gnu/python3.11/pyconfig.h "$include/x86_64-linux-gnu/python3.10/" || return
+    /usr/bin/python3 - "$folder/.apt/$wheel" "$include" <<'END'
+import pathlib, sys, zipfile
+
+prefix = "tensorflow/include/external/local_config_python/python_include/"
+with zipfile.ZipFile(sys.argv[1]) as wheel:
+    for name in wheel.namelist():
+        if name.startswith(prefix) and name.endswith(".h"):
+            path = pathlib.Path(sys.argv[2], "python3.10", name.removeprefix(prefix))
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(wheel.read(name))
+END
+}
+
+unavailable() { echo "python_headers: Python $1 has no headers here: no module is built for it" >&2; }
+
+[ -f "$folder/usr/include/python3.10/Python.h" ] || [ "$(uname -m)" != x86_64 ] || fetch_3_10 || unavailable 3.10
 for python in "${wanted[@]}"; do
     [ ! -f "$folder/usr/include/python${python%:*}/Python.h" ] || continue
-    fetch "$python" || { echo "python_headers: Python ${python%:*} has no headers here: no module is built for it" >&2; }
+    fetch "$python" || unavailable "${python%:*}"
 done
 rm -rf "$folder/.apt"

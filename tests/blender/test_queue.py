@@ -285,7 +285,7 @@ def test_a_first_look_is_kept_with_its_sentence():
     bake.run()
     bake.keep(Results().store)
     state.note(bake)
-    stale.keep(bake.target, parts[bake.target], bake.warnings, waiting.turn.is_first)
+    stale.keep(bake, parts[bake.target], waiting.turn.is_first)
     stale.refresh(bpy.context)
     row = state.rows[bake.target]
     assert row.is_stale
