@@ -27,8 +27,7 @@ fetch_3_10() {
     local sha256=eaeabba8e8b462ab6a1465ccc1f569692e73f5f312a0061309275a433e23dd23
     local include=$folder/usr/include
     mkdir -p "$folder/.apt"
-    /usr/bin/python3 -m venv "$folder/.apt/venv"
-    "$folder/.apt/venv/bin/pip" download --quiet --disable-pip-version-check --no-deps --only-binary :all: --python-version 3.10 \
+    build/venv/bin/python -m pip download --quiet --disable-pip-version-check --no-deps --only-binary :all: --python-version 3.10 \
         --platform manylinux2014_x86_64 --dest "$folder/.apt" tensorflow-cpu==2.10.0 >&2 || return
     echo "$sha256  $folder/.apt/$wheel" | sha256sum --check --status || return
     mkdir -p "$include/x86_64-linux-gnu/python3.10"

@@ -32,8 +32,12 @@ function(archive name file sha256 from)
     endif()
     file(RENAME ${path}.part ${path})
   else()
-    # pip knows which index or mirror this machine uses.
-    execute_process(COMMAND ${Python_EXECUTABLE} -m pip download --quiet --disable-pip-version-check --no-deps ${from}
+    # pip knows which index or mirror this machine uses. Debian's Python has none, tools/setup.sh's environment has.
+    set(python ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/../../build/venv/bin/python)
+    if(NOT EXISTS ${python})
+      set(python ${Python_EXECUTABLE})
+    endif()
+    execute_process(COMMAND ${python} -m pip download --quiet --disable-pip-version-check --no-deps ${from}
                             --dest ${BEAMSPREAD_ARCHIVES_DIR} RESULT_VARIABLE code)
     if(NOT code EQUAL 0)
       message(FATAL_ERROR "pip could not fetch ${file}. Put the file into ${BEAMSPREAD_ARCHIVES_DIR}.")
