@@ -85,6 +85,7 @@ fetch_into() {
 # and has numpy, and draw with it if it has matplotlib.
 prepare_other_python() {
     local other ours
+    [ "$(readlink -f "$(command -v python3)")" != "$(readlink -f "$debian_python")" ] || return 0
     other=$(python3 -c 'import importlib.util as u, sys
 print("%d.%d" % sys.version_info[:2], all(u.find_spec(name) for name in ("numpy", "matplotlib")))' 2>/dev/null) || return 0
     ours=$("$debian_python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
