@@ -18,8 +18,8 @@ CHECKSUMS = "native.sha256"
 
 _MODULE = re.compile(r"^_native\.(?:cpython-|cp)(?P<major>3)(?P<minor>\d+)(?:-(?P<platform>[^.]*))?\.(?:so|pyd)$")
 
-_BLENDERS = {"3.10": "3.1 to 4.0", "3.11": "4.1 to 5.0", "3.13": "5.1 and 5.2"}
-"""Which Blenders from blender.org bring which Python."""
+_BLENDERS = {"3.10": "3.4 to 4.0", "3.11": "4.1 to 5.0", "3.13": "5.1 and 5.2"}
+"""Which Blenders from blender.org that the add-on runs in bring which Python."""
 
 _GLIBC = re.compile(r"version [`']GLIBC_([0-9.]+)' not found")
 _LIBRARY = re.compile(r"^(\S+\.so\S*): cannot open shared object file")
