@@ -32,7 +32,8 @@ double interpolation_error(const RadialProfile& profile, const Vec2& axis, doubl
     // Half the distance between the points, over distance / near: where the window has risen to a half, at .6 of the
     // near radius.
     constexpr double spacing = 1.0 / 0.6;
-    // Two rings per octave and more than two directions per wave of the last harmonic.
+    // Two rings per octave and more than two directions per wave of the last harmonic: with half and with
+    // twice as many of either, results are the same to two digits of their errors.
     const int rings = static_cast<int>(std::ceil(2.0 * std::log2(last / first))) + 1;
     const int directions = 2 * static_cast<int>(profile.harmonics()) + 3;
     const double log_step = std::log(last / first) / rings;
@@ -62,7 +63,8 @@ double interpolation_error(const RadialProfile& profile, const Vec2& axis, doubl
 double near_radius(const std::vector<AngleLight>& lights, double pitch, double distance, double allowed,
                    Progress& progress)
 {
-    // Below, the window's own shape is too much for the interpolation.
+    // Below, the window's own shape is too much for the interpolation. Errors with 4 and 16 differ by
+    // no more than 2e-5 of the light, the time by 10 %.
     constexpr double least = 8.0;
     double power = 0.0;
     for (const AngleLight& light : lights)
@@ -81,7 +83,8 @@ double near_radius(const std::vector<AngleLight>& lights, double pitch, double d
         }
         return sum;
     };
-    constexpr double finer = 1.2;  // the work is as the square
+    // The work is as the square: 1.1 and 1.44 change it by about 10 %, errors by less than 3e-5 of the light.
+    constexpr double finer = 1.2;
     double near = least;
     while (largest(near) > allowed * std::max(power, 0.0))
         near *= finer;

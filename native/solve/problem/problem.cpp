@@ -14,7 +14,7 @@ namespace beamspread {
 
 namespace {
 
-// Sums over 10^8 texels, and products with kernels, stay in single precision.
+// Sums over 10^8 texels, 1e38, and products with kernels, stay in single precision, which ends at 3.4e38.
 constexpr float most_irradiance = 1e30f;
 
 // Beyond, light is even over any plane, and radii lie outside the tables.
