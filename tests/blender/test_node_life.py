@@ -6,6 +6,8 @@ import beamspread
 import bpy
 import numpy as np
 import pytest
+from beamspread.blender.jobs.pixels import images_of
+from beamspread.blender.node.tree import BASE_COLOR
 from scenes import add_material, add_plane, add_sun, bake, node_of, pixels, select
 
 OLDER_FILE = str(Path(__file__).with_name("files") / "node_before_sockets.blend")
@@ -14,6 +16,26 @@ INPUTS = ["Base Color", "Roughness", "Normal"]
 
 def inner(node, name):
     return node.node_tree.nodes[name]
+
+
+def test_an_older_file_that_was_open_before_the_add_on_was_switched_on():
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    beamspread.unregister()
+    try:
+        bpy.ops.wm.open_mainfile(filepath=OLDER_FILE)
+    finally:
+        beamspread.register()
+    assert list(node_of(bpy.data.materials["Marble"]).inputs.keys()) == INPUTS
+
+
+def test_an_older_linked_node_has_no_texture():
+    """What belongs to another file keeps its inputs, which were none."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(OLDER_FILE, link=True) as (_, linked):
+        linked.materials = ["Marble"]
+    (material,) = linked.materials
+    assert BASE_COLOR not in node_of(material).inputs
+    assert images_of(material) == set()
 
 
 class TestOlderFile:

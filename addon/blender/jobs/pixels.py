@@ -17,7 +17,6 @@ import numpy as np
 from ..images.files import file_of
 from ..node.find import find_node
 from ..node.node import BeamspreadNode
-from ..node.tree import BASE_COLOR
 
 # Files of more bytes would take more than about 10 ms to read.
 LARGE = 8 << 20
@@ -73,7 +72,7 @@ def images_of(owner) -> set:
     if tree is None:
         return set()
     node = find_node(owner) if isinstance(owner, bpy.types.Material) else None
-    if node is not None and not node.inputs[BASE_COLOR].is_linked:
+    if node is not None and not node.has_texture():
         return set()
     return {image for image in _images_in(tree) if image is not None}
 

@@ -285,6 +285,9 @@ def _upgrade(tree) -> None:
 def _add_class() -> None:
     if not BeamspreadNode.is_registered:
         compat.register_node_class(BeamspreadNode, "ShaderNodeCustomGroup")
+    # While Blender starts, add-ons see no file, and load_post comes later.
+    if isinstance(bpy.data, bpy.types.BlendData):
+        upgrade_nodes()
 
 
 def _remove_class() -> None:
