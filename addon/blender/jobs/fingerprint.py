@@ -228,8 +228,11 @@ class Fingerprints:
         return self._images[key]
 
     def _surface(self, node) -> list:
-        # By what is linked alone: the node's own properties count else, and Blender fills in values of new inputs late.
-        inputs = [(socket.identifier, _upstream(socket)) for socket in node.inputs if socket.name not in LOOKS]
+        inputs = [
+            (socket.identifier, _upstream(socket), _plain(getattr(socket, "default_value", None)))
+            for socket in node.inputs
+            if socket.name not in LOOKS
+        ]
         return [repr(node.surface()), getattr(node, "side", ""), inputs]
 
     def _world(self, scene, view_layer) -> str:
