@@ -228,11 +228,9 @@ class Fingerprints:
         return self._images[key]
 
     def _surface(self, node) -> list:
-        inputs = [
-            (socket.identifier, _upstream(socket), _plain(getattr(socket, "default_value", None)))
-            for socket in node.inputs
-            if socket.name not in LOOKS
-        ]
+        # What isn't linked isn't read, and a node of an older file gets its inputs late.
+        linked = (socket for socket in node.inputs if socket.is_linked and socket.name not in LOOKS)
+        inputs = [(socket.identifier, _upstream(socket)) for socket in linked]
         return [repr(node.surface()), getattr(node, "side", ""), inputs]
 
     def _world(self, scene, view_layer) -> str:
