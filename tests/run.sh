@@ -127,10 +127,10 @@ beside=$(mktemp)
     if [ $all = 1 ]; then step "tests in bpy 4.5" in_bpy; else step "tests in bpy 4.5" in_bpy_without_cycles; fi
 } >"$beside" 2>&1 &
 step "tests in Blender" in_blender
+step "the zip in Blenders" tests/matrix.sh "${matrix[@]}"
 wait
 cat "$beside"
 rm -f "$beside"
-step "the zip in Blenders" tests/matrix.sh "${matrix[@]}"
 if [ $all = 1 ]; then
     step "wheel" tests/wheel.sh
 else
