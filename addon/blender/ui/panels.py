@@ -33,7 +33,7 @@ class BEAMSPREAD_PT_render(RenderPanel, bpy.types.Panel):
     bl_label = "Beamspread"
 
     def draw_header_preset(self, _context):
-        draw_help(self.layout, "first_bake", "lights")
+        draw_help(self.layout, "lights")
 
     def draw(self, context):
         layout = self.layout
@@ -95,6 +95,9 @@ class BEAMSPREAD_PT_images(RenderPanel, bpy.types.Panel):
     bl_parent_id = "BEAMSPREAD_PT_render"
     bl_options = {"DEFAULT_CLOSED"}
 
+    def draw_header_preset(self, _context):
+        draw_help(self.layout, "images")
+
     def draw(self, context):
         layout, settings = self.layout, context.scene.beamspread
         _use_columns(layout)
@@ -112,7 +115,7 @@ class BEAMSPREAD_PT_batch(RenderPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header_preset(self, _context):
-        draw_help(self.layout, "batch", "cli")
+        draw_help(self.layout, "cli")
 
     def draw(self, context):
         layout = self.layout
@@ -137,7 +140,7 @@ class MaterialPanel:
         return material is not None and compat.uses_nodes(material) and find_node(material) is not None
 
     def draw_header_preset(self, _context):
-        draw_help(self.layout, "materials", "libraries")
+        draw_help(self.layout, "node")
 
     def draw(self, context):
         layout = self.layout
