@@ -1,5 +1,7 @@
 """Live in Rendered views of Cycles, which reads an image once: nodes show it a new one whenever things come to rest."""
 
+import time
+
 import bpy
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ import scenes
 from beamspread.blender.live import session, stand_ins
 from test_live import live_pixels, make_scene, settle, switched_off_at_the_end  # noqa: F401
 
-STEPS = 5
+REST_SECONDS = session.CALM_SECONDS + stand_ins.PAUSE_SECONDS + 0.1
 
 
 def views():
@@ -33,9 +35,11 @@ def scene():
 def seen(material):
     """What renderers see, once things rest."""
     settle()
-    for _ in range(STEPS):
+    end = time.monotonic() + REST_SECONDS
+    while time.monotonic() < end:
         session.step(bpy.context)
         bpy.context.view_layer.update()
+        time.sleep(0.01)
     return scenes.node_of(material).node_tree.nodes["Image"].image
 
 

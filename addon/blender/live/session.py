@@ -22,7 +22,7 @@ from .canvas import Canvas, image_for, image_name_of
 from .marks import Marks
 from .painting import painted_results
 from .reader import Reader
-from .stand_ins import StandIns, is_cycles_looked_at
+from .stand_ins import StandIns
 
 # Between steps while something changes or is painted, while nothing does, and while Live is off.
 BUSY_SECONDS, IDLE_SECONDS, OFF_SECONDS = 0.01, 0.05, 0.5
@@ -32,6 +32,9 @@ END_SECONDS = 10.0
 
 # A look that takes so long at most may be had while Blender evaluates a change.
 SMALL_SECONDS = 0.01
+
+# So long after a change Cycles gets to see pictures, with each of which it begins anew.
+CALM_SECONDS = 0.3
 
 # Of an object's texels, those that it shares with another in the same image: more than margins do.
 SAME_PLACE = 0.5
@@ -102,7 +105,7 @@ class Session:
         shown = self._show_pictures(context)
         if shown:
             self.seconds = time.perf_counter() - changed_at
-        self._show_cycles(context, is_at_rest=not (has_changed or shown or self.is_busy()))
+        self._show_cycles(context, shown)
         return has_changed or shown or self.is_busy()
 
     def waits_for_painter(self, context) -> bool:
@@ -180,12 +183,11 @@ class Session:
             self._subjects = []
             self._painter.show(())
 
-    def _show_cycles(self, context, is_at_rest: bool) -> None:
-        if not is_cycles_looked_at(context):
-            self._stand_ins.end()
-        elif is_at_rest:
-            shown = (canvas.image() for canvas in self._canvases)
-            self._stand_ins.show([image for image in shown if image is not None and self.covers(image)])
+    def _show_cycles(self, context, has_new: bool) -> None:
+        is_calm = not self._marks and time.perf_counter() - self._changed_at >= CALM_SECONDS
+        shown = (canvas.image() for canvas in self._canvases)
+        images = [image for image in shown if image is not None and self.covers(image)]
+        self._stand_ins.follow(context, images, has_new, is_calm, self.is_busy())
 
     def _adopt_bakes(self, context) -> None:
         """Take images that have other pixels than Live's, of a bake or a file, for what the scene looks like now."""

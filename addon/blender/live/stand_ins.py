@@ -1,9 +1,12 @@
 """Copies of pictures for Cycles' Rendered view, which reads an image once, by its file where it has one.
 
-A new image is read. They are made only while nothing changes, since Cycles begins anew with each.
+A new image is read. They are made only while nothing moves, since Cycles begins anew with each.
 """
 
 from __future__ import annotations
+
+import time
+from collections.abc import Sequence
 
 import bpy
 import numpy as np
@@ -14,19 +17,33 @@ from ..node.tree import IMAGE
 
 NAME = ".Beamspread Live"  # the dot hides it in menus
 
+# Between two looks, while pictures are still to come.
+PAUSE_SECONDS = 1.0
+
 
 class StandIns:
     """What nodes' inner trees show in place of the nodes' images."""
 
     def __init__(self) -> None:
         self._shown: dict[str, tuple[str, np.ndarray]] = {}  # image -> stand-in, its pixels
+        self._is_due, self._last = True, 0.0
 
     def names(self) -> set[str]:
         """Of the stand-ins."""
         return {name for name, _ in self._shown.values()}
 
-    def show(self, images: list) -> None:
-        """Have Cycles see what these images hold."""
+    def follow(self, context, images: Sequence, has_new: bool, is_calm: bool, is_busy: bool) -> None:
+        """Have Cycles see the images where it renders a view, once nothing moves; `is_busy`: more is still to come."""
+        if not _is_cycles_looked_at(context):
+            self.end()
+            return
+        self._is_due |= has_new
+        now = time.perf_counter()
+        if self._is_due and is_calm and (not is_busy or now - self._last >= PAUSE_SECONDS):
+            self._show(images)
+            self._is_due, self._last = False, now
+
+    def _show(self, images: Sequence) -> None:
         for image in images:
             pixels = np.empty(len(image.pixels), np.float32)
             image.pixels.foreach_get(pixels)
@@ -51,6 +68,7 @@ class StandIns:
 
     def end(self) -> None:
         """Show the nodes' own images again."""
+        self._is_due = True
         if self._shown:
             show_own_images()
             for name in self.names():
@@ -58,7 +76,7 @@ class StandIns:
             self._shown.clear()
 
 
-def is_cycles_looked_at(context) -> bool:
+def _is_cycles_looked_at(context) -> bool:
     """Whether a 3D View is rendered by Cycles."""
     if context.scene.render.engine != "CYCLES":
         return False
