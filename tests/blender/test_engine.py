@@ -198,6 +198,16 @@ def test_f12_ends_soon_when_it_should_and_keeps_no_picture(seen):
     assert engine.begin_result.return_value.load_from_file.call_count == 0
 
 
+def test_f12_says_how_far_it_is(seen):
+    engine, scene = MagicMock(resolution_x=64, resolution_y=64), bpy.context.scene
+    engine.test_break.return_value = False
+    scene.render.resolution_x = scene.render.resolution_y = 64
+    scene.cycles.samples, scene.cycles.use_adaptive_sampling = 2000, False
+    render_picture(engine, bpy.context.evaluated_depsgraph_get())
+    told = [call.args[0] for call in engine.update_progress.call_args_list]
+    assert any(0 < fraction <= 1 for fraction in told), told
+
+
 def test_f12_that_fails_says_why(seen, tmp_path, capfd):
     bpy.context.scene.camera = None
     said = messages_of(lambda: picture(tmp_path)) + capfd.readouterr().out
