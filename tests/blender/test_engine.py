@@ -10,6 +10,7 @@ import pytest
 from beamspread.blender.jobs import stale
 from beamspread.blender.jobs.picture import render_picture
 from beamspread.blender.jobs.state import Standing, state
+from beamspread.blender.ui.panels import target_of_blender
 from beamspread.core.bake.runner import Target
 from mathutils import Matrix
 from scenes import (
@@ -244,3 +245,13 @@ def test_its_own_bake_is_known_of_in_the_image_that_the_node_shows(tmp_path):
 def row():
     stale.refresh(bpy.context)
     return state.rows[Target("Plane", "Medium")]
+
+
+def test_the_panel_says_what_blenders_own_bake_fills():
+    material = add_material()
+    assert target_of_blender(None) == target_of_blender(material)
+    assert target_of_blender(material).startswith("Select an Image Texture node")
+    texture = material.node_tree.nodes.new("ShaderNodeTexImage")
+    texture.image = bpy.data.images.new("Filled", 4, 4)
+    material.node_tree.nodes.active = texture
+    assert target_of_blender(material) == "Fills 'Filled', the image of the selected Image Texture node."
