@@ -26,11 +26,13 @@ class StandIns:
 
     def __init__(self) -> None:
         self._shown: dict[str, tuple[str, np.ndarray]] = {}  # image -> stand-in, its pixels
+        # image -> the stand-in before: Cycles knows images by their addresses, and a new one must not get its
+        self._before: dict[str, str] = {}
         self._is_due, self._last = True, 0.0
 
     def names(self) -> set[str]:
         """Of the stand-ins."""
-        return {name for name, _ in self._shown.values()}
+        return {*(name for name, _ in self._shown.values()), *self._before.values()}
 
     def follow(self, context, images: Sequence, has_new: bool, is_calm: bool, is_busy: bool) -> None:
         """Have Cycles see the images where it renders a view, once nothing moves; `is_busy`: more is still to come."""
@@ -55,7 +57,8 @@ class StandIns:
             for tree in {node.node_tree for node in all_nodes() if node.image == image and node.node_tree is not None}:
                 if tree.library is None:
                     tree.nodes[IMAGE].image = new
-            _remove(name)
+            _remove(self._before.get(image.name, ""))
+            self._before[image.name] = name
 
     def update(self, image) -> None:
         """Have others than Cycles follow between two looks, if the image has a stand-in."""
@@ -74,6 +77,7 @@ class StandIns:
             for name in self.names():
                 _remove(name)
             self._shown.clear()
+            self._before.clear()
 
 
 def _is_cycles_looked_at(context) -> bool:
