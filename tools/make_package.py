@@ -24,7 +24,7 @@ TIME = (1980, 1, 1, 0, 0, 0)
 MOST_BYTES = 40_000_000
 # Type stubs are for editors: the wheel has them.
 LEFT_OUT = re.compile(r"(^|/)__pycache__/|\.pyc$|\.pyi$|^py\.typed$|/\.|^\.|^CMakeFiles/")
-SUFFIXES = {".py", ".exr", ".csv", ".toml", ".so", ".pyd"}
+SUFFIXES = {".py", ".exr", ".csv", ".toml", ".so", ".pyd", ".md"}
 MODULE = re.compile(r"^_native\.(?P<abi>cpython-3\d+|cp3\d+|abi3)[^/]*\.(so|pyd)$")
 
 

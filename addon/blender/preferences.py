@@ -42,15 +42,14 @@ def memory_limit() -> int:
 
 
 @functools.cache
-def documentation(*names: str) -> str:
-    """The first of these pages that is on this machine, as a URL; empty where none is."""
-    pages = (folder / f"{name}.md" for name in names for folder in DOCS)
-    return next((page.as_uri() for page in pages if page.is_file()), "")
+def documentation(name: str) -> str:
+    """A page of the documentation as a URL; empty where it is not on this machine."""
+    return next((page.as_uri() for folder in DOCS if (page := folder / f"{name}.md").is_file()), "")
 
 
-def draw_help(layout, *names: str) -> None:
-    """A button that opens the first of these pages, if there is one."""
-    if url := documentation(*names):
+def draw_help(layout, name: str) -> None:
+    """A button that opens a page of the documentation."""
+    if url := documentation(name):
         layout.operator("wm.url_open", text="", icon="HELP", emboss=False).url = url
 
 
@@ -102,9 +101,10 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
         files = library.cached_files()
         megabytes = sum(file.stat().st_size for file in files if file.is_file()) / 2**20
         row = layout.row()
-        row.label(text=f"{len(files)} simulated, {megabytes:.1f} MB in {library.cache_folder()}")
+        row.label(text=f"{len(files)} simulated media, {megabytes:.1f} MB, in")
         row.operator("beamspread.clear_cache", icon="TRASH")
-        if url := documentation("first_bake", "method"):
+        layout.label(text=str(library.cache_folder()))  # by itself: beside a button it would be cut
+        if url := documentation("node"):
             layout.operator("wm.url_open", text="Documentation", icon="HELP").url = url
 
 

@@ -10,6 +10,7 @@ import pytest
 from beamspread.blender.jobs import stale
 from beamspread.blender.jobs.picture import render_picture
 from beamspread.blender.jobs.state import Standing, state
+from beamspread.blender.ui.panels import target_of_blender
 from beamspread.core.bake.runner import Target
 from mathutils import Matrix
 from scenes import (
@@ -198,6 +199,16 @@ def test_f12_ends_soon_when_it_should_and_keeps_no_picture(seen):
     assert engine.begin_result.return_value.load_from_file.call_count == 0
 
 
+def test_f12_says_how_far_it_is(seen):
+    engine, scene = MagicMock(resolution_x=64, resolution_y=64), bpy.context.scene
+    engine.test_break.return_value = False
+    scene.render.resolution_x = scene.render.resolution_y = 64
+    scene.cycles.samples, scene.cycles.use_adaptive_sampling = 2000, False
+    render_picture(engine, bpy.context.evaluated_depsgraph_get())
+    told = [call.args[0] for call in engine.update_progress.call_args_list]
+    assert any(0 < fraction <= 1 for fraction in told), told
+
+
 def test_f12_that_fails_says_why(seen, tmp_path, capfd):
     bpy.context.scene.camera = None
     said = messages_of(lambda: picture(tmp_path)) + capfd.readouterr().out
@@ -234,3 +245,13 @@ def test_its_own_bake_is_known_of_in_the_image_that_the_node_shows(tmp_path):
 def row():
     stale.refresh(bpy.context)
     return state.rows[Target("Plane", "Medium")]
+
+
+def test_the_panel_says_what_blenders_own_bake_fills():
+    material = add_material()
+    assert target_of_blender(None) == target_of_blender(material)
+    assert target_of_blender(material).startswith("Select an Image Texture node")
+    texture = material.node_tree.nodes.new("ShaderNodeTexImage")
+    texture.image = bpy.data.images.new("Filled", 4, 4)
+    material.node_tree.nodes.active = texture
+    assert target_of_blender(material) == "Fills 'Filled', the image of the selected Image Texture node."

@@ -4,6 +4,7 @@ import bpy
 import pytest
 from beamspread.blender.jobs import batch, stale
 from beamspread.blender.jobs.state import Standing, state
+from beamspread.blender.node.node import upgrade_nodes
 from beamspread.core.bake.runner import Bake, Target
 from beamspread.core.batch import options
 from mathutils import Matrix
@@ -32,6 +33,31 @@ def plane():
     bake(plane)
     assert row().standing == Standing.BAKED
     return plane
+
+
+def remove_inputs(tree):
+    """As nodes of the first version were."""
+    if hasattr(tree, "interface"):
+        for item in [one for one in tree.interface.items_tree if getattr(one, "in_out", "") == "INPUT"]:
+            tree.interface.remove(item)
+    else:
+        tree.inputs.clear()
+
+
+def test_inputs_that_an_older_node_gets_late_are_no_change():
+    """Switched on in a window, the add-on finds no nodes yet: one of an older file may be baked without inputs."""
+    bpy.context.scene.beamspread.resolution = 32
+    material = add_material()
+    plane, node = add_plane(material=material), node_of(material)
+    add_sun(20)
+    remove_inputs(node.node_tree)
+    assert list(node.inputs) == []
+    bake(plane)
+    assert row().standing == Standing.BAKED
+    upgrade_nodes()
+    assert len(node.inputs) == 3
+    stale.fingerprints.forget()
+    assert row().standing == Standing.BAKED
 
 
 def vertex(_plane):

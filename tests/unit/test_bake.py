@@ -18,7 +18,7 @@ from beamspread.core.errors import MaterialError
 from beamspread.core.material.material import Material
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
-from beamspread.core.scene.lights import Light, PointLight, SpotLight, SunLight
+from beamspread.core.scene.lights import AreaLight, Light, PointLight, SpotLight, SunLight
 from beamspread.core.scene.occluders import Mesh, Occluder
 from beamspread.core.scene.receiver import Chart, Receiver, build_receiver
 from beamspread.core.scene.uv_map import Polygons, fit_uv_maps
@@ -253,6 +253,24 @@ def test_progress_rises_to_one_and_can_stop_at_any_time():
         with pytest.raises(beamspread.Cancelled):
             bake(grid(), Illumination([SUN, SUN]), MATERIAL, 0.0, SETTINGS, lambda done, m=moment: done < m)
     assert np.array_equal(bake(grid(), Illumination([SUN, SUN]), MATERIAL, 0.0, SETTINGS), sun)
+
+
+def test_most_of_the_progress_is_that_of_rays_where_a_light_has_a_size(monkeypatch):
+    area = AreaLight("Area", 10.0, (1.0, 1.0, 1.0), True, (0.0, 0.0, 0.5), np.eye(3), 0.3, 0.3, False, np.pi)
+    seen, around = [0.0], []
+    add_to = Gatherer.add_to
+
+    def noted(self, *arguments):
+        before = seen[-1]
+        add_to(self, *arguments)
+        around.append((before, seen[-1]))
+
+    monkeypatch.setattr(Gatherer, "add_to", noted)
+    job([area], settings=replace(SETTINGS, samples=4)).run(lambda fraction: seen.append(fraction) or True)
+    assert len(around) == 1
+    # At 1000 rays from each texel; the solver adds up to five of the units that one ray has .4 of.
+    assert around[0][0] < 0.1
+    assert around[0][1] > 0.9
 
 
 def test_job_works_out_the_albedo_of_a_base_colour():

@@ -2,6 +2,7 @@
 
 import ast
 import hashlib
+import re
 import subprocess
 import sys
 import zipfile
@@ -71,6 +72,15 @@ def test_it_holds_what_was_staged_and_licences_and_nothing_else(files):
         assert f"beamspread/{name}" in files
     assert sum(name.startswith("library/") for name in names) == 12
     assert all(files[f"beamspread/{name}"] == (STAGED / name).read_bytes() for name in staged)
+
+
+def test_help_buttons_find_their_pages(files):
+    sources = [text.decode() for name, text in files.items() if name.endswith(".py")]
+    pages = {
+        page for text in sources for page in re.findall(r'(?:draw_help\(self\.layout, |documentation\()"(\w+)"', text)
+    }
+    assert len(pages) >= 5
+    assert {f"beamspread/docs/{page}.md" for page in pages} <= set(files)
 
 
 def test_every_module_has_its_checksum(files):

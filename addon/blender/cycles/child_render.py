@@ -1,7 +1,12 @@
 """A picture of the scene, by another engine. Part of the child process (child.py)."""
 
+import re
+
 import bpy
 import numpy as np
+
+# What engines say of how far they are, from Blender 5.0 on to handlers alone.
+SAMPLES = re.compile(r"\bSample (\d+)/(\d+)")
 
 
 class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
@@ -11,10 +16,10 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
     bl_label = "Beamspread"
 
 
-def render(request, scene, _progress) -> dict:
+def render(request, scene, progress) -> dict:
     """The task `render`: one view layer at one frame into the multi-layer EXR file `picture`, by `engine`.
 
-    Compositing and sequencer are left to the process that asked, which hears how far it is from what Cycles prints.
+    Compositing and sequencer are left to the process that asked.
     """
     bpy.utils.register_class(BeamspreadNode)
     scene.render.engine = request["engine"]
@@ -28,5 +33,11 @@ def render(request, scene, _progress) -> dict:
     if hasattr(settings, "media_type"):
         settings.media_type = "MULTI_LAYER_IMAGE"
     settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
+    bpy.app.handlers.render_stats.append(lambda said, *_: _tell(progress, said))
     bpy.ops.render.render(write_still=True, scene=scene.name, layer=request["view_layer"])
     return {"frame": np.array(scene.frame_current)}
+
+
+def _tell(progress, said) -> None:
+    if isinstance(said, str) and (found := SAMPLES.search(said)):
+        progress(int(found[1]) / max(int(found[2]), 1))

@@ -30,7 +30,7 @@ def check_image(image) -> None:
     if image.source == "TILED":
         raise ImageError(f"{name} has UDIM tiles, which cannot be baked yet: choose a single image in the node.")
     if image.source == "SEQUENCE" and FRAMES in image:
-        raise ImageError(f"{name} is the frames of a batch: Show Single Images (Render > Beamspread > Batch) first.")
+        raise ImageError(f"{name} holds the frames of a batch: Show Single Images (Render > Beamspread > Batch) first.")
     if image.source not in {"FILE", "GENERATED"}:
         raise ImageError(f"{name} is a sequence, movie or viewer: choose a single image in the node.")
     if image.library is not None:

@@ -86,7 +86,7 @@ def _prepare(depsgraph, obj, passes, size: tuple[int, int]) -> list[Bake]:
 
 def _check_active_image(material, settings: BakeSettings) -> None:
     """Raise ImageError if what is baked would be taken for luminance, or would replace what the surface is made of."""
-    node, active = find_node(material), _active_image(material)
+    node, active = find_node(material), active_image(material)
     if active is not None and active in _images_read(node):
         raise ImageError(
             f"The active image '{active.name}' is a texture of the Beamspread node and no target: if Blender has "
@@ -102,7 +102,7 @@ def _check_active_image(material, settings: BakeSettings) -> None:
 def _fills_own_image(bake: Bake) -> bool:
     """Whether the image that Blender bakes to is the one that the node shows as luminance."""
     material = bpy.data.materials[bake.target.material_name]
-    return COMBINED in bake.job.settings.layers and find_node(material).image == _active_image(material)
+    return COMBINED in bake.job.settings.layers and find_node(material).image == active_image(material)
 
 
 class _Fillings:
@@ -145,8 +145,10 @@ def _after_bake(*_arguments) -> None:
     fillings.end()
 
 
-def _active_image(material):
+def active_image(material):
     """What Blender's Bake fills: the image of the texture node that was active last, or else of the first one."""
+    if material is None or material.node_tree is None:
+        return None
     textures = [node for node in material.node_tree.nodes if node.type == "TEX_IMAGE"]
     textures.sort(key=lambda node: not node.show_texture)
     return textures[0].image if textures else None

@@ -6,5 +6,6 @@ reader     the scene as subjects of pictures; reads only what has changed
 saved      what an image was last saved as
 painting   images on which the user can paint: Live waits
 canvas     pixels of images, which get their own back
+stand_ins  images that Cycles sees in place of these
 session    steps of a timer: look, have it painted, show
 """

@@ -22,6 +22,7 @@ from .canvas import Canvas, image_for, image_name_of
 from .marks import Marks
 from .painting import painted_results
 from .reader import Reader
+from .stand_ins import StandIns
 
 # Between steps while something changes or is painted, while nothing does, and while Live is off.
 BUSY_SECONDS, IDLE_SECONDS, OFF_SECONDS = 0.01, 0.05, 0.5
@@ -32,8 +33,8 @@ END_SECONDS = 10.0
 # A look that takes so long at most may be had while Blender evaluates a change.
 SMALL_SECONDS = 0.01
 
-# Seen in 3.4, whether it is told of new pixels or not.
-IN_CYCLES = "Rendered view of Cycles may keep the pixels that it began with: look at Material Preview or EEVEE."
+# So long after a change Cycles gets to see pictures, with each of which it begins anew.
+CALM_SECONDS = 0.3
 
 # Of an object's texels, those that it shares with another in the same image: more than margins do.
 SAME_PLACE = 0.5
@@ -56,6 +57,7 @@ class Session:
         self._marks.other = True
         self._subjects: list[Subject] = []
         self._canvases: list[Canvas] = []
+        self._stand_ins = StandIns()
         self._errors: dict[Target, str] = {}
         self._regions: dict[Target, np.ndarray] = {}  # of the last pictures
         self._paused = False
@@ -70,7 +72,7 @@ class Session:
         """Take the updates of a depsgraph."""
         was_calm = not self._marks
         own = {image.name for canvas in self._canvases if (image := canvas.image()) is not None}
-        self._marks.note(list(depsgraph.updates), own)
+        self._marks.note(list(depsgraph.updates), own | self._stand_ins.names())
         if was_calm and self._marks:
             self._changed_at = time.perf_counter()
         is_small = self._look_seconds < SMALL_SECONDS or self._marks.is_lamps_alone()
@@ -80,6 +82,7 @@ class Session:
 
     def forget(self) -> None:
         """Read everything again: all data may be others' now, as after undo."""
+        self._stand_ins.end()
         self._reader, self._marks = Reader(), Marks()
         self._marks.other = True
         for canvas in self._canvases:
@@ -102,6 +105,7 @@ class Session:
         shown = self._show_pictures(context)
         if shown:
             self.seconds = time.perf_counter() - changed_at
+        self._show_cycles(context, shown)
         return has_changed or shown or self.is_busy()
 
     def waits_for_painter(self, context) -> bool:
@@ -139,8 +143,6 @@ class Session:
         said += self._reader.sentences()
         if self._reader.left_out:
             said.append(f"Live leaves out {', '.join(self._reader.left_out)}.")
-        if bpy.context.scene.render.engine == "CYCLES":
-            said.append(IN_CYCLES)
         return said + self.kept()
 
     def kept(self) -> list[str]:
@@ -170,14 +172,22 @@ class Session:
         self._canvases = [one for one in self._canvases if one not in canvases]
 
     def _restore(self) -> None:
+        self._stand_ins.end()
         for canvas in self._canvases:
             canvas.give_back()
 
     def _pause(self) -> None:
         if not self._paused:
             self._paused = True
+            self._stand_ins.end()
             self._subjects = []
             self._painter.show(())
+
+    def _show_cycles(self, context, has_new: bool) -> None:
+        is_calm = not self._marks and time.perf_counter() - self._changed_at >= CALM_SECONDS
+        shown = (canvas.image() for canvas in self._canvases)
+        images = [image for image in shown if image is not None and self.covers(image)]
+        self._stand_ins.follow(context, images, has_new, is_calm, self.is_busy())
 
     def _adopt_bakes(self, context) -> None:
         """Take images that have other pixels than Live's, of a bake or a file, for what the scene looks like now."""
@@ -234,6 +244,7 @@ class Session:
             self._drop([one for one in self._canvases if one.image() == image])
             self._canvases.append(canvas)
         canvas.show(image, picture)
+        self._stand_ins.update(image)
         return True
 
     def _in_the_way(self, picture: Picture, image) -> Target | None:

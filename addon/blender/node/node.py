@@ -15,6 +15,7 @@ from .draw import draw_node
 from .output import link_output, plain_of
 from .tree import (
     BASE_COLOR,
+    IMAGE,
     ROUGHNESS,
     ROUGHNESS_BEFORE,
     add_missing_inputs,
@@ -88,7 +89,7 @@ def _show(node, _context) -> None:
     if tree is None:
         return
     plain = plain_of(node)
-    if _is_shared(tree, plain) and sum(node.node_tree == tree for node in _all_nodes()) > 1:
+    if _is_shared(tree, plain) and sum(node.node_tree == tree for node in all_nodes()) > 1:
         tree = tree.copy()
         tree.use_fake_user = True
         node.node_tree = tree
@@ -246,16 +247,25 @@ def _decimal(value: float) -> float:
     return float(f"{value:.7g}")
 
 
-def _all_nodes():
+def all_nodes():
     """Every Beamspread node of the file, in materials and in groups."""
     trees = [material.node_tree for material in bpy.data.materials if material.node_tree] + list(bpy.data.node_groups)
     return (node for tree in trees for node in tree.nodes if node.bl_idname == BeamspreadNode.bl_idname)
 
 
 @persistent
+def show_own_images(*_arguments) -> None:
+    """Have trees show the images of their nodes: undo, and what Blender saves by itself, bring back Live's own."""
+    for node in all_nodes():
+        tree = node.node_tree
+        if tree is not None and tree.library is None and IMAGE in tree.nodes and tree.nodes[IMAGE].image != node.image:
+            show_values(tree, node.image, node.ior)
+
+
+@persistent
 def upgrade_nodes(*_arguments) -> None:
     """Give nodes of older files the inputs that they have today; links and values stay."""
-    for tree in {node.node_tree for node in _all_nodes()} - {None}:
+    for tree in {node.node_tree for node in all_nodes()} - {None}:
         _upgrade(tree)
 
 
@@ -277,7 +287,7 @@ def _upgrade(tree) -> None:
     if tree.library is not None or not add_missing_inputs(tree):
         return
     # Nodes that are there get a new input before it has a default.
-    for node in _all_nodes():
+    for node in all_nodes():
         if node.node_tree == tree:
             node.inputs[ROUGHNESS].default_value = ROUGHNESS_BEFORE
 
@@ -294,10 +304,12 @@ def _remove_class() -> None:
     # Blender up to 4.3 (3.4.1 and 4.3.2 were seen to) frees the type but not the evaluated copies of nodes that point
     # to it, and crashes when those go, at the latest on exit: there a class in use stays. In 4.5 a class that stays
     # keeps the process from exiting.
-    if bpy.app.version >= (4, 5, 0) or not any(_all_nodes()):
+    if bpy.app.version >= (4, 5, 0) or not any(all_nodes()):
         bpy.utils.unregister_class(BeamspreadNode)
 
 
 register, unregister = all_or_nothing(
-    (_add_class, _remove_class), *handlers(load_post=upgrade_nodes, save_pre=release_unused_trees)
+    (_add_class, _remove_class),
+    *handlers(load_post=upgrade_nodes, save_pre=release_unused_trees),
+    *handlers(load_post=show_own_images, undo_post=show_own_images, redo_post=show_own_images),
 )

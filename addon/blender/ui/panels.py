@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .. import compat
-from ..jobs.engine import BeamspreadEngine
+from ..jobs.engine import BeamspreadEngine, active_image
 from ..node.draw import draw_properties
 from ..node.find import find_node
 from ..preferences import draw_help
@@ -33,7 +33,7 @@ class BEAMSPREAD_PT_render(RenderPanel, bpy.types.Panel):
     bl_label = "Beamspread"
 
     def draw_header_preset(self, _context):
-        draw_help(self.layout, "first_bake", "lights")
+        draw_help(self.layout, "lights")
 
     def draw(self, context):
         layout = self.layout
@@ -83,9 +83,19 @@ class BEAMSPREAD_PT_active_image(RenderPanel, bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         _use_columns(layout)
+        active = context.view_layer.objects.active  # `context.object` is empty in the render properties
+        draw_sentences(layout, context, [target_of_blender(getattr(active, "active_material", None))], "INFO")
         layout.operator("object.bake", text="Bake Active Image", icon="RENDER_STILL")
         layout.prop(context.scene.render.bake, "margin")
         layout.prop(context.scene.render.bake, "use_clear", text="Clear Image")
+
+
+def target_of_blender(material) -> str:
+    """What Blender's own Bake fills, in a sentence."""
+    image = active_image(material)
+    if image is None:
+        return "Select an Image Texture node with an image in the Shader Editor: Blender's Bake fills that."
+    return f"Fills '{image.name}', the image of the selected Image Texture node."
 
 
 class BEAMSPREAD_PT_images(RenderPanel, bpy.types.Panel):
@@ -94,6 +104,9 @@ class BEAMSPREAD_PT_images(RenderPanel, bpy.types.Panel):
     bl_label = "New Images"
     bl_parent_id = "BEAMSPREAD_PT_render"
     bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header_preset(self, _context):
+        draw_help(self.layout, "images")
 
     def draw(self, context):
         layout, settings = self.layout, context.scene.beamspread
@@ -112,7 +125,7 @@ class BEAMSPREAD_PT_batch(RenderPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header_preset(self, _context):
-        draw_help(self.layout, "batch", "cli")
+        draw_help(self.layout, "cli")
 
     def draw(self, context):
         layout = self.layout
@@ -137,7 +150,7 @@ class MaterialPanel:
         return material is not None and compat.uses_nodes(material) and find_node(material) is not None
 
     def draw_header_preset(self, _context):
-        draw_help(self.layout, "materials", "libraries")
+        draw_help(self.layout, "node")
 
     def draw(self, context):
         layout = self.layout

@@ -89,7 +89,9 @@ def draw_bake(layout, context, material_name: str = "") -> None:
     else:
         shown = draw_problems(layout, context)
         draw_buttons(layout)
-        layout.prop(context.scene.beamspread, "use_live", toggle=True)
+        row = layout.row()
+        row.use_property_split = False  # as wide as the buttons above
+        row.prop(context.scene.beamspread, "use_live", toggle=True, icon="PLAY")
         # What keeps an object from being baked keeps it from following, too.
         said = [one for one in session.sentences() if one.partition(": ")[2] not in shown]
         draw_sentences(layout, context, said, "INFO")
@@ -170,8 +172,8 @@ def estimates(context) -> list[str]:
         return []
     if settings.use_indirect:
         seconds = in_words(sum(seconds_estimate(*size) for size in sizes))
-        many = f" for {len(sizes)} objects" if len(sizes) > 1 else ""
-        found.append(f"Indirect light: about {seconds}{many}, where something stands above them.")
+        many, them = (f" for {len(sizes)} objects", "them") if len(sizes) > 1 else ("", "it")
+        found.append(f"Indirect light: about {seconds}{many}, where something stands above {them}.")
     if settings.solver == "direct" and settings.output == "LUMINANCE":
         lamps = [obj.data.type for obj in context.view_layer.objects if obj.type == "LIGHT"]
         suns = lamps.count("SUN")

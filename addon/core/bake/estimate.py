@@ -10,6 +10,9 @@ SIMULATION_SECONDS = {"preview": 3.0, "final": 130.0}
 # Of the fft solver, per texel and light, in seconds of one processor.
 FFT_SECONDS = 1.5e-6
 
+# Of a ray to a light of a size, on one processor (docs/performance.md, room: 3 to 4 million a second on two).
+RAY_SECONDS = 6e-7
+
 # Of the direct solver, per pair of texels: for light of its own direction at each, and of one for all as a sun's.
 DIRECT_SECONDS, DIRECT_SUN_SECONDS = 3e-8, 3e-10
 
@@ -32,6 +35,11 @@ def solver_seconds(width: int, height: int, suns: int, others: int, solver: str,
     if solver == "direct":
         return (DIRECT_SUN_SECONDS * suns + DIRECT_SECONDS * others) * texels**2 / processors(threads)
     return FFT_SECONDS * texels * (1 + suns + others) / processors(threads)
+
+
+def ray_seconds(texels: int, rays: int, threads: int = 0) -> float:
+    """Of so many rays from each texel."""
+    return RAY_SECONDS * texels * rays / processors(threads)
 
 
 def bake_bytes(width: int, height: int, solver: str) -> int:

@@ -13,8 +13,9 @@ from ..progress import Progress, say, stages, timed
 from ..scene.illumination import Illumination
 from ..scene.lights import Light
 from ..scene.receiver import Receiver
-from .estimate import simulation_seconds, solver_seconds
+from .estimate import ray_seconds, simulation_seconds, solver_seconds
 from .layers import LAYERS, WITHOUT_MEDIUM
+from .luminance import rays_per_texel
 from .margin import extend_margin
 from .settings import COMBINED, BakeSettings
 from .surface import Surface
@@ -83,7 +84,11 @@ class BakeJob:
         shape, settings = self.receiver.coverage.shape, self.settings
         suns = sum(light.is_parallel for light in self.illumination.lights)
         others = len(self.illumination.lights) - suns
-        return 0.1 + solver_seconds(*shape, suns, others, settings.solver, settings.threads) * len(settings.layers)
+        seconds = solver_seconds(*shape, suns, others, settings.solver, settings.threads)
+        if not all(light.has_one_direction for light in self.illumination.lights):
+            rays = max(rays_per_texel(chart.grid, self.surface.material, settings) for chart in self.receiver.charts)
+            seconds += ray_seconds(shape[0] * shape[1], rays, settings.threads)
+        return 0.1 + seconds * len(settings.layers)
 
     def warnings(self) -> list[str]:
         """What the artist should know before it runs."""

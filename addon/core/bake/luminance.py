@@ -17,7 +17,7 @@ from ..scene.grid import Grid
 from ..scene.illumination import Illumination
 from ..scene.lights import Light
 from .convolve import solve as convolve_plane_lights
-from .estimate import solver_seconds
+from .estimate import ray_seconds, solver_seconds
 from .gather import Gatherer
 from .settings import BakeSettings
 
@@ -90,7 +90,7 @@ def spread(
 ) -> np.ndarray:
     """`bake` with the LDF of each channel given; the material is checked, and `settings.quality` does not count."""
     lights = illumination.lights
-    gatherer = Gatherer(grid, illumination, settings, _rays(grid, material, settings))
+    gatherer = Gatherer(grid, illumination, settings, rays_per_texel(grid, material, settings))
     bytes_waiting = 4 * grid.width * grid.height * len(lights)
     if all(light.has_one_direction for light in lights) and bytes_waiting <= MOST_WAITING:
         solve = _spread_together
@@ -115,7 +115,7 @@ def spread(
     return luminance if grid.color_out is None else luminance * grid.color_out
 
 
-def _rays(grid: Grid, material: Material, settings: BakeSettings) -> int:
+def rays_per_texel(grid: Grid, material: Material, settings: BakeSettings) -> int:
     """How many rays of each texel leave noise of a hundredth, in a penumbra, of what the medium spreads.
 
     Light from a point fills some 4 pi l^2 texels, l the mean free path, over whose rays its noise is averaged; that of
@@ -131,6 +131,12 @@ def _solve_weight(grid: Grid, solver: str) -> float:
     """Of all lights together."""
     size = grid.width, grid.height
     return SOLVE_WEIGHT * max(1.0, solver_seconds(*size, 0, 1, solver) / solver_seconds(*size, 0, 1, "fft"))
+
+
+def _ray_weight(grid: Grid, rays: int) -> float:
+    """Of so many rays from each texel."""
+    texels = grid.width * grid.height
+    return LIGHT_WEIGHT * ray_seconds(texels, rays) / solver_seconds(grid.width, grid.height, 0, 0, "fft")
 
 
 def _spread_together(gatherer: Gatherer, lights: Sequence[Light], medium: dict, solver: str, progress) -> np.ndarray:
@@ -157,8 +163,6 @@ def _spread_apart(gatherer: Gatherer, lights: Sequence[Light], medium: dict, sol
 
 def _spread_field(gatherer: Gatherer, lights: Sequence[Light], medium: dict, _solver: str, progress) -> np.ndarray:
     """Lights of any number and size, added up as they come."""
-    works = [LIGHT_WEIGHT, SOLVE_WEIGHT, *[LIGHT_WEIGHT] * len(lights), SOLVE_WEIGHT]
-    looking, choosing, *adding, solving = stages(progress, works)
     grid = gatherer.grid
     shape, survey, means = gatherer.survey()
     brightest = sorted(range(len(lights)), key=lambda i: means[i], reverse=True)
@@ -166,6 +170,9 @@ def _spread_field(gatherer: Gatherer, lights: Sequence[Light], medium: dict, _so
     suns = [i for i in lit if lights[i].is_parallel]
     kept = suns if len(suns) <= MOST_KEPT else []
     later = [i for i in lit if i not in kept]
+    rays = {i: max(FEWEST_RAYS, round(gatherer.rays * means[i] / (sum(means) or 1.0))) for i in later}
+    to_add = [LIGHT_WEIGHT + (0.0 if lights[i].has_one_direction else _ray_weight(grid, rays[i])) for i in later]
+    looking, choosing, *adding, solving = stages(progress, [LIGHT_WEIGHT, SOLVE_WEIGHT, *to_add, SOLVE_WEIGHT])
     # What a survey has missed shines on few texels, and is looked at as it is.
     look_at = [*later[:MOST_STAND_INS], *(i for i in later[MOST_STAND_INS:] if means[i] == 0)]
     parts = []
@@ -177,8 +184,7 @@ def _spread_field(gatherer: Gatherer, lights: Sequence[Light], medium: dict, _so
         return _dark(grid)
     field = native.LightField((grid.height, grid.width), parts, shape, expected, progress=choosing, **medium)
     for i, step in zip(later, adding):
-        rays = round(gatherer.rays * means[i] / sum(means))
-        gatherer.add_to(field, lights[i], max(FEWEST_RAYS, rays), step)
+        gatherer.add_to(field, lights[i], rays[i], step)
     return field.solve(solving)
 
 
