@@ -39,7 +39,7 @@ def test_it_follows_the_frame(plane, tmp_path):
     assert is_sequence(node.image)
     stale.refresh(bpy.context)
     (row,) = state.rows.values()
-    assert row.sentences == ("Shows the frames 3 to 5 of a batch.",)
+    assert row.sentences == ("Shows the frames 3 to 5 of a batch; what has changed since is not known.",)
     assert [file_shown(node.node_tree, frame) for frame in (1, 3, 4, 5, 9)] == [3, 3, 4, 5, 5]
     rendered = [render_brightness(plane, frame, tmp_path) for frame in (3, 4, 5)]
     written = [native.read_exr(str(path))[0].mean() for path in sorted((tmp_path / "beamspread").iterdir())]
