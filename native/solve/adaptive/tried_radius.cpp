@@ -53,19 +53,23 @@ std::vector<Block> blocks(const PlaneLight& light, const Plane& plane)
         const std::size_t row = within(y, plane.height);
         found.push_back({row - row % rows_at_once, column - column % targets_at_once});
     };
-    for (std::size_t i = 0; i < strata * strata; ++i)
-        add((static_cast<double>(i / strata) + random.uniform()) * static_cast<double>(plane.height) / strata,
-            (static_cast<double>(i % strata) + random.uniform()) * static_cast<double>(plane.width) / strata);
+    for (std::size_t row = 0; row < strata; ++row)
+        for (std::size_t column = 0; column < strata; ++column) {
+            const double y = (static_cast<double>(row) + random.uniform()) / strata;
+            const double x = (static_cast<double>(column) + random.uniform()) / strata;
+            add(y * static_cast<double>(plane.height), x * static_cast<double>(plane.width));
+        }
     std::size_t brightest = 0;
     const auto irradiance = [&](std::size_t i) { return light.irradiance(i / plane.width, i % plane.width); };
     for (std::size_t i = 0; i < plane.height * plane.width; ++i)
         if (irradiance(i) > irradiance(brightest))
             brightest = i;
+    const std::size_t y = brightest / plane.width;
+    const std::size_t x = brightest % plane.width;
     for (std::size_t i = 0; i < around; ++i) {
         const double r = i == 0 ? 0.0 : std::pow(4.0, static_cast<double>(i));
         const double phi = 2.0 * pi * random.uniform();
-        add(static_cast<double>(brightest / plane.width) + r * std::sin(phi),
-            static_cast<double>(brightest % plane.width) + r * std::cos(phi));
+        add(static_cast<double>(y) + r * std::sin(phi), static_cast<double>(x) + r * std::cos(phi));
     }
     return found;
 }
