@@ -12,7 +12,8 @@ namespace beamspread {
 
 namespace {
 
-// Of the way to a face, which may be among what blocks light; rays are traced in single precision.
+// Of the way to a face, which may be among what blocks light; rays are traced in single precision. A face that blocks
+// takes up to 1.4 % of its own light at 1 - 1e-7, and nothing from 1 - 2.5e-7 on.
 constexpr double short_of_face = 1.0 - 1e-5;
 
 // Squared distance over squared size from which on a face is as good as a point: right to 2e-3.

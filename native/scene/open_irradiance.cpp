@@ -10,10 +10,13 @@ namespace beamspread {
 
 namespace {
 
+// As the distance below is in steps, half takes a spot an eighth of the time and is off by 2e-3 of the brightest, other
+// lights by 4e-5 in the same time; twice takes a spot 1.5 times as long.
 constexpr std::size_t texels_per_node = 8;
 
 // From so many steps between nodes away on, cubics between them know the light of a point to 1e-3, and better of a larger
-// one.
+// one. Lights of a size: 5e-5 of the brightest; from half as many on 3e-4, a spot's border 2e-2; from twice as many
+// 1e-6, a spot takes 1.6 times as long.
 constexpr double steps_to_smooth_light = 12.0;
 
 // From so many texels away on a texel's centre knows its mean to 5e-4 of the light of a point.

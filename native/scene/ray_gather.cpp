@@ -28,7 +28,8 @@ constexpr std::size_t max_rays_at_once = 256;
 // What the rays of a texel met.
 enum Met : std::uint8_t { nothing = 0, light = 1, obstacle = 2, both = light | obstacle };
 
-// How often rays are moved on where none finds the light, and how far: a lattice of four dimensions (Roberts 2018, "The
+// How often rays are moved on where none finds the light: with half as many, 6 of 416 texels that a narrow lamp just
+// reaches stay dark, 1e-5 of its light, with twice as many none as with these. And how far: a lattice of four dimensions (Roberts 2018, "The
 // unreasonable effectiveness of quasirandom sequences").
 constexpr int max_trials = 64;
 constexpr GridSobol::Point steps = {0.8566748838545029, 0.7338918566271259, 0.6287067210378086, 0.5385972572236101};

@@ -111,6 +111,20 @@ def test_lamps(library, shape, path):
         compare((light * mask).astype(np.float32), direction, library, path, 1e-2)
 
 
+@pytest.mark.parametrize(("height", "mask"), [(0.02, "all"), (0.2, "random"), (0.06, "half")])
+def test_radii_that_are_tried(library, height, mask):
+    """Planes so large that near radii below the bound are tried: eight points would be 4 times the tolerance off.
+
+    `direct` would take minutes; up to 192 x 192 texels, `fft` keeps all terms.
+    """
+    light, direction = lamp(190, 190, height)
+    if mask != "all":
+        light *= np.random.default_rng(2).random(light.shape) < 0.95 if mask == "random" else np.arange(190) < 180
+    arguments = (light, direction, library, 0.9, 4.0, 1.0)
+    exact = convolve(*arguments, tolerance=1e-7)
+    assert_within(2e-3, convolve(*arguments, solver="adaptive", tolerance=2e-3), exact)
+
+
 def test_a_long_plane(library):
     """Coarser grids of coarser grids, along one axis only."""
     light = np.random.default_rng(1).random((2, 3000)).astype(np.float32)

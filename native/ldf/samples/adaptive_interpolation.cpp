@@ -74,7 +74,8 @@ constexpr double tolerated_variance = 0.01;
 // exponentially around there, 0 far from any light, 1 deep inside.
 double interior(double r, double radius)
 {
-    constexpr int directions = 64;  // 32 give the same errors to four digits
+    // Against 128, the worst texel differs by 2e-5 of the peak, with 32 by 5e-5; in .6 and .35 of the time.
+    constexpr int directions = 64;
     double sum = 0.0;
     for (int i = 0; i < directions; ++i) {
         const double phi = (i + 0.5) * pi / directions;  // from the direction away from O

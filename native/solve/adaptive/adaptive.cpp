@@ -4,13 +4,13 @@
 #include <array>
 #include <cmath>
 #include <iterator>
-#include <map>
 
 #include "base/constants.h"
-#include "base/threads.h"
 #include "solve/adaptive/mask_pyramid.h"
 #include "solve/adaptive/multilevel_sum.h"
 #include "solve/adaptive/near_radius.h"
+#include "solve/adaptive/term_sums.h"
+#include "solve/adaptive/tried_radius.h"
 #include "solve/adaptive/wide_beams.h"
 #include "solve/separable/term_row.h"
 
@@ -34,31 +34,6 @@ LightTerms choose_terms(const Plane& plane, PlaneLight light, const ChannelMediu
                        [&](const KernelDecomposition& kernels, const Incidence&, const LightTerms&) {
                            return kernels.within(allowed);
                        });
-}
-
-// Light of one term on the plane.
-Grid term_light(const LightTerms& terms, std::size_t t, std::size_t height, std::size_t width)
-{
-    Grid grid(height, width);
-    parallel_for(height, [&](std::size_t y) {
-        TermRow row;
-        row.start(terms, {y, 0, width}, t, 1);
-        std::copy_n(row.values(t), width, grid.row(y));
-    });
-    return grid;
-}
-
-std::size_t term_profile(const LightTerms& terms, std::size_t t)
-{
-    return terms.terms[t].kernels[0].front().profile;
-}
-
-HarmonicSum term_kernel(const LightTerms& terms, std::size_t t)
-{
-    HarmonicSum sum;
-    for (const KernelTerm& part : terms.terms[t].kernels[0])
-        (part.phase == Phase::cosine ? sum.cosine : sum.sine)[part.m] += part.weight;
-    return sum;
 }
 
 // All light by its angle of incidence; that of about the same angle as if all were the most grazing of it, whose kernels
@@ -99,26 +74,6 @@ std::vector<Square> wide_beams(const std::vector<Square>& squares, std::size_t t
                  [texels](const Square& square) { return square.size * square.size >= texels / 500; });
     return wide;
 }
-
-// Multilevel sums on a plane, one kernel per profile made once.
-class LevelSums {
-public:
-    LevelSums(const LightTerms& terms, std::vector<GridLevel> levels) : m_terms(terms), m_levels(std::move(levels)) {}
-
-    Grid sum(std::size_t t, Grid light, Progress& progress, double work)
-    {
-        const std::size_t profile = term_profile(m_terms, t);
-        if (!m_kernels.contains(profile))
-            m_kernels.emplace(profile, MultilevelKernel(m_terms.profiles[profile].profile, m_levels));
-        return multilevel_sum(m_levels, m_kernels.at(profile).tables(term_kernel(m_terms, t)), std::move(light),
-                              progress, work);
-    }
-
-private:
-    const LightTerms& m_terms;
-    std::vector<GridLevel> m_levels;
-    std::map<std::size_t, MultilevelKernel> m_kernels;
-};
 
 // A channel's irradiance times a power of two that makes the largest value about 1, as sums over it may be counted in
 // single precision or in whole numbers.
@@ -170,14 +125,16 @@ std::vector<float> solve_adaptive(const Plane& plane, const PlaneLight& light, c
     const double distance = std::hypot(static_cast<double>(height) * pitch_y, static_cast<double>(width) * pitch_x);
     const double near = near_radius(by_angle(plane, even, medium), std::max(pitch_y, pitch_x), distance,
                                     2.0 * tolerance_share * tolerance, progress);
-    LevelSums texel_sums(terms, grid_levels(height, width, pitch_y, pitch_x, near));
+    const double tried =
+        tried_radius(terms, even, squares, wide, pitch_y, pitch_x, near, tolerance_share * tolerance, progress);
+    TermSums texel_sums(terms, grid_levels(height, width, pitch_y, pitch_x, tried));
     // The kernel of wide beams is the light that one texel spreads to all offsets, seen as coarsely.
-    LevelSums kernel_sums(terms, grid_levels(2 * height - 1, 2 * width - 1, pitch_y, pitch_x, near));
+    TermSums kernel_sums(terms, grid_levels(2 * height - 1, 2 * width - 1, pitch_y, pitch_x, near));
 
     Grid sum(height, width);
     for (std::size_t t = 0; t < count; ++t) {
         const double work = 1.0 / static_cast<double>(count);
-        Grid beams = term_light(terms, t, height, width);
+        Grid beams = term_light(terms, t);
         if (!wide.empty()) {
             Grid texel(2 * height - 1, 2 * width - 1);
             texel.row(height - 1)[width - 1] = 1.0;

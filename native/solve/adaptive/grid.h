@@ -6,8 +6,9 @@
 
 namespace beamspread {
 
-// Targets that are summed at a time.
+// Targets that are summed at a time: so many of each of so many rows, whose sums stay in registers.
 inline constexpr std::ptrdiff_t targets_at_once = 16;
+inline constexpr std::size_t rows_at_once = 4;
 
 // Values on a grid, row by row; rows are filled up with zeros to a multiple of the targets summed at a time.
 struct Grid {
@@ -25,6 +26,24 @@ struct Grid {
     }
     double* row(std::size_t y) { return values.data() + y * stride; }
     const double* row(std::size_t y) const { return values.data() + y * stride; }
+};
+
+// Some targets of a grid, in whole blocks of those that are summed at a time.
+class Targets {
+public:
+    Targets(std::size_t height, std::size_t width)
+        : m_blocks(width / targets_at_once + 1), m_has((height / rows_at_once + 1) * m_blocks)
+    {
+    }
+
+    void add(std::size_t y, std::size_t x) { m_has[block(y, x)] = 1; }
+    bool has(std::size_t y, std::size_t x) const { return m_has[block(y, x)] != 0; }
+
+private:
+    std::size_t block(std::size_t y, std::size_t x) const { return y / rows_at_once * m_blocks + x / targets_at_once; }
+
+    std::size_t m_blocks;
+    std::vector<char> m_has;
 };
 
 // Values for offsets -reach .. reach from a beam, rows upward; zeros on either side of a row for targets beyond.

@@ -103,6 +103,10 @@ MultilevelKernel::MultilevelKernel(const RadialProfile& profile, const std::vect
 
 std::vector<KernelTable> MultilevelKernel::tables(const HarmonicSum& harmonics) const
 {
+    std::vector<std::size_t> present;  // one, but for light of one direction
+    for (std::size_t m = 0; m < m_levels.front().integrals.harmonics; ++m)
+        if (harmonics.cosine[m] != 0.0 || harmonics.sine[m] != 0.0)
+            present.push_back(m);
     std::vector<KernelTable> tables;
     for (const Quadrant& level : m_levels) {
         KernelTable& table = tables.emplace_back(level.height - 1, level.width - 1);
@@ -114,7 +118,7 @@ std::vector<KernelTable> MultilevelKernel::tables(const HarmonicSum& harmonics) 
                 std::array<double, 2> cosine{};
                 std::array<double, 2> sine{};
                 const std::size_t point = i * level.width + j;
-                for (std::size_t m = 0; m < level.integrals.harmonics; ++m) {
+                for (const std::size_t m : present) {
                     const double weight = level.window[point];
                     cosine[m % 2] += weight * harmonics.cosine[m] * level.integrals.cosine[m * points + point];
                     sine[m % 2] += weight * harmonics.sine[m] * level.integrals.sine[m * points + point];

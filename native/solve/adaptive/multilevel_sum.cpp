@@ -29,26 +29,60 @@ Neighbours neighbours(bool halved, std::size_t fine)
     return {fine / 2, 4, {-1.0 / 16.0, 9.0 / 16.0, 9.0 / 16.0, -1.0 / 16.0}};
 }
 
-// Hands light to the coarse points that its place is interpolated from.
+// Hands light to the coarse points that its place is interpolated from: the transpose of cubic interpolation.
 Grid gather(const Grid& fine, const GridLevel& level, const GridLevel& coarser)
 {
     Grid coarse(coarser.height, coarser.width);
-    std::vector<double> row(coarse.width);
-    for (std::size_t y = 0; y < fine.height; ++y) {
-        std::fill(row.begin(), row.end(), 0.0);
-        for (std::size_t x = 0; x < fine.width; ++x) {
-            const Neighbours along = neighbours(level.halves_x, x);
-            for (std::size_t k = 0; k < along.count; ++k)
-                row[along.first + k] += along.weights[k] * fine.row(y)[x];
+    constexpr std::size_t margin = 8;  // zeros beside a row: a coarse point takes light from up to 5 texels away
+    parallel_for(coarse.height, [&](std::size_t coarse_y) {
+        std::vector<double> row(fine.width + 2 * margin);
+        const auto add = [&](std::size_t y, double weight) {
+            if (y < fine.height)  // neither beyond nor, wrapped around, before
+                add_scaled(row.data() + margin, fine.row(y), weight, fine.width);
+        };
+        if (level.halves_y) {
+            add(2 * coarse_y - 2, 1.0);
+            for (const std::size_t y : {2 * coarse_y - 3, 2 * coarse_y - 1})
+                add(y, 9.0 / 16.0);
+            for (const std::size_t y : {2 * coarse_y - 5, 2 * coarse_y + 1})
+                add(y, -1.0 / 16.0);
+        } else {
+            add(coarse_y, 1.0);
         }
+        double* to = coarse.row(coarse_y);
+        const double* from = row.data() + margin;
+        if (!level.halves_x) {
+            std::copy_n(from, coarse.width, to);
+            return;
+        }
+        for (std::size_t x = 0; x < coarse.width; ++x) {
+            const double* at = from + 2 * static_cast<std::ptrdiff_t>(x) - 2;
+            to[x] = at[0] + 9.0 / 16.0 * (at[-1] + at[1]) - 1.0 / 16.0 * (at[-3] + at[3]);
+        }
+    });
+    return coarse;
+}
+
+// The coarse targets that fine ones are interpolated from.
+Targets coarser_targets(const Targets& fine, const GridLevel& level, const GridLevel& coarser)
+{
+    Targets coarse(coarser.height, coarser.width);
+    for (std::size_t y = 0; y < level.height; ++y) {
         const Neighbours across = neighbours(level.halves_y, y);
-        for (std::size_t k = 0; k < across.count; ++k)
-            add_scaled(coarse.row(across.first + k), row.data(), across.weights[k], row.size());
+        for (std::size_t x = 0; x < level.width; ++x) {
+            if (!fine.has(y, x))
+                continue;
+            const Neighbours along = neighbours(level.halves_x, x);
+            for (std::size_t k = 0; k < across.count; ++k) {
+                coarse.add(across.first + k, along.first);
+                coarse.add(across.first + k, along.first + along.count - 1);
+            }
+        }
     }
     return coarse;
 }
 
-void add_interpolated(Grid& fine, const Grid& coarse, const GridLevel& level)
+void add_interpolated(Grid& fine, const Grid& coarse, const GridLevel& level, const Targets* only)
 {
     parallel_for(fine.height, [&](std::size_t y) {
         std::vector<double> row(coarse.width);
@@ -56,6 +90,8 @@ void add_interpolated(Grid& fine, const Grid& coarse, const GridLevel& level)
         for (std::size_t k = 0; k < across.count; ++k)
             add_scaled(row.data(), coarse.row(across.first + k), across.weights[k], row.size());
         for (std::size_t x = 0; x < fine.width; ++x) {
+            if (only != nullptr && !only->has(y, x))
+                continue;
             const Neighbours along = neighbours(level.halves_x, x);
             for (std::size_t k = 0; k < along.count; ++k)
                 fine.row(y)[x] += along.weights[k] * row[along.first + k];
@@ -63,81 +99,125 @@ void add_interpolated(Grid& fine, const Grid& coarse, const GridLevel& level)
     });
 }
 
+// Light of a column of `rows_at_once` texels.
 struct Source {
     std::ptrdiff_t x;
-    double light;
+    std::array<double, rows_at_once> light;
 };
 
-// Sources other than zero of each row, from left to right, and one that is never reached.
+// Sources other than zero of the rows from each row on, from left to right, and one that is never reached; first those
+// that begin before the grid.
 std::vector<std::vector<Source>> source_rows(const Grid& light)
 {
-    std::vector<std::vector<Source>> rows(light.height);
-    for (std::size_t y = 0; y < light.height; ++y) {
-        for (std::size_t x = 0; x < light.width; ++x)
-            if (light.row(y)[x] != 0.0)
-                rows[y].push_back({static_cast<std::ptrdiff_t>(x), light.row(y)[x]});
-        rows[y].push_back({std::numeric_limits<std::ptrdiff_t>::max(), 0.0});
-    }
+    std::vector<std::vector<Source>> rows(light.height + rows_at_once - 1);
+    parallel_for(rows.size(), [&](std::size_t first) {
+        for (std::size_t x = 0; x < light.width; ++x) {
+            Source source{static_cast<std::ptrdiff_t>(x), {}};
+            bool lit = false;
+            for (std::size_t i = 0; i < rows_at_once; ++i)
+                if (const std::size_t y = first + i + 1 - rows_at_once; y < light.height) {
+                    source.light[i] = light.row(y)[x];
+                    lit |= source.light[i] != 0.0;
+                }
+            if (lit)
+                rows[first].push_back(source);
+        }
+        rows[first].push_back({std::numeric_limits<std::ptrdiff_t>::max(), {}});
+    });
     return rows;
 }
 
 using Lanes = double __attribute__((vector_size(64), aligned(8), may_alias));
 static_assert(2 * sizeof(Lanes) == targets_at_once * sizeof(double));
 
-// Adds the sources of one row up to column `last` to the targets from column x on; the kernel's row at dx = 0.
-BEAMSPREAD_CLONES void add_sources(double* sum, std::ptrdiff_t x, const Source* source, std::ptrdiff_t last,
+// Adds sources up to column `last` to the targets from column x on, each row's to the row of targets as far below or
+// above; the kernel's row at dx = 0.
+BEAMSPREAD_CLONES void add_sources(double* const* sums, std::ptrdiff_t x, const Source* source, std::ptrdiff_t last,
                                    const double* kernel)
 {
-    auto* to = reinterpret_cast<Lanes*>(sum);
-    Lanes left = to[0];
-    Lanes right = to[1];
+    static_assert(rows_at_once == 4);
+    auto* to0 = reinterpret_cast<Lanes*>(sums[0] + x);
+    auto* to1 = reinterpret_cast<Lanes*>(sums[1] + x);
+    auto* to2 = reinterpret_cast<Lanes*>(sums[2] + x);
+    auto* to3 = reinterpret_cast<Lanes*>(sums[3] + x);
+    Lanes left0 = to0[0], right0 = to0[1];
+    Lanes left1 = to1[0], right1 = to1[1];
+    Lanes left2 = to2[0], right2 = to2[1];
+    Lanes left3 = to3[0], right3 = to3[1];
     for (; source->x <= last; ++source) {
         const auto* values = reinterpret_cast<const Lanes*>(kernel + (x - source->x));
-        left += source->light * values[0];
-        right += source->light * values[1];
+        const Lanes left = values[0];
+        const Lanes right = values[1];
+        left0 += source->light[0] * left;
+        right0 += source->light[0] * right;
+        left1 += source->light[1] * left;
+        right1 += source->light[1] * right;
+        left2 += source->light[2] * left;
+        right2 += source->light[2] * right;
+        left3 += source->light[3] * left;
+        right3 += source->light[3] * right;
     }
-    to[0] = left;
-    to[1] = right;
+    to0[0] = left0;
+    to0[1] = right0;
+    to1[0] = left1;
+    to1[1] = right1;
+    to2[0] = left2;
+    to2[1] = right2;
+    to3[0] = left3;
+    to3[1] = right3;
 }
 
 }  // namespace
 
-void add_pairs(Grid& sum, const Grid& light, const KernelTable& kernel, Progress& progress, double work)
+void add_pairs(Grid& sum, const Grid& light, const KernelTable& kernel, Progress& progress, double work,
+               const Targets* only)
 {
     const std::vector<std::vector<Source>> sources = source_rows(light);
     const auto width = static_cast<std::ptrdiff_t>(sum.width);
-    parallel_for(sum.height, [&](std::size_t target) {
-        const auto y = static_cast<std::ptrdiff_t>(target);
-        const std::ptrdiff_t first = std::max<std::ptrdiff_t>(0, y - kernel.reach_y());
+    const std::size_t groups = (sum.height + rows_at_once - 1) / rows_at_once;
+    parallel_for(groups, [&](std::size_t group) {
+        std::array<double*, rows_at_once> rows{};
+        std::vector<double> beyond(sum.stride);  // rows that the grid does not have
+        for (std::size_t i = 0; i < rows_at_once; ++i)
+            rows[i] = group * rows_at_once + i < sum.height ? sum.row(group * rows_at_once + i) : beyond.data();
+        const auto y = static_cast<std::ptrdiff_t>(group * rows_at_once);
+        const auto before = static_cast<std::ptrdiff_t>(rows_at_once) - 1;
+        const std::ptrdiff_t first = std::max(-before, y - kernel.reach_y());
         const std::ptrdiff_t end = std::min(static_cast<std::ptrdiff_t>(light.height), y + kernel.reach_y() + 1);
         for (std::ptrdiff_t source_y = first; source_y < end; ++source_y) {
-            const Source* source = sources[static_cast<std::size_t>(source_y)].data();
+            const Source* source = sources[static_cast<std::size_t>(source_y + before)].data();
             const double* row = kernel.row(y - source_y);
             std::ptrdiff_t reach = kernel.reach_x();
             while (reach > 0 && row[reach] == 0.0 && row[-reach] == 0.0)
                 --reach;
             for (std::ptrdiff_t x = 0; x < width; x += targets_at_once) {
+                if (only != nullptr && !only->has(group * rows_at_once, static_cast<std::size_t>(x)))
+                    continue;
                 while (source->x < x - reach)
                     ++source;
-                add_sources(sum.row(target) + x, x, source, x + targets_at_once - 1 + reach, row);
+                add_sources(rows.data(), x, source, x + targets_at_once - 1 + reach, row);
             }
         }
-        progress.advance(work / static_cast<double>(sum.height));
+        progress.advance(work / static_cast<double>(groups));
     });
 }
 
 Grid multilevel_sum(const std::vector<GridLevel>& levels, const std::vector<KernelTable>& kernels, Grid light,
-                    Progress& progress, double work)
+                    Progress& progress, double work, const Targets* only)
 {
     std::vector<Grid> sums;
+    std::vector<Targets> targets;  // of each level, if not all
     for (std::size_t k = 0; k < levels.size(); ++k) {
         if (k > 0)
             light = gather(light, levels[k - 1], levels[k]);
+        if (only != nullptr)
+            targets.push_back(k == 0 ? *only : coarser_targets(targets.back(), levels[k - 1], levels[k]));
         // Nearly all the work is on the finest grid.
-        add_pairs(sums.emplace_back(light.height, light.width), light, kernels[k], progress, k == 0 ? work : 0.0);
+        add_pairs(sums.emplace_back(light.height, light.width), light, kernels[k], progress, k == 0 ? work : 0.0,
+                  only != nullptr ? &targets[k] : nullptr);
     }
     for (std::size_t k = levels.size() - 1; k-- > 0;)
-        add_interpolated(sums[k], sums[k + 1], levels[k]);
+        add_interpolated(sums[k], sums[k + 1], levels[k], only != nullptr ? &targets[k] : nullptr);
     return std::move(sums.front());
 }
 

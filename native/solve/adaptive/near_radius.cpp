@@ -63,9 +63,6 @@ double interpolation_error(const RadialProfile& profile, const Vec2& axis, doubl
 double near_radius(const std::vector<AngleLight>& lights, double pitch, double distance, double allowed,
                    Progress& progress)
 {
-    // Below, the window's own shape is too much for the interpolation. Errors with 4 and 16 differ by
-    // no more than 2e-5 of the light, the time by 10 %.
-    constexpr double least = 8.0;
     double power = 0.0;
     for (const AngleLight& light : lights)
         power += light.power * 2.0 * pi * light.profile.cumulative(distance)[0];
@@ -85,7 +82,7 @@ double near_radius(const std::vector<AngleLight>& lights, double pitch, double d
     };
     // The work is as the square: 1.1 and 1.44 change it by about 10 %, errors by less than 3e-5 of the light.
     constexpr double finer = 1.2;
-    double near = least;
+    double near = least_near_radius;
     while (largest(near) > allowed * std::max(power, 0.0))
         near *= finer;
     return near;

@@ -8,6 +8,10 @@
 
 namespace beamspread {
 
+// Below, in points of a grid, the window's own shape is too much for the interpolation. Errors with 4 and 16 differ by
+// no more than 2e-5 of the light, the time by 10 %.
+inline constexpr double least_near_radius = 8.0;
+
 // Beams of about one angle.
 struct AngleLight {
     RadialProfile profile;

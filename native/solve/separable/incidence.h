@@ -21,6 +21,8 @@ struct Incidence {
         float greatest = 0.0f;
     };
 
+    // Half as many ask for 3 % fewer to 10 % more terms, twice as many for 3 % fewer or more; errors are no larger with
+    // either.
     static constexpr std::size_t count = 64;
     double first = 1.0;  // beyond `last`: nothing is lit
     double last = 0.0;

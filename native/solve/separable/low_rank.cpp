@@ -15,10 +15,15 @@ namespace beamspread {
 namespace {
 
 constexpr std::size_t angle_count = Incidence::count;
-constexpr double least_gain = 1e-14;  // that is not rounding
+// Of a term, relative to the squared light, that is not rounding; at a tolerance of 1e-3 a hundred times as much
+// gives the same.
+constexpr double least_gain = 1e-14;
+
+// Steps of u(theta), linear in between: a quarter of them leaves the worst texel the same within 2 %.
 constexpr std::size_t table_steps = 4096;
 
-// Errors of m = 0 count so many times: under even light they add up, while those of the other harmonics cancel.
+// Errors of m = 0 count so many times: under even light they add up, while those of the other harmonics cancel. Where
+// the radiance itself is not looked at; `adaptive` is off by as much with 1 to 6, within 2 %.
 constexpr double power_weight = 3.0;
 
 using Matrix = Eigen::MatrixXd;
@@ -122,6 +127,7 @@ AngularMedium describe(const ChannelMedium& of, const Incidence& incidence, cons
     for (std::size_t j = 0; j < nodes; ++j) {
         const Matrix bins = bins_of(medium.nodes[j]);
         for (Eigen::Index k = 0; k < bins.cols(); ++k) {
+            // What is left is rounding; 1e-8 of the power leaves no greater errors.
             if (mean_bins(0, k) <= 1e-12 * power)
                 continue;
             for (std::size_t m = 0; m < harmonic_count; ++m) {

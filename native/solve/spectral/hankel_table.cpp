@@ -14,13 +14,19 @@ namespace beamspread {
 
 namespace {
 
-// Samples of projections: evenly near the window, then in proportion to the distance.
-constexpr double even_step = 0.25;
+// Samples of the transform: twice as fine as texels, whose frequencies the table holds. At half of it errors are the same;
+// at twice, the table would end at Nyquist.
+constexpr double sample_step = 0.5;
+
+// Projections are integrated at the samples near the window: 16 and 64 leave the same errors, in the same time. Farther
+// away in proportion to the distance: half the growth brings the worst error of a slab's images from 1.6e-4 of the
+// brightest texel to 1.2e-5, for suns in up to 7 % more time, twice the growth leaves 1.4e-3; without images the
+// error is 2e-6 with all three.
 constexpr double even_until = 32.0;
 constexpr double growth = 1.012;
-constexpr double sample_step = 0.5;  // of the transform: twice as fine as texels
 
-// Across a panel the last harmonic turns by no more than this, which four points integrate to some 5e-6.
+// Across a panel the last harmonic turns by no more than this, which four points integrate to some 5e-6. With half of it
+// and twice, the worst texel is the same, in 3 % more and less time.
 constexpr double panel_turn = pi;
 
 // Weights of four neighbours at t in [0, 1] between the second and the third (Lagrange).
@@ -36,8 +42,8 @@ std::array<double, 4> cubic_weights(double t)
 std::vector<double> sample_positions(double end)
 {
     std::vector<double> positions;
-    for (int i = 0; i * even_step < even_until; ++i)
-        positions.push_back(i * even_step);
+    for (int i = 0; i * sample_step < even_until; ++i)
+        positions.push_back(i * sample_step);
     for (int i = 0; positions.back() < std::max(end, 1.1 * even_until) * growth; ++i)
         positions.push_back(even_until * std::pow(growth, i));
     return positions;
@@ -60,6 +66,7 @@ std::vector<double> panel_breaks(const RadialWindow& window, double to_paths)
     }
     for (int i = 1; 0.5 * i * window.outer < end && window.outer > 0.0; ++i)
         breaks.push_back(0.5 * i * window.outer);
+    // Of the taper: 4 and 16 panels give the same.
     for (int i = 0; i < 8 && window.taper > 0.0; ++i)
         breaks.push_back(window.cut + window.taper * i / 8.0);
     breaks.push_back(end);
@@ -118,7 +125,8 @@ HankelTable::HankelTable(const std::vector<ScaledProfile>& profiles, const Radia
 {
     const std::size_t samples = static_cast<std::size_t>(std::ceil(window.end() / sample_step)) + 1;
     // Neighbours in the table are within 0.2 radians of each other's phase, where kernels are long 0.4: that table
-    // would leave the cache, and such kernels hold little power at their ends.
+    // would leave the cache, and such kernels hold little power at their ends. Half the length has 4e-6 of the
+    // brightest texel for 2e-6, twice the same.
     const std::size_t length = fast_even_size((samples <= 2048 ? 32 : 16) * samples);
     m_k_step = 2.0 * pi / (static_cast<double>(length) * sample_step);
     m_column.assign(profiles.size() * harmonic_count, no_column);
@@ -149,10 +157,10 @@ void HankelTable::add_profile(const ScaledProfile& scaled, std::size_t index, co
     });
 
     const double log_growth = std::log(growth);
-    const auto even_count = static_cast<std::size_t>(even_until / even_step);
+    const auto even_count = static_cast<std::size_t>(even_until / sample_step);
     const auto projection = [&](double x, std::size_t m) {
         if (x < even_until)
-            return projections[static_cast<std::size_t>(std::lround(x / even_step))][m];
+            return projections[static_cast<std::size_t>(std::lround(x / sample_step))][m];
         const double place = std::log(x / even_until) / log_growth;
         const auto i = std::clamp<std::size_t>(static_cast<std::size_t>(place), 1, positions.size() - even_count - 3);
         const auto w = cubic_weights(place - static_cast<double>(i));
