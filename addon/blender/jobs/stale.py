@@ -84,7 +84,8 @@ def _record(target: Target) -> Record | None:
 def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
     if is_sequence(_image(target)):
         first, last, *_ = _image(target)[FRAMES]
-        return Row(target, Standing.BAKED, (f"Shows the frames {first} to {last} of a batch; what has changed since is not known.",))
+        why = f"Shows the frames {first} to {last} of a batch; what has changed since is not known."
+        return Row(target, Standing.BAKED, (why,))
     changed = [] if record is None or now is None else record.changed(now)
     if record is not None and not record.is_dirty and _is_painted(_image(target)):
         changed.append("pixels of the image")
