@@ -92,11 +92,11 @@ private:
             const auto lease = m_scratch.lend();
             std::vector<Vec3f>& covered = *lease;
             covered.resize(row.width);
-            const float* coverage = m_coverage + row.y * row.width;
-            for (std::size_t x = 0; x < row.width; ++x)
-                covered[x] = coverage[x] * row.irradiance[x];
+            const float* coverage = m_coverage + row.y * m_field.problem().plane.width + row.x;
+            for (std::size_t i = 0; i < row.width; ++i)
+                covered[i] = coverage[i] * row.irradiance[i];
             static_assert(sizeof(Vec3f) == 3 * sizeof(float));
-            m_field.add({row.y, row.width, &row.travel->x, &covered.front().x}, m_color, m_is_colored);
+            m_field.add({row.y, row.x, row.width, &row.travel->x, &covered.front().x}, m_color, m_is_colored);
         }
 
     private:

@@ -42,12 +42,12 @@ public:
 
     void add(const RayRow& row) override
     {
-        Vec3f* const irradiance = m_irradiance.row(row.y);
-        Vec3f* const flow = m_flow.row(row.y);
-        for (std::size_t x = 0; x < row.width; ++x) {
-            const Vec3f& light = row.irradiance[x];
-            irradiance[x] += light;
-            flow[x] += (light.x + light.y + light.z) / 3.0f * row.travel[x];
+        Vec3f* const irradiance = m_irradiance.row(row.y) + row.x;
+        Vec3f* const flow = m_flow.row(row.y) + row.x;
+        for (std::size_t i = 0; i < row.width; ++i) {
+            const Vec3f& light = row.irradiance[i];
+            irradiance[i] += light;
+            flow[i] += (light.x + light.y + light.z) / 3.0f * row.travel[i];
         }
     }
 
@@ -60,7 +60,7 @@ private:
 // Keeps each ray of a texel.
 class Layers final : public RaySink {
 public:
-    Layers(const ReceiverGrid& grid, int rays) : m_next(grid.height)
+    Layers(const ReceiverGrid& grid, int rays)
     {
         for (int i = 0; i < rays; ++i)
             m_layers.emplace_back(Field(grid), Field(grid));
@@ -68,9 +68,9 @@ public:
 
     void add(const RayRow& row) override
     {
-        const auto& [irradiance, direction] = m_layers[m_next[row.y]++];
-        std::copy_n(row.irradiance, row.width, irradiance.row(row.y));
-        std::copy_n(row.travel, row.width, direction.row(row.y));
+        const auto& [irradiance, direction] = m_layers[row.ray];
+        std::copy_n(row.irradiance, row.width, irradiance.row(row.y) + row.x);
+        std::copy_n(row.travel, row.width, direction.row(row.y) + row.x);
     }
 
     py::object result() const
@@ -83,7 +83,6 @@ public:
 
 private:
     std::vector<std::pair<Field, Field>> m_layers;
-    std::vector<std::size_t> m_next;  // ray of each row
 };
 
 void check_rays(int rays)

@@ -1,9 +1,14 @@
 #include "scene/environment_light.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "base/constants.h"
 #include "base/error.h"
@@ -33,15 +38,60 @@ struct Lines {
     }
 };
 
-// A place among cumulated chances, and the part of the way through it that `at` leaves.
-std::size_t find(std::span<const double> cumulated, double at, double& part)
-{
-    const double wanted = at * cumulated.back();
-    const auto above = std::upper_bound(cumulated.begin() + 1, cumulated.end() - 1, wanted);
-    const auto index = static_cast<std::size_t>(above - cumulated.begin()) - 1;
-    part = std::clamp((wanted - cumulated[index]) / (cumulated[index + 1] - cumulated[index]), 0.0, 1.0);
-    return index;
-}
+// Cumulated chances, and where among them every so manieth part of all begins: what lies between is found by a short
+// search (Chen and Asau 1974, "On generating random variates from an empirical distribution").
+class Chances {
+public:
+    Chances() = default;
+
+    // `cumulated` begins with 0, and stays where it is.
+    explicit Chances(std::span<const double> cumulated)
+        : m_cumulated(cumulated), m_guide(std::bit_ceil(cumulated.size() / cells_per_part + 1) + 1)
+    {
+        const std::size_t parts = m_guide.size() - 1;
+        for (std::size_t k = 0; k <= parts; ++k)
+            m_guide[k] = search(cumulated.back() * (static_cast<double>(k) / static_cast<double>(parts)), 0,
+                                cumulated.size() - 2);
+    }
+
+    // A place, and the part of the way through it that `at` leaves.
+    std::size_t find(double at, double& part) const
+    {
+        const std::size_t k = part_of(at);
+        const double wanted = at * m_cumulated.back();
+        const std::size_t index = search(wanted, m_guide[k], m_guide[k + 1]);
+        part = std::clamp((wanted - m_cumulated[index]) / (m_cumulated[index + 1] - m_cumulated[index]), 0.0, 1.0);
+        return index;
+    }
+
+    // Has the memory on its way that `fetch` looks at, and that which `find` does.
+    void fetch_guide(double at) const { __builtin_prefetch(&m_guide[part_of(at)]); }
+    void fetch(double at) const { __builtin_prefetch(&m_cumulated[m_guide[part_of(at)] + 1]); }
+
+    // Of a place, in the unit of `cumulated`.
+    double of(std::size_t index) const { return m_cumulated[index + 1] - m_cumulated[index]; }
+
+private:
+    static constexpr std::size_t cells_per_part = 4;
+
+    // Parts are a power of two, so that their borders are exact.
+    std::size_t part_of(double at) const
+    {
+        return static_cast<std::size_t>(at * static_cast<double>(m_guide.size() - 1));
+    }
+
+    // The place in [first, last] that a value lies in.
+    std::uint32_t search(double wanted, std::size_t first, std::size_t last) const
+    {
+        const auto begin = m_cumulated.begin() + 1;
+        const auto above = std::upper_bound(begin + static_cast<std::ptrdiff_t>(first),
+                                            begin + static_cast<std::ptrdiff_t>(last), wanted);
+        return static_cast<std::uint32_t>(above - begin);
+    }
+
+    std::span<const double> m_cumulated;
+    std::vector<std::uint32_t> m_guide;
+};
 
 // An environment whose cells are chosen with chances proportional to their light on a plane.
 class FacingEnvironment final : public ExtendedLight {
@@ -54,7 +104,8 @@ public:
           m_columns(m_width, pi, -pi),
           m_rows(m_height, -0.5 * pi, 0.5 * pi),
           m_cumulated(m_height * (m_width + 1)),
-          m_cumulated_rows(m_height + 1)
+          m_cumulated_rows(m_height + 1),
+          m_sagitta(2.0 * std::pow(std::sin(pi / static_cast<double>(m_width)), 2))
     {
         std::vector<Vec3> sums(m_height);
         parallel_for(m_height, [&](std::size_t y) { sums[y] = add_up(y); });
@@ -62,29 +113,22 @@ public:
             m_irradiance += sums[y];
             m_cumulated_rows[y + 1] = m_cumulated_rows[y] + m_cumulated[(y + 1) * (m_width + 1) - 1];
         }
+        m_chance.reserve(m_height);
+        for (std::size_t y = 0; y < m_height; ++y)
+            m_chance.emplace_back(std::span(m_cumulated).subspan(y * (m_width + 1), m_width + 1));
+        m_row_chance = Chances(m_cumulated_rows);
     }
 
     void sample(const Vec3& /*point*/, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const override
     {
-        const double total = m_cumulated_rows.back();
-        for (const Vec2& place : square) {
-            LightRay& ray = *rays++;
-            ray = {.travel = -normal, .distance = std::numeric_limits<double>::infinity(), .flux = Vec3f(0.0f)};
-            if (!(total > 0.0))
-                continue;
-            double part_x = 0.0;
-            double part_y = 0.0;
-            const std::size_t y = find(m_cumulated_rows, place.y, part_y);
-            const std::span<const double> row = cumulated(y);
-            const std::size_t x = find(row, place.x, part_x);
-            const double chance = (row[x + 1] - row[x]) / total;
-            const double sine = std::lerp(m_rows.sine[y], m_rows.sine[y + 1], part_y);
-            const double cosine = std::sqrt(std::max(1.0 - sine * sine, 0.0));
-            const double azimuth = std::lerp(m_columns.angle[x], m_columns.angle[x + 1], part_x);
-            const Vec3 direction(cosine * std::cos(azimuth), cosine * std::sin(azimuth), sine);
-            ray.travel = -glm::normalize(m_map.to_world * direction);
-            ray.flux = m_map.of_cell(x, y) * static_cast<float>(solid_angle(y) / chance);
+        if (!(m_cumulated_rows.back() > 0.0)) {
+            std::fill_n(
+                rays, square.size(),
+                LightRay{.travel = -normal, .distance = std::numeric_limits<double>::infinity(), .flux = Vec3f(0.0f)});
+            return;
         }
+        for (std::size_t first = 0; first < square.size(); first += at_once)
+            sample_some(square.subspan(first, std::min(at_once, square.size() - first)), rays + first);
     }
 
     Vec3 irradiance(const Vec3& /*point*/, const Vec3& /*normal*/) const override { return m_irradiance; }
@@ -92,10 +136,47 @@ public:
     bool is_far() const override { return true; }
 
 private:
-    std::span<const double> cumulated(std::size_t y) const
+    // Rays at once: what one needs is far from what the next one needs, and is asked for some steps ahead.
+    static constexpr std::size_t at_once = 16;
+
+    void sample_some(std::span<const Vec2> square, LightRay* rays) const
     {
-        return std::span(m_cumulated).subspan(y * (m_width + 1), m_width + 1);
+        const double total = m_cumulated_rows.back();
+        std::array<std::size_t, at_once> columns;
+        std::array<std::size_t, at_once> rows;
+        std::array<double, at_once> parts_x;
+        std::array<double, at_once> parts_y;
+        for (std::size_t i = 0; i < square.size(); ++i) {
+            rows[i] = m_row_chance.find(square[i].y, parts_y[i]);
+            m_chance[rows[i]].fetch_guide(square[i].x);
+        }
+        for (std::size_t i = 0; i < square.size(); ++i)
+            m_chance[rows[i]].fetch(square[i].x);
+        for (std::size_t i = 0; i < square.size(); ++i) {
+            columns[i] = m_chance[rows[i]].find(square[i].x, parts_x[i]);
+            __builtin_prefetch(&m_map.of_cell(columns[i], rows[i]));
+        }
+        for (std::size_t i = 0; i < square.size(); ++i) {
+            const std::size_t x = columns[i];
+            const std::size_t y = rows[i];
+            const double part_x = parts_x[i];
+            const double part_y = parts_y[i];
+            LightRay& ray = rays[i];
+            ray.distance = std::numeric_limits<double>::infinity();
+            const double chance = m_chance[y].of(x) / total;
+            const double sine = std::lerp(m_rows.sine[y], m_rows.sine[y + 1], part_y);
+            // Along the chord of the cell's azimuths in place of the arc, and out to the arc: for cells of at most
+            // 2 pi / min_cells wide within 3e-7.
+            const double cosine = std::sqrt(std::max(1.0 - sine * sine, 0.0)) * arc_over_chord(part_x);
+            const Vec3 direction(cosine * std::lerp(m_columns.cosine[x], m_columns.cosine[x + 1], part_x),
+                                 cosine * std::lerp(m_columns.sine[x], m_columns.sine[x + 1], part_x), sine);
+            ray.travel = -glm::normalize(m_map.to_world * direction);
+            ray.flux = m_map.of_cell(x, y) * static_cast<float>(solid_angle(y) / chance);
+        }
     }
+
+    // The chord of an arc of the width w is sqrt(1 - 4 t (1 - t) sin^2(w / 2)) out, to first order in the square.
+    double arc_over_chord(double t) const { return 1.0 + m_sagitta * t * (1.0 - t); }
 
     double solid_angle(std::size_t y) const
     {
@@ -157,6 +238,9 @@ private:
     Lines m_columns, m_rows;
     std::vector<double> m_cumulated;  // of each row, one more than cells
     std::vector<double> m_cumulated_rows;
+    std::vector<Chances> m_chance;  // [row]
+    Chances m_row_chance;
+    double m_sagitta;
     Vec3 m_irradiance{0.0};
 };
 

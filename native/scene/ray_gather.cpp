@@ -22,7 +22,8 @@ namespace beamspread {
 
 namespace {
 
-// More rays of a row than that are not kept at once: 50 MB of each thread for 8192 texels.
+// Texels of a row, and rays of each, that are kept at once: 400 kB, for the processor's cache.
+constexpr std::size_t texels_at_once = 64;
 constexpr std::size_t max_rays_at_once = 256;
 
 // What the rays of a texel met.
@@ -32,7 +33,8 @@ enum Met : std::uint8_t { nothing = 0, light = 1, obstacle = 2, both = light | o
 // reaches stay dark, 1e-5 of its light, with twice as many none as with these. And how far: a lattice of four dimensions (Roberts 2018, "The
 // unreasonable effectiveness of quasirandom sequences").
 constexpr int max_trials = 64;
-constexpr GridSobol::Point steps = {0.8566748838545029, 0.7338918566271259, 0.6287067210378086, 0.5385972572236101};
+constexpr Vec2 step_on_light(0.8566748838545029, 0.7338918566271259);
+constexpr Vec2 step_in_texel(0.6287067210378086, 0.5385972572236101);
 
 // One light's rays on one grid.
 class RayGatherer {
@@ -43,6 +45,7 @@ public:
           m_prepared(light.facing(grid.normal)),
           m_light(m_prepared ? *m_prepared : light),
           m_open(grid, m_light),
+          m_is_far(m_light.is_far()),
           m_occluders(occluders),
           m_rays(static_cast<std::size_t>(settings.rays)),
           m_even_rays(occluders ? std::min(static_cast<std::size_t>(settings.even_rays), m_rays) : 0),
@@ -62,11 +65,14 @@ public:
     {
         const auto lease = m_rows.lend();
         Rays& rays = *lease;
-        rays.start(m_even_rays, m_grid.width);
-        for (std::size_t x = 0; x < m_grid.width; ++x)
-            gather_texel(x, y, {m_even_sobol, 0, m_even_rays, m_even_rays, true}, rays);
-        trace(rays);
-        std::copy(rays.met.begin(), rays.met.end(), met_in(y));
+        for (std::size_t x = 0; x < m_grid.width; x += texels_at_once) {
+            const Span span{y, x, std::min(texels_at_once, m_grid.width - x)};
+            rays.start(m_even_rays, span);
+            for (std::size_t i = 0; i < span.width; ++i)
+                gather_texel(i, {m_even_sobol, 0, m_even_rays, m_even_rays, true}, rays);
+            trace(rays);
+            std::copy(rays.met.begin(), rays.met.end(), met_in(y) + static_cast<std::ptrdiff_t>(x));
+        }
     }
 
     void gather_row(std::size_t y, RaySink& sink)
@@ -76,35 +82,83 @@ public:
         rays.met_around.assign(m_grid.width, Met::both);
         if (takes_a_look())
             look_around(y, rays.met_around);
-        const bool is_even =
-            std::find(rays.met_around.begin(), rays.met_around.end(), Met::both) == rays.met_around.end();
-        const std::size_t most = is_even ? m_even_rays : m_rays;
-        for (std::size_t first = 0; first < most; first += max_rays_at_once)
-            gather_some(y, first, std::min(most - first, max_rays_at_once), rays, sink);
+        for (std::size_t x = 0; x < m_grid.width; x += texels_at_once) {
+            const Span span{y, x, std::min(texels_at_once, m_grid.width - x)};
+            const auto begin = rays.met_around.begin() + static_cast<std::ptrdiff_t>(x);
+            const auto end = begin + static_cast<std::ptrdiff_t>(span.width);
+            const std::size_t most = std::find(begin, end, Met::both) == end ? m_even_rays : m_rays;
+            for (std::size_t first = 0; first < most; first += max_rays_at_once)
+                gather_some(span, first, std::min(most - first, max_rays_at_once), rays, sink);
+        }
     }
 
 private:
-    // Of one row; the last four of one texel.
+    // Part of a row of texels.
+    struct Span {
+        std::size_t y;
+        std::size_t x;
+        std::size_t width;
+    };
+
+    // Of a span; the last six of one texel.
     struct Rays {
+        Span span{};
         std::vector<Vec3f> travel, irradiance;  // [ray * width + texel]
-        std::vector<std::uint8_t> met, met_around;  // [texel] by its own rays, and by those around it
+        std::vector<std::uint8_t> met;  // [texel]
+        std::vector<std::uint8_t> met_around;  // [texel of the row] by its own rays and those around it
         // A packet that is being filled, and what its rays carry.
         std::array<ShadowRay, Occluders::packet_size> packet;
         std::array<std::size_t, Occluders::packet_size> carried;
         std::size_t waiting = 0;
-        std::vector<GridSobol::Point> places;
+        std::vector<Vec2> on_light, in_texel, unsorted;
         std::vector<Vec3> points, weights;
         std::vector<LightRay> found;
 
-        void start(std::size_t count, std::size_t width)
+        void start(std::size_t count, const Span& of)
         {
-            travel.assign(count * width, Vec3f(0.0f, 0.0f, -1.0f));
-            irradiance.assign(count * width, Vec3f(0.0f));
-            met.assign(width, Met::nothing);
-            places.resize(count);
+            span = of;
+            travel.assign(count * span.width, Vec3f(0.0f, 0.0f, -1.0f));
+            irradiance.assign(count * span.width, Vec3f(0.0f));
+            met.assign(span.width, Met::nothing);
+            resize(count);
+        }
+
+        void resize(std::size_t count)
+        {
+            on_light.resize(count);
+            in_texel.resize(count);
             points.resize(count);
             weights.resize(count);
             found.resize(count);
+        }
+
+        // Brings together rays towards the same part of the light: a packet of such meets the same triangles.
+        void sort()
+        {
+            constexpr std::size_t side = 8;
+            constexpr std::array<std::uint8_t, side> spread = {0, 1, 4, 5, 16, 17, 20, 21};
+            const auto part = [&](std::size_t i) {
+                const auto x = static_cast<std::size_t>(on_light[i].x * side);
+                const auto y = static_cast<std::size_t>(on_light[i].y * side);
+                return static_cast<std::size_t>(spread[x] + 2 * spread[y]);  // along a Morton curve
+            };
+            if (on_light.size() < 2 * Occluders::packet_size)
+                return;
+            std::array<std::size_t, side * side + 1> end{};
+            for (std::size_t i = 0; i < on_light.size(); ++i)
+                ++end[part(i) + 1];
+            for (std::size_t i = 1; i < end.size(); ++i)
+                end[i] += end[i - 1];
+            unsorted.resize(2 * on_light.size());
+            for (std::size_t i = 0; i < on_light.size(); ++i) {
+                const std::size_t to = end[part(i)]++;
+                unsorted[2 * to] = on_light[i];
+                unsorted[2 * to + 1] = in_texel[i];
+            }
+            for (std::size_t i = 0; i < on_light.size(); ++i) {
+                on_light[i] = unsorted[2 * i];
+                in_texel[i] = unsorted[2 * i + 1];
+            }
         }
     };
 
@@ -135,39 +189,47 @@ private:
         }
     }
 
-    void gather_some(std::size_t y, std::size_t first, std::size_t count, Rays& rays, RaySink& sink) const
+    void gather_some(const Span& span, std::size_t first, std::size_t count, Rays& rays, RaySink& sink) const
     {
-        rays.start(count, m_grid.width);
-        for (std::size_t x = 0; x < m_grid.width; ++x) {
-            const std::uint8_t around = rays.met_around[x];
+        rays.start(count, span);
+        for (std::size_t i = 0; i < span.width; ++i) {
+            const std::uint8_t around = rays.met_around[span.x + i];
             if (around == Met::both)
-                gather_texel(x, y, {m_sobol, first, count, m_rays, m_occluders != nullptr}, rays);
+                gather_texel(i, {m_sobol, first, count, m_rays, m_occluders != nullptr}, rays);
             else if (around == Met::light && first < m_even_rays)
-                gather_texel(x, y, {m_even_sobol, first, std::min(count, m_even_rays - first), m_even_rays, false},
-                             rays);
+                gather_texel(i, {m_even_sobol, first, std::min(count, m_even_rays - first), m_even_rays, false}, rays);
         }
         trace(rays);
         for (std::size_t i = 0; i < count; ++i) {
-            const std::size_t begin = i * m_grid.width;
-            sink.add(
-                {.y = y, .width = m_grid.width, .travel = &rays.travel[begin], .irradiance = &rays.irradiance[begin]});
+            const std::size_t begin = i * span.width;
+            sink.add({.ray = first + i,
+                      .y = span.y,
+                      .x = span.x,
+                      .width = span.width,
+                      .travel = &rays.travel[begin],
+                      .irradiance = &rays.irradiance[begin]});
         }
     }
 
-    void gather_texel(std::size_t x, std::size_t y, const Part& part, Rays& rays) const
+    // Of a texel of the span.
+    void gather_texel(std::size_t texel, const Part& part, Rays& rays) const
     {
         const std::size_t count = part.count;
+        const std::size_t x = rays.span.x + texel;
+        const std::size_t y = rays.span.y;
         const Vec3 open = m_open.at(x, y) * (static_cast<double>(count) / static_cast<double>(part.all));
         if (open == Vec3(0.0))
             return;
-        rays.places.resize(count);
-        part.sobol.points(x, y, part.first, count, rays.places.data());
+        rays.resize(count);
+        part.sobol.points(x, y, part.first, count, rays.on_light.data(), rays.in_texel.data());
+        if (part.is_traced)
+            rays.sort();
         Vec3 sum = sample(x, y, rays);
         // Where all miss, although there is light, others are tried.
         for (int i = 0; i < max_trials && sum == Vec3(0.0); ++i) {
-            for (GridSobol::Point& place : rays.places) {
-                for (std::size_t k = 0; k < place.size(); ++k)
-                    place[k] += steps[k] - std::floor(place[k] + steps[k]);
+            for (std::size_t k = 0; k < count; ++k) {
+                rays.on_light[k] = glm::fract(rays.on_light[k] + step_on_light);
+                rays.in_texel[k] = glm::fract(rays.in_texel[k] + step_in_texel);
             }
             sum = sample(x, y, rays);
         }
@@ -182,7 +244,7 @@ private:
             if (rays.weights[i] == Vec3(0.0))
                 continue;
             const LightRay& found = rays.found[i];
-            const std::size_t index = i * m_grid.width + x;
+            const std::size_t index = i * rays.span.width + texel;
             rays.travel[index] = Vec3f(glm::normalize(m_grid.to_plane(found.travel)));
             rays.irradiance[index] = Vec3f(unhindered(rays.weights[i]));
             if (!part.is_traced)
@@ -197,12 +259,17 @@ private:
     // The rays of a texel at their places, and what they carry unhindered; returns the sum of that.
     Vec3 sample(std::size_t x, std::size_t y, Rays& rays) const
     {
+        const std::size_t count = rays.on_light.size();
+        for (std::size_t i = 0; i < count; ++i)
+            rays.points[i] =
+                m_grid.point(static_cast<double>(x) + rays.in_texel[i].x, static_cast<double>(y) + rays.in_texel[i].y);
+        if (m_is_far)
+            m_light.sample(rays.points.front(), m_grid.normal, rays.on_light, rays.found.data());
+        else
+            for (std::size_t i = 0; i < count; ++i)
+                m_light.sample(rays.points[i], m_grid.normal, {&rays.on_light[i], 1}, &rays.found[i]);
         Vec3 sum(0.0);
-        for (std::size_t i = 0; i < rays.places.size(); ++i) {
-            const GridSobol::Point& place = rays.places[i];
-            rays.points[i] = m_grid.point(static_cast<double>(x) + place[2], static_cast<double>(y) + place[3]);
-            const Vec2 on_light(place[0], place[1]);
-            m_light.sample(rays.points[i], m_grid.normal, {&on_light, 1}, &rays.found[i]);
+        for (std::size_t i = 0; i < count; ++i) {
             const LightRay& found = rays.found[i];
             const double cos_theta = -glm::dot(found.travel, m_grid.normal);
             const bool counts = cos_theta > min_cos_theta && found.distance > m_position_rounding;
@@ -221,7 +288,7 @@ private:
         for (std::size_t i = 0; i < rays.waiting; ++i) {
             const std::size_t index = rays.carried[i];
             rays.irradiance[index] *= transmittance[i];
-            std::uint8_t& met = rays.met[index % m_grid.width];
+            std::uint8_t& met = rays.met[index % rays.span.width];
             met |= transmittance[i] == Vec3f(1.0f)   ? Met::light
                    : transmittance[i] == Vec3f(0.0f) ? Met::obstacle
                                                      : Met::both;
@@ -233,6 +300,7 @@ private:
     std::unique_ptr<const ExtendedLight> m_prepared;
     const ExtendedLight& m_light;
     OpenIrradiance m_open;
+    bool m_is_far;
     const Occluders* m_occluders;
     std::size_t m_rays;
     std::size_t m_even_rays;

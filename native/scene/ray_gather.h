@@ -10,15 +10,17 @@
 
 namespace beamspread {
 
-// One ray at each texel of a row.
+// One ray at each texel of a part of a row.
 struct RayRow {
+    std::size_t ray = 0;  // of those of a texel
     std::size_t y = 0;
+    std::size_t x = 0;
     std::size_t width = 0;
     const Vec3f* travel = nullptr;      // [texel] unit vectors of the plane frame, z <= -min_cos_theta
     const Vec3f* irradiance = nullptr;  // [texel] W/m^2 in each channel, cosine and visibility included
 };
 
-// Takes the rays of a grid. Called from several threads at once, all rays of a row from the same.
+// Takes the rays of a grid. Called from several threads at once, for one row by one of them.
 class RaySink {
 public:
     virtual ~RaySink() = default;
@@ -37,7 +39,7 @@ struct RaySettings {
     int even_rays = 0;
 };
 
-// At most `rays` rows of rays for each row of texels; their sum is the light of the texel. Low-discrepancy over the texel and
+// At most `rays` rays from each texel; their sum is the light of the texel. Low-discrepancy over the texel and
 // over the light, from a seed: the same for any number of threads. Where nothing is in the way the sum is that of many
 // more rays, without noise. `occluders` may be null. Throws InvalidArgument, Cancelled.
 void gather_rays(const ReceiverGrid& grid, const ExtendedLight& light, const Occluders* occluders,

@@ -262,7 +262,7 @@ void UnscatteredRays::add(const RayBeams& rays, const std::vector<double>& color
             for (std::size_t k = 0; k < exits.count() && irradiance > 0.0; ++k) {
                 const auto [distance, power] = exits.at(k, static_cast<float>(half_tangent));
                 const double exitance = irradiance * static_cast<double>(power) * inv_pi / m_unit;
-                share(m_plane, static_cast<float>(x) + distance * static_cast<float>(step.x),
+                share(m_plane, static_cast<float>(rays.x + x) + distance * static_cast<float>(step.x),
                       static_cast<float>(rays.y) + distance * static_cast<float>(step.y),
                       [&](std::size_t place, float part) {
                           std::atomic_ref(m_sums[place * channels + c])

@@ -37,6 +37,13 @@ def test_rendered_viewports_show_the_scene_by_eevee(seen):
     assert seen["scene light"]
 
 
+def test_blender_s_own_bake_has_bounced_light(seen):
+    """A white wall to the sky's half of some texels returns a tenth of the sun at least."""
+    without, bounced = (seen[f"own bake, indirect {indirect}"] for indirect in (False, True))
+    assert without > 0
+    assert bounced > 1.05 * without
+
+
 def test_a_pasted_node_parts_from_the_first_and_outlives_undo(seen):
     assert seen["pasted"] == [1.0, 1.7]
     assert seen["after undo and redo"] == [1.0, 1.7]

@@ -63,6 +63,37 @@ def add_scene():
     return plane
 
 
+def blender_s_own_bake(plane):
+    """Of irradiance into another image, before a white wall in the sun; sums with and without what bounces."""
+    settings = bpy.context.scene.beamspread
+    settings.quality, settings.output = "preview", "IRRADIANCE"
+    wall = scenes.add_mesh("Wall", [(-4, 2, 0), (4, 2, 0), (4, 2, 4), (-4, 2, 4)], [(0, 1, 2, 3)])
+    wall.data.materials.append(bpy.data.materials.new("White"))
+    sun = scenes.add_sun(60, 90, 3.0)
+    scenes.select(plane)
+    tree = plane.data.materials[0].node_tree
+    image = bpy.data.images.new("Own", 16, 16, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image = image
+    tree.nodes.active = texture
+    over = []
+    for handlers in (bpy.app.handlers.object_bake_complete, bpy.app.handlers.object_bake_cancel):
+        handlers.append(lambda *_: over.append(1))
+    for indirect in (False, True):
+        settings.use_indirect = indirect
+        over.clear()
+        with bpy.context.temp_override(window=window()):
+            bpy.ops.object.bake("INVOKE_DEFAULT", type="COMBINED", margin=0)
+        yield lambda: over
+        yield lambda: not bpy.app.is_job_running("OBJECT_BAKE")
+        results[f"own bake, indirect {indirect}"] = float(scenes.pixels(image)[..., :3].sum())
+    tree.nodes.remove(texture)
+    for obj in (wall, sun):
+        bpy.data.objects.remove(obj)
+    scenes.select(plane)
+
+
 def scenario():
     bpy.app.handlers.render_complete.append(lambda *_: ended.append("complete"))
     plane = add_scene()
@@ -78,6 +109,8 @@ def scenario():
     path = str(Path(sys.argv[-1]).with_name("f12.exr"))
     bpy.data.images["Render Result"].save_render(path)
     results["picture"] = scenes.pixels(bpy.data.images.load(path))[8, 8].tolist()
+
+    yield from blender_s_own_bake(plane)
 
     tree = plane.data.materials[0].node_tree
     for node in tree.nodes:

@@ -12,6 +12,9 @@ import numpy as np
 
 STRATUM, AXES = "stratum", ("x_axis", "y_axis", "z_axis")
 
+# The node that keeps rounds apart: Cycles' first sample of each bake is at the middle of its texel, whatever the seed.
+ROUND = "Round"
+
 
 def add_ghost(charts, strata, is_diffuse=False):
     """The object, and its image; every chart's tiles fill rows of the image from `chart_rows` on.
@@ -59,6 +62,13 @@ def add_ghost(charts, strata, is_diffuse=False):
     return obj, image
 
 
+def draw_anew(ghost, number: int) -> None:
+    """Other directions from the same places than in rounds of other numbers."""
+    node = ghost.data.materials[0].node_tree.nodes.get(ROUND)
+    if node is not None:
+        node.inputs[1].default_value = (0, 0, number)
+
+
 def _mirror(image):
     """The material; what a ray sees follows from the attributes."""
     material = _new_material()
@@ -86,8 +96,9 @@ def _mirror(image):
     uv = tree.nodes.new("ShaderNodeUVMap")
     uv.uv_map = "UVMap"
     noise = tree.nodes.new("ShaderNodeTexWhiteNoise")
-    noise.noise_dimensions = "2D"
-    link(noise.inputs["Vector"], uv.outputs[0])
+    noise.noise_dimensions = "3D"
+    link(noise.inputs["Vector"], vector("ADD", uv.outputs[0], (0, 0, 0)))
+    noise.inputs["Vector"].links[0].from_node.name = ROUND
     random = tree.nodes.new("ShaderNodeSeparateXYZ")
     link(random.inputs[0], noise.outputs["Color"])
     stratum = attribute(STRATUM)

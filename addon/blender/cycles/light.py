@@ -23,6 +23,7 @@ from .. import compat
 from ..node.find import find_place
 from ..node.tree import BASE_COLOR
 from ..read.visible import render_visible_names, renders
+from .child_denoise import has_denoiser
 from .process import run
 from .scene_copy import SceneCopy
 from .world import world_panorama
@@ -38,8 +39,9 @@ MOST_SAMPLES = 128
 # Of light that comes directly, with its shadows, and is not understood by our readers.
 DIRECT_NODES, DIRECT_NOISE = 256, 0.02
 
-# For estimates: what Blender takes to start, the paths that a node takes, and how many a processor traces.
-START_SECONDS, PATHS_PER_NODE, PATHS_PER_SECOND = 3.0, 600, 1.5e5
+# For estimates: what Blender takes to start, the paths that a node takes, with a denoiser after them, and how many a
+# processor traces.
+START_SECONDS, PATHS_PER_NODE, PATHS_TO_DENOISE, PATHS_PER_SECOND = 3.0, 600, 256, 1.5e5
 
 # Of a node, how high above the receiver its light is gathered: nothing that stands there may be below.
 LIFT = 1e-3
@@ -51,19 +53,36 @@ WHITE = 1.0, (1.0, 1.0, 1.0)
 UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-class CyclesLight:
-    """Completes the jobs of one scene, which share a copy of it. Make it, and call `complete`, in the main thread."""
+class CopyForCycles:
+    """A copy of a scene, and what stands in it for the materials that are baked. Make it in the main thread."""
 
-    def __init__(self, depsgraph) -> None:
+    def __init__(self, scene, view_layer) -> None:
+        self.scene = SceneCopy(scene, view_layer)
+        places = {one.name: find_place(one) for one in bpy.data.materials}
+        places = {name: place for name, place in places.items() if place is not None}
+        self.reflectances = {name: _reflectance(node.surface()) for name, (node, _) in places.items()}
+        # Where the texture is: the groups around a node, the node, its input.
+        self.textures = {
+            name: ([group.name for group in groups], node.name, BASE_COLOR)
+            for name, (node, groups) in places.items()
+            if node.has_texture()
+        }
+
+
+class CyclesLight:
+    """Completes the jobs of one scene, which share a copy of it.
+
+    Make it, and call `complete`, in the main thread, or with a copy that was made there.
+    """
+
+    def __init__(self, depsgraph, copy: CopyForCycles | None = None) -> None:
         # By name: undo between two jobs brings other data-blocks.
         self._names = depsgraph.scene.name, depsgraph.view_layer.name
         world = compat.world_of(depsgraph)
         self._world = world.name if world else ""
         self._corners = _corners_of_solids(depsgraph)
         self._lamps = {obj.name: _place(obj) for obj in bpy.data.scenes[self._names[0]].objects if obj.type == "LIGHT"}
-        self._copy: SceneCopy | None = None
-        self._surfaces: dict = {}
-        self._textures: dict = {}
+        self._copy = copy
         self._panorama: WorldLight | None = None
 
     def complete(self, job: BakeJob) -> BakeJob:
@@ -75,20 +94,12 @@ class CyclesLight:
         others = [name for name in illumination.by_cycles if name != world and name in scene.objects]
         if not (world or bounced or others):
             return job
-        if threading.current_thread() is not threading.main_thread():
-            missing = "Blender's own Bake leaves out what Cycles finds, as bounced light: use Bake Beamspread."
-            return replace(job, illumination=illumination.warning(missing))
         if self._copy is None:
-            self._copy = SceneCopy(scene, scene.view_layers[self._names[1]])
-            places = {one.name: find_place(one) for one in bpy.data.materials}
-            places = {name: place for name, place in places.items() if place is not None}
-            self._surfaces = {name: node.surface() for name, (node, _) in places.items()}
-            self._textures = {
-                name: ([group.name for group in groups], node.name, BASE_COLOR)
-                for name, (node, groups) in places.items()
-                if node.has_texture()
-            }
-        illumination = illumination.found({world, *others} - {""}).warning(*self._copy.warnings)
+            if threading.current_thread() is not threading.main_thread():
+                missing = "Blender's own Bake asks Cycles only where Indirect Light is on: or use Bake Beamspread."
+                return replace(job, illumination=illumination.warning(missing))
+            self._copy = CopyForCycles(scene, scene.view_layers[self._names[1]])
+        illumination = illumination.found({world, *others} - {""}).warning(*self._copy.scene.warnings)
         return replace(
             job,
             illumination=illumination,
@@ -122,7 +133,7 @@ class CyclesLight:
         lights: list[Light] = []
         if world:
             if self._panorama is None:
-                radiance = world_panorama(self._copy, progress=first)
+                radiance = world_panorama(self._copy.scene, progress=first)
                 self._panorama = WorldLight(world, *WHITE, True, radiance, UPRIGHT)
             lights.append(self._panorama)
         if bounced:
@@ -147,14 +158,14 @@ class CyclesLight:
             "light": "INDIRECT",
             "only": [],
             "by_lamps": False,
-            "reflectances": {name: _reflectance(surface) for name, surface in self._surfaces.items()},
-            "textures": self._textures,
+            "reflectances": self._copy.reflectances,
+            "textures": self._copy.textures,
             "noise": (LEAST_NOISE, MOST_NOISE),
             "noise_of_all": NOISE_OF_ALL,
             "direct": 0.0,
             "most_samples": MOST_SAMPLES,
         }
-        found = run(self._copy, "fields", {**request, **options}, progress)
+        found = run(self._copy.scene, "fields", {**request, **options}, progress)
         grids = (chart.grid for chart in receiver.charts)
         return tuple(Field(grid.origin, grid.normal, found[f"radiance_{n}"]) for n, grid in enumerate(grids))
 
@@ -194,7 +205,8 @@ def seconds_estimate(width: int, height: int) -> float:
     some six times.
     """
     nodes = NODES * max(1, round(NODES * min(width, height) / max(width, height)))
-    return START_SECONDS + nodes * PATHS_PER_NODE / (PATHS_PER_SECOND * (os.cpu_count() or 1))
+    paths = nodes * (PATHS_TO_DENOISE if has_denoiser() else PATHS_PER_NODE)
+    return START_SECONDS + paths / (PATHS_PER_SECOND * (os.cpu_count() or 1))
 
 
 def _corners_of_solids(depsgraph) -> np.ndarray:

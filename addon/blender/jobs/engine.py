@@ -13,6 +13,7 @@ from ...core.bake.runner import WRITTEN, Bake, Target
 from ...core.bake.settings import COMBINED, BakeSettings
 from ...core.errors import ImageError, sentence
 from .. import compat
+from ..cycles.light import CopyForCycles
 from ..node.find import NOTHING_FOUND, find_misplaced, find_node, find_targets, materials_of
 from ..registration import all_or_nothing, classes, handlers
 from . import stale
@@ -78,7 +79,7 @@ def _prepare(depsgraph, obj, passes, size: tuple[int, int]) -> list[Bake]:
         settings = depsgraph.scene.beamspread.for_bake()
         for target in targets:
             _check_active_image(bpy.data.materials[target.material_name], settings)
-        bakes = prepare(depsgraph, targets, settings, size=size) or find_misplaced([obj])
+        bakes = prepare(depsgraph, targets, settings, size=size, copy=fillings.copy) or find_misplaced([obj])
     except Exception as error:  # noqa: BLE001 - Blender would swallow it
         return [Bake(Target(obj.name), error=sentence(error))]
     return bakes or [Bake(Target(obj.name), error=NOTHING_FOUND)]
@@ -110,14 +111,21 @@ class _Fillings:
 
     The window calls `begin` before it bakes and `end` after it, in the main thread; between them the engine adds bakes
     in another. Scripts call neither, and bake in the main thread.
+
+    Attributes
+    ----------
+    copy : of the scene, for Cycles to find what bounces: in its thread the engine can make none.
     """
 
     def __init__(self) -> None:
         self._parts: dict[Target, Parts] | None = None
+        self.copy: CopyForCycles | None = None
 
     def begin(self) -> None:
         targets = find_targets(bpy.context.selected_objects)
         self._parts = stale.parts_of(bpy.context, targets) if targets else {}
+        scene = bpy.context.scene
+        self.copy = CopyForCycles(scene, bpy.context.view_layer) if targets and scene.beamspread.use_indirect else None
 
     def add(self, bakes: list[Bake]) -> None:
         parts = self._parts
@@ -127,7 +135,7 @@ class _Fillings:
             stale.keep_later(bake, (parts or {}).get(bake.target))
 
     def end(self) -> None:
-        self._parts = None
+        self._parts = self.copy = None
         stale.look_soon()
 
 
@@ -232,5 +240,5 @@ def _leave_panels() -> None:
 register, unregister = all_or_nothing(
     *classes(BeamspreadEngine),
     (_use_panels, _leave_panels),
-    *handlers(object_bake_pre=_before_bake, object_bake_complete=_after_bake),
+    *handlers(object_bake_pre=_before_bake, object_bake_complete=_after_bake, object_bake_cancel=_after_bake),
 )

@@ -13,7 +13,7 @@ from ...core.bake.surface import Surface
 from ...core.errors import BakeError, sentence
 from ...core.scene.receiver import build_receiver, texture_size
 from ...core.scene.uv_map import fit_uv_maps
-from ..cycles.light import CyclesLight
+from ..cycles.light import CopyForCycles, CyclesLight
 from ..images.files import check_image
 from ..images.sequence import is_sequence, size_of_frames
 from ..node.find import find_place, materials_of
@@ -37,9 +37,10 @@ def prepare(
     resolution: int | None = None,
     size: tuple[int, int] | None = None,
     visible: set[str] | None = None,
+    copy: CopyForCycles | None = None,
 ) -> list[Bake]:
     """A bake for each target; see `Preparation`."""
-    preparation = Preparation(depsgraph, targets, settings, resolution, size, visible)
+    preparation = Preparation(depsgraph, targets, settings, resolution, size, visible, copy)
     return [preparation.bake(target) for target in targets]
 
 
@@ -65,7 +66,8 @@ class Preparation:
     """What was read of a scene at one time, from which each target's job is made when it is its turn: jobs are large.
 
     `size` overrides all other sizes, `visible` names the objects that render, None: all. Afterwards the depsgraph is
-    no longer needed, but for the copy of the scene that Cycles gets: the first job that needs one makes it.
+    no longer needed, but for the copy of the scene that Cycles gets, where none is given: the first job that needs one
+    makes it.
     """
 
     def __init__(
@@ -76,11 +78,12 @@ class Preparation:
         resolution: int | None = None,
         size: tuple[int, int] | None = None,
         visible: set[str] | None = None,
+        copy: CopyForCycles | None = None,
     ) -> None:
         self.settings = settings
         self._plans: dict[Target, _Plan | str] = {}
         try:
-            self._illumination, self._by_cycles = read_illumination(depsgraph), CyclesLight(depsgraph)
+            self._illumination, self._by_cycles = read_illumination(depsgraph), CyclesLight(depsgraph, copy)
         except Exception as error:  # noqa: BLE001 - each bake asked for needs an answer
             self._plans = dict.fromkeys(targets, sentence(error))
             return

@@ -47,6 +47,7 @@ def read_illumination(depsgraph, kept: Kept | None = None) -> Illumination:
         (*lights.warnings, *dict.fromkeys(occluders.warnings)),
         compat.transparent_bounces(depsgraph.scene),
         lights.by_cycles,
+        lights.receivers,
     )
 
 
@@ -78,6 +79,7 @@ class _Lights:
         self._links: dict[str, dict] = {}
         self.warnings: dict[str, None] = {}  # in order, each once
         self.by_cycles: dict[str, str] = {}  # see Illumination
+        self.receivers: dict[str, frozenset[str]] = {}
 
     def all(self) -> list[Light]:
         glowing = [glow.light((name, 1.0, (1.0, 1.0, 1.0), True)) for (name, _), glow in self._glows.items()]
@@ -93,10 +95,12 @@ class _Lights:
         if is_portal(obj.data):
             return
         light, reason = read_lamp(obj, matrix)
+        links = links_of(obj, self._names)
         if reason:
-            self.by_cycles[obj.name] = f"The light '{obj.name}' counts as if it had no nodes: {reason} not understood."
+            why = f"The light '{obj.name}' counts as if it had no nodes: {reason} not understood."
+            self._leave_to_cycles(obj.name, why, links)
         if light is not None:
-            self._add(light, links_of(obj, self._names))
+            self._add(light, links)
 
     def add_mesh(self, instance) -> None:
         """Instances of a mesh become one light."""
@@ -109,7 +113,8 @@ class _Lights:
             self._glows[key] = glow = self._kept.glows[key].unplaced()
             self._links[obj.name] = links_of(obj, self._names)
             if glow.reason:
-                self.by_cycles[obj.name] = f"What glows of '{obj.name}' is left out: {glow.reason} not understood."
+                why = f"What glows of '{obj.name}' is left out: {glow.reason} not understood."
+                self._leave_to_cycles(obj.name, why, self._links[obj.name])
         self._glows[key].place(instance.matrix_world)
 
     def add_world(self, view_layer, world) -> None:
@@ -121,6 +126,11 @@ class _Lights:
             self.by_cycles[world.name] = f"The world '{world.name}' is left out: {reason} not understood."
         if light is not None:
             self._add(light, {})
+
+    def _leave_to_cycles(self, name: str, why: str, links: dict) -> None:
+        self.by_cycles[name] = why
+        if links.get("receivers") is not None:
+            self.receivers[name] = links["receivers"]
 
     def _add(self, light: Light, links: dict) -> None:
         if why := fault(light):

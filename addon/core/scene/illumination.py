@@ -26,6 +26,7 @@ class Illumination:
     lights : those that can be baked.
     warnings : sentences that name what is left out.
     by_cycles : names of the lights that only Cycles knows, each with the sentence that says what counts instead.
+    receivers : of these lights the names of the objects that they are linked to, of those that are not linked to all.
     """
 
     def __init__(
@@ -35,10 +36,11 @@ class Illumination:
         warnings: Sequence[str] = (),
         most_crossings: int | None = None,
         by_cycles: Mapping[str, str] | None = None,
+        receivers: Mapping[str, Collection[str]] | None = None,
     ) -> None:
         """`most_crossings`: light that crossed so many see-through surfaces ends at the next; None: it never does."""
         self.lights = tuple(lights)
-        self.by_cycles = dict(by_cycles or {})
+        self.by_cycles, self.receivers = dict(by_cycles or {}), dict(receivers or {})
         self.warnings = (*warnings, *self.by_cycles.values())
         self._occluders = (Occluder("", occluders),) if isinstance(occluders, Mesh) else tuple(occluders or ())
         self._most_crossings = most_crossings
@@ -49,10 +51,11 @@ class Illumination:
         """The same without the lights that are not linked to an object of that name; shares the hierarchies."""
         linked = copy(self)
         linked.lights = tuple(one for one in self.lights if one.receivers is None or receiver in one.receivers)
-        return linked
+        beyond = {name for name, names in self.receivers.items() if receiver not in names}
+        return linked.found(beyond & set(self.by_cycles))
 
     def found(self, names: Collection[str]) -> Illumination:
-        """The same where Cycles takes over those lights of `by_cycles`: what counted instead is gone."""
+        """The same without those lights of `by_cycles`, as Cycles takes them over: what counted instead is gone."""
         rest = copy(self)
         said = {self.by_cycles[name] for name in names}
         rest.by_cycles = {name: why for name, why in self.by_cycles.items() if name not in names}

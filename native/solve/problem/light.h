@@ -55,9 +55,10 @@ struct PlaneLight {
 std::vector<PlaneLight> lights_of_channels(const std::vector<View2D<const float>>& irradiance,
                                            const Directions& directions);
 
-// Rays of any directions that come from one light, one at each texel of a row.
+// Rays of any directions that come from one light, one at each texel of a part of a row.
 struct RayBeams {
     std::size_t y;
+    std::size_t x;
     std::size_t width;
     const float* travel;  // [texel][x, y, z]
     const float* irradiance;  // [texel][channel], W/m^2

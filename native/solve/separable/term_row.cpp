@@ -19,23 +19,27 @@ constexpr std::size_t rays_at_once = 64;
 }  // namespace
 
 void BeamMoments::add(const LightTerms& terms, const BeamRow& beams, const std::vector<float>& colors,
-                      std::size_t first, std::size_t end, const Values& values)
+                      std::size_t first, std::size_t end, const Values& values, const float* irradiance)
 {
     if (first == end || terms.basis.functions.empty())  // a black medium needs none
         return;
     const std::size_t count = beams.irradiance.size();
     m_step.resize(count);
-    for (auto* scratch : {&m_part, &m_cosine, &m_sine, &m_u})
+    for (auto* scratch : {&m_part, &m_cosine, &m_sine, &m_u, &m_product})
         scratch->resize(count);
     const LowRankBasis& basis = terms.basis;
     const std::size_t steps = basis.functions.front().values.size() - 1;
     const double per_step = basis.last > basis.first ? static_cast<double>(steps) / (basis.last - basis.first) : 0.0;
     find_steps(m_step.data(), m_part.data(), beams.half_tangent.data(), static_cast<float>(basis.first),
                static_cast<float>(per_step), static_cast<std::uint32_t>(steps), count);
-    std::copy_n(beams.irradiance.data(), count, m_cosine.data());
+    if (irradiance)
+        std::fill_n(m_cosine.data(), count, 1.0f);
+    else
+        std::copy_n(beams.irradiance.data(), count, m_cosine.data());
     std::fill_n(m_sine.data(), count, 0.0f);
     std::size_t m = 0;
     std::optional<std::size_t> function;  // that m_u holds
+    std::optional<Phase> phase;           // of the product with it
     for (std::size_t t = first; t < end; ++t) {
         const LightTerm& term = terms.terms[t];
         if (!term.fixed.empty() || colors[term.set] == 0.0f)
@@ -43,11 +47,18 @@ void BeamMoments::add(const LightTerms& terms, const BeamRow& beams, const std::
         const LowRankBasis::AngleFunction& wanted = basis.functions[term.function];
         for (; m < wanted.m; ++m)
             rotate(m_cosine.data(), m_sine.data(), beams.cos_beta.data(), beams.sin_beta.data(), count);
-        if (function != term.function)
+        if (function != term.function) {
             look_up(m_u.data(), wanted.values.data(), m_step.data(), m_part.data(), count);
+            phase.reset();
+        }
+        if (phase != term.phase)
+            multiply(m_product.data(), m_u.data(), (term.phase == Phase::cosine ? m_cosine : m_sine).data(), count);
         function = term.function;
-        add_scaled_product(values(t), m_u.data(), (term.phase == Phase::cosine ? m_cosine : m_sine).data(),
-                           colors[term.set], count);
+        phase = term.phase;
+        if (irradiance)
+            add_scaled_product(values(t), m_product.data(), irradiance + term.set * count, colors[term.set], count);
+        else
+            add_scaled(values(t), m_product.data(), colors[term.set], count);
     }
 }
 
@@ -87,7 +98,7 @@ void MomentSum::add(LightTerms& terms, const PlaneLight& light, std::size_t y)
     for (std::size_t x = 0; x < terms.plane.width; x += texels_at_once) {
         const RowSpan span{y, x, std::min(texels_at_once, terms.plane.width - x)};
         if (m_beams.read(terms.plane, light, span))
-            add_beams(terms, span, m_colors);
+            add_beams(terms, span);
     }
 }
 
@@ -96,8 +107,10 @@ void MomentSum::add(LightTerms& terms, const RayBeams& rays, const std::vector<d
     const std::size_t channels = color.size();
     const std::size_t sets = terms.sets.count();
     m_colors.resize(sets);
+    for (std::size_t set = 0; set < sets; ++set)
+        m_colors[set] = static_cast<float>(color[terms.sets.channel(set)]);
     for (std::size_t x = 0; x < rays.width; x += rays_at_once) {
-        const RowSpan span{rays.y, x, std::min(rays_at_once, rays.width - x)};
+        const RowSpan span{rays.y, rays.x + x, std::min(rays_at_once, rays.width - x)};
         const float* irradiance = rays.irradiance + x * channels;
         for (auto* values : {&m_beams.irradiance, &m_beams.cos_beta, &m_beams.sin_beta, &m_beams.half_tangent})
             values->resize(span.width);
@@ -107,21 +120,26 @@ void MomentSum::add(LightTerms& terms, const RayBeams& rays, const std::vector<d
             continue;
         find_angles(rays.travel + 3 * x, m_beams.irradiance.data(), m_beams.cos_beta.data(), m_beams.sin_beta.data(),
                     m_beams.half_tangent.data(), span.width);
-        for (std::size_t part = 0; part < (is_colored ? sets : 1); ++part) {
-            if (is_colored)
-                for (std::size_t i = 0; i < span.width; ++i)
-                    m_beams.irradiance[i] = irradiance[i * channels + terms.sets.channel(part)];
-            for (std::size_t set = 0; set < sets; ++set)
-                m_colors[set] = is_colored && set != part ? 0.0f : static_cast<float>(color[terms.sets.channel(set)]);
-            add_beams(terms, span, m_colors);
+        if (!is_colored) {
+            add_beams(terms, span);
+            continue;
         }
+        m_irradiance.resize(sets * span.width);
+        for (std::size_t set = 0; set < sets; ++set) {
+            const std::size_t channel = terms.sets.channel(set);
+            for (std::size_t i = 0; i < span.width; ++i)
+                m_irradiance[set * span.width + i] = irradiance[i * channels + channel];
+        }
+        add_beams(terms, span, m_irradiance.data());
     }
 }
 
-void MomentSum::add_beams(LightTerms& terms, const RowSpan& span, const std::vector<float>& colors)
+void MomentSum::add_beams(LightTerms& terms, const RowSpan& span, const float* irradiance)
 {
-    m_moments.add(terms, m_beams, colors, 0, terms.terms.size(),
-                  [&](std::size_t t) { return terms.moments[t].data() + span.y * terms.plane.width + span.x; });
+    const std::size_t place = span.y * terms.plane.width + span.x;
+    m_moments.add(
+        terms, m_beams, m_colors, 0, terms.terms.size(), [&](std::size_t t) { return terms.moments[t].data() + place; },
+        irradiance);
 }
 
 }  // namespace beamspread

@@ -16,16 +16,18 @@ public:
     // Where the value of a term at the first beam is.
     using Values = std::function<float*(std::size_t term)>;
 
-    // To terms [first, end); `colors`: of the beams in each set.
+    // To terms [first, end); `colors`: of the beams in each set. `irradiance`: of the beams in each set, after each other;
+    // null: in all of them that of the beams.
     void add(const LightTerms& terms, const BeamRow& beams, const std::vector<float>& colors, std::size_t first,
-             std::size_t end, const Values& values);
+             std::size_t end, const Values& values, const float* irradiance = nullptr);
 
 private:
     std::vector<std::uint32_t> m_step;  // in the tables of the basis
     std::vector<float> m_part;
-    std::vector<float> m_cosine;  // cos(m beta), sin(m beta) times irradiance
+    std::vector<float> m_cosine;  // cos(m beta), sin(m beta), times irradiance where that is the same for all sets
     std::vector<float> m_sine;
     std::vector<float> m_u;
+    std::vector<float> m_product;
 };
 
 // The light of one row of texels: of lights that are kept, and what else has been added up.
@@ -55,10 +57,11 @@ public:
     void add(LightTerms& terms, const RayBeams& rays, const std::vector<double>& color, bool is_colored);
 
 private:
-    void add_beams(LightTerms& terms, const RowSpan& span, const std::vector<float>& colors);
+    void add_beams(LightTerms& terms, const RowSpan& span, const float* irradiance = nullptr);
 
     BeamRow m_beams;
     BeamMoments m_moments;
+    std::vector<float> m_irradiance;  // [set][beam]
     std::vector<float> m_colors;
 };
 

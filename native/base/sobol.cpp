@@ -1,0 +1,144 @@
+#include "base/sobol.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "base/platform.h"
+
+namespace beamspread {
+
+namespace {
+
+using Numbers = std::array<std::array<std::uint32_t, 32>, GridSobol::dimensions>;
+
+constexpr Numbers make_direction_numbers()
+{
+    // Degree, coefficients and first numbers of each dimension's polynomial; the first dimension has none.
+    struct Polynomial {
+        std::size_t degree;
+        std::uint32_t coefficients;
+        std::array<std::uint32_t, 3> first;
+    };
+    constexpr std::array<Polynomial, GridSobol::dimensions - 1> polynomials = {
+        Polynomial{1, 0, {1, 0, 0}}, Polynomial{2, 1, {1, 3, 0}}, Polynomial{3, 1, {1, 3, 1}}};
+    Numbers numbers{};
+    for (std::size_t bit = 0; bit < 32; ++bit)
+        numbers[0][bit] = 1u << (31 - bit);
+    for (std::size_t d = 1; d < GridSobol::dimensions; ++d) {
+        const auto& [degree, coefficients, first] = polynomials[d - 1];
+        auto& v = numbers[d];
+        for (std::size_t bit = 0; bit < 32; ++bit) {
+            if (bit < degree) {
+                v[bit] = first[bit] << (31 - bit);
+                continue;
+            }
+            v[bit] = v[bit - degree] ^ (v[bit - degree] >> degree);
+            for (std::size_t k = 1; k < degree; ++k)
+                v[bit] ^= (coefficients >> (degree - 1 - k) & 1u) * v[bit - k];
+        }
+    }
+    return numbers;
+}
+
+constexpr Numbers direction_numbers = make_direction_numbers();
+
+std::uint64_t spread_bits(std::uint64_t value)
+{
+    value = (value | value << 16) & 0x0000ffff0000ffffULL;
+    value = (value | value << 8) & 0x00ff00ff00ff00ffULL;
+    value = (value | value << 4) & 0x0f0f0f0f0f0f0f0fULL;
+    value = (value | value << 2) & 0x3333333333333333ULL;
+    return (value | value << 1) & 0x5555555555555555ULL;
+}
+
+[[gnu::always_inline]] inline std::uint32_t reverse_bits(std::uint32_t value)
+{
+    value = value >> 16 | value << 16;
+    value = (value & 0xff00ff00u) >> 8 | (value & 0x00ff00ffu) << 8;
+    value = (value & 0xf0f0f0f0u) >> 4 | (value & 0x0f0f0f0fu) << 4;
+    value = (value & 0xccccccccu) >> 2 | (value & 0x33333333u) << 2;
+    return (value & 0xaaaaaaaau) >> 1 | (value & 0x55555555u) << 1;
+}
+
+// Wang's and Mueller's mixers, as good as random for seeds.
+std::uint32_t hash(std::uint32_t value)
+{
+    value = (value ^ value >> 16) * 0x45d9f3bu;
+    value = (value ^ value >> 16) * 0x45d9f3bu;
+    return value ^ value >> 16;
+}
+
+// Every bit is flipped or not by those below it (Laine, Karras 2011, with Burley's constants).
+[[gnu::always_inline]] inline std::uint32_t flip_upwards(std::uint32_t value, std::uint32_t seed)
+{
+    value ^= value * 0x3d20adeau;
+    value += seed;
+    value *= (seed >> 16) | 1u;
+    value ^= value * 0x05526c56u;
+    return value ^ value * 0x53a22864u;
+}
+
+std::uint32_t scramble(std::uint32_t digits, std::uint32_t seed)
+{
+    return reverse_bits(flip_upwards(reverse_bits(digits), seed));
+}
+
+// One coordinate of points, each after two numbers: of a block's first point and the points' offsets from it.
+BEAMSPREAD_CLONES void scatter(double* __restrict result, const std::uint32_t* offsets, std::uint32_t block,
+                               std::uint32_t seed, std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::uint32_t scrambled = reverse_bits(flip_upwards(block ^ offsets[i], seed));
+        result[2 * i] = (scrambled + 0.5) * 0x1.0p-32;
+    }
+}
+
+}  // namespace
+
+GridSobol::GridSobol(std::size_t points_per_cell, std::uint32_t seed)
+    : m_seed(seed), m_bits(std::countr_zero(std::bit_ceil(points_per_cell)))
+{
+    for (std::size_t i = 0; i < points_per_cell; ++i) {
+        const Bits point = sequence(static_cast<std::uint32_t>(i));
+        for (std::size_t d = 0; d < dimensions; ++d)
+            m_offsets[d].push_back(point[d]);
+    }
+}
+
+void GridSobol::points(std::size_t x, std::size_t y, std::size_t first, std::size_t count, Vec2* front,
+                       Vec2* back) const
+{
+    // Where the whole grid has more than 2^32 points, it is tiled by sequences with seeds of their own.
+    const std::uint64_t cell = spread_bits(x) | spread_bits(y) << 1;
+    const int cell_bits = 32 - m_bits;
+    const std::uint32_t seed = hash(m_seed ^ hash(static_cast<std::uint32_t>(cell >> cell_bits) + 1));
+    const auto within = static_cast<std::uint32_t>(cell & ((std::uint64_t{1} << cell_bits) - 1));
+    const Bits block = sequence(shuffle(within, hash(seed)) << m_bits);
+    for (std::size_t d = 0; d < dimensions; ++d) {
+        // Sobol's points are linear over bits: those of a block are the block's first one plus the first ones.
+        double* const into = &(d < 2 ? front : back)->x + d % 2;
+        scatter(into, m_offsets[d].data() + first, block[d],
+                hash(seed + 0x9e3779b9u * static_cast<std::uint32_t>(d + 1)), count);
+    }
+}
+
+// A permutation of all numbers of so many bits that keeps aligned blocks together.
+std::uint32_t GridSobol::shuffle(std::uint32_t cell, std::uint32_t seed) const
+{
+    const int unused = m_bits;  // of 32
+    return unused == 0 ? scramble(cell, seed) : scramble(cell << unused, seed) >> unused;
+}
+
+GridSobol::Bits GridSobol::sequence(std::uint32_t index)
+{
+    Bits point{};
+    for (std::size_t bit = 0; index != 0; ++bit, index >>= 1) {
+        if (index & 1u)
+            for (std::size_t d = 0; d < dimensions; ++d)
+                point[d] ^= direction_numbers[d][bit];
+    }
+    std::ranges::transform(point, point.begin(), reverse_bits);
+    return point;
+}
+
+}  // namespace beamspread

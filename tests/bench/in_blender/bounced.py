@@ -1,0 +1,132 @@
+"""What bounced.py runs in Blender as a module: SCENE [REFERENCE_SAMPLES]. Prints rows of a table.
+
+The child process's own mirrors gather what bounces; errors are those of the irradiance at its nodes, between them as
+texels get it, and of means of 4 x 4 nodes. Of two references each takes the
+other's noise out of the square: they share none.
+"""
+
+import math
+import os
+import sys
+import time
+from pathlib import Path
+
+import beamspread
+import bpy
+import numpy as np
+from beamspread.core.scene.lights import STRATA, WEIGHTS
+from beamspread.core.scene.lights.field import spline_weights
+
+sys.path.insert(0, str(Path(beamspread.__file__).with_name("blender") / "cycles"))
+import child_fields
+from child_denoise import Denoiser
+from child_ghost import add_ghost
+
+NODES, LOOKS, TEXELS = 64, 8, 256
+CHART = {
+    "corner": [-1, -1, 1e-4],
+    "x_axis": [1, 0, 0],
+    "y_axis": [0, 1, 0],
+    "normal": [0, 0, 1],
+    "size": [2, 2],
+    "nodes": [NODES, NODES],
+}
+REQUEST = {"charts": [CHART], "strata": STRATA.tolist()}
+
+
+def quad(name, corners, color):
+    add_mesh(name, corners, [(0, 1, 2, 3)], color)
+
+
+def add_mesh(name, corners, faces, color):
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    nodes = material.node_tree.nodes
+    nodes.clear()
+    diffuse, output = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeOutputMaterial")
+    diffuse.inputs["Color"].default_value = (*color, 1)
+    material.node_tree.links.new(output.inputs["Surface"], diffuse.outputs[0])
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(corners, [], faces)
+    mesh.materials.append(material)
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, mesh))
+
+
+def add_lamp(kind, energy, place=(0, 0, 0), turn=(0, 0, 0)):
+    lamp = bpy.data.lights.new(kind, kind)
+    lamp.energy = energy
+    if kind == "AREA":
+        lamp.size = 0.5
+    obj = bpy.data.objects.new(kind, lamp)
+    obj.location, obj.rotation_euler = place, turn
+    bpy.context.scene.collection.objects.link(obj)
+
+
+def add_scene(name):
+    quad("Floor", [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], (0.5,) * 3)
+    if name == "wall":
+        quad("Wall", [(-0.8, 0.3, 0), (0.8, 0.3, 0), (0.8, 0.4, 0.9), (-0.8, 0.4, 0.9)], (0.9, 0.6, 0.3))
+        add_lamp("SUN", 3.0, turn=(math.radians(40), 0, math.radians(60)))
+        return
+    quad("Back", [(-1, 1, 0), (1, 1, 0), (1, 1, 2), (-1, 1, 2)], (0.8,) * 3)
+    quad("Front", [(-1, -1, 0), (1, -1, 0), (1, -1, 2), (-1, -1, 2)], (0.8,) * 3)
+    quad("Left", [(-1, -1, 0), (-1, 1, 0), (-1, 1, 2), (-1, -1, 2)], (0.8, 0.2, 0.2))
+    quad("Right", [(1, -1, 0), (1, 1, 0), (1, 1, 2), (1, -1, 2)], (0.2, 0.7, 0.2))
+    quad("Ceiling", [(-1, -1, 2), (1, -1, 2), (1, 1, 2), (-1, 1, 2)], (0.8,) * 3)
+    foot = [(-0.3, -0.2), (0.2, -0.35), (0.35, 0.15), (-0.15, 0.3)]
+    faces = [(4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
+    add_mesh("Box", [(x, y, z) for z in (0, 0.6) for x, y in foot], faces, (0.8,) * 3)
+    add_lamp("AREA", 30.0, (0, 0.2, 1.9))
+
+
+def irradiance(pixels):
+    (part,) = child_fields.split(REQUEST, np.nan_to_num(pixels))
+    return np.pi * np.tensordot(np.float32(WEIGHTS), part, 1)
+
+
+def between_nodes(values):
+    weights = spline_weights(TEXELS, NODES)
+    return np.stack([weights @ values[..., channel] @ weights.T for channel in range(3)], axis=-1)
+
+
+def in_blocks(values):
+    return values.reshape(NODES // 4, 4, NODES // 4, 4, 3).mean(axis=(1, 3))
+
+
+def error(values, references, view):
+    one, other = (view(values) - view(reference) for reference in references)
+    return math.sqrt(max(float(np.mean(one * other)), 0.0)) / np.mean(references)
+
+
+def main():
+    name, samples = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 24
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    add_scene(name)
+    scene = bpy.context.scene
+    child_fields.set_up(scene, "INDIRECT")
+    ghost, image = add_ghost(REQUEST["charts"], REQUEST["strata"])
+    scene.collection.objects.link(ghost)
+    baker = child_fields.Baker(scene, ghost, image, "INDIRECT", "GLOSSY")
+    start = time.process_time()
+    looks = [irradiance(baker.bake(child_fields.LOOK)) for _ in range(LOOKS)]
+    seconds = (time.process_time() - start) / LOOKS
+    references = [irradiance(baker.bake(samples)) for _ in range(2)]
+    denoise = Denoiser()
+    print(f"| {name}: samples | CPU time | at nodes, denoised | between, denoised | of 4 x 4, denoised |")
+    for together in (1, 2, 4, 8):
+        noisy = [np.mean(looks[i : i + together], axis=0) for i in range(0, LOOKS, together)]
+        clean = [denoise([one])[0] for one in noisy]
+        sets = {"single": (noisy, clean)}
+        if len(noisy) > 1:
+            sets[f"mean of {len(noisy)}"] = [np.mean(noisy, axis=0)], [np.mean(clean, axis=0)]
+        for kind, pair in sets.items():
+            cells = []
+            for view in (lambda values: values, between_nodes, in_blocks):
+                found = [math.sqrt(np.mean([error(one, references, view) ** 2 for one in some])) for some in pair]
+                cells.append(", ".join(f"{part:.2%}" for part in found))
+            print(f"| {child_fields.LOOK * together} {kind} | {seconds * together:.1f} s |", " | ".join(cells), "|")
+    sys.stdout.flush()
+    os._exit(0)
+
+
+main()
