@@ -63,7 +63,7 @@ choose_matrix() {
 }
 
 # Most comparisons with Cycles, which take minutes. Those of lamps stay, whose meaning changed between the versions.
-with_cycles=(test_cycles_extended_lights test_cycles_irradiance test_indirect test_light_is_not_lost test_passes
+with_cycles=(test_cycles_extended_lights test_cycles_irradiance test_indirect test_light_is_not_lost test_panorama test_passes
              test_read_emitters test_read_world test_reflectance test_shown_in_cycles test_transparency)
 in_bpy_without_cycles() {
     local name ignored=()

@@ -19,38 +19,33 @@ CYCLES_SAMPLES = 256
 RAYS = 256
 
 
-def white_material(texels=TEXELS):
-    """White, diffuse, with an image to bake into."""
-    image = bpy.data.images.new("Bake", texels, texels, float_buffer=True, alpha=False)
+def target_material(color, texels):
+    """Diffuse, with an image that Cycles bakes into."""
+    material = scenes.diffuse_material(color, "Target")
+    image = bpy.data.images.new("Target", texels, texels, float_buffer=True, alpha=False)
     image.colorspace_settings.name = "Non-Color"
-    material = bpy.data.materials.new("White")
-    if bpy.app.version < (5, 0, 0):  # later ones always use nodes, and warn
-        material.use_nodes = True
-    nodes = material.node_tree.nodes
-    nodes.clear()
-    output, diffuse = nodes.new("ShaderNodeOutputMaterial"), nodes.new("ShaderNodeBsdfDiffuse")
-    diffuse.inputs["Color"].default_value = (1, 1, 1, 1)
-    diffuse.inputs["Roughness"].default_value = 0
-    material.node_tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
-    texture = nodes.new("ShaderNodeTexImage")
+    texture = material.node_tree.nodes.new("ShaderNodeTexImage")
     texture.image = image
-    nodes.active = texture
+    material.node_tree.nodes.active = texture
     return material, image
 
 
 def add_receiver(world, uvs=scenes.SQUARE_UVS, texels=TEXELS):
-    material, image = white_material(texels)
+    material, image = target_material((1, 1, 1), texels)
     return scenes.add_plane("Receiver", (2, 2), world, uvs, material), image
 
 
 def cycles_irradiance(plane, image, samples=CYCLES_SAMPLES):
+    return cycles_bake(plane, image, {"DIRECT"}, samples)
+
+
+def cycles_bake(floor, image, passes, samples):
     """Pi times what Cycles bakes."""
     scene = bpy.context.scene
-    scene.cycles.samples = samples
-    scene.cycles.use_adaptive_sampling = False
-    scene.cycles.use_denoising = False
-    scenes.select(plane)
-    bpy.ops.object.bake(type="DIFFUSE", pass_filter={"DIRECT"}, margin=0, use_clear=True)
+    scene.cycles.samples, scene.cycles.use_adaptive_sampling, scene.cycles.use_denoising = samples, False, False
+    scene.cycles.sample_clamp_indirect = 0
+    scenes.select(floor)
+    bpy.ops.object.bake(type="DIFFUSE", pass_filter=passes, margin=0, use_clear=True)
     return math.pi * scenes.pixels(image)
 
 

@@ -56,6 +56,18 @@ def add_material(name="Medium", image=None, linked=False, shader=False, **proper
     return material
 
 
+def diffuse_material(color, name="Diffuse"):
+    material = bpy.data.materials.new(name)
+    if bpy.app.version < (5, 0, 0):
+        material.use_nodes = True
+    nodes = material.node_tree.nodes
+    nodes.clear()
+    diffuse, output = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeOutputMaterial")
+    diffuse.inputs["Color"].default_value = (*color, 1)
+    material.node_tree.links.new(output.inputs["Surface"], diffuse.outputs[0])
+    return material
+
+
 def add_group_material():
     """A material whose Beamspread node sits in a group within a group."""
     groups = [bpy.data.node_groups.new(name, "ShaderNodeTree") for name in ("Outer", "Inner")]

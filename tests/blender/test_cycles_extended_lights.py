@@ -61,7 +61,7 @@ def core_light(lamp):
 def our_irradiance(plane, light, occluders=None):
     """By rays, and the grid."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    polygons = read_polygons(plane.evaluated_get(depsgraph), "White")
+    polygons = read_polygons(plane.evaluated_get(depsgraph), "Target")
     receiver = build_receiver(fit_uv_maps(polygons), TEXELS, TEXELS)
     grid = receiver.charts[0].grid
     irradiance = native.gather_rays(grid.native(), light.native(), occluders, rays=64)[0] * light.rgb()

@@ -1,4 +1,4 @@
-"""Light that Cycles finds on a copy of the scene: what bounces, what glows, the world; and the scene stays as it is."""
+"""Light that Cycles finds on a copy of the scene: what bounces, what glows; and the scene stays as it is."""
 
 import math
 import os
@@ -13,12 +13,12 @@ import scenes
 from beamspread.blender.cycles import light, process
 from beamspread.blender.cycles.child_denoise import Denoiser, has_denoiser
 from beamspread.blender.cycles.scene_copy import PREFIX, SceneCopy, remove_stale
-from beamspread.blender.cycles.world import world_panorama
 from beamspread.blender.jobs.prepare import prepare_scene
 from beamspread.blender.node.find import find_node
 from beamspread.core.bake.runner import CANCELLED, FAILED, Target
 from beamspread.core.native import native
 from beamspread.core.scene.lights import DIRECTIONS, STRATA, WEIGHTS
+from cycles_truth import cycles_bake, target_material
 from mathutils import Euler, Matrix
 
 TEXELS, GREY = 32, 0.5
@@ -34,31 +34,8 @@ def coarse(monkeypatch):
     bpy.context.scene.beamspread.margin = 0
 
 
-def diffuse_material(color, name="Diffuse"):
-    material = bpy.data.materials.new(name)
-    if bpy.app.version < (5, 0, 0):
-        material.use_nodes = True
-    nodes = material.node_tree.nodes
-    nodes.clear()
-    diffuse, output = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeOutputMaterial")
-    diffuse.inputs["Color"].default_value = (*color, 1)
-    material.node_tree.links.new(output.inputs["Surface"], diffuse.outputs[0])
-    return material
-
-
-def target_material(color, texels):
-    """Diffuse, with an image that Cycles bakes into."""
-    material = diffuse_material(color, "Target")
-    image = bpy.data.images.new("Target", texels, texels, float_buffer=True, alpha=False)
-    image.colorspace_settings.name = "Non-Color"
-    texture = material.node_tree.nodes.new("ShaderNodeTexImage")
-    texture.image = image
-    material.node_tree.nodes.active = texture
-    return material, image
-
-
 def glowing_material(strength):
-    material = diffuse_material((0, 0, 0), "Glow")
+    material = scenes.diffuse_material((0, 0, 0), "Glow")
     nodes = material.node_tree.nodes
     emission = nodes.new("ShaderNodeEmission")
     emission.inputs["Strength"].default_value = strength
@@ -88,7 +65,7 @@ def add_wall(color=(0.9, 0.6, 0.3)):
     """It stands on the floor, in the light, and leans a little."""
     corners = [(-0.8, 0.3, 0), (0.8, 0.3, 0), (0.8, 0.4, 0.9), (-0.8, 0.4, 0.9)]
     wall = scenes.add_mesh("Wall", corners, [(0, 1, 2, 3)])
-    wall.data.materials.append(diffuse_material(color))
+    wall.data.materials.append(scenes.diffuse_material(color))
     return wall
 
 
@@ -118,15 +95,6 @@ def baked(floor, indirect, output):
 
 def irradiance(floor, indirect):
     return baked(floor, indirect, "IRRADIANCE")
-
-
-def cycles_bake(floor, image, passes, samples):
-    scene = bpy.context.scene
-    scene.cycles.samples, scene.cycles.use_adaptive_sampling, scene.cycles.use_denoising = samples, False, False
-    scene.cycles.sample_clamp_indirect = 0
-    scenes.select(floor)
-    bpy.ops.object.bake(type="DIFFUSE", pass_filter=passes, margin=0, use_clear=True)
-    return math.pi * scenes.pixels(image)
 
 
 def blocks(values):
@@ -420,7 +388,7 @@ def state():
 
 
 def folders():
-    return set(Path(tempfile.gettempdir()).glob(f"{PREFIX}*"))
+    return set(Path(tempfile.gettempdir()).glob(f"{PREFIX}{os.getpid()}-*"))
 
 
 def test_the_scene_stays_as_it_is(monkeypatch, tmp_path):
@@ -499,82 +467,6 @@ def test_folders_of_killed_processes_go(tmp_path, monkeypatch):
     remove_stale()
     assert not stale.exists()
     assert ours.exists()
-
-
-def world_nodes():
-    world = bpy.data.worlds.new("World")
-    bpy.context.scene.world = world
-    if bpy.app.version < (5, 0, 0):
-        world.use_nodes = True
-    return world.node_tree, next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
-
-
-def panorama(width=256, height=128):
-    with SceneCopy(bpy.context.scene, bpy.context.view_layer) as copy:
-        return world_panorama(copy, width, height)
-
-
-def directions(width, height):
-    azimuth = 2 * np.pi * (0.5 - (np.arange(width) + 0.5) / width)
-    elevation = np.pi * ((np.arange(height) + 0.5) / height - 0.5)[:, None]
-    parts = np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)
-    return np.stack(np.broadcast_arrays(*parts), axis=-1)
-
-
-def test_panorama_shows_every_direction_in_its_place():
-    """A world as bright as the direction's coordinates; within a texel they change by pi / 128, and it is jittered."""
-    tree, background = world_nodes()
-    place, add = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeVectorMath")
-    add.inputs[1].default_value = (2, 2, 2)
-    tree.links.new(add.inputs[0], place.outputs["Generated"])
-    tree.links.new(background.inputs["Color"], add.outputs[0])
-    bpy.context.scene.render.film_transparent = True
-    bpy.context.scene.cycles.film_exposure = 3.0
-    scenes.add_plane("In the way", (50, 50))
-    np.testing.assert_allclose(panorama(), 2 + directions(256, 128), atol=0.5 * np.pi / 128)
-
-
-def test_panorama_keeps_images_in_memory():
-    """An unsaved environment image comes back as it is, texel by texel; Cycles interpolates it linearly."""
-    tree, background = world_nodes()
-    image = bpy.data.images.new("Sky", 32, 16, float_buffer=True)
-    image.colorspace_settings.name = "Non-Color"
-    values = np.ones((16, 32, 4), np.float32)
-    values[..., :3] = np.random.default_rng(1).random((16, 32, 3))
-    image.pixels.foreach_set(values.ravel())
-    texture = tree.nodes.new("ShaderNodeTexEnvironment")
-    texture.image, texture.interpolation = image, "Closest"
-    tree.links.new(background.inputs["Color"], texture.outputs["Color"])
-    np.testing.assert_allclose(panorama(32, 16), values[..., :3], atol=1e-5)
-
-
-def test_panorama_answers_light_paths_as_to_a_diffuse_surface():
-    tree, background = world_nodes()
-    path, mix = tree.nodes.new("ShaderNodeLightPath"), tree.nodes.new("ShaderNodeMath")
-    mix.operation = "MULTIPLY_ADD"
-    mix.inputs[1].default_value, mix.inputs[2].default_value = 5.0, 1.0
-    tree.links.new(mix.inputs[0], path.outputs["Is Camera Ray"])
-    tree.links.new(background.inputs["Strength"], mix.outputs[0])
-    background.inputs["Color"].default_value = (0.1, 0.2, 0.3, 1)
-    np.testing.assert_allclose(panorama(16, 8), np.broadcast_to((0.1, 0.2, 0.3), (8, 16, 3)), rtol=1e-6)
-
-
-def test_panorama_has_all_of_a_sky_s_sun():
-    """Its irradiance on a level plane against Cycles' bake, 1 %."""
-    tree, background = world_nodes()
-    sky = tree.nodes.new("ShaderNodeTexSky")
-    kinds = {item.identifier for item in sky.bl_rna.properties["sky_type"].enum_items}
-    sky.sky_type = "NISHITA" if "NISHITA" in kinds else "MULTIPLE_SCATTERING"
-    sky.sun_elevation, sky.sun_rotation = 0.5, 1.0
-    tree.links.new(background.inputs["Color"], sky.outputs["Color"])
-    seen = panorama(1024, 512)
-    up = np.clip(directions(1024, 512)[..., 2], 0, None)
-    solid = 2 * np.pi / 1024 * np.pi / 512 * np.sqrt(1 - directions(1024, 512)[..., 2] ** 2)
-    ours = (seen * (up * solid)[..., None]).sum(axis=(0, 1))
-    material, image = target_material((1, 1, 1), 4)
-    floor = scenes.add_plane("Floor", material=material)
-    truth = cycles_bake(floor, image, {"DIRECT"}, 16384).mean(axis=(0, 1))
-    np.testing.assert_allclose(ours, truth, rtol=0.01)
 
 
 def test_a_process_that_is_cancelled_at_once():

@@ -88,7 +88,7 @@ def our_irradiance(plane):
     """By the add-on, at FINE x FINE points of each texel (FINE H, FINE W, 3), and what it warns of."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     illumination = read_illumination(depsgraph)
-    polygons = fit_uv_maps(read_polygons(plane.evaluated_get(depsgraph), "White"))
+    polygons = fit_uv_maps(read_polygons(plane.evaluated_get(depsgraph), "Target"))
     receiver = build_receiver(polygons, FINE * TEXELS, FINE * TEXELS)
     grid = receiver.charts[0].grid
     total = np.zeros((grid.height, grid.width, 3), np.float32)

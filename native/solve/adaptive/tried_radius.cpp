@@ -17,8 +17,7 @@ namespace beamspread {
 namespace {
 
 // Radii that are tried and the one that they are compared with, of the bound. The work is as the square: compared with
-// the bound itself the same ones come out, trying takes 1.35 times
-// as long.
+// the bound itself the same ones come out, trying takes 1.35 times as long.
 constexpr std::array<double, 3> parts = {0.2, 0.3, 0.44};
 constexpr double compared_with = 0.66;
 

@@ -1,8 +1,8 @@
 """What bounced.py runs in Blender as a module: SCENE [REFERENCE_SAMPLES]. Prints rows of a table.
 
 The child process's own mirrors gather what bounces; errors are those of the irradiance at its nodes, between them as
-texels get it, and of means of 4 x 4 nodes. Of two references each takes the
-other's noise out of the square: they share none.
+texels get it, and of means of 4 x 4 nodes. Of two references each takes the other's noise out of the square: they share
+none.
 """
 
 import math
@@ -18,7 +18,9 @@ from beamspread.core.scene.lights import STRATA, WEIGHTS
 from beamspread.core.scene.lights.field import spline_weights
 
 sys.path.insert(0, str(Path(beamspread.__file__).with_name("blender") / "cycles"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blender"))
 import child_fields
+import scenes
 from child_denoise import Denoiser
 from child_ghost import add_ghost
 
@@ -39,16 +41,9 @@ def quad(name, corners, color):
 
 
 def add_mesh(name, corners, faces, color):
-    material = bpy.data.materials.new(name)
-    material.use_nodes = True
-    nodes = material.node_tree.nodes
-    nodes.clear()
-    diffuse, output = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeOutputMaterial")
-    diffuse.inputs["Color"].default_value = (*color, 1)
-    material.node_tree.links.new(output.inputs["Surface"], diffuse.outputs[0])
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(corners, [], faces)
-    mesh.materials.append(material)
+    mesh.materials.append(scenes.diffuse_material(color, name))
     bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, mesh))
 
 
