@@ -66,6 +66,21 @@ def test_at_rest_the_picture_is_the_bake():
     np.testing.assert_allclose(live, baked_pixels(plane), rtol=1e-4)
 
 
+@pytest.mark.parametrize("change", ["lamp", "node"])
+def test_a_change_is_looked_at_before_the_next_step(change, monkeypatch):
+    plane, lamp, material = make_scene()
+    plane.location.x = 0.1
+    settle()  # more than lamps has been looked at: how long that takes is known
+    painter, asked = session.live.session._painter, []
+    monkeypatch.setattr(painter, "show", asked.append)
+    if change == "lamp":
+        lamp.location.x = -0.4
+    else:
+        scenes.node_of(material).albedo = (0.8, 0.7, 0.6)
+    bpy.context.view_layer.update()
+    assert len(asked) == 1
+
+
 def test_a_moved_lamp_reads_no_mesh(monkeypatch):
     _, lamp, material = make_scene()
     first = live_pixels(material)

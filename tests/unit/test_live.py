@@ -172,6 +172,27 @@ def test_an_exact_picture_stops_when_something_changes():
         assert painter.join(20)
 
 
+def test_a_new_medium_has_a_pace_of_its_own():
+    painter, sides = Painter(rest_seconds=0.01), []
+    quick = painter._studio.quick
+    painter._studio.quick = lambda subject, side, progress: sides.append(side) or quick(subject, side, progress)
+
+    def show(*lights, **rest):
+        painter.show([subject(*lights, **rest)])
+        wait_for(lambda: painter._done == painter._generation)
+
+    try:
+        show(LAMP)
+        for _ in range(10):
+            painter.paces[Target("Floor"), False].note(SIDES[0], 10.0)
+        show(LAMP, albedo=(0.9, 0.9, 0.6))
+        show(SUN, albedo=(0.9, 0.9, 0.6))
+        assert sides == [FIRST_SIDE, SIDES[0], FIRST_SIDE]
+    finally:
+        painter.end()
+        assert painter.join(10)
+
+
 def replace_name(light, number):
     place = (light.position[0] * math.cos(number), light.position[1] * math.sin(number), 0.3)
     return PointLight(f"{light.name} {number}", light.strength, light.color, True, place)

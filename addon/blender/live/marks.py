@@ -18,6 +18,7 @@ class Marks:
     lamps : names of lamps that moved or shine differently.
     moved, shaped : names of other objects that are elsewhere, and of objects and data of another shape.
     materials : full names of those that have changed.
+    nodes : whether any have other values; these are read at every look, so that it is no reason for one.
     images : whether any has changed that materials may show.
     other : whether anything else has, as what is visible, or the world.
     """
@@ -27,7 +28,7 @@ class Marks:
         self.moved: set[str] = set()
         self.shaped: set[str] = set()
         self.materials: set[str] = set()
-        self.images = self.world = self.other = False
+        self.nodes = self.images = self.world = self.other = False
 
     def __bool__(self) -> bool:
         return bool(self.lamps) or not self.is_lamps_alone()
@@ -37,8 +38,8 @@ class Marks:
         return not (self.moved or self.shaped or self.materials or self.images or self.world or self.other)
 
     def is_movement_alone(self) -> bool:
-        """Whether objects are elsewhere or lamps shine differently, and nothing has another shape or look."""
-        return not (self.shaped or self.materials or self.images or self.world or self.other)
+        """Whether objects are elsewhere or lamps shine differently, and nothing has another shape; see `materials`."""
+        return not (self.shaped or self.images or self.world or self.other)
 
     def note(self, updates: Collection, own_images: Collection[str]) -> None:
         """Add the updates of a depsgraph; those of `own_images`, and of materials along with them, are no news."""
@@ -55,6 +56,8 @@ class Marks:
                 self.world = True
             elif isinstance(changed, bpy.types.Scene | bpy.types.Collection):
                 self.other = True
+            elif isinstance(changed, bpy.types.ShaderNodeTree):
+                self.nodes = True
             elif one.is_updated_geometry and not isinstance(changed, USED):
                 self.shaped.add(changed.name)
 

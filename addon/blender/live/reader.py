@@ -81,7 +81,7 @@ class Reader:
         if light is None:
             if marks.images:
                 self._kept.forget_images()
-            self._kept.forget_materials([name for name in marks.materials if not _shows_medium_alone(name)])
+            self._kept.forget_materials([name for name in marks.materials if not shows_medium_alone(name)])
             if marks.world:
                 self._kept.world = None
             self._kept.forget(marks.shaped)
@@ -187,7 +187,7 @@ def _hidden(view_layer) -> list[str]:
     return [f"what the viewport hides: {', '.join(names)}"] if names else []
 
 
-def _shows_medium_alone(material_name: str) -> bool:
+def shows_medium_alone(material_name: str) -> bool:
     """Whether a Beamspread node is all that a material shows: others see nothing of it but its shape."""
     node = find_node(bpy.data.materials.get(material_name))
     return node is not None and any(link.to_node.bl_idname == OUTPUT for link in node.outputs["BSDF"].links)

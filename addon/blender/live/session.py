@@ -21,7 +21,7 @@ from ..registration import all_or_nothing, handlers
 from .canvas import Canvas, image_for, image_name_of
 from .marks import Marks
 from .painting import painted_results
-from .reader import Reader
+from .reader import Reader, shows_medium_alone
 from .stand_ins import StandIns
 
 # Between steps while something changes or is painted, while nothing does, and while Live is off.
@@ -76,7 +76,8 @@ class Session:
         if was_calm and self._marks:
             self._changed_at = time.perf_counter()
         is_small = self._look_seconds < SMALL_SECONDS or self._marks.is_lamps_alone()
-        if self._marks and self._marks.is_movement_alone() and is_small and not self._paused and not is_occupied():
+        is_simple = self._marks.is_movement_alone() and all(map(shows_medium_alone, self._marks.materials))
+        if (self._marks or self._marks.nodes) and is_simple and is_small and not self._paused and not is_occupied():
             # At once, so that it is painted while the window is drawn.
             self._look(depsgraph)
 

@@ -39,7 +39,8 @@ class Painter:
         self._epochs: dict = {}  # by target: of its last adoption
         self._adopted: dict = {}  # by target: key
         self._painted: dict = {}  # by target: key, whether with libraries of their own, whether exact
-        self.paces: dict = {}  # by target
+        self._surfaces: dict = {}  # by target, as painted last
+        self.paces: dict = {}  # by target and whether its surface is that of the picture before
         self._thread = threading.Thread(target=self._run, daemon=True, name="Beamspread painter")
         self._thread.start()
 
@@ -115,7 +116,7 @@ class Painter:
         for subject in subjects:
             if self._painted[subject.target][2]:
                 continue
-            if self.paces[subject.target].side() < SIDES[-1] < max(self._studio.size_of(subject)):
+            if self.paces[subject.target, True].side() < SIDES[-1] < max(self._studio.size_of(subject)):
                 # A look before what may take long.
                 self._put(subject, lambda subject: self._studio.quick(subject, SIDES[-1], self._until(generation)))
             self._put(subject, lambda subject: self._studio.exact(subject, self._until(generation)))
@@ -130,13 +131,21 @@ class Painter:
             known = self._painted[subject.target] = subject.key, not lacking, True
         if known is not None and known[:2] == (subject.key, not lacking):
             return
-        pace, made = self.paces.setdefault(subject.target, Pace()), self._studio.fields.made
+        for is_same in (True, False):
+            self.paces.setdefault((subject.target, is_same), Pace())
+        # A new medium takes longer, as its kernels have to be made.
+        is_same = self._surfaces.get(subject.target) == subject.surface
+        self._surfaces[subject.target] = subject.surface
+        pace, made = self.paces[subject.target, is_same], self._studio.fields.made
         side = pace.side()
         start = time.perf_counter()
-        self._put(subject, lambda subject: self._studio.quick(subject, side, lambda _: not self._is_ending))
-        if self._studio.fields.made == made:
+        has_failed = not self._put(
+            subject, lambda subject: self._studio.quick(subject, side, lambda _: not self._is_ending)
+        )
+        if self._studio.fields.made == made or not is_same:
             pace.note(side, time.perf_counter() - start)
-        self._note(subject, is_exact=False)
+        # What went wrong would go wrong again.
+        self._note(subject, is_exact=has_failed)
 
     def _lacking(self, subject: Subject) -> list:
         try:
@@ -147,7 +156,8 @@ class Painter:
     def _note(self, subject: Subject, is_exact: bool) -> None:
         self._painted[subject.target] = subject.key, not self._lacking(subject), is_exact
 
-    def _put(self, subject: Subject, paint) -> None:
+    def _put(self, subject: Subject, paint) -> bool:
+        """Whether nothing went wrong, of which the picture tells."""
         epoch = self._epoch
         try:
             picture = paint(subject)
@@ -156,6 +166,7 @@ class Painter:
         except Exception as error:  # noqa: BLE001 - the window says it, and the others are still to be painted
             picture = Picture(subject, error=sentence(error))
         self._pictures.put((epoch, picture))
+        return not picture.error
 
     def _until(self, generation: int) -> Progress:
         return lambda _fraction: not self._is_stale(generation)
