@@ -17,7 +17,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 TOOLS = ROOT / "build/venv/bin"
 NATIVE = ROOT / "native"
-COMPILE_COMMANDS = ROOT / "build/release/compile_commands.json"
+# Of the preset that compiles each file by itself.
+COMPILE_COMMANDS = ROOT / "build/dev/compile_commands.json"
 STAMPS = ROOT / "build/.tidy"
 PYTHON_FOLDERS = ["addon", "tests", "tools", "blend_examples", "docs"]
 PROJECT_INCLUDE = re.compile(rb'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
@@ -58,6 +59,7 @@ def source_and_headers(path: Path) -> frozenset[Path]:
 def check_tidy() -> bool:
     tidy = str(TOOLS / "clang-tidy")
     configuration = (ROOT / ".clang-tidy").read_bytes() + subprocess.check_output([tidy, "--version"])
+    subprocess.run(["cmake", "--preset", "dev"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
     commands = {Path(entry["file"]): entry["command"] for entry in json.loads(COMPILE_COMMANDS.read_text())}
     STAMPS.mkdir(parents=True, exist_ok=True)
 

@@ -113,7 +113,7 @@ def test_spread(shape, spread):
     plane, image = add_receiver(PLANES["plain"])
     lamp = add_light("AREA", plane, shape=shape, size=0.9, size_y=0.6, spread=math.radians(spread))
     # Within 20 degrees the light falls from all to nothing over a few blocks, which Cycles samples coarsely.
-    assert_agree(plane, image, core_light(lamp), samples=1024, most=0.02 if spread == 20 else TOLERANCE)
+    assert_agree(plane, image, core_light(lamp), samples=512, most=0.02 if spread == 20 else TOLERANCE)
 
 
 @pytest.mark.skipif(IS_OLD, reason="Blender's spread begins at one degree")
@@ -141,7 +141,7 @@ def test_area_through_the_plane():
     plane, image = add_receiver(PLANES["plain"])
     lamp = add_light("AREA", plane, (1.2, 0, 0.2), (0.1, 0.7, 0.1), shape="RECTANGLE", size=1.5, size_y=1)
     # The light is without bound along the line where the lamp cuts the plane.
-    assert_agree(plane, image, core_light(lamp), least=0.05, samples=1024, worst=0.2, total=5e-3, most=0.04)
+    assert_agree(plane, image, core_light(lamp), least=0.05, samples=512, worst=0.2, total=5e-3, most=0.04)
 
 
 @pytest.mark.parametrize("size", [(0, 0), (0.5, 0)])
@@ -175,7 +175,7 @@ def test_radius(kind, place, soft):
     options = {"least": 0.05, "total": 6e-3, "worst": 0.15, "most": 0.04} if cuts else {"worst": 0.1}
     if kind == "SPOT" and place[2] < 0:
         options["least"] = 0.3
-    assert_agree(plane, image, core_light(lamp), samples=1024, **options)
+    assert_agree(plane, image, core_light(lamp), samples=512, **options)
 
 
 @pytest.mark.parametrize("soft", MODELS)
@@ -186,7 +186,7 @@ def test_spot_falloff_with_radius(blend, soft):
     lamp = add_light(
         "SPOT", plane, scale=(1.5, 1, 0.8), shadow_soft_size=0.3, spot_size=0.9, spot_blend=blend, **options
     )
-    assert_agree(plane, image, core_light(lamp), samples=1024, least=0.05)
+    assert_agree(plane, image, core_light(lamp), samples=512, least=0.05)
 
 
 @pytest.mark.parametrize("angle", [0, 5, 40, 120])
@@ -198,4 +198,4 @@ def test_sun_angle(tilt, angle):
     if tilt - math.radians(angle) / 2 > math.pi / 2:
         assert cycles_irradiance(plane, image).max() == our_irradiance(plane, light).max() == 0
     else:
-        assert_agree(plane, image, light, samples=1024)
+        assert_agree(plane, image, light, samples=512)

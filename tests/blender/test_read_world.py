@@ -58,7 +58,7 @@ def the_world():
 def irradiance(light, normal):
     """Plain sum over the texels of a panorama, each of which is a patch of sky, cut into 4 x 4."""
     height, width = light.radiance.shape[:2]
-    finer = max(1, 2048 // width)
+    finer = max(1, 1024 // width)
     radiance = np.repeat(np.repeat(light.radiance, finer, axis=0), finer, axis=1).astype(float)
     height, width = radiance.shape[:2]
     towards = directions(width, height, slice(None)) @ np.array(light.to_world).T

@@ -322,7 +322,7 @@ def sound_files(tmp_path_factory):
     return [path.read_bytes(), plain_exr(image(5, 5, 2), [("A", HALF), ("B", FLOAT)]), plain_multi_part(pair)]
 
 
-@settings(max_examples=1000, deadline=None)
+@settings(max_examples=400, deadline=None)
 @given(
     kind=st.integers(0, 2),
     # Most of what can be damaged is in the first few hundred bytes.
