@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import sentence
 from ..native import native
-from ..progress import Progress
+from ..progress import Progress, stages
 from .job import BakeJob
 
 WRITTEN, SKIPPED, FAILED, CANCELLED = "written", "skipped", "failed", "cancelled"
@@ -58,7 +58,10 @@ class Bake:
             return
         start = time.monotonic()
         try:
-            self.layers = self.job.run(progress)
+            coloring, baking = stages(progress, [self.job.color_seconds, self.job.seconds()])
+            self.job = self.job.colored(coloring)
+            self.warnings += [one for one in self.job.warnings() if one not in self.warnings]
+            self.layers = self.job.run(baking)
             self.is_dark = self.job.is_dark(self.layers)
             self.warnings += self.job.warnings_after(self.layers)
         except (KeyboardInterrupt, native.Cancelled):
