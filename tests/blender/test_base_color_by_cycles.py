@@ -81,7 +81,7 @@ def bake_of(obj, number=0, **changes):
 
 def evaluated(obj, number=0):
     """The colour and the coverage of the texels."""
-    job = bake_of(obj, number).job.colored()
+    job, _ = bake_of(obj, number).job.colored()
     mean = np.array(job.surface.base_color)
     # color_in times color_out is the colour over its mean.
     colors = [chart.grid.color_in * chart.grid.color_out * mean for chart in job.receiver.charts]
@@ -260,7 +260,7 @@ def test_it_is_asked_for_once_in_a_run_and_only_where_it_counts(plane, monkeypat
     turns = Queue(preparation, [target, target], False)._turns
     assert turns[0].seconds == turns[1].seconds + preparation.color_seconds(target) > turns[1].seconds
     for _ in range(2):
-        job = preparation.bake(target).job.colored()
+        job, _ = preparation.bake(target).job.colored()
         assert job.surface.base_color == pytest.approx((0.4,) * 3)
     assert asked == [target]
     select(plane)

@@ -40,14 +40,15 @@ class BakeJob:
     more_color: Callable[[BakeJob, Progress | None], BakeJob] | None = None
     color_seconds: float = 0.0
 
-    def colored(self, progress: Progress | None = None) -> BakeJob:
-        """The job with its colours, which may have more to warn of."""
+    def colored(self, progress: Progress | None = None) -> tuple[BakeJob, Progress | None]:
+        """The job with its colours, which may have more to warn of, and the progress that is left for `run`."""
         if self.more_color is None or self._surely_dark():
-            return self
+            return self, progress
         self.surface.check()
-        say(progress, "Evaluating the base color")
+        coloring, rest = stages(progress, [self.color_seconds, self._finding_seconds() + self._baking_seconds()])
+        say(coloring, "Evaluating the base color")
         with timed(f"base color of '{self.name}'"):
-            return replace(self.more_color(self, progress), more_color=None, color_seconds=0.0)
+            return replace(self.more_color(self, coloring), more_color=None), rest
 
     def run(self, progress: Progress | None = None) -> dict[str, np.ndarray]:
         """The layers of a `colored` job: name -> float32 (height, width, 3), with margin, row 0 at the bottom."""
@@ -83,10 +84,6 @@ class BakeJob:
         media = to_simulate(self.surface, self.settings)
         for medium, step in zip(media, stages(progress, [1.0] * len(media))):
             library(medium, self.settings.quality, step, self.settings.threads)
-
-    def seconds(self) -> float:
-        """About how long `run` takes."""
-        return self._finding_seconds() + self._baking_seconds()
 
     def _finding_seconds(self) -> float:
         return self.more_seconds if self.more_light else 0.0

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import sentence
 from ..native import native
-from ..progress import Progress, stages
+from ..progress import Progress
 from .job import BakeJob
 
 WRITTEN, SKIPPED, FAILED, CANCELLED = "written", "skipped", "failed", "cancelled"
@@ -58,10 +58,9 @@ class Bake:
             return
         start = time.monotonic()
         try:
-            coloring, baking = stages(progress, [self.job.color_seconds, self.job.seconds()])
-            self.job = self.job.colored(coloring)
+            self.job, rest = self.job.colored(progress)
             self.warnings += [one for one in self.job.warnings() if one not in self.warnings]
-            self.layers = self.job.run(baking)
+            self.layers = self.job.run(rest)
             self.is_dark = self.job.is_dark(self.layers)
             self.warnings += self.job.warnings_after(self.layers)
         except (KeyboardInterrupt, native.Cancelled):
