@@ -215,6 +215,19 @@ def test_of_several_materials_the_others_stay_out():
     assert np.ptp(ours) > 0.2
 
 
+def test_what_is_linked_from_another_file(plane, tmp_path):
+    add_noise_to(plane.data.materials[0])
+    truth, _ = evaluated(plane)
+    library = str(tmp_path / "library.blend")
+    bpy.data.libraries.write(library, {plane})
+    bpy.data.batch_remove([plane, plane.data.materials[0]])
+    with bpy.data.libraries.load(library, link=True) as (_there, wanted):
+        wanted.objects = ["Plane"]
+    bpy.context.collection.objects.link(wanted.objects[0])
+    ours, _ = evaluated(wanted.objects[0])
+    np.testing.assert_allclose(ours, truth, atol=1e-4)
+
+
 def test_a_child_that_fails_is_said_and_the_own_color_counts(plane, monkeypatch, tmp_path):
     material = plane.data.materials[0]
     own = bake(plane)[0].copy()

@@ -16,8 +16,9 @@ def colors(request, scene, progress) -> dict:
     are baked, each the mean of `samples`: Cycles takes the first of these in the middle, and moves those back that are
     beyond a triangle.
     """
-    obj, material = scene.objects[request["object"]], bpy.data.materials[request["material"]]
-    source = linked_source(material.node_tree, *request["texture"])
+    obj, material = selectable(scene, scene.objects[request["object"]]), bpy.data.materials[request["material"]]
+    shown = material.copy()  # a linked one would be baked as it was
+    source = linked_source(shown.node_tree, *request["texture"])
     if source is None:
         raise RuntimeError(f"nothing is linked to the Base Color of '{material.name}'")
     without_limits(scene)
@@ -26,12 +27,10 @@ def colors(request, scene, progress) -> dict:
     image = bpy.data.images.new("Colors", width * places, height * places, float_buffer=True, alpha=False)
     image.colorspace_settings.name = "Non-Color"
     image.pixels.foreach_set(np.full(len(image.pixels), np.nan, np.float32))
-    glow(material.node_tree, source, image)
+    glow(shown.node_tree, source, image)
     bare = bpy.data.materials.new("Without image")
     for slot in obj.material_slots:
-        if slot.material != material:
-            slot.material = bare
-    make_selectable(scene, obj)
+        slot.material = shown if slot.material == material else bare
     baker = Baker(scene, obj, image, "EMIT")
     layers = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.uv_layers
     baker.options |= {"use_clear": False, "uv_layer": next(one.name for one in layers if one.active_render)}
@@ -50,10 +49,16 @@ def glow(tree, source, image) -> None:
     tree.links.new(emission.inputs["Color"], source)
 
 
-def make_selectable(scene, obj) -> None:
-    """Blender bakes what is selected, and selects only what a view shows."""
-    if obj.name not in scene.collection.objects:
+def selectable(scene, obj):
+    """The object, or a copy of a linked one: Blender bakes what is selected, its own, and shown by a view."""
+    if obj.library is not None:
+        obj = obj.copy()
+        obj.name += " to bake"  # Cycles looks for it by its name
+    if obj.data.library is not None:
+        obj.data = obj.data.copy()
+    if obj not in scene.collection.objects.values():
         scene.collection.objects.link(obj)
     obj.hide_viewport = obj.hide_select = False
     bpy.context.view_layer.update()
     obj.hide_set(False)
+    return obj
