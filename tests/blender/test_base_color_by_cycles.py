@@ -260,7 +260,8 @@ def test_it_stops_within_two_seconds_and_leaves_the_scene(plane):
 
 
 def test_it_is_asked_for_once_in_a_run_and_only_where_it_counts(plane, monkeypatch):
-    add_noise_to(plane.data.materials[0])
+    material = plane.data.materials[0]
+    add_noise_to(material)
     asked = []
 
     def colors(_copy, target, receiver, _progress):
@@ -268,7 +269,7 @@ def test_it_is_asked_for_once_in_a_run_and_only_where_it_counts(plane, monkeypat
         return [np.full((chart.grid.height, chart.grid.width, 3), 0.4, np.float32) for chart in receiver.charts]
 
     monkeypatch.setattr(texture, "colors_by_cycles", colors)
-    settings, target = bpy.context.scene.beamspread.for_bake(), Target("Plane", plane.data.materials[0].name)
+    settings, target = bpy.context.scene.beamspread.for_bake(), Target("Plane", material.name)
     preparation = read_scene(bpy.context, [target], settings)
     turns = Queue(preparation, [target, target], False)._turns
     assert turns[0].seconds == turns[1].seconds + preparation.color_seconds(target) > turns[1].seconds
@@ -282,6 +283,11 @@ def test_it_is_asked_for_once_in_a_run_and_only_where_it_counts(plane, monkeypat
     assert bake_of(plane, output="IRRADIANCE").job.more_color is None
     bpy.context.scene.beamspread.output = "IRRADIANCE"
     assert estimates(bpy.context) == []
+    bpy.context.scene.beamspread.output = "LUMINANCE"
+    image = material.node_tree.nodes.new("ShaderNodeTexImage")
+    material.node_tree.links.new(base_color(material), image.outputs["Color"])
+    assert estimates(bpy.context) == []
+    assert bake_of(plane).job.more_color is None
 
 
 def test_blenders_own_bake_has_it(plane):
