@@ -17,7 +17,7 @@ from .process import run
 # In a texel of a small texture; of larger ones fewer, down to the least, so that it takes seconds.
 MOST_SAMPLES, LEAST_SAMPLES, ALL_SAMPLES = 16, 4, 1 << 24
 
-# Pixels that are baked, which take 100 bytes each: up to so many a texel has several, in rows.
+# Pixels that are baked, which take some 200 bytes each: up to so many a texel has several, in rows.
 ALL_PIXELS = 1 << 22
 
 # Of a processor, for estimates: a noise texture of two octaves in Blender 3.4 (4.5: 2.5e6).
