@@ -107,17 +107,6 @@ def test_images_finer_than_the_bake_are_averaged(plane):
     assert found == pytest.approx(bake(plane)[0], rel=1e-4)
 
 
-def test_what_is_not_understood_is_named_and_the_own_color_counts(plane):
-    material = plane.data.materials[0]
-    own = bake(plane)[0].copy()
-    noise = material.node_tree.nodes.new("ShaderNodeTexNoise")
-    link(material, noise.outputs["Color"])
-    assert bake(plane)[0] == pytest.approx(own, rel=1e-6)
-    (message,) = state.messages()
-    assert "Noise Texture" in message
-    assert "Bake the nodes to an image" in message
-
-
 def test_colors_above_one_are_cut_and_said(plane):
     material = plane.data.materials[0]
     link(material, add_image(material, COLORS * 2).outputs["Color"])

@@ -351,4 +351,4 @@ def test_a_texture_that_is_not_understood_is_said():
     noise = material.node_tree.nodes.new("ShaderNodeTexNoise")
     material.node_tree.links.new(scenes.node_of(material).inputs["Base Color"], noise.outputs["Color"])
     assert live_pixels(material).max() > 0
-    assert "Base Color of 'Plane' can't be evaluated" in session.sentences()[0]
+    assert "Live can't evaluate the Base Color of 'Plane'" in session.sentences()[0]

@@ -364,6 +364,9 @@ class EndlessJob:
     def warnings(self):
         return []
 
+    def colored(self, progress):
+        return self, progress
+
     def run(self, progress):
         while progress(0.5):
             pass

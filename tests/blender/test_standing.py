@@ -71,6 +71,11 @@ def own_uvs(plane):
     plane.data.update()
 
 
+def painted(plane):
+    plane.data.color_attributes.new("Painted", "FLOAT_COLOR", "POINT").data[0].color = (1, 0, 0, 1)
+    plane.data.update()
+
+
 def world(_plane):
     bpy.context.scene.world = bpy.data.worlds.new("Grey")
 
@@ -97,6 +102,7 @@ CHANGES = {
     "occluder's material": (see_through, "other objects"),
     "receiver moved": (lambda plane: setattr(plane.location, "z", 0.1), "object"),
     "receiver's UVs": (own_uvs, "object"),
+    "receiver's colours": (painted, "object"),
     "node": (lambda plane: setattr(node_of(plane.data.materials[0]), "ior", 1.3), "material"),
     "world": (world, "world"),
     "setting": (lambda _: setattr(bpy.context.scene.beamspread, "samples", 2), "settings"),
@@ -112,6 +118,19 @@ def test_what_a_bake_read_makes_it_stale(plane, name):
     assert row().is_stale
     assert row().standing == Standing.STALE
     assert part in row().sentences[0]
+
+
+def test_another_output_of_the_node_before_it(plane):
+    node = node_of(plane.data.materials[0])
+    place = node.id_data.nodes.new("ShaderNodeTexCoord")
+    node.id_data.links.new(node.inputs["Base Color"], place.outputs["UV"])
+    bake(plane)
+    node.id_data.links.new(node.inputs["Roughness"], place.outputs["Object"])
+    update()
+    assert row().standing == Standing.BAKED
+    node.id_data.links.new(node.inputs["Base Color"], place.outputs["Object"])
+    update()
+    assert "material" in row().sentences[0]
 
 
 def test_what_it_did_not_read_does_not(plane):

@@ -395,6 +395,9 @@ class FailingJob:
     def warnings(self):
         return ["Careful."]
 
+    def colored(self, progress):
+        return self, progress
+
     def is_dark(self, layers):
         return False
 
@@ -440,6 +443,30 @@ def test_a_bake_that_cannot_be_stored_has_failed():
     one.run()
     one.keep(full_disk)
     assert (one.status, one.error, one.layers) == ("failed", "no space left", {})
+
+
+def test_a_job_gets_the_colors_that_it_lacks_before_it_runs():
+    """What there is to say of them comes beside what was said before, and progress goes on from there."""
+    before, fractions = job([SUN], surface=Surface(MATERIAL, base_color=(0.5,) * 3)), []
+
+    def color(one, progress):
+        progress(0.0)
+        progress(1.0)
+        said = one.illumination.warning("Paler than it looks.")
+        return replace(one, surface=Surface(MATERIAL, base_color=(0.3,) * 3), illumination=said)
+
+    late = replace(before, more_color=color, color_seconds=1e6)
+    bake = Bake(Target("Plane"), late)
+    assert bake.warnings == []
+    bake.run(fractions.append)
+    assert bake.warnings == ["Paler than it looks."]
+    truth = replace(before, surface=Surface(MATERIAL, base_color=(0.3,) * 3)).run()
+    assert bake.layers[COMBINED] == pytest.approx(truth[COMBINED])
+    assert fractions[0] == 0
+    assert 0.999 < fractions[1] <= fractions[2]
+    assert fractions == sorted(fractions)
+    dark = replace(late, illumination=Illumination([]), more_color=lambda *_: pytest.fail("nothing shows it"))
+    assert not dark.colored()[0].run()[COMBINED].any()
 
 
 def test_a_bake_that_ended_before_it_was_cancelled_keeps_nothing():

@@ -85,6 +85,7 @@ def test_grid_is_the_chart_alone():
     assert np.array(chart.grid.origin) == pytest.approx([4, 2, 0])
     values = np.arange(32, dtype=np.float32).reshape(8, 4, 1)
     texture = receiver.to_texture([values])
+    np.testing.assert_array_equal(receiver.charts[0].read(texture), values)
     assert np.array_equal(texture[4:12, 8:12], values)
     assert texture.sum() == values.sum()
     assert receiver.inside().sum() == 32
@@ -136,7 +137,7 @@ def test_faces_that_join_to_one_plane():
 
 @pytest.mark.parametrize("shear", [-0.7, 0.3, 2.0])
 def test_sheared_uvs_are_resampled(shear):
-    """A field that is linear on the plane comes back linear in the texture."""
+    """A field that is linear on the plane comes back linear in the texture, and from there the same on the grid."""
     p_u, p_v = np.array([3.0, 0, 0]), np.array([shear, 2.0, 0])
     receiver = receiver_of(quad(p_u, p_v, (1, 1, 0)), 30, 20)
     grid = receiver.charts[0].grid
@@ -150,11 +151,16 @@ def test_sheared_uvs_are_resampled(shear):
         + rows[..., None] * 0.1 * np.array(grid.y_axis)
     )
     slope = np.array([2.0, -1.0, 0.5])
-    texture = receiver.to_texture([(points @ slope)[..., None].astype(np.float32)])[..., 0]
+    on_grid = (points @ slope)[..., None].astype(np.float32)
+    texture = receiver.to_texture([on_grid])[..., 0]
     v, u = (np.mgrid[:20, :30] + 0.5) / [[[20]], [[30]]]
     expected = (np.array([1, 1, 0]) + u[..., None] * p_u + v[..., None] * p_v) @ slope
     inside = (slice(1, -1), slice(1, -1))
     assert texture[inside] == pytest.approx(expected[inside], abs=1e-4)
+    (chart,) = receiver.charts
+    is_inside = (np.abs(chart.uvs(30, 20) - 0.5) < 0.5 - 1 / 20).all(axis=2)
+    assert is_inside.mean() > 0.3
+    assert chart.read(np.float32(expected[..., None]))[is_inside] == pytest.approx(on_grid[is_inside], abs=1e-4)
 
 
 def test_texture_size_keeps_texels_square():

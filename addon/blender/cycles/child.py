@@ -14,11 +14,17 @@ import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+import child_colors
 import child_fields
 import child_render
 import child_world
 
-TASKS = {"world": child_world.panorama, "fields": child_fields.fields, "render": child_render.render}
+TASKS = {
+    "world": child_world.panorama,
+    "fields": child_fields.fields,
+    "colors": child_colors.colors,
+    "render": child_render.render,
+}
 
 
 def restore_images(file: Path) -> None:

@@ -40,7 +40,7 @@ def fields(request, scene, progress) -> dict:
         shine_alone(scene, request["only"])
     ghost, image = add_ghost(request["charts"], request["strata"], request["by_lamps"])
     scene.collection.objects.link(ghost)
-    baker = Baker(scene, ghost, image, request["light"], "DIFFUSE" if request["by_lamps"] else "GLOSSY")
+    baker = Baker(scene, ghost, image, "DIFFUSE" if request["by_lamps"] else "GLOSSY", request["light"])
     looks = [baker.bake(LOOK), baker.bake(LOOK)]
     mean, samples, count = Mean(), 2 * LOOK, 2 * LOOK
     for look in looks:
@@ -178,14 +178,20 @@ def shine_alone(scene, names) -> None:
                     socket.default_value = 0.0
 
 
-def set_up(scene, light) -> None:
-    """The artist's materials and bounces, but no clamps, no exposure, nothing that stops early."""
+def without_limits(scene) -> None:
+    """Cycles without clamps, exposure, or what stops early."""
     scene.render.engine = "CYCLES"
     cycles = scene.cycles
     cycles.use_denoising = cycles.use_adaptive_sampling = cycles.use_auto_tile = False
     cycles.film_exposure = 1.0
     cycles.time_limit = 0
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
+
+
+def set_up(scene, light) -> None:
+    """The artist's materials and bounces."""
+    without_limits(scene)
+    cycles = scene.cycles
     # The mirror stands for a diffuse surface: it uses up a glossy bounce in place of a diffuse one.
     cycles.glossy_bounces += 1
     cycles.diffuse_bounces -= 1
@@ -213,8 +219,8 @@ class Mean:
 class Baker:
     """Bakes the ghost again and again."""
 
-    def __init__(self, scene, ghost, image, light, kind) -> None:
-        self.scene, self.ghost, self.image, self.light, self.kind = scene, ghost, image, light, kind
+    def __init__(self, scene, ghost, image, kind, light="") -> None:
+        self.scene, self.ghost, self.image, self.kind, self.light = scene, ghost, image, kind, light
         self.rounds = 0
         view_layer = bpy.context.view_layer
         view_layer.update()  # before, the ghost can't be selected
@@ -231,10 +237,11 @@ class Baker:
         draw_anew(self.ghost, self.rounds)
         self.scene.cycles.seed, self.scene.cycles.samples = self.rounds, samples
         if self.light == "INDIRECT" and INDIRECT_LACKS_LAMPS:
-            return self._bake({"DIRECT", "INDIRECT"}) - self._bake({"DIRECT"})
-        return self._bake({self.light})
+            return self.bake_passes({"DIRECT", "INDIRECT"}) - self.bake_passes({"DIRECT"})
+        return self.bake_passes({self.light})
 
-    def _bake(self, passes: set) -> np.ndarray:
+    def bake_passes(self, passes: set) -> np.ndarray:
+        """As the scene is now."""
         bpy.ops.object.bake(type=self.kind, pass_filter=passes, **self.options)
         values = np.empty(len(self.image.pixels), np.float32)
         self.image.pixels.foreach_get(values)

@@ -120,13 +120,13 @@ def _mirror(image):
     if "SHARP" in {item.identifier for item in glossy.bl_rna.properties["distribution"].enum_items}:
         glossy.distribution = "SHARP"
     link(glossy.inputs["Normal"], halfway)
-    _finish(tree, glossy, image)
+    finish(tree, glossy, image)
     return material
 
 
 def _diffuse(image):
     material = _new_material()
-    _finish(material.node_tree, material.node_tree.nodes.new("ShaderNodeBsdfDiffuse"), image)
+    finish(material.node_tree, material.node_tree.nodes.new("ShaderNodeBsdfDiffuse"), image)
     return material
 
 
@@ -138,7 +138,7 @@ def _new_material():
     return material
 
 
-def _finish(tree, surface, image) -> None:
+def finish(tree, surface, image) -> None:
     """White, at the output, and with the image that is baked into."""
     surface.inputs["Color"].default_value = (1, 1, 1, 1)
     output = tree.nodes.new("ShaderNodeOutputMaterial")

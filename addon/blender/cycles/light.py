@@ -94,11 +94,9 @@ class CyclesLight:
         others = [name for name in illumination.by_cycles if name != world and name in scene.objects]
         if not (world or bounced or others):
             return job
-        if self._copy is None:
-            if threading.current_thread() is not threading.main_thread():
-                missing = "Blender's own Bake asks Cycles only where Indirect Light is on: or use Bake Beamspread."
-                return replace(job, illumination=illumination.warning(missing))
-            self._copy = CopyForCycles(scene, scene.view_layers[self._names[1]])
+        if self.copy() is None:
+            missing = "Blender's own Bake asks Cycles only where Indirect Light is on: or use Bake Beamspread."
+            return replace(job, illumination=illumination.warning(missing))
         illumination = illumination.found({world, *others} - {""}).warning(*self._copy.scene.warnings)
         return replace(
             job,
@@ -108,6 +106,13 @@ class CyclesLight:
                 receiver, illumination.lights, world, others, bounced, progress
             ),
         )
+
+    def copy(self) -> CopyForCycles | None:
+        """Of the scene; None where there is none yet, and where it can't be made: outside the main thread."""
+        if self._copy is None and threading.current_thread() is threading.main_thread():
+            scene = bpy.data.scenes[self._names[0]]
+            self._copy = CopyForCycles(scene, scene.view_layers[self._names[1]])
+        return self._copy
 
     def _is_below_something(self, receiver: Receiver) -> bool:
         for grid in (chart.grid for chart in receiver.charts):

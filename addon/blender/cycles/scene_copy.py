@@ -69,7 +69,7 @@ class SceneCopy:
         for image in bpy.data.images:
             if not image.is_dirty or image.library is not None or image.source not in {"GENERATED", "FILE"}:
                 if image.is_dirty and image.source == "TILED":
-                    self.warnings.append(f"The image '{image.name}' is not saved: bounced light sees its files.")
+                    self.warnings.append(f"The image '{image.name}' is not saved: Cycles sees its files.")
                 continue
             if not image.size[0] or not image.users:
                 continue

@@ -21,6 +21,7 @@ from .fingerprint import Parts
 from .picture import render_picture, show_by_eevee
 from .prepare import prepare
 from .state import state
+from .texture import needs_cycles
 
 
 class BeamspreadEngine(bpy.types.RenderEngine):
@@ -125,7 +126,9 @@ class _Fillings:
         targets = find_targets(bpy.context.selected_objects)
         self._parts = stale.parts_of(bpy.context, targets) if targets else {}
         scene = bpy.context.scene
-        self.copy = CopyForCycles(scene, bpy.context.view_layer) if targets and scene.beamspread.use_indirect else None
+        asks = bool(targets) and scene.beamspread.use_indirect
+        asks |= any(needs_cycles(scene.objects[one.object_name], one.material_name) for one in targets)
+        self.copy = CopyForCycles(scene, bpy.context.view_layer) if asks else None
 
     def add(self, bakes: list[Bake]) -> None:
         parts = self._parts

@@ -71,18 +71,22 @@ def values_of(struct, skipped: Iterable[str] = (), depth: int = 0) -> list:
 
 def tree_values(tree) -> list:
     """Nodes with their values, and links; groups from inside. Names and places in the editor don't count."""
-    numbers = {node.name: number for number, node in enumerate(tree.nodes)}
-    nodes = [_node_values(node) for node in tree.nodes]
-    links = [
+    return [[_node_values(node) for node in tree.nodes], _links_between(tree.nodes, tree.links)]
+
+
+def _links_between(nodes: Iterable, links: Iterable) -> list:
+    """Those of the links that have these nodes at both ends."""
+    numbers = {node.name: number for number, node in enumerate(nodes)}
+    ends = (
         (
-            numbers[link.from_node.name],
+            numbers.get(link.from_node.name),
             link.from_socket.identifier,
-            numbers[link.to_node.name],
+            numbers.get(link.to_node.name),
             link.to_socket.identifier,
         )
-        for link in tree.links
-    ]
-    return [nodes, sorted(links)]
+        for link in links
+    )
+    return sorted(end for end in ends if None not in end)
 
 
 def _node_values(node) -> list:
@@ -263,7 +267,9 @@ def _upstream(socket) -> list:
     tree = socket.id_data
     if not socket.is_linked:
         return []
-    return [_node_values(node) for node in tree.nodes if node.bl_idname not in LEFT_OUT] if tree else []
+    nodes = [node for node in tree.nodes if node.bl_idname not in LEFT_OUT]
+    links = [link for link in tree.links if link.to_node != socket.node or link.to_socket == socket]
+    return [[_node_values(node) for node in nodes], _links_between([*nodes, socket.node], links)]
 
 
 def image_part(image) -> str:
@@ -280,7 +286,7 @@ def _modifier(modifier) -> object:
 
 
 def _mesh(obj, depsgraph) -> str:
-    """Of the corners, faces and UV maps, with modifiers where the window shows the object."""
+    """Of the corners, faces, UV maps and painted colours, with modifiers where the window shows the object."""
     if obj.type not in GEOMETRY:
         return obj.data.name_full if obj.data else ""
     evaluated = obj.evaluated_get(depsgraph)
@@ -298,6 +304,7 @@ def _mesh(obj, depsgraph) -> str:
             (mesh.polygons, "loop_total", np.int32, 1),
             (mesh.polygons, "material_index", np.int32, 1),
             *((layer.data, "uv", np.float32, 2) for layer in mesh.uv_layers),
+            *((layer.data, "color", np.float32, 4) for layer in mesh.color_attributes),
         ]:
             array = np.empty(len(values) * size, kind)
             values.foreach_get(name, array)

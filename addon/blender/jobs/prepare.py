@@ -6,13 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from ...core.bake.estimate import bake_bytes, machine_bytes
-from ...core.bake.job import BakeJob, to_simulate
+from ...core.bake.job import BakeJob, needs_medium, to_simulate
 from ...core.bake.runner import Bake, Target
 from ...core.bake.settings import BakeSettings
 from ...core.bake.surface import Surface
 from ...core.errors import BakeError, sentence
 from ...core.scene.receiver import build_receiver, texture_size
 from ...core.scene.uv_map import fit_uv_maps
+from ..cycles.colors import seconds_of_colors
 from ..cycles.light import CopyForCycles, CyclesLight
 from ..images.files import check_image
 from ..images.sequence import is_sequence, size_of_frames
@@ -20,7 +21,10 @@ from ..node.find import find_place, materials_of
 from ..read.geometry import read_polygons
 from ..read.lights import read_illumination
 from ..read.visible import as_rendered, render_visible_names
-from .texture import BaseColor, read_texture
+from .texture import BaseColor, ColorByCycles, read_texture
+
+# Stands for a base color that is found when the job runs.
+SOME_COLOR = (0.5, 0.5, 0.5)
 
 
 def prepare_scene(
@@ -105,6 +109,12 @@ class Preparation:
         plan = self._plans[target]
         return [] if isinstance(plan, str) else to_simulate(plan.surface, replace(self.settings, quality=quality))
 
+    def color_seconds(self, target: Target) -> float:
+        """About how long Cycles takes for its base colour, where it does."""
+        plan = self._plans[target]
+        asks = needs_medium(self.settings) and not isinstance(plan, str) and isinstance(plan.texture, ColorByCycles)
+        return seconds_of_colors(*plan.size) if asks else 0.0
+
     def bake(self, target: Target, settings: BakeSettings | None = None) -> Bake:
         """The target's bake, with its job or the reason why there is none; in the main thread."""
         plan = self._plans[target]
@@ -115,7 +125,9 @@ class Preparation:
             illumination = self._illumination.lighting(target.object_name)
             job = BakeJob(target.object_name, receiver, illumination, plan.surface, settings or self.settings)
             check_memory(job, self.settings.memory_limit)
-            if plan.texture is not None:
+            if isinstance(plan.texture, ColorByCycles):
+                job = plan.texture.in_job(job, self._by_cycles.copy())
+            elif plan.texture is not None:
                 job = plan.texture.in_job(job)
             return Bake(target, self._by_cycles.complete(job))
         except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
@@ -129,7 +141,7 @@ class _Plan:
     maps: list
     size: tuple[int, int]
     surface: Surface
-    texture: BaseColor | None = None
+    texture: BaseColor | ColorByCycles | None = None
 
 
 def _read_target(depsgraph, target: Target, resolution: int | None, size: tuple[int, int] | None) -> _Plan:
@@ -148,6 +160,8 @@ def _read_target(depsgraph, target: Target, resolution: int | None, size: tuple[
     if not node.has_texture():
         return _Plan(maps, size, surface)
     texture = read_texture(node, groups, obj, build_receiver(maps, *size))
+    if texture.unknown:
+        return _Plan(maps, size, replace(surface, base_color=SOME_COLOR), ColorByCycles(target, surface, texture.blur))
     return _Plan(maps, size, texture.on(surface), texture)
 
 

@@ -75,11 +75,14 @@ def _turns(preparation: Preparation, targets: list[Target], preview_first: bool)
     keys = {_image_key(target) for target in quick}
     again = [target for target in targets if _image_key(target) in keys]
     met: list = []
+    colored: set[Target] = set()
 
     def seconds(target: Target, quality: str) -> float:
         found = [medium for medium in preparation.to_simulate(target, quality) if (quality, medium) not in met]
         met.extend((quality, medium) for medium in found)
-        return OTHER_SECONDS + simulation_seconds(quality, preparation.settings.threads) * len(found)
+        coloring = 0.0 if target in colored else preparation.color_seconds(target)
+        colored.add(target)
+        return OTHER_SECONDS + coloring + simulation_seconds(quality, preparation.settings.threads) * len(found)
 
     turns = []
     for target in targets:

@@ -2,22 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
+import bpy
 import numpy as np
 
-from ...core.bake.job import BakeJob
+from ...core.bake.job import BakeJob, needs_medium
+from ...core.bake.runner import Target
 from ...core.bake.surface import Surface
+from ...core.errors import BakeError, sentence
 from ...core.material.material import RGB
+from ...core.progress import Progress
 from ...core.scene.receiver import Receiver
 from ...core.scene.texture import mean_color, textured
+from ..cycles.colors import colors_by_cycles, seconds_of_colors
+from ..cycles.light import CopyForCycles
+from ..node.find import find_place
 from ..node.tree import BASE_COLOR
-from ..read.base_color import read_base_color
+from ..read.base_color import is_understood, read_base_color
 from ..read.image_texture import NotUnderstoodError
 from ..read.node_links import Wanted
 
 # Rounding, or a little over by interpolation.
 BRIGHTEST = 1.001
+
+# What counts where a texture does not.
+UNLINKED = "the colour or albedo counts that its node shows without a link"
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,15 +38,26 @@ class BaseColor:
 
     Attributes
     ----------
-    colors : float32 (grid height, grid width, 3) of each chart, up to 1; none where the nodes are not understood.
+    colors : float32 (grid height, grid width, 3) of each chart, up to 1; none where they are not known.
     blur : part of the texture that light meets on its way in.
     warnings : sentences.
+    unknown : what of the nodes is not understood, as the beginning of a sentence; empty where all is.
     """
 
     colors: tuple[np.ndarray, ...] = ()
     mean: RGB | None = None
     blur: float = 0.0
     warnings: tuple[str, ...] = ()
+    unknown: str = ""
+
+    @classmethod
+    def of(cls, colors: Sequence[np.ndarray], receiver: Receiver, blur: float, object_name: str) -> BaseColor:
+        warnings = ()
+        if max(color.max(initial=0) for color in colors) > BRIGHTEST:
+            what = f"The Base Color of '{object_name}' is above 1 in places, which reflects more than arrives"
+            warnings = (f"{what}: cut to 1.",)
+        colors = tuple(color.clip(0, 1) for color in colors)
+        return cls(colors, mean_color(receiver, colors), blur, warnings)
 
     def on(self, surface: Surface) -> Surface:
         """The surface with the mean colour, or as it is."""
@@ -43,26 +66,56 @@ class BaseColor:
     def in_job(self, job: BakeJob) -> BakeJob:
         """A job on such a surface with the rest."""
         job = replace(job, illumination=job.illumination.warning(*self.warnings))
-        return replace(job, receiver=textured(job.receiver, list(self.colors), self.blur)) if self.colors else job
+        return replace(job, receiver=textured(job.receiver, self.colors, self.blur)) if self.colors else job
 
 
 def read_texture(node, groups: tuple, obj, receiver: Receiver) -> BaseColor:
     """What is linked to the node, at the places of a receiver of an evaluated object.
 
-    `groups` are the group nodes around the node. What can't be evaluated is said, and then the colour counts that the
-    node has of its own.
+    `groups` are the group nodes around the node.
     """
     try:
         colors = read_base_color(Wanted(node.inputs[BASE_COLOR], groups), obj, receiver)
     except NotUnderstoodError as reason:
-        warning = (
-            f"The Base Color of '{obj.name}' can't be evaluated, because {reason} not understood: the colour or albedo "
-            "counts that its node shows without a link. Bake the nodes to an image and link that."
-        )
-        return BaseColor(warnings=(warning,))
-    warnings = ()
-    if max(color.max(initial=0) for color in colors) > BRIGHTEST:
-        what = f"The Base Color of '{obj.name}' is above 1 in places, which reflects more than arrives"
-        warnings = (f"{what}: cut to 1.",)
-    colors = tuple(color.clip(max=1) for color in colors)
-    return BaseColor(colors, mean_color(receiver, list(colors)), node.texture_blur, warnings)
+        return BaseColor(blur=node.texture_blur, unknown=str(reason))
+    return BaseColor.of(colors, receiver, node.texture_blur, obj.name)
+
+
+def needs_cycles(obj, material_name: str) -> bool:
+    """Whether a bake of one of an object's materials has Cycles evaluate a texture."""
+    place = find_place(bpy.data.materials.get(material_name))
+    if place is None or not place[0].has_texture():
+        return False
+    return not is_understood(Wanted(place[0].inputs[BASE_COLOR], place[1]), obj)
+
+
+class ColorByCycles:
+    """A texture that only Cycles knows, of one target; what was found, or that nothing was, holds for all its jobs."""
+
+    def __init__(self, target: Target, surface: Surface, blur: float) -> None:
+        self._target, self._surface, self._blur = target, surface, blur
+        self._found: BaseColor | None = None
+
+    def in_job(self, job: BakeJob, copy: CopyForCycles | None) -> BakeJob:
+        """The job, which asks Cycles when it runs."""
+        if not needs_medium(job.settings):
+            return job
+        if copy is not None:
+            job = replace(job, illumination=job.illumination.warning(*copy.scene.warnings))
+        elif self._found is None:
+            self._found = self._missing("there is no copy of the scene for it")
+        seconds = seconds_of_colors(job.receiver.width, job.receiver.height) if self._found is None else 0.0
+        return replace(job, more_color=partial(self._color, copy), color_seconds=seconds)
+
+    def _color(self, copy: CopyForCycles | None, job: BakeJob, progress: Progress | None) -> BakeJob:
+        if self._found is None:
+            try:
+                colors = colors_by_cycles(copy, self._target, job.receiver, progress)
+                self._found = BaseColor.of(colors, job.receiver, self._blur, self._target.object_name)
+            except (BakeError, OSError) as error:
+                self._found = self._missing(sentence(error))
+        return self._found.in_job(replace(job, surface=self._found.on(self._surface)))
+
+    def _missing(self, why: str) -> BaseColor:
+        what = f"Cycles has not evaluated the Base Color of '{self._target.object_name}', so {UNLINKED}"
+        return BaseColor(warnings=(f"{what}: {why}",))

@@ -11,7 +11,7 @@ from ...core.bake.runner import Target
 from ...core.scene.receiver import build_receiver, texture_size
 from ...core.scene.texture import Texture
 from ...core.scene.uv_map import Polygons, fit_uv_maps
-from ..jobs.texture import BaseColor, read_texture
+from ..jobs.texture import UNLINKED, BaseColor, read_texture
 from ..node.find import find_place
 
 # Texels along the longer side where nodes are evaluated: more would keep the window waiting.
@@ -64,9 +64,15 @@ class Textures:
     def sentences(self) -> list[str]:
         """What there is to say."""
         said = [warning for read in self._read.values() for warning in read.base_color.warnings]
+        said += [_unknown(target, read) for target, read in self._read.items() if read.base_color.unknown]
         coarse = dict.fromkeys(target.material_name for target, read in self._read.items() if read.is_coarse)
         said += [f"Live has the texture of '{name}' with {MOST_TEXELS} texels along a side." for name in coarse]
         return list(dict.fromkeys(said))
+
+
+def _unknown(target: Target, read: Read) -> str:
+    what = f"Live can't evaluate the Base Color of '{target.object_name}'"
+    return f"{what}, because {read.base_color.unknown} not understood, so {UNLINKED}: bakes have Cycles evaluate it."
 
 
 def _evaluated(node, groups: tuple, obj, polygons: Polygons, size: tuple[int, int] | int) -> Read:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.scene.receiver import Receiver
+from .image_texture import MISSING, NotUnderstoodError, Pixels
 from .node_links import End, Wanted, follow
 from .node_values import converted
 from .places import ON_NO_PATH, Places
@@ -40,7 +41,6 @@ def read_base_color(wanted: Wanted, obj, receiver: Receiver) -> list[np.ndarray]
     NotUnderstoodError
         Names the first node in the way.
     """
-    uv_map = next((layer.name for layer in obj.data.uv_layers if layer.active_render), "")
     to_local, images = np.array(obj.matrix_world.inverted_safe(), dtype=float), Images()
     width, height = receiver.width, receiver.height
     count = _places_along_texels(wanted, max(width, height))
@@ -53,10 +53,30 @@ def read_base_color(wanted: Wanted, obj, receiver: Receiver) -> list[np.ndarray]
             strip = max(1, PLACES_AT_ONCE // chart.grid.width)
             for first in range(0, chart.grid.height, strip):
                 rows = slice(first, first + strip)
-                evaluator = _OnChart(_outputs(uvs[rows], positions[rows], to_local), images, uv_map)
+                evaluator = _OnChart(_outputs(uvs[rows], positions[rows], to_local), images, _uv_map(obj))
                 total[rows] += _color(evaluator, wanted, uvs[rows].shape[:2])
         colors.append(np.maximum(total / count**2, 0))
     return colors
+
+
+def is_understood(wanted: Wanted, obj) -> bool:
+    """Whether `read_base_color` can do so, without a look at pixels."""
+    nowhere = _outputs(np.zeros((1, 1, 2)), np.zeros((1, 1, 3)), np.eye(4))
+    try:
+        _OnChart(nowhere, Images(_Unread()), _uv_map(obj)).value(wanted)
+    except NotUnderstoodError:
+        return False
+    return True
+
+
+class _Unread(Pixels):
+    @staticmethod
+    def _read(_image) -> np.ndarray:
+        return MISSING[None, None]
+
+
+def _uv_map(obj) -> str:
+    return next((layer.name for layer in obj.data.uv_layers if layer.active_render), "")
 
 
 def _color(evaluator: Places, wanted: Wanted, shape: tuple[int, int]) -> np.ndarray:

@@ -13,8 +13,8 @@ MOST_WIDE = 4096
 class Images:
     """Pixels of images, each read once."""
 
-    def __init__(self) -> None:
-        self._pixels = Pixels()
+    def __init__(self, pixels: Pixels | None = None) -> None:
+        self._pixels = pixels or Pixels()
         self._environments: dict[str, np.ndarray] = {}
 
     def environment(self, node) -> np.ndarray:

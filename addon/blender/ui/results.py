@@ -8,12 +8,14 @@ from ...core import native
 from ...core.bake.estimate import in_words, solver_seconds
 from ...core.bake.luminance import MOST_RAYS
 from ...core.errors import BakeError
+from ..cycles.colors import seconds_of_colors
 from ..cycles.light import seconds_estimate
 from ..images.files import check_image
 from ..images.results import check_editable
 from ..jobs.popup import wrap
 from ..jobs.prepare import check_visible
 from ..jobs.state import Row, Standing, state
+from ..jobs.texture import needs_cycles
 from ..live import session
 from ..node.find import find_misplaced, find_node, find_targets, materials_of
 from ..read.visible import render_visible_names
@@ -172,8 +174,14 @@ def estimates(context) -> list[str]:
         return []
     if settings.use_indirect:
         seconds = in_words(sum(seconds_estimate(*size) for size in sizes))
-        many, them = (f" for {len(sizes)} objects", "them") if len(sizes) > 1 else ("", "it")
-        found.append(f"Indirect light: about {seconds}{many}, where something stands above {them}.")
+        them = "them" if len(sizes) > 1 else "it"
+        found.append(f"Indirect light: about {seconds}{_of_many(sizes)}, where something stands above {them}.")
+    objects = context.scene.objects if settings.output == "LUMINANCE" else {}
+    pairs = [(target, size) for target, size in zip(chosen, sizes) if target.object_name in objects]
+    asked = [size for one, size in pairs if needs_cycles(objects[one.object_name], one.material_name)]
+    if asked:
+        seconds = in_words(sum(seconds_of_colors(*size) for size in asked))
+        found.append(f"Base color, by Cycles: about {seconds}{_of_many(asked)}.")
     if settings.solver == "direct" and settings.output == "LUMINANCE":
         lamps = [obj.data.type for obj in context.view_layer.objects if obj.type == "LIGHT"]
         suns = lamps.count("SUN")
@@ -182,6 +190,10 @@ def estimates(context) -> list[str]:
             sized = f", up to {MOST_RAYS} times that if lamps have a size" if len(lamps) > suns else ""
             found.append(f"Direct solver: at least {in_words(seconds)}{sized}. FFT gives the same in seconds.")
     return found
+
+
+def _of_many(sizes: list) -> str:
+    return f" for {len(sizes)} objects" if len(sizes) > 1 else ""
 
 
 def _size(target, resolution: int) -> tuple[int, int]:

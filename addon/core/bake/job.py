@@ -26,7 +26,8 @@ class BakeJob:
     """A receiver with its light and its surface; `name` is what to call the receiver in messages.
 
     `more_light` finds what `illumination` lacks, as bounced light, when the job runs, in whatever thread; that takes
-    about `more_seconds`.
+    about `more_seconds`. `more_color` makes another job of it, with the surface and the texture that it
+    lacks; that takes about `color_seconds`.
     """
 
     name: str
@@ -36,11 +37,23 @@ class BakeJob:
     settings: BakeSettings
     more_light: Callable[[Receiver, Progress | None], Sequence[Light]] | None = None
     more_seconds: float = 0.0
+    more_color: Callable[[BakeJob, Progress | None], BakeJob] | None = None
+    color_seconds: float = 0.0
+
+    def colored(self, progress: Progress | None = None) -> tuple[BakeJob, Progress | None]:
+        """The job with its colours, which may have more to warn of, and the progress that is left for `run`."""
+        if self.more_color is None or self._surely_dark():
+            return self, progress
+        self.surface.check()
+        coloring, rest = stages(progress, [self.color_seconds, self._finding_seconds() + self._baking_seconds()])
+        say(coloring, "Evaluating the base color")
+        with timed(f"base color of '{self.name}'"):
+            return replace(self.more_color(self, coloring), more_color=None), rest
 
     def run(self, progress: Progress | None = None) -> dict[str, np.ndarray]:
-        """The layers: name -> float32 (height, width, 3), margin included, row 0 at the bottom."""
+        """The layers of a `colored` job: name -> float32 (height, width, 3), with margin, row 0 at the bottom."""
         self.surface.check()
-        finding, baking = stages(progress, [self.more_seconds if self.more_light else 0.0, self._seconds()])
+        finding, baking = stages(progress, [self._finding_seconds(), self._baking_seconds()])
         if self.more_light is not None:
             say(finding, "Finding indirect light")
             with timed(f"bounced light of '{self.name}'"):
@@ -72,7 +85,10 @@ class BakeJob:
         for medium, step in zip(media, stages(progress, [1.0] * len(media))):
             library(medium, self.settings.quality, step, self.settings.threads)
 
-    def _seconds(self) -> float:
+    def _finding_seconds(self) -> float:
+        return self.more_seconds if self.more_light else 0.0
+
+    def _baking_seconds(self) -> float:
         return self._simulation_seconds() + self._solver_seconds()
 
     def _simulation_seconds(self) -> float:

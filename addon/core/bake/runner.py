@@ -58,7 +58,9 @@ class Bake:
             return
         start = time.monotonic()
         try:
-            self.layers = self.job.run(progress)
+            self.job, rest = self.job.colored(progress)
+            self.warnings += [one for one in self.job.warnings() if one not in self.warnings]
+            self.layers = self.job.run(rest)
             self.is_dark = self.job.is_dark(self.layers)
             self.warnings += self.job.warnings_after(self.layers)
         except (KeyboardInterrupt, native.Cancelled):

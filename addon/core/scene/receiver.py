@@ -79,6 +79,14 @@ class Chart:
         x, y = self.texel_to_grid @ np.stack(centres)
         part[rows, columns] = bilinear(values, x - 0.5, y - 0.5)
 
+    def read(self, texture: np.ndarray) -> np.ndarray:
+        """Values of its grid (grid height, grid width, C) from a texture (height, width, C)."""
+        if self.texel_to_grid is None:
+            return self.part_of(texture)
+        height, width = texture.shape[:2]
+        x, y = np.moveaxis(self.uvs(width, height).reshape(-1, 2) * [width, height], -1, 0)
+        return bilinear(texture, x - 0.5, y - 0.5).reshape(self.grid.height, self.grid.width, -1).astype(np.float32)
+
 
 @dataclass(frozen=True, eq=False)
 class Receiver:
