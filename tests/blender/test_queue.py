@@ -6,6 +6,7 @@ import beamspread
 import bpy
 import pytest
 from beamspread.blender import preferences
+from beamspread.blender.cycles.child_denoise import has_denoiser
 from beamspread.blender.images.results import Results
 from beamspread.blender.jobs import operator, popup, prepare, stale
 from beamspread.blender.jobs.operator import BakeThread
@@ -155,6 +156,12 @@ def test_progress_says_what_is_done_and_how_long_it_lasts(monkeypatch):
         # Ten per cent in ten seconds, however far it was before.
         assert state.progress.in_words() == "Baking 50%, all 25%, about 1 min left"
         assert state.progress.in_short() == "25%, 1 min left"
+        # Where it stands still and leaps, the last half of the run counts.
+        for now[0] in range(111, 151):
+            state.update(0.52, 0.26, "Baking")
+        now[0] += 1
+        state.update(0.54, 0.27, "Baking")
+        assert state.progress.in_short() == "27%, 30 min left"
     finally:
         state.stop()
 
@@ -219,6 +226,7 @@ def test_estimates_follow_solver_and_sizes():
     settings.use_indirect = True
     (alone,) = estimates(bpy.context)
     assert alone.startswith("Indirect light: about ")
+    assert ("no denoiser" in alone) == (not has_denoiser())
     select(one, other)
     (both,) = estimates(bpy.context)
     assert "for 2 objects" in both

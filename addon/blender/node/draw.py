@@ -33,7 +33,8 @@ def draw_properties(node, layout) -> None:
     _draw_color(node, layout)
     _draw_channels(layout, node, "mean_free_path", "Path")
     metres = bpy.context.scene.unit_settings.scale_length
-    layout.label(text=f"Mean free path {readable_lengths([length * metres for length in node.mean_free_path])}")
+    # In few letters: side bars are narrow.
+    layout.label(text=readable_lengths([length * metres for length in node.mean_free_path]), icon="DRIVER_DISTANCE")
     layout.prop(node, "anisotropy")
     layout.prop(node, "ior")
     layout.prop(node, "thickness")

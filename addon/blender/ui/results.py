@@ -8,6 +8,7 @@ from ...core import native
 from ...core.bake.estimate import in_words, solver_seconds
 from ...core.bake.luminance import MOST_RAYS
 from ...core.errors import BakeError
+from ..cycles.child_denoise import has_denoiser
 from ..cycles.light import seconds_estimate
 from ..images.files import check_image
 from ..images.results import check_editable
@@ -173,7 +174,8 @@ def estimates(context) -> list[str]:
     if settings.use_indirect:
         seconds = in_words(sum(seconds_estimate(*size) for size in sizes))
         many, them = (f" for {len(sizes)} objects", "them") if len(sizes) > 1 else ("", "it")
-        found.append(f"Indirect light: about {seconds}{many}, where something stands above {them}.")
+        slower = "" if has_denoiser() else " This Blender has no denoiser: it traces more rays instead."
+        found.append(f"Indirect light: about {seconds}{many}, where something stands above {them}.{slower}")
     if settings.solver == "direct" and settings.output == "LUMINANCE":
         lamps = [obj.data.type for obj in context.view_layer.objects if obj.type == "LIGHT"]
         suns = lamps.count("SUN")
