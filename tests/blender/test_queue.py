@@ -1,6 +1,7 @@
 """Turns of a run: first looks at media that are not simulated yet, jobs made when it is their turn, refusals."""
 
 import time
+from types import SimpleNamespace
 
 import beamspread
 import bpy
@@ -13,6 +14,7 @@ from beamspread.blender.jobs.operator import BakeThread
 from beamspread.blender.jobs.prepare import read_scene
 from beamspread.blender.jobs.queue import Queue
 from beamspread.blender.jobs.state import Standing, state
+from beamspread.blender.node.draw import draw_node
 from beamspread.blender.node.find import find_targets
 from beamspread.blender.ui.results import estimates
 from beamspread.core.bake.estimate import in_words
@@ -202,18 +204,25 @@ def test_the_search_for_indirect_light_stops_within_two_seconds():
     assert thread.bake.status == CANCELLED
 
 
-def test_unregistering_ends_what_runs():
+def test_unregistering_ends_what_runs_and_says_so(monkeypatch):
     """Blender would end with an error if a thread of ours still ran when it quits."""
+    status = []
+    monkeypatch.setattr(bpy.types.WorkSpace, "status_text_set", lambda _workspace, text: status.append(text))
     bpy.context.scene.beamspread.solver = "direct"
     bpy.context.scene.beamspread.resolution = 1024
     bpy.data.lights["Sun"].type = "POINT"
     bpy.data.objects["Sun"].location.z = 1.0
-    plane("Plane", **KNOWN)
+    node = node_of(plane("Plane", **KNOWN).data.materials[0])
     thread = BakeThread(queue().next())
+    state.start(thread.bake.target)
     thread.start()
     operator.unregister()
     try:
         assert not thread.is_alive()
+        assert set(status) == {None}
+        texts = []
+        draw_node(node, SimpleNamespace(label=lambda text, icon: texts.append(text)))
+        assert texts == ["The add-on Beamspread is disabled."]
     finally:
         operator.register()
 

@@ -220,7 +220,7 @@ def test_paths_of_textures_that_saving_makes_relative_change_nothing(plane, tmp_
     assert row().standing == Standing.BAKED
 
 
-def test_failures_of_what_is_gone_are_no_rows(plane):
+def test_failures_of_a_material_that_another_has_replaced_are_no_rows(plane):
     other = add_plane("Other", material=plane.data.materials[0])
     select(other)
     assert "to the same part of the image" in messages_of(bpy.ops.beamspread.bake)

@@ -21,6 +21,10 @@ def readable_lengths(metres) -> str:
 
 def draw_node(node, layout) -> None:
     """In the node editor: with the Bake button on top."""
+    if not hasattr(bpy.types, "BEAMSPREAD_OT_bake"):
+        # Before Blender 4.5 the node's class stays while nodes use it.
+        layout.label(text="The add-on Beamspread is disabled.", icon="ERROR")
+        return
     row = layout.row()
     row.scale_y = 1.2
     row.operator("beamspread.bake", text="Bake", icon="RENDER_STILL")
