@@ -248,6 +248,14 @@ def test_estimates_follow_solver_and_sizes():
     assert sun.startswith("Direct solver: at least ")
     assert " h." in sun
     assert " days, up to 1024 times that if lamps have a size." in lamp
+    settings.solver, bpy.context.scene.world = "fft", None
+    bpy.data.lights["Sun"].shadow_soft_size = 0
+    assert estimates(bpy.context) == []
+    bpy.data.lights["Sun"].shadow_soft_size = 0.1
+    (sized,) = estimates(bpy.context)
+    assert sized.startswith("Light of a size, as the world's: about ")
+    settings.samples = 1
+    assert estimates(bpy.context) == []
 
 
 @pytest.mark.parametrize(

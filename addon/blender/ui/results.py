@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import bpy
 
 from ...core import native
-from ...core.bake.estimate import in_words, solver_seconds
-from ...core.bake.luminance import MOST_RAYS
+from ...core.bake.estimate import in_words, ray_seconds, solver_seconds
+from ...core.bake.luminance import MOST_RAYS, rays_per_texel
 from ...core.errors import BakeError
 from ..cycles.child_denoise import has_denoiser
 from ..cycles.light import seconds_estimate
@@ -183,7 +185,31 @@ def estimates(context) -> list[str]:
         if seconds > LONG_SECONDS:
             sized = f", up to {MOST_RAYS} times that if lamps have a size" if len(lamps) > suns else ""
             found.append(f"Direct solver: at least {in_words(seconds)}{sized}. FFT gives the same in seconds.")
+    elif settings.output == "LUMINANCE" and _has_wide_lights(context):
+        seconds = sum(_seconds_of_rays(target, size, settings.for_bake()) for target, size in zip(chosen, sizes))
+        if seconds > LONG_SECONDS:
+            found.append(f"Light of a size, as the world's: about {in_words(seconds)}. Fewer samples are quicker.")
     return found
+
+
+def _has_wide_lights(context) -> bool:
+    """Whether there is light that a bake sends many rays to, as far as it is known without reading the scene."""
+    lamps = [obj for obj in context.view_layer.objects if obj.type == "LIGHT"]
+    return context.scene.world is not None or any(not _is_narrow(obj.data) for obj in lamps)
+
+
+def _is_narrow(lamp) -> bool:
+    return lamp.type != "AREA" and not (lamp.angle if lamp.type == "SUN" else lamp.shadow_soft_size)
+
+
+def _seconds_of_rays(target, size: tuple[int, int], settings) -> float:
+    """About; as if the object filled its UV map."""
+    node, obj = find_node(bpy.data.materials.get(target.material_name)), bpy.data.objects.get(target.object_name)
+    if node is None or obj is None:
+        return 0.0
+    pitch = max(max(obj.dimensions) / max(size), 1e-9)
+    rays = rays_per_texel(SimpleNamespace(pitch_x=pitch, pitch_y=pitch), node.surface().material, settings)
+    return ray_seconds(size[0] * size[1], rays, settings.threads)
 
 
 def _size(target, resolution: int) -> tuple[int, int]:
