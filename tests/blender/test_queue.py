@@ -164,6 +164,9 @@ def test_progress_says_what_is_done_and_how_long_it_lasts(monkeypatch):
         now[0] += 1
         state.update(0.54, 0.27, "Baking")
         assert state.progress.in_short() == "27%, 30 min left"
+        state.ask_to_stop()
+        state.update(0.6, 0.3, "Stopping")
+        assert state.progress.in_words() == "Stopping 60%, all 30%"
     finally:
         state.stop()
 

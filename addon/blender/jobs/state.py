@@ -106,6 +106,9 @@ class State:
         if self.progress is None:
             return
         self.progress.doing, self.progress.own, self.progress.everything = doing, own, everything
+        if self._stop_asked:
+            self.progress.seconds_left = None
+            return
         now = time.monotonic()
         self._paces.append((now, everything))
         while now - self._paces[0][0] > max(PACE_SECONDS, PACE_PART * (now - self._began)):
