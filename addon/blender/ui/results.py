@@ -154,7 +154,8 @@ def draw_results(layout, context, material_name: str, shown: set[str]) -> None:
         standing = _standing(row)
         draw_sentences(box, context, [f"{row.target.object_name}: {standing.value}"], ICONS[standing])
         # Why it is out of date is said of each, other sentences once.
-        sentences = [one for one in row.sentences if one not in shown or (row.is_stale and one == row.sentences[0])]
+        is_said_of_each = row.is_stale and row.standing not in (Standing.FAILED, Standing.CANCELLED)
+        sentences = [one for one in row.sentences if one not in shown or (is_said_of_each and one == row.sentences[0])]
         shown.update(sentences)
         draw_sentences(box, context, sentences, "DOT")
     if len(rows) > MOST_OBJECTS:
