@@ -1,17 +1,20 @@
 """Turns of a run: first looks at media that are not simulated yet, jobs made when it is their turn, refusals."""
 
 import time
+from types import SimpleNamespace
 
 import beamspread
 import bpy
 import pytest
 from beamspread.blender import preferences
+from beamspread.blender.cycles.child_denoise import has_denoiser
 from beamspread.blender.images.results import Results
 from beamspread.blender.jobs import operator, popup, prepare, stale
 from beamspread.blender.jobs.operator import BakeThread
 from beamspread.blender.jobs.prepare import read_scene
 from beamspread.blender.jobs.queue import Queue
 from beamspread.blender.jobs.state import Standing, state
+from beamspread.blender.node.draw import draw_node
 from beamspread.blender.node.find import find_targets
 from beamspread.blender.ui.results import estimates
 from beamspread.core.bake.estimate import in_words
@@ -155,6 +158,15 @@ def test_progress_says_what_is_done_and_how_long_it_lasts(monkeypatch):
         # Ten per cent in ten seconds, however far it was before.
         assert state.progress.in_words() == "Baking 50%, all 25%, about 1 min left"
         assert state.progress.in_short() == "25%, 1 min left"
+        # Where it stands still and leaps, the last half of the run counts.
+        for now[0] in range(111, 151):
+            state.update(0.52, 0.26, "Baking")
+        now[0] += 1
+        state.update(0.54, 0.27, "Baking")
+        assert state.progress.in_short() == "27%, 30 min left"
+        state.ask_to_stop()
+        state.update(0.6, 0.3, "Stopping")
+        assert state.progress.in_words() == "Stopping 60%, all 30%"
     finally:
         state.stop()
 
@@ -195,18 +207,25 @@ def test_the_search_for_indirect_light_stops_within_two_seconds():
     assert thread.bake.status == CANCELLED
 
 
-def test_unregistering_ends_what_runs():
+def test_unregistering_ends_what_runs_and_says_so(monkeypatch):
     """Blender would end with an error if a thread of ours still ran when it quits."""
+    status = []
+    monkeypatch.setattr(bpy.types.WorkSpace, "status_text_set", lambda _workspace, text: status.append(text))
     bpy.context.scene.beamspread.solver = "direct"
     bpy.context.scene.beamspread.resolution = 1024
     bpy.data.lights["Sun"].type = "POINT"
     bpy.data.objects["Sun"].location.z = 1.0
-    plane("Plane", **KNOWN)
+    node = node_of(plane("Plane", **KNOWN).data.materials[0])
     thread = BakeThread(queue().next())
+    state.start(thread.bake.target)
     thread.start()
     operator.unregister()
     try:
         assert not thread.is_alive()
+        assert set(status) == {None}
+        texts = []
+        draw_node(node, SimpleNamespace(label=lambda text, icon: texts.append(text)))
+        assert texts == ["The add-on Beamspread is disabled."]
     finally:
         operator.register()
 
@@ -219,6 +238,7 @@ def test_estimates_follow_solver_and_sizes():
     settings.use_indirect = True
     (alone,) = estimates(bpy.context)
     assert alone.startswith("Indirect light: about ")
+    assert ("no denoiser" in alone) == (not has_denoiser())
     select(one, other)
     (both,) = estimates(bpy.context)
     assert "for 2 objects" in both
@@ -231,6 +251,14 @@ def test_estimates_follow_solver_and_sizes():
     assert sun.startswith("Direct solver: at least ")
     assert " h." in sun
     assert " days, up to 1024 times that if lamps have a size." in lamp
+    settings.solver, bpy.context.scene.world = "fft", None
+    bpy.data.lights["Sun"].shadow_soft_size = 0
+    assert estimates(bpy.context) == []
+    bpy.data.lights["Sun"].shadow_soft_size = 0.1
+    (sized,) = estimates(bpy.context)
+    assert sized.startswith("Light of a size, as the world's: about ")
+    settings.samples = 1
+    assert estimates(bpy.context) == []
 
 
 @pytest.mark.parametrize(

@@ -53,6 +53,14 @@ def test_each_row_says_why_it_is_out_of_date_and_other_sentences_come_once():
     assert layout.said.count(sentences[1]) == 1
 
 
+def test_why_it_failed_is_not_said_again_below_what_is_in_the_way():
+    layout, why, target = Layout(), "The albedo's red is 1.", Target("First", "One")
+    state.rows = {target: Row(target, Standing.FAILED, (why,), is_stale=True)}
+    results.draw_results(layout, context(), "", {why})
+    assert "First: Failed" in layout.said
+    assert why not in layout.said
+
+
 def test_what_keeps_live_from_following_is_said_once(monkeypatch):
     layout, why = Layout(), "It is not flat."
     target = Target("First", "One")

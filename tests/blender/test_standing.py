@@ -222,6 +222,33 @@ def test_dark_is_a_warning_that_stays_with_the_image(tmp_path):
     assert "All lights are behind 'Plane'" in row().sentences[0]
 
 
+def test_paths_of_textures_that_saving_makes_relative_change_nothing(plane, tmp_path):
+    image = bpy.data.images.new("Sky", 4, 2, float_buffer=True)
+    image.filepath_raw, image.file_format = str(tmp_path / "sky.hdr"), "HDR"
+    image.save()
+    world = bpy.context.scene.world = bpy.data.worlds.new("World")
+    world.use_nodes = True
+    tree = world.node_tree
+    sky = tree.nodes.new("ShaderNodeTexEnvironment")
+    sky.image = bpy.data.images.load(image.filepath_raw)
+    tree.links.new(tree.nodes["Background"].inputs["Color"], sky.outputs["Color"])
+    bake(plane)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    assert sky.image.filepath == "//sky.hdr"
+    stale.fingerprints.forget()
+    assert row().standing == Standing.BAKED
+
+
+def test_failures_of_a_material_that_another_has_replaced_are_no_rows(plane):
+    other = add_plane("Other", material=plane.data.materials[0])
+    select(other)
+    assert "to the same part of the image" in messages_of(bpy.ops.beamspread.bake)
+    assert row(Target("Other", "Medium")).standing == Standing.FAILED
+    other.data.materials[0] = other.data.materials[0].copy()
+    stale.refresh(bpy.context)
+    assert {str(target) for target in state.rows} == {"Plane / Medium", "Other / Medium.001"}
+
+
 def test_failures_stand_beside_what_was_baked_before(plane):
     plane.hide_render = True
     select(plane)

@@ -58,7 +58,8 @@ def values_of(struct, skipped: Iterable[str] = (), depth: int = 0) -> list:
         if prop.type == "COLLECTION":
             value = [values_of(one, (), depth + 1) for one in value or () if one is not None]
         elif isinstance(value, bpy.types.ID):
-            value = value.name_full, getattr(value, "filepath", "")
+            # Without the folder, which saving the file elsewhere makes relative: pixels are looked at for themselves.
+            value = value.name_full, bpy.path.basename(getattr(value, "filepath", ""))
         elif isinstance(value, bpy.types.bpy_struct):
             value = values_of(value, (), depth + 1)
         elif prop.type == "POINTER":

@@ -284,6 +284,9 @@ def _end_threads() -> None:
         if isinstance(thread, BakeThread):
             thread.cancel()
             thread.join()
+    if state.is_running():  # the operator goes without being asked to clear up
+        for workspace in bpy.data.workspaces:
+            workspace.status_text_set(None)
     state.stop()
 
 

@@ -17,7 +17,7 @@ from ..images import previews
 from ..images.files import file_of
 from ..images.owners import noted_as
 from ..images.sequence import is_sequence
-from ..node.find import find_node, find_targets
+from ..node.find import find_misplaced, find_node, find_targets
 from ..node.tree import FRAMES
 from ..registration import all_or_nothing, handlers
 from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
@@ -41,8 +41,16 @@ def refresh(context) -> None:
     recorded = {target: record for target in targets if (record := _record(target)) is not None}
     now = fingerprints.of(context, recorded) if recorded else {}
     state.rows = {target: _row(target, recorded.get(target), now.get(target)) for target in targets}
-    # What could not be baked at all, as a node inside a group, is no target.
-    state.rows |= {row.target: row for row in state.failures() if row.target not in state.rows}
+    state.rows |= {row.target: row for row in _failures_of_others(context.scene, targets)}
+
+
+def _failures_of_others(scene, targets: list[Target]) -> list[Row]:
+    """Of what is no target, as a node inside a group, unless its object has another material in its place by now."""
+    others = [row for row in state.failures() if row.target not in targets]
+    named = {target.object_name for target in targets}
+    again = find_misplaced(scene.objects[name] for name in named & {row.target.object_name for row in others})
+    misplaced = {bake.target for bake in again}
+    return [row for row in others if row.target.object_name not in named or row.target in misplaced]
 
 
 def parts_of(context, targets: list[Target]) -> dict[Target, Parts]:

@@ -39,8 +39,9 @@ class Row:
     is_stale: bool = False
 
 
-# The time that is left follows from the pace of the last seconds, once there are enough of them to tell.
-PACE_SECONDS, LEAST_PACE_SECONDS = 15.0, 3.0
+# The time that is left follows from the pace of the last seconds, once there are enough of them to tell. These are a
+# part of the run's at least: what stands still for long, as Blender while it starts, would make it hours.
+PACE_SECONDS, PACE_PART, LEAST_PACE_SECONDS = 15.0, 0.5, 3.0
 
 
 @dataclass
@@ -67,8 +68,9 @@ class Progress:
 
     def in_words(self) -> str:
         """What is being done, and how long the run will last."""
+        everything = f", all {self.everything:.0%}" if self.everything != self.own else ""
         left = f", about {in_words(self.seconds_left)} left" if self.seconds_left is not None else ""
-        return f"{self.doing or 'Baking'} {self.own:.0%}, all {self.everything:.0%}{left}"
+        return f"{self.doing or 'Baking'} {self.own:.0%}{everything}{left}"
 
     def in_a_line(self) -> str:
         return f"{self.target}: {self.in_words()} (Esc cancels)"
@@ -81,6 +83,7 @@ class State:
         self.progress: Progress | None = None
         self.rows: dict[Target, Row] = {}
         self._paces: deque[tuple[float, float]] = deque()
+        self._began = 0.0
         self._stop_asked = False
         self._said: dict[Target, Row] = {}
 
@@ -91,6 +94,7 @@ class State:
     def begin(self) -> None:
         """Note that a run begins."""
         self._paces.clear()
+        self._began = time.monotonic()
         self._stop_asked = False
 
     def start(self, subject: Target, everything: float = 0.0) -> None:
@@ -102,9 +106,12 @@ class State:
         if self.progress is None:
             return
         self.progress.doing, self.progress.own, self.progress.everything = doing, own, everything
+        if self._stop_asked:
+            self.progress.seconds_left = None
+            return
         now = time.monotonic()
         self._paces.append((now, everything))
-        while now - self._paces[0][0] > PACE_SECONDS:
+        while now - self._paces[0][0] > max(PACE_SECONDS, PACE_PART * (now - self._began)):
             self._paces.popleft()
         began, before = self._paces[0]
         if now - began >= LEAST_PACE_SECONDS and everything > before:

@@ -21,6 +21,10 @@ def readable_lengths(metres) -> str:
 
 def draw_node(node, layout) -> None:
     """In the node editor: with the Bake button on top."""
+    if not hasattr(bpy.types, "BEAMSPREAD_OT_bake"):
+        # Before Blender 4.5 the node's class stays while nodes use it.
+        layout.label(text="The add-on Beamspread is disabled.", icon="ERROR")
+        return
     row = layout.row()
     row.scale_y = 1.2
     row.operator("beamspread.bake", text="Bake", icon="RENDER_STILL")
@@ -33,7 +37,8 @@ def draw_properties(node, layout) -> None:
     _draw_color(node, layout)
     _draw_channels(layout, node, "mean_free_path", "Path")
     metres = bpy.context.scene.unit_settings.scale_length
-    layout.label(text=f"Mean free path {readable_lengths([length * metres for length in node.mean_free_path])}")
+    # In few letters: side bars are narrow.
+    layout.label(text=readable_lengths([length * metres for length in node.mean_free_path]), icon="DRIVER_DISTANCE")
     layout.prop(node, "anisotropy")
     layout.prop(node, "ior")
     layout.prop(node, "thickness")

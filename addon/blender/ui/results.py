@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import bpy
 
 from ...core import native
-from ...core.bake.estimate import in_words, solver_seconds
-from ...core.bake.luminance import MOST_RAYS
+from ...core.bake.estimate import in_words, ray_seconds, solver_seconds
+from ...core.bake.luminance import MOST_RAYS, rays_per_texel
 from ...core.errors import BakeError
+from ..cycles.child_denoise import has_denoiser
 from ..cycles.colors import seconds_of_colors
 from ..cycles.light import seconds_estimate
 from ..images.files import check_image
@@ -153,7 +156,8 @@ def draw_results(layout, context, material_name: str, shown: set[str]) -> None:
         standing = _standing(row)
         draw_sentences(box, context, [f"{row.target.object_name}: {standing.value}"], ICONS[standing])
         # Why it is out of date is said of each, other sentences once.
-        sentences = [one for one in row.sentences if one not in shown or (row.is_stale and one == row.sentences[0])]
+        is_said_of_each = row.is_stale and row.standing not in (Standing.FAILED, Standing.CANCELLED)
+        sentences = [one for one in row.sentences if one not in shown or (is_said_of_each and one == row.sentences[0])]
         shown.update(sentences)
         draw_sentences(box, context, sentences, "DOT")
     if len(rows) > MOST_OBJECTS:
@@ -175,7 +179,8 @@ def estimates(context) -> list[str]:
     if settings.use_indirect:
         seconds = in_words(sum(seconds_estimate(*size) for size in sizes))
         them = "them" if len(sizes) > 1 else "it"
-        found.append(f"Indirect light: about {seconds}{_of_many(sizes)}, where something stands above {them}.")
+        slower = "" if has_denoiser() else " This Blender has no denoiser: it traces more rays instead."
+        found.append(f"Indirect light: about {seconds}{_of_many(sizes)}, where something stands above {them}.{slower}")
     objects = context.scene.objects if settings.output == "LUMINANCE" else {}
     pairs = [(target, size) for target, size in zip(chosen, sizes) if target.object_name in objects]
     asked = [size for one, size in pairs if needs_cycles(objects[one.object_name], one.material_name)]
@@ -189,11 +194,35 @@ def estimates(context) -> list[str]:
         if seconds > LONG_SECONDS:
             sized = f", up to {MOST_RAYS} times that if lamps have a size" if len(lamps) > suns else ""
             found.append(f"Direct solver: at least {in_words(seconds)}{sized}. FFT gives the same in seconds.")
+    elif settings.output == "LUMINANCE" and _has_wide_lights(context):
+        seconds = sum(_seconds_of_rays(target, size, settings.for_bake()) for target, size in zip(chosen, sizes))
+        if seconds > LONG_SECONDS:
+            found.append(f"Light of a size, as the world's: about {in_words(seconds)}. Fewer samples are quicker.")
     return found
 
 
 def _of_many(sizes: list) -> str:
     return f" for {len(sizes)} objects" if len(sizes) > 1 else ""
+
+
+def _has_wide_lights(context) -> bool:
+    """Whether there is light that a bake sends many rays to, as far as it is known without reading the scene."""
+    lamps = [obj for obj in context.view_layer.objects if obj.type == "LIGHT"]
+    return context.scene.world is not None or any(not _is_narrow(obj.data) for obj in lamps)
+
+
+def _is_narrow(lamp) -> bool:
+    return lamp.type != "AREA" and not (lamp.angle if lamp.type == "SUN" else lamp.shadow_soft_size)
+
+
+def _seconds_of_rays(target, size: tuple[int, int], settings) -> float:
+    """About; as if the object filled its UV map."""
+    node, obj = find_node(bpy.data.materials.get(target.material_name)), bpy.data.objects.get(target.object_name)
+    if node is None or obj is None:
+        return 0.0
+    pitch = max(max(obj.dimensions) / max(size), 1e-9)
+    rays = rays_per_texel(SimpleNamespace(pitch_x=pitch, pitch_y=pitch), node.surface().material, settings)
+    return ray_seconds(size[0] * size[1], rays, settings.threads)
 
 
 def _size(target, resolution: int) -> tuple[int, int]:
