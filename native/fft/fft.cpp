@@ -73,7 +73,7 @@ void real_to_half_2d(const FftInstructionSet& instructions, const float* real, C
                      std::size_t width, int threads)
 {
     const std::size_t columns = width / 2 + 1;
-    // Some hundred kilobytes, so that an item stays in the cache.
+    // Some hundred kilobytes, so that an item stays in the cache: 8 take 1.2 to 1.6 times as long, 32 the same.
     constexpr std::size_t lines = 16;
     with_threads(threads, [&] {
         parallel_for((height + lines - 1) / lines, [&](std::size_t item) {

@@ -33,7 +33,7 @@ std::vector<Vec3> sub_texel_points(const ReceiverGrid& grid, int samples)
 }
 
 // Points of the Gauss rule, two along each axis: from so many texels away on, they know the mean of a point lamp's light
-// within a texel to 2e-6.
+// within a texel to 2e-6; from half as many 2.2e-5, from twice 9e-8.
 constexpr double texels_to_smooth_lamp = 16.0;
 
 std::vector<Vec3> gauss_points(const ReceiverGrid& grid)

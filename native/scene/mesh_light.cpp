@@ -16,7 +16,7 @@ namespace {
 // takes up to 1.4 % of its own light at 1 - 1e-7, and nothing from 1 - 2.5e-7 on.
 constexpr double short_of_face = 1.0 - 1e-5;
 
-// Squared distance over squared size from which on a face is as good as a point: right to 2e-3.
+// Squared distance over squared size from which on a face is as good as a point: right to 2e-3, and in inverse proportion.
 constexpr double sizes_to_small = 20.0 * 20.0;
 
 }  // namespace

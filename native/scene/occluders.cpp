@@ -28,7 +28,9 @@ namespace {
 // Instances of smaller meshes cost more than copies: one takes about 400 bytes, a triangle about 110.
 constexpr std::size_t least_instanced = 16;
 
-// Rounding of a ray in an instance's frame grows with the condition of its matrix: beyond, instances are copied.
+// Rounding of a ray in an instance's frame grows with the condition of its matrix: beyond, instances are copied. At
+// 100 rays start 16 * 2^-23 * 100 = 2e-4 of the scene's size off the receiver, and closer contact is lost; it is in
+// proportion.
 constexpr double most_condition = 100.0;
 
 double frobenius(const Mat3& matrix)

@@ -18,6 +18,7 @@ namespace beamspread {
 
 namespace {
 
+// Half takes 1.03 times the CPU time, an eighth 1.17 times, twice .92 times for half as many threads; of 800,000 photons.
 constexpr std::uint64_t enough_photons_per_job = 200'000;
 
 // Consecutive ones, see transport/tally/map_scatter.h.

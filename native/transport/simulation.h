@@ -13,7 +13,8 @@
 
 namespace beamspread {
 
-// Photons are walked in this many independent batches per angle: their scatter is the statistical error.
+// Photons are walked in this many independent batches per angle: their scatter is the statistical error,
+// known to 1 / sqrt(2 (32 - 1)), 13 %; with half as many to 18 %, with twice to 9 %.
 inline constexpr std::size_t batch_count = 32;
 
 // One side of one angle, normalized to one unit of power that entered the medium.

@@ -35,7 +35,8 @@ void complex_columns(Complex* columns, std::size_t count, std::size_t size, std:
 }
 
 // Of lines that are half as long as those of the plane. Long lines of real values are transformed as complex ones of half
-// their length, which has fast factors up to 11, short ones have them up to 5.
+// their length, which has fast factors up to 11, short ones have them up to 5. From 60
+// to 500 the others' planes take 1.13 to 1.19 times as long, from 500 to 2000 .90 to .95 times.
 std::size_t good_size(std::size_t size)
 {
     constexpr std::size_t long_line = 500;

@@ -18,13 +18,16 @@ namespace beamspread {
 namespace {
 
 // Beyond the last simulated angle, if that is at least this close to grazing, its distribution is
-// used with the exact Fresnel factor.
+// used with the exact Fresnel factor. Totals at 89.7 degrees are then off by less than 1e-3
+// with an ior of 1.4, and with 1 too small by 3 to 17 % (albedos of .99 and .6, g .8), from 86 degrees on by 5 to 30 %.
 constexpr double grazing_deg = 88.0;
 
-// Below this exponent a bin's weight is zero to any purpose, and the expansion in its variance no longer holds.
+// Below this exponent a bin's weight is zero to any purpose, and the expansion in its variance no longer holds. With
+// -30 and -120 no texel changes by 1e-12 of the brightest.
 constexpr double negligible_log_weight = -60.0;
 
-// Harmonics at the end of the row that move less than this part of a profile's power only cost time.
+// Harmonics at the end of the row that move less than this part of a profile's power only cost time: the worst of 64 x 64
+// texels is off by 1e-6 of the brightest. Half and a tenth give the same, twice 3e-5, ten times 2e-4.
 constexpr double negligible_harmonics = 1e-4;
 
 // Sums over the rows of a pole, [harmonic][radius bin].
@@ -207,7 +210,8 @@ double LdfLibrary::residual(double angle_deg, double albedo, Side side) const
 
 double LdfLibrary::diffuse_reflectance(double albedo) const
 {
-    // 2 integral of R(mu) mu dmu by midpoints, exact to 1e-4: in mu, because R may grow linearly with it at grazing.
+    // 2 integral of R(mu) mu dmu by midpoints: in mu, because R may grow linearly with it at grazing. 128 differ by
+    // 1.6e-5 in twice the time, 32 by 6e-5 in half.
     constexpr int points = 64;
     double sum = 0.0;
     for (int i = 0; i < points; ++i) {

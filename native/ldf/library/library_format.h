@@ -25,6 +25,7 @@
 
 namespace beamspread::library_format {
 
+// Values in a line of ratios, which come in rows of many lengths: part of the layout, like the version.
 inline constexpr std::size_t ratio_columns = 2048;
 
 // Goes up when the layout changes.

@@ -9,9 +9,15 @@ namespace beamspread {
 
 namespace {
 
-constexpr double allowed_noise = 0.01;  // of the peak: a fifth of what the top of the peak spans
+// Measured on 36 disks of .5 to 15 mean free paths at 30 to 60 degrees, 96 x 96 texels with the noise of 1e4, 1e5 and 1e6
+// photons per square mean free path: the point is off by .33, .08 and .11 diameters (root mean square).
+//
+// Of the peak: a fifth of what its top spans. Half: .34, .16, .11; twice: .20, .11, .07.
+constexpr double allowed_noise = 0.01;
+// .9: .34, .07, .06; .975: .32, .10, .07
 constexpr double top_fraction = 0.95;
-constexpr double resolved = 4.0;  // texels across the top
+// Texels across the top. Half: .32, .08, .08; twice: .34, .08, .11.
+constexpr double resolved = 4.0;
 
 struct Parts {
     std::vector<double> even;

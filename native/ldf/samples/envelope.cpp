@@ -10,16 +10,20 @@ namespace beamspread {
 
 namespace {
 
-// Bias of the logarithm: half of its square.
+// Measured by the errors of `adaptive`, summed over 96 x 96 texels with the noise of 1e4, 1e5 and 1e6 photons per square
+// mean free path, between angles 40 to 60 degrees apart and albedos of .6 and .9 to .95: .88, .33 and .11.
+//
+// Bias of the logarithm: half of its square. Half: .90, .35, .11; twice: .85, .32, .10.
 constexpr double allowed_noise = 0.1;
 
-// Of the radial means, for which texels far apart are joined.
+// Of the radial means, for which texels far apart are joined. Half: 1.25 with the fewest photons, else the same; twice: .87.
 constexpr double allowed_ring_noise = 0.3;
 
-// The noise itself is estimated over some neighbours.
+// The noise itself is estimated over some neighbours. Half: the same; twice: .85 with the fewest photons, else the same, in
+// 1.14 times the time.
 constexpr double noise_sigma = 3.0;
 
-// Relative variance where too little light was seen to tell.
+// Relative variance where too little light was seen to tell: 1e3 to 1e9 give the same within .1 %.
 constexpr double unknown = 1e6;
 
 // Black to any purpose; logarithms stay finite.

@@ -24,7 +24,8 @@ public:
 
     // The largest squares, searched from the top, that are wholly lit and even: no texel's irradiance is farther
     // from the square's mean than `tolerance` times its own, and no two directions in it differ by more than
-    // 1/20 of that: kernels of up to eight azimuthal harmonics then differ by less than the tolerance. The paper
+    // 1/20 of that: kernels of up to eight azimuthal harmonics then differ by less than the tolerance (with
+    // 1/10 and 1/40 errors over a lamp are the same). The paper
     // takes binary masks; evenness is added for light that varies. Texels that are in no larger square are
     // squares of size one; dark ones are in none.
     std::vector<Square> squares(double tolerance) const;

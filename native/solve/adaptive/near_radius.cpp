@@ -30,7 +30,8 @@ double kernel_at(const RadialProfile& profile, const Vec2& place)
 double interpolation_error(const RadialProfile& profile, const Vec2& axis, double near, double first, double last)
 {
     // Half the distance between the points, over distance / near: where the window has risen to a half, at .6 of the
-    // near radius.
+    // near radius. Half of it, a sun around a hole is off by ten times as much in .6 of the time; twice by a tenth in 1.9
+    // times.
     constexpr double spacing = 1.0 / 0.6;
     // Two rings per octave and more than two directions per wave of the last harmonic: with half and with
     // twice as many of either, results are the same to two digits of their errors.

@@ -17,7 +17,8 @@ namespace {
 // Sums over 10^8 texels, 1e38, and products with kernels, stay in single precision, which ends at 3.4e38.
 constexpr float most_irradiance = 1e30f;
 
-// Beyond, light is even over any plane, and radii lie outside the tables.
+// There the widest plane, of 65536 texels, measures 7e-4 mean free paths: all of it lies within the tables' first bin of
+// radius, 2^-10, in which nothing is told apart.
 constexpr double most_paths_per_texel = 1e8;
 
 // Kernels are tabulated in units of the longer side, finely enough for the shorter one.

@@ -33,7 +33,7 @@ constexpr std::size_t worst_count = 12;
 constexpr double rounding = 5e-6;
 
 // The mean of a site relative to what harmonic 0 alone would bring: where light travels away from, sums of harmonics are
-// small, and off by about this.
+// small, and off by about this. Half and twice choose the same.
 constexpr double least_asymmetry = 0.01;
 
 // Of many lights so many stand for all: the brightest, whose light changes most from texel to texel.

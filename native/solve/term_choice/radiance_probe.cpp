@@ -23,10 +23,12 @@ constexpr double rings_per_octave = 3.0;
 constexpr std::size_t near_directions = 96;
 constexpr std::size_t far_directions = 384;
 
-// Of the tables of the angle, which the basis has 4096 of: functions change by some per cent from one to the next.
+// Of the tables of the angle, which the basis has 4096 of: functions change by some per cent from one to the next. Half
+// and twice ask for as many terms within 2 %, and the worst texel is as far off.
 constexpr std::size_t angle_steps = 256;
 
-// A site is as small beside rings of so many times its reach as a texel's neighbours are.
+// A site is as small beside rings of so many times its reach as a texel's neighbours are. Half asks for 3 % fewer terms,
+// twice for as many; the worst texel is as far off with either.
 constexpr double far_radius = 5.0 * static_cast<double>(site_reach);
 
 }  // namespace

@@ -25,15 +25,20 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 // Legendre coefficients of the phase function, g^l, are kept until they have fallen to this, but at least and at most
-// so many. `exact_totals_error` says what the others leave.
+// so many. `exact_totals_error` says what the others leave. Against 1e-5, 100 and 400, over g of -.5 to .95: a g of .9 is
+// off by 1e-4, and by 3e-4 where next to nothing comes back; half 5e-5 in 1.2 times the time, twice 6e-4 in .75 times. A g
+// of .8 is off by 1.5e-5; with at least 20 by 2e-4 in .75 times, with at least 80 by 2e-9 in 1.5 times. Beyond .966 the
+// most decide: with 96 a g of .95 is off by 2e-4, as is by 7e-5.
 constexpr double negligible_coefficient = 1.4e-3;
 constexpr int min_coefficients = 40;
 constexpr int max_coefficients = 192;
 
-// Thickness of the first layer over the smallest cosine. Its error is a twelfth of the square.
+// Thickness of the first layer over the smallest cosine. Its error is a twelfth of the square; half and twice
+// change no total by 1e-9, in the same time within 15 %.
 constexpr double first_layer = 0.02;
 
-// A half-space is reached when less than this gets through: the other side's effect on R is its square.
+// A half-space is reached when less than this gets from any direction of the quadrature to another: the other side's
+// effect on R grows as the square. A hundred times as much leaves 9e-5, a thousand times 3e-3, in .95 of the time.
 constexpr double opaque = 1e-6;
 
 int coefficient_count(double g)

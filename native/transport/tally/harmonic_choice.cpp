@@ -8,7 +8,8 @@ namespace beamspread {
 namespace {
 
 // Root mean square of what is left out, relative to the mean around a ring: less than that is not missed, be there
-// ever so little noise.
+// ever so little noise. Of two million photons none and twice keep the same but for 5e-8 of the brightest texel; 1e-2 leave
+// 3e-4 and files 2 % smaller, 3e-2 1.4e-3 and 17 %.
 constexpr double negligible = 3e-3;
 
 // Sums of cos(m phi) over an octave of radii and some rows.

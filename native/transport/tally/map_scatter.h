@@ -9,7 +9,8 @@
 
 namespace beamspread {
 
-// Batches are taken together in this many groups, each a simulation of its own.
+// Batches are taken together in this many groups, each a simulation of its own: errors of single texels are known to
+// 1 / sqrt(2 (8 - 1)), 27 %; with half as many to 41 %, with twice, and files of twice the deviations, to 18 %.
 inline constexpr std::size_t group_count = 8;
 
 // How many deviations are kept of a group, given how many harmonics each row has and of how many radius bins.

@@ -44,7 +44,9 @@ PolePlaces pole_places(const Medium& medium, double theta_inside)
 
 std::uint32_t mirrored_orders(const Medium& medium)
 {
-    constexpr double thickest = 4.0;  // mean free paths: behind, next to nothing of the beam comes back
+    // Mean free paths: behind, next to nothing of the beam comes back. Counted around the first exit alone, errors sum to .2
+    // to .5 % of the light of a slab of 5, and 3 to 6 % of one of 3 (g .8, ior 1.4, 45 degrees, between 30 and 60).
+    constexpr double thickest = 4.0;
     return medium.ior > 1.0 && medium.thickness <= thickest ? sharp_orders : 0;
 }
 
