@@ -183,8 +183,8 @@ def test_a_new_medium_has_a_pace_of_its_own():
 
     try:
         show(LAMP)
-        for _ in range(10):
-            painter.paces[Target("Floor"), False].note(SIDES[0], 10.0)
+        for side in SIDES:
+            painter.paces[Target("Floor"), False].note(side, 10.0)
         show(LAMP, albedo=(0.9, 0.9, 0.6))
         show(SUN, albedo=(0.9, 0.9, 0.6))
         assert sides == [FIRST_SIDE, SIDES[0], FIRST_SIDE]

@@ -12,8 +12,10 @@ namespace beamspread {
 namespace {
 
 // Rings around the old pole that cells are cut from, and the size of cells relative to the distance of the poles: below
-// what the finer edges and the last harmonics around the new pole tell apart.
-constexpr int rings_per_octave = 8;
+// what the finer edges and the last harmonics around the new pole tell apart. A lamp over slabs of .3 to 4 mean free paths,
+// against 32 rings and cells a quarter as large: the worst texel is off by 3e-4 of the brightest, with 8 rings by 2.5e-3, with
+// 4 by 1e-2, in the same time. Half and twice of the others change nothing.
+constexpr int rings_per_octave = 16;
 constexpr double cell_size = 0.01;
 constexpr double least_cells = 16.0;  // of half a ring
 constexpr double most_cells = 256.0;

@@ -21,7 +21,8 @@ constexpr float most_irradiance = 1e30f;
 // radius, 2^-10, in which nothing is told apart.
 constexpr double most_paths_per_texel = 1e8;
 
-// Kernels are tabulated in units of the longer side, finely enough for the shorter one.
+// Kernels are tabulated in units of the longer side, finely enough for the shorter one, which takes time and memory in
+// proportion. Beside `direct` the worst texel is off by 4e-7 of the brightest, as for squares.
 constexpr double most_aspect = 1000.0;
 
 bool is_irradiance(float irradiance)

@@ -24,7 +24,7 @@ constexpr std::size_t small_plane = 192;
 constexpr double share = 0.25;
 
 // So often there is a closer look around the texels where errors are largest. Without, the worst texel there is off by
-// twice as much, for 3 % fewer terms.
+// twice as much, for 3 % fewer terms. Half as many texels are as good, twice as many take 1.2 times as long.
 constexpr std::size_t refinements = 2;
 constexpr std::size_t worst_count = 12;
 

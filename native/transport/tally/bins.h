@@ -27,7 +27,7 @@ inline std::size_t order_bin(std::uint32_t order)
     return exact_orders + 4 * static_cast<std::size_t>(octave - 4) + quarter;
 }
 
-// Light of fewer scatterings may leave in sharp peaks; then it is blurred.
+// Light of fewer scatterings may leave in sharp peaks; then it is blurred: 17 harmonics leave 1 % of g .9 at 7 to 8, as below.
 inline constexpr std::uint32_t sharp_orders = 8;
 
 // Places that radii and azimuths are counted around, see transport/tally/poles.h.
