@@ -59,7 +59,8 @@ def source_and_headers(path: Path) -> frozenset[Path]:
 def check_tidy() -> bool:
     tidy = str(TOOLS / "clang-tidy")
     configuration = (ROOT / ".clang-tidy").read_bytes() + subprocess.check_output([tidy, "--version"])
-    subprocess.run(["cmake", "--preset", "dev"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    # Afresh, as a cache would keep the libraries that it once found.
+    subprocess.run(["cmake", "--fresh", "--preset", "dev"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
     commands = {Path(entry["file"]): entry["command"] for entry in json.loads(COMPILE_COMMANDS.read_text())}
     STAMPS.mkdir(parents=True, exist_ok=True)
 
