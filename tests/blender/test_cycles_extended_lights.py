@@ -58,11 +58,11 @@ def core_light(lamp):
     return SphereSpotLight(*common, position, *cone, data.shadow_soft_size, model)
 
 
-def our_irradiance(plane, light, occluders=None):
+def our_irradiance(plane, light, occluders=None, texels=TEXELS):
     """By rays, and the grid."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     polygons = read_polygons(plane.evaluated_get(depsgraph), "Target")
-    receiver = build_receiver(fit_uv_maps(polygons), TEXELS, TEXELS)
+    receiver = build_receiver(fit_uv_maps(polygons), texels, texels)
     grid = receiver.charts[0].grid
     irradiance = native.gather_rays(grid.native(), light.native(), occluders, rays=64)[0] * light.rgb()
     if light.is_behind(grid):
@@ -70,13 +70,20 @@ def our_irradiance(plane, light, occluders=None):
     return receiver.to_texture([irradiance])
 
 
+def in_the_middle_of_texels(plane, light):
+    """Over the middle half of each side, which is what Cycles samples of a texel."""
+    return our_irradiance(plane, light, texels=4 * TEXELS).reshape(TEXELS, 4, TEXELS, 4, 3)[:, 1:3, :, 1:3].mean((1, 3))
+
+
 def blocks(values):
     return values.reshape(TEXELS // BLOCK, BLOCK, TEXELS // BLOCK, BLOCK, 3).mean(axis=(1, 3))
 
 
-def assert_agree(plane, image, light, least=0.02, samples=256, worst=0.06, total=3e-3, most=TOLERANCE):
+def assert_agree(
+    plane, image, light, arrives=our_irradiance, least=0.02, samples=256, worst=0.06, total=3e-3, most=TOLERANCE
+):
     """Nine of ten lit blocks within 1 %, the others, which Cycles samples badly, within 6 %; the total .3 %."""
-    cycles, ours = cycles_irradiance(plane, image, samples), our_irradiance(plane, light)
+    cycles, ours = cycles_irradiance(plane, image, samples), arrives(plane, light)
     broken = ~np.isfinite(cycles)  # of spots without blend, at the cone's border in newer Blenders
     assert broken.mean() < 0.05
     cycles, ours = (blocks(np.where(broken, 0, values)) for values in (cycles, ours))
@@ -159,10 +166,7 @@ MODELS = [True] if IS_OLD else [True, False]
 @pytest.mark.parametrize("place", [(0.3, -0.2, 1.1), (0.3, -0.2, 0.35), (0.3, -0.2, 0.1), (0.2, 0, -0.1)], ids=str)
 @pytest.mark.parametrize("kind", ["POINT", "SPOT"])
 def test_radius(kind, place, soft):
-    """Also where the lamp is partly below the plane, and texels within it.
-
-    Around a ball whose centre is below, a spot's light, a tenth of that inside, differs by up to a fifth.
-    """
+    """Also where the lamp is partly below the plane, and texels within it."""
     if kind == "SPOT" and place[2] < 0 and soft:
         place = (*place[:2], 0.03)  # lower down, as a disk it lights the plane by a thousandth at most
     plane, image = add_receiver(PLANES["plain"])
@@ -170,11 +174,9 @@ def test_radius(kind, place, soft):
     if not IS_OLD:
         options["use_soft_falloff"] = soft
     lamp = add_light(kind, plane, place=place, shadow_soft_size=0.3, **options)
-    # Cycles is noisy where the lamp cuts the plane.
     cuts = place[2] <= 0.1 and (kind == "SPOT" or place[2] < 0)
-    options = {"least": 0.05, "total": 6e-3, "worst": 0.15, "most": 0.04} if cuts else {"worst": 0.1}
-    if kind == "SPOT" and place[2] < 0:
-        options["least"] = 0.3
+    # A spot's light ends where its ball does: texels there depend on where exactly Cycles samples them.
+    options = {"arrives": in_the_middle_of_texels, "most": 0.02, "worst": 0.1} if cuts else {}
     assert_agree(plane, image, core_light(lamp), samples=512, **options)
 
 
