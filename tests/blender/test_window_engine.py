@@ -39,9 +39,17 @@ def test_rendered_viewports_show_the_scene_by_eevee(seen):
 
 def test_blender_s_own_bake_has_bounced_light(seen):
     """A white wall to the sky's half of some texels returns a tenth of the sun at least."""
-    without, bounced = (seen[f"own bake, indirect {indirect}"] for indirect in (False, True))
+    without, bounced = (sum(seen[f"own bake, {name}"]) for name in ("plain", "bounced"))
     assert without > 0
     assert bounced > 1.05 * without
+
+
+def test_blender_s_own_bake_has_lamps_that_only_cycles_knows(seen):
+    """A red one, which would be white without its nodes."""
+    red, *others = seen["own bake, lamp"]
+    plain, *other_plain = seen["own bake, plain"]
+    assert red > 1.05 * plain
+    assert others == pytest.approx(other_plain, rel=1e-6)
 
 
 def test_a_pasted_node_parts_from_the_first_and_outlives_undo(seen):

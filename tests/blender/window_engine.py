@@ -64,7 +64,9 @@ def add_scene():
 
 
 def blender_s_own_bake(plane):
-    """Of irradiance into another image, before a white wall in the sun; sums with and without what bounces."""
+    """Of irradiance into another image, before a white wall in the sun; sums with and without what bounces, and with a
+    lamp that only Cycles knows.
+    """
     settings = bpy.context.scene.beamspread
     settings.quality, settings.output = "preview", "IRRADIANCE"
     wall = scenes.add_mesh("Wall", [(-4, 2, 0), (4, 2, 0), (4, 2, 4), (-4, 2, 4)], [(0, 1, 2, 3)])
@@ -80,18 +82,34 @@ def blender_s_own_bake(plane):
     over = []
     for handlers in (bpy.app.handlers.object_bake_complete, bpy.app.handlers.object_bake_cancel):
         handlers.append(lambda *_: over.append(1))
-    for indirect in (False, True):
+    lamp = None
+    for name, indirect in [("plain", False), ("bounced", True), ("lamp", False)]:
         settings.use_indirect = indirect
+        if name == "lamp":
+            lamp = add_checkered_lamp()
         over.clear()
         with bpy.context.temp_override(window=window()):
             bpy.ops.object.bake("INVOKE_DEFAULT", type="COMBINED", margin=0)
         yield lambda: over
         yield lambda: not bpy.app.is_job_running("OBJECT_BAKE")
-        results[f"own bake, indirect {indirect}"] = float(scenes.pixels(image)[..., :3].sum())
+        results[f"own bake, {name}"] = scenes.pixels(image)[..., :3].sum(axis=(0, 1)).tolist()
     tree.nodes.remove(texture)
-    for obj in (wall, sun):
+    for obj in (wall, sun, lamp):
         bpy.data.objects.remove(obj)
     scenes.select(plane)
+
+
+def add_checkered_lamp():
+    data = bpy.data.lights.new("Checkered", "POINT")
+    data.energy, data.use_nodes = 100, True
+    tree = data.node_tree
+    checker = tree.nodes.new("ShaderNodeTexChecker")
+    checker.inputs["Color1"].default_value, checker.inputs["Color2"].default_value = (1, 0, 0, 1), (0.5, 0, 0, 1)
+    tree.links.new(checker.outputs["Color"], tree.nodes["Emission"].inputs["Color"])
+    lamp = bpy.data.objects.new("Checkered", data)
+    lamp.location = 0, 0, 1
+    bpy.context.collection.objects.link(lamp)
+    return lamp
 
 
 def scenario():

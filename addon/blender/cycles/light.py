@@ -95,7 +95,7 @@ class CyclesLight:
         if not (world or bounced or others):
             return job
         if self.copy() is None:
-            missing = "Blender's own Bake asks Cycles only where Indirect Light is on: or use Bake Beamspread."
+            missing = "Blender's own Bake could not ask Cycles for light that only it knows: use Bake Beamspread."
             return replace(job, illumination=illumination.warning(missing))
         illumination = illumination.found({world, *others} - {""}).warning(*self._copy.scene.warnings)
         return replace(

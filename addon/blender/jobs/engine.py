@@ -21,7 +21,6 @@ from .fingerprint import Parts
 from .picture import render_picture, show_by_eevee
 from .prepare import prepare
 from .state import state
-from .texture import needs_cycles
 
 
 class BeamspreadEngine(bpy.types.RenderEngine):
@@ -115,7 +114,7 @@ class _Fillings:
 
     Attributes
     ----------
-    copy : of the scene, for Cycles to find what bounces: in its thread the engine can make none.
+    copy : of the scene, for what only Cycles knows: in its thread the engine can make none.
     """
 
     def __init__(self) -> None:
@@ -125,10 +124,7 @@ class _Fillings:
     def begin(self) -> None:
         targets = find_targets(bpy.context.selected_objects)
         self._parts = stale.parts_of(bpy.context, targets) if targets else {}
-        scene = bpy.context.scene
-        asks = bool(targets) and scene.beamspread.use_indirect
-        asks |= any(needs_cycles(scene.objects[one.object_name], one.material_name) for one in targets)
-        self.copy = CopyForCycles(scene, bpy.context.view_layer) if asks else None
+        self.copy = CopyForCycles(bpy.context.scene, bpy.context.view_layer) if targets else None
 
     def add(self, bakes: list[Bake]) -> None:
         parts = self._parts
