@@ -90,6 +90,12 @@ def test_what_cannot_start_is_said_in_one_popup(seen):
     assert "albedo's red is 1" in sentence
 
 
+def test_disabling_the_add_on_ends_the_bake_and_its_timer(seen):
+    assert seen["ticks of a bake"] > 2
+    assert seen["ticks when disabled"] == 0
+    assert not seen["runs on when disabled"]
+
+
 def test_loading_another_file_ends_the_bake(seen):
     assert not seen["runs on in the next file"]
 
