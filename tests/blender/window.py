@@ -211,6 +211,7 @@ def scenario():
     results["seconds to cancel"] = time.monotonic() - began
     results["kept by cancel"] = [brightness(name) for name in ("First", "Second")] == before
     results["messages of cancel"] = state.messages()
+    results["standing after cancel"] = state.said_of(Target("First", "First")).standing.value
 
     settings.solver = "fft"
     started(objects="ALL")

@@ -47,7 +47,8 @@ def colors_by_cycles(
         "height": receiver.height,
         **_samples(receiver.width, receiver.height),
     }
-    found = run(copy.scene, "colors", request, progress)["colors"]
+    seconds = seconds_of_colors(receiver.width, receiver.height)
+    found = run(copy.scene, "colors", request, progress, "Evaluating the base color", seconds)["colors"]
     known = np.isfinite(found).all(axis=2)
     if not known.any():
         raise BakeError("Cycles found no texel on it.")

@@ -130,7 +130,7 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         _leave_window()
         return self._finish(context)
 
-    def cancel(self, context):
+    def cancel(self, _context):
         """Blender closes the window or loads another file."""
         self._thread.cancel()
         self._thread.join()

@@ -135,7 +135,9 @@ class State:
             return  # it is still to run
         if standing == Standing.BAKED and bake.warnings:
             standing = Standing.WARNED
-        row = Row(bake.target, standing, tuple(bake.messages()))
+        # That it was cancelled is its standing.
+        sentences = bake.messages()[standing == Standing.CANCELLED :]
+        row = Row(bake.target, standing, tuple(sentences))
         self._said[bake.target] = self.rows[bake.target] = row
 
     def said_of(self, target: Target) -> Row | None:
@@ -154,9 +156,7 @@ class State:
     def messages(self) -> list[str]:
         """Everything said, each sentence once."""
         said = [
-            f"{row.target}: {sentence}"
-            if not number and row.standing in (Standing.FAILED, Standing.CANCELLED)
-            else sentence
+            f"{row.target}: {sentence}" if not number and row.standing == Standing.FAILED else sentence
             for row in self._said.values()
             for number, sentence in enumerate(row.sentences)
         ]
