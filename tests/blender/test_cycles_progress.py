@@ -40,25 +40,24 @@ def test_it_says_that_cycles_starts_and_moves_before_it_answers(monkeypatch, tmp
     assert 0 < heard.fractions[0] < 0.1
 
 
-def test_the_pace_follows_the_estimate_then_the_process_and_never_ends(monkeypatch):
+def test_the_pace_follows_the_estimate_and_the_process_and_never_ends_by_itself(monkeypatch):
     now = [100.0]
     monkeypatch.setattr("time.monotonic", lambda: now[0])
     pace = process._Pace(10.0)
 
-    def at(seconds, *answers):
+    def at(seconds, told=0.0):
         now[0] = 100.0 + seconds
-        return pace.fraction([(100.0 + when, fraction) for when, fraction in answers])
+        return pace.fraction(told)
 
     assert at(2) == pytest.approx(0.2)
-    assert at(4, (3, 0.0)) == pytest.approx(0.4)
-    # One tenth in two seconds, after three to start: 23 in all. What was shown stays.
-    assert at(5, (3, 0.0), (5, 0.1)) == pytest.approx(0.4)
-    assert at(11.5, (3, 0.0), (5, 0.1)) == pytest.approx(0.5)
-    assert at(23, (3, 0.0), (5, 0.1)) == pytest.approx(0.75)
-    assert at(2300, (3, 0.0), (5, 0.1)) < 1
-    assert at(2300, (3, 0.0), (5, 1.0)) == pytest.approx(1)
+    assert at(3, 0.4) == pytest.approx(0.4)
+    assert at(3.5, 0.1) == pytest.approx(0.4)
+    assert at(5, 0.1) == pytest.approx(0.5)
+    assert at(10, 0.1) == pytest.approx(0.75)
+    assert at(10000, 0.1) < 1
+    assert at(10000, 1.0) == 1
 
 
 def test_without_an_estimate_only_what_the_process_says_counts():
     pace = process._Pace(0.0)
-    assert [pace.fraction([]), pace.fraction([(0.0, 0.0)]), pace.fraction([(0.0, 0.3)])] == [0, 0, 0.3]
+    assert [pace.fraction(told) for told in (0.0, 0.3)] == [0, 0.3]

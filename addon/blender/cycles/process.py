@@ -68,8 +68,8 @@ def run(
     child, pace = _Child(_command(copy, file), counts_samples=task == "render"), _Pace(seconds)
     try:
         while child.is_running(POLL_SECONDS):
-            say(progress, doing if child.answers else f"{doing} (Cycles starts)")
-            answer = None if progress is None else progress(pace.fraction(child.answers))
+            say(progress, doing if child.has_answered else f"{doing} (Cycles starts)")
+            answer = None if progress is None else progress(pace.fraction(child.fraction))
             if isinstance(answer, bool | np.bool_) and not answer:
                 raise native.Cancelled("the bake was cancelled")
             if time.monotonic() - child.heard > SILENT_SECONDS:
@@ -94,19 +94,16 @@ def _command(copy: SceneCopy, request: Path) -> list[str]:
 class _Pace:
     """How far a process seems to be that seldom says so: by the time that it takes, of what it is reckoned to take.
 
-    It never falls and, whatever the time, never arrives: once all of that is over, a quarter is left.
+    By time alone it never arrives: once all of that is over, a quarter is left.
     """
 
     def __init__(self, seconds: float) -> None:
         self._began, self._seconds, self._fraction = time.monotonic(), seconds, 0.0
 
-    def fraction(self, answers: list[tuple[float, float]]) -> float:
-        told, seconds = 0.0, self._seconds
-        if answers and answers[-1][1] > 0:
-            (start, _), (now, told) = answers[0], answers[-1]
-            seconds = start - self._began + (now - start) / told
+    def fraction(self, told: float) -> float:
+        """Of the whole, from what it has `told`."""
         if self._seconds:
-            part = (time.monotonic() - self._began) / seconds
+            part = (time.monotonic() - self._began) / self._seconds
             told = max(told, part if part < 0.5 else 1 - 0.25 / part)
         self._fraction = max(self._fraction, told)
         return self._fraction
@@ -121,9 +118,7 @@ class _Child:
         # Windows would open a console for it.
         hidden = getattr(subprocess, "CREATE_NO_WINDOW", 0)
         self._process = subprocess.Popen(command, encoding="utf-8", errors="replace", creationflags=hidden, **pipes)
-        self.heard = time.monotonic()
-        # The first and the last time that it said how far it was: seconds of the clock, and how far.
-        self.answers: list[tuple[float, float]] = []
+        self.fraction, self.has_answered, self.heard = 0.0, False, time.monotonic()
         self.last_lines: deque[str] = deque(maxlen=LAST_LINES)
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
@@ -152,11 +147,8 @@ class _Child:
         for line in self._process.stdout:
             self.heard = time.monotonic()
             if line.startswith(MARK):
-                self._note(float(line.split()[1]))
+                self.fraction, self.has_answered = float(line.split()[1]), True
             elif self._counts_samples and (found := SAMPLES.search(line)):
-                self._note(int(found[1]) / max(int(found[2]), 1))
+                self.fraction = int(found[1]) / max(int(found[2]), 1)
             elif line.strip():
                 self.last_lines.append(line.strip())
-
-    def _note(self, fraction: float) -> None:
-        self.answers = [*self.answers[:1], (self.heard, fraction)]

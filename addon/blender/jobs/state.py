@@ -68,9 +68,9 @@ class Progress:
 
     def in_words(self) -> str:
         """What is being done, and how long the run will last."""
-        everything = f", all {self.everything:.0%}" if self.everything != self.own else ""
+        own, everything = f"{self.own:.0%}", f"{self.everything:.0%}"
         left = f", about {in_words(self.seconds_left)} left" if self.seconds_left is not None else ""
-        return f"{self.doing or 'Baking'} {self.own:.0%}{everything}{left}"
+        return f"{self.doing or 'Baking'} {own}{f', all {everything}' if everything != own else ''}{left}"
 
     def in_a_line(self) -> str:
         return f"{self.target}: {self.in_words()} (Esc cancels)"
