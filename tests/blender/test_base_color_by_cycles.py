@@ -5,6 +5,7 @@ import time
 import bpy
 import numpy as np
 import pytest
+from beamspread.blender import preferences
 from beamspread.blender.cycles import process
 from beamspread.blender.jobs import texture
 from beamspread.blender.jobs.operator import BakeThread
@@ -73,10 +74,10 @@ def add_checker(material, scale, one, other):
     tree.links.new(base_color(material), checker.outputs["Color"])
 
 
-def bake_of(obj, number=0, **changes):
+def bake_of(obj, number=0, size=SIZE, **changes):
     settings = bpy.context.scene.beamspread.for_bake(**changes)
     target = Target(obj.name, obj.data.materials[number].name)
-    return read_scene(bpy.context, [target], settings, SIZE).bake(target)
+    return read_scene(bpy.context, [target], settings, size).bake(target)
 
 
 def evaluated(obj, number=0):
@@ -248,7 +249,7 @@ def test_it_stops_within_two_seconds_and_leaves_the_scene(plane):
     thread = BakeThread(bake_of(plane))
     thread.start()
     asked = time.monotonic()
-    while thread.doing != "Evaluating the base color":
+    while not thread.doing.startswith("Evaluating the base color"):
         assert time.monotonic() - asked < 2
         time.sleep(0.01)
     thread.cancel()
@@ -288,6 +289,19 @@ def test_it_is_asked_for_once_in_a_run_and_only_where_it_counts(plane, monkeypat
     material.node_tree.links.new(base_color(material), image.outputs["Color"])
     assert estimates(bpy.context) == []
     assert bake_of(plane).job.more_color is None
+
+
+def test_the_memory_of_cycles_counts(plane, monkeypatch):
+    settings = bpy.context.scene.beamspread
+    settings.resolution = 512
+    monkeypatch.setattr(preferences, "memory_limit", lambda: 500 * 2**20)  # more than the bake, less than Cycles takes
+    assert bake_of(plane, 0, 512).job
+    add_noise_to(plane.data.materials[0])
+    assert "Cycles' process for the base color of 512 x 512 texels takes about 1.0 GB" in bake_of(plane, 0, 512).error
+    assert bake_of(plane, 0, 512, output="IRRADIANCE").job
+    select(plane)
+    (estimate,) = estimates(bpy.context)
+    assert estimate.endswith(", 1.0 GB of memory.")
 
 
 def test_blenders_own_bake_has_it(plane):

@@ -444,14 +444,14 @@ def test_cancelling_kills_the_process(monkeypatch):
 
     def progress(fraction):
         fractions.append(fraction)
-        return fraction == 0
+        return fraction < 0.2
 
     bake.run(progress)
     assert bake.status == CANCELLED
     (child,) = children
     assert child.returncode is not None
     assert child.returncode != 0
-    assert 0 < fractions[-1] < 0.1  # it had begun, and had not ended
+    assert 0.2 <= fractions[-1] < 0.5  # it had begun, and had not ended
     assert state() == before
     del bake
     assert folders() <= there

@@ -7,7 +7,8 @@ import bpy
 import numpy as np
 import pytest
 from beamspread.blender.jobs.pixels import images_of
-from beamspread.blender.node.tree import BASE_COLOR
+from beamspread.blender.node.node import upgrade_nodes
+from beamspread.blender.node.tree import BASE_COLOR, EMISSION, IMAGE, UNSEEN
 from scenes import add_material, add_plane, add_sun, bake, node_of, pixels, select
 
 OLDER_FILE = str(Path(__file__).with_name("files") / "node_before_sockets.blend")
@@ -16,6 +17,18 @@ INPUTS = ["Base Color", "Roughness", "Normal"]
 
 def inner(node, name):
     return node.node_tree.nodes[name]
+
+
+def sends_base_color(node):
+    """Whether the emission takes the base colour, and nothing of it."""
+    total = inner(node, EMISSION).inputs["Color"].links[0].from_node
+    nothing = total.inputs[1].links[0].from_node
+    (given,) = nothing.inputs[0].links
+    kinds = nothing.operation, total.operation, tuple(nothing.inputs[1].default_value)
+    image = total.inputs[0].links[0].from_node
+    return (
+        image == inner(node, IMAGE) and given.from_socket.name == BASE_COLOR and kinds == ("MULTIPLY", "ADD", (0, 0, 0))
+    )
 
 
 def test_an_older_file_that_was_open_before_the_add_on_was_switched_on():
@@ -58,6 +71,7 @@ class TestOlderFile:
         for node in nodes.values():
             assert [socket.name for socket in node.inputs] == INPUTS
             assert [socket.name for socket in node.outputs] == ["Color", "BSDF"]
+            assert sends_base_color(node)
             assert inner(node, "Glossy").inputs["Roughness"].is_linked
             assert node.inputs["Roughness"].default_value == pytest.approx(0.1)
 
@@ -77,6 +91,19 @@ class TestOlderFile:
         bake(plane)
         assert (pixels(node_of(plane.data.materials[0]).image) > 0).all()
         assert node_of(plane.data.materials[0]).ior == 1.0
+
+
+def test_no_input_is_greyed_out_and_trees_without_that_get_it():
+    node = node_of(add_material())
+    # As trees were that had all inputs and did not use this one.
+    tree = node.node_tree
+    tree.nodes.remove(tree.nodes[UNSEEN])
+    tree.links.new(inner(node, EMISSION).inputs["Color"], inner(node, IMAGE).outputs["Color"])
+    upgrade_nodes()
+    assert sends_base_color(node)
+    if hasattr(node.inputs[0], "is_inactive"):
+        bpy.context.view_layer.update()
+        assert [socket.name for socket in node.inputs if socket.is_inactive] == []
 
 
 def test_append_from_an_older_file():

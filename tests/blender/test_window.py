@@ -59,7 +59,8 @@ def test_escape_ends_a_bake_of_minutes_and_keeps_the_images(seen):
     # Drawn by software beside other processes, the window answers slowly; test_queue.py times the bake alone.
     assert seen["seconds to cancel"] < 10
     assert seen["kept by cancel"]
-    assert seen["messages of cancel"] == ["First / First: The bake was cancelled."]
+    assert seen["standing after cancel"] == "Cancelled"
+    assert seen["messages of cancel"] == []  # the standing says it
 
 
 def test_escape_ends_what_was_opened_last(seen):
@@ -88,6 +89,12 @@ def test_what_cannot_start_is_said_in_one_popup(seen):
     ((title, (sentence,)),) = seen["popups of refusal"]
     assert title == "Beamspread: nothing was baked"
     assert "albedo's red is 1" in sentence
+
+
+def test_disabling_the_add_on_ends_the_bake_and_its_timer(seen):
+    assert seen["ticks of a bake"] > 2
+    assert seen["ticks when disabled"] == 0
+    assert not seen["runs on when disabled"]
 
 
 def test_loading_another_file_ends_the_bake(seen):

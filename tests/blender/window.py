@@ -30,6 +30,27 @@ PATIENCE_SECONDS = 60
 results = {"drawn": {}, "shown": [], "popups": []}
 
 
+class WINDOW_OT_count_ticks(bpy.types.Operator):
+    """Counts what timers send to the window."""
+
+    bl_idname = "window.count_ticks"
+    bl_label = "Count Ticks"
+
+    def invoke(self, context, _event):
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, _context, event):
+        results["ticks"] += event.type == "TIMER"
+        return {"PASS_THROUGH"}
+
+
+def ticks_of_a_second():
+    """Count them anew."""
+    results["ticks"], began = 0, time.monotonic()
+    yield lambda: time.monotonic() > began + 1
+
+
 def count_draws(owner, name: str) -> None:
     """Have calls of a function that draws counted under the name of its owner; what it raises is kept."""
     function, label = getattr(owner, name), owner.__name__.rpartition(".")[2]
@@ -190,6 +211,7 @@ def scenario():
     results["seconds to cancel"] = time.monotonic() - began
     results["kept by cancel"] = [brightness(name) for name in ("First", "Second")] == before
     results["messages of cancel"] = state.messages()
+    results["standing after cancel"] = state.said_of(Target("First", "First")).standing.value
 
     settings.solver = "fft"
     started(objects="ALL")
@@ -225,7 +247,20 @@ def scenario():
     press_escape()
     scenes.node_of(bpy.data.materials["Second"]).albedo = (0.5, 0.5, 0.5)
 
-    settings.solver = "direct"
+    settings.solver, results["ticks"] = "direct", 0
+    bpy.utils.register_class(WINDOW_OT_count_ticks)
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        bpy.ops.window.count_ticks("INVOKE_DEFAULT")
+    started()
+    yield from ticks_of_a_second()
+    results["ticks of a bake"] = results["ticks"]
+    beamspread.unregister()
+    yield from ticks_of_a_second()  # some are still queued
+    yield from ticks_of_a_second()
+    results["ticks when disabled"] = results["ticks"]
+    results["runs on when disabled"] = state.is_running()
+    beamspread.register()
+
     started()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     results["runs on in the next file"] = state.is_running()

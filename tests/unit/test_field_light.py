@@ -170,3 +170,16 @@ def test_reflectance_of_a_surface():
     expected = [library(native.Medium(g=0.8, ior=1.4)).diffuse_reflectance(albedo) for albedo in material.albedo]
     np.testing.assert_allclose(Surface(material).reflectance(), expected, rtol=4e-3)
     assert Surface(material, base_color=(0.1, 0.2, 0.3)).reflectance() == [0.1, 0.2, 0.3]
+
+
+@pytest.mark.parametrize("faintest", [1e-22, 1e-44])
+def test_where_hardly_anything_arrives_light_has_a_direction_all_the_same(faintest):
+    """Also where the squares of single numbers have no digits left, and where these themselves have none."""
+    grid = grid_of(24, 24)
+    radiance = np.full((len(STRATA), 4, 4, 3), faintest) * np.random.default_rng(2).random((len(STRATA), 1, 1, 1))
+    radiance[:, :, :2] = 1.0
+    material = Material(albedo=(0.9,) * 3, mean_free_path=(0.1,) * 3, anisotropy=0.0, ior=1.0)
+    field = light_of(grid, radiance)
+    baked = bake(grid, Illumination([field]), material, 0.0, BakeSettings(quality="preview"))
+    assert np.isfinite(baked).all()
+    assert baked[:, 0].min() > 0

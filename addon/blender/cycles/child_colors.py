@@ -9,7 +9,7 @@ from child_fields import Baker, linked_source, without_limits
 from child_ghost import finish
 
 
-def colors(request, scene, progress) -> dict:
+def colors(request, scene, _progress) -> dict:
     """The task `colors`: float32 (height, width, 3), means over texels; not a number where none of it is on the mesh.
 
     `texture` names the input: the group nodes around a node, the node, the socket. `places` along each side of a texel
@@ -34,7 +34,6 @@ def colors(request, scene, progress) -> dict:
     baker = Baker(scene, obj, image, "EMIT")
     layers = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.uv_layers
     baker.options |= {"use_clear": False, "uv_layer": next(one.name for one in layers if one.active_render)}
-    progress(0.1)
     fine = baker.bake_passes(set()).reshape(height, places, width, places, 3)
     total, count = np.nan_to_num(fine, nan=0.0).sum(axis=(1, 3)), np.isfinite(fine).sum(axis=(1, 3))
     return {"colors": np.where(count > 0, total / np.maximum(count, 1), np.nan).astype(np.float32)}

@@ -17,8 +17,12 @@ from .process import run
 # In a texel of a small texture; of larger ones fewer, down to the least, so that it takes seconds.
 MOST_SAMPLES, LEAST_SAMPLES, ALL_SAMPLES = 16, 4, 1 << 24
 
-# Pixels that are baked, which take some 200 bytes each: up to so many a texel has several, in rows.
+# Pixels that are baked: up to so many a texel has several, in rows.
 ALL_PIXELS = 1 << 22
+
+# Of the child process: Blender itself, and each pixel that is baked. Peaks in 3.4 (4.5), of a plane alone: 0.25 (0.27)
+# GB of 256^2 pixels, 0.99 (0.98) of 2048^2, 3.24 of 4096^2. A scene of gigabytes takes those, too.
+BLENDER_BYTES, PIXEL_BYTES = 270 << 20, 190
 
 # Of a processor, for estimates: a noise texture of two octaves in Blender 3.4 (4.5: 2.5e6).
 SAMPLES_PER_SECOND = 3e6
@@ -47,7 +51,8 @@ def colors_by_cycles(
         "height": receiver.height,
         **_samples(receiver.width, receiver.height),
     }
-    found = run(copy.scene, "colors", request, progress)["colors"]
+    seconds = seconds_of_colors(receiver.width, receiver.height)
+    found = run(copy.scene, "colors", request, progress, "Evaluating the base color", seconds)["colors"]
     known = np.isfinite(found).all(axis=2)
     if not known.any():
         raise BakeError("Cycles found no texel on it.")
@@ -60,6 +65,11 @@ def seconds_of_colors(width: int, height: int) -> float:
     chosen = _samples(width, height)
     samples = width * height * chosen["places"] ** 2 * chosen["samples"]
     return START_SECONDS + samples / (SAMPLES_PER_SECOND * (os.cpu_count() or 1))
+
+
+def bytes_of_colors(width: int, height: int) -> int:
+    """About how much memory the child process takes for that, before the bake takes its own."""
+    return BLENDER_BYTES + PIXEL_BYTES * width * height * _samples(width, height)["places"] ** 2
 
 
 def _samples(width: int, height: int) -> dict[str, int]:

@@ -143,19 +143,21 @@ class CyclesLight:
             lights.append(self._panorama)
         if bounced:
             direct = _irradiance_in_the_open(receiver, [*own, *lights])
-            lights.append(FieldLight("Bounced light", *WHITE, False, self._fields(receiver, second, direct=direct)))
+            fields = self._fields(receiver, second, "Finding indirect light", direct=direct)
+            lights.append(FieldLight("Bounced light", *WHITE, False, fields))
         return lights + [self._direct(receiver, name, step) for name, step in zip(others, each)]
 
     def _direct(self, receiver: Receiver, name: str, progress: Progress | None) -> Light:
         """What an object sends to the receiver."""
         lamp = self._lamps.get(name)
+        doing = f"Finding the light of '{name}'"
         options = {"light": "DIRECT", "only": [name], "noise": (DIRECT_NOISE, DIRECT_NOISE)}
         if lamp is None:
-            return FieldLight(name, *WHITE, False, self._fields(receiver, progress, **options))
+            return FieldLight(name, *WHITE, False, self._fields(receiver, progress, doing, **options))
         whole = {"by_lamps": True, "strata": [[0.0, 1.0, 0.0, 1.0]], "charts": charts_of(receiver, DIRECT_NODES)}
-        return LampFieldLight(name, *WHITE, False, self._fields(receiver, progress, **options, **whole), *lamp)
+        return LampFieldLight(name, *WHITE, False, self._fields(receiver, progress, doing, **options, **whole), *lamp)
 
-    def _fields(self, receiver: Receiver, progress: Progress | None, **options) -> tuple[Field, ...]:
+    def _fields(self, receiver: Receiver, progress: Progress | None, doing: str, **options) -> tuple[Field, ...]:
         """Bounced light, or what the options ask for."""
         request = {
             "charts": charts_of(receiver, NODES),
@@ -170,7 +172,8 @@ class CyclesLight:
             "direct": 0.0,
             "most_samples": MOST_SAMPLES,
         }
-        found = run(self._copy.scene, "fields", {**request, **options}, progress)
+        seconds = seconds_estimate(receiver.width, receiver.height)
+        found = run(self._copy.scene, "fields", {**request, **options}, progress, doing, seconds)
         grids = (chart.grid for chart in receiver.charts)
         return tuple(Field(grid.origin, grid.normal, found[f"radiance_{n}"]) for n, grid in enumerate(grids))
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...core.errors import BakeError
 from ...core.native import native
-from ...core.progress import Progress
+from ...core.progress import Progress, say
 from .scene_copy import SceneCopy
 
 CHILD = Path(__file__).with_name("child.py")
@@ -35,13 +35,21 @@ SILENT_SECONDS = 1800.0
 LAST_LINES = 12
 
 
-def run(copy: SceneCopy, task: str, request: dict, progress: Progress | None = None) -> dict[str, np.ndarray]:
+def run(
+    copy: SceneCopy,
+    task: str,
+    request: dict,
+    progress: Progress | None = None,
+    doing: str = "Cycles works",
+    seconds: float = 0.0,
+) -> dict[str, np.ndarray]:
     """Have a child process do a task of child.py on the copy.
 
     Parameters
     ----------
     request : what the task needs, as JSON can hold it.
-    progress : called with 0..1 several times a second, returns False to stop.
+    progress : called with 0..1 several times a second, returns False to stop; told what is `doing`.
+    seconds : that it will take, about; 0: nobody knows.
 
     Returns
     -------
@@ -57,10 +65,11 @@ def run(copy: SceneCopy, task: str, request: dict, progress: Progress | None = N
     name = uuid.uuid4().hex
     output, file = copy.folder / f"{name}.npz", copy.folder / f"{name}.json"
     file.write_text(json.dumps({**copy.request, **request, "task": task, "output": str(output), "mark": MARK}))
-    child = _Child(_command(copy, file), counts_samples=task == "render")
+    child, pace = _Child(_command(copy, file), counts_samples=task == "render"), _Pace(seconds)
     try:
         while child.is_running(POLL_SECONDS):
-            answer = None if progress is None else progress(child.fraction)
+            say(progress, doing if child.has_answered else f"{doing} (Cycles starts)")
+            answer = None if progress is None else progress(pace.fraction(child.fraction))
             if isinstance(answer, bool | np.bool_) and not answer:
                 raise native.Cancelled("the bake was cancelled")
             if time.monotonic() - child.heard > SILENT_SECONDS:
@@ -82,6 +91,24 @@ def _command(copy: SceneCopy, request: Path) -> list[str]:
     return [copy.binary, *options, "--", str(copy.file), str(request)]
 
 
+class _Pace:
+    """How far a process seems to be that seldom says so: by the time that it takes, of what it is reckoned to take.
+
+    By time alone it never arrives: once all of that is over, a quarter is left.
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self._began, self._seconds, self._fraction = time.monotonic(), seconds, 0.0
+
+    def fraction(self, told: float) -> float:
+        """Of the whole, from what it has `told`."""
+        if self._seconds:
+            part = (time.monotonic() - self._began) / self._seconds
+            told = max(told, part if part < 0.5 else 1 - 0.25 / part)
+        self._fraction = max(self._fraction, told)
+        return self._fraction
+
+
 class _Child:
     """A process, and what it says: how far it is by lines of its own, or by the samples that Cycles counts."""
 
@@ -91,7 +118,7 @@ class _Child:
         # Windows would open a console for it.
         hidden = getattr(subprocess, "CREATE_NO_WINDOW", 0)
         self._process = subprocess.Popen(command, encoding="utf-8", errors="replace", creationflags=hidden, **pipes)
-        self.fraction, self.heard = 0.0, time.monotonic()
+        self.fraction, self.has_answered, self.heard = 0.0, False, time.monotonic()
         self.last_lines: deque[str] = deque(maxlen=LAST_LINES)
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
@@ -120,7 +147,7 @@ class _Child:
         for line in self._process.stdout:
             self.heard = time.monotonic()
             if line.startswith(MARK):
-                self.fraction = float(line.split()[1])
+                self.fraction, self.has_answered = float(line.split()[1]), True
             elif self._counts_samples and (found := SAMPLES.search(line)):
                 self.fraction = int(found[1]) / max(int(found[2]), 1)
             elif line.strip():

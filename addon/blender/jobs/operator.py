@@ -23,6 +23,9 @@ TIMER_SECONDS = 0.1
 
 NOTHING_STALE = "Nothing is out of date."
 
+# Of the run in the window.
+_timers: list[bpy.types.Timer] = []
+
 
 class BakeThread(threading.Thread):
     """Runs one bake; poll `fraction` and `doing` until it has ended."""
@@ -103,7 +106,7 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         if not self._start_next():
             return self._finish(context)
         manager = context.window_manager
-        self._timer = manager.event_timer_add(TIMER_SECONDS, window=context.window)
+        _timers.append(manager.event_timer_add(TIMER_SECONDS, window=context.window))
         manager.progress_begin(0, 100)
         manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -124,14 +127,14 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         self._take(bake)
         if bake.status != CANCELLED and self._start_next():
             return {"PASS_THROUGH"}
-        self._end_modal(context)
+        _leave_window()
         return self._finish(context)
 
-    def cancel(self, context):
+    def cancel(self, _context):
         """Blender closes the window or loads another file."""
         self._thread.cancel()
         self._thread.join()
-        self._end_modal(context)
+        _leave_window()
 
     def _prepare(self, context, preview_first: bool) -> bool:
         """Make the queue of bakes; False if there is nothing to do at all."""
@@ -224,13 +227,6 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
             self.report({level}, message)
             self._said.add(message)
 
-    def _end_modal(self, context) -> None:
-        context.window_manager.event_timer_remove(self._timer)
-        context.window_manager.progress_end()
-        if context.workspace is not None:
-            context.workspace.status_text_set(None)
-        state.stop()
-
     def _finish(self, context):
         stale.look_soon()
         redraw(context)
@@ -278,16 +274,24 @@ class BEAMSPREAD_OT_cancel(bpy.types.Operator):
         return {"FINISHED"}
 
 
+def _leave_window() -> None:
+    """Take away what a run has in the window."""
+    while _timers:
+        bpy.context.window_manager.event_timer_remove(_timers.pop())
+        bpy.context.window_manager.progress_end()
+    if state.is_running():
+        for workspace in bpy.data.workspaces:  # the user may have changed to another meanwhile
+            workspace.status_text_set(None)
+    state.stop()
+
+
 def _end_threads() -> None:
     """One that outlives its operator would end Blender with an error when that quits."""
     for thread in threading.enumerate():
         if isinstance(thread, BakeThread):
             thread.cancel()
             thread.join()
-    if state.is_running():  # the operator goes without being asked to clear up
-        for workspace in bpy.data.workspaces:
-            workspace.status_text_set(None)
-    state.stop()
+    _leave_window()  # the operator goes without being asked to
 
 
 register, unregister = all_or_nothing(*classes(BEAMSPREAD_OT_bake, BEAMSPREAD_OT_cancel), (lambda: None, _end_threads))

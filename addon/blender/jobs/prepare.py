@@ -13,7 +13,7 @@ from ...core.bake.surface import Surface
 from ...core.errors import BakeError, sentence
 from ...core.scene.receiver import build_receiver, texture_size
 from ...core.scene.uv_map import fit_uv_maps
-from ..cycles.colors import seconds_of_colors
+from ..cycles.colors import bytes_of_colors, seconds_of_colors
 from ..cycles.light import CopyForCycles, CyclesLight
 from ..images.files import check_image
 from ..images.sequence import is_sequence, size_of_frames
@@ -124,7 +124,7 @@ class Preparation:
             receiver = build_receiver(plan.maps, *plan.size)
             illumination = self._illumination.lighting(target.object_name)
             job = BakeJob(target.object_name, receiver, illumination, plan.surface, settings or self.settings)
-            check_memory(job, self.settings.memory_limit)
+            check_memory(job, self.settings.memory_limit, colors_by_cycles=self.color_seconds(target) > 0)
             if isinstance(plan.texture, ColorByCycles):
                 job = plan.texture.in_job(job, self._by_cycles.copy())
             elif plan.texture is not None:
@@ -165,14 +165,18 @@ def _read_target(depsgraph, target: Target, resolution: int | None, size: tuple[
     return _Plan(maps, size, texture.on(surface), texture)
 
 
-def check_memory(job: BakeJob, limit: int) -> None:
-    """Raise BakeError if a bake would take more bytes than allowed; 0: than the machine has."""
+def check_memory(job: BakeJob, limit: int, colors_by_cycles: bool = False) -> None:
+    """Raise BakeError if a bake, or Cycles before it, would take more bytes than allowed; 0: than the machine has."""
     limit = limit or machine_bytes()
-    width, height = job.receiver.width, job.receiver.height
-    needed = bake_bytes(width, height, job.settings.solver)
+    size = job.receiver.width, job.receiver.height
+    texels = f"{size[0]} x {size[1]} texels"
+    needs = [(bake_bytes(*size, job.settings.solver), f"{texels} take")]
+    if colors_by_cycles:
+        needs.append((bytes_of_colors(*size), f"Cycles' process for the base color of {texels} takes"))
+    needed, who = max(needs)
     if limit and needed > limit:
         raise BakeError(
-            f"{width} x {height} texels take about {needed / 2**30:.1f} GB of memory, and {limit / 2**30:.1f} GB are "
+            f"{who} about {needed / 2**30:.1f} GB of memory, and {limit / 2**30:.1f} GB are "
             "allowed: lower the resolution, or raise the memory limit in the add-on's preferences."
         )
 

@@ -68,9 +68,9 @@ class Progress:
 
     def in_words(self) -> str:
         """What is being done, and how long the run will last."""
-        everything = f", all {self.everything:.0%}" if self.everything != self.own else ""
+        own, everything = f"{self.own:.0%}", f"{self.everything:.0%}"
         left = f", about {in_words(self.seconds_left)} left" if self.seconds_left is not None else ""
-        return f"{self.doing or 'Baking'} {self.own:.0%}{everything}{left}"
+        return f"{self.doing or 'Baking'} {own}{f', all {everything}' if everything != own else ''}{left}"
 
     def in_a_line(self) -> str:
         return f"{self.target}: {self.in_words()} (Esc cancels)"
@@ -135,7 +135,9 @@ class State:
             return  # it is still to run
         if standing == Standing.BAKED and bake.warnings:
             standing = Standing.WARNED
-        row = Row(bake.target, standing, tuple(bake.messages()))
+        # That it was cancelled is its standing.
+        sentences = bake.messages()[standing == Standing.CANCELLED :]
+        row = Row(bake.target, standing, tuple(sentences))
         self._said[bake.target] = self.rows[bake.target] = row
 
     def said_of(self, target: Target) -> Row | None:
@@ -154,9 +156,7 @@ class State:
     def messages(self) -> list[str]:
         """Everything said, each sentence once."""
         said = [
-            f"{row.target}: {sentence}"
-            if not number and row.standing in (Standing.FAILED, Standing.CANCELLED)
-            else sentence
+            f"{row.target}: {sentence}" if not number and row.standing == Standing.FAILED else sentence
             for row in self._said.values()
             for number, sentence in enumerate(row.sentences)
         ]

@@ -8,6 +8,7 @@ NAME = ".Beamspread"
 BASE_COLOR, ROUGHNESS, NORMAL = "Base Color", "Roughness", "Normal"
 IMAGE, FRESNEL, COAT, GLOSSY = "Image", "Fresnel", "Coat", "Glossy"
 FACING = "Facing"
+INPUT, EMISSION, UNSEEN = "Input", "Emission", "Unseen"
 
 # Of an image sequence: its first and last frame, width and height.
 FRAMES = "beamspread_frames"
@@ -33,7 +34,7 @@ def make_inner_tree() -> bpy.types.ShaderNodeTree:
     coat.operation = "MULTIPLY"
     glossy = _add(tree, "ShaderNodeBsdfGlossy", GLOSSY, (-200, -300))
     glossy.inputs["Roughness"].default_value = ROUGHNESS_BEFORE
-    emission = _add(tree, "ShaderNodeEmission", "Emission", (-200, 0))
+    emission = _add(tree, "ShaderNodeEmission", EMISSION, (-200, 0))
     total = _add(tree, "ShaderNodeAddShader", "Total", (0, -100))
     output = _add(tree, "NodeGroupOutput", "Output", (200, 0))
     link = tree.links.new
@@ -56,18 +57,37 @@ def is_inner_tree(tree) -> bool:
 def add_missing_inputs(tree) -> bool:
     """Give a tree, perhaps one of an older file, the inputs that nodes have today; whether it lacked them."""
     compat.set_shader_color(tree)
-    if compat.has_input_socket(tree, NORMAL) or any(name not in tree.nodes for name in (FRESNEL, GLOSSY)):
-        return False
+    lacks_inputs = not compat.has_input_socket(tree, NORMAL) and {FRESNEL, GLOSSY} <= set(tree.nodes.keys())
+    if lacks_inputs:
+        _add_inputs(tree)
+    if UNSEEN not in tree.nodes and {INPUT, IMAGE, EMISSION} <= set(tree.nodes.keys()):
+        _use_base_color(tree)
+    return lacks_inputs
+
+
+def _add_inputs(tree) -> None:
     glossy, fresnel = tree.nodes[GLOSSY], tree.nodes[FRESNEL]
     compat.add_input_socket(tree, "NodeSocketColor", BASE_COLOR, hide_value=True)
     compat.add_input_socket(tree, "NodeSocketFloat", ROUGHNESS, default=ROUGHNESS_BEFORE)
     compat.add_input_socket(tree, "NodeSocketVector", NORMAL, hide_value=True)
-    given = _add(tree, "NodeGroupInput", "Input", (-1400, -450))
+    given = _add(tree, "NodeGroupInput", INPUT, (-1400, -450))
     normal = _normal_or_plain(tree, given.outputs[NORMAL])
     tree.links.new(glossy.inputs["Roughness"], given.outputs[ROUGHNESS])
     tree.links.new(glossy.inputs["Normal"], normal)
     tree.links.new(fresnel.inputs["Normal"], normal)
-    return True
+
+
+def _use_base_color(tree) -> None:
+    """Have the emission depend on the base colour, times 0: Blender 5 greys out inputs that no output depends on."""
+    nothing = _add(tree, "ShaderNodeVectorMath", UNSEEN, (-600, 250))
+    nothing.operation = "MULTIPLY"
+    nothing.inputs[1].default_value = (0.0, 0.0, 0.0)
+    total = _add(tree, "ShaderNodeVectorMath", "Seen", (-400, 150))
+    link = tree.links.new
+    link(nothing.inputs[0], tree.nodes[INPUT].outputs[BASE_COLOR])
+    link(total.inputs[0], tree.nodes[IMAGE].outputs["Color"])
+    link(total.inputs[1], nothing.outputs[0])
+    link(tree.nodes[EMISSION].inputs["Color"], total.outputs[0])
 
 
 def _normal_or_plain(tree, given):

@@ -156,9 +156,10 @@ class MaterialPanel:
         layout = self.layout
         _use_columns(layout)
         material = _active_material(context)
+        # First what changes by itself: the properties are in the node and in Blender's Surface panel, too.
+        draw_bake(layout, context, material.name)
         draw_properties(find_node(material), layout)
         draw_image_buttons(layout, context)
-        draw_bake(layout, context, material.name)
 
 
 def _active_material(context):

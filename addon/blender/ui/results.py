@@ -11,7 +11,7 @@ from ...core.bake.estimate import in_words, ray_seconds, solver_seconds
 from ...core.bake.luminance import MOST_RAYS, rays_per_texel
 from ...core.errors import BakeError
 from ..cycles.child_denoise import has_denoiser
-from ..cycles.colors import seconds_of_colors
+from ..cycles.colors import bytes_of_colors, seconds_of_colors
 from ..cycles.light import seconds_estimate
 from ..images.files import check_image
 from ..images.results import check_editable
@@ -186,7 +186,8 @@ def estimates(context) -> list[str]:
     asked = [size for one, size in pairs if needs_cycles(objects[one.object_name], one.material_name)]
     if asked:
         seconds = in_words(sum(seconds_of_colors(*size) for size in asked))
-        found.append(f"Base color, by Cycles: about {seconds}{_of_many(asked)}.")
+        memory = max(bytes_of_colors(*size) for size in asked) / 2**30
+        found.append(f"Base color, by Cycles: about {seconds}{_of_many(asked)}, {memory:.1f} GB of memory.")
     if settings.solver == "direct" and settings.output == "LUMINANCE":
         lamps = [obj.data.type for obj in context.view_layer.objects if obj.type == "LIGHT"]
         suns = lamps.count("SUN")

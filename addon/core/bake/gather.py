@@ -21,6 +21,9 @@ SURVEY_TEXELS, SURVEY_RAYS = 96, 4
 # Of light that stands for itself where the solver chooses how exactly to look.
 STAND_IN_RAYS = 8
 
+# W/m^2: below, single precision has no direction either.
+LEAST_FLOW = 1e-30
+
 
 class Gatherer:
     """What reaches one grid.
@@ -71,8 +74,10 @@ class Gatherer:
         if light.has_one_direction:
             return light.plane_lights(self._reach(light, progress), directions=True)
         irradiance, flow = self.totals(light, STAND_IN_RAYS, progress)
-        length = np.linalg.norm(flow, axis=-1, keepdims=True)
-        direction = np.divide(flow, length, out=np.full_like(flow, (0, 0, -1)), where=length > 0)
+        # In double precision: the square of what hardly arrives, as 1e-22 at a border, has no digits in single.
+        length = np.sqrt(np.einsum("...i,...i->...", flow, flow, dtype=np.float64))[..., None]
+        down = np.full_like(flow, (0, 0, -1))
+        direction = np.divide(flow, length, out=down, where=length > LEAST_FLOW, casting="same_kind")
         return native.PlaneLight.of_channels(irradiance * light.rgb(), direction, 3)
 
     def survey(self) -> tuple[tuple[int, int], list[list], list[float]]:
