@@ -14,6 +14,7 @@ from ...core.batch.names import file_stems
 from ...core.batch.options import BatchOptions
 from ...core.errors import ImageError
 from ..node.find import find_node, find_targets
+from ..read.instances import with_instanced
 from . import files, writing
 from .results import Results
 
@@ -24,7 +25,7 @@ class Outputs:
     def __init__(self, scene, options: BatchOptions) -> None:
         self._options, self._settings, self._results = options, scene.beamspread, Results()
         self._view_of = scene if scene.beamspread.use_view_transform else None
-        targets = find_targets(scene.objects)
+        targets = find_targets(with_instanced(scene.objects))
         self._stems = file_stems(_names(target, layer) for target in targets for layer in LAYERS)
 
     def write(self, bake: Bake, frame: int) -> str:

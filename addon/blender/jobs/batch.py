@@ -20,7 +20,8 @@ from ...core.progress import timed
 from ..images.files import file_of
 from ..images.outputs import Outputs
 from ..images.writing import size_of
-from ..node.find import NOTHING_FOUND, find_misplaced, find_targets
+from ..node.find import NOTHING_FOUND, find_bakeable, find_misplaced
+from ..read.instances import by_name
 from . import stale
 from .fingerprint import SETTINGS, Parts, settings_part
 from .prepare import prepare_scene
@@ -96,16 +97,19 @@ class _Batch:
 
     def _find(self) -> tuple[list[Target], list[Bake]]:
         """What to bake, and what can't be."""
-        targets, impossible, objects = [], [], self._scene.objects
-        for name in self._options.objects or [obj.name for obj in objects]:
+        view_layer = bpy.context.view_layer
+        if not self._options.objects:
+            return find_bakeable(view_layer), find_misplaced(self._scene.objects)
+        targets, impossible, objects = [], [], by_name(self._scene)
+        for name in self._options.objects:
             obj = objects.get(name)
-            found, misplaced = (find_targets([obj]), find_misplaced([obj])) if obj else ([], [])
-            if self._options.objects and not found and not misplaced:
+            found, misplaced = (find_bakeable(view_layer, [obj]), find_misplaced([obj])) if obj else ([], [])
+            if not found and not misplaced:
                 missing = "has no material with a Beamspread node" if obj else "is not in the scene"
                 impossible.append(Bake(Target(name), error=f"The object '{name}' {missing}."))
             impossible += misplaced
             targets += found
-        return targets, impossible
+        return list(dict.fromkeys(targets)), impossible
 
     def _skipped(self, target: Target, frame: int) -> BakeRecord | None:
         """The record of what an earlier run has written."""

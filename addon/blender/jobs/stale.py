@@ -17,8 +17,9 @@ from ..images import previews
 from ..images.files import file_of
 from ..images.owners import noted_as
 from ..images.sequence import is_sequence
-from ..node.find import find_misplaced, find_node, find_targets
+from ..node.find import find_bakeable, find_misplaced, find_node
 from ..node.tree import FRAMES
+from ..read.instances import by_name
 from ..registration import all_or_nothing, handlers
 from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
 from .record import Record, keep_record, record_of
@@ -37,7 +38,7 @@ _last = {"change": 0.0, "seconds": 0.0, "is looking": False}
 def refresh(context) -> None:
     """Bring the rows of all targets of the context's scene up to date."""
     _keep_waiting()
-    targets = find_targets(context.scene.objects)
+    targets = find_bakeable(context.view_layer, context.scene.objects)
     recorded = {target: record for target in targets if (record := _record(target)) is not None}
     now = fingerprints.of(context, recorded) if recorded else {}
     state.rows = {target: _row(target, recorded.get(target), now.get(target)) for target in targets}
@@ -47,8 +48,8 @@ def refresh(context) -> None:
 def _failures_of_others(scene, targets: list[Target]) -> list[Row]:
     """Of what is no target, as a node inside a group, unless its object has another material in its place by now."""
     others = [row for row in state.failures() if row.target not in targets]
-    named = {target.object_name for target in targets}
-    again = find_misplaced(scene.objects[name] for name in named & {row.target.object_name for row in others})
+    named, objects = {target.object_name for target in targets}, by_name(scene) if others else {}
+    again = find_misplaced(objects[name] for name in named & {row.target.object_name for row in others})
     misplaced = {bake.target for bake in again}
     return [row for row in others if row.target.object_name not in named or row.target in misplaced]
 
