@@ -139,16 +139,18 @@ class Fingerprints:
         depsgraph = context.evaluated_depsgraph_get()
         visible = render_visible_names(view_layer)
         self._sees_media = scene.beamspread.use_indirect
-        lamps, solids, own, owners = 0, 0, {}, {}
+        lamps, solids, own, known = 0, 0, {}, {}
         shown = [obj for obj in scene.objects if obj.name in visible]
         self._scatter.look(depsgraph, [obj for obj in shown if scatters(obj)])
-        for obj, text in self._with_instanced(shown, depsgraph, {}):
-            owners |= dict.fromkeys([obj.data] if obj.type == "LIGHT" else (one.material for one in obj.material_slots))
+        for obj, text in self._with_instanced(shown, depsgraph, known):
             if obj.type == "LIGHT":
                 lamps += _number(text)
             else:
-                own.setdefault(obj.name, text)
-                solids += _number(self._with_materials(obj, text))
+                number = _number(digest(text, known[obj][1]))
+                own.setdefault(obj.name, (text, number))
+                solids += number
+        owners = [obj.data for obj in known if obj.type == "LIGHT"]
+        owners += [slot.material for obj in known for slot in obj.material_slots]
         shared = {
             "lights": f"{lamps % 2**64:x}",
             "world": self._world(scene, view_layer),
@@ -161,11 +163,10 @@ class Fingerprints:
                 node = find_node(bpy.data.materials.get(target.material_name))
             if node is None:
                 continue
-            mine = own.get(obj.name, "")
-            others = solids - _number(self._with_materials(obj, mine)) if mine else solids
+            mine, number = own.get(obj.name, ("", 0))
             found[target] = {
                 "object": mine,
-                "other objects": f"{others % 2**64:x}",
+                "other objects": f"{(solids - number) % 2**64:x}",
                 **shared,
                 "material": digest(self._surface(node)),
                 SETTINGS: settings_part(scene),
@@ -188,18 +189,20 @@ class Fingerprints:
     def _with_instanced(self, objects: Iterable, depsgraph, known: dict, place: str = "") -> Iterator[tuple]:
         """Objects, and after them what they show of collections, each with a digest of its shape and place.
 
-        `known` has digests of those met before, without the `place` of what shows them.
+        `known` gets, of each, the digest without the `place` of what shows it, and those of its materials.
         """
         later = []
         for obj in objects:
             collection = collection_of(obj)
             if obj.type == "LIGHT" or obj.type in SOLID or obj.instance_type != "NONE":
                 if obj not in known:
-                    known[obj] = self._lamp(obj) if obj.type == "LIGHT" else self._solid(obj, depsgraph)
+                    text = self._lamp(obj) if obj.type == "LIGHT" else self._solid(obj, depsgraph)
+                    known[obj] = text, [self._material(slot.material) for slot in obj.material_slots]
+                text, _ = known[obj]
                 if collection is not None:
-                    later.append((collection, digest(place, known[obj], list(collection.instance_offset))))
+                    later.append((collection, digest(place, text, list(collection.instance_offset))))
                 if obj.type != "EMPTY":
-                    yield obj, digest(place, known[obj]) if place else known[obj]
+                    yield obj, digest(place, text) if place else text
         for collection, there in later:
             yield from self._with_instanced(rendered_in(collection), depsgraph, known, there)
 
@@ -218,9 +221,6 @@ class Fingerprints:
         modifiers = [(modifier.show_render, modifier.type, _modifier(modifier)) for modifier in obj.modifiers]
         particles = [values_of(one.settings, _ID_LOOKS) for one in obj.particle_systems]
         return digest(_mesh(obj, depsgraph), modifiers, particles)
-
-    def _with_materials(self, obj, shape: str) -> str:
-        return digest(shape, [self._material(slot.material) for slot in obj.material_slots])
 
     def _material(self, material) -> str:
         """As others see it: of a Beamspread node only the medium, whose light may bounce, and not the baked image."""

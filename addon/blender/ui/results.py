@@ -19,8 +19,8 @@ from ..jobs.popup import wrap
 from ..jobs.state import Row, Standing, state
 from ..jobs.texture import needs_cycles
 from ..live import session
-from ..node.find import find_bakeable, find_misplaced, find_node, materials_of
-from ..read.instances import by_name
+from ..node.find import find_misplaced, find_node, find_targets, materials_of
+from ..read.instances import by_name, with_instanced
 from ..read.placed import why_hidden
 from ..read.visible import render_visible_names
 
@@ -175,7 +175,9 @@ def _standing(row: Row) -> Standing:
 def estimates(context) -> list[str]:
     """How long what takes long will take for the objects that Bake would bake, in sentences."""
     settings, found = context.scene.beamspread, []
-    chosen = find_bakeable(context.view_layer, context.view_layer.objects.selected) or list(state.rows)
+    selected = context.view_layer.objects.selected
+    inner = {obj.name for obj in with_instanced(selected)}
+    chosen = find_targets(selected) or [one for one in state.rows if one.object_name in inner] or list(state.rows)
     sizes = [_size(target, settings.resolution) for target in chosen]
     if not sizes:
         return []
