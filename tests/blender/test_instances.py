@@ -10,6 +10,7 @@ from beamspread.blender.jobs.batch import bake_all
 from beamspread.blender.jobs.state import Standing, state
 from beamspread.blender.live import session
 from beamspread.blender.node.find import find_bakeable
+from beamspread.blender.ui.results import estimates
 from beamspread.core.bake.runner import Target
 from beamspread.core.batch import options
 from mathutils import Euler, Matrix
@@ -290,6 +291,17 @@ def test_a_batch_follows_the_instance(tmp_path):
     one, two = (pixels(bpy.data.images.load(one.path)) for one in report.bakes)
     assert np.abs(one - two).max() > 0.1 * one.max()
     assert np.array_equal(bake_it(holder), two)
+
+
+def test_estimates_are_of_what_the_selected_one_shows():
+    holder, _, _ = nested()
+    add_plane("Other", material=add_material("Other"))
+    bpy.context.scene.beamspread.use_indirect = True
+    stale.refresh(bpy.context)
+    for selected, is_of_both in ((holder, False), (add_sun(), True)):
+        select(selected)
+        (estimate,) = estimates(bpy.context)
+        assert ("for 2 objects" in estimate) == is_of_both
 
 
 def link_tiles(tmp_path, has_image):
