@@ -7,6 +7,7 @@ import scenes
 from beamspread.blender.cycles import light
 from beamspread.blender.jobs import stale
 from beamspread.blender.jobs.batch import bake_all
+from beamspread.blender.jobs.prepare import prepare_scene
 from beamspread.blender.jobs.state import Standing, state
 from beamspread.blender.live import session
 from beamspread.blender.node.find import find_bakeable
@@ -15,7 +16,9 @@ from beamspread.core.bake.runner import Target
 from beamspread.core.batch import options
 from mathutils import Euler, Matrix
 from scenes import add_blocker, add_material, add_plane, add_sun, messages_of, node_of, pixels, select
+from test_indirect import add_gobo
 from test_live import settle
+from test_standing import scatter_group
 
 TILE = Target("Tile", "Medium")
 WITHIN = Matrix.Translation((0.3, -0.2, 0.1)) @ Euler((0.1, 0.2, 0.7)).to_matrix().to_4x4()
@@ -190,6 +193,24 @@ def test_particles_count_as_places():
     assert "'Tile' stands in 6 places" in messages_of(lambda: bpy.ops.beamspread.bake(objects="ALL"))
 
 
+def test_instances_of_other_meshes_under_its_name_are_no_places():
+    """As geometry nodes make them."""
+    tile, collection = add_tile()
+    tile.modifiers.new("Scatter", "NODES").node_group = group = scatter_group(tile)
+    tree_info = next(one for one in group.nodes if one.bl_idname == "GeometryNodeObjectInfo")
+    cube, points = group.nodes.new("GeometryNodeMeshCube"), tree_info.outputs["Geometry"].links[0].to_node
+    cube.inputs["Size"].default_value = (0.01,) * 3
+    group.links.new(points.inputs["Instance"], cube.outputs[0])
+    group.nodes.remove(tree_info)
+    join = group.nodes.new("GeometryNodeJoinGeometry")
+    given, result = (next(one for one in group.nodes if one.type == kind) for kind in ("GROUP_INPUT", "GROUP_OUTPUT"))
+    for source in (given, group.nodes["Move"]):
+        group.links.new(join.inputs[0], source.outputs[0])
+    group.links.new(result.inputs[0], join.outputs[0])
+    add_sun(30, 20)
+    assert bake_it(add_instancer(collection, SKEWED)).any()
+
+
 def test_an_instance_that_does_not_render_is_no_place():
     holder, collection, _ = in_the_scene()
     add_sun(30, 20)
@@ -265,6 +286,7 @@ def test_a_wall_that_does_not_render_throws_no_shadow():
     assert darkest(bake_it(holder)) < 0.7
     within.hide_render = True
     assert darkest(bake_it(holder)) > 0.9
+    assert "Wall" in {one.object.name for one in bpy.context.evaluated_depsgraph_get().object_instances}
 
 
 @pytest.mark.parametrize("names", [[], ["Tile"], ["Holder"], ["Holder", "Tile"]])
@@ -377,6 +399,25 @@ def test_indirect_light_is_that_of_what_is_made_real(monkeypatch):
     assert bounced.mean() > 0.03 * direct.mean()
     assert (ours - direct).mean() == pytest.approx(bounced.mean(), rel=0.01)
     np.testing.assert_allclose(ours, truth, rtol=0, atol=0.02 * bounced.max())
+
+
+def irradiance():
+    settings = bpy.context.scene.beamspread.for_bake(output="IRRADIANCE")
+    (bake,) = prepare_scene(bpy.context, find_bakeable(bpy.context.view_layer), settings)
+    bake.run()
+    return bake.layers["Irradiance"]
+
+
+def test_cycles_counts_an_instanced_lamp_once():
+    """Beside a lamp that it alone understands, whose light it finds with all others switched off."""
+    add_plane(material=add_material())
+    add_gobo("POINT")
+    lamp, collection = scenes.add_lamp((0, 0, 1)), bpy.data.collections.new("Lamps")
+    truth = irradiance()
+    bpy.context.scene.collection.objects.unlink(lamp)
+    collection.objects.link(lamp)
+    add_instancer(collection, Matrix())
+    np.testing.assert_allclose(irradiance(), truth, rtol=0, atol=0.02 * truth.max())
 
 
 def test_a_colour_by_cycles_is_that_of_what_is_made_real():
