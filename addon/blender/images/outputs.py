@@ -28,9 +28,9 @@ class Outputs:
         targets = find_targets(with_instanced(scene.objects))
         self._stems = file_stems(_names(target, layer) for target in targets for layer in LAYERS)
 
-    def write(self, bake: Bake, frame: int) -> str:
-        """Write all layers; the path of the first."""
-        paths = [self._write_layer(bake, frame, layer, texture) for layer, texture in bake.layers.items()]
+    def write(self, bake: Bake, frame: int, attributes: dict[str, str]) -> str:
+        """Write all layers, with what EXR files of frames are to say of themselves; the path of the first."""
+        paths = [self._write_layer(bake, frame, layer, texture, attributes) for layer, texture in bake.layers.items()]
         return paths[0]
 
     def path(self, target: Target, layer: str, frame: int) -> Path:
@@ -56,7 +56,7 @@ class Outputs:
             return None
         return image
 
-    def _write_layer(self, bake: Bake, frame: int, layer: str, texture: np.ndarray) -> str:
+    def _write_layer(self, bake: Bake, frame: int, layer: str, texture: np.ndarray, attributes: dict[str, str]) -> str:
         image = self.own_image(bake.target, layer)
         if image is not None and tuple(image.size) == texture.shape[1::-1]:
             filled = self._results.fill_shown(image, bake, texture)
@@ -66,7 +66,8 @@ class Outputs:
                 f"The image '{image.name}' keeps the result of another: this one has a file of its own."
             )
         path = self.path(bake.target, layer, frame)
-        writing.write_file(path, texture, _format_of(path), view_of=self._view_of)
+        said = attributes if self._options.frames else None
+        writing.write_file(path, texture, _format_of(path), said, view_of=self._view_of)
         if path.suffix == writing.EXTENSIONS["PNG"] and texture.max() > 1 and self._view_of is None:
             bake.warnings.append("Values above 1 were clipped: EXR keeps them.")
         return str(path)

@@ -16,6 +16,7 @@ from ..node.node import link_result
 from ..node.tree import FRAMES
 from ..read.instances import with_instanced
 from ..registration import all_or_nothing, classes
+from .files import file_of
 from .outputs import Outputs
 
 # Of a sequence: the image that the node had before. A pointer, so that it stays in the file.
@@ -30,6 +31,13 @@ def is_sequence(image) -> bool:
 def size_of_frames(image) -> tuple[int, int]:
     """Width and height of such a sequence's frames."""
     return tuple(image[FRAMES][2:])
+
+
+def file_at(image, frame: int) -> Path | None:
+    """The file that such a sequence has for a frame, or None."""
+    first, last, *_ = image[FRAMES]
+    path = file_of(image)
+    return path.with_name(re.sub(r"\d+$", f"{frame:04d}", path.stem) + path.suffix) if first <= frame <= last else None
 
 
 def find_frames(scene, target: Target) -> tuple[list[int], Path]:

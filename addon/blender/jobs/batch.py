@@ -23,8 +23,9 @@ from ..images.writing import size_of
 from ..node.find import NOTHING_FOUND, find_bakeable, find_misplaced
 from ..read.instances import by_name
 from . import stale
-from .fingerprint import SETTINGS, Parts, settings_part
+from .fingerprint import IMAGE, SETTINGS, Parts, settings_part
 from .prepare import prepare_scene
+from .record import Record, in_file
 
 
 def bake_all(options: BatchOptions, stop: Stop | None = None) -> Report:
@@ -91,7 +92,7 @@ class _Batch:
                 yield record
         parts = self._parts_of(left)
         for bake in self._prepared(left):
-            self._bake(bake, frame)
+            self._bake(bake, frame, parts.get(bake.target))
             self._remember(bake, parts.get(bake.target))
             yield BakeRecord.of(bake, frame)
 
@@ -130,8 +131,8 @@ class _Batch:
         return self._earlier.skipped(wanted, needs_record=own is not None)
 
     def _parts_of(self, targets: list[Target]) -> dict[Target, Parts]:
-        """What bakes read that go to images which nodes show."""
-        shown = [target for target in targets if self._own_image(target) is not None]
+        """What bakes read that go to images which nodes show, or to frames."""
+        shown = [target for target in targets if self._options.frames or self._own_image(target) is not None]
         if not shown or self._stop:
             return {}
         own = settings_part(self._scene, self._options.solver, self._options.indirect)
@@ -165,12 +166,15 @@ class _Batch:
                     logging.getLogger(__name__).info(line)
             yield bake
 
-    def _bake(self, bake: Bake, frame: int) -> None:
+    def _bake(self, bake: Bake, frame: int, parts: Parts | None) -> None:
         bake.run(_Printer(bake.target, self._stop))
         if self._stop and bake.job is not None and not bake.layers:
             # Also where it failed: a terminal's Ctrl-C ends the Blender that looks for bounced light, too.
             bake.cancel()
-        bake.keep(lambda bake: self._outputs.write(bake, frame))
+        # A sequence does not tell its size.
+        read = {name: one for name, one in (parts or {}).items() if name != IMAGE}
+        said = in_file(Record(read, tuple(bake.warnings))) if read else {}
+        bake.keep(lambda bake: self._outputs.write(bake, frame, said))
 
 
 def _cancelled(target: Target) -> Bake:
