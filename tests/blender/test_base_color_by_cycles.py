@@ -265,7 +265,7 @@ def test_it_is_asked_for_once_in_a_run_and_only_where_it_counts(plane, monkeypat
     add_noise_to(material)
     asked = []
 
-    def colors(_copy, target, receiver, _progress):
+    def colors(_copy, target, _matrix, receiver, _progress):
         asked.append(target)
         return [np.full((chart.grid.height, chart.grid.width, 3), 0.4, np.float32) for chart in receiver.charts]
 

@@ -27,20 +27,17 @@ def add_grouped():
     return plane
 
 
-def add_instance():
-    """A plane that the scene has only as an instance of an instanced collection."""
+def add_instances():
+    """A plane that the scene has only as two instances of an instanced collection."""
     plane = add_plane("Shown", material=add_material())
     inner, outer = bpy.data.collections.new("Inner"), bpy.data.collections.new("Outer")
     bpy.context.scene.collection.objects.unlink(plane)
     inner.objects.link(plane)
-    holders = []
-    for collection in (inner, outer):
+    for collection, place in ((inner, outer), (outer, bpy.context.scene.collection), (outer, bpy.context.collection)):
         holder = bpy.data.objects.new(f"Instance of {collection.name}", None)
         holder.instance_type, holder.instance_collection = "COLLECTION", collection
-        holders.append(holder)
-    outer.objects.link(holders[0])
-    bpy.context.scene.collection.objects.link(holders[1])
-    return holders[1]
+        place.objects.link(holder)
+    return holder
 
 
 def add_curve():
@@ -52,7 +49,7 @@ def add_curve():
 
 MISPLACED = [
     (add_grouped, "Grouped", ["'Grouped' is in the node group 'Outer'", "Ctrl Alt G"]),
-    (add_instance, "Instance of Outer", ["'Shown'", "instance", "'Outer'", "Make Instances Real"]),
+    (add_instances, "Shown", ["'Shown' stands in 2 places", "Make Instances Real", "Make Single User"]),
     (add_curve, "Spline", ["'Spline' is no mesh", "Convert"]),
 ]
 
@@ -117,11 +114,12 @@ def test_a_texture_reaches_a_group_by_its_input():
     assert found[15, 8, 1] / found[0, 8, 1] == pytest.approx(15.5 / 0.5, rel=1e-3)
 
 
-def test_an_instance_of_what_was_baked_is_no_mistake():
-    holder = add_instance()
+def test_instances_of_what_was_baked_are_no_mistake():
+    holder = add_instances()
     node_of(bpy.data.materials["Medium"]).image = bpy.data.images.new("Baked", 4, 4)
+    assert "No mesh has a material" in messages_of(lambda: bpy.ops.beamspread.bake(objects="ALL"))
     select(holder)
-    assert "No mesh has a material with a Beamspread node" in messages_of(bpy.ops.beamspread.bake)
+    assert "'Shown' stands in 2 places" in messages_of(bpy.ops.beamspread.bake)
 
 
 def baked_with_messages(plane):

@@ -4,8 +4,10 @@ import bpy
 import numpy as np
 import pytest
 from beamspread.blender.images.sequence import is_sequence
+from beamspread.blender.images.writing import write_exr
 from beamspread.blender.jobs import batch, stale
-from beamspread.blender.jobs.state import state
+from beamspread.blender.jobs.record import ATTRIBUTE
+from beamspread.blender.jobs.state import Standing, state
 from beamspread.core.batch import options
 from beamspread.core.native import native
 from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, save_scene, select
@@ -32,14 +34,42 @@ def file_shown(tree, frame):
     return min(max(frame - user.frame_start + 1, 1), user.frame_duration) + user.frame_offset
 
 
+def row_at(frame):
+    bpy.context.scene.frame_set(frame)
+    stale.refresh(bpy.context)
+    (row,) = state.rows.values()
+    return row
+
+
+def test_it_says_of_the_frame_what_has_changed_since(plane, tmp_path):
+    bpy.ops.beamspread.show_frames()
+    shown = "Shows the frames 3 to 5 of a batch"
+    for frame in (3, 4, 5):
+        row = row_at(frame)
+        assert (row.standing, row.sentences) == (Standing.BAKED, (f"{shown}.",))
+    assert row_at(9).sentences == (f"{shown}; what has changed since is not known.",)
+    light = bpy.data.lights["Sun"]
+    bpy.context.scene.frame_set(4)
+    light.keyframe_insert("energy", frame=4)
+    light.energy = 7
+    light.keyframe_insert("energy", frame=3)
+    assert [row_at(frame).standing for frame in (3, 4)] == [Standing.STALE, Standing.BAKED]
+    row = row_at(3)
+    assert row.sentences == (f"{shown}. Changed since this one was baked: lights.",)
+    assert not row.is_stale  # for a bake of this image
+    assert batch.bake_all(options.parse(["--frames", "3-3"])).all_written()
+    assert row_at(3).standing == Standing.BAKED
+    # As older ones, and those in PNG.
+    write_exr(tmp_path / "beamspread" / "Plane_Medium_0003.exr", np.ones((32, 32, 3), np.float32), {ATTRIBUTE: ""})
+    assert row_at(3).sentences == (f"{shown}; what has changed since is not known.",)
+
+
 def test_it_follows_the_frame(plane, tmp_path):
     node = node_of(plane.data.materials[0])
     own = node.image
     assert bpy.ops.beamspread.show_frames() == {"FINISHED"}
     assert is_sequence(node.image)
-    stale.refresh(bpy.context)
-    (row,) = state.rows.values()
-    assert row.sentences == ("Shows the frames 3 to 5 of a batch; what has changed since is not known.",)
+    assert row_at(5).sentences == ("Shows the frames 3 to 5 of a batch.",)
     assert [file_shown(node.node_tree, frame) for frame in (1, 3, 4, 5, 9)] == [3, 3, 4, 5, 5]
     rendered = [render_brightness(plane, frame, tmp_path) for frame in (3, 4, 5)]
     written = [native.read_exr(str(path))[0].mean() for path in sorted((tmp_path / "beamspread").iterdir())]

@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 from child_fields import Baker, linked_source, without_limits
 from child_ghost import finish
+from mathutils import Matrix
 
 
 def colors(request, scene, _progress) -> dict:
@@ -16,7 +17,8 @@ def colors(request, scene, _progress) -> dict:
     are baked, each the mean of `samples`: Cycles takes the first of these in the middle, and moves those back that are
     beyond a triangle.
     """
-    obj, material = selectable(scene, scene.objects[request["object"]]), bpy.data.materials[request["material"]]
+    obj, material = made_real(scene, request["object"], request["matrix"]), bpy.data.materials[request["material"]]
+    obj = selectable(scene, obj)
     shown = material.copy()  # a linked one would be baked as it was
     source = linked_source(shown.node_tree, *request["texture"])
     if source is None:
@@ -46,6 +48,26 @@ def glow(tree, source, image) -> None:
     emission = tree.nodes.new("ShaderNodeEmission")
     finish(tree, emission, image)
     tree.links.new(emission.inputs["Color"], source)
+
+
+def made_real(scene, name, matrix):
+    """The object of that name; with a matrix one that stands there, in place of the instance."""
+    if matrix is None:
+        return scene.objects[name]
+    instanced = next(one for one in bpy.data.objects if one.name == name and one.users_collection)
+    obj = instanced.copy()
+    instanced.hide_render = True
+    obj.name = f"{name} to bake"
+    obj.animation_data_clear()
+    obj.constraints.clear()
+    # A parent's inverse may skew, as instances can, and an object itself can't.
+    obj.parent = bpy.data.objects.new("Place", None)
+    scene.collection.objects.link(obj.parent)
+    obj.parent_type, obj.matrix_parent_inverse, obj.matrix_basis = "OBJECT", Matrix(matrix), Matrix()
+    for delta in ("delta_location", "delta_rotation_euler"):
+        setattr(obj, delta, (0, 0, 0))
+    obj.delta_rotation_quaternion, obj.delta_scale = (1, 0, 0, 0), (1, 1, 1)
+    return obj
 
 
 def selectable(scene, obj):

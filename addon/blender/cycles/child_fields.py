@@ -162,7 +162,7 @@ def shine_alone(scene, names) -> None:
         if linking is not None:
             linking.receiver_collection = None
     own = {slot.material for name in names for slot in bpy.data.objects[name].material_slots}
-    for obj in scene.objects:
+    for obj in bpy.data.objects:  # instances of collections show others than the scene's
         if obj.type == "LIGHT" and obj.name not in names:
             obj.hide_render = True
     trees = [one.node_tree for one in bpy.data.materials if one.node_tree and one not in own]
@@ -195,7 +195,7 @@ def set_up(scene, light) -> None:
     # The mirror stands for a diffuse surface: it uses up a glossy bounce in place of a diffuse one.
     cycles.glossy_bounces += 1
     cycles.diffuse_bounces -= 1
-    for obj in scene.objects:
+    for obj in bpy.data.objects:
         # What mirrors meet of a lamp behind something see-through would count as indirect.
         obj.visible_glossy = obj.visible_diffuse and not (light == "INDIRECT" and obj.type == "LIGHT")
     if light == "INDIRECT" and scene.world is not None:

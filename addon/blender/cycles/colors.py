@@ -32,9 +32,17 @@ RINGS = 2
 
 
 def colors_by_cycles(
-    copy: CopyForCycles, target: Target, receiver: Receiver, progress: Progress | None = None
+    copy: CopyForCycles,
+    target: Target,
+    matrix: list | None,
+    receiver: Receiver,
+    progress: Progress | None = None,
 ) -> list[np.ndarray]:
     """Float32 (grid height, grid width, 3) of each chart, linear, averaged over each texel.
+
+    Parameters
+    ----------
+    matrix : of the instance that stands for the target, rows; None: it stands in the scene itself.
 
     Raises
     ------
@@ -45,6 +53,7 @@ def colors_by_cycles(
     """
     request = {
         "object": target.object_name,
+        "matrix": matrix,
         "material": target.material_name,
         "texture": copy.textures[target.material_name],
         "width": receiver.width,

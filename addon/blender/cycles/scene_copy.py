@@ -12,6 +12,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ..read.instances import with_instanced
+
 PREFIX = "beamspread-cycles-"
 FILE, IMAGES = "scene.blend", "images.npz"
 
@@ -43,7 +45,7 @@ class SceneCopy:
             "scripts": bpy.context.preferences.filepaths.use_scripts_auto_execute,
         }
         try:
-            for obj in scene.objects:
+            for obj in with_instanced(scene.objects):
                 if obj.mode == "EDIT":
                     obj.update_from_editmode()
             # Unlike saving the file this runs no handlers of other add-ons, packs nothing and makes no preview.

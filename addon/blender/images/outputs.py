@@ -14,6 +14,7 @@ from ...core.batch.names import file_stems
 from ...core.batch.options import BatchOptions
 from ...core.errors import ImageError
 from ..node.find import find_node, find_targets
+from ..read.instances import with_instanced
 from . import files, writing
 from .results import Results
 
@@ -24,12 +25,12 @@ class Outputs:
     def __init__(self, scene, options: BatchOptions) -> None:
         self._options, self._settings, self._results = options, scene.beamspread, Results()
         self._view_of = scene if scene.beamspread.use_view_transform else None
-        targets = find_targets(scene.objects)
+        targets = find_targets(with_instanced(scene.objects))
         self._stems = file_stems(_names(target, layer) for target in targets for layer in LAYERS)
 
-    def write(self, bake: Bake, frame: int) -> str:
-        """Write all layers; the path of the first."""
-        paths = [self._write_layer(bake, frame, layer, texture) for layer, texture in bake.layers.items()]
+    def write(self, bake: Bake, frame: int, attributes: dict[str, str]) -> str:
+        """Write all layers, with what EXR files of frames are to say of themselves; the path of the first."""
+        paths = [self._write_layer(bake, frame, layer, texture, attributes) for layer, texture in bake.layers.items()]
         return paths[0]
 
     def path(self, target: Target, layer: str, frame: int) -> Path:
@@ -55,7 +56,7 @@ class Outputs:
             return None
         return image
 
-    def _write_layer(self, bake: Bake, frame: int, layer: str, texture: np.ndarray) -> str:
+    def _write_layer(self, bake: Bake, frame: int, layer: str, texture: np.ndarray, attributes: dict[str, str]) -> str:
         image = self.own_image(bake.target, layer)
         if image is not None and tuple(image.size) == texture.shape[1::-1]:
             filled = self._results.fill_shown(image, bake, texture)
@@ -65,7 +66,8 @@ class Outputs:
                 f"The image '{image.name}' keeps the result of another: this one has a file of its own."
             )
         path = self.path(bake.target, layer, frame)
-        writing.write_file(path, texture, _format_of(path), view_of=self._view_of)
+        said = attributes if self._options.frames else None
+        writing.write_file(path, texture, _format_of(path), said, view_of=self._view_of)
         if path.suffix == writing.EXTENSIONS["PNG"] and texture.max() > 1 and self._view_of is None:
             bake.warnings.append("Values above 1 were clipped: EXR keeps them.")
         return str(path)

@@ -17,6 +17,7 @@ from ...core.scene.receiver import Receiver, build_receiver
 from ...core.scene.uv_map import fit_uv_maps
 from ..node.find import find_node, find_targets
 from ..read.geometry import read_polygons
+from ..read.instances import with_instanced
 
 # Of an image: JSON, a list of (object, material).
 KEY = "beamspread_results"
@@ -60,7 +61,7 @@ def users_of(image) -> list[Target]:
     """What shows the image in its Beamspread node, in any scene."""
     return [
         target
-        for target in find_targets(obj for obj in bpy.data.objects if obj.users_scene)
+        for target in find_targets(with_instanced(obj for obj in bpy.data.objects if obj.users_scene))
         if find_node(bpy.data.materials[target.material_name]).image == image
     ]
 

@@ -14,7 +14,9 @@ from ...core.errors import ImageError
 from ..node.find import find_node, find_targets
 from ..node.node import link_result
 from ..node.tree import FRAMES
+from ..read.instances import with_instanced
 from ..registration import all_or_nothing, classes
+from .files import file_of
 from .outputs import Outputs
 
 # Of a sequence: the image that the node had before. A pointer, so that it stays in the file.
@@ -29,6 +31,13 @@ def is_sequence(image) -> bool:
 def size_of_frames(image) -> tuple[int, int]:
     """Width and height of such a sequence's frames."""
     return tuple(image[FRAMES][2:])
+
+
+def file_at(image, frame: int) -> Path | None:
+    """The file that such a sequence has for a frame, or None."""
+    first, last, *_ = image[FRAMES]
+    path = file_of(image)
+    return path.with_name(re.sub(r"\d+$", f"{frame:04d}", path.stem) + path.suffix) if first <= frame <= last else None
 
 
 def find_frames(scene, target: Target) -> tuple[list[int], Path]:
@@ -68,7 +77,8 @@ Their own images are kept: Show Single Images brings them back"""
 
     def execute(self, context):
         shown = []
-        for target in find_targets(context.scene.objects):
+        targets = _targets(context.scene)
+        for target in targets:
             node, material = find_node(bpy.data.materials[target.material_name]), target.material_name
             if bpy.data.materials[material].library is not None:
                 continue
@@ -89,7 +99,7 @@ Their own images are kept: Show Single Images brings them back"""
                     self.report({level}, sentence)
             shown.append(f"'{target}' shows the frames {frames[0]} to {frames[-1]}")
         if not shown:
-            where = f" in {folder}" if find_targets(context.scene.objects) else ""
+            where = f" in {folder}" if targets else ""
             self.report({"ERROR"}, f"There are no frames of a batch{where}: bake them with --frames A-B")
             return {"CANCELLED"}
         self.report({"INFO"}, ". ".join(shown))
@@ -113,9 +123,13 @@ class BEAMSPREAD_OT_show_single(bpy.types.Operator):
         return {"FINISHED"}
 
 
+def _targets(scene) -> list[Target]:
+    return find_targets(with_instanced(scene.objects))
+
+
 def _sequences(scene):
     """Nodes that show one."""
-    nodes = (find_node(bpy.data.materials[target.material_name]) for target in find_targets(scene.objects))
+    nodes = (find_node(bpy.data.materials[target.material_name]) for target in _targets(scene))
     return (node for node in nodes if is_sequence(node.image))
 
 

@@ -20,10 +20,12 @@ from ...core.progress import timed
 from ..images.files import file_of
 from ..images.outputs import Outputs
 from ..images.writing import size_of
-from ..node.find import NOTHING_FOUND, find_misplaced, find_targets
+from ..node.find import NOTHING_FOUND, find_bakeable, find_misplaced
+from ..read.instances import by_name
 from . import stale
-from .fingerprint import SETTINGS, Parts, settings_part
+from .fingerprint import IMAGE, SETTINGS, Parts, settings_part
 from .prepare import prepare_scene
+from .record import Record, in_file
 
 
 def bake_all(options: BatchOptions, stop: Stop | None = None) -> Report:
@@ -90,22 +92,25 @@ class _Batch:
                 yield record
         parts = self._parts_of(left)
         for bake in self._prepared(left):
-            self._bake(bake, frame)
+            self._bake(bake, frame, parts.get(bake.target))
             self._remember(bake, parts.get(bake.target))
             yield BakeRecord.of(bake, frame)
 
     def _find(self) -> tuple[list[Target], list[Bake]]:
         """What to bake, and what can't be."""
-        targets, impossible, objects = [], [], self._scene.objects
-        for name in self._options.objects or [obj.name for obj in objects]:
+        view_layer = bpy.context.view_layer
+        if not self._options.objects:
+            return find_bakeable(view_layer), find_misplaced(self._scene.objects)
+        targets, impossible, objects = [], [], by_name(self._scene)
+        for name in self._options.objects:
             obj = objects.get(name)
-            found, misplaced = (find_targets([obj]), find_misplaced([obj])) if obj else ([], [])
-            if self._options.objects and not found and not misplaced:
+            found, misplaced = (find_bakeable(view_layer, [obj]), find_misplaced([obj])) if obj else ([], [])
+            if not found and not misplaced:
                 missing = "has no material with a Beamspread node" if obj else "is not in the scene"
                 impossible.append(Bake(Target(name), error=f"The object '{name}' {missing}."))
             impossible += misplaced
             targets += found
-        return targets, impossible
+        return list(dict.fromkeys(targets)), impossible
 
     def _skipped(self, target: Target, frame: int) -> BakeRecord | None:
         """The record of what an earlier run has written."""
@@ -126,8 +131,8 @@ class _Batch:
         return self._earlier.skipped(wanted, needs_record=own is not None)
 
     def _parts_of(self, targets: list[Target]) -> dict[Target, Parts]:
-        """What bakes read that go to images which nodes show."""
-        shown = [target for target in targets if self._own_image(target) is not None]
+        """What bakes read that go to images which nodes show, or to frames."""
+        shown = [target for target in targets if self._options.frames or self._own_image(target) is not None]
         if not shown or self._stop:
             return {}
         own = settings_part(self._scene, self._options.solver, self._options.indirect)
@@ -161,12 +166,15 @@ class _Batch:
                     logging.getLogger(__name__).info(line)
             yield bake
 
-    def _bake(self, bake: Bake, frame: int) -> None:
+    def _bake(self, bake: Bake, frame: int, parts: Parts | None) -> None:
         bake.run(_Printer(bake.target, self._stop))
         if self._stop and bake.job is not None and not bake.layers:
             # Also where it failed: a terminal's Ctrl-C ends the Blender that looks for bounced light, too.
             bake.cancel()
-        bake.keep(lambda bake: self._outputs.write(bake, frame))
+        # A sequence does not tell its size.
+        read = {name: one for name, one in (parts or {}).items() if name != IMAGE}
+        said = in_file(Record(read, tuple(bake.warnings))) if read else {}
+        bake.keep(lambda bake: self._outputs.write(bake, frame, said))
 
 
 def _cancelled(target: Target) -> Bake:

@@ -7,7 +7,7 @@ others: after a change of version a bake counts as stale.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import bpy
 import numpy as np
@@ -16,6 +16,7 @@ from ...core.bake.runner import Target
 from ...core.errors import sentence
 from .. import compat
 from ..node.find import find_node
+from ..read.instances import by_name, collection_of, rendered_in
 from ..read.visible import render_visible_names
 from .pixels import Pixels, images_of, results
 from .scatter import Scatter, scatters
@@ -138,33 +139,34 @@ class Fingerprints:
         depsgraph = context.evaluated_depsgraph_get()
         visible = render_visible_names(view_layer)
         self._sees_media = scene.beamspread.use_indirect
-        lamps, solids, own, owners = 0, 0, {}, []
+        lamps, solids, own, known = 0, 0, {}, {}
         shown = [obj for obj in scene.objects if obj.name in visible]
         self._scatter.look(depsgraph, [obj for obj in shown if scatters(obj)])
-        for obj in shown:
-            owners += [obj.data] if obj.type == "LIGHT" else [slot.material for slot in obj.material_slots]
+        for obj, text in self._with_instanced(shown, depsgraph, known):
             if obj.type == "LIGHT":
-                lamps += _number(self._lamp(obj))
-            elif obj.type in SOLID or obj.instance_type != "NONE":
-                own[obj.name] = self._solid(obj, depsgraph)
-                solids += _number(self._with_materials(obj, own[obj.name]))
+                lamps += _number(text)
+            else:
+                number = _number(digest(text, known[obj][1]))
+                own.setdefault(obj.name, (text, number))
+                solids += number
+        owners = [obj.data for obj in known if obj.type == "LIGHT"]
+        owners += [slot.material for obj in known for slot in obj.material_slots]
         shared = {
             "lights": f"{lamps % 2**64:x}",
             "world": self._world(scene, view_layer),
             "textures": self._textures([*owners, scene.world]),
         }
-        found = {}
+        found, objects = {}, by_name(scene)
         for target in targets:
-            obj, node = scene.objects.get(target.object_name), None
+            obj, node = objects.get(target.object_name), None
             if obj is not None:
                 node = find_node(bpy.data.materials.get(target.material_name))
             if node is None:
                 continue
-            mine = own.get(obj.name, "")
-            others = solids - _number(self._with_materials(obj, mine)) if mine else solids
+            mine, number = own.get(obj.name, ("", 0))
             found[target] = {
                 "object": mine,
-                "other objects": f"{others % 2**64:x}",
+                "other objects": f"{(solids - number) % 2**64:x}",
                 **shared,
                 "material": digest(self._surface(node)),
                 SETTINGS: settings_part(scene),
@@ -184,31 +186,41 @@ class Fingerprints:
         kept = self._keep(data, lambda: digest(values_of(data, _ID_LOOKS), _tree_of(data)))
         return digest(kept, _matrix(obj), obj.visible_diffuse, _links(obj))
 
+    def _with_instanced(self, objects: Iterable, depsgraph, known: dict, place: str = "") -> Iterator[tuple]:
+        """Objects, and after them what they show of collections, each with a digest of its shape and place.
+
+        `known` gets, of each, the digest without the `place` of what shows it, and those of its materials.
+        """
+        later = []
+        for obj in objects:
+            collection = collection_of(obj)
+            if obj.type == "LIGHT" or obj.type in SOLID or obj.instance_type != "NONE":
+                if obj not in known:
+                    text = self._lamp(obj) if obj.type == "LIGHT" else self._solid(obj, depsgraph)
+                    known[obj] = text, [self._material(slot.material) for slot in obj.material_slots]
+                text, _ = known[obj]
+                if collection is not None:
+                    later.append((collection, digest(place, text, list(collection.instance_offset))))
+                if obj.type != "EMPTY":
+                    yield obj, digest(place, text) if place else text
+        for collection, there in later:
+            yield from self._with_instanced(rendered_in(collection), depsgraph, known, there)
+
     def _solid(self, obj, depsgraph) -> str:
-        """Its shape and place, without its materials."""
+        """Its shape and place, without its materials and what it shows of a collection."""
         seen = obj.visible_diffuse, obj.visible_shadow, obj.show_instancer_for_render, obj.instance_type, _links(obj)
-        inner = obj.instance_collection if obj.instance_type == "COLLECTION" else None
-        instanced = sorted(self._instanced(one, depsgraph) for one in inner.all_objects) if inner else ()
         shape = self._keep(obj, lambda: self._shape(obj, depsgraph))
         scattered = ()
         if scatters(obj):
             self._scatter.look(depsgraph, [obj])
             text, materials = self._scatter.of(obj)
             scattered = text, [self._material(material) for material in materials]
-        return digest(shape, _matrix(obj), seen, instanced, *scattered)
-
-    def _instanced(self, obj, depsgraph) -> str:
-        if obj.type == "LIGHT":
-            return self._lamp(obj)
-        return self._with_materials(obj, self._solid(obj, depsgraph))
+        return digest(shape, _matrix(obj), seen, *scattered)
 
     def _shape(self, obj, depsgraph) -> str:
         modifiers = [(modifier.show_render, modifier.type, _modifier(modifier)) for modifier in obj.modifiers]
         particles = [values_of(one.settings, _ID_LOOKS) for one in obj.particle_systems]
         return digest(_mesh(obj, depsgraph), modifiers, particles)
-
-    def _with_materials(self, obj, shape: str) -> str:
-        return digest(shape, [self._material(slot.material) for slot in obj.material_slots])
 
     def _material(self, material) -> str:
         """As others see it: of a Beamspread node only the medium, whose light may bounce, and not the baked image."""

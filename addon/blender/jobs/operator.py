@@ -12,7 +12,7 @@ from ...core.bake.runner import CANCELLED, WRITTEN, Bake, Target
 from ...core.bake.settings import COMBINED
 from ..images import previews
 from ..images.results import Results
-from ..node.find import NOTHING_FOUND, find_misplaced, find_targets
+from ..node.find import NOTHING_FOUND, find_bakeable, find_misplaced
 from ..registration import all_or_nothing, classes
 from . import popup, stale
 from .prepare import read_scene
@@ -160,11 +160,12 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         if self.objects == "STALE":
             stale.refresh(context)
             return [row.target for row in state.rows.values() if row.is_stale], []
-        for objects in (context.selected_objects if self.objects == "SELECTED" else (), context.scene.objects):
-            targets, misplaced = find_targets(objects), find_misplaced(objects)
+        if self.objects == "SELECTED":
+            chosen = context.selected_objects
+            targets, misplaced = find_bakeable(context.view_layer, chosen), find_misplaced(chosen)
             if targets or misplaced:
-                break
-        return targets, misplaced
+                return targets, misplaced
+        return find_bakeable(context.view_layer), find_misplaced(context.scene.objects)
 
     def _start_next(self) -> bool:
         """Start the next bake that can be; False if there is none."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+import bpy
+
 from ...core.bake.estimate import bake_bytes, machine_bytes
 from ...core.bake.job import BakeJob, needs_medium, to_simulate
 from ...core.bake.runner import Bake, Target
@@ -20,6 +22,7 @@ from ..images.sequence import is_sequence, size_of_frames
 from ..node.find import find_place, materials_of
 from ..read.geometry import read_polygons
 from ..read.lights import read_illumination
+from ..read.placed import Placed, check_placed, find_placed
 from ..read.visible import as_rendered, render_visible_names
 from .texture import BaseColor, ColorByCycles, read_texture
 
@@ -56,11 +59,10 @@ def read_scene(context, targets: list[Target], settings: BakeSettings, resolutio
     resolution : texels along the longer side; None keeps the size of the node's image, or the scene's setting where
         there is none.
     """
-    for name in {target.object_name for target in targets}:
-        for material in materials_of(context.scene.objects[name]):
-            # Evaluated before the node's class was registered, it would still be of an unknown class.
-            for tree in [material.node_tree, *(group.node_tree for group in find_place(material)[1])]:
-                tree.update_tag()
+    for material in {bpy.data.materials[target.material_name] for target in targets}:
+        # Evaluated before the node's class was registered, it would still be of an unknown class.
+        for tree in [material.node_tree, *(group.node_tree for group in find_place(material)[1])]:
+            tree.update_tag()
     with as_rendered(context.view_layer):
         visible = render_visible_names(context.view_layer)
         return Preparation(context.evaluated_depsgraph_get(), targets, settings, resolution, visible=visible)
@@ -88,14 +90,15 @@ class Preparation:
         self._plans: dict[Target, _Plan | str] = {}
         try:
             self._illumination, self._by_cycles = read_illumination(depsgraph), CyclesLight(depsgraph, copy)
+            placed = find_placed(depsgraph, {target.object_name for target in targets}, visible)
         except Exception as error:  # noqa: BLE001 - each bake asked for needs an answer
             self._plans = dict.fromkeys(targets, sentence(error))
             return
         for target in targets:
             try:
-                if visible is not None:
-                    check_visible(target.object_name, visible)
-                self._plans[target] = _read_target(depsgraph, target, resolution, size)
+                here = placed.get(target.object_name)
+                check_placed(target.object_name, here, depsgraph.view_layer)
+                self._plans[target] = _read_target(depsgraph, target, here, resolution, size)
             except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
                 self._plans[target] = sentence(error)
 
@@ -144,9 +147,10 @@ class _Plan:
     texture: BaseColor | ColorByCycles | None = None
 
 
-def _read_target(depsgraph, target: Target, resolution: int | None, size: tuple[int, int] | None) -> _Plan:
-    obj = depsgraph.scene.objects[target.object_name].evaluated_get(depsgraph)
-    node, groups = find_place(next(one for one in materials_of(obj) if one.name == target.material_name))
+def _read_target(
+    depsgraph, target: Target, placed: Placed, resolution: int | None, size: tuple[int, int] | None
+) -> _Plan:
+    node, groups = find_place(next(one for one in materials_of(placed.obj) if one.name == target.material_name))
     surface = node.surface()
     surface.check()
     if size is None and node.image is not None:
@@ -155,13 +159,14 @@ def _read_target(depsgraph, target: Target, resolution: int | None, size: tuple[
             check_image(image)
         own = size_of_frames(image) if is_sequence(image) else tuple(image.size)
         size = own if resolution is None else None
-    maps = fit_uv_maps(read_polygons(obj, target.material_name))
+    maps = fit_uv_maps(read_polygons(placed.obj, target.material_name, placed.matrix))
     size = size or texture_size(maps, resolution or depsgraph.scene.beamspread.resolution)
     if not node.has_texture():
         return _Plan(maps, size, surface)
-    texture = read_texture(node, groups, obj, build_receiver(maps, *size))
+    texture = read_texture(node, groups, placed, build_receiver(maps, *size))
     if texture.unknown:
-        return _Plan(maps, size, replace(surface, base_color=SOME_COLOR), ColorByCycles(target, surface, texture.blur))
+        by_cycles = ColorByCycles(target, surface, texture.blur, placed)
+        return _Plan(maps, size, replace(surface, base_color=SOME_COLOR), by_cycles)
     return _Plan(maps, size, texture.on(surface), texture)
 
 
@@ -178,13 +183,4 @@ def check_memory(job: BakeJob, limit: int, colors_by_cycles: bool = False) -> No
         raise BakeError(
             f"{who} about {needed / 2**30:.1f} GB of memory, and {limit / 2**30:.1f} GB are "
             "allowed: lower the resolution, or raise the memory limit in the add-on's preferences."
-        )
-
-
-def check_visible(object_name: str, visible: set[str]) -> None:
-    """Raise BakeError if the object does not render: a bake of hours would show nothing."""
-    if object_name not in visible:
-        raise BakeError(
-            f"The object '{object_name}' is hidden from render: turn on its camera icon, and its collections', "
-            "in the Outliner."
         )

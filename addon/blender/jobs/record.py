@@ -1,15 +1,20 @@
-"""What an image remembers of the bakes in it, saved with the file: what each has read, and what there was to say."""
+"""What images, and files of frames, remember of the bakes in them: what each has read, and what there was to say."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
 from ...core.bake.runner import Target
+from ...core.exr_header import text_of
 from .fingerprint import Parts
 
 # Text, since names of objects may be longer than Blender's own keys.
 KEY = "beamspread_bakes"
+
+# Of an EXR file.
+ATTRIBUTE = "beamspread:bake"
 
 
 @dataclass(frozen=True)
@@ -28,10 +33,17 @@ class Record:
 
 def record_of(image, target: Target) -> Record | None:
     """Of the target's bake in the image, or None if it has none."""
-    found = _all(image).get(str(target))
-    if not found:
-        return None
-    return Record(found["parts"], tuple(found["warnings"]), found["is_dirty"], tuple(found.get("notes", ())))
+    return _record(_all(image).get(str(target)))
+
+
+def record_in(path: Path) -> Record | None:
+    """Of the bake in a file, or None if it says nothing of one."""
+    return _record(_read(text_of(path, ATTRIBUTE)))
+
+
+def in_file(record: Record) -> dict[str, str]:
+    """Attributes by which a file says so."""
+    return {ATTRIBUTE: json.dumps(asdict(record))}
 
 
 def keep_record(image, target: Target, record: Record) -> None:
@@ -39,8 +51,18 @@ def keep_record(image, target: Target, record: Record) -> None:
 
 
 def _all(image) -> dict:
+    return _read(image.get(KEY, "{}"))
+
+
+def _read(text: str) -> dict:
     try:
-        known = json.loads(image.get(KEY, "{}"))
+        known = json.loads(text)
     except (TypeError, ValueError):
         return {}
     return known if isinstance(known, dict) else {}
+
+
+def _record(found: dict | None) -> Record | None:
+    if not found:
+        return None
+    return Record(found["parts"], tuple(found["warnings"]), found["is_dirty"], tuple(found.get("notes", ())))

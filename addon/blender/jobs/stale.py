@@ -16,12 +16,13 @@ from ...core.bake.runner import Bake, Target
 from ..images import previews
 from ..images.files import file_of
 from ..images.owners import noted_as
-from ..images.sequence import is_sequence
-from ..node.find import find_misplaced, find_node, find_targets
+from ..images.sequence import file_at, is_sequence
+from ..node.find import find_bakeable, find_misplaced, find_node
 from ..node.tree import FRAMES
+from ..read.instances import by_name
 from ..registration import all_or_nothing, handlers
 from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
-from .record import Record, keep_record, record_of
+from .record import Record, keep_record, record_in, record_of
 from .state import Row, Standing, redraw, state
 
 # After the last change; longer where a look takes long, which happens between two changes at most once.
@@ -37,8 +38,8 @@ _last = {"change": 0.0, "seconds": 0.0, "is looking": False}
 def refresh(context) -> None:
     """Bring the rows of all targets of the context's scene up to date."""
     _keep_waiting()
-    targets = find_targets(context.scene.objects)
-    recorded = {target: record for target in targets if (record := _record(target)) is not None}
+    targets = find_bakeable(context.view_layer, context.scene.objects)
+    recorded = {target: record for target in targets if (record := _record(target, context.scene)) is not None}
     now = fingerprints.of(context, recorded) if recorded else {}
     state.rows = {target: _row(target, recorded.get(target), now.get(target)) for target in targets}
     state.rows |= {row.target: row for row in _failures_of_others(context.scene, targets)}
@@ -47,8 +48,8 @@ def refresh(context) -> None:
 def _failures_of_others(scene, targets: list[Target]) -> list[Row]:
     """Of what is no target, as a node inside a group, unless its object has another material in its place by now."""
     others = [row for row in state.failures() if row.target not in targets]
-    named = {target.object_name for target in targets}
-    again = find_misplaced(scene.objects[name] for name in named & {row.target.object_name for row in others})
+    named, objects = {target.object_name for target in targets}, by_name(scene) if others else {}
+    again = find_misplaced(objects[name] for name in named & {row.target.object_name for row in others})
     misplaced = {bake.target for bake in again}
     return [row for row in others if row.target.object_name not in named or row.target in misplaced]
 
@@ -84,16 +85,17 @@ def _image(target: Target):
     return None if node is None else node.image
 
 
-def _record(target: Target) -> Record | None:
+def _record(target: Target, scene) -> Record | None:
     image = _image(target)
+    if is_sequence(image):
+        path = file_at(image, scene.frame_current)
+        return path and record_in(path)
     return None if image is None else record_of(image, noted_as(image, target))
 
 
 def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
     if is_sequence(_image(target)):
-        first, last, *_ = _image(target)[FRAMES]
-        why = f"Shows the frames {first} to {last} of a batch; what has changed since is not known."
-        return Row(target, Standing.BAKED, (why,))
+        return _row_of_frames(target, record, now)
     changed = [] if record is None or now is None else record.changed(now)
     if record is not None and not record.is_dirty and _is_painted(_image(target)):
         changed.append("pixels of the image")
@@ -110,6 +112,19 @@ def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
     warnings = (*([_why_again(record.parts[QUALITY], now[QUALITY])] if changed else []), *record.warnings)
     standing = Standing.WARNED if warnings else Standing.BAKED
     return Row(target, standing, (*warnings, *record.notes), bool(changed))
+
+
+def _row_of_frames(target: Target, record: Record | None, now: Parts | None) -> Row:
+    """Of a sequence, by the frame that is shown; a bake does not make it anew, and so it is not up for one."""
+    first, last, *_ = _image(target)[FRAMES]
+    shown = f"Shows the frames {first} to {last} of a batch"
+    if record is None or now is None:
+        return Row(target, Standing.BAKED, (f"{shown}; what has changed since is not known.",))
+    changed = record.changed(now)
+    if changed:
+        why = f"{shown}. Changed since this one was baked: {', '.join(changed)}."
+        return Row(target, Standing.STALE, (why, *record.warnings))
+    return Row(target, Standing.WARNED if record.warnings else Standing.BAKED, (f"{shown}.", *record.warnings))
 
 
 def _has_lost_its_file(image) -> bool:

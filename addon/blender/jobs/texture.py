@@ -24,6 +24,7 @@ from ..node.tree import BASE_COLOR
 from ..read.base_color import is_understood, read_base_color
 from ..read.image_texture import NotUnderstoodError
 from ..read.node_links import Wanted
+from ..read.placed import Placed
 
 # Rounding, or a little over by interpolation.
 BRIGHTEST = 1.001
@@ -69,16 +70,16 @@ class BaseColor:
         return replace(job, receiver=textured(job.receiver, self.colors, self.blur)) if self.colors else job
 
 
-def read_texture(node, groups: tuple, obj, receiver: Receiver) -> BaseColor:
-    """What is linked to the node, at the places of a receiver of an evaluated object.
+def read_texture(node, groups: tuple, placed: Placed, receiver: Receiver) -> BaseColor:
+    """What is linked to the node, at the places of an object's receiver.
 
     `groups` are the group nodes around the node.
     """
     try:
-        colors = read_base_color(Wanted(node.inputs[BASE_COLOR], groups), obj, receiver)
+        colors = read_base_color(Wanted(node.inputs[BASE_COLOR], groups), placed, receiver)
     except NotUnderstoodError as reason:
         return BaseColor(blur=node.texture_blur, unknown=str(reason))
-    return BaseColor.of(colors, receiver, node.texture_blur, obj.name)
+    return BaseColor.of(colors, receiver, node.texture_blur, placed.obj.name)
 
 
 def needs_cycles(obj, material_name: str) -> bool:
@@ -92,8 +93,10 @@ def needs_cycles(obj, material_name: str) -> bool:
 class ColorByCycles:
     """A texture that only Cycles knows, of one target; what was found, or that nothing was, holds for all its jobs."""
 
-    def __init__(self, target: Target, surface: Surface, blur: float) -> None:
+    def __init__(self, target: Target, surface: Surface, blur: float, placed: Placed) -> None:
         self._target, self._surface, self._blur = target, surface, blur
+        # Plain, as it goes to a thread.
+        self._matrix = np.array(placed.matrix).tolist() if placed.is_instance else None
         self._found: BaseColor | None = None
 
     def in_job(self, job: BakeJob, copy: CopyForCycles | None) -> BakeJob:
@@ -110,7 +113,7 @@ class ColorByCycles:
     def _color(self, copy: CopyForCycles | None, job: BakeJob, progress: Progress | None) -> BakeJob:
         if self._found is None:
             try:
-                colors = colors_by_cycles(copy, self._target, job.receiver, progress)
+                colors = colors_by_cycles(copy, self._target, self._matrix, job.receiver, progress)
                 self._found = BaseColor.of(colors, job.receiver, self._blur, self._target.object_name)
             except (BakeError, OSError) as error:
                 self._found = self._missing(sentence(error))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..node.find import find_node, find_targets
+from ..read.instances import with_instanced
 
 
 def painted_results(context) -> list:
@@ -12,7 +13,7 @@ def painted_results(context) -> list:
     painted = _painted(context)
     if not painted:
         return []
-    targets = find_targets(context.scene.objects)
+    targets = find_targets(with_instanced(context.scene.objects))
     results = {find_node(bpy.data.materials[target.material_name]).image for target in targets}
     return [image for image in painted if image in results]
 

@@ -11,10 +11,11 @@ from ...core.live.picture import for_live
 from ...core.live.subject import Subject
 from ...core.scene.illumination import Illumination
 from ..images.files import check_image
-from ..node.find import find_node, find_targets
+from ..node.find import find_bakeable, find_node
 from ..read.geometry import read_polygons
 from ..read.kept import Kept
 from ..read.lights import read_illumination, with_lamps
+from ..read.placed import Placed, check_placed, find_placed
 from ..read.visible import render_visible_names
 from .marks import Marks
 from .textures import Textures
@@ -95,25 +96,27 @@ class Reader:
         layer = depsgraph.view_layer
         renders = render_visible_names(layer)
         visible = [obj for obj in layer.objects if obj.visible_get(view_layer=layer) and obj.name in renders]
-        self._targets = find_targets(visible)
-        changed = marks.moved | marks.shaped
-        for target in list(self._polygons):
-            obj = layer.objects.get(target.object_name)
-            if marks.other or obj is None or obj.name in changed or obj.data.name in changed:
-                self._read_polygons(depsgraph, target)
+        self._targets = find_bakeable(layer, visible)
+        self.errors = {target: why for target, why in self.errors.items() if target in self._targets}
+        changed, due = marks.moved | marks.shaped, []
         for target in self._targets:
-            if target not in self._polygons:
-                self._read_polygons(depsgraph, target)
+            obj = layer.objects.get(target.object_name)  # None where it is an instance, which others move, too
+            is_known = target in self._polygons and obj is not None and not marks.other
+            if not is_known or obj.name in changed or obj.data.name in changed:
+                due.append(target)
+        placed = find_placed(depsgraph, {target.object_name for target in due})
+        for target in due:
+            self._read_polygons(target, placed.get(target.object_name), layer)
         self._polygons = {target: self._polygons[target] for target in self._targets if target in self._polygons}
 
-    def _read_polygons(self, depsgraph, target: Target) -> None:
+    def _read_polygons(self, target: Target, placed: Placed | None, view_layer) -> None:
         self.errors.pop(target, None)
-        obj = depsgraph.view_layer.objects.get(target.object_name)
         before = self._polygons.pop(target, None)
-        if obj is None or target not in self._targets:
+        if placed is None:
             return
         try:
-            polygons = read_polygons(obj.evaluated_get(depsgraph), target.material_name)
+            check_placed(target.object_name, placed, view_layer)
+            polygons = read_polygons(placed.obj, target.material_name, placed.matrix)
         except Exception as error:  # noqa: BLE001 - the others are still to be read
             self.errors[target] = sentence(error)
             return

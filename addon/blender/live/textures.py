@@ -13,6 +13,7 @@ from ...core.scene.texture import Texture
 from ...core.scene.uv_map import Polygons, fit_uv_maps
 from ..jobs.texture import UNLINKED, BaseColor, read_texture
 from ..node.find import find_place
+from ..read.placed import Placed, find_placed
 
 # Texels along the longer side where nodes are evaluated: more would keep the window waiting.
 MOST_TEXELS = 1024
@@ -54,8 +55,8 @@ class Textures:
             return None
         known = self._read.get(target)
         if known is None or known.polygons is not polygons or known.size != size:
-            obj = depsgraph.scene.objects[target.object_name].evaluated_get(depsgraph)
-            known = _evaluated(node, groups, obj, polygons, size)
+            placed = find_placed(depsgraph, {target.object_name})[target.object_name]
+            known = _evaluated(node, groups, placed, polygons, size)
         elif known.texture is not None and known.texture.blur != node.texture_blur:
             known = replace(known, texture=replace(known.texture, blur=node.texture_blur))
         self._read[target] = known
@@ -75,11 +76,11 @@ def _unknown(target: Target, read: Read) -> str:
     return f"{what}, because {read.base_color.unknown} not understood, so {UNLINKED}: bakes have Cycles evaluate it."
 
 
-def _evaluated(node, groups: tuple, obj, polygons: Polygons, size: tuple[int, int] | int) -> Read:
+def _evaluated(node, groups: tuple, placed: Placed, polygons: Polygons, size: tuple[int, int] | int) -> Read:
     maps = fit_uv_maps(polygons)
     width, height = texture_size(maps, size) if isinstance(size, int) else size
     shrink = min(1.0, MOST_TEXELS / max(width, height))
     receiver = build_receiver(maps, max(1, round(width * shrink)), max(1, round(height * shrink)))
-    found = read_texture(node, groups, obj, receiver)
+    found = read_texture(node, groups, placed, receiver)
     texture = Texture(receiver, found.colors, found.blur) if found.colors else None
     return Read(found, texture, polygons, size, texture is not None and shrink < 1)

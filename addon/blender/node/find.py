@@ -6,6 +6,8 @@ from collections.abc import Iterable, Iterator
 
 from ...core.bake.runner import Bake, Target
 from .. import compat
+from ..read.instances import count_places, with_instanced
+from ..read.visible import render_visible_names
 from .node import BeamspreadNode
 from .output import is_linked
 
@@ -52,12 +54,37 @@ def find_targets(objects: Iterable) -> list[Target]:
     return [Target(obj.name, material.name) for obj in objects for material in materials_of(obj)]
 
 
+def find_bakeable(view_layer, chosen: Iterable | None = None) -> list[Target]:
+    """The targets among the chosen objects, None: among the scene's, and among what only instances of these show.
+
+    Of the latter a material that shows an image already has been baked elsewhere if it belongs to another file, or if
+    it stands in several places and nobody has chosen it.
+    """
+    objects = list(view_layer.id_data.objects if chosen is None else chosen)
+    inner = with_instanced(objects)[len(objects) :]
+    own = {obj.name for obj in (*view_layer.objects, *objects)} if inner else set()
+    found = [(obj, material) for obj in inner if obj.name not in own for material in materials_of(obj)]
+    places = _count_rendered(view_layer) if found and chosen is None else {}
+    targets = find_targets(objects)
+    for obj, material in found:
+        is_local = material.library is None and material.override_library is None
+        if find_node(material).image is None or (is_local and places.get(obj.name, 0) <= 1):
+            targets.append(Target(obj.name, material.name))
+    return targets
+
+
+def _count_rendered(view_layer) -> dict[str, int]:
+    visible = render_visible_names(view_layer)
+    return count_places(obj for obj in view_layer.objects if obj.name in visible)
+
+
 def find_misplaced(objects: Iterable) -> list[Bake]:
     """Beamspread nodes where no bake can use them: failures that say where, and what to do.
 
-    A node that shows an image already has been baked elsewhere, as those of instances often are.
+    A node on what is no mesh that shows an image already has been baked elsewhere.
     """
-    return [Bake(Target(obj.name, material.name), error=why) for obj in objects for material, why in _misplaced(obj)]
+    shown = with_instanced(objects)
+    return [Bake(Target(obj.name, material.name), error=why) for obj in shown for material, why in _misplaced(obj)]
 
 
 def _misplaced(obj) -> Iterator[tuple]:
@@ -68,27 +95,11 @@ def _misplaced(obj) -> Iterator[tuple]:
         if node is None and compat.uses_nodes(material):
             for _, groups in _nodes_in(material.node_tree):
                 yield material, _why_not_in_group(material, groups)
-    if obj.instance_type != "COLLECTION" or obj.instance_collection is None:
-        return
-    for inner in _objects_shown_by(obj.instance_collection):
-        for material in materials_of(inner):
-            if find_node(material).image is None:
-                why = f"'{inner.name}', which has the Beamspread node, is only an instance here, of the collection "
-                remedy = "make it real (Object > Apply > Make Instances Real)."
-                yield material, f"{why}'{obj.instance_collection.name}': {remedy}"
 
 
 def _all_materials(obj) -> list:
     materials = (slot.material for slot in obj.material_slots)
     return list(dict.fromkeys(material for material in materials if material is not None))
-
-
-def _objects_shown_by(collection) -> Iterator:
-    """Objects of an instanced collection, and of those that it instances in turn (Blender allows no circles)."""
-    for obj in collection.all_objects:
-        yield obj
-        if obj.instance_type == "COLLECTION" and obj.instance_collection is not None:
-            yield from _objects_shown_by(obj.instance_collection)
 
 
 def _why_not_in_group(material, groups: tuple) -> str:

@@ -8,6 +8,7 @@ from ...core.scene.receiver import Receiver
 from .image_texture import MISSING, NotUnderstoodError, Pixels
 from .node_links import End, Wanted, follow
 from .node_values import converted
+from .placed import Placed
 from .places import ON_NO_PATH, Places
 from .textures import Images
 
@@ -28,21 +29,21 @@ class _OnChart(Places):
         return super().own_value(end)
 
 
-def read_base_color(wanted: Wanted, obj, receiver: Receiver) -> list[np.ndarray]:
+def read_base_color(wanted: Wanted, placed: Placed, receiver: Receiver) -> list[np.ndarray]:
     """Float32 (grid height, grid width, 3) of each chart, not below 0: the linear colour, averaged over each texel.
 
     Parameters
     ----------
     wanted : the input that the colour is linked to.
-    obj : evaluated mesh object, for coordinates of its own.
+    placed : mesh object, for coordinates of its own.
 
     Raises
     ------
     NotUnderstoodError
         Names the first node in the way.
     """
-    to_local, images = np.array(obj.matrix_world.inverted_safe(), dtype=float), Images()
-    width, height = receiver.width, receiver.height
+    to_local, images = np.array(placed.matrix.inverted_safe(), dtype=float), Images()
+    width, height, uv_map = receiver.width, receiver.height, _uv_map(placed.obj)
     count = _places_along_texels(wanted, max(width, height))
     middles = (np.arange(count) + 0.5) / count
     colors = []
@@ -53,7 +54,7 @@ def read_base_color(wanted: Wanted, obj, receiver: Receiver) -> list[np.ndarray]
             strip = max(1, PLACES_AT_ONCE // chart.grid.width)
             for first in range(0, chart.grid.height, strip):
                 rows = slice(first, first + strip)
-                evaluator = _OnChart(_outputs(uvs[rows], positions[rows], to_local), images, _uv_map(obj))
+                evaluator = _OnChart(_outputs(uvs[rows], positions[rows], to_local), images, uv_map)
                 total[rows] += _color(evaluator, wanted, uvs[rows].shape[:2])
         colors.append(np.maximum(total / count**2, 0))
     return colors

@@ -66,8 +66,12 @@ def _transform(points: np.ndarray, matrix) -> np.ndarray:
     return points.astype(float) @ world[:3, :3].T + world[:3, 3]
 
 
-def read_polygons(obj, material_name: str) -> Polygons:
-    """The faces of an evaluated mesh object that carry the material, in world space."""
+def read_polygons(obj, material_name: str, matrix=None) -> Polygons:
+    """The faces of an evaluated mesh object that carry the material, in world space.
+
+    `matrix` is where it stands, None: its own.
+    """
+    matrix = obj.matrix_world if matrix is None else matrix
     mesh = obj.to_mesh()
     try:
         totals, starts, slots = (np.empty(len(mesh.polygons), np.int32) for _ in range(3))
@@ -85,14 +89,14 @@ def read_polygons(obj, material_name: str) -> Polygons:
     sizes = totals[chosen]
     new_starts = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
     loops = np.repeat(starts[chosen] - new_starts[:-1], sizes) + np.arange(new_starts[-1])
-    world = np.array(obj.matrix_world, dtype=float)[:3, :3]
+    world = np.array(matrix, dtype=float)[:3, :3]
     if abs(np.linalg.det(world)) < 1e-30:
         world = _flat_scale(world)
     # Normals transform with the inverse transpose, which also keeps them outward under mirroring.
     world_normals = normals.reshape(-1, 3)[chosen] @ np.linalg.inv(world)
     lengths = np.linalg.norm(world_normals, axis=1, keepdims=True)
     return Polygons(
-        corners=_transform(vertices[corners[loops]], obj.matrix_world),
+        corners=_transform(vertices[corners[loops]], matrix),
         uvs=None if uvs is None else uvs[loops].astype(float),
         starts=new_starts,
         normals=world_normals / np.where(lengths > 0, lengths, 1),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from .instances import with_instanced
+
 
 def links_of(obj, names: set[str]) -> dict[str, frozenset[str] | None]:
     """The fields `receivers` and `blockers` of an object's light; `names` are those of all objects of the scene."""
@@ -33,5 +35,4 @@ def _linked(collection, names: set[str]) -> frozenset[str] | None:
 
 
 def _shown_by(obj) -> set[str]:
-    inner = obj.instance_collection if obj.instance_type == "COLLECTION" else None
-    return {obj.name}.union(*(_shown_by(one) for one in inner.all_objects)) if inner else {obj.name}
+    return {one.name for one in with_instanced([obj])}

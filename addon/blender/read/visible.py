@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 
+from .instances import instanced_collections
+
 
 def render_visible_names(view_layer) -> set[str]:
     """Names of the objects that a render of the view layer shows (the depsgraph of the viewport shows others)."""
@@ -54,7 +56,22 @@ def as_rendered(view_layer):
         for child in layer_collection.children:
             visit(child)
 
+    def show_modifiers(obj) -> None:
+        for modifier in obj.modifiers:
+            set_value(modifier, "show_viewport", modifier.show_render)
+            if modifier.type == "SUBSURF":
+                set_value(modifier, "levels", modifier.render_levels)
+
+    def learn_of_parts() -> None:
+        for collection in collections:
+            collection.update_tag()  # of what it shows where one within is hidden, or no longer
+
+    view_layer.update()  # of objects linked since the last time it knows nothing
     objects = list(view_layer.objects)
+    # Lists, since what is hidden or not makes collections look for their objects anew.
+    collections = instanced_collections(objects)
+    parts = [part for collection in collections for part in (collection, *collection.children_recursive)]
+    instanced = [obj for collection in collections for obj in collection.all_objects]
     hidden = [obj for obj in objects if obj.hide_get(view_layer=view_layer)]
     try:
         visit(view_layer.layer_collection)
@@ -63,10 +80,15 @@ def as_rendered(view_layer):
                 continue
             set_value(obj, "hide_viewport", False)
             obj.hide_set(False, view_layer=view_layer)
-            for modifier in obj.modifiers:
-                set_value(modifier, "show_viewport", modifier.show_render)
-                if modifier.type == "SUBSURF":
-                    set_value(modifier, "levels", modifier.render_levels)
+            show_modifiers(obj)
+        for part in parts:
+            if part.library is None:
+                set_value(part, "hide_viewport", part.hide_render)
+        learn_of_parts()
+        for obj in instanced:
+            if obj.library is None:
+                set_value(obj, "hide_viewport", obj.hide_render)
+                show_modifiers(obj)
         view_layer.update()
         yield
     finally:
@@ -74,4 +96,5 @@ def as_rendered(view_layer):
             setattr(owner, name, value)
         for obj in hidden:
             obj.hide_set(True, view_layer=view_layer)
+        learn_of_parts()
         view_layer.update()

@@ -16,11 +16,12 @@ from ..cycles.light import seconds_estimate
 from ..images.files import check_image
 from ..images.results import check_editable
 from ..jobs.popup import wrap
-from ..jobs.prepare import check_visible
 from ..jobs.state import Row, Standing, state
 from ..jobs.texture import needs_cycles
 from ..live import session
 from ..node.find import find_misplaced, find_node, find_targets, materials_of
+from ..read.instances import by_name, with_instanced
+from ..read.placed import why_hidden
 from ..read.visible import render_visible_names
 
 # Objects whose warnings, and rows, that a panel shows; it is drawn often.
@@ -49,7 +50,9 @@ def warnings_for(obj, visible: set[str]) -> list[str]:
         return messages
     if not obj.data.uv_layers:
         messages.append("The mesh has no UV map: unwrap it first.")
-    checks = [lambda: check_visible(obj.name, visible)]
+    if obj.name not in visible:
+        messages.append(why_hidden(obj.name, bpy.context.view_layer))
+    checks = []
     for material in materials:
         if bpy.context.scene.beamspread.output == "LUMINANCE":
             checks.append(lambda material=material: check_editable(material))
@@ -172,7 +175,9 @@ def _standing(row: Row) -> Standing:
 def estimates(context) -> list[str]:
     """How long what takes long will take for the objects that Bake would bake, in sentences."""
     settings, found = context.scene.beamspread, []
-    chosen = find_targets(context.view_layer.objects.selected) or list(state.rows)
+    selected = context.view_layer.objects.selected
+    inner = {obj.name for obj in with_instanced(selected)}
+    chosen = find_targets(selected) or [one for one in state.rows if one.object_name in inner] or list(state.rows)
     sizes = [_size(target, settings.resolution) for target in chosen]
     if not sizes:
         return []
@@ -181,7 +186,7 @@ def estimates(context) -> list[str]:
         them = "them" if len(sizes) > 1 else "it"
         slower = "" if has_denoiser() else " This Blender has no denoiser: it traces more rays instead."
         found.append(f"Indirect light: about {seconds}{_of_many(sizes)}, where something stands above {them}.{slower}")
-    objects = context.scene.objects if settings.output == "LUMINANCE" else {}
+    objects = by_name(context.scene) if settings.output == "LUMINANCE" else {}
     pairs = [(target, size) for target, size in zip(chosen, sizes) if target.object_name in objects]
     asked = [size for one, size in pairs if needs_cycles(objects[one.object_name], one.material_name)]
     if asked:

@@ -1,0 +1,471 @@
+"""What stands in a scene through an instance of a collection alone is baked there, as if it were made real."""
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+from beamspread.blender.cycles import light
+from beamspread.blender.jobs import stale
+from beamspread.blender.jobs.batch import bake_all
+from beamspread.blender.jobs.prepare import prepare_scene
+from beamspread.blender.jobs.state import Standing, state
+from beamspread.blender.live import session
+from beamspread.blender.node.find import find_bakeable
+from beamspread.blender.ui.results import estimates
+from beamspread.core.bake.runner import Target
+from beamspread.core.batch import options
+from mathutils import Euler, Matrix
+from scenes import add_blocker, add_material, add_plane, add_sun, messages_of, node_of, pixels, select
+from test_indirect import add_gobo
+from test_live import settle
+from test_standing import scatter_group
+
+TILE = Target("Tile", "Medium")
+WITHIN = Matrix.Translation((0.3, -0.2, 0.1)) @ Euler((0.1, 0.2, 0.7)).to_matrix().to_4x4()
+TURNED = Euler((0.1, -0.2, 2.0)).to_matrix().to_4x4()
+SKEWED = Matrix.Translation((1, 2, 0.5)) @ TURNED @ Matrix.Diagonal((1, 0.7, 1, 1))
+MIRRORED = Matrix.Translation((-1, 0, 0.2)) @ Matrix.Diagonal((-1.2, 1, 1, 1))
+OFFSET = (0.4, 0.1, -0.3)
+
+
+@pytest.fixture(autouse=True)
+def small():
+    settings = bpy.context.scene.beamspread
+    settings.resolution, settings.margin = 32, 0
+    state.forget()
+
+
+def add_tile(matrix=WITHIN, **properties):
+    """A plane and a wall upon it in a collection that the scene does not have; it, and its material."""
+    material = add_material(**properties)
+    tile, wall = add_plane("Tile", matrix=matrix, material=material), add_blocker(0.5, matrix=matrix)
+    collection = bpy.data.collections.new("Tiles")
+    collection.instance_offset = OFFSET
+    for obj in (tile, wall):
+        bpy.context.scene.collection.objects.unlink(obj)
+        collection.objects.link(obj)
+    return tile, collection
+
+
+def add_instancer(collection, matrix, name="Holder", within=None):
+    holder = bpy.data.objects.new(name, None)
+    holder.instance_type, holder.instance_collection = "COLLECTION", collection
+    holder.matrix_world = matrix
+    (within or bpy.context.scene.collection).objects.link(holder)
+    return holder
+
+
+def nest(collection):
+    """A collection with an instance of another, and where what is in the latter stands in it."""
+    outer = bpy.data.collections.new("Outer")
+    add_instancer(collection, MIRRORED, "Middle", outer)
+    return outer, MIRRORED @ Matrix.Translation(-collection.instance_offset)
+
+
+def bake_it(holder, material=TILE.material_name):
+    select(holder)
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    node = node_of(bpy.data.materials[material])
+    found, node.image = pixels(node.image), None
+    return found
+
+
+def real_mesh(obj, matrix):
+    """A copy with all of the place in its vertices: an object's own can't be skewed."""
+    copy = obj.copy()
+    copy.data = obj.data.copy()
+    copy.data.transform(matrix)
+    copy.matrix_world = Matrix()
+    if np.linalg.det(matrix.to_3x3()) < 0:
+        copy.data.flip_normals()
+    return copy
+
+
+def make_real(holder, collection, matrix):
+    """Put the instanced objects into the scene in place of the instance; by name of what they were."""
+    found = {}
+    for obj in collection.objects:
+        found[obj.name] = real_mesh(obj, matrix @ obj.matrix_world)
+        bpy.context.scene.collection.objects.link(found[obj.name])
+    bpy.data.objects.remove(holder)
+    return found
+
+
+def in_the_scene():
+    _, collection = add_tile()
+    return add_instancer(collection, SKEWED), collection, SKEWED @ Matrix.Translation(-collection.instance_offset)
+
+
+def excluded():
+    """The collection is the scene's, and excluded from the view layer."""
+    holder, collection, matrix = in_the_scene()
+    bpy.context.scene.collection.children.link(collection)
+    bpy.context.view_layer.layer_collection.children[collection.name].exclude = True
+    return holder, collection, matrix
+
+
+def nested():
+    _, collection = add_tile()
+    outer, within = nest(collection)
+    return add_instancer(outer, SKEWED), collection, SKEWED @ within
+
+
+@pytest.mark.parametrize("add", [in_the_scene, excluded, nested])
+def test_it_is_baked_as_if_made_real(add):
+    """Within rounding of the places' product, which moves shadows' borders by as much."""
+    holder, collection, matrix = add()
+    add_sun(30, 20)
+    ours = bake_it(holder)
+    real = make_real(holder, collection, matrix)["Tile"]
+    truth = bake_it(real)
+    assert truth.min() < 0.6 * truth.max()  # there is a shadow
+    np.testing.assert_allclose(ours, truth, rtol=0, atol=1e-5 * truth.max())
+
+
+def row():
+    bpy.context.view_layer.update()
+    stale.refresh(bpy.context)
+    return state.rows[TILE]
+
+
+def move(name):
+    bpy.data.objects[name].location.x += 0.1
+
+
+def move_lamp_within(_):
+    bpy.data.objects["Lamp"].location.x += 0.1
+
+
+def change_offset(_):
+    bpy.data.collections["Tiles"].instance_offset = (0, 0, 0)
+
+
+CHANGES = [
+    ("Holder", move, "object, other objects, lights"),  # the wall and the lamp stand there, too
+    ("Middle", move, "object, other objects, lights"),
+    ("Tile", move, "object"),
+    ("Wall", move, "other objects"),
+    ("Lamp", move, "lights"),
+    ("", change_offset, "object, other objects, lights"),
+]
+
+
+@pytest.mark.parametrize(("name", "change", "parts"), CHANGES, ids=[name or "offset" for name, _, _ in CHANGES])
+def test_what_makes_a_bake_out_of_date(name, change, parts):
+    _, collection = add_tile()
+    lamp = scenes.add_lamp((0, 0, 3))
+    bpy.context.scene.collection.objects.unlink(lamp)
+    collection.objects.link(lamp)
+    holder = add_instancer(nest(collection)[0], SKEWED)
+    assert row().standing == Standing.NEVER
+    select(holder)
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    assert row().standing == Standing.BAKED
+    change(name)
+    assert row().sentences[0] == f"Changed since its bake: {parts}."
+    assert bpy.ops.beamspread.bake(objects="STALE") == {"FINISHED"}
+    assert row().standing == Standing.BAKED
+
+
+def test_another_instance_makes_it_out_of_date_and_says_why_it_cannot_be_baked_again():
+    _, collection = add_tile()
+    add_sun()
+    select(add_instancer(collection, SKEWED))
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    add_instancer(collection, MIRRORED)
+    assert row().standing == Standing.STALE
+    assert "'Tile' stands in 2 places" in messages_of(lambda: bpy.ops.beamspread.bake(objects="STALE"))
+
+
+def scatter(tile):
+    """As particles as well, five times."""
+    plane = add_plane("Ground")
+    plane.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    settings = plane.particle_systems[0].settings
+    settings.type, settings.render_type, settings.instance_object, settings.count = "HAIR", "OBJECT", tile, 5
+
+
+def test_particles_count_as_places():
+    tile, collection = add_tile()
+    add_instancer(collection, SKEWED)
+    scatter(tile)
+    add_sun()
+    assert "'Tile' stands in 6 places" in messages_of(lambda: bpy.ops.beamspread.bake(objects="ALL"))
+
+
+def test_instances_of_other_meshes_under_its_name_are_no_places():
+    """As geometry nodes make them."""
+    tile, collection = add_tile()
+    tile.modifiers.new("Scatter", "NODES").node_group = group = scatter_group(tile)
+    tree_info = next(one for one in group.nodes if one.bl_idname == "GeometryNodeObjectInfo")
+    cube, points = group.nodes.new("GeometryNodeMeshCube"), tree_info.outputs["Geometry"].links[0].to_node
+    cube.inputs["Size"].default_value = (0.01,) * 3
+    group.links.new(points.inputs["Instance"], cube.outputs[0])
+    group.nodes.remove(tree_info)
+    join = group.nodes.new("GeometryNodeJoinGeometry")
+    given, result = (next(one for one in group.nodes if one.type == kind) for kind in ("GROUP_INPUT", "GROUP_OUTPUT"))
+    for source in (given, group.nodes["Move"]):
+        group.links.new(join.inputs[0], source.outputs[0])
+    group.links.new(result.inputs[0], join.outputs[0])
+    add_sun(30, 20)
+    assert bake_it(add_instancer(collection, SKEWED)).any()
+
+
+def test_an_instance_that_does_not_render_is_no_place():
+    holder, collection, _ = in_the_scene()
+    add_sun(30, 20)
+    truth = bake_it(holder)
+    add_instancer(collection, MIRRORED).hide_render = True
+    node_of(bpy.data.materials["Medium"]).image = bpy.data.images.new("Former", *truth.shape[1::-1], float_buffer=True)
+    assert bpy.ops.beamspread.bake(objects="ALL") == {"FINISHED"}
+    assert np.array_equal(pixels(node_of(bpy.data.materials["Medium"]).image), truth)
+
+
+def hide(name):
+    bpy.data.objects[name].hide_render = True
+
+
+def hide_collection(name):
+    bpy.data.collections[name].hide_render = True
+
+
+HIDDEN = [(hide, "Holder"), (hide, "Middle"), (hide, "Tile"), (hide_collection, "Tiles"), (hide_collection, "Outer")]
+
+
+@pytest.mark.parametrize(("change", "name"), HIDDEN, ids=[name for _, name in HIDDEN])
+def test_what_does_not_render_is_not_baked(change, name):
+    holder, _, _ = nested()
+    add_sun()
+    change(name)
+    select(holder)
+    message = messages_of(bpy.ops.beamspread.bake)
+    assert "'Tile' is hidden from render" in message
+    assert "and those of 'Holder' and 'Middle', which shows it, in the Outliner" in message
+
+
+def hide_in_viewport(name):
+    bpy.data.objects[name].hide_viewport = True
+
+
+def hide_collection_in_viewport(name):
+    bpy.data.collections[name].hide_viewport = True
+
+
+SHOWN = [
+    (hide_in_viewport, "Holder"),
+    (hide_in_viewport, "Middle"),
+    (hide_in_viewport, "Tile"),
+    (hide_in_viewport, "Wall"),
+    (hide_collection_in_viewport, "Tiles"),
+]
+
+
+@pytest.mark.parametrize(("change", "name"), SHOWN, ids=[name for _, name in SHOWN])
+def test_what_the_viewport_hides_is_baked(change, name):
+    holder, _, _ = nested()
+    add_sun(30, 20)
+    truth = bake_it(holder)
+    change(name)
+    assert bpy.ops.beamspread.bake(objects="ALL") == {"FINISHED"}
+    assert np.array_equal(pixels(node_of(bpy.data.materials["Medium"]).image), truth)
+    assert [one.hide_viewport for one in (*bpy.data.objects, *bpy.data.collections)].count(True) == 1
+
+
+def darkest(texture):
+    """Away from the border, as part of the brightest."""
+    return texture[8:24, 8:24, 0].min() / texture[..., 0].max()
+
+
+def test_a_wall_that_does_not_render_throws_no_shadow():
+    holder, collection, _ = in_the_scene()
+    add_sun(30, 20)
+    within = bpy.data.collections.new("Within")
+    collection.children.link(within)
+    collection.objects.unlink(bpy.data.objects["Wall"])
+    within.objects.link(bpy.data.objects["Wall"])
+    assert darkest(bake_it(holder)) < 0.7
+    within.hide_render = True
+    assert darkest(bake_it(holder)) > 0.9
+    assert "Wall" in {one.object.name for one in bpy.context.evaluated_depsgraph_get().object_instances}
+
+
+@pytest.mark.parametrize("names", [[], ["Tile"], ["Holder"], ["Holder", "Tile"]])
+def test_a_batch_bakes_it(names, tmp_path):
+    holder, _, _ = nested()
+    add_sun(30, 20)
+    truth = bake_it(holder)
+    chosen = ["--object", *names] if names else []
+    report = bake_all(options.parse([*chosen, "--output", str(tmp_path)]))
+    assert [(one.object, one.status) for one in report.bakes] == [("Tile", "written")]
+    image = bpy.data.images.load(str(tmp_path / "Tile_Medium.exr"))
+    assert np.array_equal(pixels(image), truth)
+
+
+def test_a_batch_follows_the_instance(tmp_path):
+    holder, _, _ = in_the_scene()
+    add_sun(30, 20)
+    holder.rotation_euler = (0, 0, 0)
+    for frame, angle in ((1, 0.0), (2, -0.4)):
+        holder.rotation_euler.y = angle
+        holder.keyframe_insert("rotation_euler", frame=frame)
+    report = bake_all(options.parse(["--output", str(tmp_path), "--frames", "1-2"]))
+    assert report.all_written()
+    one, two = (pixels(bpy.data.images.load(one.path)) for one in report.bakes)
+    assert np.abs(one - two).max() > 0.1 * one.max()
+    assert np.array_equal(bake_it(holder), two)
+
+
+def test_estimates_are_of_what_the_selected_one_shows():
+    holder, _, _ = nested()
+    add_plane("Other", material=add_material("Other"))
+    bpy.context.scene.beamspread.use_indirect = True
+    stale.refresh(bpy.context)
+    for selected, is_of_both in ((holder, False), (add_sun(), True)):
+        select(selected)
+        (estimate,) = estimates(bpy.context)
+        assert ("for 2 objects" in estimate) == is_of_both
+
+
+def link_tiles(tmp_path, has_image):
+    """An instance of a collection of another file, whose material may have been baked there."""
+    add_tile()
+    if has_image:
+        node_of(bpy.data.materials["Medium"]).image = bpy.data.images.new("Baked", 4, 4)
+    path = str(tmp_path / "library.blend")
+    bpy.data.libraries.write(path, {bpy.data.collections["Tiles"]})
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(path, link=True) as (_, wanted):
+        wanted.collections = ["Tiles"]
+    return add_instancer(bpy.data.collections["Tiles"], SKEWED)
+
+
+@pytest.mark.parametrize("has_image", [False, True])
+def test_one_of_another_file_is_refused_unless_it_was_baked_there(has_image, tmp_path):
+    select(link_tiles(tmp_path, has_image))
+    add_sun()
+    message = messages_of(bpy.ops.beamspread.bake)
+    assert ("No mesh has a material" if has_image else "belongs to another .blend file") in message
+
+
+def test_problems_inside_are_said():
+    tile, collection = add_tile()
+    material = tile.data.materials[0] = scenes.add_group_material()
+    material.copy()  # which has the same group
+    select(add_instancer(collection, SKEWED))
+    assert "'Grouped' is in the node group 'Outer'" in messages_of(bpy.ops.beamspread.bake)
+
+
+def test_an_object_of_the_scene_is_baked_where_it_stands_itself():
+    """Though an instance shows it as well."""
+    plane = add_plane("Tile", material=add_material())
+    collection = bpy.data.collections.new("Tiles")
+    collection.objects.link(plane)
+    add_sun(30)
+    truth = bake_it(plane)
+    add_instancer(collection, Matrix.Translation((0, 0, 9)) @ Euler((0, 0.8, 0)).to_matrix().to_4x4())
+    bpy.context.view_layer.update()
+    assert find_bakeable(bpy.context.view_layer) == [TILE]
+    assert np.array_equal(bake_it(plane), truth)
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 0, 0), reason="light linking came in Blender 4.0")
+def test_light_is_linked_to_what_the_instancer_shows():
+    holder, _, _ = nested()
+    other = add_plane("Other")
+    sun = add_sun(30, 20)
+    truth = bake_it(holder)
+    for linked, is_lit in ((holder, True), (other, False)):
+        sun.light_linking.receiver_collection = links = bpy.data.collections.new("Links")
+        links.objects.link(linked)
+        found = bake_it(holder)
+        assert np.array_equal(found, truth) if is_lit else not found.any()
+
+
+def test_indirect_light_is_that_of_what_is_made_real(monkeypatch):
+    """Of a bright wall of the collection and of a card of the scene, by the same random numbers."""
+    monkeypatch.setattr(light, "NODES", 16)
+    for name in ("LEAST_NOISE", "MOST_NOISE"):
+        monkeypatch.setattr(light, name, 0.02)
+    holder, collection, matrix = nested()
+    bpy.data.objects["Wall"].data.materials.append(scenes.diffuse_material((0.8, 0.1, 0.1)))
+    card = add_plane("Card", (3, 3), matrix @ WITHIN @ Matrix.Translation((0, -1, 1)) @ Matrix.Rotation(1.2, 4, "X"))
+    card.data.materials.append(scenes.diffuse_material((0.1, 0.8, 0.1)))
+    add_sun(30, 20)
+    direct = bake_it(holder)
+    bpy.context.scene.beamspread.use_indirect = True
+    ours = bake_it(holder)
+    truth = bake_it(make_real(holder, collection, matrix)["Tile"])
+    bounced = truth - direct
+    assert bounced.mean() > 0.03 * direct.mean()
+    assert (ours - direct).mean() == pytest.approx(bounced.mean(), rel=0.01)
+    np.testing.assert_allclose(ours, truth, rtol=0, atol=0.02 * bounced.max())
+
+
+def irradiance():
+    settings = bpy.context.scene.beamspread.for_bake(output="IRRADIANCE")
+    (bake,) = prepare_scene(bpy.context, find_bakeable(bpy.context.view_layer), settings)
+    bake.run()
+    return bake.layers["Irradiance"]
+
+
+def test_cycles_counts_an_instanced_lamp_once():
+    """Beside a lamp that it alone understands, whose light it finds with all others switched off."""
+    add_plane(material=add_material())
+    add_gobo("POINT")
+    lamp, collection = scenes.add_lamp((0, 0, 1)), bpy.data.collections.new("Lamps")
+    truth = irradiance()
+    bpy.context.scene.collection.objects.unlink(lamp)
+    collection.objects.link(lamp)
+    add_instancer(collection, Matrix())
+    np.testing.assert_allclose(irradiance(), truth, rtol=0, atol=0.02 * truth.max())
+
+
+def test_a_colour_by_cycles_is_that_of_what_is_made_real():
+    """By coordinates of its own and of the world, in an object that is skewed as it stands."""
+    holder, collection, matrix = in_the_scene()
+    material = bpy.data.materials["Medium"]
+    tree, node = material.node_tree, node_of(material)
+    node.color_mode, node.mean_free_path, node.texture_blur = "BASE_COLOR", (0.001,) * 3, 0.0
+    noise, mix = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeVectorMath")
+    tree.links.new(mix.inputs[0], tree.nodes.new("ShaderNodeTexCoord").outputs["Object"])
+    tree.links.new(mix.inputs[1], tree.nodes.new("ShaderNodeNewGeometry").outputs["Position"])
+    tree.links.new(noise.inputs["Vector"], mix.outputs[0])
+    tree.links.new(node.inputs["Base Color"], noise.outputs["Color"])
+    add_sun(30, 20)
+    ours = bake_it(holder)
+    parent = bpy.data.objects.new("Parent", None)
+    bpy.context.scene.collection.objects.link(parent)
+    for obj in collection.objects:
+        obj.parent, obj.matrix_parent_inverse = parent, matrix  # which may be skewed
+    bpy.data.objects.remove(holder)
+    bpy.context.scene.collection.children.link(collection)
+    truth = bake_it(bpy.data.objects["Tile"])
+    assert truth.std() > 0.1 * truth.mean()
+    np.testing.assert_allclose(ours, truth, rtol=0, atol=1e-3 * truth.max())
+
+
+@pytest.fixture
+def live():
+    yield
+    session.end()
+
+
+def test_live_follows_the_instance(live):
+    holder, _, _ = nested()
+    image = bpy.data.images.new("Target", 64, 64, float_buffer=True, alpha=False)
+    material = bpy.data.materials["Medium"]
+    node_of(material).image = image
+    add_sun(30, 20)
+    bpy.context.scene.beamspread.use_live = True
+    settle()
+    assert session.sentences() == []
+    before = pixels(image)
+    holder.rotation_euler.y += 0.4
+    settle()
+    after = pixels(image)
+    assert np.abs(after - before).max() > 0.05 * before.max()
+    bpy.context.scene.beamspread.use_live = False
+    session.step(bpy.context)
+    select(holder)
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    np.testing.assert_allclose(after, pixels(image), rtol=0, atol=0.02 * before.max())
