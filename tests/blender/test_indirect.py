@@ -196,6 +196,7 @@ def fields_of(chart, **options):
         "textures": {},
         "noise_of_all": 0.0,
         "direct": 0.0,
+        "negligible": 0.0,
         "charts": [chart],
         **options,
     }
@@ -345,6 +346,22 @@ def irradiance_of_jobs(floor, linking, receivers, blockers):
     bake.run()
     assert not bake.error
     return bake.layers["Irradiance"]
+
+
+def test_what_leaks_into_a_closed_box_is_no_light(monkeypatch):
+    """Blender's first cube around a plane as wide: some ten-millionth of the light gets in along the edges."""
+    monkeypatch.setattr(light, "NODES", 64)
+    floor = scenes.add_plane("Floor", material=scenes.add_material())
+    bpy.ops.mesh.primitive_cube_add()
+    scenes.add_sun(40, 60, 10.0)
+    scenes.add_lamp((4, 1, 6), 1000.0).data.shadow_soft_size = 0.1
+    bpy.context.scene.world = bpy.data.worlds.new("Grey")
+    (bake,) = jobs_of(floor)
+    bake.run()
+    assert not bake.error
+    assert bake.is_dark
+    assert light.NOTHING_BOUNCES in bake.warnings
+    assert "No light reaches 'Floor'" in " ".join(bake.warnings)
 
 
 def test_nothing_above_a_receiver_means_no_search():

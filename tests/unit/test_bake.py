@@ -398,6 +398,8 @@ class FailingJob:
     def colored(self, progress):
         return self, progress
 
+    lit = colored
+
     def is_dark(self, layers):
         return False
 

@@ -149,19 +149,20 @@ def test_a_job_bakes_the_light_that_it_finds():
     receiver = Receiver(grid.coverage, (Chart(grid, grid.coverage),))
     seen = []
 
-    def find(found_for, progress):
-        seen.append(found_for)
+    def find(job, progress):
+        seen.append(job.receiver)
         if progress is not None and progress(0.5) is False:
             raise native.Cancelled("stopped")
-        return [light_of(grid, np.ones((len(STRATA), 2, 2, 3)))]
+        light = light_of(grid, np.ones((len(STRATA), 2, 2, 3)))
+        return replace(job, illumination=job.illumination.lit_by([light]))
 
     surface = Surface(Material(albedo=(0.9,) * 3, mean_free_path=(0.1,) * 3))
     job = BakeJob("Floor", receiver, Illumination([]), surface, BakeSettings(layers=(IRRADIANCE,)), find)
     assert job.warnings() == []
-    np.testing.assert_allclose(job.run()[IRRADIANCE], np.pi, rtol=1e-5)
+    np.testing.assert_allclose(job.lit()[0].run()[IRRADIANCE], np.pi, rtol=1e-5)
     assert seen == [receiver]
     with pytest.raises(native.Cancelled):
-        job.run(lambda _fraction: False)
+        job.lit(lambda _fraction: False)
 
 
 def test_reflectance_of_a_surface():

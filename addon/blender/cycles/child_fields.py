@@ -28,6 +28,8 @@ def fields(request, scene, progress) -> dict:
 
     `light` is "INDIRECT" or "DIRECT", `only` names the objects whose light counts, none: all. With `by_lamps` a white
     diffuse surface stands in place of the mirrors, for which Cycles looks for lamps however small; it has one stratum.
+    The mean `irradiance`, W/m^2, is that of the first two rounds; there are no others if it is less than the part
+    `negligible` of `direct`.
 
     Radiance is each stratum's mean by the cosine. The noise is that of the irradiance, the root of its mean square over
     all nodes, as part of its mean. What bounces is smooth: a denoiser takes noise out of its irradiance, and strata
@@ -46,12 +48,14 @@ def fields(request, scene, progress) -> dict:
     for look in looks:
         mean.add(look, LOOK)
     looks = [np.nan_to_num(look) for look in looks]
+    found = np.pi * float(np.mean([mean_radiance(request, look) for look in looks]))
     # The mean of both has noise / sqrt(2); it falls by the root of the samples.
     noise = noise_of(request, *looks) / np.sqrt(2)
     denoise = working_denoiser(request, mean) if request["light"] == "INDIRECT" else None
     gain = DENOISED if denoise else 1.0
-    allowed = gain * allowed_noise(request, looks)
-    wanted = int(min(np.ceil(samples * (noise / allowed) ** 2), request["most_samples"]))
+    allowed = gain * allowed_noise(request, found)
+    most = samples if found < request["negligible"] * request["direct"] else request["most_samples"]
+    wanted = int(min(np.ceil(samples * (noise / allowed) ** 2), most))
     progress(samples / max(wanted, samples))
     while samples < wanted:
         count = min(count, wanted - samples)
@@ -63,7 +67,7 @@ def fields(request, scene, progress) -> dict:
         parts = with_irradiance(request, parts, denoise(irradiances(request, parts)))
     result = {f"radiance_{n}": part for n, part in enumerate(parts)}
     result["noise"] = np.array(noise * np.sqrt(2 * LOOK / samples) / gain)
-    result["samples"] = np.array(samples)
+    result["samples"], result["irradiance"] = np.array(samples), np.array(found)
     return result
 
 
@@ -268,9 +272,8 @@ def mean_radiance(request, pixels) -> np.ndarray:
     )
 
 
-def allowed_noise(request, looks) -> float:
+def allowed_noise(request, found: float) -> float:
     """Of the irradiance found, as part of it; where there is much light besides, more of it goes unseen."""
-    found = np.pi * float(np.mean([mean_radiance(request, look) for look in looks]))
     least, most = request["noise"]
     return float(np.clip(request["noise_of_all"] * (1 + request["direct"] / found), least, most)) if found > 0 else most
 

@@ -36,6 +36,11 @@ NODES, MOST_SQUARES = 64, 2.0
 NOISE_OF_ALL, LEAST_NOISE, MOST_NOISE = 0.01, 0.03, 0.1
 MOST_SAMPLES = 128
 
+# Less bounced light is none, beside what the lights would send without anything in their way: what leaks into a closed
+# box with sun and lamp outside, at a single node beside its edges, is 1.3e-7.
+NEGLIGIBLE = 1e-6
+NOTHING_BOUNCES = "Indirect light is left out: it is less than a millionth of what the lights send without obstacles."
+
 # Of light that comes directly, with its shadows, and is not understood by our readers.
 DIRECT_NODES, DIRECT_NOISE = 256, 0.02
 
@@ -102,9 +107,7 @@ class CyclesLight:
             job,
             illumination=illumination,
             more_seconds=seconds_estimate(job.receiver.width, job.receiver.height) * (bounced + len(others)),
-            more_light=lambda receiver, progress: self._find(
-                receiver, illumination.lights, world, others, bounced, progress
-            ),
+            more_light=lambda found_for, progress: self._complete(found_for, world, others, bounced, progress),
         )
 
     def copy(self) -> CopyForCycles | None:
@@ -123,29 +126,27 @@ class CyclesLight:
                 return True
         return False
 
-    def _find(
-        self,
-        receiver: Receiver,
-        own: Sequence[Light],
-        world: str,
-        others: list[str],
-        bounced: bool,
-        progress: Progress | None,
-    ) -> list[Light]:
-        """What Cycles adds to the scene's `own` lights. Runs in any thread."""
+    def _complete(
+        self, job: BakeJob, world: str, others: list[str], bounced: bool, progress: Progress | None
+    ) -> BakeJob:
+        """The job with what Cycles adds to its lights. Runs in any thread."""
         weights = [float(bool(world) and self._panorama is None), 2.0 * bounced, *(1.0 for _ in others)]
         first, second, *each = stages(progress, weights)
-        lights: list[Light] = []
+        illumination, receiver = job.illumination, job.receiver
         if world:
             if self._panorama is None:
                 radiance = world_panorama(self._copy.scene, progress=first)
                 self._panorama = WorldLight(world, *WHITE, True, radiance, UPRIGHT)
-            lights.append(self._panorama)
+            illumination = illumination.lit_by([self._panorama])
         if bounced:
-            direct = _irradiance_in_the_open(receiver, [*own, *lights])
-            fields = self._fields(receiver, second, "Finding indirect light", direct=direct)
-            lights.append(FieldLight("Bounced light", *WHITE, False, fields))
-        return lights + [self._direct(receiver, name, step) for name, step in zip(others, each)]
+            direct = _irradiance_in_the_open(receiver, illumination.lights)
+            fields, irradiance = self._fields(receiver, second, "Finding indirect light", direct=direct)
+            if irradiance >= NEGLIGIBLE * direct:
+                illumination = illumination.lit_by([FieldLight("Bounced light", *WHITE, False, fields)])
+            elif irradiance > 0:
+                illumination = illumination.warning(NOTHING_BOUNCES)
+        found = [self._direct(receiver, name, step) for name, step in zip(others, each)]
+        return replace(job, illumination=illumination.lit_by(found))
 
     def _direct(self, receiver: Receiver, name: str, progress: Progress | None) -> Light:
         """What an object sends to the receiver."""
@@ -153,12 +154,15 @@ class CyclesLight:
         doing = f"Finding the light of '{name}'"
         options = {"light": "DIRECT", "only": [name], "noise": (DIRECT_NOISE, DIRECT_NOISE)}
         if lamp is None:
-            return FieldLight(name, *WHITE, False, self._fields(receiver, progress, doing, **options))
+            return FieldLight(name, *WHITE, False, self._fields(receiver, progress, doing, **options)[0])
         whole = {"by_lamps": True, "strata": [[0.0, 1.0, 0.0, 1.0]], "charts": charts_of(receiver, DIRECT_NODES)}
-        return LampFieldLight(name, *WHITE, False, self._fields(receiver, progress, doing, **options, **whole), *lamp)
+        fields, _ = self._fields(receiver, progress, doing, **options, **whole)
+        return LampFieldLight(name, *WHITE, False, fields, *lamp)
 
-    def _fields(self, receiver: Receiver, progress: Progress | None, doing: str, **options) -> tuple[Field, ...]:
-        """Bounced light, or what the options ask for."""
+    def _fields(
+        self, receiver: Receiver, progress: Progress | None, doing: str, **options
+    ) -> tuple[tuple[Field, ...], float]:
+        """Bounced light, or what the options ask for, and about its mean irradiance, W/m^2."""
         request = {
             "charts": charts_of(receiver, NODES),
             "strata": STRATA.tolist(),
@@ -170,12 +174,14 @@ class CyclesLight:
             "noise": (LEAST_NOISE, MOST_NOISE),
             "noise_of_all": NOISE_OF_ALL,
             "direct": 0.0,
+            "negligible": NEGLIGIBLE,
             "most_samples": MOST_SAMPLES,
         }
         seconds = seconds_estimate(receiver.width, receiver.height)
         found = run(self._copy.scene, "fields", {**request, **options}, progress, doing, seconds)
         grids = (chart.grid for chart in receiver.charts)
-        return tuple(Field(grid.origin, grid.normal, found[f"radiance_{n}"]) for n, grid in enumerate(grids))
+        fields = tuple(Field(grid.origin, grid.normal, found[f"radiance_{n}"]) for n, grid in enumerate(grids))
+        return fields, float(found["irradiance"])
 
 
 def _irradiance_in_the_open(receiver: Receiver, lights: Sequence[Light]) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +11,6 @@ from ..errors import BakeError
 from ..ldf.library import is_known, library
 from ..progress import Progress, say, stages, timed
 from ..scene.illumination import Illumination
-from ..scene.lights import Light
 from ..scene.receiver import Receiver
 from .estimate import ray_seconds, simulation_seconds, solver_seconds
 from .layers import LAYERS, WITHOUT_MEDIUM
@@ -25,9 +24,8 @@ from .surface import Surface
 class BakeJob:
     """A receiver with its light and its surface; `name` is what to call the receiver in messages.
 
-    `more_light` finds what `illumination` lacks, as bounced light, when the job runs, in whatever thread; that takes
-    about `more_seconds`. `more_color` makes another job of it, with the surface and the texture that it
-    lacks; that takes about `color_seconds`.
+    `more_color` makes another job of it, with the surface and the texture that it lacks, `more_light` one with what its
+    illumination lacks, as bounced light, in whatever thread; they take about `color_seconds` and `more_seconds`.
     """
 
     name: str
@@ -35,7 +33,7 @@ class BakeJob:
     illumination: Illumination
     surface: Surface
     settings: BakeSettings
-    more_light: Callable[[Receiver, Progress | None], Sequence[Light]] | None = None
+    more_light: Callable[[BakeJob, Progress | None], BakeJob] | None = None
     more_seconds: float = 0.0
     more_color: Callable[[BakeJob, Progress | None], BakeJob] | None = None
     color_seconds: float = 0.0
@@ -50,21 +48,25 @@ class BakeJob:
         with timed(f"base color of '{self.name}'"):
             return replace(self.more_color(self, coloring), more_color=None), rest
 
-    def run(self, progress: Progress | None = None) -> dict[str, np.ndarray]:
-        """The layers of a `colored` job: name -> float32 (height, width, 3), with margin, row 0 at the bottom."""
+    def lit(self, progress: Progress | None = None) -> tuple[BakeJob, Progress | None]:
+        """The `colored` job with all its light, which may have more to warn of, and the progress left for `run`."""
+        if self.more_light is None:
+            return self, progress
         self.surface.check()
-        finding, baking = stages(progress, [self._finding_seconds(), self._baking_seconds()])
-        if self.more_light is not None:
-            say(finding, "Finding indirect light")
-            with timed(f"bounced light of '{self.name}'"):
-                illumination = self.illumination.lit_by(self.more_light(self.receiver, finding))
-            return replace(self, illumination=illumination, more_light=None).run(baking)
+        finding, rest = stages(progress, [self._finding_seconds(), self._baking_seconds()])
+        say(finding, "Finding indirect light")
+        with timed(f"bounced light of '{self.name}'"):
+            return replace(self.more_light(self, finding), more_light=None), rest
+
+    def run(self, progress: Progress | None = None) -> dict[str, np.ndarray]:
+        """The layers of a `lit` job: name -> float32 (height, width, 3), with margin, row 0 at the bottom."""
+        self.surface.check()
         if self._surely_dark():  # at once: to simulate the medium may take half a minute
             return {name: np.zeros((*self.receiver.coverage.shape, 3), np.float32) for name in self.settings.layers}
         parts = len(self.settings.layers) * len(self.receiver.charts)
-        simulating, *solving = stages(baking, [self._simulation_seconds()] + [self._solver_seconds() / parts] * parts)
+        simulating, *solving = stages(progress, [self._simulation_seconds()] + [self._solver_seconds() / parts] * parts)
         self._simulate(simulating)
-        say(baking, "Baking")
+        say(progress, "Baking")
         material, steps = self.surface.material, iter(solving)
         if needs_medium(self.settings):
             with timed(f"albedo of '{self.name}'"):

@@ -59,15 +59,19 @@ class Bake:
         start = time.monotonic()
         try:
             self.job, rest = self.job.colored(progress)
-            self.warnings += [one for one in self.job.warnings() if one not in self.warnings]
-            self.layers = self.job.run(rest)
-            self.is_dark = self.job.is_dark(self.layers)
-            self.warnings += self.job.warnings_after(self.layers)
+            job, rest = self.job.lit(rest)  # not kept: what was found is large
+            self._warn(job.warnings())
+            self.layers = job.run(rest)
+            self.is_dark = job.is_dark(self.layers)
+            self._warn(job.warnings_after(self.layers))
         except (KeyboardInterrupt, native.Cancelled):
             self.cancel()
         except Exception as error:  # noqa: BLE001 - the others are still to be baked
             self.error = sentence(error)
         self.seconds += time.monotonic() - start
+
+    def _warn(self, sentences: list[str]) -> None:
+        self.warnings += [one for one in sentences if one not in self.warnings]
 
     def cancel(self) -> None:
         """Drop what it has made, so that nothing is kept."""
