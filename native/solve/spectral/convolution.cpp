@@ -1,6 +1,7 @@
 #include "solve/spectral/convolution.h"
 
 #include <algorithm>
+#include <array>
 
 #include "base/threads.h"
 #include "fft/complex_loops.h"
@@ -112,13 +113,14 @@ void Convolution::transform_light(const Tile& tile, std::size_t first, std::size
             scratch.rows.push_back(tile.light());
         scratch.lines.resize(rows_per_item * stride);
         scratch.half.resize(rows_per_item * columns);
+        std::array<TermValues, rows_per_item> light_rows{};
         for (std::size_t y = 0; y < rows; ++y)
-            scratch.rows[y]->start({tile.window_y.first + y0 + y, tile.window_x.first, tile.window_x.count}, first,
-                                   count);
+            light_rows[y] = scratch.rows[y](
+                {tile.window_y.first + y0 + y, tile.window_x.first, tile.window_x.count}, first, count);
         for (std::size_t t = 0; t < count; ++t) {
             for (std::size_t y = 0; y < rows; ++y) {
                 float* line = scratch.lines.data() + y * stride;
-                scratch.rows[y]->evaluate(first + t, line);
+                std::copy_n(light_rows[y].values + t * light_rows[y].stride, tile.window_x.count, line);
                 std::fill(line + tile.window_x.count, line + stride, 0.0f);
             }
             real_to_half(scratch.lines.data(), scratch.half.data(), rows, stride);
