@@ -42,12 +42,13 @@ std::vector<float> CoarseGrid::spread(const MakeLightRow& light, std::size_t fir
         progress.advance(work / static_cast<double>(items));
         return rows;
     };
-    const auto add = [&](std::size_t item, const std::vector<float>& rows) {
-        for (std::size_t t = 0; t < count; ++t)
-            add_scaled(result.data() + t * nodes() + item * stride, rows.data() + t * spline_order * stride, 1.0f,
-                       spline_order * stride);
-    };
-    parallel_ordered<std::vector<float>>(items, spread_rows, add);
+    parallel_ordered(items, [&](std::size_t item) {
+        return [&, item, rows = spread_rows(item)] {
+            for (std::size_t t = 0; t < count; ++t)
+                add_scaled(result.data() + t * nodes() + item * stride, rows.data() + t * spline_order * stride, 1.0f,
+                           spline_order * stride);
+        };
+    });
     return result;
 }
 
