@@ -456,50 +456,31 @@ class OccluderMesh:
 
 class Occluders:
     """
-    Triangles that block light, both sides of them.
+    Triangles of meshes that block light, or a part of it, on both sides.
 
     Parameters
     ----------
-    vertices : ndarray, float64, shape (N, 3), C-contiguous
-        World positions in metres. Copied.
-    triangles : ndarray, uint32, shape (M, 3), C-contiguous
-        Vertex indices. Copied. M = 0 is allowed: nothing is blocked.
+    meshes : list of OccluderMesh
+        None at all is allowed: nothing is blocked.
     origin : 3 floats
         World position near the receivers, metres: rays are traced in single precision relative to it.
+    most_crossings : int, optional
+        A ray that has crossed so many see-through triangles ends at the next.
+    most_copied : int
+        Where there are more triangles than this, counting those of each placement, the placements of a mesh share its
+        triangles.
 
     Raises
     ------
     ValueError
-        Wrong dtype or shape, a position that is not finite, an index that is out of range.
+        A number that is not finite, an index that is out of range.
     """
-    @staticmethod
-    def of_meshes(
+    def __init__(
+        self,
         meshes: list[OccluderMesh],
         origin: numpy.ndarray = (0.0, 0.0, 0.0),
         most_crossings: int | None = None,
         most_copied: int = 1048576,
-    ) -> Occluders:
-        """
-        Of meshes that may stand in many places and let light through.
-
-        Parameters
-        ----------
-        meshes : list of OccluderMesh
-        origin : 3 floats
-            As above.
-        most_crossings : int, optional
-            A ray that has crossed so many see-through triangles ends at the next.
-        most_copied : int
-            Where there are more triangles than this, counting those of each placement, the placements of a mesh share its
-            triangles.
-
-        Raises
-        ------
-        ValueError
-            A number that is not finite, an index that is out of range.
-        """
-    def __init__(
-        self, vertices: numpy.ndarray, triangles: numpy.ndarray, origin: numpy.ndarray = (0.0, 0.0, 0.0)
     ) -> None: ...
     @property
     def instance_count(self) -> int:

@@ -211,20 +211,4 @@ std::vector<ExrPart> read_exr_parts(const std::string& path)
     });
 }
 
-ExrPart read_exr_part(const std::string& path, const std::string& name)
-{
-    return reading(path, [&](long long file_bytes) {
-        Imf::MultiPartInputFile file(path.c_str(), Imf::globalThreadCount(), reconstruct);
-        std::string names;
-        for (int i = 0; i < file.parts(); ++i) {
-            if (part_name(file.header(i)) == name) {
-                check_header(file.header(i), file_bytes);
-                return read_part(file, i);
-            }
-            names += (i ? ", '" : "'") + part_name(file.header(i)) + "'";
-        }
-        fail("it has no part '" + name + "', only " + names);
-    });
-}
-
 }  // namespace beamspread

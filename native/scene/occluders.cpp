@@ -122,11 +122,6 @@ struct Occluders::Hierarchy {
     embree::Scene top;
 };
 
-Occluders::Occluders(std::span<const Vec3> vertices, std::span<const Triangle> triangles, const Vec3& origin)
-    : Occluders(std::array{OccluderMesh{.vertices = vertices, .triangles = triangles}}, origin, {})
-{
-}
-
 Occluders::Occluders(std::span<const OccluderMesh> meshes, const Vec3& origin, const OccluderSettings& settings)
     : m_most_crossings(settings.most_crossings), m_origin(origin)
 {

@@ -50,10 +50,7 @@ struct OccluderSettings {
 // relative to its own middle, and rays are turned into its frame.
 class Occluders {
 public:
-    using Triangle = beamspread::Triangle;
-
-    // Opaque. `vertices` are in world metres; both arrays are copied. None at all is allowed. Throws InvalidArgument.
-    Occluders(std::span<const Vec3> vertices, std::span<const Triangle> triangles, const Vec3& origin);
+    // Meshes are copied. None at all is allowed. Throws InvalidArgument.
     Occluders(std::span<const OccluderMesh> meshes, const Vec3& origin, const OccluderSettings& settings);
     ~Occluders();
     Occluders(const Occluders&) = delete;
