@@ -44,8 +44,7 @@ void parallel_ordered(std::size_t count, const std::function<std::function<void(
             return next == count ? next : next++;
         });
     const auto work = tbb::make_filter<std::size_t, Use>(tbb::filter_mode::parallel, make);
-    const auto merge =
-        tbb::make_filter<Use, void>(tbb::filter_mode::serial_in_order, [](const Use& use) { use(); });
+    const auto merge = tbb::make_filter<Use, void>(tbb::filter_mode::serial_in_order, [](const Use& use) { use(); });
     tbb::parallel_pipeline(in_flight, take & work & merge);
 }
 

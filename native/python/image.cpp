@@ -79,9 +79,8 @@ py::tuple read_exr(const std::string& path, const std::optional<std::string>& pa
         const py::gil_scoped_release released;
         parts = read_exr_parts(path);
     }
-    const auto found = std::ranges::find_if(parts, [&](const ExrPart& one) {
-        return part_name ? one.name == *part_name : parts.size() == 1;
-    });
+    const auto found = std::ranges::find_if(
+        parts, [&](const ExrPart& one) { return part_name ? one.name == *part_name : parts.size() == 1; });
     if (found == parts.end()) {
         std::string names;
         for (const ExrPart& one : parts)

@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 #include "python/problem.h"
-#include "solve/adaptive/mask_pyramid.h"
+#include "solve/adaptive/adaptive.h"
 #include "solve/solve.h"
 #include "solve/spectral/spectral.h"
 
@@ -111,8 +111,8 @@ Array<float> convolve(const Lights& lights, const Sources& ldf, const std::vecto
 {
     Problem problem = problem_of(lights, ldf, albedo, mean_free_path, tolerance);
     problem.plane = plane_of(lights, pitch);
-    problem.solver = named<Solver>(
-        "solver", solver, {{"fft", Solver::fft}, {"direct", Solver::direct}, {"adaptive", Solver::adaptive}});
+    problem.solver = named<Solver>("solver", solver,
+                                   {{"fft", Solver::fft}, {"direct", Solver::direct}, {"adaptive", Solver::adaptive}});
     problem.threads = threads;
     problem.memory = memory;
     problem.coarsening = coarsening;
@@ -146,7 +146,7 @@ Squares adaptive_beams(const HeldLight& light, double tolerance)
         const py::gil_scoped_release release;
         validate(Problem{
             plane, std::vector<ChannelMedium>(light.light.color.size()), {light.light}, Solver::adaptive, tolerance});
-        squares = even_squares(plane, light.light, tolerance);
+        squares = beam_squares(plane, light.light, tolerance);
     }
     const auto count = static_cast<py::ssize_t>(squares.size());
     Array<std::int64_t> places({count, py::ssize_t{3}});

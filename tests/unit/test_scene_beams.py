@@ -112,7 +112,9 @@ def test_sun_equals_brute_force(seed, samples, count):
     grid = make_grid(axes=axes, centre=centre)
     vertices, triangles = random_triangles(seed, count, axes, centre)
     travel = np.array([0.5, -0.4, -1.0]) @ axes
-    got, direction = gather(grid, native.SunLight(3 * travel), native.Occluders([native.OccluderMesh(vertices, triangles)]), samples=samples)
+    got, direction = gather(
+        grid, native.SunLight(3 * travel), native.Occluders([native.OccluderMesh(vertices, triangles)]), samples=samples
+    )
     np.testing.assert_allclose(direction, axes @ travel / np.linalg.norm(travel), rtol=1e-12)
     travel = np.broadcast_to(travel / np.linalg.norm(travel), (*got.shape, samples**2, 3))
     wanted, _, doubtful = expected_beams(grid, samples, travel, 1.0, np.inf, vertices, triangles)
@@ -169,7 +171,9 @@ def test_texels_that_need_no_rays_are_as_if_traced(
     # Rounded by more than the grid's own triangles: its shadow's border is known less well.
     beyond = 3000 * (np.array([slant, 0.3, 1.0]) + [(0, 0, 0), (0.0003, 0, 0), (0, 0.0003, 0)])
     vertices = np.concatenate([local, beyond]) @ axes + centre
-    occluders = native.Occluders([native.OccluderMesh(vertices, np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3))], origin)
+    occluders = native.Occluders(
+        [native.OccluderMesh(vertices, np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3))], origin
+    )
     if lamp_height is None:
         light = native.SunLight(np.array([-slant, -0.3, -1.0]) @ axes)
     else:
@@ -192,7 +196,9 @@ def test_rays_keep_clear_of_the_plane_and_of_the_lamp(sun):
     triangles = (np.array([[0, 1, 2], [0, 2, 3]]) + np.arange(0, len(vertices), 4)[:, None, None]).reshape(-1, 3)
     triangles = triangles.astype(np.uint32)
     light = native.SunLight(sun) if sun else native.PointLight(lamp)
-    got, _ = gather(grid, light, native.Occluders([native.OccluderMesh(vertices, triangles)]), samples=1, clearance=clearance)
+    got, _ = gather(
+        grid, light, native.Occluders([native.OccluderMesh(vertices, triangles)]), samples=1, clearance=clearance
+    )
     points = points_of(grid, 1)[:, :, 0] + (0, 0, clearance)
     if sun:
         travel, distance = np.broadcast_to(sun, points.shape) / math.sqrt(2), np.full(points.shape[:2], 1e3)
@@ -315,7 +321,14 @@ def test_clearance_keeps_an_uneven_plane_from_shadowing_itself():
     z = 1e-4 * np.random.default_rng(1).uniform(-1, 1, x.shape)
     corner = (np.arange(8)[:, None] * 9 + np.arange(8)).ravel()
     faces = [(corner, corner + 1, corner + 10), (corner, corner + 10, corner + 9)]
-    occluders = native.Occluders([native.OccluderMesh(np.stack([x, y, z], -1).reshape(-1, 3), np.concatenate([np.stack(face, 1) for face in faces]).astype(np.uint32))])
+    occluders = native.Occluders(
+        [
+            native.OccluderMesh(
+                np.stack([x, y, z], -1).reshape(-1, 3),
+                np.concatenate([np.stack(face, 1) for face in faces]).astype(np.uint32),
+            )
+        ]
+    )
     arguments = make_grid(30, 30, (1.9, 1.9)), native.SunLight((1, 0, -1)), occluders
     assert (gather(*arguments)[0] == 0).any()
     np.testing.assert_allclose(gather(*arguments, clearance=1.1e-4)[0], math.sqrt(0.5), rtol=1e-6)

@@ -54,7 +54,9 @@ def test_no_light_leaks_through_shared_edges():
 
 def test_degenerate_triangles_are_harmless():
     faces = np.array([[0, 0, 0], [0, 1, 1]], np.uint32)
-    assert (light_past(native.Occluders([native.OccluderMesh(SQUARE, faces)]), native.SunLight((0.1, 0.2, -1))) > 0).all()
+    assert (
+        light_past(native.Occluders([native.OccluderMesh(SQUARE, faces)]), native.SunLight((0.1, 0.2, -1))) > 0
+    ).all()
 
 
 @pytest.mark.parametrize(

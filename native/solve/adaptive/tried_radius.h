@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "base/progress.h"
-#include "solve/adaptive/mask_pyramid.h"
+#include "solve/adaptive/even_squares.h"
 #include "solve/separable/light_terms.h"
 
 namespace beamspread {

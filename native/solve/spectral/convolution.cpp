@@ -114,8 +114,8 @@ void Convolution::transform_light(const Tile& tile, std::size_t first, std::size
         scratch.half.resize(rows_per_item * columns);
         std::array<TermValues, rows_per_item> light_rows{};
         for (std::size_t y = 0; y < rows; ++y)
-            light_rows[y] = scratch.rows[y](
-                {tile.window_y.first + y0 + y, tile.window_x.first, tile.window_x.count}, first, count);
+            light_rows[y] =
+                scratch.rows[y]({tile.window_y.first + y0 + y, tile.window_x.first, tile.window_x.count}, first, count);
         for (std::size_t t = 0; t < count; ++t) {
             for (std::size_t y = 0; y < rows; ++y) {
                 float* line = scratch.lines.data() + y * stride;

@@ -51,9 +51,9 @@ LightTerms chosen_terms(const Problem& problem, Progress& progress)
 SpectralField::SpectralField(const Problem& problem, Progress& progress)
     : m_problem(problem),
       m_terms(chosen_terms(problem, progress)),
-      m_levels(choose_levels(
-          problem.plane, m_terms.profiles,
-          {centre_deviation, problem.memory, terms(), m_terms.sets.results.size(), problem.coarsening}))
+      m_levels(
+          choose_levels(problem.plane, m_terms.profiles,
+                        {centre_deviation, problem.memory, terms(), m_terms.sets.results.size(), problem.coarsening}))
 {
 }
 
