@@ -539,6 +539,8 @@ class ReceiverGrid:
 class Light:
     """
     A light of strength 1 without colour; its kinds are SunLight, PointLight, SpotLight.
+
+    Each raises ValueError for an argument that is out of range, with a message that names it.
     """
     def position_in(self, grid: ReceiverGrid) -> tuple | None:
         """
@@ -563,11 +565,6 @@ class SunLight(Light):
     ----------
     direction : 3 floats
         Of travel in the world, any length but 0.
-
-    Raises
-    ------
-    ValueError
-        An argument is out of range; the message names it.
     """
     def __init__(self, direction: numpy.ndarray) -> None: ...
 
@@ -579,11 +576,6 @@ class PointLight(Light):
     ----------
     position : 3 floats
         In the world, metres.
-
-    Raises
-    ------
-    ValueError
-        An argument is out of range; the message names it.
     """
     def __init__(self, position: numpy.ndarray) -> None: ...
 
@@ -605,11 +597,6 @@ class SpotLight(Light):
     falloff : str
         "scaled": as Cycles in Blender 4.2, 4.5 and 5.0, where the lamp's scale shapes the cone. "legacy": as in 3.4, where
         it does not, and light falls off with the cosine to the axis besides.
-
-    Raises
-    ------
-    ValueError
-        An argument is out of range; the message names it.
     """
     def __init__(
         self, position: numpy.ndarray, frame: numpy.ndarray, spot_size: float, blend: float, falloff: str = "scaled"

@@ -214,14 +214,6 @@ std::array<Vec3, 3> Occluders::triangle(std::size_t index) const
     return {m_origin + Vec3(a), m_origin + Vec3(b), m_origin + Vec3(c)};
 }
 
-std::uint32_t Occluders::blocked(std::span<const ShadowRay> rays) const
-{
-    if (m_is_opaque)
-        return trace(rays, nullptr);
-    std::array<Passage, packet_size> passages;
-    return trace(rays, passages.data());
-}
-
 void Occluders::transmit(std::span<const ShadowRay> rays, Vec3f* transmittance, bool is_coherent) const
 {
     if (m_is_opaque) {

@@ -59,9 +59,6 @@ public:
     // Rays that are traced together: neighbours take the same way through the hierarchy, and share it.
     static constexpr std::size_t packet_size = 16;
 
-    // Bit i: whether nothing of the i-th of at most `packet_size` rays gets through.
-    std::uint32_t blocked(std::span<const ShadowRay> rays) const;
-
     // What at most `packet_size` rays let through in each channel, 0 to 1. Whether they go much the same way only decides
     // how they are traced.
     void transmit(std::span<const ShadowRay> rays, Vec3f* transmittance, bool is_coherent = true) const;
@@ -85,6 +82,7 @@ public:
 
 private:
     struct Hierarchy;
+    // Bit i: whether nothing of the i-th ray gets through.
     std::uint32_t trace(std::span<const ShadowRay> rays, Passage* passages, bool is_coherent = true) const;
     void build(std::span<const OccluderMesh> meshes, std::size_t most_copied);
     void add_instances(const OccluderMesh& mesh);

@@ -190,19 +190,21 @@ def library(medium, quality="final", progress=None, threads=0):
         raise ValueError(f"argument 'medium' is {medium!r}; allowed: a Medium")
     if quality not in PHOTONS:
         raise ValueError(f"argument 'quality' is {quality!r}; allowed: 'final', 'preview'")
+    if known := _at_hand(medium, quality):
+        return known
+    say(progress, SIMULATING + (" (preview)" if quality == "preview" else ""))
+    made = make(medium, quality, progress, threads=threads)
     path = _cache_path(medium, quality)
-    known = _loaded.get(path) or _load_shipped(medium, quality) or _load(path, medium)
-    if known is None:
-        say(progress, SIMULATING + (" (preview)" if quality == "preview" else ""))
-        known = make(medium, quality, progress, threads=threads)
-        _store(known, path)
-    return keep_recent(_loaded, path, known, _LOADED_LIMIT)
+    _store(made, path)
+    return keep_recent(_loaded, path, made, _LOADED_LIMIT)
 
 
 def known_library(medium):
     """The best library of a medium that came with the package or is cached; None where one would be simulated."""
-    for quality in ("final", "preview"):
-        path = _cache_path(medium, quality)
-        if found := _loaded.get(path) or _load_shipped(medium, quality) or _load(path, medium):
-            return keep_recent(_loaded, path, found, _LOADED_LIMIT)
-    return None
+    return _at_hand(medium, "final") or _at_hand(medium, "preview")
+
+
+def _at_hand(medium, quality):
+    path = _cache_path(medium, quality)
+    found = _loaded.get(path) or _load_shipped(medium, quality) or _load(path, medium)
+    return found and keep_recent(_loaded, path, found, _LOADED_LIMIT)

@@ -9,7 +9,6 @@
 #include "solve/adaptive/multilevel_sum.h"
 #include "solve/adaptive/near_radius.h"
 #include "solve/adaptive/term_sums.h"
-#include "solve/adaptive/tried_radius.h"
 #include "solve/adaptive/wide_beams.h"
 #include "solve/separable/term_row.h"
 
