@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "base/constants.h"
+#include "simd/loops.h"
 #include "solve/adaptive/multilevel_sum.h"
 #include "solve/adaptive/near_radius.h"
 #include "solve/adaptive/term_sums.h"
@@ -119,8 +120,7 @@ std::vector<float> solve_adaptive(const Plane& plane, const PlaneLight& light, c
                       0.5 * work);
         }
         const Grid part = texel_sums.sum(t, std::move(beams), progress, wide.empty() ? work : 0.5 * work);
-        for (std::size_t i = 0; i < part.values.size(); ++i)
-            sum.values[i] += part.values[i];
+        add_scaled(sum.values.data(), part.values.data(), 1.0, sum.values.size());
     }
     for (std::size_t y = 0; y < height; ++y)
         std::transform(sum.row(y), sum.row(y) + width, radiance.data() + y * width,

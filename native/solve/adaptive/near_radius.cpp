@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <compare>
 #include <numeric>
 
 #include "base/constants.h"
 #include "base/random.h"
 #include "base/vec.h"
+#include "simd/loops.h"
 #include "solve/adaptive/term_sums.h"
 #include "solve/adaptive/wide_beams.h"
 
@@ -90,7 +90,6 @@ double interpolation_error(const RadialProfile& profile, const Vec2& axis, doubl
 struct Block {
     std::size_t y;  // of its first texel
     std::size_t x;
-    auto operator<=>(const Block&) const = default;
 };
 
 std::vector<Block> blocks(const PlaneLight& light, const Plane& plane)
@@ -176,9 +175,6 @@ double tried_radius(const LightTerms& terms, const PlaneLight& light, const std:
     Targets targets(height, width);
     for (const Block& block : looked_at)
         targets.add(block.y, block.x);
-    std::vector<Block> summed = looked_at;  // each once
-    std::ranges::sort(summed);
-    summed.erase(std::ranges::unique(summed).begin(), summed.end());
 
     std::vector<TermSums> sums;
     for (const double radius : radii)
@@ -189,10 +185,7 @@ double tried_radius(const LightTerms& terms, const PlaneLight& light, const std:
         take_steps(beams, wide);
         for (std::size_t i = 0; i < radii.size(); ++i) {
             const Grid part = sums[i].sum(t, beams, progress, 0.0, &targets);
-            for (const Block& block : summed)
-                for (std::size_t y = block.y; y < std::min(height, block.y + rows_at_once); ++y)
-                    for (std::size_t x = block.x; x < std::min(width, block.x + targets_at_once); ++x)
-                        radiance[i].row(y)[x] += part.row(y)[x];
+            add_scaled(radiance[i].values.data(), part.values.data(), 1.0, part.values.size());
         }
         progress.advance(0.0);
     }
