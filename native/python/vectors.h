@@ -18,8 +18,9 @@ using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
 template <class Row, class Number>
 std::span<const Row> to_rows(const std::string& name, const py::array& array, const std::string& allowed)
 {
-    constexpr std::size_t columns = sizeof(Row) / sizeof(Number);
-    static_assert(columns * sizeof(Number) == sizeof(Row));
+    constexpr std::size_t bytes = sizeof(Number);
+    constexpr std::size_t columns = sizeof(Row) / bytes;
+    static_assert(columns * bytes == sizeof(Row));
     if (!py::isinstance<Array<Number>>(array) || array.ndim() != 2 || side(array, 1) != columns)
         reject(name, shape_text(array), allowed);
     return {static_cast<const Row*>(array.data()), side(array, 0)};
