@@ -456,50 +456,31 @@ class OccluderMesh:
 
 class Occluders:
     """
-    Triangles that block light, both sides of them.
+    Triangles of meshes that block light, or a part of it, on both sides.
 
     Parameters
     ----------
-    vertices : ndarray, float64, shape (N, 3), C-contiguous
-        World positions in metres. Copied.
-    triangles : ndarray, uint32, shape (M, 3), C-contiguous
-        Vertex indices. Copied. M = 0 is allowed: nothing is blocked.
+    meshes : list of OccluderMesh
+        None at all is allowed: nothing is blocked.
     origin : 3 floats
         World position near the receivers, metres: rays are traced in single precision relative to it.
+    most_crossings : int, optional
+        A ray that has crossed so many see-through triangles ends at the next.
+    most_copied : int
+        Where there are more triangles than this, counting those of each placement, the placements of a mesh share its
+        triangles.
 
     Raises
     ------
     ValueError
-        Wrong dtype or shape, a position that is not finite, an index that is out of range.
+        A number that is not finite, an index that is out of range.
     """
-    @staticmethod
-    def of_meshes(
+    def __init__(
+        self,
         meshes: list[OccluderMesh],
         origin: numpy.ndarray = (0.0, 0.0, 0.0),
         most_crossings: int | None = None,
         most_copied: int = 1048576,
-    ) -> Occluders:
-        """
-        Of meshes that may stand in many places and let light through.
-
-        Parameters
-        ----------
-        meshes : list of OccluderMesh
-        origin : 3 floats
-            As above.
-        most_crossings : int, optional
-            A ray that has crossed so many see-through triangles ends at the next.
-        most_copied : int
-            Where there are more triangles than this, counting those of each placement, the placements of a mesh share its
-            triangles.
-
-        Raises
-        ------
-        ValueError
-            A number that is not finite, an index that is out of range.
-        """
-    def __init__(
-        self, vertices: numpy.ndarray, triangles: numpy.ndarray, origin: numpy.ndarray = (0.0, 0.0, 0.0)
     ) -> None: ...
     @property
     def instance_count(self) -> int:
@@ -558,6 +539,8 @@ class ReceiverGrid:
 class Light:
     """
     A light of strength 1 without colour; its kinds are SunLight, PointLight, SpotLight.
+
+    Each raises ValueError for an argument that is out of range, with a message that names it.
     """
     def position_in(self, grid: ReceiverGrid) -> tuple | None:
         """
@@ -582,11 +565,6 @@ class SunLight(Light):
     ----------
     direction : 3 floats
         Of travel in the world, any length but 0.
-
-    Raises
-    ------
-    ValueError
-        An argument is out of range; the message names it.
     """
     def __init__(self, direction: numpy.ndarray) -> None: ...
 
@@ -598,11 +576,6 @@ class PointLight(Light):
     ----------
     position : 3 floats
         In the world, metres.
-
-    Raises
-    ------
-    ValueError
-        An argument is out of range; the message names it.
     """
     def __init__(self, position: numpy.ndarray) -> None: ...
 
@@ -624,11 +597,6 @@ class SpotLight(Light):
     falloff : str
         "scaled": as Cycles in Blender 4.2, 4.5 and 5.0, where the lamp's scale shapes the cone. "legacy": as in 3.4, where
         it does not, and light falls off with the cosine to the axis besides.
-
-    Raises
-    ------
-    ValueError
-        An argument is out of range; the message names it.
     """
     def __init__(
         self, position: numpy.ndarray, frame: numpy.ndarray, spot_size: float, blend: float, falloff: str = "scaled"

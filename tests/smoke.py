@@ -81,7 +81,7 @@ def fuzz(whole, path, library, cases=150):
 def beams():
     grid = native.ReceiverGrid((-1, -1, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 2 / SIZE, 2 / SIZE, SIZE, SIZE)
     corners = np.array([[0, -1, 0.5], [0.5, -1, 0.5], [0.5, 1, 0.5], [0, 1, 0.5]])
-    occluders = native.Occluders(corners, np.array([[0, 1, 2], [0, 2, 3]], np.uint32), (0, 0, 0))
+    occluders = native.Occluders([native.OccluderMesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.uint32))], (0, 0, 0))
 
     def gather(light, progress=None):
         return native.gather_beams(grid, light, occluders, samples=3, threads=THREADS, progress=progress)
@@ -108,7 +108,7 @@ def rays(library):
     tinted = native.OccluderMesh(
         corners, faces, None, [native.Transmittance((0.5, 0.2, 0.1))], np.zeros((2, 1), np.uint32), None
     )
-    occluders = native.Occluders.of_meshes([tinted], (0, 0, 0))
+    occluders = native.Occluders([tinted], (0, 0, 0))
     image = np.random.default_rng(0).random((8, 16, 3)).astype(np.float32)
     lights = [
         native.SunDiskLight((0.3, 0, -1), 0.2),

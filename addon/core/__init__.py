@@ -8,6 +8,7 @@ Each package imports only those above it (tests/unit/test_layers.py reads this l
     progress    progress of a job made of stages
     whole_file  files that are whole or as they were
     exr_header  what OpenEXR files say of their channels
+    recent      what was used last, kept
     arrays      array arguments, converted only where nothing is lost
     scene       receivers (charts on planes), lights, triangles that throw shadows
     material    optical properties, measured presets

@@ -31,10 +31,9 @@ void parallel_for(std::size_t count, const std::function<void(std::size_t)>& bod
     tbb::parallel_for(std::size_t{0}, count, body, tbb::simple_partitioner{});
 }
 
-void detail::parallel_ordered(std::size_t count, const std::function<std::shared_ptr<void>(std::size_t)>& make,
-                              const std::function<void(std::size_t, std::shared_ptr<void>)>& use)
+void parallel_ordered(std::size_t count, const std::function<std::function<void()>(std::size_t)>& make)
 {
-    using Item = std::pair<std::size_t, std::shared_ptr<void>>;
+    using Use = std::function<void()>;
     // Twice as many results in flight as threads: enough to hide uneven work items.
     const auto in_flight = 2 * thread_count();
     std::size_t next = 0;
@@ -44,10 +43,8 @@ void detail::parallel_ordered(std::size_t count, const std::function<std::shared
                 flow.stop();
             return next == count ? next : next++;
         });
-    const auto work = tbb::make_filter<std::size_t, Item>(tbb::filter_mode::parallel,
-                                                          [&](std::size_t i) { return Item(i, make(i)); });
-    const auto merge = tbb::make_filter<Item, void>(tbb::filter_mode::serial_in_order,
-                                                    [&](Item item) { use(item.first, std::move(item.second)); });
+    const auto work = tbb::make_filter<std::size_t, Use>(tbb::filter_mode::parallel, make);
+    const auto merge = tbb::make_filter<Use, void>(tbb::filter_mode::serial_in_order, [](const Use& use) { use(); });
     tbb::parallel_pipeline(in_flight, take & work & merge);
 }
 

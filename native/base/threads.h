@@ -16,12 +16,8 @@ std::size_t thread_count();
 // Calls body(0) .. body(count - 1). An exception in a body stops the loop and is rethrown here.
 void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body);
 
-// Calls make(i) in parallel and use(i, result) one at a time in the order of i, so that sums come out
-// the same, bit for bit, for any number of threads. At most a few results exist at once.
-template <class Result>
-void parallel_ordered(std::size_t count, const std::function<Result(std::size_t)>& make,
-                      const std::function<void(std::size_t, Result)>& use);
+// Calls make(i) in parallel, and what it returns one at a time in the order of i, so that sums come out the same, bit
+// for bit, for any number of threads. At most a few results exist at once.
+void parallel_ordered(std::size_t count, const std::function<std::function<void()>(std::size_t)>& make);
 
 }  // namespace beamspread
-
-#include "base/threads_impl.h"

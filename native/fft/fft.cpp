@@ -36,37 +36,22 @@ const std::vector<Named>& runnable_sets()
     return runnable;
 }
 
-const FftInstructionSet& fastest()
-{
-    static const FftInstructionSet& instructions = *runnable_sets().front().instructions;
-    return instructions;
-}
-
 }  // namespace
+
+const FftInstructionSet& fft()
+{
+    static const FftInstructionSet& fastest = *runnable_sets().front().instructions;
+    return fastest;
+}
 
 std::size_t fast_even_size(std::size_t min_size)
 {
     // Lines whole pages apart share few lines of the cache, which takes a fifth to a third longer.
     constexpr std::size_t page = 4096 / sizeof(Complex);
-    std::size_t half = fastest().good_size((min_size + 1) / 2);
+    std::size_t half = fft().good_size((min_size + 1) / 2);
     while (2 * half % page == 0)
-        half = fastest().good_size(half + 1);
+        half = fft().good_size(half + 1);
     return 2 * half;
-}
-
-void real_to_half(const float* real, Complex* half, std::size_t count, std::size_t size)
-{
-    fastest().real_to_half(real, half, count, size);
-}
-
-void half_to_real(const Complex* half, float* real, std::size_t count, std::size_t size)
-{
-    fastest().half_to_real(half, real, count, size);
-}
-
-void complex_in_place(Complex* lines, std::size_t count, std::size_t size, bool forward)
-{
-    fastest().complex_in_place(lines, count, size, forward);
 }
 
 void real_to_half_2d(const FftInstructionSet& instructions, const float* real, Complex* half, std::size_t height,

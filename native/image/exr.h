@@ -44,7 +44,4 @@ void write_exr_bottom_up(const std::string& path, const ExrPart& part, std::span
 // path, where the file is missing, damaged, too large, deep, or has subsampled channels.
 std::vector<ExrPart> read_exr_parts(const std::string& path);
 
-// Reads the part of this name only; throws IoError if there is none.
-ExrPart read_exr_part(const std::string& path, const std::string& name);
-
 }  // namespace beamspread

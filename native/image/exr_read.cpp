@@ -150,21 +150,6 @@ bool is_multi_part(const std::string& path)
     return (static_cast<unsigned char>(start[5]) & (Imf::MULTI_PART_FILE_FLAG >> 8)) != 0;
 }
 
-// Calls read(file_bytes); whatever goes wrong becomes an IoError that names the path.
-template <class Read>
-auto reading(const std::string& path, const Read& read)
-{
-    try {
-        std::error_code error;
-        const auto file_bytes = std::filesystem::file_size(path, error);
-        if (error)
-            fail(error.message());
-        return read(static_cast<long long>(file_bytes));
-    } catch (const std::exception& error) {
-        throw IoError("cannot read '" + path + "': " + detail::reason_of(error, path));
-    }
-}
-
 // Checks all headers before anything of the size that they claim is allocated.
 void check_headers(const Imf::MultiPartInputFile& file, long long file_bytes)
 {
@@ -199,32 +184,22 @@ std::vector<ExrPart> read_multi_part(const std::string& path)
 
 std::vector<ExrPart> read_exr_parts(const std::string& path)
 {
-    return reading(path, [&path](long long file_bytes) {
+    try {
+        std::error_code error;
+        const auto file_bytes = std::filesystem::file_size(path, error);
+        if (error)
+            fail(error.message());
         if (is_multi_part(path))
             return read_multi_part(path);
         // OpenEXR's thread pool is global state of the host's process: used as the host has set it up, and left so.
         Imf::MultiPartInputFile file(path.c_str(), Imf::globalThreadCount(), reconstruct);
-        check_headers(file, file_bytes);
+        check_headers(file, static_cast<long long>(file_bytes));
         std::vector<ExrPart> parts;
         parts.push_back(read_part(file, 0));
         return parts;
-    });
-}
-
-ExrPart read_exr_part(const std::string& path, const std::string& name)
-{
-    return reading(path, [&](long long file_bytes) {
-        Imf::MultiPartInputFile file(path.c_str(), Imf::globalThreadCount(), reconstruct);
-        std::string names;
-        for (int i = 0; i < file.parts(); ++i) {
-            if (part_name(file.header(i)) == name) {
-                check_header(file.header(i), file_bytes);
-                return read_part(file, i);
-            }
-            names += (i ? ", '" : "'") + part_name(file.header(i)) + "'";
-        }
-        fail("it has no part '" + name + "', only " + names);
-    });
+    } catch (const std::exception& error) {
+        throw IoError("cannot read '" + path + "': " + detail::reason_of(error, path));
+    }
 }
 
 }  // namespace beamspread

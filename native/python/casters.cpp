@@ -1,7 +1,5 @@
 #include "python/casters.h"
 
-#include "base/error.h"
-
 namespace beamspread {
 
 Progress::Callback progress_callback(const py::object& progress)
@@ -21,6 +19,11 @@ Progress::Callback progress_callback(const py::object& progress)
     };
 }
 
+std::string shape_text(const py::array& array)
+{
+    return std::string(py::str(array.dtype())) + " of shape " + std::string(py::str(array.attr("shape")));
+}
+
 template <class T>
 Array<T> real_array(const std::string& name, const py::object& values)
 {
@@ -29,8 +32,7 @@ Array<T> real_array(const std::string& name, const py::object& values)
         reject(name, "no array", "real numbers");
     const std::string kind(1, array.dtype().kind());
     if (std::string("fiub").find(kind) == std::string::npos)
-        reject(name, std::string(py::str(array.dtype())) + " of " + std::to_string(array.ndim()) + " dimensions",
-               "real numbers");
+        reject(name, shape_text(array), "real numbers");
     if (py::module_::import("numpy.ma").attr("is_masked")(values).cast<bool>())
         reject(name, "an array with masked values", "real numbers, none of them masked");
     return py::array_t<T, py::array::c_style | py::array::forcecast>::ensure(array);
@@ -41,11 +43,7 @@ template Array<double> real_array(const std::string&, const py::object&);
 
 Side side_from_name(const std::string& name)
 {
-    if (name == "reflected")
-        return Side::reflected;
-    if (name == "transmitted")
-        return Side::transmitted;
-    reject("side", "'" + name + "'", "'reflected', 'transmitted'");
+    return named<Side>("side", name, {{"reflected", Side::reflected}, {"transmitted", Side::transmitted}});
 }
 
 std::size_t image_side(std::ptrdiff_t size)

@@ -7,6 +7,11 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <initializer_list>
+#include <string>
+#include <utility>
+
+#include "base/error.h"
 #include "base/progress.h"
 #include "transport/tally/tally.h"
 
@@ -28,6 +33,27 @@ Progress::Callback progress_callback(const py::object& progress);
 // on the way: masks, imaginary parts, and what is no number.
 template <class T>
 Array<T> real_array(const std::string& name, const py::object& values);
+
+// "float32 of shape (4, 3)"
+std::string shape_text(const py::array& array);
+
+inline std::size_t side(const py::array& array, py::ssize_t axis)
+{
+    return static_cast<std::size_t>(array.shape(axis));
+}
+
+// What a name stands for; throws InvalidArgument for one that is not known.
+template <class T>
+T named(const std::string& argument, const std::string& name, std::initializer_list<std::pair<const char*, T>> known)
+{
+    std::string allowed;
+    for (const auto& [known_name, value] : known) {
+        if (name == known_name)
+            return value;
+        allowed += (allowed.empty() ? "'" : ", '") + std::string(known_name) + "'";
+    }
+    reject(argument, "'" + name + "'", allowed);
+}
 
 // "reflected" or "transmitted"; throws InvalidArgument.
 Side side_from_name(const std::string& name);

@@ -16,21 +16,15 @@ namespace beamspread {
 
 namespace {
 
-static_assert(sizeof(Vec3) == 3 * sizeof(double) && sizeof(Vec3f) == 3 * sizeof(float));
-
 std::unique_ptr<SunDiskLight> make_sun(const Numbers& direction, double angle, const std::string& disk)
 {
-    if (disk != "even" && disk != "flat")
-        reject("disk", "'" + disk + "'", "'even' or 'flat'");
-    return std::make_unique<SunDiskLight>(to_vec3("direction", direction), angle,
-                                          disk == "even" ? SunDisk::even : SunDisk::flat);
+    const auto kind = named<SunDisk>("disk", disk, {{"even", SunDisk::even}, {"flat", SunDisk::flat}});
+    return std::make_unique<SunDiskLight>(to_vec3("direction", direction), angle, kind);
 }
 
 SphereModel to_model(const std::string& name)
 {
-    if (name != "sphere" && name != "disk")
-        reject("model", "'" + name + "'", "'sphere' or 'disk'");
-    return name == "sphere" ? SphereModel::sphere : SphereModel::disk;
+    return named<SphereModel>("model", name, {{"sphere", SphereModel::sphere}, {"disk", SphereModel::disk}});
 }
 
 std::unique_ptr<SphereLight> make_sphere(const Numbers& position, double radius, const std::string& model)
@@ -67,13 +61,8 @@ std::unique_ptr<EnvironmentLight> make_environment(const py::array& radiance, co
 
 std::unique_ptr<MeshLight> make_mesh(const py::array& vertices, const py::array& triangles, const py::array& radiance)
 {
-    const auto coordinates = to_rows<double>("vertices", vertices, 3, "contiguous float64 (N, 3)");
-    const auto indices = to_rows<std::uint32_t>("triangles", triangles, 3, "contiguous uint32 (M, 3)");
-    const auto glow = to_rows<float>("radiance", radiance, 3, "contiguous float32 (M, 3)");
-    return std::make_unique<MeshLight>(
-        std::span(reinterpret_cast<const Vec3*>(coordinates.data()), coordinates.size() / 3),
-        std::span(reinterpret_cast<const MeshLight::Triangle*>(indices.data()), indices.size() / 3),
-        std::span(reinterpret_cast<const Vec3f*>(glow.data()), glow.size() / 3));
+    return std::make_unique<MeshLight>(to_vertices(vertices), to_triangles(triangles),
+                                       to_rows<Vec3f, float>("radiance", radiance, "contiguous float32 (M, 3)"));
 }
 
 py::tuple irradiance(const ExtendedLight& light, const Numbers& point, const Numbers& normal)
@@ -84,11 +73,9 @@ py::tuple irradiance(const ExtendedLight& light, const Numbers& point, const Num
 
 py::tuple sample(const ExtendedLight& light, const Numbers& point, const Numbers& normal, const py::array& square)
 {
-    const auto places = to_rows<double>("square", square, 2, "contiguous float64 (N, 2)");
-    static_assert(sizeof(Vec2) == 2 * sizeof(double));
-    std::vector<LightRay> rays(places.size() / 2);
-    light.sample(to_vec3("point", point), to_vec3("normal", normal),
-                 {reinterpret_cast<const Vec2*>(places.data()), rays.size()}, rays.data());
+    const auto places = to_rows<Vec2, double>("square", square, "contiguous float64 (N, 2)");
+    std::vector<LightRay> rays(places.size());
+    light.sample(to_vec3("point", point), to_vec3("normal", normal), places, rays.data());
     const auto count = static_cast<py::ssize_t>(rays.size());
     Array<double> travel({count, py::ssize_t{3}});
     Array<double> distance(count);

@@ -12,15 +12,10 @@ const FftInstructionSet& instructions_named(const std::string& instruction_set)
     return fft_instruction_set(instruction_set.empty() ? fft_instruction_sets().front() : instruction_set);
 }
 
-std::size_t side(const py::array& array, py::ssize_t axis)
-{
-    return static_cast<std::size_t>(array.shape(axis));
-}
-
 void check_lines(const std::string& name, const py::array& array)
 {
     if (array.ndim() != 2 || array.shape(0) == 0 || array.shape(1) == 0)
-        reject(name, "of shape " + py::str(array.attr("shape")).cast<std::string>(), "(lines, values), not empty");
+        reject(name, shape_text(array), "(lines, values), not empty");
 }
 
 Array<Complex> real_transform(const Array<float>& values, int threads, const std::string& instruction_set)

@@ -39,15 +39,6 @@ std::map<std::string, ExrAttribute> to_attributes(const py::dict& attributes)
     return result;
 }
 
-ExrCompression to_compression(const std::string& name)
-{
-    if (name == "zip")
-        return ExrCompression::zip;
-    if (name == "none")
-        return ExrCompression::none;
-    reject("compression", "'" + name + "'", "'zip' or 'none'");
-}
-
 // The arrays' rows go up, the file's lines down.
 void flip_rows(const float* from, float* to, std::size_t height, std::size_t row_values)
 {
@@ -58,10 +49,10 @@ void flip_rows(const float* from, float* to, std::size_t height, std::size_t row
 void write_exr(const std::string& path, const py::array& array, const std::vector<std::string>& channels,
                const py::dict& attributes, const std::string& compression, bool half)
 {
-    const ExrCompression packing = to_compression(compression);
+    const auto packing = named<ExrCompression>("compression", compression,
+                                               {{"zip", ExrCompression::zip}, {"none", ExrCompression::none}});
     if (!py::isinstance<Array<float>>(array) || array.ndim() != 3)
-        reject("array", std::string(py::str(array.dtype())) + " of " + std::to_string(array.ndim()) + " dimensions",
-               "contiguous float32 (H, W, C)");
+        reject("array", shape_text(array), "contiguous float32 (H, W, C)");
     if (array.shape(2) != static_cast<py::ssize_t>(channels.size()))
         reject("array", std::to_string(array.shape(2)) + " channels",
                "as many as names in channels, " + std::to_string(channels.size()));
@@ -83,19 +74,22 @@ void write_exr(const std::string& path, const py::array& array, const std::vecto
 
 py::tuple read_exr(const std::string& path, const std::optional<std::string>& part_name)
 {
-    ExrPart part;
+    std::vector<ExrPart> parts;
     {
         const py::gil_scoped_release released;
-        if (part_name) {
-            part = read_exr_part(path, *part_name);
-        } else {
-            std::vector<ExrPart> parts = read_exr_parts(path);
-            if (parts.size() != 1)
-                throw IoError("cannot read '" + path + "': it has " + std::to_string(parts.size()) +
-                              " parts; name one of them");
-            part = std::move(parts[0]);
-        }
+        parts = read_exr_parts(path);
     }
+    const auto found = std::ranges::find_if(
+        parts, [&](const ExrPart& one) { return part_name ? one.name == *part_name : parts.size() == 1; });
+    if (found == parts.end()) {
+        std::string names;
+        for (const ExrPart& one : parts)
+            names += (names.empty() ? "'" : ", '") + one.name + "'";
+        throw IoError("cannot read '" + path + "': it has " +
+                      (part_name ? "no part '" + *part_name + "', only " + names
+                                 : std::to_string(parts.size()) + " parts; name one of them, " + names));
+    }
+    const ExrPart& part = *found;
     Array<float> array({static_cast<py::ssize_t>(part.height), static_cast<py::ssize_t>(part.width),
                         static_cast<py::ssize_t>(part.channels.size())});
     flip_rows(part.pixels.data(), array.mutable_data(), static_cast<std::size_t>(part.height),

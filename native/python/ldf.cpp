@@ -11,10 +11,10 @@ namespace beamspread {
 
 namespace {
 
-using ImageFunction = std::vector<float> (*)(const LdfLibrary&, double, double, std::size_t, double, Side, double);
-
-Array<float> image(ImageFunction make, const LdfLibrary& library, double angle, double albedo, std::ptrdiff_t size,
-                   double pitch, const std::string& side, double beam_diameter)
+// `make`: ldf_image, or its standard error.
+template <auto make>
+Array<float> image(const LdfLibrary& library, double angle, double albedo, std::ptrdiff_t size, double pitch,
+                   const std::string& side, double beam_diameter)
 {
     const Side which = side_from_name(side);
     std::vector<float> texels;
@@ -119,14 +119,8 @@ ValueError
         .def("diffuse_reflectance", &LdfLibrary::diffuse_reflectance, py::arg("albedo"),
              "Reflectance under uniform diffuse light; needs a library from 0 to at least 88 degrees.");
     library
-        .def(
-            "image",
-            [](const LdfLibrary& self, double angle, double albedo, std::ptrdiff_t size, double pitch,
-               const std::string& side, double beam_diameter) {
-                return image(ldf_image, self, angle, albedo, size, pitch, side, beam_diameter);
-            },
-            py::arg("angle"), py::arg("albedo"), py::arg("size"), py::arg("pitch"), py::arg("side") = "reflected",
-            py::arg("beam_diameter") = 0.0, R"(The LDF as texel means.
+        .def("image", &image<ldf_image>, py::arg("angle"), py::arg("albedo"), py::arg("size"), py::arg("pitch"),
+             py::arg("side") = "reflected", py::arg("beam_diameter") = 0.0, R"(The LDF as texel means.
 
 Parameters
 ----------
@@ -151,14 +145,9 @@ Raises
 ValueError
     Names the argument, its value and what is allowed.
 )")
-        .def(
-            "image_standard_error",
-            [](const LdfLibrary& self, double angle, double albedo, std::ptrdiff_t size, double pitch,
-               const std::string& side, double beam_diameter) {
-                return image(ldf_image_standard_error, self, angle, albedo, size, pitch, side, beam_diameter);
-            },
-            py::arg("angle"), py::arg("albedo"), py::arg("size"), py::arg("pitch"), py::arg("side") = "reflected",
-            py::arg("beam_diameter") = 0.0, R"(Statistical standard error of every texel of `image`.
+        .def("image_standard_error", &image<ldf_image_standard_error>, py::arg("angle"), py::arg("albedo"),
+             py::arg("size"), py::arg("pitch"), py::arg("side") = "reflected", py::arg("beam_diameter") = 0.0,
+             R"(Statistical standard error of every texel of `image`.
 
 From the scatter between eight groups of the simulation's photons, hence with a relative error of about a quarter of its
 own (less between simulated angles, where several simulations add up). Parameters, units and errors as for `image`.

@@ -56,13 +56,10 @@ py::tuple to_planar(const AngularSpace& space, const py::object& phi, const py::
 
 Interpolation method_from_name(const std::string& name)
 {
-    if (name == "angular")
-        return Interpolation::angular;
-    if (name == "adaptive")
-        return Interpolation::adaptive;
-    if (name == "planar")
-        return Interpolation::planar;
-    reject("method", "'" + name + "'", "'angular', 'adaptive', 'planar'");
+    return named<Interpolation>("method", name,
+                                {{"angular", Interpolation::angular},
+                                 {"adaptive", Interpolation::adaptive},
+                                 {"planar", Interpolation::planar}});
 }
 
 LdfSample interpolate_samples(const std::vector<std::shared_ptr<LdfSample>>& samples, double angle, double albedo,

@@ -20,10 +20,7 @@ LdfSample sample_of(const py::object& image, double pitch, double angle, double 
 {
     const Array<float> pixels = real_array<float>("image", image);
     if (pixels.ndim() != 2)
-        reject("image",
-               std::string(py::str(py::array::ensure(image).dtype())) + " of " + std::to_string(pixels.ndim()) +
-                   " dimensions",
-               "real numbers, (N, M)");
+        reject("image", shape_text(py::array::ensure(image)), "real numbers, (N, M)");
     LdfSample sample;
     sample.height = static_cast<std::size_t>(pixels.shape(0));
     sample.width = static_cast<std::size_t>(pixels.shape(1));

@@ -45,8 +45,8 @@ public:
     }
 
     void add_rays(const ReceiverGrid& grid, const ExtendedLight& light, const std::vector<double>& color,
-                  const Array<float>& coverage, const Occluders* occluders, const RaySettings& settings,
-                  const py::object& progress)
+                  const Array<float>& coverage, const Occluders* occluders, int rays, std::uint32_t seed, int threads,
+                  double clearance, int even_rays, const py::object& progress)
     {
         const Plane& plane = m_field->problem().plane;
         if (grid.width != plane.width || grid.height != plane.height)
@@ -56,7 +56,7 @@ public:
         Progress report(progress_callback(progress));
         Sink sink(*m_field, color, light.is_colored(), coverage.data());
         const py::gil_scoped_release release;
-        gather_rays(grid, light, occluders, settings, sink, report);
+        gather_rays(grid, light, occluders, {rays, threads, clearance, seed, even_rays}, sink, report);
     }
 
     Array<float> solve(const py::object& progress)
@@ -148,18 +148,10 @@ ldf, albedo, mean_free_path, pitch, tolerance, threads, progress
              py::arg("threads") = 0, py::arg("progress") = py::none())
         .def("add", &HeldField::add, py::arg("light"),
              "Adds a PlaneLight, also one of `lights` that only stood for it.")
-        .def(
-            "add_rays",
-            [](HeldField& field, const ReceiverGrid& grid, const ExtendedLight& light, const std::vector<double>& color,
-               const Array<float>& coverage, const Occluders* occluders, int rays, std::uint32_t seed, int threads,
-               double clearance, int even_rays, const py::object& progress) {
-                field.add_rays(grid, light, color, coverage, occluders, {rays, threads, clearance, seed, even_rays},
-                               progress);
-            },
-            py::arg("grid"), py::arg("light"), py::arg("color"), py::arg("coverage"), py::arg("occluders") = py::none(),
-            py::arg("rays") = 16, py::arg("seed") = 0, py::arg("threads") = 0, py::arg("clearance") = 0.0,
-            py::arg("even_rays") = 0, py::arg("progress") = py::none(),
-            R"(Adds the rays of a light of a size, see `gather_rays`.
+        .def("add_rays", &HeldField::add_rays, py::arg("grid"), py::arg("light"), py::arg("color"), py::arg("coverage"),
+             py::arg("occluders") = py::none(), py::arg("rays") = 16, py::arg("seed") = 0, py::arg("threads") = 0,
+             py::arg("clearance") = 0.0, py::arg("even_rays") = 0, py::arg("progress") = py::none(),
+             R"(Adds the rays of a light of a size, see `gather_rays`.
 
 `color`: factor in each channel; `coverage`: float32 (H, W), part of each texel that receives light.
 )")

@@ -43,7 +43,10 @@ std::optional<py::tuple> position_in(const Light& light, const ReceiverGrid& gri
 void bind_lights(py::module_& m)
 {
     py::class_<Light>(m, "Light",
-                      "A light of strength 1 without colour; its kinds are SunLight, PointLight, SpotLight.")
+                      R"(A light of strength 1 without colour; its kinds are SunLight, PointLight, SpotLight.
+
+Each raises ValueError for an argument that is out of range, with a message that names it.
+)")
         .def("position_in", &position_in, py::arg("grid"), R"(Where all of the light comes from.
 
 Parameters
@@ -63,11 +66,6 @@ Parameters
 ----------
 direction : 3 floats
     Of travel in the world, any length but 0.
-
-Raises
-------
-ValueError
-    An argument is out of range; the message names it.
 )")
         .def(py::init(&make_sun), py::arg("direction"));
 
@@ -77,11 +75,6 @@ Parameters
 ----------
 position : 3 floats
     In the world, metres.
-
-Raises
-------
-ValueError
-    An argument is out of range; the message names it.
 )")
         .def(py::init(&make_point), py::arg("position"));
 
@@ -101,11 +94,6 @@ blend : float
 falloff : str
     "scaled": as Cycles in Blender 4.2, 4.5 and 5.0, where the lamp's scale shapes the cone. "legacy": as in 3.4, where
     it does not, and light falls off with the cosine to the axis besides.
-
-Raises
-------
-ValueError
-    An argument is out of range; the message names it.
 )")
         .def(py::init(&make_spot), py::arg("position"), py::arg("frame"), py::arg("spot_size"), py::arg("blend"),
              py::arg("falloff") = "scaled");

@@ -17,27 +17,12 @@ struct HeldMesh {
     OccluderMesh mesh;
 };
 
-std::span<const Vec3> to_vertices(const py::array& array)
-{
-    const auto rows = to_rows<double>("vertices", array, 3, "contiguous float64 (N, 3)");
-    static_assert(sizeof(Vec3) == 3 * sizeof(double));
-    return {reinterpret_cast<const Vec3*>(rows.data()), rows.size() / 3};
-}
-
-std::span<const Triangle> to_triangles(const py::array& array)
-{
-    const auto rows = to_rows<std::uint32_t>("triangles", array, 3, "contiguous uint32 (M, 3)");
-    return {reinterpret_cast<const Triangle*>(rows.data()), rows.size() / 3};
-}
-
 std::vector<Placement> to_placements(const py::array& array)
 {
-    const auto rows = to_rows<double>("placements", array, 12, "contiguous float64 (K, 12)");
+    using Row = std::array<double, 12>;
     std::vector<Placement> placements;
-    placements.reserve(rows.size() / 12);
-    for (std::size_t i = 0; i < rows.size(); i += 12) {
-        const double* const row = &rows[i];
-        const auto column = [row](int j) { return Vec3(row[j], row[4 + j], row[8 + j]); };
+    for (const Row& row : to_rows<Row, double>("placements", array, "contiguous float64 (K, 12)")) {
+        const auto column = [&row](std::size_t j) { return Vec3(row[j], row[4 + j], row[8 + j]); };
         placements.push_back({Mat3(column(0), column(1), column(2)), column(3)});
     }
     return placements;
@@ -55,25 +40,14 @@ std::unique_ptr<HeldMesh> make_mesh(const py::array& vertices, const py::array& 
         held->mesh.placements = to_placements(*placements);
     held->mesh.transmittances.assign(transmittances.begin(), transmittances.end());
     if (materials)
-        held->mesh.materials = to_rows<std::uint32_t>("materials", *materials, 1, "contiguous uint32 (M, 1)");
-    if (uvs) {
-        const auto rows = to_rows<float>("uvs", *uvs, 6, "contiguous float32 (M, 6)");
-        static_assert(sizeof(std::array<Vec2f, 3>) == 6 * sizeof(float));
-        held->mesh.uvs = {reinterpret_cast<const std::array<Vec2f, 3>*>(rows.data()), rows.size() / 6};
-    }
+        held->mesh.materials =
+            to_rows<std::uint32_t, std::uint32_t>("materials", *materials, "contiguous uint32 (M, 1)");
+    if (uvs)
+        held->mesh.uvs = to_rows<std::array<Vec2f, 3>, float>("uvs", *uvs, "contiguous float32 (M, 6)");
     return held;
 }
 
-std::unique_ptr<Occluders> make_occluders(const py::array& vertices, const py::array& triangles, const Numbers& origin)
-{
-    const std::span corners = to_vertices(vertices);
-    const std::span faces = to_triangles(triangles);
-    const Vec3 centre = to_vec3("origin", origin);
-    const py::gil_scoped_release released;
-    return std::make_unique<Occluders>(corners, faces, centre);
-}
-
-std::unique_ptr<Occluders> join_occluders(const std::vector<const HeldMesh*>& held, const Numbers& origin,
+std::unique_ptr<Occluders> make_occluders(const std::vector<const HeldMesh*>& held, const Numbers& origin,
                                           std::optional<int> most_crossings, std::size_t most_copied)
 {
     std::vector<OccluderMesh> meshes;
@@ -89,15 +63,11 @@ std::unique_ptr<Occluders> join_occluders(const std::vector<const HeldMesh*>& he
 
 Extension to_extension(const std::string& name)
 {
-    if (name == "repeat")
-        return Extension::repeat;
-    if (name == "extend")
-        return Extension::extend;
-    if (name == "clip")
-        return Extension::clip;
-    if (name == "mirror")
-        return Extension::mirror;
-    reject("extension", "'" + name + "'", "'repeat', 'extend', 'clip', 'mirror'");
+    return named<Extension>("extension", name,
+                            {{"repeat", Extension::repeat},
+                             {"extend", Extension::extend},
+                             {"clip", Extension::clip},
+                             {"mirror", Extension::mirror}});
 }
 
 std::shared_ptr<Transmittance> make_color(const Numbers& color)
@@ -180,33 +150,14 @@ ValueError
         .def(py::init(&make_mesh), py::arg("vertices"), py::arg("triangles"), py::arg("placements") = py::none(),
              py::arg("transmittances") = py::list(), py::arg("materials") = py::none(), py::arg("uvs") = py::none());
 
-    py::class_<Occluders>(m, "Occluders", R"(Triangles that block light, both sides of them.
-
-Parameters
-----------
-vertices : ndarray, float64, shape (N, 3), C-contiguous
-    World positions in metres. Copied.
-triangles : ndarray, uint32, shape (M, 3), C-contiguous
-    Vertex indices. Copied. M = 0 is allowed: nothing is blocked.
-origin : 3 floats
-    World position near the receivers, metres: rays are traced in single precision relative to it.
-
-Raises
-------
-ValueError
-    Wrong dtype or shape, a position that is not finite, an index that is out of range.
-)")
-        .def(py::init(&make_occluders), py::arg("vertices"), py::arg("triangles"),
-             py::arg("origin") = py::make_tuple(0.0, 0.0, 0.0))
-        .def_static("of_meshes", &join_occluders, py::arg("meshes"), py::arg("origin") = py::make_tuple(0.0, 0.0, 0.0),
-                    py::arg("most_crossings") = py::none(), py::arg("most_copied") = OccluderSettings{}.most_copied,
-                    R"(Of meshes that may stand in many places and let light through.
+    py::class_<Occluders>(m, "Occluders", R"(Triangles of meshes that block light, or a part of it, on both sides.
 
 Parameters
 ----------
 meshes : list of OccluderMesh
+    None at all is allowed: nothing is blocked.
 origin : 3 floats
-    As above.
+    World position near the receivers, metres: rays are traced in single precision relative to it.
 most_crossings : int, optional
     A ray that has crossed so many see-through triangles ends at the next.
 most_copied : int
@@ -218,6 +169,8 @@ Raises
 ValueError
     A number that is not finite, an index that is out of range.
 )")
+        .def(py::init(&make_occluders), py::arg("meshes"), py::arg("origin") = py::make_tuple(0.0, 0.0, 0.0),
+             py::arg("most_crossings") = py::none(), py::arg("most_copied") = OccluderSettings{}.most_copied)
         .def_property_readonly("triangle_count", &Occluders::triangle_count,
                                "int: number of triangles, those of each placement counted.")
         .def_property_readonly(

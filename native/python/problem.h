@@ -4,10 +4,16 @@
 #include <memory>
 #include <vector>
 
-#include "python/plane_light.h"
+#include "python/casters.h"
 #include "solve/problem/problem.h"
 
 namespace beamspread {
+
+// A light and the arrays that it looks at.
+struct HeldLight {
+    PlaneLight light;
+    std::vector<py::object> arrays;
+};
 
 using Lights = std::vector<const HeldLight*>;
 using Sources = std::vector<std::shared_ptr<LdfSource>>;

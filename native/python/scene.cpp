@@ -65,15 +65,12 @@ py::tuple gather_beams(const ReceiverGrid& grid, const Light& light, const Occlu
 Array<float> coverage(const py::array& corners, const py::array& corner_counts, py::ssize_t width, py::ssize_t height,
                       int threads)
 {
-    const auto positions = to_rows<double>("corners", corners, 2, "contiguous float64 (N, 2)");
+    const auto points = to_rows<Vec2, double>("corners", corners, "contiguous float64 (N, 2)");
     if (!py::isinstance<Array<std::uint32_t>>(corner_counts) || corner_counts.ndim() != 1)
         reject("corner_counts", shape_text(corner_counts), "contiguous uint32 (P,)");
     if (width < 1 || height < 1)
         reject(width < 1 ? "width" : "height", static_cast<double>(std::min(width, height)), "1 or more texels");
-    static_assert(sizeof(Vec2) == 2 * sizeof(double));
-    const std::span<const Vec2> points(reinterpret_cast<const Vec2*>(positions.data()), positions.size() / 2);
-    const std::span<const std::uint32_t> counts(static_cast<const std::uint32_t*>(corner_counts.data()),
-                                                static_cast<std::size_t>(corner_counts.size()));
+    const std::span counts(static_cast<const std::uint32_t*>(corner_counts.data()), side(corner_counts, 0));
     Array<float> covered({height, width});
     const View2D<float> texels{covered.mutable_data(), static_cast<std::size_t>(height),
                                static_cast<std::size_t>(width), width};

@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 #include "python/problem.h"
-#include "solve/adaptive/mask_pyramid.h"
+#include "solve/adaptive/adaptive.h"
 #include "solve/solve.h"
 #include "solve/spectral/spectral.h"
 
@@ -17,18 +17,8 @@ namespace beamspread {
 
 namespace {
 
-std::string shape_text(const py::array& array)
-{
-    return "of shape " + py::str(array.attr("shape")).cast<std::string>();
-}
-
 // Of any strides: channels of an array are looked at where they are.
 using Plane2D = py::array_t<float, 0>;
-
-std::size_t side(const py::array& array, py::ssize_t axis)
-{
-    return static_cast<std::size_t>(array.shape(axis));
-}
 
 View2D<const float> channel_view(const Plane2D& irradiance, py::ssize_t channel)
 {
@@ -47,15 +37,6 @@ Directions directions_of(const Array<float>& direction, const View2D<const float
         direction.shape(2) == 3)
         return PerTexel{direction.data()};
     reject("direction", shape_text(direction), "(3,) or (H, W, 3) like irradiance");
-}
-
-Solver solver_named(const std::string& name)
-{
-    for (const auto& [known, solver] :
-         {std::pair{"fft", Solver::fft}, {"direct", Solver::direct}, {"adaptive", Solver::adaptive}})
-        if (name == known)
-            return solver;
-    reject("solver", "'" + name + "'", "'fft', 'direct', 'adaptive'");
 }
 
 HeldLight point_light(const Plane2D& irradiance, std::array<double, 3> position, const std::vector<double>& color)
@@ -130,7 +111,8 @@ Array<float> convolve(const Lights& lights, const Sources& ldf, const std::vecto
 {
     Problem problem = problem_of(lights, ldf, albedo, mean_free_path, tolerance);
     problem.plane = plane_of(lights, pitch);
-    problem.solver = solver_named(solver);
+    problem.solver = named<Solver>("solver", solver,
+                                   {{"fft", Solver::fft}, {"direct", Solver::direct}, {"adaptive", Solver::adaptive}});
     problem.threads = threads;
     problem.memory = memory;
     problem.coarsening = coarsening;
@@ -164,7 +146,7 @@ Squares adaptive_beams(const HeldLight& light, double tolerance)
         const py::gil_scoped_release release;
         validate(Problem{
             plane, std::vector<ChannelMedium>(light.light.color.size()), {light.light}, Solver::adaptive, tolerance});
-        squares = even_squares(plane, light.light, tolerance);
+        squares = beam_squares(plane, light.light, tolerance);
     }
     const auto count = static_cast<py::ssize_t>(squares.size());
     Array<std::int64_t> places({count, py::ssize_t{3}});

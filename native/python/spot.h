@@ -9,9 +9,8 @@ namespace beamspread {
 // Throws InvalidArgument.
 inline SpotCone to_spot_cone(const Numbers& frame, double spot_size, double blend, const std::string& falloff)
 {
-    if (falloff != "scaled" && falloff != "legacy")
-        reject("falloff", "'" + falloff + "'", "'scaled' or 'legacy'");
-    const SpotFalloff kind = falloff == "scaled" ? SpotFalloff::scaled : SpotFalloff::legacy;
+    const auto kind =
+        named<SpotFalloff>("falloff", falloff, {{"scaled", SpotFalloff::scaled}, {"legacy", SpotFalloff::legacy}});
     return {to_axes("frame", frame), spot_size, blend, kind};
 }
 

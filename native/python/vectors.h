@@ -1,10 +1,11 @@
 // Small vectors from Python's sequences of numbers.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <span>
 #include <string>
 
-#include "base/error.h"
 #include "base/vec.h"
 #include "python/casters.h"
 
@@ -13,19 +14,26 @@ namespace beamspread {
 // Few numbers of any type, copied.
 using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-inline std::string shape_text(const py::array& array)
+// A big array of `Number`s whose rows are seen as `Row`s: its type is never converted silently. Throws InvalidArgument.
+template <class Row, class Number>
+std::span<const Row> to_rows(const std::string& name, const py::array& array, const std::string& allowed)
 {
-    return std::string(py::str(array.dtype())) + " of shape " + std::string(py::str(array.attr("shape")));
+    constexpr std::size_t bytes = sizeof(Number);
+    constexpr std::size_t columns = sizeof(Row) / bytes;
+    static_assert(columns * bytes == sizeof(Row));
+    if (!py::isinstance<Array<Number>>(array) || array.ndim() != 2 || side(array, 1) != columns)
+        reject(name, shape_text(array), allowed);
+    return {static_cast<const Row*>(array.data()), side(array, 0)};
 }
 
-// A big array: its type is never converted silently. Throws InvalidArgument.
-template <class T>
-std::span<const T> to_rows(const std::string& name, const py::array& array, py::ssize_t columns,
-                           const std::string& allowed)
+inline std::span<const Vec3> to_vertices(const py::array& array)
 {
-    if (!py::isinstance<Array<T>>(array) || array.ndim() != 2 || array.shape(1) != columns)
-        reject(name, shape_text(array), allowed);
-    return {static_cast<const T*>(array.data()), static_cast<std::size_t>(array.size())};
+    return to_rows<Vec3, double>("vertices", array, "contiguous float64 (N, 3)");
+}
+
+inline std::span<const std::array<std::uint32_t, 3>> to_triangles(const py::array& array)
+{
+    return to_rows<std::array<std::uint32_t, 3>, std::uint32_t>("triangles", array, "contiguous uint32 (M, 3)");
 }
 
 // Throws InvalidArgument.

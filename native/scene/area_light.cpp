@@ -17,9 +17,6 @@ namespace beamspread {
 
 namespace {
 
-// Hosts that keep angles in single precision round pi up.
-constexpr double max_spread = static_cast<double>(static_cast<float>(pi));
-
 // A lamp whose squared size is less than this part of its squared distance is sampled evenly over its area: that costs
 // half and its shadows are as noisy, within 1 % also with half of it and twice.
 constexpr double small = 0.05;
@@ -139,7 +136,7 @@ AreaLight::AreaLight(const Vec3& position, const Mat3& lamp_to_world, double siz
     }
     check_size("size_x", size_x);
     check_size("size_y", size_y);
-    if (!(spread >= 0.0 && spread <= max_spread))
+    if (!(spread >= 0.0 && spread <= detail::max_angle))
         reject("spread", spread, "0 <= spread <= pi, the full angle in radians");
     if (!detail::is_finite(m_axis))
         m_radiance = 0.0;

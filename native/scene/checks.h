@@ -5,9 +5,13 @@
 #include <sstream>
 #include <string>
 
+#include "base/constants.h"
 #include "base/vec.h"
 
 namespace beamspread::detail {
+
+// Hosts that keep angles in single precision round pi up.
+inline constexpr double max_angle = static_cast<double>(static_cast<float>(pi));
 
 inline bool is_finite(const Vec3& v)
 {

@@ -122,11 +122,6 @@ struct Occluders::Hierarchy {
     embree::Scene top;
 };
 
-Occluders::Occluders(std::span<const Vec3> vertices, std::span<const Triangle> triangles, const Vec3& origin)
-    : Occluders(std::array{OccluderMesh{.vertices = vertices, .triangles = triangles}}, origin, {})
-{
-}
-
 Occluders::Occluders(std::span<const OccluderMesh> meshes, const Vec3& origin, const OccluderSettings& settings)
     : m_most_crossings(settings.most_crossings), m_origin(origin)
 {
@@ -217,14 +212,6 @@ std::array<Vec3, 3> Occluders::triangle(std::size_t index) const
 {
     const auto [a, b, c] = m_hierarchy->sets.front()->corners(index);
     return {m_origin + Vec3(a), m_origin + Vec3(b), m_origin + Vec3(c)};
-}
-
-std::uint32_t Occluders::blocked(std::span<const ShadowRay> rays) const
-{
-    if (m_is_opaque)
-        return trace(rays, nullptr);
-    std::array<Passage, packet_size> passages;
-    return trace(rays, passages.data());
 }
 
 void Occluders::transmit(std::span<const ShadowRay> rays, Vec3f* transmittance, bool is_coherent) const

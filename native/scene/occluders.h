@@ -50,10 +50,7 @@ struct OccluderSettings {
 // relative to its own middle, and rays are turned into its frame.
 class Occluders {
 public:
-    using Triangle = beamspread::Triangle;
-
-    // Opaque. `vertices` are in world metres; both arrays are copied. None at all is allowed. Throws InvalidArgument.
-    Occluders(std::span<const Vec3> vertices, std::span<const Triangle> triangles, const Vec3& origin);
+    // Meshes are copied. None at all is allowed. Throws InvalidArgument.
     Occluders(std::span<const OccluderMesh> meshes, const Vec3& origin, const OccluderSettings& settings);
     ~Occluders();
     Occluders(const Occluders&) = delete;
@@ -61,9 +58,6 @@ public:
 
     // Rays that are traced together: neighbours take the same way through the hierarchy, and share it.
     static constexpr std::size_t packet_size = 16;
-
-    // Bit i: whether nothing of the i-th of at most `packet_size` rays gets through.
-    std::uint32_t blocked(std::span<const ShadowRay> rays) const;
 
     // What at most `packet_size` rays let through in each channel, 0 to 1. Whether they go much the same way only decides
     // how they are traced.
@@ -88,6 +82,7 @@ public:
 
 private:
     struct Hierarchy;
+    // Bit i: whether nothing of the i-th ray gets through.
     std::uint32_t trace(std::span<const ShadowRay> rays, Passage* passages, bool is_coherent = true) const;
     void build(std::span<const OccluderMesh> meshes, std::size_t most_copied);
     void add_instances(const OccluderMesh& mesh);

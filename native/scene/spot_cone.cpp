@@ -3,16 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/constants.h"
 #include "base/error.h"
 #include "scene/checks.h"
 
 namespace beamspread {
 
 namespace {
-
-// Hosts that keep angles in single precision round pi up.
-constexpr double max_spot_size = static_cast<double>(static_cast<float>(pi));
 
 double smoothstep(double t)
 {
@@ -28,7 +24,7 @@ SpotCone::SpotCone(const Mat3& lamp_to_world, double spot_size, double blend, Sp
       m_smooth((1.0 - m_cos_half_size) * blend),
       m_falloff(falloff)
 {
-    if (!(spot_size > 0.0 && spot_size <= max_spot_size))
+    if (!(spot_size > 0.0 && spot_size <= detail::max_angle))
         reject("spot_size", spot_size, "0 < spot_size <= pi, the full angle in radians");
     if (!(blend >= 0.0 && blend <= 1.0))
         reject("blend", blend, "0 to 1");

@@ -13,12 +13,9 @@ namespace beamspread {
 
 namespace {
 
-// Hosts that keep angles in single precision round pi up.
-constexpr double max_angle = static_cast<double>(static_cast<float>(pi));
-
 double half_sine_squared(double angle)
 {
-    if (!(angle >= 0.0 && angle <= max_angle))
+    if (!(angle >= 0.0 && angle <= detail::max_angle))
         reject("angle", angle, "0 <= angle <= pi, the full angle in radians");
     const double sine = std::sin(std::min(0.5 * angle, 0.5 * pi));
     return sine * sine;

@@ -62,6 +62,18 @@ BEAMSPREAD_CLONES void add_scaled_product(float* __restrict sum, const float* a,
         sum[i] += factor * (a[i] * b[i]);
 }
 
+BEAMSPREAD_CLONES void add_product(std::complex<float>* sum, const float* factor, const std::complex<float>* values,
+                                   std::size_t count)
+{
+    // std::complex is two floats by definition ([complex.numbers]).
+    auto* s = reinterpret_cast<float*>(sum);
+    const auto* v = reinterpret_cast<const float*>(values);
+    for (std::size_t i = 0; i < count; ++i) {
+        s[2 * i] += factor[i] * v[2 * i];
+        s[2 * i + 1] += factor[i] * v[2 * i + 1];
+    }
+}
+
 BEAMSPREAD_CLONES void interpolate(float* __restrict result, const float* table, std::size_t stride,
                                    const float* weight, std::size_t count)
 {

@@ -1,6 +1,7 @@
 // Inner loops over arrays, see base/platform.h.
 #pragma once
 
+#include <complex>
 #include <cstddef>
 #include <cstdint>
 
@@ -27,6 +28,9 @@ void multiply(float* product, const float* a, const float* b, std::size_t count)
 
 // sum[i] += factor * a[i] * b[i]
 void add_scaled_product(float* sum, const float* a, const float* b, float factor, std::size_t count);
+
+// sum[i] += factor[i] * values[i]
+void add_product(std::complex<float>* sum, const float* factor, const std::complex<float>* values, std::size_t count);
 
 // result[f] = sum over k of weight[k] * table[k * stride + f], k = 0 .. 3
 void interpolate(float* result, const float* table, std::size_t stride, const float* weight, std::size_t count);

@@ -141,13 +141,13 @@ public:
             return;
         const auto factor = static_cast<float>(color);
         const std::size_t strips = (m_plane.height + rows_per_strip - 1) / rows_per_strip;
-        parallel_ordered<Strip>(
-            strips, [&](std::size_t i) { return strip(i * rows_per_strip); },
-            [&](std::size_t, const Strip& done) {
+        parallel_ordered(strips, [&](std::size_t item) {
+            return [&, done = strip(item * rows_per_strip)] {
                 float* out = luminance + done.first_row * m_plane.width * stride;
                 for (std::size_t i = 0; i < done.values.size(); ++i)
                     out[i * stride] += factor * done.values[i];
-            });
+            };
+        });
     }
 
 private:

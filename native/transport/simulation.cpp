@@ -228,7 +228,11 @@ std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> 
         if (job + 1 == jobs_per_angle)
             results.push_back(normalized(angles_deg[item / jobs_per_angle], sums, total_photons));
     };
-    with_threads(threads, [&] { parallel_ordered<JobSums>(angles_deg.size() * jobs_per_angle, walk_job, merge_job); });
+    with_threads(threads, [&] {
+        parallel_ordered(angles_deg.size() * jobs_per_angle, [&](std::size_t item) {
+            return [&, item, sums = walk_job(item)]() mutable { merge_job(item, std::move(sums)); };
+        });
+    });
     progress.finish();
     return results;
 }

@@ -74,7 +74,7 @@ def print_ray_rates(grid, rays=16):
     print(f"{'10^6 rays/CPU s':23}" + "".join(f"{name:>10}" for name in EXTENDED))
     for name, vertices in SCENES.items():
         triangles = None if vertices is None else np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)
-        occluders = None if vertices is None else native.Occluders(vertices, triangles)
+        occluders = None if vertices is None else native.Occluders([native.OccluderMesh(vertices, triangles)])
         row = f"{name:23}"
         for light in EXTENDED.values():
             start = time.process_time()
@@ -93,7 +93,7 @@ def main():
             occluders = None
             if vertices is not None:
                 triangles = np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)
-                occluders = native.Occluders(vertices, triangles)
+                occluders = native.Occluders([native.OccluderMesh(vertices, triangles)])
             row = f"{name:23}"
             for light in LIGHTS.values():
                 found, traced = (seconds(grid, light, occluders, find_shadows) for find_shadows in (True, False))

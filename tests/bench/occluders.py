@@ -68,7 +68,7 @@ def run(name, part):
     mesh, most_copied = CASES[name](part)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     start = time.perf_counter()
-    occluders = native.Occluders.of_meshes([mesh], most_copied=most_copied)
+    occluders = native.Occluders([mesh], most_copied=most_copied)
     times = [time.perf_counter() - start]
     grid = native.ReceiverGrid((-1, -1, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 1 / 256, 1 / 256, 512, 512)
     for light in LIGHTS:

@@ -179,7 +179,8 @@ void compare(const char* name, const ExtendedLight& light, const Shapes& shapes,
 {
     const ReceiverGrid grid{{-2.0, -2.0, 0.0}, {1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}, 4.0 / side, 4.0 / side,
                             side, side};
-    const Occluders occluders(shapes.vertices, shapes.triangles, {});
+    const OccluderMesh mesh{.vertices = shapes.vertices, .triangles = shapes.triangles};
+    const Occluders occluders({&mesh, 1}, {}, {});
     const std::unique_ptr<const ExtendedLight> facing = light.facing(grid.normal);
     const ExtendedLight& prepared = facing ? *facing : light;
     RaySettings settings;

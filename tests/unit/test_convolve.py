@@ -292,7 +292,7 @@ DOWN = (0.0, 0.0, -1.0)
         ({"irradiance": "bright"}, "'irradiance' is 'bright'"),
         ({"direction": (0, 0, 1)}, "'direction' is with z = 1"),
         ({"direction": (0, 0, -2)}, "'direction' is of length 2"),
-        ({"direction": np.zeros((5, 4, 3))}, "'direction' is of shape"),
+        ({"direction": np.zeros((5, 4, 3))}, "'direction' is float32 of shape"),
         ({"direction": np.zeros((4, 5, 3))}, "'direction' is of length 0"),
         ({"ldf": None}, "'ldf' is None"),
         ({"albedo": 1.0}, "'albedo' is 1"),

@@ -48,7 +48,7 @@ def test_round_trip_keeps_bits_and_the_order_of_channels(tmp_path_factory, heigh
 
 
 def test_unknown_compression_is_named(tmp_path):
-    with pytest.raises(ValueError, match=r"compression.*'piz'.*'zip' or 'none'"):
+    with pytest.raises(ValueError, match=r"compression.*'piz'.*'zip', 'none'"):
         native.write_exr(str(tmp_path / "a.exr"), image(2, 2), ["R", "G", "B"], compression="piz")
 
 
@@ -189,7 +189,7 @@ def test_unwritable_places_are_named(tmp_path, name, reason):
     ("array", "channels", "attributes", "message"),
     [
         (image().astype(np.float64), "RGB", {}, "array.*float64"),
-        (image()[..., 0], "RGB", {}, "array.*2 dimensions"),
+        (image()[..., 0], "RGB", {}, r"array.*\(\d+, \d+\)"),
         (image()[:, ::2], "RGB", {}, "array"),
         (image(), "RG", {}, "array.*3 channels"),
         (image(0, 4), "RGB", {}, "height.*0"),

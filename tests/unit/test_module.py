@@ -20,7 +20,7 @@ WHEEL_LIBRARIES = ROOT / "build/bpy-4.5/bpy/lib"
 ASK_EMBREE = """
 from beamspread.core.native import native
 import numpy as np
-occluders = native.Occluders(np.eye(3), np.array([[0, 1, 2]], np.uint32))
+occluders = native.Occluders([native.OccluderMesh(np.eye(3), np.array([[0, 1, 2]], np.uint32))])
 print(native.embree_version())
 """
 
@@ -41,7 +41,7 @@ from beamspread.core.native import native
 library = simulate(Medium(), angles=[0, 30], photons=256)
 for solver in ("fft", "direct", "adaptive"):
     convolve(np.ones((8, 8), np.float32), (0.0, 0.0, -1.0), library, 0.5, 1.0, 1.0, solver=solver)
-occluders = native.Occluders(np.eye(3), np.array([[0, 1, 2]], np.uint32))
+occluders = native.Occluders([native.OccluderMesh(np.eye(3), np.array([[0, 1, 2]], np.uint32))])
 grid = native.ReceiverGrid((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), pitch_x=1, pitch_y=1, width=4, height=4)
 native.gather_beams(grid, native.SunLight((0, 0, -1)), occluders)
 """

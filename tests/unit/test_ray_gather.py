@@ -29,13 +29,13 @@ def make_grid(texels=16, size=2.0):
 
 
 def card(scale=0.25, height=0.4, shift=(0.0, 0.0)):
-    return native.Occluders(scale * SQUARE + (*shift, height), TWO)
+    return native.Occluders([native.OccluderMesh(scale * SQUARE + (*shift, height), TWO)])
 
 
 def wall(x, height):
     """The half plane right of x at a height."""
     corners = np.array([(x, -50, height), (50, -50, height), (50, 50, height), (x, 50, height)], float)
-    return native.Occluders(corners, TWO)
+    return native.Occluders([native.OccluderMesh(corners, TWO)])
 
 
 @pytest.mark.parametrize("name", LIGHTS)
@@ -159,7 +159,7 @@ def test_a_glowing_mesh_does_not_shade_itself():
     open_light = native.gather_rays(grid, mesh)[0]
     for shift in (0.0, 300.0):
         origin = (0.0, 0.0, shift)
-        blocked = native.gather_rays(grid, mesh, native.Occluders(corners, TWO, origin))[0]
+        blocked = native.gather_rays(grid, mesh, native.Occluders([native.OccluderMesh(corners, TWO)], origin))[0]
         np.testing.assert_allclose(blocked, open_light, rtol=1e-6)
 
 

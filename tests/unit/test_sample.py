@@ -52,7 +52,7 @@ def test_takes_any_real_array():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"image": np.zeros((2, 2, 3))}, "'image' is float64 of 3 dimensions"),
+        ({"image": np.zeros((2, 2, 3))}, r"'image' is float64 of shape \(2, 2, 3\)"),
         ({"image": np.zeros((0, 4))}, "'image' is of 0 x 4"),
         ({"image": np.zeros((2, 2), complex)}, "'image' is complex128"),
         ({"image": np.ma.masked_less([[0.1, 0.2]], 0.15)}, "'image' is an array with masked values"),

@@ -19,21 +19,21 @@ def light_past(occluders, light=DOWN, grid=GRID, samples=4):
 
 def test_no_triangles_block_nothing():
     for vertices in (np.zeros((0, 3)), SQUARE):
-        occluders = native.Occluders(vertices, np.zeros((0, 3), np.uint32))
+        occluders = native.Occluders([native.OccluderMesh(vertices, np.zeros((0, 3), np.uint32))])
         assert occluders.triangle_count == 0
         assert (light_past(occluders) == 1).all()
 
 
 def test_both_sides_of_a_triangle_block():
     for faces in (FACES, FACES[:, ::-1].copy()):
-        occluders = native.Occluders(SQUARE, faces)
+        occluders = native.Occluders([native.OccluderMesh(SQUARE, faces)])
         assert occluders.triangle_count == 2
         assert not light_past(occluders).any()
 
 
 def test_arrays_are_copied():
     vertices, faces = SQUARE.copy(), FACES.copy()
-    occluders = native.Occluders(vertices, faces)
+    occluders = native.Occluders([native.OccluderMesh(vertices, faces)])
     vertices[:], faces[:] = 1e9, 7
     del vertices, faces
     assert not light_past(occluders).any()
@@ -47,14 +47,16 @@ def test_no_light_leaks_through_shared_edges():
     faces = np.concatenate(
         [np.stack([corner, corner + 1, corner + 25], 1), np.stack([corner, corner + 25, corner + 24], 1)]
     )
-    occluders = native.Occluders(vertices, faces.astype(np.uint32))
+    occluders = native.Occluders([native.OccluderMesh(vertices, faces.astype(np.uint32))])
     grid = native.ReceiverGrid((-1, -1, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 2 / 96, 2 / 96, 96, 96)
     assert not light_past(occluders, grid=grid, samples=16).any()
 
 
 def test_degenerate_triangles_are_harmless():
     faces = np.array([[0, 0, 0], [0, 1, 1]], np.uint32)
-    assert (light_past(native.Occluders(SQUARE, faces), native.SunLight((0.1, 0.2, -1))) > 0).all()
+    assert (
+        light_past(native.Occluders([native.OccluderMesh(SQUARE, faces)]), native.SunLight((0.1, 0.2, -1))) > 0
+    ).all()
 
 
 @pytest.mark.parametrize(
@@ -73,9 +75,9 @@ def test_degenerate_triangles_are_harmless():
 )
 def test_bad_arrays_are_named(vertices, triangles, message):
     with pytest.raises(ValueError, match=message):
-        native.Occluders(vertices, triangles)
+        native.Occluders([native.OccluderMesh(vertices, triangles)])
 
 
 def test_an_origin_without_numbers_is_named():
     with pytest.raises(ValueError, match=r"origin.*nan.*finite"):
-        native.Occluders(SQUARE, FACES, (0, math.nan, 0))
+        native.Occluders([native.OccluderMesh(SQUARE, FACES)], (0, math.nan, 0))

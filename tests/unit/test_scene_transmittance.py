@@ -34,7 +34,7 @@ def image(texels, **options):
 
 
 def light_past(meshes, light=DOWN, samples=4, most_crossings=None, on=None, **options):
-    occluders = native.Occluders.of_meshes(meshes, most_crossings=most_crossings)
+    occluders = native.Occluders(meshes, most_crossings=most_crossings)
     return native.gather_beams(on or grid(), light, occluders, samples, **options)[0]
 
 
@@ -63,7 +63,7 @@ def test_the_direction_is_weighed_by_what_arrives():
     one = native.OccluderMesh(half, FACES, None, [native.Transmittance((0.25,) * 3)], np.zeros((2, 1), np.uint32))
     wide = grid(1, 1)
     plain = native.gather_beams(wide, lamp, None, 8)
-    dimmed = native.gather_beams(wide, lamp, native.Occluders.of_meshes([one]), 8)
+    dimmed = native.gather_beams(wide, lamp, native.Occluders([one]), 8)
     # Half of the rays, mirror images of the others, at a quarter.
     np.testing.assert_allclose(dimmed[0], plain[0] * 0.625, rtol=1e-6)
     j, i = np.divmod(np.arange(64), 8)  # see beams.cpp
@@ -171,7 +171,7 @@ def test_finding_shadows_and_threads_change_nothing(seed, count, colored, far):
     triangles = np.arange(3 * count, dtype=np.uint32).reshape(-1, 3)
     materials = rng.integers(0, 4, (count, 1)).astype(np.uint32)
     mesh = native.OccluderMesh(corners.reshape(-1, 3) + shift, triangles, None, see_through, materials)
-    occluders = native.Occluders.of_meshes([mesh], shift)
+    occluders = native.Occluders([mesh], shift)
     place = native.ReceiverGrid(shift - (1, 1, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 1 / 40, 1 / 40, 80, 80)
     for light in (native.SunLight((0.3, 0.2, -1)), native.PointLight(shift + (0.2, 0.1, 1.4))):
         first, *others = [
@@ -206,7 +206,7 @@ def test_a_ray_ends_after_so_many_crossings():
 
 def test_what_occluders_say_of_themselves():
     def said(*transmittances):
-        occluders = native.Occluders.of_meshes([card(one) for one in transmittances])
+        occluders = native.Occluders([card(one) for one in transmittances])
         return occluders.is_opaque, occluders.is_colored
 
     opaque, clear = native.Transmittance((0, 0, 0)), native.Transmittance((1, 1, 1))

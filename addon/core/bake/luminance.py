@@ -20,6 +20,7 @@ from .convolve import solve as convolve_plane_lights
 from .estimate import ray_seconds, solver_seconds
 from .gather import Gatherer
 from .settings import BakeSettings
+from .surface import channel_media
 
 # Shares of the time that a bake takes, roughly: reading an LDF that is known, gathering a light, solving for all.
 LIBRARY_WEIGHT, LIGHT_WEIGHT, SOLVE_WEIGHT = 0.2, 1.0, 3.0
@@ -194,11 +195,8 @@ def _dark(grid: Grid) -> np.ndarray:
 
 def _libraries(material: Material, thickness: float, settings: BakeSettings, progress: Progress | None) -> list:
     """The LDF library of each channel; channels of the same medium share one."""
-    depths = [thickness / length if thickness else math.inf for length in material.mean_free_path]
-    channels = list(zip(material.channel_anisotropy, depths))
-    distinct = sorted(set(channels))
-    by_channel = {}
-    for (g, depth), stage in zip(distinct, stages(progress, [1.0] * len(distinct))):
-        medium = native.Medium(g=g, ior=material.ior, thickness=depth)
-        by_channel[g, depth] = library(medium, settings.quality, stage, settings.threads)
-    return [by_channel[channel] for channel in channels]
+    media = channel_media(material, thickness)
+    libraries = dict.fromkeys(media)
+    for medium, stage in zip(libraries, stages(progress, [1.0] * len(libraries))):
+        libraries[medium] = library(medium, settings.quality, stage, settings.threads)
+    return [libraries[medium] for medium in media]

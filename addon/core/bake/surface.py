@@ -13,6 +13,12 @@ from ..native import native
 from ..progress import Progress, stages
 
 
+def channel_media(material: Material, thickness: float) -> list:
+    """The native `Medium` of each channel; of a material and a thickness in the same unit, 0 for a half-space."""
+    depths = [thickness / length if thickness else math.inf for length in material.mean_free_path]
+    return [native.Medium(g, material.ior, depth) for g, depth in zip(material.channel_anisotropy, depths)]
+
+
 @dataclass(frozen=True)
 class Surface:
     """Values in scene units.
@@ -45,33 +51,22 @@ class Surface:
         cosines = (nodes + 1) / 2
         angles = np.degrees(np.arccos(cosines)).tolist()
         values = []
-        for albedo, length, g in zip(
-            self.material.albedo, self.material.mean_free_path, self.material.channel_anisotropy
-        ):
-            medium = native.Medium(g=g, ior=self.material.ior, thickness=self._depth(length))
+        for albedo, medium in zip(self.material.albedo, channel_media(self.material, self.thickness)):
             reflected, _ = native.exact_totals(medium, angles, [albedo])
             values.append(float(weights * cosines @ reflected[:, 0]))
         return values
 
-    def _depth(self, mean_free_path: float) -> float:
-        return self.thickness / mean_free_path if self.thickness else math.inf
-
     def media(self) -> list:
         """The native `Medium`s that its bake needs libraries of, each once."""
-        found = []
-        for length, g in zip(self.material.mean_free_path, self.material.channel_anisotropy):
-            medium = native.Medium(g=g, ior=self.material.ior, thickness=self._depth(length))
-            found += [] if medium in found else [medium]
-        return found
+        return list(dict.fromkeys(channel_media(self.material, self.thickness)))
 
     def resolve(self, quality: str, progress: Progress | None = None, threads: int = 0) -> Material:
         """The material, its albedo worked out from the base colour if there is one."""
         self.check()
         if self.base_color is None:
             return self.material
-        channels = zip(self.base_color, self.material.mean_free_path, self.material.channel_anisotropy)
+        channels = zip(self.base_color, channel_media(self.material, self.thickness))
         albedo = []
-        for (color, length, g), stage in zip(channels, stages(progress, [1.0] * len(self.base_color))):
-            medium = native.Medium(g=g, ior=self.material.ior, thickness=self._depth(length))
+        for (color, medium), stage in zip(channels, stages(progress, [1.0] * len(self.base_color))):
             albedo.append(albedo_from_color(color, medium, quality, stage, threads)[0])
         return replace(self.material, albedo=tuple(albedo))

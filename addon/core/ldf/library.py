@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..native import native
 from ..progress import say
+from ..recent import keep_recent
 
 PHOTONS = {"preview": 80_000, "final": 4_000_000}
 """Photons per angle for a medium with g .8 and ior 1; see `photons_for`."""
@@ -159,14 +160,6 @@ _loaded = {}
 _LOADED_LIMIT = 8
 
 
-def _remember(path, result):
-    _loaded.pop(path, None)
-    _loaded[path] = result
-    while len(_loaded) > _LOADED_LIMIT:
-        del _loaded[next(iter(_loaded))]
-    return result
-
-
 def library(medium, quality="final", progress=None, threads=0):
     """LDF library of a medium for every angle of incidence and albedo.
 
@@ -197,19 +190,21 @@ def library(medium, quality="final", progress=None, threads=0):
         raise ValueError(f"argument 'medium' is {medium!r}; allowed: a Medium")
     if quality not in PHOTONS:
         raise ValueError(f"argument 'quality' is {quality!r}; allowed: 'final', 'preview'")
+    if known := _at_hand(medium, quality):
+        return known
+    say(progress, SIMULATING + (" (preview)" if quality == "preview" else ""))
+    made = make(medium, quality, progress, threads=threads)
     path = _cache_path(medium, quality)
-    known = _loaded.get(path) or _load_shipped(medium, quality) or _load(path, medium)
-    if known is None:
-        say(progress, SIMULATING + (" (preview)" if quality == "preview" else ""))
-        known = make(medium, quality, progress, threads=threads)
-        _store(known, path)
-    return _remember(path, known)
+    _store(made, path)
+    return keep_recent(_loaded, path, made, _LOADED_LIMIT)
 
 
 def known_library(medium):
     """The best library of a medium that came with the package or is cached; None where one would be simulated."""
-    for quality in ("final", "preview"):
-        path = _cache_path(medium, quality)
-        if found := _loaded.get(path) or _load_shipped(medium, quality) or _load(path, medium):
-            return _remember(path, found)
-    return None
+    return _at_hand(medium, "final") or _at_hand(medium, "preview")
+
+
+def _at_hand(medium, quality):
+    path = _cache_path(medium, quality)
+    found = _loaded.get(path) or _load_shipped(medium, quality) or _load(path, medium)
+    return found and keep_recent(_loaded, path, found, _LOADED_LIMIT)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
-
 import numpy as np
 
 from ..native import native
+from ..recent import keep_recent
 from ..scene.grid import Grid
 
 # Up to what angle of incidence, degrees, the kernels of a field are right to what part; light from beyond counts as at
@@ -36,7 +35,7 @@ class Fields:
     """
 
     def __init__(self) -> None:
-        self._kept: OrderedDict = OrderedDict()
+        self._kept: dict = {}
         self._choices: dict = {}  # by media: which exactness
         self.made = 0
 
@@ -49,16 +48,13 @@ class Fields:
         values = tuple(map(float, (*medium["albedo"], *medium["mean_free_path"], *pitch)))
         key = (*map(id, medium["ldf"]), *values, *shape, is_colored)
         if key in self._kept:
-            self._kept.move_to_end(key)
             field, _ = self._kept[key]
             field.clear()
-            return field
-        field = self._make(shape, medium | {"pitch": pitch}, is_colored)
-        self.made += 1
-        self._kept[key] = field, medium["ldf"]  # with these, so that no others get their numbers
-        while len(self._kept) > MOST_FIELDS:
-            self._kept.popitem(last=False)
-        return field
+        else:
+            field = self._make(shape, medium | {"pitch": pitch}, is_colored)
+            self.made += 1
+        # With the libraries, so that no others get their numbers.
+        return keep_recent(self._kept, key, (field, medium["ldf"]), MOST_FIELDS)[0]
 
     def _make(self, shape: tuple[int, int], medium: dict, is_colored: bool):
         media = tuple((one.medium.g, one.medium.ior, one.medium.thickness) for one in medium["ldf"])

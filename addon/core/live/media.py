@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..ldf import library as libraries
 from ..native import native
+from ..recent import keep_recent
 
 # Libraries in memory, those used last: some megabytes each.
 MOST_KEPT = 12
@@ -36,14 +37,12 @@ class Media:
     def serve(self, medium) -> tuple[object, bool]:
         """A library, and whether it is the medium's own. Simulates in preview quality if there is none at all."""
         if own := self._known.get(medium) or libraries.known_library(medium):
-            _keep(self._known, medium, own)
-            return own, True
+            return keep_recent(self._known, medium, own, MOST_KEPT), True
         path = nearest(medium)
         if path is None:
-            _keep(self._known, medium, libraries.library(medium, "preview"))
-            return self._known[medium], True
+            return keep_recent(self._known, medium, libraries.library(medium, "preview"), MOST_KEPT), True
         if path not in self._stand_ins:
-            _keep(self._stand_ins, path, native.LdfLibrary.load(path))
+            keep_recent(self._stand_ins, path, native.LdfLibrary.load(path), MOST_KEPT)
         return self._stand_ins[path], False
 
     def want(self, media: Collection) -> None:
@@ -95,17 +94,10 @@ class Media:
             return
         finally:
             self.simulating = ""
-        _keep(self._known, medium, found)
+        keep_recent(self._known, medium, found, MOST_KEPT)
         self._on_news()
         with self._condition:
             self._wanted = tuple(one for one in self._wanted if one != medium)
-
-
-def _keep(kept: dict, key, value) -> None:
-    kept.pop(key, None)
-    kept[key] = value
-    while len(kept) > MOST_KEPT:
-        del kept[next(iter(kept))]
 
 
 def nearest(medium) -> Path | None:

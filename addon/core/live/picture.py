@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,11 +12,12 @@ from ..bake.gather import Gatherer
 from ..bake.luminance import TOLERANCE, spread
 from ..bake.margin import WHOLE, extend_margin
 from ..bake.settings import COMBINED, BakeSettings
+from ..bake.surface import channel_media
 from ..ldf.albedo import albedo_from_reflectance
 from ..ldf.samples import load_source
 from ..material.material import Material
-from ..native import native
 from ..progress import Progress
+from ..recent import keep_recent
 from ..scene.grid import Grid
 from ..scene.lights import Light
 from ..scene.receiver import Receiver, build_receiver, texture_size
@@ -143,8 +143,7 @@ class Studio:
         key = id(subject.polygons)
         if key not in self._maps:
             # With the polygons, so that no others get their number.
-            self._maps[key] = subject.polygons, fit_uv_maps(subject.polygons)
-            _drop_oldest(self._maps, MOST_RECEIVERS)
+            keep_recent(self._maps, key, (subject.polygons, fit_uv_maps(subject.polygons)), MOST_RECEIVERS)
         return self._maps[key][1]
 
     def _receiver(self, subject: Subject, size: tuple[int, int]) -> FramedReceiver:
@@ -154,8 +153,7 @@ class Studio:
             if subject.texture is not None:
                 receiver = subject.texture.on(receiver)
             framed = FramedReceiver(receiver, subject.settings.margin)
-            self._receivers[key] = framed, subject.polygons, subject.texture
-            _drop_oldest(self._receivers, MOST_RECEIVERS)
+            keep_recent(self._receivers, key, (framed, subject.polygons, subject.texture), MOST_RECEIVERS)
         return self._receivers[key][0]
 
 
@@ -209,16 +207,9 @@ def _reached(known: np.ndarray, rings: int) -> np.ndarray:
     return known
 
 
-def _drop_oldest(kept: dict, most: int) -> None:
-    while len(kept) > most:
-        del kept[next(iter(kept))]
-
-
 def _media(subject: Subject) -> list:
     """Of each channel."""
-    material, thickness = subject.surface.material, subject.surface.thickness
-    depths = [thickness / length if thickness else math.inf for length in material.mean_free_path]
-    return [native.Medium(g=g, ior=material.ior, thickness=d) for g, d in zip(material.channel_anisotropy, depths)]
+    return channel_media(subject.surface.material, subject.surface.thickness)
 
 
 def _have_kernels_of_their_own(lights: Sequence[Light], grid: Grid) -> bool:

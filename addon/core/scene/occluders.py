@@ -76,4 +76,4 @@ def build(occluders: Sequence[Occluder], origin: Vector, most_crossings: int | N
     for same in by_mesh.values():
         matrices = [np.eye(4)[None, :3] if one.placements is None else one.placements for one in same]
         meshes.append(same[0].mesh.native(np.concatenate(matrices)))
-    return native.Occluders.of_meshes(meshes, origin, most_crossings) if meshes else None
+    return native.Occluders(meshes, origin, most_crossings) if meshes else None

@@ -6,6 +6,8 @@
 
 namespace beamspread {
 
+// Lines are contiguous and follow each other; `real` lines have `size` values, `half` lines size / 2 + 1. All
+// transforms are sums without a factor; forward ones have the sign e^-i. One thread does the work.
 struct FftInstructionSet {
     void (*real_to_half)(const float*, std::complex<float>*, std::size_t count, std::size_t size);
     void (*half_to_real)(const std::complex<float>*, float*, std::size_t count, std::size_t size);

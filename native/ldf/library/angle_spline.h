@@ -1,7 +1,6 @@
 // Interpolation in the angle of incidence.
 #pragma once
 
-#include <span>
 #include <vector>
 
 namespace beamspread {
@@ -21,8 +20,6 @@ public:
 
     // Weight of each node's value in the interpolated value at x.
     std::vector<double> weights(double x, Parity parity) const;
-
-    std::span<const double> nodes() const { return m_nodes; }
 
 private:
     std::vector<double> m_nodes;

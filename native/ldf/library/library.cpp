@@ -300,11 +300,9 @@ std::vector<BallisticExit> LdfLibrary::ballistic(double angle_deg, Side side) co
 LdfLibrary simulate_library(const Medium& medium, const std::vector<double>& angles_deg, std::uint64_t photons,
                             std::uint64_t seed, int threads, std::string_view kernel, Progress& progress)
 {
-    // Checked before the work, though the library checks again.
     std::vector<double> sorted = angles_deg;
     std::sort(sorted.begin(), sorted.end());
-    if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end())
-        reject("angles", *std::adjacent_find(sorted.begin(), sorted.end()), "distinct angles");
+    const AngleNodes checked(sorted);  // before the work, though the library checks again
     auto results = simulate(medium, sorted, photons, seed, threads, kernel, progress);
     return LdfLibrary(medium, photons, seed, std::move(results));
 }

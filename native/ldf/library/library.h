@@ -69,7 +69,6 @@ public:
 
     // Per unit power that *entered*, around the first pole; the weights include the Fresnel transmittance at entry. At the
     // simulated angles, and between them where a beam has images.
-    std::size_t node_count() const override { return m_nodes.count(); }
     std::vector<RadialProfile> node_profiles(double albedo, Side side) const override;
     AngleWeights angle_weights(double angle_deg) const override;
 

@@ -21,7 +21,6 @@ public:
 
     // Angles at which profiles are known; `profile` is the sum of `node_profiles` with the weights that `angle_weights`
     // gives, of the harmonics that AngleWeights::harmonics leaves. For solvers that meet many angles at once.
-    virtual std::size_t node_count() const = 0;
     virtual std::vector<RadialProfile> node_profiles(double albedo, Side side) const = 0;
 
     struct AngleWeights {

@@ -272,6 +272,15 @@ Harmonics RadialProfile::cumulative(double r) const
     return out;
 }
 
+double RadialProfile::reach(double fraction) const
+{
+    const double allowed = fraction * cumulative(m_support)[0];
+    for (std::size_t k = 0; k < edge_count; ++k)
+        if (remaining(radial_edge(k))[0] <= allowed)
+            return radial_edge(k);
+    return m_support;
+}
+
 double RadialProfile::total() const
 {
     return 2.0 * pi * m_total[0];

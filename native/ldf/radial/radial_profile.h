@@ -47,6 +47,9 @@ public:
 
     double support() const override { return m_support; }
 
+    // The least edge that all but this fraction of the power stays within.
+    double reach(double fraction) const;
+
     double centre() const { return m_centre; }
     void set_centre(double centre) { m_centre = centre; }
 

@@ -29,7 +29,6 @@
 #include "base/constants.h"
 #include "ldf/samples/angular_space.h"
 #include "ldf/samples/envelope.h"
-#include "ldf/samples/sample_lookup.h"
 
 namespace beamspread {
 

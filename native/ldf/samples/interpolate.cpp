@@ -9,7 +9,6 @@
 #include "ldf/samples/angular_space.h"
 #include "ldf/samples/brightest.h"
 #include "ldf/samples/sample_grid.h"
-#include "ldf/samples/sample_lookup.h"
 
 namespace beamspread {
 

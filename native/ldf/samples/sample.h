@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "base/vec.h"
+
 namespace beamspread {
 
 inline constexpr std::size_t max_sample_side = 16384;
@@ -30,6 +32,10 @@ struct LdfSample {
     // Power that leaves within the image, per unit power incident.
     double power() const;
 };
+
+// Exitance between the centres of texels, bilinear; outside of them the value at the border: an LDF does not end with its
+// image.
+double exitance_at(const LdfSample& sample, const Vec2& place);
 
 // Throws InvalidArgument. Exitance is finite and not negative, but for undershoots of up to 10 % of the brightest
 // texel: few harmonics (ldf_image.h) and denoised simulations have them. Its integral lies in [0, 1.05].

@@ -24,7 +24,6 @@ public:
 
     // Samples have one side.
     RadialProfile profile(double angle_deg, double albedo, Side side) const override;
-    std::size_t node_count() const override { return m_angles.size(); }
     std::vector<RadialProfile> node_profiles(double albedo, Side side) const override;
     AngleWeights angle_weights(double angle_deg) const override;
     void check_angle(double angle_deg) const override;

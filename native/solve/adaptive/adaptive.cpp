@@ -6,11 +6,10 @@
 #include <iterator>
 
 #include "base/constants.h"
-#include "solve/adaptive/mask_pyramid.h"
+#include "simd/loops.h"
 #include "solve/adaptive/multilevel_sum.h"
 #include "solve/adaptive/near_radius.h"
 #include "solve/adaptive/term_sums.h"
-#include "solve/adaptive/tried_radius.h"
 #include "solve/adaptive/wide_beams.h"
 #include "solve/separable/term_row.h"
 
@@ -77,32 +76,11 @@ std::vector<Square> wide_beams(const std::vector<Square>& squares, std::size_t t
     return wide;
 }
 
-// A channel's irradiance times a power of two that makes the largest value about 1, as sums over it may be counted in
-// single precision or in whole numbers.
-struct ScaledLight {
-    int exponent = 0;
-    std::vector<float> values;
-};
-
-ScaledLight scale_light(const View2D<const float>& irradiance)
-{
-    ScaledLight scaled{0, std::vector<float>(irradiance.height * irradiance.width)};
-    float greatest = 0.0f;
-    for (std::size_t y = 0; y < irradiance.height; ++y)
-        for (std::size_t x = 0; x < irradiance.width; ++x)
-            greatest = std::max(greatest, irradiance(y, x));
-    std::frexp(greatest, &scaled.exponent);
-    for (std::size_t y = 0; y < irradiance.height; ++y)
-        for (std::size_t x = 0; x < irradiance.width; ++x)
-            scaled.values[y * irradiance.width + x] = std::ldexp(irradiance(y, x), -scaled.exponent);
-    return scaled;
-}
-
 }  // namespace
 
-std::vector<Square> even_squares(const Plane& plane, const PlaneLight& light, double tolerance)
+std::vector<Square> beam_squares(const Plane& plane, const PlaneLight& light, double tolerance)
 {
-    return MaskPyramid(plane, light).squares(tolerance_share * tolerance);
+    return even_squares(plane, light, tolerance_share * tolerance);
 }
 
 std::vector<float> solve_adaptive(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium,
@@ -112,23 +90,20 @@ std::vector<float> solve_adaptive(const Plane& plane, const PlaneLight& light, c
     const double pitch_y = metres_y / medium.mean_free_path;
     const double pitch_x = metres_x / medium.mean_free_path;
     std::vector<float> radiance(height * width);
-    const std::vector<Square> squares = even_squares(plane, light, tolerance);
+    const std::vector<Square> squares = beam_squares(plane, light, tolerance);
     if (squares.empty()) {
         progress.advance(1.0);
         return radiance;
     }
-    const ScaledLight scaled = scale_light(light.irradiance);
-    PlaneLight even = light;
-    even.irradiance = {scaled.values.data(), height, width, static_cast<std::ptrdiff_t>(width)};
-    const LightTerms terms = choose_terms(plane, even, medium, tolerance);
+    const LightTerms terms = choose_terms(plane, light, medium, tolerance);
     const std::size_t count = terms.terms.size();
     const std::vector<Square> wide = wide_beams(squares, height * width);
 
     const double distance = std::hypot(static_cast<double>(height) * pitch_y, static_cast<double>(width) * pitch_x);
-    const double near = near_radius(by_angle(plane, even, medium), std::max(pitch_y, pitch_x), distance,
+    const double near = near_radius(by_angle(plane, light, medium), std::max(pitch_y, pitch_x), distance,
                                     2.0 * tolerance_share * tolerance, progress);
     const double tried =
-        tried_radius(terms, even, squares, wide, pitch_y, pitch_x, near, tolerance_share * tolerance, progress);
+        tried_radius(terms, light, squares, wide, pitch_y, pitch_x, near, tolerance_share * tolerance, progress);
     TermSums texel_sums(terms, grid_levels(height, width, pitch_y, pitch_x, tried));
     // The kernel of wide beams is the light that one texel spreads to all offsets, seen as coarsely.
     TermSums kernel_sums(terms, grid_levels(2 * height - 1, 2 * width - 1, pitch_y, pitch_x, near));
@@ -145,12 +120,11 @@ std::vector<float> solve_adaptive(const Plane& plane, const PlaneLight& light, c
                       0.5 * work);
         }
         const Grid part = texel_sums.sum(t, std::move(beams), progress, wide.empty() ? work : 0.5 * work);
-        for (std::size_t i = 0; i < part.values.size(); ++i)
-            sum.values[i] += part.values[i];
+        add_scaled(sum.values.data(), part.values.data(), 1.0, sum.values.size());
     }
     for (std::size_t y = 0; y < height; ++y)
         std::transform(sum.row(y), sum.row(y) + width, radiance.data() + y * width,
-                       [&](double value) { return static_cast<float>(std::ldexp(inv_pi * value, scaled.exponent)); });
+                       [](double value) { return static_cast<float>(inv_pi * value); });
     return radiance;
 }
 

@@ -7,7 +7,6 @@
 
 #include "base/progress.h"
 #include "solve/adaptive/grid.h"
-#include "solve/adaptive/mask_pyramid.h"
 #include "solve/adaptive/multilevel_kernel.h"
 #include "solve/separable/light_terms.h"
 

@@ -3,8 +3,8 @@
 
 #include <vector>
 
+#include "solve/adaptive/even_squares.h"
 #include "solve/adaptive/grid.h"
-#include "solve/adaptive/mask_pyramid.h"
 
 namespace beamspread {
 

@@ -6,13 +6,16 @@
 
 #include "base/constants.h"
 #include "base/threads.h"
+#include "ldf/radial/texel_integral.h"
 #include "simd/loops.h"
-#include "solve/direct/beam_basis.h"
 
 namespace beamspread {
 
 namespace {
 
+// The kernel of a beam at (theta, beta) is the sum over nodes j and harmonics m of
+//   weight_j,m(theta) [cos(m beta) A_jm + sin(m beta) B_jm],
+// A_jm and B_jm being texel integrals of c_jm(r) cos(m phi) and c_jm(r) sin(m phi). A term is a sum of some of these.
 struct Term {
     std::size_t node;
     Harmonics cosine{};
@@ -52,14 +55,15 @@ struct Beam {
     double irradiance;
     double cos_beta;
     double sin_beta;
-    BeamBasis::Weights weights;
+    LdfSource::AngleWeights weights;  // of the nodes; none where all beams have one direction
 };
 
 // The lit texels of each row.
-std::vector<std::vector<Beam>> beam_rows(const Plane& plane, const PlaneLight& light, const BeamBasis& basis,
+std::vector<std::vector<Beam>> beam_rows(const Plane& plane, const PlaneLight& light, const LdfSource& ldf,
                                          Progress& progress)
 {
     std::vector<std::vector<Beam>> rows(plane.height);
+    const bool uniform = std::holds_alternative<OneDirection>(light.directions);
     parallel_for(plane.height, [&](std::size_t y) {
         for (std::size_t x = 0; x < plane.width; ++x) {
             const auto irradiance = static_cast<double>(light.irradiance(y, x));
@@ -67,7 +71,9 @@ std::vector<std::vector<Beam>> beam_rows(const Plane& plane, const PlaneLight& l
                 continue;
             const Vec3 direction = travel_at(plane, light.directions, y, x);
             const double beta = azimuth(direction);
-            rows[y].push_back({x, irradiance, std::cos(beta), std::sin(beta), basis.weights(direction)});
+            rows[y].push_back({x, irradiance, std::cos(beta), std::sin(beta), {}});
+            if (!uniform)
+                rows[y].back().weights = ldf.angle_weights(incidence_deg(direction));
         }
         progress.advance(0.0);
     });
@@ -98,6 +104,37 @@ void find_factors(const Beam& beam, const std::vector<RadialProfile>& profiles, 
     }
 }
 
+// A term's kernel for the row offset dy and dx = -(width - 1) .. width - 1, from texel integrals of the quadrant of offsets
+// (first .. , 0 .. width - 1) around the texel where the beam enters; the other quadrants follow by symmetry.
+std::vector<double> kernel_row(const TexelIntegrals& quadrant, const Term& term, std::size_t first, std::size_t width,
+                               std::ptrdiff_t dy)
+{
+    std::vector<double> values(2 * width - 1, 0.0);
+    double* right = values.data() + (width - 1);
+    const std::size_t start = (static_cast<std::size_t>(std::abs(dy)) - first) * width;
+    for (std::size_t m = 0; m < quadrant.harmonics; ++m) {
+        const std::size_t place = m * (quadrant.cosine.size() / quadrant.harmonics) + start;
+        // phi -> -phi for dy < 0, and phi -> pi - phi for dx < 0.
+        const double by_sine = dy < 0 ? -term.sine[m] : term.sine[m];
+        const double mirrored = m % 2 == 0 ? 1.0 : -1.0;
+        if (term.cosine[m] != 0.0) {
+            const double* a = quadrant.cosine.data() + place;
+            for (std::size_t x = 0; x < width; ++x)
+                right[x] += term.cosine[m] * a[x];
+            for (std::size_t x = 1; x < width; ++x)
+                values[width - 1 - x] += mirrored * term.cosine[m] * a[x];
+        }
+        if (by_sine != 0.0) {
+            const double* b = quadrant.sine.data() + place;
+            for (std::size_t x = 0; x < width; ++x)
+                right[x] += by_sine * b[x];
+            for (std::size_t x = 1; x < width; ++x)
+                values[width - 1 - x] -= mirrored * by_sine * b[x];
+        }
+    }
+    return values;
+}
+
 // Kernels of all terms for the row offsets first .. first + count - 1 and the opposite ones.
 class KernelRows {
 public:
@@ -105,15 +142,18 @@ public:
                const std::vector<Term>& terms, std::size_t first, std::size_t count, Progress& progress)
         : m_first(first), m_terms(terms.size()), m_rows(2 * count * m_terms)
     {
-        std::vector<QuadrantRows> nodes(profiles.size());
+        const double px = plane.pitch_x / medium.mean_free_path;
+        const double py = plane.pitch_y / medium.mean_free_path;
+        const double y0 = (static_cast<double>(first) - 0.5) * py;
+        std::vector<TexelIntegrals> nodes(profiles.size());
         parallel_for(nodes.size(), [&](std::size_t j) {
-            nodes[j] = QuadrantRows(profiles[j], plane, medium, first, count);
+            nodes[j] = integrate_texels(profiles[j], {-0.5 * px, y0, px, py, plane.width, count});
             progress.advance(0.0);
         });
         parallel_for(m_rows.size(), [&](std::size_t i) {
             const Term& term = terms[i % m_terms];
             const auto dy = static_cast<std::ptrdiff_t>(first + i / m_terms / 2);
-            nodes[term.node].row(i / m_terms % 2 == 0 ? dy : -dy, term.cosine, term.sine, m_rows[i]);
+            m_rows[i] = kernel_row(nodes[term.node], term, first, plane.width, i / m_terms % 2 == 0 ? dy : -dy);
             progress.advance(0.0);
         });
     }
@@ -142,12 +182,14 @@ std::vector<float> solve_direct(const Plane& plane, const PlaneLight& light, con
                                 Progress& progress)
 {
     const auto* one = std::get_if<OneDirection>(&light.directions);
-    const BeamBasis basis = one != nullptr ? BeamBasis::uniform(one->travel) : BeamBasis::library_nodes(*medium.ldf);
-    const std::vector<RadialProfile> profiles = basis.profiles(medium);
+    const LdfSource& ldf = *medium.ldf;
+    const std::vector<RadialProfile> profiles =
+        one != nullptr ? std::vector{ldf.profile(incidence_deg(one->travel), medium.albedo, Side::reflected)}
+                       : ldf.node_profiles(medium.albedo, Side::reflected);
     const std::vector<Term> terms = basis_terms(one, profiles);
     // Every row lights every row.
     const double work = 1.0 / (static_cast<double>(plane.height) * static_cast<double>(plane.height));
-    const std::vector<std::vector<Beam>> beams = beam_rows(plane, light, basis, progress);
+    const std::vector<std::vector<Beam>> beams = beam_rows(plane, light, ldf, progress);
 
     std::vector<double> sum(plane.width * plane.height);
     const auto add_row = [&](std::size_t target, std::size_t source, const std::vector<double>* kernels) {

@@ -1,8 +1,6 @@
 #include "solve/problem/beam_loops.h"
 
 #include <cmath>
-#include <cstdint>
-#include <limits>
 
 #include "base/platform.h"
 
@@ -39,20 +37,6 @@ BEAMSPREAD_CLONES void find_angles(const float* directions, const float* irradia
         sin_beta[i] = y * per_across;
         half_tangent[i] = across / (length - z);
     }
-}
-
-BEAMSPREAD_CLONES bool are_beams(const float* irradiance, const float* directions, std::size_t count)
-{
-    std::uint32_t faults = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-        const float x = directions[3 * i];
-        const float y = directions[3 * i + 1];
-        const float z = directions[3 * i + 2];
-        const bool finite = (irradiance[i] >= 0.0f) & (irradiance[i] <= std::numeric_limits<float>::max());
-        const bool unit = std::abs(x * x + y * y + z * z - 1.0f) < unit_tolerance;
-        faults |= (finite & ((irradiance[i] == 0.0f) | (unit & (z < 0.0f)))) ? 0u : 1u;
-    }
-    return faults == 0;
 }
 
 }  // namespace beamspread

@@ -73,29 +73,29 @@ Histogram histogram_of(const Plane& plane, const std::vector<PlaneLight>& lights
 {
     Histogram sum;
     sum.extremes.resize(lights.size());
-    parallel_ordered<Histogram>((plane.height + rows_per_item - 1) / rows_per_item,
-                                [&](std::size_t item) {
-                                    Histogram part;
-                                    part.extremes.resize(lights.size());
-                                    BeamRow row;
-                                    for (std::size_t l = 0; l < lights.size(); ++l) {
-                                        const double strength =
-                                            std::accumulate(lights[l].color.begin(), lights[l].color.end(), 0.0);
-                                        const std::size_t end = std::min(plane.height, (item + 1) * rows_per_item);
-                                        for (std::size_t y = item * rows_per_item; y < end && strength > 0.0; ++y)
-                                            if (row.read(plane, lights[l], {y, 0, plane.width}))
-                                                add_row(row, y, strength, part, part.extremes[l]);
-                                    }
-                                    return part;
-                                },
-                                [&](std::size_t, const Histogram& part) {
-                                    for (std::size_t i = 0; i < bin_count; ++i) {
-                                        sum.light[i] += part.light[i];
-                                        sum.beams[i] += part.beams[i];
-                                    }
-                                    for (std::size_t l = 0; l < lights.size(); ++l)
-                                        merge(part.extremes[l], sum.extremes[l]);
-                                });
+    const auto read_rows = [&](std::size_t item) {
+        Histogram part;
+        part.extremes.resize(lights.size());
+        BeamRow row;
+        for (std::size_t l = 0; l < lights.size(); ++l) {
+            const double strength = std::accumulate(lights[l].color.begin(), lights[l].color.end(), 0.0);
+            const std::size_t end = std::min(plane.height, (item + 1) * rows_per_item);
+            for (std::size_t y = item * rows_per_item; y < end && strength > 0.0; ++y)
+                if (row.read(plane, lights[l], {y, 0, plane.width}))
+                    add_row(row, y, strength, part, part.extremes[l]);
+        }
+        return part;
+    };
+    parallel_ordered((plane.height + rows_per_item - 1) / rows_per_item, [&](std::size_t item) {
+        return [&, part = read_rows(item)] {
+            for (std::size_t i = 0; i < bin_count; ++i) {
+                sum.light[i] += part.light[i];
+                sum.beams[i] += part.beams[i];
+            }
+            for (std::size_t l = 0; l < lights.size(); ++l)
+                merge(part.extremes[l], sum.extremes[l]);
+        };
+    });
     return sum;
 }
 

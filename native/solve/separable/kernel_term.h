@@ -29,7 +29,4 @@ struct ScaledProfile {
     double reach = 0.0;           // metres: what the profile holds farther out is left out
 };
 
-// Radius in metres outside which the profile holds no more than this fraction of its power.
-double reach(const RadialProfile& profile, double mean_free_path, double fraction);
-
 }  // namespace beamspread

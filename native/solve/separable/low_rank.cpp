@@ -214,7 +214,7 @@ LowRankBasis KernelDecomposition::basis(const std::vector<std::size_t>& chosen, 
         ranks = std::max(ranks, m_terms[t].rank + 1);
     for (std::size_t k = 0; k < m_media.size(); ++k) {
         const ScaledProfile empty{RadialProfile(), m_media[k].mean_free_path,
-                                  reach(m_angular->media[k].mean, m_media[k].mean_free_path, beyond)};
+                                  m_angular->media[k].mean.reach(beyond) * m_media[k].mean_free_path};
         basis.profiles.emplace_back(ranks, empty);
     }
     // [medium][rank][node]

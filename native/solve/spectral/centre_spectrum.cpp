@@ -178,7 +178,7 @@ void CentreSpectrum::transform(Columns& columns, std::size_t column, std::size_t
         line[0] = rows[0];
         std::transform(rows + 1, rows + m_height, line + 1, [](float row) { return 2.0f * row; });
     }
-    real_to_half(columns.lines.data(), columns.half.data(), count, m_padded_height);
+    fft().real_to_half(columns.lines.data(), columns.half.data(), count, m_padded_height);
     for (std::size_t i = 0; i < count; ++i) {
         const Complex* half = columns.half.data() + i * m_frequencies;
         const bool sine = columns.sums[first + i]->sine;

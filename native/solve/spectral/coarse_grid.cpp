@@ -8,12 +8,11 @@
 
 namespace beamspread {
 
-std::vector<std::vector<float>> CoarseGrid::spread(const MakeLightRow& light, std::size_t first, std::size_t count,
-                                                   Progress& progress, double work) const
+std::vector<float> CoarseGrid::spread(const MakeLightRow& light, std::size_t first, std::size_t count,
+                                      Progress& progress, double work) const
 {
     struct RowScratch {
-        std::unique_ptr<LightRow> light;
-        std::vector<float> texels;
+        LightRow light;
         std::vector<float> nodes;
         std::vector<float> line;
     };
@@ -21,7 +20,7 @@ std::vector<std::vector<float>> CoarseGrid::spread(const MakeLightRow& light, st
     const std::size_t stride = m_x.nodes();
     const std::size_t step = m_y.step();
     const std::size_t items = (m_height + step - 1) / step;
-    std::vector<std::vector<float>> result(count, std::vector<float>(nodes(), 0.0f));
+    std::vector<float> result(count * nodes(), 0.0f);
     // The texels of an item share the rows of nodes that their light goes to, [term][row][node].
     const auto spread_rows = [&](std::size_t item) {
         std::vector<float> rows(count * spline_order * stride, 0.0f);
@@ -29,14 +28,12 @@ std::vector<std::vector<float>> CoarseGrid::spread(const MakeLightRow& light, st
         RowScratch& scratch = *lease;
         if (!scratch.light)
             scratch.light = light();
-        scratch.texels.resize(m_width);
         scratch.nodes.resize(stride);
         for (std::size_t y = item * step; y < std::min(m_height, (item + 1) * step); ++y) {
             const float* weights = m_y.weights(y);
-            scratch.light->start({y, 0, m_width}, first, count);
+            const TermValues texels = scratch.light({y, 0, m_width}, first, count);
             for (std::size_t t = 0; t < count; ++t) {
-                scratch.light->evaluate(first + t, scratch.texels.data());
-                m_x.spread(scratch.texels.data(), scratch.nodes.data(), scratch.line);
+                m_x.spread(texels.values + t * texels.stride, scratch.nodes.data(), scratch.line);
                 for (std::size_t row = 0; row < spline_order; ++row)
                     add_scaled(rows.data() + (t * spline_order + row) * stride, scratch.nodes.data(), weights[row],
                                stride);
@@ -45,12 +42,13 @@ std::vector<std::vector<float>> CoarseGrid::spread(const MakeLightRow& light, st
         progress.advance(work / static_cast<double>(items));
         return rows;
     };
-    const auto add = [&](std::size_t item, const std::vector<float>& rows) {
-        for (std::size_t t = 0; t < count; ++t)
-            add_scaled(result[t].data() + item * stride, rows.data() + t * spline_order * stride, 1.0f,
-                       spline_order * stride);
-    };
-    parallel_ordered<std::vector<float>>(items, spread_rows, add);
+    parallel_ordered(items, [&](std::size_t item) {
+        return [&, item, rows = spread_rows(item)] {
+            for (std::size_t t = 0; t < count; ++t)
+                add_scaled(result.data() + t * nodes() + item * stride, rows.data() + t * spline_order * stride, 1.0f,
+                           spline_order * stride);
+        };
+    });
     return result;
 }
 

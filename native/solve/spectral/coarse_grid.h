@@ -21,8 +21,8 @@ public:
     std::size_t nodes() const { return m_x.nodes() * m_y.nodes(); }
 
     // `count` terms of the light from `first` on, [term][node]. Advances the progress by `work`.
-    std::vector<std::vector<float>> spread(const MakeLightRow& light, std::size_t first, std::size_t count,
-                                           Progress& progress, double work) const;
+    std::vector<float> spread(const MakeLightRow& light, std::size_t first, std::size_t count, Progress& progress,
+                              double work) const;
 
     struct Scratch {
         std::vector<float> nodes;

@@ -1,9 +1,9 @@
 #include "solve/spectral/convolution.h"
 
 #include <algorithm>
+#include <array>
 
 #include "base/threads.h"
-#include "fft/complex_loops.h"
 #include "simd/loops.h"
 
 namespace beamspread {
@@ -112,16 +112,17 @@ void Convolution::transform_light(const Tile& tile, std::size_t first, std::size
             scratch.rows.push_back(tile.light());
         scratch.lines.resize(rows_per_item * stride);
         scratch.half.resize(rows_per_item * columns);
+        std::array<TermValues, rows_per_item> light_rows{};
         for (std::size_t y = 0; y < rows; ++y)
-            scratch.rows[y]->start({tile.window_y.first + y0 + y, tile.window_x.first, tile.window_x.count}, first,
-                                   count);
+            light_rows[y] =
+                scratch.rows[y]({tile.window_y.first + y0 + y, tile.window_x.first, tile.window_x.count}, first, count);
         for (std::size_t t = 0; t < count; ++t) {
             for (std::size_t y = 0; y < rows; ++y) {
                 float* line = scratch.lines.data() + y * stride;
-                scratch.rows[y]->evaluate(first + t, line);
+                std::copy_n(light_rows[y].values + t * light_rows[y].stride, tile.window_x.count, line);
                 std::fill(line + tile.window_x.count, line + stride, 0.0f);
             }
-            real_to_half(scratch.lines.data(), scratch.half.data(), rows, stride);
+            fft().real_to_half(scratch.lines.data(), scratch.half.data(), rows, stride);
             for (std::size_t x = 0; x < columns; ++x) {
                 Complex* column = light.column(t, x) + y0;
                 for (std::size_t y = 0; y < rows; ++y)
@@ -168,7 +169,7 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
                     std::copy_n(light.column(first + t, x), tile.window_y.count, line);
                     std::fill(line + tile.window_y.count, line + height, Complex());
                 }
-                complex_in_place(scratch.lines.data(), batch, height, true);
+                fft().complex_in_place(scratch.lines.data(), batch, height, true);
                 const std::size_t begin = first_part[first * results.count()];
                 const std::size_t end = first_part[(first + batch) * results.count()];
                 m_spectra.select(x - item * columns_per_item, begin, end - begin, scratch.centres);
@@ -187,7 +188,7 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
                 const Complex* odd = even + height;
                 for (std::size_t f = 0; f < height; ++f)  // -i times the odd ones
                     even[f] += Complex(odd[f].imag(), -odd[f].real());
-                complex_in_place(even, 1, height, false);
+                fft().complex_in_place(even, 1, height, false);
                 Complex* result = results.column(k, x);
                 for (std::size_t y = 0; y < tile.y.count; ++y)
                     result[y] = (first_term > 0 ? result[y] : Complex()) + even[offset + y];
@@ -217,7 +218,7 @@ void Convolution::store_result(const Tile& tile, std::size_t medium, ColumnSpect
             for (std::size_t y = 0; y < rows; ++y)
                 scratch.half[y * columns + x] = column[y];
         }
-        half_to_real(scratch.half.data(), scratch.lines.data(), rows, stride);
+        fft().half_to_real(scratch.half.data(), scratch.lines.data(), rows, stride);
         for (std::size_t y = 0; y < rows; ++y)
             tile.store(medium, {tile.y.first + y0 + y, tile.x.first, tile.x.count},
                        scratch.lines.data() + y * stride + offset, factor);

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <functional>
-#include <memory>
 #include <span>
 #include <vector>
 
@@ -15,25 +14,15 @@
 
 namespace beamspread {
 
-// The light of a row of nodes, term after term.
-class LightRow {
-public:
-    virtual ~LightRow() = default;
-
-    // Terms [first, first + count) will be asked for.
-    virtual void start(const RowSpan& span, std::size_t first, std::size_t count) = 0;
-
-    virtual void evaluate(std::size_t t, float* values) = 0;
-
-protected:
-    LightRow() = default;
-    LightRow(const LightRow&) = default;
-    LightRow(LightRow&&) = default;
-    LightRow& operator=(const LightRow&) = default;
-    LightRow& operator=(LightRow&&) = default;
+// The light of some nodes of a row, one term after the other, each `stride` values after the one before.
+struct TermValues {
+    const float* values;
+    std::size_t stride;
 };
 
-using MakeLightRow = std::function<std::unique_ptr<LightRow>()>;
+// Terms [first, first + count) of a row's light, which stay until the next row is asked for.
+using LightRow = std::function<TermValues(const RowSpan& span, std::size_t first, std::size_t count)>;
+using MakeLightRow = std::function<LightRow()>;
 
 // Takes a row of a result: `values` times `factor`. Called from several threads at once. The values may
 // be changed.
@@ -68,7 +57,7 @@ private:
     };
 
     struct RowScratch {
-        std::vector<std::unique_ptr<LightRow>> rows;
+        std::vector<LightRow> rows;
         std::vector<float> lines;
         std::vector<Complex> half;
     };

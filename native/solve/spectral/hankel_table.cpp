@@ -177,7 +177,7 @@ void HankelTable::add_profile(const ScaledProfile& scaled, std::size_t index, co
             line[n] = static_cast<float>(2.0 * sample_step * projection(static_cast<double>(n) * sample_step, m));
         line[0] *= 0.5f;
         std::vector<Complex> half(length / 2 + 1);
-        real_to_half(line.data(), half.data(), 1, length);
+        fft().real_to_half(line.data(), half.data(), 1, length);
         float* values = m_table.data() + column(index, m);
         for (std::size_t i = 0; i + 3 < m_rows; ++i)
             values[(i + 1) * m_columns] = m % 2 == 0 ? half[i].real() : -half[i].imag();

@@ -2,19 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
-#include <optional>
 #include <span>
 #include <utility>
 
 #include "base/constants.h"
-#include "base/pool.h"
 #include "base/threads.h"
 #include "simd/loops.h"
-#include "solve/separable/term_row.h"
-#include "solve/spectral/coarse_grid.h"
 #include "solve/spectral/convolution.h"
-#include "solve/spectral/padded_plane.h"
 #include "solve/term_choice/choose_terms.h"
 
 namespace beamspread {
@@ -29,44 +23,20 @@ constexpr double centre_deviation = 3.0;
 // the brightest. Half and twice: the same errors; ten times: beside a lamp's shadow twice as large.
 constexpr double most_beyond = 1e-5;
 
-// Light on the texels themselves.
-class TexelRow final : public LightRow {
-public:
-    explicit TexelRow(const LightTerms& terms) : m_terms(terms) {}
-    void start(const RowSpan& span, std::size_t first, std::size_t count) override
-    {
-        m_row.start(m_terms, span, first, count);
-        m_width = span.width;
-    }
-    void evaluate(std::size_t t, float* values) override { std::copy_n(m_row.values(t), m_width, values); }
+double nodes(const PaddedPlane& plane)
+{
+    return static_cast<double>(plane.padded_width) * static_cast<double>(plane.padded_height);
+}
 
-private:
-    const LightTerms& m_terms;
-    TermRow m_row;
-    std::size_t m_width = 0;
-};
-
-// Light on the nodes of a coarse grid.
-class NodeRow final : public LightRow {
-public:
-    NodeRow(const std::vector<std::vector<float>>& terms, std::size_t width) : m_terms(terms), m_width(width) {}
-    void start(const RowSpan& span, std::size_t /*first*/, std::size_t /*count*/) override { m_span = span; }
-    void evaluate(std::size_t t, float* values) override
-    {
-        std::copy_n(m_terms[t].data() + m_span.y * m_width + m_span.x, m_span.width, values);
-    }
-
-private:
-    const std::vector<std::vector<float>>& m_terms;
-    std::size_t m_width;
-    RowSpan m_span{};
-};
-
-// What light does beyond the reach of the texels' kernels, in the scale of the texels' sums before their own factor.
-struct CoarseLuminance {
-    CoarseGrid grid;
-    std::vector<std::vector<float>> nodes;  // [result]
-};
+MakeLightRow texel_rows(const LightTerms& terms)
+{
+    return [&terms] {
+        return [&terms, row = TermRow()](const RowSpan& span, std::size_t first, std::size_t count) mutable {
+            row.start(terms, span, first, count);
+            return TermValues{row.values(first), span.width};
+        };
+    };
+}
 
 LightTerms chosen_terms(const Problem& problem, Progress& progress)
 {
@@ -78,156 +48,102 @@ LightTerms chosen_terms(const Problem& problem, Progress& progress)
 
 }  // namespace
 
-class SpectralField::Solver {
-public:
-    Solver(const Problem& problem, Progress& progress)
-        : m_problem(problem),
-          m_terms(chosen_terms(problem, progress)),
-          m_levels(choose_levels(problem.plane, m_terms.profiles,
-                                 {centre_deviation, problem.memory, m_terms.terms.size(), m_terms.sets.results.size(),
-                                  problem.coarsening}))
-    {
-    }
-
-    std::size_t terms() const { return m_terms.terms.size(); }
-
-    void add(const PlaneLight& light)
-    {
-        parallel_for(m_problem.plane.height, [&](std::size_t y) {
-            const auto lease = m_sums.lend();
-            (*lease).add(m_terms, light, y);
-        });
-    }
-
-    void add(const RayBeams& rays, const std::vector<double>& color, bool is_colored)
-    {
-        const auto lease = m_sums.lend();
-        (*lease).add(m_terms, rays, color, is_colored);
-    }
-
-    void clear()
-    {
-        for (std::vector<float>& moments : m_terms.moments)
-            std::fill(moments.begin(), moments.end(), 0.0f);
-    }
-
-    void solve(Progress& progress, float* luminance)
-    {
-        if (m_terms.terms.empty()) {  // nothing is lit
-            std::fill_n(luminance, m_problem.plane.texels() * m_problem.channels.size(), 0.0f);
-            return;
-        }
-        double share = 1.0;  // of the texels in the work
-        std::optional<CoarseLuminance> coarse;
-        if (m_levels.coarse) {
-            share = nodes(m_levels.texels.plane);
-            share /= share + nodes(m_levels.coarse->plane);
-            coarse.emplace(solve_coarse(*m_levels.coarse, progress, 1.0 - share));
-        }
-        if (!m_spectra)
-            m_spectra.emplace(m_levels.texels, m_terms.profiles, m_levels.outside_centre);
-        Convolution convolution(*m_spectra, m_terms.terms, m_terms.sets.results.size(), m_problem.memory);
-        const auto store = [&](std::size_t result, const RowSpan& span, float* values, double factor) {
-            if (coarse) {
-                const auto lease = m_scratch.lend();
-                coarse->grid.add_interpolated(coarse->nodes[result], span, values, *lease);
-            }
-            store_row(result, span, values, factor, luminance);
-        };
-        convolution.solve(texel_rows(), store, progress, share);
-    }
-
-private:
-    static double nodes(const PaddedPlane& plane)
-    {
-        return static_cast<double>(plane.padded_width) * static_cast<double>(plane.padded_height);
-    }
-
-    MakeLightRow texel_rows() const
-    {
-        return [this] { return std::make_unique<TexelRow>(m_terms); };
-    }
-
-    CoarseLuminance solve_coarse(const Level& level, Progress& progress, double work)
-    {
-        const PaddedPlane& plane = level.plane;
-        const CoarseGrid grid(plane, m_problem.plane.width, m_problem.plane.height);
-        const std::size_t results = m_terms.sets.results.size();
-        std::vector<std::vector<float>> sums(results, std::vector<float>(grid.nodes(), 0.0f));
-        if (!m_coarse_spectra)
-            m_coarse_spectra.emplace(level, m_terms.profiles, std::nullopt);
-        const double size = nodes(m_levels.texels.plane);
-        const auto add = [&](std::size_t result, const RowSpan& span, const float* values, double factor) {
-            add_scaled(sums[result].data() + span.y * plane.width + span.x, values, static_cast<float>(factor * size),
-                       span.width);
-        };
-        const std::size_t terms = m_terms.terms.size();
-        // Beside the light on the nodes its spectra, which are as large, and those of the results.
-        const std::size_t for_light = m_problem.memory / 4;
-        const std::size_t for_spectra = m_problem.memory / 2;
-        const std::size_t at_once = std::clamp<std::size_t>(for_light / (grid.nodes() * sizeof(float)), 1, terms);
-        for (std::size_t first = 0; first < terms; first += at_once) {
-            const std::size_t count = std::min(at_once, terms - first);
-            const double part = work * static_cast<double>(count) / static_cast<double>(terms);
-            const auto light = grid.spread(texel_rows(), first, count, progress, 0.5 * part);
-            Convolution convolution(*m_coarse_spectra, std::span(m_terms.terms).subspan(first, count), results,
-                                    for_spectra);
-            const auto rows = [&] { return std::make_unique<NodeRow>(light, plane.width); };
-            convolution.solve(rows, add, progress, 0.5 * part);
-        }
-        return {grid, std::move(sums)};
-    }
-
-    void store_row(std::size_t result, const RowSpan& span, const float* values, double factor, float* luminance) const
-    {
-        const std::size_t channels = m_problem.channels.size();
-        for (const ChannelSets::Member& member : m_terms.sets.results[result].members) {
-            const auto scaled = static_cast<float>(factor * inv_pi * member.factor);
-            float* out = luminance + (span.y * m_problem.plane.width + span.x) * channels + member.channel;
-            for (std::size_t x = 0; x < span.width; ++x)
-                out[x * channels] = scaled * values[x];
-        }
-    }
-
-    Problem m_problem;
-    LightTerms m_terms;
-    Levels m_levels;
-    std::optional<KernelSpectra> m_spectra;  // of the texels, kept for the next time
-    std::optional<KernelSpectra> m_coarse_spectra;
-    Pool<MomentSum> m_sums;
-    Pool<CoarseGrid::Scratch> m_scratch;
-};
-
 SpectralField::SpectralField(const Problem& problem, Progress& progress)
-    : m_solver(std::make_unique<Solver>(problem, progress))
+    : m_problem(problem),
+      m_terms(chosen_terms(problem, progress)),
+      m_levels(
+          choose_levels(problem.plane, m_terms.profiles,
+                        {centre_deviation, problem.memory, terms(), m_terms.sets.results.size(), problem.coarsening}))
 {
 }
 
-SpectralField::~SpectralField() = default;
-
 void SpectralField::add(const PlaneLight& light)
 {
-    m_solver->add(light);
+    parallel_for(m_problem.plane.height, [&](std::size_t y) {
+        const auto lease = m_sums.lend();
+        (*lease).add(m_terms, light, y);
+    });
 }
 
 void SpectralField::add(const RayBeams& rays, const std::vector<double>& color, bool is_colored)
 {
-    m_solver->add(rays, color, is_colored);
-}
-
-void SpectralField::solve(Progress& progress, float* luminance)
-{
-    m_solver->solve(progress, luminance);
+    const auto lease = m_sums.lend();
+    (*lease).add(m_terms, rays, color, is_colored);
 }
 
 void SpectralField::clear()
 {
-    m_solver->clear();
+    for (std::vector<float>& moments : m_terms.moments)
+        std::fill(moments.begin(), moments.end(), 0.0f);
 }
 
-std::size_t SpectralField::terms() const
+void SpectralField::solve(Progress& progress, float* luminance)
 {
-    return m_solver->terms();
+    if (m_terms.terms.empty()) {  // nothing is lit
+        std::fill_n(luminance, m_problem.plane.texels() * m_problem.channels.size(), 0.0f);
+        return;
+    }
+    double share = 1.0;  // of the texels in the work
+    std::optional<CoarseLuminance> coarse;
+    if (m_levels.coarse) {
+        share = nodes(m_levels.texels.plane);
+        share /= share + nodes(m_levels.coarse->plane);
+        coarse.emplace(solve_coarse(*m_levels.coarse, progress, 1.0 - share));
+    }
+    if (!m_spectra)
+        m_spectra.emplace(m_levels.texels, m_terms.profiles, m_levels.outside_centre);
+    Convolution convolution(*m_spectra, m_terms.terms, m_terms.sets.results.size(), m_problem.memory);
+    const auto store = [&](std::size_t result, const RowSpan& span, float* values, double factor) {
+        if (coarse) {
+            const auto lease = m_scratch.lend();
+            coarse->grid.add_interpolated(coarse->nodes[result], span, values, *lease);
+        }
+        store_row(result, span, values, factor, luminance);
+    };
+    convolution.solve(texel_rows(m_terms), store, progress, share);
+}
+
+SpectralField::CoarseLuminance SpectralField::solve_coarse(const Level& level, Progress& progress, double work)
+{
+    const PaddedPlane& plane = level.plane;
+    const CoarseGrid grid(plane, m_problem.plane.width, m_problem.plane.height);
+    const std::size_t results = m_terms.sets.results.size();
+    std::vector<std::vector<float>> sums(results, std::vector<float>(grid.nodes(), 0.0f));
+    if (!m_coarse_spectra)
+        m_coarse_spectra.emplace(level, m_terms.profiles, std::nullopt);
+    const double size = nodes(m_levels.texels.plane);
+    const auto add = [&](std::size_t result, const RowSpan& span, const float* values, double factor) {
+        add_scaled(sums[result].data() + span.y * plane.width + span.x, values, static_cast<float>(factor * size),
+                   span.width);
+    };
+    // Beside the light on the nodes its spectra, which are as large, and those of the results.
+    const std::size_t for_light = m_problem.memory / 4;
+    const std::size_t for_spectra = m_problem.memory / 2;
+    const std::size_t at_once = std::clamp<std::size_t>(for_light / (grid.nodes() * sizeof(float)), 1, terms());
+    for (std::size_t first = 0; first < terms(); first += at_once) {
+        const std::size_t count = std::min(at_once, terms() - first);
+        const double part = work * static_cast<double>(count) / static_cast<double>(terms());
+        const std::vector<float> light = grid.spread(texel_rows(m_terms), first, count, progress, 0.5 * part);
+        Convolution convolution(*m_coarse_spectra, std::span(m_terms.terms).subspan(first, count), results,
+                                for_spectra);
+        const auto row = [&](const RowSpan& span, std::size_t term, std::size_t /*count*/) {
+            return TermValues{light.data() + term * grid.nodes() + span.y * plane.width + span.x, grid.nodes()};
+        };
+        convolution.solve([&] { return row; }, add, progress, 0.5 * part);
+    }
+    return {grid, std::move(sums)};
+}
+
+void SpectralField::store_row(std::size_t result, const RowSpan& span, const float* values, double factor,
+                              float* luminance) const
+{
+    const std::size_t channels = m_problem.channels.size();
+    for (const ChannelSets::Member& member : m_terms.sets.results[result].members) {
+        const auto scaled = static_cast<float>(factor * inv_pi * member.factor);
+        float* out = luminance + (span.y * m_problem.plane.width + span.x) * channels + member.channel;
+        for (std::size_t x = 0; x < span.width; ++x)
+            out[x * channels] = scaled * values[x];
+    }
 }
 
 void solve_spectral(const Problem& problem, Progress& progress, float* luminance)

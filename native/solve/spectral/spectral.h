@@ -2,12 +2,16 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
+#include <optional>
 #include <vector>
 
+#include "base/pool.h"
 #include "base/progress.h"
 #include "solve/problem/problem.h"
 #include "solve/separable/term_row.h"
+#include "solve/spectral/coarse_grid.h"
+#include "solve/spectral/kernel_spectra.h"
+#include "solve/spectral/padded_plane.h"
 
 namespace beamspread {
 
@@ -21,9 +25,6 @@ public:
     // Chooses the terms. `problem.lights` are kept; with light to come only those of one direction are, see
     // `light_terms`. What they look at must outlive the field.
     SpectralField(const Problem& problem, Progress& progress);
-    ~SpectralField();
-    SpectralField(const SpectralField&) = delete;
-    SpectralField& operator=(const SpectralField&) = delete;
 
     // Adds light to that to come, see `MomentSum`. Rays of different rows may be added at the same time.
     void add(const PlaneLight& light);
@@ -36,11 +37,25 @@ public:
     void clear();
 
     // How many there are; what is solved costs in proportion to them.
-    std::size_t terms() const;
+    std::size_t terms() const { return m_terms.terms.size(); }
 
 private:
-    class Solver;
-    std::unique_ptr<Solver> m_solver;
+    // What light does beyond the reach of the texels' kernels, in the scale of the texels' sums before their own factor.
+    struct CoarseLuminance {
+        CoarseGrid grid;
+        std::vector<std::vector<float>> nodes;  // [result]
+    };
+
+    CoarseLuminance solve_coarse(const Level& level, Progress& progress, double work);
+    void store_row(std::size_t result, const RowSpan& span, const float* values, double factor, float* luminance) const;
+
+    Problem m_problem;
+    LightTerms m_terms;
+    Levels m_levels;
+    std::optional<KernelSpectra> m_spectra;  // of the texels, kept for the next time
+    std::optional<KernelSpectra> m_coarse_spectra;
+    Pool<MomentSum> m_sums;
+    Pool<CoarseGrid::Scratch> m_scratch;
 };
 
 void solve_spectral(const Problem& problem, Progress& progress, float* luminance);
