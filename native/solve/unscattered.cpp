@@ -18,7 +18,7 @@ namespace {
 
 // Against 8192, the worst texel of a lamp's light is off by 1.4e-4 of the brightest.
 constexpr std::size_t table_steps = 1024;
-constexpr std::size_t rows_per_strip = 64;
+constexpr std::size_t rows_per_strip = 64;  // with 16 to 256, times are the same
 
 // Exits with less than this share of the incident power at any angle are left out: of a slab of .25 that leaves 1.5e-6
 // of the brightest texel, ten times as much 4e-4, a hundred times 6e-4, in the same time.

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from beamspread import LdfSample, Medium, simulate
+from beamspread import LdfSample, Medium, convolve, simulate
+from scipy.signal import fftconvolve
 
 
 @pytest.fixture(scope="module")
@@ -118,3 +119,24 @@ def test_samples_take_their_diameter_with_them(half_space):
 def test_bad_diameters(half_space, diameter):
     with pytest.raises(ValueError, match="'beam_diameter' is"):
         half_space.image(40, 0.9, 21, 0.3, beam_diameter=diameter)
+
+
+@pytest.mark.parametrize("ior", [1.2, 1.4])
+def test_light_on_slabs_is_the_sum_of_its_beams(ior):
+    """Around all the places where a thin slab's light comes from, which solvers see around one of them.
+
+    The disk that each beam lights is known to 2e-3 here. Where less than half a mean free path from that place had four
+    steps of radius per octave, texels were off by 1e-2 and 2e-2.
+    """
+    angle, albedo, size, pitch = 40, 0.9, 96, 0.005
+    slab = simulate(Medium(0.8, ior, 0.3), [0, 20, 40, 60], 20000)
+    x = (np.arange(size) - size / 2) * pitch
+    spots = np.exp(-0.5 * (x[:, None] ** 2 + (x + 0.12) ** 2) / 0.03**2)
+    spots /= spots.sum()
+    irradiance = fftconvolve(spots, disk_weights(2 * pitch, pitch), mode="same") / pitch**2
+    direction = np.array([math.sin(math.radians(angle)), 0, -math.cos(math.radians(angle))], np.float32)
+    light = np.maximum(irradiance, 0).astype(np.float32)
+    luminance = convolve(light, direction, slab, albedo, 1.0, pitch, tolerance=1e-4)[..., 0]
+    beam = slab.image(angle, albedo, 2 * size + 1, pitch, beam_diameter=4 * pitch)
+    expected = fftconvolve(spots, beam, mode="full")[size : 2 * size, size : 2 * size]
+    assert np.abs(np.pi * luminance - expected).max() < 5e-3 * expected.max()

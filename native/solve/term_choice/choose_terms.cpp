@@ -36,7 +36,8 @@ constexpr double rounding = 5e-6;
 // small, and off by about this. Half and twice choose the same.
 constexpr double least_asymmetry = 0.01;
 
-// Of many lights so many stand for all: the brightest, whose light changes most from texel to texel.
+// Of many lights so many stand for all: the brightest, whose light changes most from texel to texel. Of 60 lamps of random
+// colours 2 and 8 choose the same terms, in the same time.
 constexpr std::size_t most_lights = 4;
 
 using Readings = std::vector<std::vector<float>>;  // [texel][result and function]
