@@ -367,6 +367,8 @@ class EndlessJob:
     def colored(self, progress):
         return self, progress
 
+    lit = colored
+
     def run(self, progress):
         while progress(0.5):
             pass

@@ -19,7 +19,7 @@ from ..registration import all_or_nothing, classes, handlers
 from . import stale
 from .fingerprint import Parts
 from .picture import render_picture, show_by_eevee
-from .prepare import prepare
+from .prepare import Preparation
 from .state import state
 
 
@@ -79,7 +79,8 @@ def _prepare(depsgraph, obj, passes, size: tuple[int, int]) -> list[Bake]:
         settings = depsgraph.scene.beamspread.for_bake()
         for target in targets:
             _check_active_image(bpy.data.materials[target.material_name], settings)
-        bakes = prepare(depsgraph, targets, settings, size=size, copy=fillings.copy) or find_misplaced([obj])
+        preparation = Preparation(depsgraph, targets, settings, size=size, copy=fillings.copy)
+        bakes = [preparation.bake(target) for target in targets] or find_misplaced([obj])
     except Exception as error:  # noqa: BLE001 - Blender would swallow it
         return [Bake(Target(obj.name), error=sentence(error))]
     return bakes or [Bake(Target(obj.name), error=NOTHING_FOUND)]

@@ -37,20 +37,6 @@ def prepare_scene(
     return map(read_scene(context, targets, settings, resolution).bake, targets)
 
 
-def prepare(
-    depsgraph,
-    targets: list[Target],
-    settings: BakeSettings,
-    resolution: int | None = None,
-    size: tuple[int, int] | None = None,
-    visible: set[str] | None = None,
-    copy: CopyForCycles | None = None,
-) -> list[Bake]:
-    """A bake for each target; see `Preparation`."""
-    preparation = Preparation(depsgraph, targets, settings, resolution, size, visible, copy)
-    return [preparation.bake(target) for target in targets]
-
-
 def read_scene(context, targets: list[Target], settings: BakeSettings, resolution: int | None = None) -> Preparation:
     """Read what bakes of the targets need, as the scene would render at its current frame.
 

@@ -66,10 +66,9 @@ def as_rendered(view_layer):
         for collection in collections:
             collection.update_tag()  # of what it shows where one within is hidden, or no longer
 
-    view_layer.update()  # of objects linked since the last time it knows nothing
     objects = list(view_layer.objects)
     # Lists, since what is hidden or not makes collections look for their objects anew.
-    collections = instanced_collections(objects)
+    collections = instanced_collections(view_layer.id_data.objects)
     parts = [part for collection in collections for part in (collection, *collection.children_recursive)]
     instanced = [obj for collection in collections for obj in collection.all_objects]
     hidden = [obj for obj in objects if obj.hide_get(view_layer=view_layer)]

@@ -11,11 +11,12 @@
 namespace beamspread {
 
 // 2^fine_bits edges per octave between these powers of two, mean free paths. Lamps .1 to 1.8 mean free paths above slabs of
-// .3 to 4, against 2^7 from -7 on: the worst texel is off by 5e-3 of the brightest, with as many edges of 2^5 from -1 on by
-// 2.3e-2, with 2^6 by 1.7e-3; but then lamps over half-spaces take 1.7 times as long. Up to 2^4 mean free paths changes nothing.
-inline constexpr int min_fine_exponent = -5;
+// .3 to 4 with an ior above 1, against 2^7 from -7 on: the worst texel is off by 2.3e-2 of the brightest; with as many edges
+// of 2^4 from -5 on by 5e-3, but then errors over half-spaces reach 1.01 times the tolerance; with 2^5 from -3 on lamps there
+// take 1.1 to 1.3 times as long. Up to 2^4 mean free paths changes nothing.
+inline constexpr int min_fine_exponent = -1;
 inline constexpr int max_fine_exponent = 2;
-inline constexpr int fine_bits = 4;
+inline constexpr int fine_bits = 5;
 inline constexpr double fine_end = 1 << max_fine_exponent;
 
 // The first of the finer edges, their number, and of how many edges of bins they take the place.
