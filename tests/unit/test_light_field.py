@@ -226,4 +226,4 @@ def test_memory_does_not_grow_with_the_lights():
         int(subprocess.run([sys.executable, "-c", MEMORY, count, folder], capture_output=True, check=True).stdout)
         for count in ("20", "85")
     ]
-    assert peaks[1] - peaks[0] < 44 * 1024
+    assert peaks[1] - peaks[0] < 32 * 1024
