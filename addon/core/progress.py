@@ -6,8 +6,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+import numpy as np
+
+from .native import native
+
 # Takes the fraction done, 0..1. Answering False (or NumPy's False_) stops the work, which then raises Cancelled; any
-# other answer goes on, also None and 0. The native module alone reads the answers: everything here passes them on.
+# other answer goes on, also None and 0. Only the native module and `ask` read the answers: all else passes them on.
 Progress = Callable[[float], object]
 
 
@@ -32,6 +36,13 @@ class _Stage:
 
     def say(self, words: str) -> None:
         say(self._progress, words)
+
+
+def ask(progress: Progress | None, fraction: float) -> None:
+    """Tell how much is done, where Python does the work itself; raises Cancelled if that is to stop."""
+    answer = None if progress is None else progress(fraction)
+    if isinstance(answer, bool | np.bool_) and not answer:
+        raise native.Cancelled("the bake was cancelled")
 
 
 def say(progress: Progress | None, words: str) -> None:

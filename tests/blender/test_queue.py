@@ -52,6 +52,25 @@ def turns(made):
     return found
 
 
+def test_to_read_the_scene_changes_no_material():
+    """Views and material icons would be drawn anew: where drawing is slow, the window would stand still meanwhile."""
+    plane("Known", **KNOWN)
+    changed = []
+
+    def note(_scene, depsgraph):
+        changed.extend(update.id.name for update in depsgraph.updates if update.is_updated_shading)
+
+    bpy.app.handlers.depsgraph_update_post.append(note)
+    try:
+        queue()
+        assert not changed
+        bpy.data.materials["Known"].node_tree.update_tag()
+        queue()
+        assert "Known" in changed
+    finally:
+        bpy.app.handlers.depsgraph_update_post.remove(note)
+
+
 def test_media_that_are_not_there_get_a_first_look_and_their_bake_after_all():
     plane("Unknown", **UNKNOWN)
     plane("Known", 5.0, **KNOWN)

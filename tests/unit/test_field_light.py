@@ -105,6 +105,25 @@ def test_dark_nodes_don_t_darken_what_is_beside_them():
     assert irradiance[30:34, 30:34].max() == 0
 
 
+def test_a_bake_can_stop_between_its_parts():
+    grid = grid_of(64, 64)
+    asked = []
+    reach = replace(reach_of(grid), progress=lambda fraction: asked.append(fraction) or len(asked) < 3)
+    with pytest.raises(native.Cancelled):
+        list(light_of(grid, np.ones((len(STRATA), 4, 4, 3))).layers(reach))
+    assert asked == [0, 1 / len(STRATA), 2 / len(STRATA)]
+
+
+def test_totals_are_the_sum_of_the_parts():
+    """In float32; the parts are kept from negative values beyond the outermost nodes, where these don't fall."""
+    grid, rng = grid_of(40, 60), np.random.default_rng(2)
+    light = light_of(grid, rng.uniform(1, 2, (len(STRATA), 8, 8, 3)))
+    irradiance, flow = totals(grid, light)
+    parts = list(light.parts(reach_of(grid)))
+    np.testing.assert_allclose(irradiance, sum(part for part, _ in parts), rtol=1e-5)
+    np.testing.assert_allclose(flow, sum(part.mean(axis=2, keepdims=True) * way for part, way in parts), atol=1e-5)
+
+
 def test_other_planes_get_nothing():
     light = light_of(grid_of(8, 8), np.ones((len(STRATA), 2, 2, 3)))
     other = grid_of(8, 8, origin=(0.0, 0.0, 0.0))

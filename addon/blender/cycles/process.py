@@ -15,8 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core.errors import BakeError
-from ...core.native import native
-from ...core.progress import Progress, say
+from ...core.progress import Progress, ask, say
 from .scene_copy import SceneCopy
 
 CHILD = Path(__file__).with_name("child.py")
@@ -69,9 +68,7 @@ def run(
     try:
         while child.is_running(POLL_SECONDS):
             say(progress, doing if child.has_answered else f"{doing} (Cycles starts)")
-            answer = None if progress is None else progress(pace.fraction(child.fraction))
-            if isinstance(answer, bool | np.bool_) and not answer:
-                raise native.Cancelled("the bake was cancelled")
+            ask(progress, pace.fraction(child.fraction))
             if time.monotonic() - child.heard > SILENT_SECONDS:
                 raise BakeError(f"Cycles gave no sign of life for {SILENT_SECONDS / 60:.0f} minutes.")
     finally:

@@ -45,10 +45,15 @@ def read_scene(context, targets: list[Target], settings: BakeSettings, resolutio
     resolution : texels along the longer side; None keeps the size of the node's image, or the scene's setting where
         there is none.
     """
+    depsgraph = context.evaluated_depsgraph_get()
     for material in {bpy.data.materials[target.material_name] for target in targets}:
-        # Evaluated before the node's class was registered, it would still be of an unknown class.
-        for tree in [material.node_tree, *(group.node_tree for group in find_place(material)[1])]:
-            tree.update_tag()
+        evaluated = material.evaluated_get(depsgraph).node_tree
+        groups = [group.node_tree for group in find_place(material)[1]]
+        # Evaluated before the node's class was registered, it would still be of an unknown class. No more than that is
+        # tagged: views, and the material's icons, would start again.
+        for tree, copy in [(material.node_tree, evaluated), *((one, one.evaluated_get(depsgraph)) for one in groups)]:
+            if any(node.bl_idname == "NodeUndefined" for node in copy.nodes):
+                tree.update_tag()
     with as_rendered(context.view_layer):
         visible = render_visible_names(context.view_layer)
         return Preparation(context.evaluated_depsgraph_get(), targets, settings, resolution, visible=visible)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..native import native
-from ..progress import Progress
+from ..progress import Progress, ask
 from ..scene.grid import Grid
 from ..scene.illumination import Illumination
 from ..scene.lights import Light
@@ -74,6 +74,7 @@ class Gatherer:
         if light.has_one_direction:
             return light.plane_lights(self._reach(light, progress), directions=True)
         irradiance, flow = self.totals(light, STAND_IN_RAYS, progress)
+        ask(progress, 1.0)  # large ones took a second, and will again
         # In double precision: the square of what hardly arrives, as 1e-22 at a border, has no digits in single.
         length = np.sqrt(np.einsum("...i,...i->...", flow, flow, dtype=np.float64))[..., None]
         down = np.full_like(flow, (0, 0, -1))

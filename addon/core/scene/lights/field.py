@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from ...progress import ask
 from ..grid import Grid, Vector
 from .light import Light
 
@@ -66,20 +67,21 @@ class Field:
     def is_of(self, grid: Grid) -> bool:
         return np.array_equal(self.origin, grid.origin) and np.array_equal(self.normal, grid.normal)
 
-    def at_texels(self, grid: Grid) -> Iterator[np.ndarray]:
-        """Float32 (H, W, 3) of each part of the hemisphere.
+    def at_texels(self, grid: Grid, parts: Iterable[np.ndarray]) -> Iterator[np.ndarray]:
+        """Float32 (H, W, 3) of each of `parts` given at the nodes, (rows, columns, 3).
 
-        Between nodes a cubic B-spline interpolates: smooth, never negative, and it averages noise. What light can't
-        reach at all is no darker part of its surroundings: nodes inside of things that stand on the plane don't darken
-        texels beside them.
+        Between nodes a cubic B-spline interpolates: smooth, and it averages noise; beyond the outermost nodes it may
+        pass zero. What light can't reach at all is no darker part of its surroundings: nodes inside of things that
+        stand on the plane don't darken texels beside them.
         """
         rows, columns = self.radiance.shape[1:3]
         up, across = spline_weights(grid.height, rows), spline_weights(grid.width, columns)
         lit = self.radiance.any(axis=(0, 3)).astype(np.float32)
         reached = np.maximum(up @ lit @ across.T, LIT_PART)[..., None]
-        for part in self.radiance:
-            values = np.stack([up @ part[..., channel] @ across.T for channel in range(3)], axis=2) / reached
-            yield np.maximum(values, 0, out=values)
+        for part in parts:
+            values = np.stack([up @ part[..., channel] @ across.T for channel in range(3)], axis=2)
+            values /= reached
+            yield values
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,17 +121,23 @@ class FieldLight(_ComputedLight):
     def parts(self, reach):
         grid = reach.grid
         field = self.field_of(grid)
-        if field is not None:
-            for values, part, weight, direction in zip(field.at_texels(grid), field.radiance, WEIGHTS, DIRECTIONS):
-                if part.any():
-                    yield values * np.float32(np.pi * weight), direction
+        if field is None:
+            return
+        lit = np.flatnonzero(field.radiance.any(axis=(1, 2, 3)))
+        parts = zip(field.at_texels(grid, field.radiance[lit]), WEIGHTS[lit], DIRECTIONS[lit])
+        for done, (values, weight, direction) in enumerate(parts):
+            ask(reach.progress, done / len(lit))
+            yield np.maximum(values, 0, out=values) * np.float32(np.pi * weight), direction
 
     def totals(self, reach):
-        irradiance, flow = np.zeros((2, reach.grid.height, reach.grid.width, 3), np.float32)
-        for part, direction in self.parts(reach):
-            irradiance += part
-            flow += part.mean(axis=2, keepdims=True) * direction
-        return reach.received(irradiance), reach.covered(flow)
+        grid, field = reach.grid, self.field_of(reach.grid)
+        if field is None:
+            irradiance, flow = np.zeros((2, grid.height, grid.width, 3), np.float32)
+        else:
+            weighted = field.radiance * np.float32(np.pi * WEIGHTS)[:, None, None, None]
+            sums = weighted.sum(axis=0), np.tensordot(weighted.mean(axis=3), DIRECTIONS, (0, 0))
+            irradiance, flow = field.at_texels(grid, sums)
+        return reach.received(np.maximum(irradiance, 0)), reach.covered(flow)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +159,7 @@ class LampFieldLight(_ComputedLight):
         if field is None:
             irradiance = np.zeros((grid.height, grid.width, 3), np.float32)
         else:
-            irradiance = next(field.at_texels(grid)) * np.float32(np.pi)
+            irradiance = np.maximum(next(field.at_texels(grid, field.radiance)), 0) * np.float32(np.pi)
         if self.is_sun:
             return irradiance, axes @ self.place
         x, y, height = axes @ np.subtract(self.place, grid.origin)
