@@ -125,8 +125,8 @@ def test_bad_diameters(half_space, diameter):
 def test_light_on_slabs_is_the_sum_of_its_beams(ior):
     """Around all the places where a thin slab's light comes from, which solvers see around one of them.
 
-    Less than half a mean free path from that one there are four steps of radius per octave, which leave errors of 1e-2
-    and 2e-2 here; with more of them it is 2e-3, which is how well the disk is known that each beam lights.
+    With 16 steps of radius per octave around that one it is 2e-3, which is how well the disk is known that each beam
+    lights; with four of them, as bins have, 1e-2 and 2e-2.
     """
     angle, albedo, size, pitch = 40, 0.9, 96, 0.005
     slab = simulate(Medium(0.8, ior, 0.3), [0, 20, 40, 60], 20000)
@@ -139,4 +139,4 @@ def test_light_on_slabs_is_the_sum_of_its_beams(ior):
     luminance = convolve(light, direction, slab, albedo, 1.0, pitch, tolerance=1e-4)[..., 0]
     beam = slab.image(angle, albedo, 2 * size + 1, pitch, beam_diameter=4 * pitch)
     expected = fftconvolve(spots, beam, mode="full")[size : 2 * size, size : 2 * size]
-    assert np.abs(np.pi * luminance - expected).max() < 2.5e-2 * expected.max()
+    assert np.abs(np.pi * luminance - expected).max() < 5e-3 * expected.max()

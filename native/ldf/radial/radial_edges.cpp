@@ -34,6 +34,15 @@ double radial_edge(std::size_t edge)
     return edges()[edge];
 }
 
+std::vector<double> radial_edges(RadialDetail detail)
+{
+    std::vector<double> radii;
+    for (std::size_t k = 0; k < edge_count; ++k)
+        if (detail == RadialDetail::all || is_bin_edge(k))
+            radii.push_back(radial_edge(k));
+    return radii;
+}
+
 bool is_bin_edge(std::size_t edge)
 {
     constexpr std::size_t per_bin = fine_edge_count / replaced_edge_count;

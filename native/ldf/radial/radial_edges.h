@@ -5,18 +5,19 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "transport/tally/bins.h"
 
 namespace beamspread {
 
 // 2^fine_bits edges per octave between these powers of two, mean free paths. Lamps .1 to 1.8 mean free paths above slabs of
-// .3 to 4 with an ior above 1, against 2^7 from -7 on: the worst texel is off by 2.3e-2 of the brightest; with as many edges
-// of 2^4 from -5 on by 5e-3, but then errors over half-spaces reach 1.01 times the tolerance; with 2^5 from -3 on lamps there
-// take 1.1 to 1.3 times as long. Up to 2^4 mean free paths changes nothing.
-inline constexpr int min_fine_exponent = -1;
+// .3 to 4 with an ior above 1, against 2^7 from -7 on: the worst texel is off by 5e-3 of the brightest; with 2^5 from -1 on
+// by 2.3e-2. With 2^5 from -5 on slabs' images differ as much, 2e-3 to 9e-3, in 1.08 times the time. Up to 2^4 mean free
+// paths changes nothing.
+inline constexpr int min_fine_exponent = -5;
 inline constexpr int max_fine_exponent = 2;
-inline constexpr int fine_bits = 5;
+inline constexpr int fine_bits = 4;
 inline constexpr double fine_end = 1 << max_fine_exponent;
 
 // The first of the finer edges, their number, and of how many edges of bins they take the place.
@@ -25,7 +26,7 @@ inline constexpr std::size_t fine_edge_count = std::size_t{max_fine_exponent - m
 inline constexpr std::size_t replaced_edge_count = 4 * std::size_t{max_fine_exponent - min_fine_exponent};
 inline constexpr std::size_t edge_count = radius_bin_count + fine_edge_count - replaced_edge_count;
 
-// Edges of the bins alone, or all.
+// Edges of the bins alone, which do for light that is seen around one place, or all.
 enum class RadialDetail { bins, all };
 
 // Radius of an edge, mean free paths, ascending.
@@ -44,6 +45,9 @@ inline std::size_t edge_beyond(float radius)
     const std::uint32_t step = std::bit_cast<std::uint32_t>(radius) >> within_finest_bits;
     return first_fine_edge + step - (static_cast<std::uint32_t>(bias + min_fine_exponent) << fine_bits);
 }
+
+// Radii of all edges of this detail, ascending.
+std::vector<double> radial_edges(RadialDetail detail);
 
 // Whether an edge is one of the bins'.
 bool is_bin_edge(std::size_t edge);

@@ -105,17 +105,16 @@ AngularMedium describe(const ChannelMedium& of, const Incidence& incidence, cons
 
     // Circles that fit into the texel where the beam enters: all that is seen of them is their power.
     const double inside = 0.5 * texel / of.mean_free_path;
-    std::size_t first = 0;
-    while (first + 1 < edge_count && radial_edge(first + 1) <= inside)
-        ++first;
+    std::vector<double> radii = radial_edges(medium.mean.detail());
+    while (radii.size() > 1 && radii[1] <= inside)
+        radii.erase(radii.begin());
     const auto bins_of = [&](const RadialProfile& profile) {
-        Matrix bins(index(harmonic_count), index(edge_count - first));
+        Matrix bins(index(harmonic_count), index(radii.size()));
         Harmonics inner{};
-        for (std::size_t k = first; k < edge_count; ++k) {
-            const Harmonics outer = profile.cumulative(radial_edge(k));
+        for (std::size_t k = 0; k < radii.size(); ++k) {
+            const Harmonics outer = profile.cumulative(radii[k]);
             for (std::size_t m = 0; m < harmonic_count; ++m)
-                bins(index(m), index(k - first)) =
-                    m > 0 && k == first && radial_edge(first) <= inside ? 0.0 : outer[m] - inner[m];
+                bins(index(m), index(k)) = m > 0 && k == 0 && radii[0] <= inside ? 0.0 : outer[m] - inner[m];
             inner = outer;
         }
         return bins;

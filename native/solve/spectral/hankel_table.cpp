@@ -51,15 +51,16 @@ std::vector<double> sample_positions(double end)
 
 // Panels of the integrals: steps of a texel across the inner window, of half a deviation across the outer one, and bins
 // of the profile, halved.
-std::vector<double> panel_breaks(const RadialWindow& window, double to_paths)
+std::vector<double> panel_breaks(const RadialWindow& window, double to_paths, RadialDetail detail)
 {
     const double end = window.end();
     std::vector<double> breaks;
     for (int r = 0; r < std::min(end, 2.0 * window_end * window.inner); ++r)
         breaks.push_back(r);
-    for (std::size_t k = 0; k < edge_count; ++k) {
-        const double r = radial_edge(k) / to_paths;
-        const double next = k + 1 < edge_count ? radial_edge(k + 1) / to_paths : r;
+    const std::vector<double> edges = radial_edges(detail);
+    for (std::size_t k = 0; k < edges.size(); ++k) {
+        const double r = edges[k] / to_paths;
+        const double next = k + 1 < edges.size() ? edges[k + 1] / to_paths : r;
         for (const double edge : {r, 0.5 * (r + next)})
             if (edge > breaks.back() && edge < end)
                 breaks.push_back(edge);
@@ -149,7 +150,7 @@ void HankelTable::add_profile(const ScaledProfile& scaled, std::size_t index, co
                               std::size_t samples, std::size_t length)
 {
     const double to_paths = unit_m / scaled.mean_free_path;
-    const std::vector<double> breaks = panel_breaks(window, to_paths);
+    const std::vector<double> breaks = panel_breaks(window, to_paths, scaled.profile.detail());
     const std::vector<double> positions = sample_positions(window.end());
     std::vector<Harmonics> projections(positions.size());
     parallel_for(positions.size(), [&](std::size_t n) {
