@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <numbers>
 #include <span>
@@ -12,6 +11,7 @@
 #include "base/error.h"
 #include "base/pool.h"
 #include "base/threads.h"
+#include "scene/checks.h"
 #include "scene/ray_start.h"
 #include "scene/shadows.h"
 
@@ -239,8 +239,7 @@ void compute_beams(const ReceiverGrid& grid, const Light& light, const Occluders
     grid.check();
     if (settings.samples < 1 || settings.samples > max_beam_samples)
         reject("samples", settings.samples, "1 to " + std::to_string(max_beam_samples));
-    if (!(settings.clearance >= 0.0) || std::isinf(settings.clearance))
-        reject("clearance", settings.clearance, "a finite length >= 0 in metres");
+    detail::check_length("clearance", settings.clearance);
 
     progress.set_total(static_cast<double>(grid.height));
     const auto gather = [&]<class Amount>(Amount, const auto& irradiance) {
