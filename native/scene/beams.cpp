@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "base/error.h"
-#include "base/pool.h"
 #include "base/threads.h"
+#include "base/working_memory.h"
 #include "scene/checks.h"
 #include "scene/ray_start.h"
 #include "scene/shadows.h"
@@ -101,8 +101,7 @@ public:
     template <class Texels>
     std::size_t gather_band(std::size_t band, const Texels& irradiance, const View2D<Vec3f>& direction)
     {
-        const auto lease = m_shades.lend();
-        std::vector<Shade>& shades = *lease;
+        std::vector<Shade>& shades = m_shades.local();
         m_shadows.shade_band(band, shades);
         const std::size_t begin = band * Shadows::rows_per_band;
         const std::size_t rows = shades.size() / m_grid.width;
@@ -219,7 +218,7 @@ private:
     double m_position_rounding;  // a lamp within this of a point is in it: light there has neither direction nor bound
     RayStart m_start;
     Shadows m_shadows;
-    Pool<std::vector<Shade>> m_shades;
+    PerThread<std::vector<Shade>> m_shades;
     Texel m_open_texel;  // texel (0, 0) with nothing in the way
 };
 

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "base/error.h"
-#include "base/pool.h"
 #include "base/sobol.h"
 #include "base/threads.h"
 #include "base/vec.h"
+#include "base/working_memory.h"
 #include "scene/beams.h"
 #include "scene/checks.h"
 #include "scene/open_irradiance.h"
@@ -63,8 +63,7 @@ public:
     // Has a look at a row, for itself and for its neighbours.
     void look_at_row(std::size_t y)
     {
-        const auto lease = m_rows.lend();
-        Rays& rays = *lease;
+        Rays& rays = m_rows.local();
         for (std::size_t x = 0; x < m_grid.width; x += texels_at_once) {
             const Span span{y, x, std::min(texels_at_once, m_grid.width - x)};
             rays.start(m_even_rays, span);
@@ -77,8 +76,7 @@ public:
 
     void gather_row(std::size_t y, RaySink& sink)
     {
-        const auto lease = m_rows.lend();
-        Rays& rays = *lease;
+        Rays& rays = m_rows.local();
         rays.met_around.assign(m_grid.width, Met::both);
         if (takes_a_look())
             look_around(y, rays.met_around);
@@ -308,7 +306,7 @@ private:
     RayStart m_start;
     double m_position_rounding;
     std::vector<std::uint8_t> m_met;  // [texel] by the rays of a look
-    Pool<Rays> m_rows;
+    PerThread<Rays> m_rows;
 };
 
 }  // namespace
