@@ -86,7 +86,7 @@ const FftInstructionSet& fft_instruction_set(const std::string& instruction_set)
 {
     std::string allowed;
     for (const Named& entry : runnable_sets()) {
-        if (instruction_set == entry.name)
+        if (instruction_set.empty() || instruction_set == entry.name)
             return *entry.instructions;
         allowed += (allowed.empty() ? "'" : ", '") + std::string(entry.name) + "'";
     }

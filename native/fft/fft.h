@@ -27,7 +27,8 @@ void real_to_half_2d(const FftInstructionSet& instructions, const float* real, C
 // What the transforms were compiled for and this processor has, fastest first: "avx512", "avx2", "baseline".
 std::vector<std::string> fft_instruction_sets();
 
-// The transforms as compiled for one of these, so that tests reach each of them. Throws InvalidArgument.
+// The transforms as compiled for one of these, so that tests reach each of them; empty: the fastest. Throws
+// InvalidArgument.
 const FftInstructionSet& fft_instruction_set(const std::string& instruction_set);
 
 }  // namespace beamspread

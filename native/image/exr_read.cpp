@@ -4,12 +4,9 @@
 #include <OpenEXR/ImfInputPart.h>
 #include <OpenEXR/ImfMultiPartInputFile.h>
 #include <OpenEXR/ImfPartType.h>
-#include <OpenEXR/ImfThreading.h>
 #include <OpenEXR/ImfTileDescription.h>
-#include <OpenEXR/ImfVersion.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <filesystem>
 #include <fstream>
@@ -79,11 +76,6 @@ long long check_header(const Imf::Header& header, long long file_bytes)
     return width * height * channels;
 }
 
-std::string part_name(const Imf::Header& header)
-{
-    return header.hasName() ? detail::as_utf8(header.name()) : "";
-}
-
 // Of a part that passed check_header.
 ExrPart read_part(Imf::MultiPartInputFile& file, int index)
 {
@@ -91,7 +83,7 @@ ExrPart read_part(Imf::MultiPartInputFile& file, int index)
     const Imath::Box2i& window = header.dataWindow();
 
     ExrPart part;
-    part.name = part_name(header);
+    part.name = header.hasName() ? detail::as_utf8(header.name()) : "";
     part.width = window.max.x - window.min.x + 1;
     part.height = window.max.y - window.min.y + 1;
     part.channels = detail::get_channels(header);
@@ -135,19 +127,15 @@ private:
 
 std::vector<char> bytes_of(const std::string& path)
 {
-    std::vector<char> bytes(std::filesystem::file_size(path));
+    std::error_code error;
+    const auto size = std::filesystem::file_size(path, error);
+    if (error)
+        fail(error.message());
+    std::vector<char> bytes(size);
     std::ifstream stream(path, std::ios::binary);
     if (!stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size())))
         throw std::system_error(errno, std::generic_category());
     return bytes;
-}
-
-// Whether the first bytes of a file say that it holds several parts.
-bool is_multi_part(const std::string& path)
-{
-    std::array<char, 8> start{};  // magic number and version
-    std::ifstream(path, std::ios::binary).read(start.data(), start.size());
-    return (static_cast<unsigned char>(start[5]) & (Imf::MULTI_PART_FILE_FLAG >> 8)) != 0;
 }
 
 // Checks all headers before anything of the size that they claim is allocated.
@@ -160,42 +148,26 @@ void check_headers(const Imf::MultiPartInputFile& file, long long file_bytes)
         fail("it holds more than 2^30 numbers");
 }
 
-// OpenEXR reads one part at a time: every thread reads the headers for itself, and takes the next part until none is
-// left.
-std::vector<ExrPart> read_multi_part(const std::string& path)
-{
-    const std::vector<char> bytes = bytes_of(path);
-    std::vector<ExrPart> parts;
-    std::once_flag counted;
-    std::atomic<int> next = 0;
-    parallel_for(std::min(thread_count(), 1 + bytes.size() / bytes_per_reader), [&](std::size_t) {
-        MemoryStream stream(path, bytes);
-        constexpr int own_threads = 0;
-        Imf::MultiPartInputFile file(stream, own_threads, reconstruct);
-        check_headers(file, static_cast<long long>(bytes.size()));
-        std::call_once(counted, [&] { parts.resize(static_cast<std::size_t>(file.parts())); });
-        for (int i = next++; i < file.parts(); i = next++)
-            parts[static_cast<std::size_t>(i)] = read_part(file, i);
-    });
-    return parts;
-}
-
 }  // namespace
 
 std::vector<ExrPart> read_exr_parts(const std::string& path)
 {
     try {
-        std::error_code error;
-        const auto file_bytes = std::filesystem::file_size(path, error);
-        if (error)
-            fail(error.message());
-        if (is_multi_part(path))
-            return read_multi_part(path);
-        // OpenEXR's thread pool is global state of the host's process: used as the host has set it up, and left so.
-        Imf::MultiPartInputFile file(path.c_str(), Imf::globalThreadCount(), reconstruct);
-        check_headers(file, static_cast<long long>(file_bytes));
+        const std::vector<char> bytes = bytes_of(path);
         std::vector<ExrPart> parts;
-        parts.push_back(read_part(file, 0));
+        std::once_flag counted;
+        std::atomic<int> next = 0;
+        // OpenEXR reads one part at a time: every thread reads the headers for itself, and takes the next part until none
+        // is left.
+        parallel_for(std::min(thread_count(), 1 + bytes.size() / bytes_per_reader), [&](std::size_t) {
+            MemoryStream stream(path, bytes);
+            constexpr int own_threads = 0;  // OpenEXR's thread pool is global state of the host's process
+            Imf::MultiPartInputFile file(stream, own_threads, reconstruct);
+            check_headers(file, static_cast<long long>(bytes.size()));
+            std::call_once(counted, [&] { parts.resize(static_cast<std::size_t>(file.parts())); });
+            for (int i = next++; i < file.parts(); i = next++)
+                parts[static_cast<std::size_t>(i)] = read_part(file, i);
+        });
         return parts;
     } catch (const std::exception& error) {
         throw IoError("cannot read '" + path + "': " + detail::reason_of(error, path));

@@ -4,7 +4,6 @@
 #include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfStdIO.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <fstream>
 #include <set>
@@ -83,16 +82,15 @@ Imf::Header make_header(const ExrPart& part, const Imath::Box2i& display_window,
     return header;
 }
 
-std::size_t line_values(const ExrPart& part)
-{
-    return part.channels.size() * static_cast<std::size_t>(part.width);
-}
-
 template <class T>
-void write_pixels(Imf::OutputPart output, const ExrPart& part, Imf::PixelType type, const T* first_line,
-                  std::size_t line_bytes)
+void write_pixels(Imf::OutputPart output, const ExrPart& part, Imf::PixelType type, std::span<const T> pixels,
+                  bool goes_up)
 {
     const std::size_t pixel_bytes = part.channels.size() * sizeof(T);
+    const std::size_t values = part.channels.size() * static_cast<std::size_t>(part.width);
+    const T* first_line = pixels.data() + (goes_up ? pixels.size() - values : 0);
+    // OpenEXR only adds strides to addresses: one that wraps around goes back, as Blender's own files are written.
+    const std::size_t line_bytes = (goes_up ? 0 - values : values) * sizeof(T);
     Imf::FrameBuffer buffer;
     for (std::size_t c = 0; c < part.channels.size(); ++c)
         buffer.insert(part.channels[c],
@@ -101,22 +99,15 @@ void write_pixels(Imf::OutputPart output, const ExrPart& part, Imf::PixelType ty
     output.writePixels(part.height);
 }
 
-template <class T>
-void write_bottom_up(Imf::OutputPart output, const ExrPart& part, Imf::PixelType type, std::span<const T> pixels)
+// `bottom_up`, if there are any, in place of the part's own pixels.
+void write_part(const Imf::OutputPart& output, const ExrPart& part, std::span<const float> bottom_up)
 {
-    const std::size_t values = line_values(part);
-    // OpenEXR only adds strides to addresses: one that wraps around goes back, as Blender's own files are written.
-    write_pixels(output, part, type, pixels.data() + pixels.size() - values, 0 - values * sizeof(T));
-}
-
-void write_part(Imf::OutputPart output, const ExrPart& part)
-{
-    if (part.half) {
-        const std::vector<half> pixels(part.pixels.begin(), part.pixels.end());
-        write_pixels(output, part, Imf::HALF, pixels.data(), line_values(part) * sizeof(half));
-    } else {
-        write_pixels(output, part, Imf::FLOAT, part.pixels.data(), line_values(part) * sizeof(float));
-    }
+    const bool goes_up = !bottom_up.empty();
+    const std::span<const float> pixels = goes_up ? bottom_up : part.pixels;
+    if (part.half)
+        write_pixels<half>(output, part, Imf::HALF, std::vector<half>(pixels.begin(), pixels.end()), goes_up);
+    else
+        write_pixels(output, part, Imf::FLOAT, pixels, goes_up);
 }
 
 void check(const std::ofstream& stream)
@@ -125,10 +116,8 @@ void check(const std::ofstream& stream)
         throw std::system_error(errno, std::generic_category());
 }
 
-// Calls write_one(output, part) for every part.
-template <class WriteOne>
 void write_file(const std::string& path, std::span<const ExrPart> parts, ExrCompression compression,
-                const WriteOne& write_one)
+                std::span<const float> bottom_up)
 {
     PendingFile file(path);
 
@@ -153,7 +142,7 @@ void write_file(const std::string& path, std::span<const ExrPart> parts, ExrComp
             Imf::MultiPartOutputFile output(named, headers.data(), static_cast<int>(headers.size()), false,
                                             own_threads);
             for (std::size_t i = 0; i < parts.size(); ++i)
-                write_one(Imf::OutputPart(output, static_cast<int>(i)), parts[i]);
+                write_part(Imf::OutputPart(output, static_cast<int>(i)), parts[i], bottom_up);
         }
         stream.close();
         check(stream);
@@ -168,21 +157,14 @@ void write_file(const std::string& path, std::span<const ExrPart> parts, ExrComp
 void write_exr_parts(const std::string& path, std::span<const ExrPart> parts, ExrCompression compression)
 {
     check_parts(parts);
-    write_file(path, parts, compression, write_part);
+    write_file(path, parts, compression, {});
 }
 
 void write_exr_bottom_up(const std::string& path, const ExrPart& part, std::span<const float> pixels,
                          ExrCompression compression)
 {
     check_part(part, pixels.size());
-    write_file(path, {&part, 1}, compression, [&](Imf::OutputPart output, const ExrPart&) {
-        if (part.half) {
-            const std::vector<half> rounded(pixels.begin(), pixels.end());
-            write_bottom_up(output, part, Imf::HALF, std::span<const half>(rounded));
-        } else {
-            write_bottom_up(output, part, Imf::FLOAT, pixels);
-        }
-    });
+    write_file(path, {&part, 1}, compression, pixels);
 }
 
 }  // namespace beamspread

@@ -19,6 +19,9 @@ namespace beamspread {
 
 namespace py = pybind11;
 
+// Of functions that run without the interpreter.
+using ReleaseGil = py::call_guard<py::gil_scoped_release>;
+
 // C-contiguous arrays of exactly this type; another type raises TypeError instead of being copied silently.
 template <class T>
 using Array = py::array_t<T, py::array::c_style>;
@@ -69,7 +72,6 @@ void bind_ldf_interpolate(py::module_& m);
 void bind_image(py::module_& m);
 void bind_lights(py::module_& m);
 void bind_occluders(py::module_& m);
-void bind_extended_lights(py::module_& m);
 void bind_rays(py::module_& m);
 void bind_scene(py::module_& m);
 void bind_solve(py::module_& m);

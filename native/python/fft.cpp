@@ -7,25 +7,20 @@ namespace beamspread {
 
 namespace {
 
-const FftInstructionSet& instructions_named(const std::string& instruction_set)
-{
-    return fft_instruction_set(instruction_set.empty() ? fft_instruction_sets().front() : instruction_set);
-}
-
-void check_lines(const std::string& name, const py::array& array)
+// How many lines there are, and of how many values.
+std::pair<std::size_t, std::size_t> lines_of(const std::string& name, const py::array& array)
 {
     if (array.ndim() != 2 || array.shape(0) == 0 || array.shape(1) == 0)
         reject(name, shape_text(array), "(lines, values), not empty");
+    return {side(array, 0), side(array, 1)};
 }
 
 Array<Complex> real_transform(const Array<float>& values, int threads, const std::string& instruction_set)
 {
-    check_lines("values", values);
-    if (values.shape(1) % 2 != 0)
-        reject("values", std::to_string(values.shape(1)) + " columns", "an even number of columns");
-    const FftInstructionSet& instructions = instructions_named(instruction_set);
-    const std::size_t height = side(values, 0);
-    const std::size_t width = side(values, 1);
+    const auto [height, width] = lines_of("values", values);
+    if (width % 2 != 0)
+        reject("values", std::to_string(width) + " columns", "an even number of columns");
+    const FftInstructionSet& instructions = fft_instruction_set(instruction_set);
     Array<Complex> spectrum({height, width / 2 + 1});
     Complex* out = spectrum.mutable_data();
     const float* in = values.data();
@@ -36,36 +31,28 @@ Array<Complex> real_transform(const Array<float>& values, int threads, const std
 
 Array<Complex> real_lines(const Array<float>& values, const std::string& instruction_set)
 {
-    check_lines("values", values);
-    const FftInstructionSet& instructions = instructions_named(instruction_set);
-    const std::size_t count = side(values, 0);
-    const std::size_t size = side(values, 1);
+    const auto [count, size] = lines_of("values", values);
     Array<Complex> half({count, size / 2 + 1});
-    instructions.real_to_half(values.data(), half.mutable_data(), count, size);
+    fft_instruction_set(instruction_set).real_to_half(values.data(), half.mutable_data(), count, size);
     return half;
 }
 
 Array<float> half_lines(const Array<Complex>& half, std::size_t size, const std::string& instruction_set)
 {
-    check_lines("half", half);
-    if (size / 2 + 1 != side(half, 1))
+    const auto [count, frequencies] = lines_of("half", half);
+    if (size / 2 + 1 != frequencies)
         reject("size", static_cast<double>(size), "one whose half has as many frequencies as the lines");
-    const FftInstructionSet& instructions = instructions_named(instruction_set);
-    const std::size_t count = side(half, 0);
     Array<float> values({count, size});
-    instructions.half_to_real(half.data(), values.mutable_data(), count, size);
+    fft_instruction_set(instruction_set).half_to_real(half.data(), values.mutable_data(), count, size);
     return values;
 }
 
 Array<Complex> complex_lines(const Array<Complex>& values, bool forward, const std::string& instruction_set)
 {
-    check_lines("values", values);
-    const FftInstructionSet& instructions = instructions_named(instruction_set);
-    const std::size_t count = side(values, 0);
-    const std::size_t size = side(values, 1);
+    const auto [count, size] = lines_of("values", values);
     Array<Complex> result({count, size});
     std::copy_n(values.data(), count * size, result.mutable_data());
-    instructions.complex_in_place(result.mutable_data(), count, size, forward);
+    fft_instruction_set(instruction_set).complex_in_place(result.mutable_data(), count, size, forward);
     return result;
 }
 

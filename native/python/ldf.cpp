@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <filesystem>
 #include <memory>
 
 #include "ldf/library/calibration.h"
@@ -40,21 +39,10 @@ Made by `simulate`, `library` or `LdfLibrary.load`. Angles are in degrees from t
 within the simulated ones (a library that reaches 88 degrees serves up to 90); albedos in [0, 1).
 )");
     library
-        .def_static(
-            "load",
-            [](const std::filesystem::path& path) {
-                const py::gil_scoped_release release;
-                return std::make_shared<LdfLibrary>(load_library(path.string()));
-            },
-            py::arg("path"),
-            "Read a library from an OpenEXR file; OSError if it is missing, damaged or something else.")
-        .def(
-            "save",
-            [](const LdfLibrary& self, const std::filesystem::path& path) {
-                const py::gil_scoped_release release;
-                save_library(self, path.string());
-            },
-            py::arg("path"), "Write a multi-part OpenEXR file; an existing file is replaced only by a complete one.")
+        .def_static("load", &load_library, py::arg("path"), ReleaseGil(),
+                    "Read a library from an OpenEXR file; OSError if it is missing, damaged or something else.")
+        .def("save", &save_library, py::arg("path"), ReleaseGil(),
+             "Write a multi-part OpenEXR file; an existing file is replaced only by a complete one.")
         .def_property_readonly("medium", &LdfLibrary::medium)
         .def_property_readonly("angles", &LdfLibrary::angles_deg, "Simulated angles, degrees, ascending.")
         .def_property_readonly("photons", &LdfLibrary::photons, "Photons per angle.")
@@ -86,14 +74,8 @@ within the simulated ones (a library that reaches 88 degrees serves up to 90); a
 From the scatter of 32 independent batches; it does not know what interpolation between far angles misses. That of a
 calibrated library does: the error halfway between simulated angles is known from `exact_totals`.
 )")
-        .def(
-            "calibrated",
-            [](const LdfLibrary& self, int threads) {
-                const py::gil_scoped_release release;
-                return std::make_shared<LdfLibrary>(calibrated(self, threads));
-            },
-            py::arg("threads") = 0,
-            R"(A copy whose totals are those of `exact_totals`.
+        .def("calibrated", &calibrated, py::arg("threads") = 0, ReleaseGil(),
+             R"(A copy whose totals are those of `exact_totals`.
 
 The light of each scattering order, with the distribution it was simulated with, is scaled: by as little as makes the
 totals right at 16 albedos from .01 to .99999, least squares weighted by statistical variance. Albedos in between, and

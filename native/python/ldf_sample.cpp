@@ -2,8 +2,8 @@
 #include "ldf/samples/sample.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <memory>
+#include <utility>
 
 #include "base/error.h"
 #include "ldf/library/ldf_image.h"
@@ -21,15 +21,8 @@ LdfSample sample_of(const py::object& image, double pitch, double angle, double 
     const Array<float> pixels = real_array<float>("image", image);
     if (pixels.ndim() != 2)
         reject("image", shape_text(py::array::ensure(image)), "real numbers, (N, M)");
-    LdfSample sample;
-    sample.height = static_cast<std::size_t>(pixels.shape(0));
-    sample.width = static_cast<std::size_t>(pixels.shape(1));
-    sample.image.assign(pixels.data(), pixels.data() + pixels.size());
-    sample.pitch = pitch;
-    sample.angle_deg = angle;
-    sample.albedo = albedo;
-    sample.beam_diameter = beam_diameter;
-    sample.g = g;
+    std::vector<float> texels(pixels.data(), pixels.data() + pixels.size());
+    LdfSample sample{side(pixels, 1), side(pixels, 0), std::move(texels), pitch, angle, albedo, beam_diameter, g};
     validate(sample);
     return sample;
 }
@@ -37,17 +30,11 @@ LdfSample sample_of(const py::object& image, double pitch, double angle, double 
 LdfSample from_library(const LdfLibrary& library, double angle, double albedo, std::ptrdiff_t size, double pitch,
                        double beam_diameter, const std::string& side)
 {
-    LdfSample sample;
     const Side which = side_from_name(side);
+    const std::size_t texels = image_side(size);
     const py::gil_scoped_release release;
-    sample.image = ldf_image(library, angle, albedo, image_side(size), pitch, which, beam_diameter);
-    sample.height = static_cast<std::size_t>(size);
-    sample.width = static_cast<std::size_t>(size);
-    sample.pitch = pitch;
-    sample.angle_deg = angle;
-    sample.albedo = albedo;
-    sample.beam_diameter = beam_diameter;
-    sample.g = library.medium().g;
+    std::vector<float> image = ldf_image(library, angle, albedo, texels, pitch, which, beam_diameter);
+    LdfSample sample{texels, texels, std::move(image), pitch, angle, albedo, beam_diameter, library.medium().g};
     validate(sample);
     return sample;
 }
@@ -96,13 +83,8 @@ ValueError
     sample.def_static("from_library", &from_library, py::arg("library"), py::arg("angle"), py::arg("albedo"),
                       py::arg("size"), py::arg("pitch"), py::arg("beam_diameter") = 0.0, py::arg("side") = "reflected",
                       "The sample whose image is `library.image(angle, albedo, size, pitch, side, beam_diameter)`.");
-    sample.def_static(
-        "load",
-        [](const std::filesystem::path& path) {
-            const py::gil_scoped_release release;
-            return load_sample(path.string());
-        },
-        py::arg("path"), R"(Read a sample from an OpenEXR file, ours or another program's.
+    sample.def_static("load", &load_sample, py::arg("path"), ReleaseGil(),
+                      R"(Read a sample from an OpenEXR file, ours or another program's.
 
 The file has one part with the channel Y (or one channel alone) and the attributes, numbers of type float, double or
 int, ``pitch`` (mean free paths), ``angle`` (degrees), ``albedo``, and where known ``beamDiameter`` (mean free paths)
@@ -113,14 +95,8 @@ Raises
 OSError
     The file is missing or damaged; or it lacks, or has a wrong, attribute, channel or value, which the message names.
 )");
-    sample.def(
-        "save",
-        [](const LdfSample& self, const std::filesystem::path& path) {
-            const py::gil_scoped_release release;
-            save_sample(self, path.string());
-        },
-        py::arg("path"),
-        "Write an OpenEXR file that `load` reads; an existing file is replaced only by a complete one.");
+    sample.def("save", &save_sample, py::arg("path"), ReleaseGil(),
+               "Write an OpenEXR file that `load` reads; an existing file is replaced only by a complete one.");
     sample.def_property_readonly("image", &image_of, "float32, shape (N, M), read-only.")
         .def_readonly("pitch", &LdfSample::pitch)
         .def_readonly("angle", &LdfSample::angle_deg)

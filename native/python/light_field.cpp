@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "base/error.h"
-#include "base/pool.h"
+#include "base/working_memory.h"
 #include "python/problem.h"
 #include "scene/ray_gather.h"
 #include "solve/light_field.h"
@@ -38,11 +38,7 @@ public:
         m_field = std::make_unique<LightField>(problem, report);
     }
 
-    void add(const HeldLight& light)
-    {
-        const py::gil_scoped_release release;
-        m_field->add(light.light);
-    }
+    void add(const HeldLight& light) { m_field->add(light.light); }
 
     void add_rays(const ReceiverGrid& grid, const ExtendedLight& light, const std::vector<double>& color,
                   const Array<float>& coverage, const Occluders* occluders, int rays, std::uint32_t seed, int threads,
@@ -70,12 +66,7 @@ public:
         return luminance;
     }
 
-    void clear()
-    {
-        const py::gil_scoped_release release;
-        m_field->clear();
-    }
-
+    void clear() { m_field->clear(); }
     std::size_t terms() const { return m_field->terms(); }
 
 private:
@@ -89,8 +80,7 @@ private:
 
         void add(const RayRow& row) override
         {
-            const auto lease = m_scratch.lend();
-            std::vector<Vec3f>& covered = *lease;
+            std::vector<Vec3f>& covered = m_scratch.local();
             covered.resize(row.width);
             const float* coverage = m_coverage + row.y * m_field.problem().plane.width + row.x;
             for (std::size_t i = 0; i < row.width; ++i)
@@ -104,7 +94,7 @@ private:
         std::vector<double> m_color;
         bool m_is_colored;
         const float* m_coverage;
-        Pool<std::vector<Vec3f>> m_scratch;
+        PerThread<std::vector<Vec3f>> m_scratch;
     };
 
     static Plane plane_of(const py::tuple& shape, std::array<double, 2> pitch)
@@ -146,7 +136,7 @@ ldf, albedo, mean_free_path, pitch, tolerance, threads, progress
              py::arg("shape"), py::arg("lights"), py::arg("survey_shape"), py::arg("survey"), py::arg("ldf"),
              py::arg("albedo"), py::arg("mean_free_path"), py::arg("pitch"), py::arg("tolerance"),
              py::arg("threads") = 0, py::arg("progress") = py::none())
-        .def("add", &HeldField::add, py::arg("light"),
+        .def("add", &HeldField::add, py::arg("light"), ReleaseGil(),
              "Adds a PlaneLight, also one of `lights` that only stood for it.")
         .def("add_rays", &HeldField::add_rays, py::arg("grid"), py::arg("light"), py::arg("color"), py::arg("coverage"),
              py::arg("occluders") = py::none(), py::arg("rays") = 16, py::arg("seed") = 0, py::arg("threads") = 0,
@@ -157,7 +147,7 @@ ldf, albedo, mean_free_path, pitch, tolerance, threads, progress
 )")
         .def("solve", &HeldField::solve, py::arg("progress") = py::none(),
              "Luminance, float32 (H, W, C) in W/(m^2 sr).")
-        .def("clear", &HeldField::clear,
+        .def("clear", &HeldField::clear, ReleaseGil(),
              "Forgets what was added; terms and kernels stay for the light that comes next.")
         .def_property_readonly("terms", &HeldField::terms, "int: how many transforms of light `solve` makes.");
 }

@@ -3,8 +3,8 @@
 #include <utility>
 #include <vector>
 
-#include "base/error.h"
-#include "python/casters.h"
+#include "base/view.h"
+#include "python/vectors.h"
 #include "scene/ray_gather.h"
 
 namespace beamspread {
@@ -12,27 +12,14 @@ namespace beamspread {
 namespace {
 
 // Rows of vectors of one ray, or of the sum of all.
-class Field {
-public:
-    explicit Field(const ReceiverGrid& grid)
-        : m_array({static_cast<py::ssize_t>(grid.height), static_cast<py::ssize_t>(grid.width), py::ssize_t{3}}),
-          m_data(m_array.mutable_data()),
-          m_row(3 * grid.width)
-    {
-        std::fill_n(m_data, m_array.size(), 0.0f);
-    }
+struct Field {
+    Array<float> array;
+    View2D<Vec3f> view;
 
-    const Array<float>& array() const { return m_array; }
-    Vec3f* row(std::size_t y) const
+    explicit Field(const ReceiverGrid& grid) : array(new_vectors(grid)), view(vectors_of(array))
     {
-        static_assert(sizeof(Vec3f) == 3 * sizeof(float));
-        return reinterpret_cast<Vec3f*>(m_data + y * m_row);
+        std::fill_n(array.mutable_data(), array.size(), 0.0f);
     }
-
-private:
-    Array<float> m_array;
-    float* m_data;
-    std::size_t m_row;
 };
 
 // Adds all rays of a texel up.
@@ -42,8 +29,8 @@ public:
 
     void add(const RayRow& row) override
     {
-        Vec3f* const irradiance = m_irradiance.row(row.y) + row.x;
-        Vec3f* const flow = m_flow.row(row.y) + row.x;
+        Vec3f* const irradiance = &m_irradiance.view(row.y, row.x);
+        Vec3f* const flow = &m_flow.view(row.y, row.x);
         for (std::size_t i = 0; i < row.width; ++i) {
             const Vec3f& light = row.irradiance[i];
             irradiance[i] += light;
@@ -51,7 +38,7 @@ public:
         }
     }
 
-    py::object result() const { return py::make_tuple(m_irradiance.array(), m_flow.array()); }
+    py::object result() const { return py::make_tuple(m_irradiance.array, m_flow.array); }
 
 private:
     Field m_irradiance, m_flow;
@@ -62,34 +49,28 @@ class Layers final : public RaySink {
 public:
     Layers(const ReceiverGrid& grid, int rays)
     {
-        for (int i = 0; i < rays; ++i)
+        for (int i = 0; i < rays && rays <= max_rays; ++i)  // more are refused later
             m_layers.emplace_back(Field(grid), Field(grid));
     }
 
     void add(const RayRow& row) override
     {
         const auto& [irradiance, direction] = m_layers[row.ray];
-        std::copy_n(row.irradiance, row.width, irradiance.row(row.y) + row.x);
-        std::copy_n(row.travel, row.width, direction.row(row.y) + row.x);
+        std::copy_n(row.irradiance, row.width, &irradiance.view(row.y, row.x));
+        std::copy_n(row.travel, row.width, &direction.view(row.y, row.x));
     }
 
     py::object result() const
     {
         py::list layers;
         for (const auto& [irradiance, direction] : m_layers)
-            layers.append(py::make_tuple(irradiance.array(), direction.array()));
+            layers.append(py::make_tuple(irradiance.array, direction.array));
         return layers;
     }
 
 private:
     std::vector<std::pair<Field, Field>> m_layers;
 };
-
-void check_rays(int rays)
-{
-    if (rays < 1 || rays > max_rays)
-        reject("rays", rays, "1 to " + std::to_string(max_rays));
-}
 
 template <class Sink>
 py::object gather(const ReceiverGrid& grid, const ExtendedLight& light, const Occluders* occluders,
@@ -113,7 +94,6 @@ py::object gather_sum(const ReceiverGrid& grid, const ExtendedLight& light, cons
 py::object gather_layers(const ReceiverGrid& grid, const ExtendedLight& light, const Occluders* occluders, int rays,
                          std::uint32_t seed, int threads, const py::object& callback, double clearance)
 {
-    check_rays(rays);
     Layers layers(grid, rays);
     return gather(grid, light, occluders, {rays, threads, clearance, seed}, callback, layers);
 }

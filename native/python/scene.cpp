@@ -31,27 +31,22 @@ std::unique_ptr<ReceiverGrid> make_grid(const Numbers& origin, const Numbers& x_
 py::tuple gather_beams(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, int samples,
                        int threads, const py::object& callback, double clearance, bool find_shadows, bool directions)
 {
-    const auto width = static_cast<py::ssize_t>(grid.width);
-    const auto height = static_cast<py::ssize_t>(grid.height);
-    static_assert(sizeof(Vec3f) == 3 * sizeof(float));
     BeamArrays beams;
-    py::object irradiance;
+    Array<float> irradiance;
     if (occluders && occluders->is_colored()) {
-        Array<float> colored({height, width, py::ssize_t{3}});
-        beams.colored = {reinterpret_cast<Vec3f*>(colored.mutable_data()), grid.height, grid.width, width};
-        irradiance = std::move(colored);
+        irradiance = new_vectors(grid);
+        beams.colored = vectors_of(irradiance);
     } else {
-        Array<float> amounts({height, width});
-        beams.irradiance = {amounts.mutable_data(), grid.height, grid.width, width};
-        irradiance = std::move(amounts);
+        irradiance = Array<float>({grid.height, grid.width});
+        beams.irradiance = {irradiance.mutable_data(), grid.height, grid.width, irradiance.shape(1)};
     }
     py::object direction = py::none();
     if (light.source().is_far) {
         const Vec3 travel = unblocked_direction(grid, light, grid.origin);
         direction = Array<double>(3, &travel.x);
     } else if (directions) {
-        Array<float> field({height, width, py::ssize_t{3}});
-        beams.direction = {reinterpret_cast<Vec3f*>(field.mutable_data()), grid.height, grid.width, width};
+        Array<float> field = new_vectors(grid);
+        beams.direction = vectors_of(field);
         direction = std::move(field);
     }
     Progress progress(progress_callback(callback));
@@ -72,8 +67,7 @@ Array<float> coverage(const py::array& corners, const py::array& corner_counts, 
         reject(width < 1 ? "width" : "height", static_cast<double>(std::min(width, height)), "1 or more texels");
     const std::span counts(static_cast<const std::uint32_t*>(corner_counts.data()), side(corner_counts, 0));
     Array<float> covered({height, width});
-    const View2D<float> texels{covered.mutable_data(), static_cast<std::size_t>(height),
-                               static_cast<std::size_t>(width), width};
+    const View2D<float> texels{covered.mutable_data(), side(covered, 0), side(covered, 1), width};
     {
         const py::gil_scoped_release released;
         compute_coverage(points, counts, threads, texels);
@@ -109,7 +103,6 @@ ValueError
              py::arg("pitch_x"), py::arg("pitch_y"), py::arg("width"), py::arg("height"));
 
     bind_lights(m);
-    bind_extended_lights(m);
     m.def("gather_beams", &gather_beams, py::arg("grid"), py::arg("light"), py::arg("occluders") = py::none(),
           py::arg("samples") = 4, py::arg("threads") = 0, py::arg("progress") = py::none(), py::arg("clearance") = 0.0,
           py::arg("find_shadows") = true, py::arg("directions") = true,

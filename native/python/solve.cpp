@@ -1,6 +1,5 @@
 #include <array>
 #include <cstdint>
-#include <memory>
 #include <numeric>
 #include <string>
 #include <tuple>

@@ -7,7 +7,9 @@
 #include <string>
 
 #include "base/vec.h"
+#include "base/view.h"
 #include "python/casters.h"
+#include "scene/receiver.h"
 
 namespace beamspread {
 
@@ -34,6 +36,18 @@ inline std::span<const Vec3> to_vertices(const py::array& array)
 inline std::span<const std::array<std::uint32_t, 3>> to_triangles(const py::array& array)
 {
     return to_rows<std::array<std::uint32_t, 3>, std::uint32_t>("triangles", array, "contiguous uint32 (M, 3)");
+}
+
+// An array of vectors for the texels of a grid, and what it holds.
+inline Array<float> new_vectors(const ReceiverGrid& grid)
+{
+    return Array<float>({grid.height, grid.width, std::size_t{3}});
+}
+
+inline View2D<Vec3f> vectors_of(Array<float>& array)
+{
+    static_assert(sizeof(Vec3f) == 3 * sizeof(float));
+    return {reinterpret_cast<Vec3f*>(array.mutable_data()), side(array, 0), side(array, 1), array.shape(1)};
 }
 
 // Throws InvalidArgument.

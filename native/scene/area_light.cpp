@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <string>
 #include <vector>
 
 #include "base/constants.h"
@@ -108,12 +107,6 @@ struct Outline {
     }
 };
 
-void check_size(const std::string& name, double size)
-{
-    if (!(size >= 0.0) || std::isinf(size))
-        reject(name, size, "a finite length >= 0");
-}
-
 }  // namespace
 
 AreaLight::AreaLight(const Vec3& position, const Mat3& lamp_to_world, double size_x, double size_y, bool is_round,
@@ -128,14 +121,11 @@ AreaLight::AreaLight(const Vec3& position, const Mat3& lamp_to_world, double siz
       m_half_spread(0.5 * spread),
       m_tan_spread(std::tan(m_half_spread))
 {
-    if (!detail::is_finite(position))
-        reject("position", detail::to_text(position), "finite coordinates in metres");
-    for (int i = 0; i < 3; ++i) {
-        if (!detail::is_finite(lamp_to_world[i]))
-            reject("frame", detail::to_text(lamp_to_world[i]), "finite axes");
-    }
-    check_size("size_x", size_x);
-    check_size("size_y", size_y);
+    detail::check_finite("position", position);
+    for (int i = 0; i < 3; ++i)
+        detail::check_finite("frame", lamp_to_world[i], "finite axes");
+    detail::check_length("size_x", size_x, "a finite length >= 0");
+    detail::check_length("size_y", size_y, "a finite length >= 0");
     if (!(spread >= 0.0 && spread <= detail::max_angle))
         reject("spread", spread, "0 <= spread <= pi, the full angle in radians");
     if (!detail::is_finite(m_axis))

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <numbers>
 #include <span>
@@ -10,8 +9,9 @@
 #include <vector>
 
 #include "base/error.h"
-#include "base/pool.h"
 #include "base/threads.h"
+#include "base/working_memory.h"
+#include "scene/checks.h"
 #include "scene/ray_start.h"
 #include "scene/shadows.h"
 
@@ -101,8 +101,7 @@ public:
     template <class Texels>
     std::size_t gather_band(std::size_t band, const Texels& irradiance, const View2D<Vec3f>& direction)
     {
-        const auto lease = m_shades.lend();
-        std::vector<Shade>& shades = *lease;
+        std::vector<Shade>& shades = m_shades.local();
         m_shadows.shade_band(band, shades);
         const std::size_t begin = band * Shadows::rows_per_band;
         const std::size_t rows = shades.size() / m_grid.width;
@@ -219,7 +218,7 @@ private:
     double m_position_rounding;  // a lamp within this of a point is in it: light there has neither direction nor bound
     RayStart m_start;
     Shadows m_shadows;
-    Pool<std::vector<Shade>> m_shades;
+    PerThread<std::vector<Shade>> m_shades;
     Texel m_open_texel;  // texel (0, 0) with nothing in the way
 };
 
@@ -239,8 +238,7 @@ void compute_beams(const ReceiverGrid& grid, const Light& light, const Occluders
     grid.check();
     if (settings.samples < 1 || settings.samples > max_beam_samples)
         reject("samples", settings.samples, "1 to " + std::to_string(max_beam_samples));
-    if (!(settings.clearance >= 0.0) || std::isinf(settings.clearance))
-        reject("clearance", settings.clearance, "a finite length >= 0 in metres");
+    detail::check_length("clearance", settings.clearance);
 
     progress.set_total(static_cast<double>(grid.height));
     const auto gather = [&]<class Amount>(Amount, const auto& irradiance) {

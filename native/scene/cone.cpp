@@ -7,15 +7,6 @@
 
 namespace beamspread {
 
-Frame::Frame(const Vec3& axis) : z(axis)
-{
-    const double sign = std::copysign(1.0, axis.z);
-    const double a = -1.0 / (sign + axis.z);
-    const double b = axis.x * axis.y * a;
-    x = {1.0 + sign * axis.x * axis.x * a, sign * b, -sign * axis.x};
-    y = {b, sign + axis.y * axis.y * a, -axis.y};
-}
-
 Cone::Cone(const Vec3& axis, double sin_squared)
     : m_frame(axis),
       m_sin_squared(sin_squared),

@@ -5,15 +5,6 @@
 
 namespace beamspread {
 
-// Two unit vectors at right angles to the unit vector and each other (Duff et al. 2017, "Building an orthonormal basis,
-// revisited").
-struct Frame {
-    Vec3 x, y, z;
-
-    explicit Frame(const Vec3& axis);
-    Vec3 to_world(const Vec3& v) const { return x * v.x + y * v.y + z * v.z; }
-};
-
 class Cone {
 public:
     // `axis` a unit vector; the half angle, at most pi / 2, by its squared sine.

@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <limits>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "base/constants.h"
@@ -132,8 +131,6 @@ public:
     }
 
     Vec3 irradiance(const Vec3& /*point*/, const Vec3& /*normal*/) const override { return m_irradiance; }
-    double distance_from(const Vec3& /*point*/) const override { return std::numeric_limits<double>::infinity(); }
-    bool is_far() const override { return true; }
 
 private:
     // Rays at once: what one needs is far from what the next one needs, and is asked for some steps ahead.

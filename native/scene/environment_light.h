@@ -1,7 +1,6 @@
 // The world: radiance from all directions, infinitely far away.
 #pragma once
 
-#include <limits>
 #include <vector>
 
 #include "base/view.h"
@@ -31,8 +30,6 @@ public:
     void sample(const Vec3& point, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const override;
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
     std::unique_ptr<const ExtendedLight> facing(const Vec3& normal) const override;
-    double distance_from(const Vec3& /*point*/) const override { return std::numeric_limits<double>::infinity(); }
-    bool is_far() const override { return true; }
     bool is_colored() const override { return m_is_colored; }
 
 private:

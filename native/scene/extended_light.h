@@ -3,6 +3,7 @@
 // In Cycles' units and by Cycles' formulas, like lights without size (light.h).
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <span>
 
@@ -39,11 +40,9 @@ public:
         return nullptr;
     }
 
-    // How near to a point it may come, at least; within a small part of it the irradiance hardly changes.
-    virtual double distance_from(const Vec3& point) const = 0;
-
-    // Whether it is the same at all points.
-    virtual bool is_far() const { return false; }
+    // How near to a point it may come, at least; within a small part of it the irradiance hardly changes. Infinite: it is
+    // the same at all points.
+    virtual double distance_from(const Vec3& /*point*/) const { return std::numeric_limits<double>::infinity(); }
 
     // Whether rays of one light differ in colour; else all channels of `flux` are the same.
     virtual bool is_colored() const { return false; }

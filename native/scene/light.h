@@ -1,4 +1,4 @@
-// What every kind of light answers; each kind has a file of its own beside this one.
+// Lights without size.
 //
 // Lights are in Cycles' units and follow Cycles' formulas, measured in Blender 3.4.1, 4.2, 4.5 and 5.0
 // (tests/blender/test_cycles_irradiance.py): a white diffuse plane baked with DIFFUSE / DIRECT shows E / pi. They have
@@ -8,6 +8,7 @@
 #include <span>
 
 #include "base/vec.h"
+#include "scene/spot_cone.h"
 
 namespace beamspread {
 
@@ -36,6 +37,43 @@ public:
     // points at once: a call for each would cost a point lamp a quarter more time.
     virtual void arrive(std::span<const Vec3> points, Arrival* arrivals) const = 0;
     virtual LightSource source() const = 0;
+};
+
+// Parallel light: E = S cos(theta), S the strength in W/m^2.
+class SunLight final : public Light {
+public:
+    // `direction` of travel, any length but 0; throws InvalidArgument.
+    explicit SunLight(const Vec3& direction);
+    void arrive(std::span<const Vec3> points, Arrival* arrivals) const override;
+    LightSource source() const override { return {.position = -m_travel, .is_far = true}; }
+
+private:
+    Vec3 m_travel;
+};
+
+// Light from one point into all directions: E = P cos(theta) / (4 pi r^2), P the power in W, whatever the lamp's scale.
+class PointLight final : public Light {
+public:
+    // Throws InvalidArgument.
+    explicit PointLight(const Vec3& position);
+    void arrive(std::span<const Vec3> points, Arrival* arrivals) const override;
+    LightSource source() const override { return {.position = m_position, .is_smooth = true}; }
+
+private:
+    Vec3 m_position;
+};
+
+// A point light behind a cone: E = P cos(theta) f / (4 pi r^2), the power P that of the whole sphere, whatever the cone.
+class SpotLight final : public Light {
+public:
+    // Throws InvalidArgument.
+    SpotLight(const Vec3& position, const SpotCone& cone) : m_point(position), m_cone(cone) {}
+    void arrive(std::span<const Vec3> points, Arrival* arrivals) const override;
+    LightSource source() const override { return {.position = m_point.source().position}; }
+
+private:
+    PointLight m_point;
+    SpotCone m_cone;
 };
 
 }  // namespace beamspread

@@ -25,10 +25,8 @@ MeshLight::MeshLight(std::span<const Vec3> vertices, std::span<const Triangle> t
                      std::span<const Vec3f> radiance)
     : m_cumulated{0.0}
 {
-    for (const Vec3& vertex : vertices) {
-        if (!detail::is_finite(vertex))
-            reject("vertices", detail::to_text(vertex), "finite coordinates in metres");
-    }
+    for (const Vec3& vertex : vertices)
+        detail::check_finite("vertices", vertex);
     if (radiance.size() != triangles.size())
         reject("radiance", std::to_string(radiance.size()) + " rows",
                "one for each triangle, " + std::to_string(triangles.size()));
@@ -38,9 +36,7 @@ MeshLight::MeshLight(std::span<const Vec3> vertices, std::span<const Triangle> t
             reject("radiance", detail::to_text(glow), "finite values >= 0");
         Face face{.corners = {}, .normal = {}, .squared_size = 0.0, .radiance = glow};
         for (std::size_t k = 0; k < 3; ++k) {
-            if (triangles[i][k] >= vertices.size())
-                reject("triangles", std::to_string(triangles[i][k]),
-                       "indices below the number of vertices, " + std::to_string(vertices.size()));
+            detail::check_index("triangles", triangles[i][k], "vertices", vertices.size());
             face.corners[k] = vertices[triangles[i][k]];
         }
         const auto& [a, b, c] = face.corners;

@@ -2,18 +2,15 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
 #include <vector>
 
 #include "scene/extended_light.h"
+#include "scene/occluder_mesh.h"
 
 namespace beamspread {
 
 class MeshLight final : public ExtendedLight {
 public:
-    // Three indices of vertices.
-    using Triangle = std::array<std::uint32_t, 3>;
-
     // `vertices` in world metres; `radiance` >= 0 of each triangle, W/(m^2 sr). Copied. Throws InvalidArgument.
     MeshLight(std::span<const Vec3> vertices, std::span<const Triangle> triangles, std::span<const Vec3f> radiance);
     void sample(const Vec3& point, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const override;

@@ -5,7 +5,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "base/error.h"
 #include "scene/checks.h"
 #include "scene/embree.h"
 #include "scene/passage.h"
@@ -125,8 +124,7 @@ struct Occluders::Hierarchy {
 Occluders::Occluders(std::span<const OccluderMesh> meshes, const Vec3& origin, const OccluderSettings& settings)
     : m_most_crossings(settings.most_crossings), m_origin(origin)
 {
-    if (!detail::is_finite(origin))
-        reject("origin", detail::to_text(origin), "finite coordinates in metres");
+    detail::check_finite("origin", origin);
     for (const OccluderMesh& mesh : meshes) {
         mesh.check();
         m_triangle_count += mesh.placements.size() * mesh.triangles.size();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numbers>
 
 #include "base/threads.h"
@@ -36,7 +37,7 @@ std::array<double, 4> spline_weights(double t)
 OpenIrradiance::OpenIrradiance(const ReceiverGrid& grid, const ExtendedLight& light)
     : m_grid(grid), m_light(light), m_pitch(std::max(grid.pitch_x, grid.pitch_y))
 {
-    if (light.is_far()) {
+    if (std::isinf(light.distance_from(grid.origin))) {
         m_everywhere = light.irradiance(grid.origin, grid.normal);
         return;
     }

@@ -5,16 +5,16 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <numbers>
 #include <string>
 #include <vector>
 
 #include "base/error.h"
-#include "base/pool.h"
 #include "base/sobol.h"
 #include "base/threads.h"
 #include "base/vec.h"
+#include "base/working_memory.h"
 #include "scene/beams.h"
+#include "scene/checks.h"
 #include "scene/open_irradiance.h"
 #include "scene/ray_start.h"
 
@@ -45,7 +45,7 @@ public:
           m_prepared(light.facing(grid.normal)),
           m_light(m_prepared ? *m_prepared : light),
           m_open(grid, m_light),
-          m_is_far(m_light.is_far()),
+          m_is_far(std::isinf(m_light.distance_from(grid.origin))),
           m_occluders(occluders),
           m_rays(static_cast<std::size_t>(settings.rays)),
           m_even_rays(occluders ? std::min(static_cast<std::size_t>(settings.even_rays), m_rays) : 0),
@@ -63,8 +63,7 @@ public:
     // Has a look at a row, for itself and for its neighbours.
     void look_at_row(std::size_t y)
     {
-        const auto lease = m_rows.lend();
-        Rays& rays = *lease;
+        Rays& rays = m_rows.local();
         for (std::size_t x = 0; x < m_grid.width; x += texels_at_once) {
             const Span span{y, x, std::min(texels_at_once, m_grid.width - x)};
             rays.start(m_even_rays, span);
@@ -77,8 +76,7 @@ public:
 
     void gather_row(std::size_t y, RaySink& sink)
     {
-        const auto lease = m_rows.lend();
-        Rays& rays = *lease;
+        Rays& rays = m_rows.local();
         rays.met_around.assign(m_grid.width, Met::both);
         if (takes_a_look())
             look_around(y, rays.met_around);
@@ -235,18 +233,17 @@ private:
         }
         // The sum of what comes unhindered is known: what is hindered takes its part of it.
         // A channel in which all rays happen to be dark goes along with the mean of the channels.
-        const double mean = (sum.x + sum.y + sum.z) / 3.0;
-        const Vec3 scale = open / glm::mix(sum, Vec3(mean), glm::equal(sum, Vec3(0.0)));
-        const auto unhindered = [&](const Vec3& weight) {
-            return scale * glm::mix(weight, Vec3((weight.x + weight.y + weight.z) / 3.0), glm::equal(sum, Vec3(0.0)));
+        const auto lit = [is_dark = glm::equal(sum, Vec3(0.0))](const Vec3& weight) {
+            return glm::mix(weight, Vec3((weight.x + weight.y + weight.z) / 3.0), is_dark);
         };
+        const Vec3 scale = open / lit(sum);
         for (std::size_t i = 0; i < count; ++i) {
             if (rays.weights[i] == Vec3(0.0))
                 continue;
             const LightRay& found = rays.found[i];
             const std::size_t index = i * rays.span.width + texel;
             rays.travel[index] = Vec3f(glm::normalize(m_grid.to_plane(found.travel)));
-            rays.irradiance[index] = Vec3f(unhindered(rays.weights[i]));
+            rays.irradiance[index] = Vec3f(scale * lit(rays.weights[i]));
             if (!part.is_traced)
                 continue;
             rays.packet[rays.waiting] = shadow_ray(m_grid, m_start, rays.points[i], found.travel, found.distance);
@@ -309,7 +306,7 @@ private:
     RayStart m_start;
     double m_position_rounding;
     std::vector<std::uint8_t> m_met;  // [texel] by the rays of a look
-    Pool<Rays> m_rows;
+    PerThread<Rays> m_rows;
 };
 
 }  // namespace
@@ -322,8 +319,7 @@ void gather_rays(const ReceiverGrid& grid, const ExtendedLight& light, const Occ
         reject("rays", settings.rays, "1 to " + std::to_string(max_rays));
     if (settings.even_rays < 0)
         reject("even_rays", settings.even_rays, "0 or more");
-    if (!(settings.clearance >= 0.0) || std::isinf(settings.clearance))
-        reject("clearance", settings.clearance, "a finite length >= 0 in metres");
+    detail::check_length("clearance", settings.clearance);
 
     const auto gather = [&] {
         RayGatherer gatherer(grid, light, occluders, settings);

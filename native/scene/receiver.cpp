@@ -1,7 +1,6 @@
 #include "scene/receiver.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <string>
 
@@ -9,9 +8,6 @@
 #include "scene/checks.h"
 
 namespace beamspread {
-
-using detail::is_finite;
-using detail::to_text;
 
 namespace {
 
@@ -24,13 +20,13 @@ constexpr std::size_t max_side = 1u << 16;
 void check_unit(const std::string& name, const Vec3& axis)
 {
     if (!(std::abs(glm::length(axis) - 1.0) <= axis_tolerance))
-        reject(name, to_text(axis), "a unit vector");
+        reject(name, detail::to_text(axis), "a unit vector");
 }
 
 void check_perpendicular(const std::string& name, const Vec3& axis, const Vec3& other)
 {
     if (std::abs(glm::dot(axis, other)) > axis_tolerance)
-        reject(name, to_text(axis), "a vector at right angles to the other axes");
+        reject(name, detail::to_text(axis), "a vector at right angles to the other axes");
 }
 
 void check_pitch(const std::string& name, double pitch)
@@ -61,8 +57,7 @@ double ReceiverGrid::reach(const Vec3& centre) const
 
 void ReceiverGrid::check() const
 {
-    if (!is_finite(origin))
-        reject("origin", to_text(origin), "finite coordinates in metres");
+    detail::check_finite("origin", origin);
     check_unit("x_axis", x_axis);
     check_unit("y_axis", y_axis);
     check_unit("normal", normal);

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "base/constants.h"
-#include "base/error.h"
 #include "scene/checks.h"
 #include "scene/cone.h"
 
@@ -13,10 +12,8 @@ namespace beamspread {
 SphereLight::SphereLight(const Vec3& position, double radius, SphereModel model)
     : m_position(position), m_radius(radius), m_model(model)
 {
-    if (!detail::is_finite(position))
-        reject("position", detail::to_text(position), "finite coordinates in metres");
-    if (!(radius >= 0.0) || std::isinf(radius))
-        reject("radius", radius, "a finite length >= 0 in metres");
+    detail::check_finite("position", position);
+    detail::check_length("radius", radius);
 }
 
 bool SphereLight::is_inside(const Vec3& point) const

@@ -21,18 +21,12 @@ double half_sine_squared(double angle)
     return sine * sine;
 }
 
-Vec3 towards(const Vec3& direction)
-{
-    const Vec3 axis = -glm::normalize(direction);
-    if (!detail::is_finite(axis))
-        reject("direction", detail::to_text(direction), "a finite vector that is not 0");
-    return axis;
-}
-
 }  // namespace
 
 SunDiskLight::SunDiskLight(const Vec3& direction, double angle, SunDisk disk)
-    : m_sin_squared(half_sine_squared(angle)), m_cone(towards(direction), m_sin_squared), m_disk(disk)
+    : m_sin_squared(half_sine_squared(angle)),
+      m_cone(-detail::unit_vector("direction", direction), m_sin_squared),
+      m_disk(disk)
 {
 }
 

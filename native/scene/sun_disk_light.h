@@ -1,8 +1,6 @@
 // Light from a disk infinitely far away, of the strength S in W/m^2.
 #pragma once
 
-#include <limits>
-
 #include "scene/cone.h"
 #include "scene/extended_light.h"
 
@@ -23,8 +21,6 @@ public:
     SunDiskLight(const Vec3& direction, double angle, SunDisk disk);
     void sample(const Vec3& point, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const override;
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
-    double distance_from(const Vec3& /*point*/) const override { return std::numeric_limits<double>::infinity(); }
-    bool is_far() const override { return true; }
 
 private:
     double m_sin_squared;  // of half the angle

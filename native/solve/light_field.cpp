@@ -1,7 +1,6 @@
 #include "solve/light_field.h"
 
 #include <algorithm>
-#include <utility>
 #include <variant>
 
 #include "base/threads.h"

@@ -11,6 +11,7 @@
 
 #include "base/constants.h"
 #include "base/threads.h"
+#include "solve/separable/incidence.h"
 
 namespace beamspread {
 
@@ -79,8 +80,6 @@ public:
     }
 
 private:
-    static double angle_deg(double half_tangent) { return 2.0 * std::atan(half_tangent) / radians_per_degree; }
-
     float m_first = 0.0f;
     float m_per_step = 0.0f;
     std::vector<std::vector<Exit>> m_exits;
@@ -128,63 +127,35 @@ struct Strip {
     std::vector<float> values;
 };
 
-class LightPass {
-public:
-    LightPass(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium)
-        : m_plane(plane), m_light(light), m_exits(plane, medium, present(plane, light))
-    {
-    }
-
-    void add(float* luminance, std::size_t stride, double color) const
-    {
-        if (m_exits.count() == 0 || color == 0.0)
-            return;
-        const auto factor = static_cast<float>(color);
-        const std::size_t strips = (m_plane.height + rows_per_strip - 1) / rows_per_strip;
-        parallel_ordered(strips, [&](std::size_t item) {
-            return [&, done = strip(item * rows_per_strip)] {
-                float* out = luminance + done.first_row * m_plane.width * stride;
-                for (std::size_t i = 0; i < done.values.size(); ++i)
-                    out[i * stride] += factor * done.values[i];
-            };
-        });
-    }
-
-private:
-    Strip strip(std::size_t first) const
-    {
-        const std::size_t last = std::min(m_plane.height, first + rows_per_strip);
-        const double reach = static_cast<double>(m_exits.largest_distance()) / m_plane.pitch_y + 1.0;
-        const auto rows = static_cast<std::size_t>(std::min(std::ceil(reach), static_cast<double>(m_plane.height)));
-        Strip result{first - std::min(first, rows), {}};
-        result.values.resize((std::min(m_plane.height, last + rows) - result.first_row) * m_plane.width);
-        const auto per_x = static_cast<float>(1.0 / m_plane.pitch_x);
-        const auto per_y = static_cast<float>(1.0 / m_plane.pitch_y);
-        BeamRow row;
-        for (std::size_t y = first; y < last; ++y) {
-            if (!row.read(m_plane, m_light, {y, 0, m_plane.width}))
+Strip strip_from(std::size_t first, const Plane& plane, const PlaneLight& light, const ExitTable& exits)
+{
+    const std::size_t last = std::min(plane.height, first + rows_per_strip);
+    const double reach = static_cast<double>(exits.largest_distance()) / plane.pitch_y + 1.0;
+    const auto rows = static_cast<std::size_t>(std::min(std::ceil(reach), static_cast<double>(plane.height)));
+    Strip result{first - std::min(first, rows), {}};
+    result.values.resize((std::min(plane.height, last + rows) - result.first_row) * plane.width);
+    const auto per_x = static_cast<float>(1.0 / plane.pitch_x);
+    const auto per_y = static_cast<float>(1.0 / plane.pitch_y);
+    BeamRow row;
+    for (std::size_t y = first; y < last; ++y) {
+        if (!row.read(plane, light, {y, 0, plane.width}))
+            continue;
+        for (std::size_t x = 0; x < plane.width; ++x) {
+            if (row.irradiance[x] == 0.0f)
                 continue;
-            for (std::size_t x = 0; x < m_plane.width; ++x) {
-                if (row.irradiance[x] == 0.0f)
-                    continue;
-                for (std::size_t k = 0; k < m_exits.count(); ++k) {
-                    const ExitTable::Exit exit = m_exits.at(k, row.half_tangent[x]);
-                    const float exitance = row.irradiance[x] * exit.power * static_cast<float>(inv_pi);
-                    share(m_plane, static_cast<float>(x) + exit.distance * row.cos_beta[x] * per_x,
-                          static_cast<float>(y) + exit.distance * row.sin_beta[x] * per_y,
-                          [&](std::size_t place, float part) {
-                              result.values[place - result.first_row * m_plane.width] += exitance * part;
-                          });
-                }
+            for (std::size_t k = 0; k < exits.count(); ++k) {
+                const ExitTable::Exit exit = exits.at(k, row.half_tangent[x]);
+                const float exitance = row.irradiance[x] * exit.power * static_cast<float>(inv_pi);
+                share(plane, static_cast<float>(x) + exit.distance * row.cos_beta[x] * per_x,
+                      static_cast<float>(y) + exit.distance * row.sin_beta[x] * per_y,
+                      [&](std::size_t place, float part) {
+                          result.values[place - result.first_row * plane.width] += exitance * part;
+                      });
             }
         }
-        return result;
     }
-
-    const Plane& m_plane;
-    const PlaneLight& m_light;
-    ExitTable m_exits;
-};
+    return result;
+}
 
 }  // namespace
 
@@ -196,24 +167,22 @@ void add_unscattered(const Problem& problem, float* luminance)
 
 void add_unscattered(const Problem& problem, const PlaneLight& light, float* luminance)
 {
+    const Plane& plane = problem.plane;
     const std::size_t channels = problem.channels.size();
-    for (std::size_t c = 0; c < channels; ++c)
-        LightPass(problem.plane, light, problem.channels[c]).add(luminance + c, channels, light.color[c]);
+    for (std::size_t c = 0; c < channels; ++c) {
+        const ExitTable exits(plane, problem.channels[c], present(plane, light));
+        if (exits.count() == 0 || light.color[c] == 0.0)
+            continue;
+        const auto factor = static_cast<float>(light.color[c]);
+        parallel_ordered((plane.height + rows_per_strip - 1) / rows_per_strip, [&](std::size_t item) {
+            return [&, done = strip_from(item * rows_per_strip, plane, light, exits)] {
+                float* out = luminance + done.first_row * plane.width * channels + c;
+                for (std::size_t i = 0; i < done.values.size(); ++i)
+                    out[i * channels] += factor * done.values[i];
+            };
+        });
+    }
 }
-
-namespace {
-
-// In any channel, W/m^2.
-double largest(const PlaneLight& light)
-{
-    float most = 0.0f;
-    for (std::size_t y = 0; y < light.irradiance.height; ++y)
-        for (std::size_t x = 0; x < light.irradiance.width; ++x)
-            most = std::max(most, light.irradiance(y, x));
-    return static_cast<double>(most) * *std::max_element(light.color.begin(), light.color.end());
-}
-
-}  // namespace
 
 struct UnscatteredRays::Exits {
     std::vector<ExitTable> tables;  // [channel]
@@ -232,15 +201,15 @@ UnscatteredRays::UnscatteredRays(const Problem& problem) : m_plane(problem.plane
     for (const PlaneLight& light : problem.to_come.lights)
         include(problem.to_come.plane, light);
     std::size_t count = 0;
-    for (const ChannelMedium& medium : problem.channels) {
-        m_exits->tables.emplace_back(m_plane, medium, angles);
-        count += m_exits->tables.back().count();
-    }
-    double brightest = 0.0;
+    for (const ChannelMedium& medium : problem.channels)
+        count += m_exits->tables.emplace_back(m_plane, medium, angles).count();
+    double most = 0.0;  // W/m^2 in any channel
     for (const auto* lights : {&problem.lights, &problem.to_come.lights})
-        for (const PlaneLight& light : *lights)
-            brightest += largest(light);
-    m_unit = std::ldexp(brightest > 0.0 ? brightest : 1.0, -fraction_bits);
+        for (const PlaneLight& light : *lights) {
+            const auto [y, x] = brightest(light.irradiance);
+            most += static_cast<double>(light.irradiance(y, x)) * *std::ranges::max_element(light.color);
+        }
+    m_unit = std::ldexp(most > 0.0 ? most : 1.0, -fraction_bits);
     if (count > 0)
         m_sums.resize(m_plane.texels() * problem.channels.size());
 }

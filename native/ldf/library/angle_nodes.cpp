@@ -53,15 +53,15 @@ LdfSource::AngleWeights AngleNodes::weights(double angle_deg, double factor) con
     return weights;
 }
 
-AngleNodes AngleNodes::refined() const
+std::vector<double> with_middles(const std::vector<double>& angles_deg)
 {
-    std::vector<double> angles;
-    for (const double angle : m_angles_deg) {
-        if (!angles.empty())
-            angles.push_back(0.5 * (angles.back() + angle));
-        angles.push_back(angle);
+    std::vector<double> all;
+    for (const double angle : angles_deg) {
+        if (!all.empty())
+            all.push_back(0.5 * (all.back() + angle));
+        all.push_back(angle);
     }
-    return AngleNodes(std::move(angles));
+    return all;
 }
 
 }  // namespace beamspread

@@ -31,12 +31,12 @@ public:
     // Weights of the nodes at the clamped angle, times a factor.
     LdfSource::AngleWeights weights(double angle_deg, double factor) const;
 
-    // The same nodes, and one in the middle of each two.
-    AngleNodes refined() const;
-
 private:
     std::vector<double> m_angles_deg;
     AngleSpline m_spline;
 };
+
+// The same angles, and one in the middle of each two.
+std::vector<double> with_middles(const std::vector<double>& angles_deg);
 
 }  // namespace beamspread

@@ -62,12 +62,7 @@ struct Exact {
 
 Exact solve_exactly(const LdfLibrary& library, int threads)
 {
-    Exact exact;
-    for (double angle : library.angles_deg()) {
-        if (!exact.angles_deg.empty())
-            exact.angles_deg.push_back(0.5 * (exact.angles_deg.back() + angle));
-        exact.angles_deg.push_back(angle);
-    }
+    Exact exact{with_middles(library.angles_deg()), {}};
     std::vector<double> solved(compared_albedos.begin(), compared_albedos.end());
     solved.insert(solved.end(), {deepest, next_to_one});
     exact.totals = exact_totals(library.medium(), exact.angles_deg, solved, threads);

@@ -109,7 +109,7 @@ LdfLibrary::LdfLibrary(const Medium& medium, std::uint64_t photons, std::uint64_
         angles.push_back(result.angle_deg);
     m_simulated = AngleNodes(std::move(angles));
     // Around one pole the images of a beam have to move from node to node.
-    m_nodes = poles_of(medium) > 1 ? m_simulated.refined() : m_simulated;
+    m_nodes = poles_of(medium) > 1 ? AngleNodes(with_middles(angles_deg())) : m_simulated;
 }
 
 void LdfLibrary::check_angle(double angle_deg) const

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <optional>
-#include <string>
 #include <string_view>
 #include <vector>
 
@@ -102,7 +102,7 @@ LdfLibrary simulate_library(const Medium& medium, const std::vector<double>& ang
                             std::uint64_t seed, int threads, std::string_view kernel, Progress& progress);
 
 // One multi-part OpenEXR file; see library_format.h for the layout. Throw IoError.
-void save_library(const LdfLibrary& library, const std::string& path);
-LdfLibrary load_library(const std::string& path);
+void save_library(const LdfLibrary& library, const std::filesystem::path& path);
+LdfLibrary load_library(const std::filesystem::path& path);
 
 }  // namespace beamspread

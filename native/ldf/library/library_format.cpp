@@ -56,7 +56,6 @@ std::string part_name(std::size_t side, std::size_t angle)
     return std::string(side_names[side]) + "." + std::to_string(angle);
 }
 
-// Lines of another length: what is too long is cut off, what is missing filled up with zeros.
 std::vector<float> with_columns(const std::vector<float>& values, std::size_t from_columns, std::size_t columns)
 {
     const std::size_t lines = values.size() / from_columns;

@@ -205,9 +205,9 @@ private:
 
 }  // namespace
 
-LdfLibrary load_library(const std::string& path)
+LdfLibrary load_library(const std::filesystem::path& path)
 {
-    return Reader(path).library();
+    return Reader(path.string()).library();
 }
 
 }  // namespace beamspread

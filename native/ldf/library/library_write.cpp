@@ -35,7 +35,7 @@ std::map<std::string, ExrAttribute> common_attributes(const LdfLibrary& library,
 
 }  // namespace
 
-void save_library(const LdfLibrary& library, const std::string& path)
+void save_library(const LdfLibrary& library, const std::filesystem::path& path)
 {
     std::vector<ExrPart> parts;
     for (std::size_t j = 0; j < library.results().size(); ++j) {
@@ -76,7 +76,7 @@ void save_library(const LdfLibrary& library, const std::string& path)
     }
     for (ExrPart& part : parts)
         part.attributes["checksum"] = format::checksum(part).text;
-    write_exr_parts(path, parts);
+    write_exr_parts(path.string(), parts);
 }
 
 }  // namespace beamspread

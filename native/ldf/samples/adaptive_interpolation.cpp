@@ -224,7 +224,6 @@ std::vector<float> adaptive_image(const SampleCell& cell, double angle_deg, doub
     const std::vector<double> by_albedo = albedo_weights(cell.albedo, albedo, medium_g, first);
     const double by_g = place_between(cell.g, medium_g, [](double x) { return std::log(1.0 - x); });
     const std::array<double, 2> g_weights{1.0 - by_g, by_g};
-    const auto linear = [](const Bracket& axis, std::size_t i) { return i ? axis.weight : 1.0 - axis.weight; };
 
     Blend blend(first.image.size());
     for (std::size_t i = 0; i < 2; ++i) {
@@ -237,7 +236,7 @@ std::vector<float> adaptive_image(const SampleCell& cell, double angle_deg, doub
             for (std::size_t k = 0; k < 2; ++k) {
                 const double even = by_angle.even[i] * g_weights[k];
                 const double odd = by_angle.odd[i] * g_weights[k];
-                const double weight = linear(cell.angle, i) * linear(cell.albedo, j) * linear(cell.g, k);
+                const double weight = cell.angle.weight_of(i) * cell.albedo.weight_of(j) * cell.g.weight_of(k);
                 if (weight > 0.0)
                     blend.add(at_height(*pair[k], heights[k], height), weight, even, odd, by_albedo, j == 1);
             }

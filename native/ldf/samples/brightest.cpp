@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <glm/mat4x4.hpp>
+
 #include "ldf/samples/blur.h"
 
 namespace beamspread {
@@ -105,36 +107,20 @@ std::vector<std::size_t> top_of(const std::vector<double>& values, const LdfSamp
 double vertex(const std::vector<double>& values, const std::vector<std::size_t>& top, const LdfSample& sample,
               double middle)
 {
-    double n = 0.0;
-    double su = 0.0;
-    double sq = 0.0;
-    double suu = 0.0;
-    double suq = 0.0;
-    double sqq = 0.0;
-    double sf = 0.0;
-    double suf = 0.0;
-    double sqf = 0.0;
+    glm::dmat4 sums(0.0);  // of products of 1, u, q = u^2 + v^2 and the value
     for (const std::size_t texel : top) {
         const double u = sample.u(texel % sample.width) / sample.pitch - middle;
         const double v = sample.v(texel / sample.width) / sample.pitch;
-        const double q = u * u + v * v;
-        const double f = values[texel];
-        n += 1.0;
-        su += u;
-        sq += q;
-        suu += u * u;
-        suq += u * q;
-        sqq += q * q;
-        sf += f;
-        suf += u * f;
-        sqf += q * f;
+        const glm::dvec4 terms(1.0, u, u * u + v * v, values[texel]);
+        sums += glm::outerProduct(terms, terms);
     }
     // The normal equations without their constant term.
-    const double uu = suu - su * su / n;
-    const double uq = suq - su * sq / n;
-    const double qq = sqq - sq * sq / n;
-    const double uf = suf - su * sf / n;
-    const double qf = sqf - sq * sf / n;
+    const auto moment = [&](int i, int j) { return sums[i][j] - sums[0][i] * sums[0][j] / sums[0][0]; };
+    const double uu = moment(1, 1);
+    const double uq = moment(1, 2);
+    const double qq = moment(2, 2);
+    const double uf = moment(1, 3);
+    const double qf = moment(2, 3);
     const double determinant = uu * qq - uq * uq;
     if (!(determinant > 1e-12 * uu * qq))
         return middle;

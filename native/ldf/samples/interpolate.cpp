@@ -1,7 +1,5 @@
 #include "ldf/samples/interpolate.h"
 
-#include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "base/error.h"
@@ -25,11 +23,10 @@ struct WeightedSample {
 std::vector<WeightedSample> linear_weights(const SampleCell& cell)
 {
     std::vector<WeightedSample> weighted;
-    const auto weight = [](const Bracket& axis, std::size_t i) { return i ? axis.weight : 1.0 - axis.weight; };
     for (std::size_t i = 0; i < 2; ++i)
         for (std::size_t j = 0; j < 2; ++j)
             for (std::size_t k = 0; k < 2; ++k) {
-                const double w = weight(cell.angle, i) * weight(cell.albedo, j) * weight(cell.g, k);
+                const double w = cell.angle.weight_of(i) * cell.albedo.weight_of(j) * cell.g.weight_of(k);
                 if (w > 0.0)
                     weighted.push_back({cell.corners[i][j][k], w});
             }

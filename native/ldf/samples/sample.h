@@ -2,8 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "base/vec.h"
@@ -42,7 +42,7 @@ double exitance_at(const LdfSample& sample, const Vec2& place);
 void validate(const LdfSample& sample);
 
 // One-part OpenEXR file; see sample_file.cpp for the layout. Throw IoError.
-void save_sample(const LdfSample& sample, const std::string& path);
-LdfSample load_sample(const std::string& path);
+void save_sample(const LdfSample& sample, const std::filesystem::path& path);
+LdfSample load_sample(const std::filesystem::path& path);
 
 }  // namespace beamspread

@@ -122,7 +122,7 @@ private:
 
 }  // namespace
 
-void save_sample(const LdfSample& sample, const std::string& path)
+void save_sample(const LdfSample& sample, const std::filesystem::path& path)
 {
     ExrPart part;
     part.width = static_cast<int>(sample.width);
@@ -135,12 +135,12 @@ void save_sample(const LdfSample& sample, const std::string& path)
                        {"beamDiameter", sample.beam_diameter}};
     if (sample.g)
         part.attributes.emplace("g", *sample.g);
-    write_exr_parts(path, {&part, 1});
+    write_exr_parts(path.string(), {&part, 1});
 }
 
-LdfSample load_sample(const std::string& path)
+LdfSample load_sample(const std::filesystem::path& path)
 {
-    return Reader(path).sample();
+    return Reader(path.string()).sample();
 }
 
 }  // namespace beamspread

@@ -3,8 +3,6 @@
 
 #include <array>
 #include <optional>
-#include <span>
-#include <string>
 #include <vector>
 
 #include "ldf/samples/sample.h"
@@ -16,6 +14,8 @@ struct Bracket {
     double lower = 0.0;
     double upper = 0.0;  // equal: the axis has that one value here
     double weight = 0.0;  // of the upper one, linear
+
+    double weight_of(std::size_t i) const { return i ? weight : 1.0 - weight; }
 };
 
 // The cell of the grid that holds what is asked for.

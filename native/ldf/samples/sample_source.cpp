@@ -129,12 +129,11 @@ RadialProfile sample_profile(const LdfSample& sample)
 SampleSource::SampleSource(std::vector<LdfSample> samples, Interpolation method)
     : m_samples(std::move(samples)), m_method(method)
 {
-    std::vector<const LdfSample*> pointers;
     for (const LdfSample& sample : m_samples) {
         check_power(sample);
-        pointers.push_back(&sample);
+        m_pointers.push_back(&sample);
     }
-    const SampleGrid checked(pointers);
+    const SampleGrid checked(m_pointers);
     checked.cell(m_samples.front().angle_deg, m_samples.front().albedo, std::nullopt);  // of one g
     m_angles = node_angles(m_samples);
 }
@@ -156,10 +155,8 @@ RadialProfile SampleSource::at_node(double angle_deg, double albedo) const
         if (const auto found = m_known.find(key); found != m_known.end())
             return found->second;
     }
-    std::vector<const LdfSample*> pointers;
-    for (const LdfSample& sample : m_samples)
-        pointers.push_back(&sample);
-    RadialProfile made = sample_profile(interpolate(pointers, angle_deg, albedo, std::nullopt, m_method, std::nullopt));
+    RadialProfile made =
+        sample_profile(interpolate(m_pointers, angle_deg, albedo, std::nullopt, m_method, std::nullopt));
     const std::scoped_lock lock(m_mutex);
     return m_known.emplace(key, std::move(made)).first->second;
 }

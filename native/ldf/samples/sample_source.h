@@ -32,6 +32,7 @@ private:
     RadialProfile at_node(double angle_deg, double albedo) const;
 
     std::vector<LdfSample> m_samples;
+    std::vector<const LdfSample*> m_pointers;  // to them
     Interpolation m_method;
     std::vector<double> m_angles;  // ascending
 

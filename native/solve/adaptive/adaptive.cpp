@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 
-#include "base/constants.h"
 #include "simd/loops.h"
 #include "solve/adaptive/multilevel_sum.h"
 #include "solve/adaptive/near_radius.h"
@@ -66,16 +64,6 @@ std::vector<AngleLight> by_angle(const Plane& plane, const PlaneLight& light, co
     return lights;
 }
 
-// The squares that cost less as beams of their width, four steps seen by all texels, than texel by texel. A texel is
-// added to some 2000 others; for half and twice as many, time and errors are the same within 6 %.
-std::vector<Square> wide_beams(const std::vector<Square>& squares, std::size_t texels)
-{
-    std::vector<Square> wide;
-    std::copy_if(squares.begin(), squares.end(), std::back_inserter(wide),
-                 [texels](const Square& square) { return square.size * square.size >= texels / 500; });
-    return wide;
-}
-
 }  // namespace
 
 std::vector<Square> beam_squares(const Plane& plane, const PlaneLight& light, double tolerance)
@@ -83,21 +71,24 @@ std::vector<Square> beam_squares(const Plane& plane, const PlaneLight& light, do
     return even_squares(plane, light, tolerance_share * tolerance);
 }
 
-std::vector<float> solve_adaptive(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium,
-                                  double tolerance, Progress& progress)
+std::vector<double> solve_adaptive(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium,
+                                   double tolerance, Progress& progress)
 {
     const auto [width, height, metres_x, metres_y] = plane;
     const double pitch_y = metres_y / medium.mean_free_path;
     const double pitch_x = metres_x / medium.mean_free_path;
-    std::vector<float> radiance(height * width);
+    std::vector<double> exitance(height * width);
     const std::vector<Square> squares = beam_squares(plane, light, tolerance);
     if (squares.empty()) {
         progress.advance(1.0);
-        return radiance;
+        return exitance;
     }
     const LightTerms terms = choose_terms(plane, light, medium, tolerance);
     const std::size_t count = terms.terms.size();
-    const std::vector<Square> wide = wide_beams(squares, height * width);
+    // The squares that cost less as beams of their width, four steps seen by all texels, than texel by texel. A texel is
+    // added to some 2000 others; for half and twice as many, time and errors are the same within 6 %.
+    std::vector<Square> wide = squares;
+    std::erase_if(wide, [&](const Square& square) { return square.size * square.size < height * width / 500; });
 
     const double distance = std::hypot(static_cast<double>(height) * pitch_y, static_cast<double>(width) * pitch_x);
     const double near = near_radius(by_angle(plane, light, medium), std::max(pitch_y, pitch_x), distance,
@@ -123,9 +114,8 @@ std::vector<float> solve_adaptive(const Plane& plane, const PlaneLight& light, c
         add_scaled(sum.values.data(), part.values.data(), 1.0, sum.values.size());
     }
     for (std::size_t y = 0; y < height; ++y)
-        std::transform(sum.row(y), sum.row(y) + width, radiance.data() + y * width,
-                       [](double value) { return static_cast<float>(inv_pi * value); });
-    return radiance;
+        std::copy_n(sum.row(y), width, exitance.data() + y * width);
+    return exitance;
 }
 
 }  // namespace beamspread

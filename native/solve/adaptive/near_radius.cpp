@@ -87,15 +87,11 @@ double interpolation_error(const RadialProfile& profile, const Vec2& axis, doubl
     return sum * log_step * 2.0 * pi / directions;
 }
 
-struct Block {
-    std::size_t y;  // of its first texel
-    std::size_t x;
-};
-
-std::vector<Block> blocks(const PlaneLight& light, const Plane& plane)
+// Their first texels.
+std::vector<Texel> blocks(const PlaneLight& light, const Plane& plane)
 {
     Random random(0, plane.height, plane.width);
-    std::vector<Block> found;
+    std::vector<Texel> found;
     const auto add = [&](double y, double x) {
         const auto within = [](double at, std::size_t size) {
             return static_cast<std::size_t>(std::clamp(at, 0.0, static_cast<double>(size) - 1.0));
@@ -110,13 +106,7 @@ std::vector<Block> blocks(const PlaneLight& light, const Plane& plane)
             const double x = (static_cast<double>(column) + random.uniform()) / strata;
             add(y * static_cast<double>(plane.height), x * static_cast<double>(plane.width));
         }
-    std::size_t brightest = 0;
-    const auto irradiance = [&](std::size_t i) { return light.irradiance(i / plane.width, i % plane.width); };
-    for (std::size_t i = 0; i < plane.height * plane.width; ++i)
-        if (irradiance(i) > irradiance(brightest))
-            brightest = i;
-    const std::size_t y = brightest / plane.width;
-    const std::size_t x = brightest % plane.width;
+    const auto [y, x] = brightest(light.irradiance);
     for (std::size_t i = 0; i < around; ++i) {
         const double r = i == 0 ? 0.0 : std::pow(4.0, static_cast<double>(i));
         const double phi = 2.0 * pi * random.uniform();
@@ -171,9 +161,9 @@ double tried_radius(const LightTerms& terms, const PlaneLight& light, const std:
     if (radii.empty() || lit < least_lit)
         return bound;
     radii.push_back(compared_with * bound);
-    const std::vector<Block> looked_at = blocks(light, terms.plane);
+    const std::vector<Texel> looked_at = blocks(light, terms.plane);
     Targets targets(height, width);
-    for (const Block& block : looked_at)
+    for (const Texel& block : looked_at)
         targets.add(block.y, block.x);
 
     std::vector<TermSums> sums;
@@ -190,7 +180,7 @@ double tried_radius(const LightTerms& terms, const PlaneLight& light, const std:
         progress.advance(0.0);
     }
 
-    const auto mean = [&](const Block& block, auto value) {
+    const auto mean = [&](const Texel& block, auto value) {
         const std::size_t end_y = std::min(height, block.y + rows_at_once);
         const std::size_t end_x = std::min(width, block.x + targets_at_once);
         double sum = 0.0;
@@ -205,7 +195,7 @@ double tried_radius(const LightTerms& terms, const PlaneLight& light, const std:
         everywhere += mean(looked_at[i], exact) / (strata * strata);
     for (std::size_t i = 0; i + 1 < radii.size(); ++i) {
         double most = 0.0;
-        for (const Block& block : looked_at) {
+        for (const Texel& block : looked_at) {
             const double error = mean(
                 block, [&](std::size_t y, std::size_t x) { return radiance[i].row(y)[x] - radiance.back().row(y)[x]; });
             most = std::max(most, error / std::max(mean(block, exact), least_radiance * everywhere));

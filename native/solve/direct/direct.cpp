@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 
-#include "base/constants.h"
 #include "base/threads.h"
 #include "ldf/radial/texel_integral.h"
 #include "simd/loops.h"
@@ -37,14 +36,9 @@ std::vector<Term> basis_terms(const OneDirection* one, const std::vector<RadialP
     }
     for (std::size_t j = 0; j < profiles.size(); ++j) {
         for (std::size_t m = 0; m < profiles[j].harmonics(); ++m) {
-            Term cosine{j, {}, {}};
-            cosine.cosine[m] = 1.0;
-            terms.push_back(cosine);
-            if (m == 0)
-                continue;
-            Term sine{j, {}, {}};
-            sine.sine[m] = 1.0;
-            terms.push_back(sine);
+            terms.emplace_back(Term{j, {}, {}}).cosine[m] = 1.0;
+            if (m > 0)
+                terms.emplace_back(Term{j, {}, {}}).sine[m] = 1.0;
         }
     }
     return terms;
@@ -117,20 +111,16 @@ std::vector<double> kernel_row(const TexelIntegrals& quadrant, const Term& term,
         // phi -> -phi for dy < 0, and phi -> pi - phi for dx < 0.
         const double by_sine = dy < 0 ? -term.sine[m] : term.sine[m];
         const double mirrored = m % 2 == 0 ? 1.0 : -1.0;
-        if (term.cosine[m] != 0.0) {
-            const double* a = quadrant.cosine.data() + place;
+        const auto add = [&](double factor, const double* integrals, double to_the_left) {
+            if (factor == 0.0)
+                return;
             for (std::size_t x = 0; x < width; ++x)
-                right[x] += term.cosine[m] * a[x];
+                right[x] += factor * integrals[x];
             for (std::size_t x = 1; x < width; ++x)
-                values[width - 1 - x] += mirrored * term.cosine[m] * a[x];
-        }
-        if (by_sine != 0.0) {
-            const double* b = quadrant.sine.data() + place;
-            for (std::size_t x = 0; x < width; ++x)
-                right[x] += by_sine * b[x];
-            for (std::size_t x = 1; x < width; ++x)
-                values[width - 1 - x] -= mirrored * by_sine * b[x];
-        }
+                values[width - 1 - x] += to_the_left * factor * integrals[x];
+        };
+        add(term.cosine[m], quadrant.cosine.data() + place, mirrored);
+        add(by_sine, quadrant.sine.data() + place, -mirrored);
     }
     return values;
 }
@@ -178,8 +168,8 @@ std::size_t rows_at_once(std::size_t terms, std::size_t width)
 
 }  // namespace
 
-std::vector<float> solve_direct(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium,
-                                Progress& progress)
+std::vector<double> solve_direct(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium,
+                                 Progress& progress)
 {
     const auto* one = std::get_if<OneDirection>(&light.directions);
     const LdfSource& ldf = *medium.ldf;
@@ -216,10 +206,7 @@ std::vector<float> solve_direct(const Plane& plane, const PlaneLight& light, con
             }
         });
     }
-    std::vector<float> luminance(sum.size());
-    std::transform(sum.begin(), sum.end(), luminance.begin(),
-                   [](double value) { return static_cast<float>(inv_pi * value); });
-    return luminance;
+    return sum;
 }
 
 }  // namespace beamspread

@@ -8,8 +8,8 @@
 
 namespace beamspread {
 
-// Radiance that a light of colour 1 causes over one medium, W/(m^2 sr), row by row; advances the progress by 1.
-std::vector<float> solve_direct(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium,
-                                Progress& progress);
+// Exitance that a light of colour 1 causes over one medium, W/m^2, row by row; advances the progress by 1.
+std::vector<double> solve_direct(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium,
+                                 Progress& progress);
 
 }  // namespace beamspread

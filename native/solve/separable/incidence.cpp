@@ -27,32 +27,6 @@ struct Histogram {
     std::vector<Incidence::Extremes> extremes;
 };
 
-void add_row(const BeamRow& row, std::size_t y, double strength, Histogram& histogram, Incidence::Extremes& extremes)
-{
-    for (std::size_t x = 0; x < row.irradiance.size(); ++x) {
-        const float irradiance = row.irradiance[x];
-        if (irradiance == 0.0f)
-            continue;
-        const float angle = row.half_tangent[x];
-        const auto bin = std::min(static_cast<std::size_t>(angle * static_cast<float>(bin_count)), bin_count - 1);
-        const double power = strength * static_cast<double>(irradiance);
-        histogram.light[bin] += power;
-        histogram.beams[bin] += 1.0;
-        if (power > extremes.irradiance) {
-            extremes.irradiance = power;
-            extremes.brightest = {y, x};
-        }
-        if (angle < extremes.least) {
-            extremes.least = angle;
-            extremes.steepest = {y, x};
-        }
-        if (angle > extremes.greatest) {
-            extremes.greatest = angle;
-            extremes.most_grazing = {y, x};
-        }
-    }
-}
-
 void merge(const Incidence::Extremes& from, Incidence::Extremes& to)
 {
     if (from.irradiance > to.irradiance) {
@@ -66,6 +40,21 @@ void merge(const Incidence::Extremes& from, Incidence::Extremes& to)
     if (from.greatest > to.greatest) {
         to.greatest = from.greatest;
         to.most_grazing = from.most_grazing;
+    }
+}
+
+void add_row(const BeamRow& row, std::size_t y, double strength, Histogram& histogram, Incidence::Extremes& extremes)
+{
+    for (std::size_t x = 0; x < row.irradiance.size(); ++x) {
+        const float irradiance = row.irradiance[x];
+        if (irradiance == 0.0f)
+            continue;
+        const float angle = row.half_tangent[x];
+        const auto bin = std::min(static_cast<std::size_t>(angle * static_cast<float>(bin_count)), bin_count - 1);
+        const double power = strength * static_cast<double>(irradiance);
+        histogram.light[bin] += power;
+        histogram.beams[bin] += 1.0;
+        merge({{y, x}, {y, x}, {y, x}, power, angle, angle}, extremes);
     }
 }
 
@@ -88,10 +77,8 @@ Histogram histogram_of(const Plane& plane, const std::vector<PlaneLight>& lights
     };
     parallel_ordered((plane.height + rows_per_item - 1) / rows_per_item, [&](std::size_t item) {
         return [&, part = read_rows(item)] {
-            for (std::size_t i = 0; i < bin_count; ++i) {
-                sum.light[i] += part.light[i];
-                sum.beams[i] += part.beams[i];
-            }
+            add_scaled(sum.light.data(), part.light.data(), 1.0, bin_count);
+            add_scaled(sum.beams.data(), part.beams.data(), 1.0, bin_count);
             for (std::size_t l = 0; l < lights.size(); ++l)
                 merge(part.extremes[l], sum.extremes[l]);
         };

@@ -4,7 +4,6 @@
 #include <optional>
 
 #include "simd/loops.h"
-#include "solve/problem/beam_loops.h"
 
 namespace beamspread {
 

@@ -163,27 +163,23 @@ void CentreSpectrum::spectrum(const Columns& columns, std::size_t column, std::s
 void CentreSpectrum::spectra(Columns& columns, std::size_t column, std::size_t first, std::size_t count,
                              float* values) const
 {
-    for (std::size_t i = 0; i < count; i += lines_at_once)
-        transform(columns, column, first + i, std::min(lines_at_once, count - i), values + i * m_frequencies);
-}
-
-void CentreSpectrum::transform(Columns& columns, std::size_t column, std::size_t first, std::size_t count,
-                               float* values) const
-{
-    columns.lines.assign(lines_at_once * m_padded_height, 0.0f);
     columns.half.resize(lines_at_once * m_frequencies);
-    for (std::size_t i = 0; i < count; ++i) {
-        const float* rows = columns.rows.data() + ((first + i) * columns.count + column) * m_stride;
-        float* line = columns.lines.data() + i * m_padded_height;
-        line[0] = rows[0];
-        std::transform(rows + 1, rows + m_height, line + 1, [](float row) { return 2.0f * row; });
-    }
-    fft().real_to_half(columns.lines.data(), columns.half.data(), count, m_padded_height);
-    for (std::size_t i = 0; i < count; ++i) {
-        const Complex* half = columns.half.data() + i * m_frequencies;
-        const bool sine = columns.sums[first + i]->sine;
-        std::transform(half, half + m_frequencies, values + i * m_frequencies,
-                       [sine](const Complex& z) { return sine ? -z.imag() : z.real(); });
+    for (const std::size_t end = first + count; first < end; first += lines_at_once) {
+        const std::size_t lines = std::min(lines_at_once, end - first);
+        columns.lines.assign(lines_at_once * m_padded_height, 0.0f);
+        for (std::size_t i = 0; i < lines; ++i) {
+            const float* rows = columns.rows.data() + ((first + i) * columns.count + column) * m_stride;
+            float* line = columns.lines.data() + i * m_padded_height;
+            line[0] = rows[0];
+            std::transform(rows + 1, rows + m_height, line + 1, [](float row) { return 2.0f * row; });
+        }
+        fft().real_to_half(columns.lines.data(), columns.half.data(), lines, m_padded_height);
+        for (std::size_t i = 0; i < lines; ++i) {
+            const Complex* half = columns.half.data() + i * m_frequencies;
+            const bool sine = columns.sums[first + i]->sine;
+            values = std::transform(half, half + m_frequencies, values,
+                                    [sine](const Complex& z) { return sine ? -z.imag() : z.real(); });
+        }
     }
 }
 

@@ -50,7 +50,6 @@ public:
     bool is_wide() const { return m_trig.empty(); }
 
 private:
-    void transform(Columns& columns, std::size_t column, std::size_t first, std::size_t count, float* values) const;
     void integrate(const ScaledProfile& scaled, const PaddedPlane& plane, const std::optional<RadialWindow>& outside,
                    float* kernels) const;
 

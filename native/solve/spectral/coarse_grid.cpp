@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "base/pool.h"
 #include "base/threads.h"
+#include "base/working_memory.h"
 #include "simd/loops.h"
 
 namespace beamspread {
@@ -11,12 +11,10 @@ namespace beamspread {
 std::vector<float> CoarseGrid::spread(const MakeLightRow& light, std::size_t first, std::size_t count,
                                       Progress& progress, double work) const
 {
-    struct RowScratch {
+    struct RowScratch : Scratch {
         LightRow light;
-        std::vector<float> nodes;
-        std::vector<float> line;
     };
-    Pool<RowScratch> pool;
+    PerThread<RowScratch> pool;
     const std::size_t stride = m_x.nodes();
     const std::size_t step = m_y.step();
     const std::size_t items = (m_height + step - 1) / step;
@@ -24,8 +22,7 @@ std::vector<float> CoarseGrid::spread(const MakeLightRow& light, std::size_t fir
     // The texels of an item share the rows of nodes that their light goes to, [term][row][node].
     const auto spread_rows = [&](std::size_t item) {
         std::vector<float> rows(count * spline_order * stride, 0.0f);
-        const auto lease = pool.lend();
-        RowScratch& scratch = *lease;
+        RowScratch& scratch = pool.local();
         if (!scratch.light)
             scratch.light = light();
         scratch.nodes.resize(stride);

@@ -106,8 +106,7 @@ void Convolution::transform_light(const Tile& tile, std::size_t first, std::size
     parallel_for(items, [&](std::size_t item) {
         const std::size_t y0 = item * rows_per_item;
         const std::size_t rows = std::min(rows_per_item, tile.window_y.count - y0);
-        const auto lease = m_row_scratch.lend();
-        RowScratch& scratch = *lease;
+        RowScratch& scratch = m_row_scratch.local();
         while (scratch.rows.size() < rows)
             scratch.rows.push_back(tile.light());
         scratch.lines.resize(rows_per_item * stride);
@@ -152,8 +151,7 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
         }
     first_part.push_back(parts.size());
     parallel_for(items, [&](std::size_t item) {
-        const auto lease = m_column_scratch.lend();
-        ColumnScratch& scratch = *lease;
+        ColumnScratch& scratch = m_column_scratch.local();
         scratch.lines.resize(terms_per_batch * height);
         scratch.sums.resize(2 * results.count() * height);
         scratch.kernel.resize(height);
@@ -209,8 +207,7 @@ void Convolution::store_result(const Tile& tile, std::size_t medium, ColumnSpect
     parallel_for(items, [&](std::size_t item) {
         const std::size_t y0 = item * rows_per_item;
         const std::size_t rows = std::min(rows_per_item, tile.y.count - y0);
-        const auto lease = m_row_scratch.lend();
-        RowScratch& scratch = *lease;
+        RowScratch& scratch = m_row_scratch.local();
         scratch.lines.resize(rows_per_item * stride);
         scratch.half.resize(rows_per_item * columns);
         for (std::size_t x = 0; x < columns; ++x) {

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "base/pool.h"
 #include "base/progress.h"
+#include "base/working_memory.h"
 #include "fft/column_spectra.h"
 #include "solve/separable/light_terms.h"
 #include "solve/spectral/kernel_spectra.h"
@@ -84,8 +84,8 @@ private:
     std::vector<std::vector<std::vector<KernelSpectra::Part>>> m_kernels;  // [term][medium]
     std::size_t m_media;
     SpectraAtOnce m_at_once;
-    Pool<RowScratch> m_row_scratch;
-    Pool<ColumnScratch> m_column_scratch;
+    PerThread<RowScratch> m_row_scratch;
+    PerThread<ColumnScratch> m_column_scratch;
 };
 
 }  // namespace beamspread

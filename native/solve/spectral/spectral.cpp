@@ -1,7 +1,6 @@
 #include "solve/spectral/spectral.h"
 
 #include <algorithm>
-#include <cmath>
 #include <span>
 #include <utility>
 
@@ -59,16 +58,12 @@ SpectralField::SpectralField(const Problem& problem, Progress& progress)
 
 void SpectralField::add(const PlaneLight& light)
 {
-    parallel_for(m_problem.plane.height, [&](std::size_t y) {
-        const auto lease = m_sums.lend();
-        (*lease).add(m_terms, light, y);
-    });
+    parallel_for(m_problem.plane.height, [&](std::size_t y) { m_sums.local().add(m_terms, light, y); });
 }
 
 void SpectralField::add(const RayBeams& rays, const std::vector<double>& color, bool is_colored)
 {
-    const auto lease = m_sums.lend();
-    (*lease).add(m_terms, rays, color, is_colored);
+    m_sums.local().add(m_terms, rays, color, is_colored);
 }
 
 void SpectralField::clear()
@@ -94,10 +89,8 @@ void SpectralField::solve(Progress& progress, float* luminance)
         m_spectra.emplace(m_levels.texels, m_terms.profiles, m_levels.outside_centre);
     Convolution convolution(*m_spectra, m_terms.terms, m_terms.sets.results.size(), m_problem.memory);
     const auto store = [&](std::size_t result, const RowSpan& span, float* values, double factor) {
-        if (coarse) {
-            const auto lease = m_scratch.lend();
-            coarse->grid.add_interpolated(coarse->nodes[result], span, values, *lease);
-        }
+        if (coarse)
+            coarse->grid.add_interpolated(coarse->nodes[result], span, values, m_scratch.local());
         store_row(result, span, values, factor, luminance);
     };
     convolution.solve(texel_rows(m_terms), store, progress, share);

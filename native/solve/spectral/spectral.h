@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "base/pool.h"
 #include "base/progress.h"
+#include "base/working_memory.h"
 #include "solve/problem/problem.h"
 #include "solve/separable/term_row.h"
 #include "solve/spectral/coarse_grid.h"
@@ -54,8 +54,8 @@ private:
     Levels m_levels;
     std::optional<KernelSpectra> m_spectra;  // of the texels, kept for the next time
     std::optional<KernelSpectra> m_coarse_spectra;
-    Pool<MomentSum> m_sums;
-    Pool<CoarseGrid::Scratch> m_scratch;
+    PerThread<MomentSum> m_sums;
+    PerThread<CoarseGrid::Scratch> m_scratch;
 };
 
 void solve_spectral(const Problem& problem, Progress& progress, float* luminance);

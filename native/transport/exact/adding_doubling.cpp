@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <Eigen/Dense>
 
@@ -239,20 +238,16 @@ Layer layer_of(const Medium& medium, const Angular& a, double albedo)
     const double depth = medium.thickness * (1.0 - albedo * a.peak);
     const double scaled_albedo = albedo * (1.0 - a.peak) / (1.0 - albedo * a.peak);
     const double thin = first_layer * std::min(a.cosine.minCoeff(), a.beam_cosine.minCoeff());
-    if (medium.is_half_space()) {
-        Layer layer = thin_layer(a, scaled_albedo, thin);
-        // More doublings than any albedo below 1 needs in double precision.
-        for (int i = 0; i < 100; ++i) {
-            layer = doubled(layer);
-            if (std::max({layer.scattered.maxCoeff(), layer.direct.maxCoeff(), layer.beam_direct.maxCoeff()}) < opaque)
-                break;
-        }
-        return layer;
-    }
-    const int doublings = std::max(0, static_cast<int>(std::ceil(std::log2(depth / thin))));
-    Layer layer = thin_layer(a, scaled_albedo, std::ldexp(depth, -doublings));
-    for (int i = 0; i < doublings; ++i)
+    const bool ends = !medium.is_half_space();
+    // Without an end, more than any albedo below 1 needs in double precision.
+    const int doublings = ends ? std::max(0, static_cast<int>(std::ceil(std::log2(depth / thin)))) : 100;
+    Layer layer = thin_layer(a, scaled_albedo, ends ? std::ldexp(depth, -doublings) : thin);
+    for (int i = 0; i < doublings; ++i) {
         layer = doubled(layer);
+        if (!ends &&
+            std::max({layer.scattered.maxCoeff(), layer.direct.maxCoeff(), layer.beam_direct.maxCoeff()}) < opaque)
+            break;
+    }
     return layer;
 }
 

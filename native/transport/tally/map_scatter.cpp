@@ -58,10 +58,9 @@ std::vector<double> contracted(const Tally& tally, double albedo, std::span<cons
     return sums;
 }
 
-// Of each group, [group][harmonic][radius bin].
-std::vector<std::vector<float>> deviations_of(std::span<const Tally* const> groups, double albedo,
-                                              std::span<const std::size_t> harmonics, std::size_t radii,
-                                              std::size_t pole)
+// Appends those of each group, [harmonic][radius bin].
+void add_deviations(std::vector<std::vector<float>>& by_group, std::span<const Tally* const> groups, double albedo,
+                    std::span<const std::size_t> harmonics, std::size_t radii, std::size_t pole)
 {
     std::vector<std::vector<double>> sums;
     for (const Tally* group : groups)
@@ -70,15 +69,12 @@ std::vector<std::vector<float>> deviations_of(std::span<const Tally* const> grou
     for (const std::vector<double>& of_group : sums)
         for (std::size_t i = 0; i < mean.size(); ++i)
             mean[i] += of_group[i] / static_cast<double>(groups.size());
-    std::vector<std::vector<float>> deviations;
-    for (const std::vector<double>& of_group : sums) {
-        std::vector<float>& to = deviations.emplace_back();
+    for (std::size_t group = 0; group < groups.size(); ++group)
         for (std::size_t i = 0; i < mean.size(); ++i) {
             const double power = mean[i % radii];
-            to.push_back(power > 0.0 ? rounded_to_five_bits((of_group[i] - mean[i]) / power) : 0.0F);
+            const double difference = sums[group][i] - mean[i];
+            by_group[group].push_back(power > 0.0 ? rounded_to_five_bits(difference / power) : 0.0F);
         }
-    }
-    return deviations;
 }
 
 }  // namespace
@@ -93,11 +89,8 @@ std::vector<float> relative_deviations(std::span<const Tally* const> groups, std
 {
     std::vector<std::vector<float>> by_group(groups.size());
     for (std::size_t pole = 0; pole < pole_count; ++pole)
-        for (const double albedo : albedos_of(pole)) {
-            const auto deviations = deviations_of(groups, albedo, harmonics, radii, pole);
-            for (std::size_t group = 0; group < groups.size(); ++group)
-                by_group[group].insert(by_group[group].end(), deviations[group].begin(), deviations[group].end());
-        }
+        for (const double albedo : albedos_of(pole))
+            add_deviations(by_group, groups, albedo, harmonics, radii, pole);
     std::vector<float> all;
     for (const std::vector<float>& of_group : by_group)
         all.insert(all.end(), of_group.begin(), of_group.end());

@@ -25,13 +25,7 @@ Vec3 scatter(const Vec3& w, double g, Random& random)
         s = a * a + b * b;
     } while (s >= 1.0 || s == 0.0);
     const double scale = sin_theta / std::sqrt(s);
-    // Orthonormal basis around w (Duff et al. 2017, JCGT 6(1)).
-    const double sign = std::copysign(1.0, w.z);
-    const double k = -1.0 / (sign + w.z);
-    const double xy = w.x * w.y * k;
-    const Vec3 tangent(1.0 + sign * w.x * w.x * k, sign * xy, -sign * w.x);
-    const Vec3 bitangent(xy, sign + w.y * w.y * k, -w.y);
-    const Vec3 out = tangent * (a * scale) + bitangent * (b * scale) + w * cos_theta;
+    const Vec3 out = Frame(w).to_world({a * scale, b * scale, cos_theta});
     // One step of Newton's method keeps the length at 1 over a million scatterings.
     return out * (1.5 - 0.5 * glm::dot(out, out));
 }

@@ -16,7 +16,6 @@
 #include "transport/walk/packet_math-inl.h"
 #include "transport/walk/packet_optics-inl.h"
 #include "transport/walk/packet_tally-inl.h"
-#include "transport/walk/photon_pool-inl.h"
 #include "transport/walk/walk_plan.h"
 
 HWY_BEFORE_NAMESPACE();
