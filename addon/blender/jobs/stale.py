@@ -17,6 +17,7 @@ from ..images import previews
 from ..images.files import file_of
 from ..images.owners import noted_as
 from ..images.sequence import file_at, is_sequence
+from ..images.undo import is_undone
 from ..node.find import find_bakeable, find_misplaced, find_node
 from ..node.tree import FRAMES
 from ..read.instances import by_name
@@ -106,10 +107,11 @@ def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
         return replace(said, is_stale=bool(changed))
     if record is None:
         return Row(target, Standing.NEVER)
+    warnings = (*_why_later(_image(target)), *record.warnings)
     if changed and changed != [QUALITY]:
         why = f"Changed since its bake: {', '.join(changed)}."
-        return Row(target, Standing.STALE, (why, *record.warnings, *record.notes), True)
-    warnings = (*([_why_again(record.parts[QUALITY], now[QUALITY])] if changed else []), *record.warnings)
+        return Row(target, Standing.STALE, (why, *warnings, *record.notes), True)
+    warnings = (*([_why_again(record.parts[QUALITY], now[QUALITY])] if changed else []), *warnings)
     standing = Standing.WARNED if warnings else Standing.BAKED
     return Row(target, standing, (*warnings, *record.notes), bool(changed))
 
@@ -134,6 +136,13 @@ def _has_lost_its_file(image) -> bool:
 
 def _is_painted(image) -> bool:
     return image.is_dirty and not previews.covers(image)
+
+
+def _why_later(image) -> list[str]:
+    if not is_undone(image):
+        return []
+    shown = f"Undo does not reach files: the image shows the later bake, which '{file_of(image).name}' holds."
+    return [f"{shown} For the earlier one, undo what was changed between them, too, and bake again."]
 
 
 def _why_again(baked: str, wanted: str) -> str:
