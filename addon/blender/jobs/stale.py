@@ -26,14 +26,14 @@ from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
 from .record import Record, keep_record, record_in, record_of
 from .state import Row, Standing, redraw, state
 
-# After the last change; longer where a look takes long, which happens between two changes at most once.
-REST_SECONDS, MOST_OF_THE_TIME = 0.3, 0.05
+# After the last change; and after the last look so long that looks take at most such a part of the time.
+REST_SECONDS, MOST_OF_THE_TIME = 0.3, 0.1
 
 FIRST_LOOK = "first look"
 
 fingerprints = Fingerprints()
 _waiting: list[tuple[Bake, Parts | None]] = []
-_last = {"change": 0.0, "seconds": 0.0, "is looking": False}
+_last = {"change": 0.0, "next": 0.0, "is looking": False}
 
 
 def refresh(context) -> None:
@@ -159,9 +159,8 @@ def look_soon() -> None:
 
 
 def _look() -> float | None:
-    rest = max(REST_SECONDS, _last["seconds"] / MOST_OF_THE_TIME)
     began = time.monotonic()
-    waiting = _last["change"] + rest - began
+    waiting = max(_last["change"] + REST_SECONDS, _last["next"]) - began
     if waiting > 0:
         return waiting
     context = bpy.context
@@ -172,7 +171,8 @@ def _look() -> float | None:
             with context.temp_override(window=window):
                 refresh(bpy.context)
         finally:
-            _last["is looking"], _last["seconds"] = False, time.monotonic() - began
+            ended = time.monotonic()
+            _last["is looking"], _last["next"] = False, ended + (ended - began) / MOST_OF_THE_TIME
         redraw(bpy.context)
     return None
 

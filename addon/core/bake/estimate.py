@@ -16,9 +16,9 @@ RAY_SECONDS = 6e-7
 # Of the direct solver, per pair of texels: for light of its own direction at each, and of one for all as a sun's.
 DIRECT_SECONDS, DIRECT_SUN_SECONDS = 3e-8, 3e-10
 
-# Bytes of memory beside the host's, whatever the size, and for each texel: where suns alone shine, where all light comes
-# from one direction at each texel, and where other light does. Peaks of processes with 256^2 to 2048^2 texels, a sun, a
-# lamp, a world and a lamp (tests/unit/test_estimate.py), and a twentieth more or over, as Blender's image takes some.
+# Bytes of memory beside the host's, whatever the size, and for each texel: where suns alone shine, where all light
+# comes from one direction at each texel, and where other light does. Peaks of processes with 256^2 to 2048^2 texels, a
+# sun, a lamp, a world and a lamp (tests/unit/test_estimate.py), and a twentieth more or over, for Blender's image.
 SUNS, NARROW, WIDE = range(3)
 BYTES = {
     "fft": ((50e6, 80), (400e6, 80), (600e6, 80)),
