@@ -11,6 +11,7 @@ from beamspread.blender.jobs.prepare import prepare_scene
 from beamspread.blender.jobs.state import Standing, state
 from beamspread.blender.live import session
 from beamspread.blender.node.find import find_bakeable
+from beamspread.blender.ui import results
 from beamspread.blender.ui.results import estimates
 from beamspread.core.bake.runner import Target
 from beamspread.core.batch import options
@@ -18,6 +19,7 @@ from mathutils import Euler, Matrix
 from scenes import add_blocker, add_material, add_plane, add_sun, messages_of, node_of, pixels, select
 from test_indirect import add_gobo
 from test_live import settle
+from test_results_panel import Layout, context
 from test_standing import scatter_group
 
 TILE = Target("Tile", "Medium")
@@ -343,16 +345,55 @@ def link_tiles(tmp_path, has_image):
 def test_one_of_another_file_is_refused_unless_it_was_baked_there(has_image, tmp_path):
     select(link_tiles(tmp_path, has_image))
     add_sun()
+    problems = results.draw_problems(Layout(), context())
+    assert len(problems) == (not has_image)
     message = messages_of(bpy.ops.beamspread.bake)
+    assert all(one in message for one in problems)
     assert ("No mesh has a material" if has_image else "belongs to another .blend file") in message
 
 
-def test_problems_inside_are_said():
-    tile, collection = add_tile()
+def use_shared_group(tile):
     material = tile.data.materials[0] = scenes.add_group_material()
     material.copy()  # which has the same group
-    select(add_instancer(collection, SKEWED))
-    assert "'Grouped' is in the node group 'Outer'" in messages_of(bpy.ops.beamspread.bake)
+
+
+def instance_again(tile):
+    add_instancer(tile.users_collection[0], MIRRORED)
+
+
+def remove_uvs(tile):
+    tile.data.uv_layers.remove(tile.data.uv_layers[0])
+
+
+def make_black_holes(tile):
+    node_of(tile.data.materials[0]).albedo = (1, 1, 1)
+
+
+def hide_within(tile):
+    tile.hide_render = True
+
+
+PROBLEMS = {
+    "'Grouped' is in the node group 'Outer'": use_shared_group,
+    "The object 'Tile' stands in 2 places": instance_again,
+    "UV map": remove_uvs,
+    "The albedo's red is 1": make_black_holes,
+    "The object 'Tile' is hidden from render": hide_within,
+}
+
+
+@pytest.mark.parametrize("sentence", PROBLEMS)
+def test_problems_inside_are_said_in_the_panel_and_by_the_bake(sentence):
+    tile, collection = add_tile()
+    add_sun()
+    select(add_instancer(nest(collection)[0], SKEWED))
+    assert results.draw_problems(Layout(), context()) == set()
+    PROBLEMS[sentence](tile)
+    layout = Layout()
+    results.draw_problems(layout, context())
+    assert sentence in layout.said
+    assert layout.said.count("Tile: ") == 1
+    assert sentence in messages_of(bpy.ops.beamspread.bake)
 
 
 def test_an_object_of_the_scene_is_baked_where_it_stands_itself():

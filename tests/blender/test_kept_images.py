@@ -380,12 +380,12 @@ def test_an_overridden_material_is_refused_and_the_sentence_helps(tmp_path):
     message = messages_of(bpy.ops.beamspread.bake)
     assert "The material 'Medium' belongs to another .blend file" in message
     assert "Make Local > Selected Objects, Data and Materials" in message
-    said = " ".join(warnings_for(plane, {"Plane"}))
+    said = " ".join(warnings_for(plane, {"Plane": 1}))
     assert "belongs to another .blend file" in said  # before the bake, in the panel
     assert image_of(plane) is None
     bpy.ops.object.make_local(type="SELECT_OBDATA_MATERIAL")
     plane = next(obj for obj in bpy.context.scene.objects if obj.type == "MESH")
-    assert warnings_for(plane, {plane.name}) == []
+    assert warnings_for(plane, {plane.name: 1}) == []
     bake(plane)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "user.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "user.blend"))

@@ -1,11 +1,19 @@
-"""Undo in a window: picture and packed data go back and forth together, and a running bake keeps its result."""
+"""Undo in a window: picture and packed data go back and forth together, and a running bake keeps its result.
+
+Files are not undone, which the results say, also without a window.
+"""
 
 import json
 import subprocess
 from pathlib import Path
 
 import bpy
+import numpy as np
 import pytest
+from beamspread.blender.jobs import stale
+from beamspread.blender.jobs.state import Standing, state
+from beamspread.core.native import native
+from scenes import add_material, add_plane, add_sun, bake, node_of, pixels
 
 
 @pytest.fixture(scope="module")
@@ -44,3 +52,44 @@ def test_a_running_bake_survives_undo_and_keeps_its_result(seen):
     assert seen["baked across undo"] == pytest.approx([7 * seen["baked 1"][0]] * 2, rel=0.05)
     assert not seen["said"]
     assert seen["undone at last"] == seen["baked 3"]
+
+
+def row():
+    """How the one target stands, and whether its sentences speak of undo."""
+    stale.refresh(bpy.context)
+    (found,) = state.rows.values()
+    said = [one for one in found.sentences if "Undo does not reach files: " in one and "'Plane_Medium.exr'" in one]
+    return found.standing, len(said)
+
+
+@pytest.mark.parametrize("is_own", [False, True])
+def test_a_file_is_not_undone_and_the_results_say_so(is_own, tmp_path):
+    """That of an image which the bake has made, or one that was there before."""
+    image, settings = None, bpy.context.scene.beamspread
+    settings.image_dir, settings.resolution, path = str(tmp_path), 16, tmp_path / "Plane_Medium.exr"
+    if is_own:
+        native.write_exr(str(path), np.zeros((16, 16, 3), np.float32), ["R", "G", "B"])
+        image = bpy.data.images.load(str(path))
+    plane, sun = add_plane(material=add_material(image=image)), add_sun(0)
+    for strength in (1.0, 3.0):
+        sun.data.energy = strength
+        bpy.ops.ed.undo_push(message="light")
+        bake(plane)
+        bpy.ops.ed.undo_push(message="bake")
+    baked, undo, redo = path.read_bytes(), bpy.ops.ed.undo, bpy.ops.ed.redo
+    brightness = pixels(bpy.data.images[-1]).mean()
+    assert row() == (Standing.BAKED, 0)
+    later, unlike = (Standing.WARNED, 1), (Standing.STALE, 1)
+    before = unlike if is_own else (Standing.NEVER, 0)  # its image is not there
+    steps = [(undo, later), (undo, unlike), (undo, before), (redo, unlike), (redo, later), (redo, (Standing.BAKED, 0))]
+    for step, expected in steps:
+        step()
+        assert row() == expected
+        if expected != (Standing.NEVER, 0):
+            assert pixels(node_of(bpy.data.materials["Medium"]).image).mean() == brightness
+    assert path.read_bytes() == baked
+    undo()
+    undo()
+    bake(bpy.data.objects["Plane"])
+    assert row() == (Standing.BAKED, 0)
+    assert path.read_bytes() != baked

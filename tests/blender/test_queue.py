@@ -141,6 +141,16 @@ def test_what_is_read_is_of_one_time():
     assert bake.job.illumination.lights[0].strength == 1.0
 
 
+def test_what_is_removed_before_its_turn_is_refused():
+    planes = [plane(f"Plane {number}", 5.0 * number) for number in range(2)]
+    waiting, kept = queue(), Results()
+    assert kept.admit(waiting.next()).job
+    bpy.data.materials.remove(planes[1].data.materials[0])
+    refused = kept.admit(waiting.next())
+    assert refused.job is None
+    assert "was removed during the bake" in refused.error
+
+
 def test_a_bake_beyond_the_memory_limit_is_refused(monkeypatch):
     one = plane("Plane")
     monkeypatch.setattr(preferences, "memory_limit", lambda: 1000)

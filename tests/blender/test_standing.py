@@ -414,3 +414,24 @@ def test_a_batch_that_fills_the_nodes_image_is_a_bake(arguments, tmp_path):
     assert row().standing == expected
     if expected == Standing.STALE:
         assert row().sentences[0] == "Changed since its bake: settings."
+
+
+def test_looks_follow_a_change_at_once_and_take_at_most_a_tenth_of_the_time(monkeypatch):
+    if not bpy.context.window_manager.windows:
+        pytest.skip("without a window there are no looks")
+    now, seconds, looked = [1e6], 0.15, []
+
+    def refresh(_context):
+        looked.append(now[0])
+        now[0] += seconds
+
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    monkeypatch.setattr(stale, "refresh", refresh)
+    for change, look in ((0.0, 0.3), (0.5, 0.45 + 10 * seconds), (9.0, 9.3)):
+        now[0] = 1e6 + change
+        stale.look_soon()
+        while (rest := stale._look()) is not None:
+            now[0] += rest
+        assert looked.pop() == pytest.approx(1e6 + look, abs=1e-3)
+    monkeypatch.undo()
+    stale._last["next"] = 0.0

@@ -91,6 +91,14 @@ def test_what_cannot_start_is_said_in_one_popup(seen):
     assert "albedo's red is 1" in sentence
 
 
+def test_an_error_ends_the_run_is_said_and_the_next_bake_works(seen):
+    why = "An error of the add-on has ended the bake: what went wrong"
+    popup = ["Beamspread: nothing was baked", [why]]
+    assert [(popups, timers) for popups, _, timers in seen["of errors"]] == [([popup], 0)] * 2
+    assert [messages for _, messages, _ in seen["of errors"]] == [[], [f"Second / Second: {why}"]]
+    assert seen["after errors"] == [["RUNNING_MODAL"], []]
+
+
 def test_disabling_the_add_on_ends_the_bake_and_its_timer(seen):
     assert seen["ticks of a bake"] > 2
     assert seen["ticks when disabled"] == 0

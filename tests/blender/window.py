@@ -17,7 +17,7 @@ sys.path[:0] = [str(FOLDER), str(FOLDER.parent.parent / "build" / "stage")]
 
 import beamspread  # noqa: E402
 import scenes  # noqa: E402
-from beamspread.blender.jobs import popup  # noqa: E402
+from beamspread.blender.jobs import operator, popup  # noqa: E402
 from beamspread.blender.jobs.state import state  # noqa: E402
 from beamspread.blender.node import draw, menu  # noqa: E402
 from beamspread.blender.ui import panels  # noqa: E402
@@ -237,6 +237,22 @@ def scenario():
     results["first look"] = [looked == brightness("Second"), state.rows[target].sentences[0]]
     results["out of date"] = state.rows[target].is_stale
     settings.quality = "preview"
+
+    results["of errors"] = []
+    for where in ("_start_next", "_take"):  # as it starts, and in the middle
+
+        def fail(*_arguments):
+            raise ValueError("what went wrong")
+
+        works, before = getattr(operator.BEAMSPREAD_OT_bake, where), len(results["popups"])
+        setattr(operator.BEAMSPREAD_OT_bake, where, fail)
+        started()
+        yield ended
+        setattr(operator.BEAMSPREAD_OT_bake, where, works)
+        results["of errors"].append([results["popups"][before:], state.messages(), len(operator._timers)])
+        results["after errors"] = [sorted(started())]
+        yield ended
+        results["after errors"].append(state.messages())
 
     # An error would raise here, and Blender would open a popup of its own beside ours.
     scenes.node_of(bpy.data.materials["Second"]).albedo = (1, 1, 1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import bpy
 import numpy as np
 
@@ -28,10 +30,7 @@ class Results:
         if bake.job is None:
             return bake
         try:
-            material = bpy.data.materials[bake.target.material_name]
-            if COMBINED in bake.job.settings.layers:
-                check_editable(material)
-            self._plan(find_node(material).image, bake)
+            self._plan(_node(bake.target, bake.job.settings.layers).image, bake)
         except BakeError as error:
             return Bake(bake.target, error=str(error))
         return bake
@@ -51,12 +50,7 @@ class Results:
         The path of the first layer's file, "" where it is packed; BakeError if it can't be kept. Where the node's
         image holds the result of another target, this one gets an image of its own.
         """
-        node = find_node(bpy.data.materials.get(bake.target.material_name))
-        if node is None:
-            raise BakeError("The material or its Beamspread node was removed during the bake.")
-        if COMBINED in bake.layers:
-            check_editable(bpy.data.materials[bake.target.material_name])
-        paths = []
+        node, paths = _node(bake.target, bake.layers), []
         for layer, texture in bake.layers.items():
             if layer == COMBINED:
                 path, image = self._store_shown(node, bake, texture)
@@ -165,6 +159,17 @@ class Results:
                     f"material: give '{target.object_name}' a material of its own (Object > Relations > Make "
                     "Single User > Materials), or move its UVs."
                 )
+
+
+def _node(target: Target, layers: Collection[str]):
+    """The target's node; BakeError where it is gone, or can't be changed and would be."""
+    material = bpy.data.materials.get(target.material_name)
+    node = find_node(material)
+    if node is None:
+        raise BakeError("The material or its Beamspread node was removed during the bake.")
+    if COMBINED in layers:
+        check_editable(material)
+    return node
 
 
 def check_editable(material) -> None:

@@ -1,6 +1,6 @@
 """Undo brings back what an image has packed, but not the pixels that are shown: here they are loaded again.
 
-A file is not undone: what its image says of the bakes in it stays, too.
+A file is not undone: what its image says of the bakes in it stays, too, and that the last one was undone.
 """
 
 from __future__ import annotations
@@ -21,38 +21,55 @@ KEY = f"{OURS}stamp"
 _shown: dict[str, str] = {}
 """Stamp of the pixels that an image shows, by its name, where this session baked them: others may be painted."""
 
-_in_files: dict[str, dict[str, str]] = {}
-"""What images with files say of their bakes, by name, while undo goes on."""
+UNDONE = f"{OURS}undone"
+"""Of an image: the bake that its file holds was undone."""
+
+_in_files: dict[tuple[str, str], dict[str, str]] = {}
+"""What images with files said of their bakes before the last undo at which they were there, by name and path."""
 
 
 def stamp(image) -> None:
     """Note that the image shows what it has just packed, or what has just been written to its file."""
     image[KEY] = _shown[image.name] = uuid.uuid4().hex
+    image.pop(UNDONE, None)
+
+
+def is_undone(image) -> bool:
+    """Whether the last bake in the image's file was undone, which the file was not."""
+    return UNDONE in image
 
 
 @persistent
 def _note_files(*_arguments) -> None:
-    _in_files.clear()
-    _in_files.update({image.name: _said(image) for image in bpy.data.images if _has_file(image)})
+    _in_files.update({_key(image): _said(image) for image in bpy.data.images if KEY in image and _has_file(image)})
 
 
 @persistent
 def _show_what_is_kept(*_arguments) -> None:
     for image in bpy.data.images:
-        if image.name in _in_files and _has_file(image):
-            for key, text in _in_files[image.name].items():
+        if _key(image) in _in_files and _has_file(image):
+            said = _in_files[_key(image)]
+            is_other = image.get(KEY) != said[KEY]
+            for key, text in said.items():
                 image[key] = text
+            if is_other:
+                image[UNDONE] = "yes"
+            else:
+                image.pop(UNDONE, None)
         kept = image.get(KEY, "")
         if _shown.get(image.name, kept) != kept:
             # Not `reload`: it would pack the image's file anew, where there is one.
             image.buffers_free()
             image.gl_free()
             _shown[image.name] = kept
-    _in_files.clear()
+
+
+def _key(image) -> tuple[str, str]:
+    return image.name, image.filepath
 
 
 def _has_file(image) -> bool:
-    return KEY in image and image.source == "FILE" and image.packed_file is None
+    return image.source == "FILE" and image.packed_file is None
 
 
 def _said(image) -> dict[str, str]:
@@ -62,6 +79,7 @@ def _said(image) -> dict[str, str]:
 @persistent
 def _forget(*_arguments) -> None:
     _shown.clear()
+    _in_files.clear()
 
 
 register, unregister = all_or_nothing(

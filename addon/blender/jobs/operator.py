@@ -10,6 +10,7 @@ from bpy.props import EnumProperty
 from ...core import native
 from ...core.bake.runner import CANCELLED, WRITTEN, Bake, Target
 from ...core.bake.settings import COMBINED
+from ...core.errors import sentence
 from ..images import previews
 from ..images.results import Results
 from ..node.find import NOTHING_FOUND, find_bakeable, find_misplaced
@@ -100,6 +101,28 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         if bpy.app.background or context.window is None:
             return self.execute(context)
         self._in_window, self._shown = True, ""
+        return self._ending_by_errors(context, self._begin)
+
+    def modal(self, context, event):
+        return self._ending_by_errors(context, lambda context: self._go_on(context, event))
+
+    def cancel(self, _context):
+        """Blender closes the window or loads another file."""
+        _end_threads()
+
+    def _ending_by_errors(self, context, step):
+        """What a step in the window returns; where it raises, Blender would call it again and again, without end."""
+        try:
+            return step(context)
+        except Exception as error:  # noqa: BLE001 - whatever it is, the run ends and says so
+            why = f"An error of the add-on has ended the bake: {sentence(error)}"
+            if state.progress is not None:
+                state.note(Bake(state.progress.target, error=why))
+            _end_threads()
+            self._fail(why)
+            return self._finish(context)
+
+    def _begin(self, context):
         if not self._prepare(context, preview_first=True):
             return self._finish(context)
         state.begin()
@@ -111,7 +134,7 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
-    def modal(self, context, event):
+    def _go_on(self, context, event):
         if event.type == "ESC" and event.value == "PRESS" and _is_ours(context, event):
             state.ask_to_stop()
         elif event.type != "TIMER":
@@ -129,12 +152,6 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
             return {"PASS_THROUGH"}
         _leave_window()
         return self._finish(context)
-
-    def cancel(self, _context):
-        """Blender closes the window or loads another file."""
-        self._thread.cancel()
-        self._thread.join()
-        _leave_window()
 
     def _prepare(self, context, preview_first: bool) -> bool:
         """Make the queue of bakes; False if there is nothing to do at all."""
@@ -215,8 +232,8 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         else:
             self._fail(f"{bake.target}: {bake.error}")
         for level, sentences in (("WARNING", bake.warnings), ("INFO", bake.notes)):
-            for sentence in sentences:
-                self._say(level, sentence)
+            for one in sentences:
+                self._say(level, one)
 
     def _fail(self, message: str) -> None:
         # In the window a popup of ours says it: for an error Blender would open one of its own beside that.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import bpy
 
-from ...core.bake.estimate import bake_bytes, machine_bytes
+from ...core.bake.estimate import machine_bytes
 from ...core.bake.job import BakeJob, needs_medium, to_simulate
 from ...core.bake.runner import Bake, Target
 from ...core.bake.settings import BakeSettings
@@ -118,12 +118,13 @@ class Preparation:
             receiver = build_receiver(plan.maps, *plan.size)
             illumination = self._illumination.lighting(target.object_name)
             job = BakeJob(target.object_name, receiver, illumination, plan.surface, settings or self.settings)
-            check_memory(job, self.settings.memory_limit, colors_by_cycles=self.color_seconds(target) > 0)
             if isinstance(plan.texture, ColorByCycles):
                 job = plan.texture.in_job(job, self._by_cycles.copy())
             elif plan.texture is not None:
                 job = plan.texture.in_job(job)
-            return Bake(target, self._by_cycles.complete(job))
+            job = self._by_cycles.complete(job)
+            check_memory(job, self.settings.memory_limit)
+            return Bake(target, job)
         except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
             return Bake(target, error=sentence(error))
 
@@ -161,13 +162,13 @@ def _read_target(
     return _Plan(maps, size, texture.on(surface), texture)
 
 
-def check_memory(job: BakeJob, limit: int, colors_by_cycles: bool = False) -> None:
+def check_memory(job: BakeJob, limit: int) -> None:
     """Raise BakeError if a bake, or Cycles before it, would take more bytes than allowed; 0: than the machine has."""
     limit = limit or machine_bytes()
     size = job.receiver.width, job.receiver.height
     texels = f"{size[0]} x {size[1]} texels"
-    needs = [(bake_bytes(*size, job.settings.solver), f"{texels} take")]
-    if colors_by_cycles:
+    needs = [(job.memory_bytes(), f"{texels} take")]
+    if job.more_color is not None:
         needs.append((bytes_of_colors(*size), f"Cycles' process for the base color of {texels} takes"))
     needed, who = max(needs)
     if limit and needed > limit:

@@ -17,6 +17,7 @@ from ..images import previews
 from ..images.files import file_of
 from ..images.owners import noted_as
 from ..images.sequence import file_at, is_sequence
+from ..images.undo import is_undone
 from ..node.find import find_bakeable, find_misplaced, find_node
 from ..node.tree import FRAMES
 from ..read.instances import by_name
@@ -25,14 +26,14 @@ from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
 from .record import Record, keep_record, record_in, record_of
 from .state import Row, Standing, redraw, state
 
-# After the last change; longer where a look takes long, which happens between two changes at most once.
-REST_SECONDS, MOST_OF_THE_TIME = 0.3, 0.05
+# After the last change; and after the last look so long that looks take at most such a part of the time.
+REST_SECONDS, MOST_OF_THE_TIME = 0.3, 0.1
 
 FIRST_LOOK = "first look"
 
 fingerprints = Fingerprints()
 _waiting: list[tuple[Bake, Parts | None]] = []
-_last = {"change": 0.0, "seconds": 0.0, "is looking": False}
+_last = {"change": 0.0, "next": 0.0, "is looking": False}
 
 
 def refresh(context) -> None:
@@ -106,10 +107,11 @@ def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
         return replace(said, is_stale=bool(changed))
     if record is None:
         return Row(target, Standing.NEVER)
+    warnings = (*_why_later(_image(target)), *record.warnings)
     if changed and changed != [QUALITY]:
         why = f"Changed since its bake: {', '.join(changed)}."
-        return Row(target, Standing.STALE, (why, *record.warnings, *record.notes), True)
-    warnings = (*([_why_again(record.parts[QUALITY], now[QUALITY])] if changed else []), *record.warnings)
+        return Row(target, Standing.STALE, (why, *warnings, *record.notes), True)
+    warnings = (*([_why_again(record.parts[QUALITY], now[QUALITY])] if changed else []), *warnings)
     standing = Standing.WARNED if warnings else Standing.BAKED
     return Row(target, standing, (*warnings, *record.notes), bool(changed))
 
@@ -136,6 +138,13 @@ def _is_painted(image) -> bool:
     return image.is_dirty and not previews.covers(image)
 
 
+def _why_later(image) -> list[str]:
+    if not is_undone(image):
+        return []
+    shown = f"Undo does not reach files: the image shows the later bake, which '{file_of(image).name}' holds."
+    return [f"{shown} For the earlier one, undo what was changed between them, too, and bake again."]
+
+
 def _why_again(baked: str, wanted: str) -> str:
     if baked == FIRST_LOOK:
         return "A first look, coarse and by direct light alone: its final bake has not ended."
@@ -150,9 +159,8 @@ def look_soon() -> None:
 
 
 def _look() -> float | None:
-    rest = max(REST_SECONDS, _last["seconds"] / MOST_OF_THE_TIME)
     began = time.monotonic()
-    waiting = _last["change"] + rest - began
+    waiting = max(_last["change"] + REST_SECONDS, _last["next"]) - began
     if waiting > 0:
         return waiting
     context = bpy.context
@@ -163,7 +171,8 @@ def _look() -> float | None:
             with context.temp_override(window=window):
                 refresh(bpy.context)
         finally:
-            _last["is looking"], _last["seconds"] = False, time.monotonic() - began
+            ended = time.monotonic()
+            _last["is looking"], _last["next"] = False, ended + (ended - began) / MOST_OF_THE_TIME
         redraw(bpy.context)
     return None
 

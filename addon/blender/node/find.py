@@ -64,18 +64,25 @@ def find_bakeable(view_layer, chosen: Iterable | None = None) -> list[Target]:
     inner = with_instanced(objects)[len(objects) :]
     own = {obj.name for obj in (*view_layer.objects, *objects)} if inner else set()
     found = [(obj, material) for obj in inner if obj.name not in own for material in materials_of(obj)]
-    places = _count_rendered(view_layer) if found and chosen is None else {}
+    places = places_rendered(view_layer) if found and chosen is None else {}
     targets = find_targets(objects)
     for obj, material in found:
-        is_local = material.library is None and material.override_library is None
-        if find_node(material).image is None or (is_local and places.get(obj.name, 0) <= 1):
+        if not was_baked_elsewhere(material) and (places.get(obj.name, 0) <= 1 or find_node(material).image is None):
             targets.append(Target(obj.name, material.name))
     return targets
 
 
-def _count_rendered(view_layer) -> dict[str, int]:
+def was_baked_elsewhere(material) -> bool:
+    """Whether a material with a node belongs to another file and shows the image that was baked there."""
+    is_local = material.library is None and material.override_library is None
+    return not is_local and find_node(material).image is not None
+
+
+def places_rendered(view_layer) -> dict[str, int]:
+    """By name, in how many places a render shows objects; where they stand themselves, others don't count."""
     visible = render_visible_names(view_layer)
-    return count_places(obj for obj in view_layer.objects if obj.name in visible)
+    shown = count_places(obj for obj in view_layer.objects if obj.name in visible)
+    return {**shown, **dict.fromkeys(visible, 1)}
 
 
 def find_misplaced(objects: Iterable) -> list[Bake]:

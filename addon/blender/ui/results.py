@@ -19,13 +19,12 @@ from ..jobs.popup import wrap
 from ..jobs.state import Row, Standing, state
 from ..jobs.texture import needs_cycles
 from ..live import session
-from ..node.find import find_misplaced, find_node, find_targets, materials_of
+from ..node.find import find_misplaced, find_node, find_targets, materials_of, places_rendered, was_baked_elsewhere
 from ..read.instances import by_name, with_instanced
-from ..read.placed import why_hidden
-from ..read.visible import render_visible_names
+from ..read.placed import Placed, check_placed
 
-# Objects whose warnings, and rows, that a panel shows; it is drawn often.
-MOST_OBJECTS = 8
+# Objects whose warnings, and rows, that a panel shows; and of collections that are looked at (7 ms): it is drawn often.
+MOST_OBJECTS, MOST_LOOKED_AT = 8, 1000
 
 ICONS = {
     Standing.NEVER: "RADIOBUT_OFF",
@@ -41,18 +40,21 @@ ICONS = {
 LONG_SECONDS = 10.0
 
 
-def warnings_for(obj, visible: set[str]) -> list[str]:
-    """What would keep the object from being baked, as far as it is known without baking."""
-    # A collection instance may show thousands of objects.
+def warnings_for(obj, places: dict[str, int]) -> list[str]:
+    """What would keep the object from being baked, as far as it is known without baking.
+
+    `places`: see `places_rendered`.
+    """
     messages = [bake.error for bake in find_misplaced([obj] if obj.instance_type == "NONE" else [])]
-    materials = materials_of(obj)
+    materials, view_layer = materials_of(obj), bpy.context.view_layer
+    if materials and obj.name not in view_layer.objects:  # an instance alone
+        materials = [one for one in materials if not was_baked_elsewhere(one)]
     if not materials:
         return messages
     if not obj.data.uv_layers:
         messages.append("The mesh has no UV map: unwrap it first.")
-    if obj.name not in visible:
-        messages.append(why_hidden(obj.name, bpy.context.view_layer))
-    checks = []
+    times = places.get(obj.name, 0)
+    checks = [lambda: check_placed(obj.name, Placed(obj, None, times) if times else None, view_layer)]
     for material in materials:
         if bpy.context.scene.beamspread.output == "LUMINANCE":
             checks.append(lambda material=material: check_editable(material))
@@ -108,14 +110,18 @@ def draw_bake(layout, context, material_name: str = "") -> None:
 
 
 def draw_problems(layout, context) -> set[str]:
-    """What would keep selected objects from being baked; the sentences."""
+    """What would keep selected objects, and what they show of collections, from being baked; the sentences."""
     # `context.object` is empty in the render properties.
-    chosen, visible = list(context.view_layer.objects.selected), render_visible_names(context.view_layer)
-    shown = set()
-    for obj in chosen[:MOST_OBJECTS]:
-        warnings = warnings_for(obj, visible)
+    view_layer = context.view_layer
+    chosen, places = list(view_layer.objects.selected)[:MOST_OBJECTS], places_rendered(view_layer)
+    inner = with_instanced(chosen)[len(chosen) :][:MOST_LOOKED_AT]
+    own = {obj.name for obj in view_layer.objects} if inner else set()
+    shown, left = set(), MOST_OBJECTS
+    for obj in [*chosen, *(one for one in inner if one.name not in own)]:
+        warnings = warnings_for(obj, places) if left else []
         draw_warnings(layout, context, [f"{obj.name}: {message}" for message in warnings])
         shown.update(warnings)
+        left -= bool(warnings)
     return shown
 
 

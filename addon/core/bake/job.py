@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -12,7 +13,7 @@ from ..ldf.library import is_known, library
 from ..progress import Progress, say, stages, timed
 from ..scene.illumination import Illumination
 from ..scene.receiver import Receiver
-from .estimate import ray_seconds, simulation_seconds, solver_seconds
+from .estimate import NARROW, SUNS, WIDE, bake_bytes, pass_bytes, ray_seconds, simulation_seconds, solver_seconds
 from .layers import LAYERS, WITHOUT_MEDIUM
 from .luminance import rays_per_texel
 from .margin import extend_margin
@@ -107,6 +108,20 @@ class BakeJob:
             rays = max(rays_per_texel(chart.grid, self.surface.material, settings) for chart in self.receiver.charts)
             seconds += ray_seconds(shape[0] * shape[1], rays, settings.threads)
         return 0.1 + seconds * len(settings.layers)
+
+    def memory_bytes(self) -> float:
+        """The most memory that it takes, about, but for that of the host and of other processes."""
+        texels, lights, surface = self.receiver.coverage.size, self.illumination.lights, self.surface
+        if not needs_medium(self.settings):
+            return pass_bytes(texels)
+        is_known = self.more_light is None and self.more_color is None
+        is_narrow = self.more_light is None and all(light.has_one_direction for light in lights)
+        kind = (SUNS if all(light.is_parallel for light in lights) else NARROW) if is_narrow else WIDE
+        is_white = all(chart.grid.color_in is None for chart in self.receiver.charts)
+        has_one_color = is_known and is_white and self.illumination.has_one_color
+        is_slab = surface.thickness > 0 and surface.material.ior > 1
+        paths = surface.thickness / max(surface.material.mean_free_path) if is_slab else math.inf
+        return bake_bytes(texels, self.settings.solver, kind, has_one_color, paths)
 
     def warnings(self) -> list[str]:
         """What the artist should know before it runs."""

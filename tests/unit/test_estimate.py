@@ -1,0 +1,92 @@
+"""The memory that a bake takes stays below what is reckoned beforehand, and is not far below where it is much."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CHILD = """
+import sys
+import beamspread
+import numpy as np
+from beamspread.core.bake.job import BakeJob
+from beamspread.core.bake.settings import BakeSettings
+from beamspread.core.bake.surface import Surface
+from beamspread.core.material.material import Material
+from beamspread.core.scene.illumination import Illumination
+from beamspread.core.scene.lights import PointLight, SunLight, WorldLight
+from beamspread.core.scene.receiver import build_receiver
+from beamspread.core.scene.uv_map import Polygons, fit_uv_maps
+
+size, solver, names, color, anisotropy, ior, path, thickness, layer = eval(sys.argv[1])
+noise = np.random.default_rng(0).random((64, 128, 3), np.float32)
+if color == (1, 1, 1):
+    noise[:] = noise[..., :1]
+axes = (1, 0, 0), (0, 1, 0), (0, 0, 1)
+made = {
+    "sun": SunLight("Sun", 2.0, (1, 1, 1), True, (0.8, 0.0, -0.6)),
+    "lamp": PointLight("Lamp", 3.0, color, True, (0.1, -0.2, 0.1)),
+    "world": WorldLight("World", 1.0, (1, 1, 1), True, noise, axes),
+}
+corners = np.array([(-0.5, -0.5, 0), (0.5, -0.5, 0), (0.5, 0.5, 0), (-0.5, 0.5, 0)])
+square = fit_uv_maps(Polygons(corners, corners[:, :2] + 0.5, np.array([0, 4]), np.array([axes[2]], float)))
+material = Material(albedo=(0.95, 0.9, 0.8), mean_free_path=(path,) * 3, anisotropy=anisotropy, ior=ior)
+surface, settings = Surface(material, thickness), BakeSettings(solver=solver, quality="preview", layers=(layer,))
+for medium in surface.media():
+    beamspread.library(medium, quality="preview")
+
+
+def status(key):
+    return next(int(line.split()[1]) for line in open("/proc/self/status") if line.startswith(key)) * 1024
+
+
+open("/proc/self/clear_refs", "w").write("5")  # the peak is that of now
+before = status("VmRSS")
+lights = Illumination([made[name] for name in names])
+job = BakeJob("Plane", build_receiver(square, size, size), lights, surface, settings)
+job.run()
+print(status("VmHWM") - before, job.memory_bytes())
+"""
+
+COLORED, WHITE = (1, 0.8, 0.6), (1, 1, 1)
+ALL = "sun", "lamp", "world"
+
+
+def taken(size, solver, names, color=COLORED, medium=(0.6, 1.4, 0.01, 0.0), layer="Combined"):
+    """Bytes at the peak, in a process of its own beside what it had before, and those reckoned.
+
+    `medium`: anisotropy, ior, mean free path and thickness, of a plane of side 1.
+    """
+    arguments = repr((size, solver, names, color, *medium, layer))
+    done = subprocess.run([sys.executable, "-c", CHILD, arguments], capture_output=True, text=True, check=True)
+    return [float(number) for number in done.stdout.split()]
+
+
+@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="peaks are read as Linux tells them")
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (512, "fft", ("sun",)),
+        (512, "fft", ("lamp",)),
+        (512, "fft", ALL, WHITE),
+        (512, "fft", ALL, COLORED, (0.95, 1.4, 0.004, 0.0)),
+        (512, "fft", ("lamp", "world"), COLORED, (0.8, 1.0, 0.04, 0.0)),
+        (48, "fft", ("world",), WHITE, (0.8, 1.4, 0.01, 0.01)),
+        (512, "fft", ("sun",), COLORED, (0.8, 1.4, 0.004, 0.004)),
+        (256, "fft", ("lamp",), COLORED, (0.8, 1.4, 0.004, 0.004)),
+        (512, "adaptive", ("sun",)),
+        (256, "adaptive", ("lamp",)),
+        (64, "direct", ("lamp",)),
+        (512, "fft", ALL, COLORED, (0.6, 1.4, 0.01, 0.0), "Irradiance"),
+    ],
+)
+def test_a_bake_takes_no_more_memory_than_reckoned(arguments):
+    peak, reckoned = taken(*arguments)
+    assert peak < reckoned
+
+
+@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="peaks are read as Linux tells them")
+def test_of_much_memory_not_much_more_is_reckoned_than_it_takes():
+    peak, reckoned = taken(1024, "fft", ("lamp", "world"), COLORED, (0.8, 1.0, 0.04, 0.0))
+    assert 1e9 < peak < reckoned < 1.4 * peak
