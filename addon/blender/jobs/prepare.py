@@ -167,12 +167,12 @@ def check_memory(job: BakeJob, limit: int) -> None:
     limit = limit or machine_bytes()
     size = job.receiver.width, job.receiver.height
     texels = f"{size[0]} x {size[1]} texels"
-    needs = [(job.memory_bytes(), f"{texels} take")]
+    needs = [(job.memory_bytes(), f"{texels} may take")]
     if job.more_color is not None:
-        needs.append((bytes_of_colors(*size), f"Cycles' process for the base color of {texels} takes"))
+        needs.append((bytes_of_colors(*size), f"Cycles' process for the base color of {texels} takes about"))
     needed, who = max(needs)
     if limit and needed > limit:
         raise BakeError(
-            f"{who} about {needed / 2**30:.1f} GB of memory, and {limit / 2**30:.1f} GB are "
+            f"{who} {needed / 2**30:.1f} GB of memory, and {limit / 2**30:.1f} GB are "
             "allowed: lower the resolution, or raise the memory limit in the add-on's preferences."
         )
