@@ -20,6 +20,7 @@ from ..cycles.light import CopyForCycles, CyclesLight
 from ..images.files import check_image
 from ..images.sequence import is_sequence, size_of_frames
 from ..node.find import find_place, materials_of
+from ..node.node import BeamspreadNode
 from ..read.geometry import read_polygons
 from ..read.lights import read_illumination
 from ..read.placed import Placed, check_placed, find_placed
@@ -49,14 +50,23 @@ def read_scene(context, targets: list[Target], settings: BakeSettings, resolutio
     for material in {bpy.data.materials[target.material_name] for target in targets}:
         evaluated = material.evaluated_get(depsgraph).node_tree
         groups = [group.node_tree for group in find_place(material)[1]]
-        # Evaluated before the node's class was registered, it would still be of an unknown class. No more than that is
-        # tagged: views, and the material's icons, would start again.
+        # No more than needs it is tagged: views, and the material's icons, would start again.
         for tree, copy in [(material.node_tree, evaluated), *((one, one.evaluated_get(depsgraph)) for one in groups)]:
-            if any(node.bl_idname == "NodeUndefined" for node in copy.nodes):
+            if not all(map(_is_current, tree.nodes, copy.nodes)):
                 tree.update_tag()
     with as_rendered(context.view_layer):
         visible = render_visible_names(context.view_layer)
         return Preparation(context.evaluated_depsgraph_get(), targets, settings, resolution, visible=visible)
+
+
+def _is_current(node, copy) -> bool:
+    """Whether a node is evaluated as it is.
+
+    It is of an unknown class where that was before its class was registered, and values that scripts set tag nothing.
+    """
+    if copy.bl_idname != node.bl_idname or not isinstance(node, BeamspreadNode):
+        return copy.bl_idname == node.bl_idname
+    return (copy.surface(), copy.texture_blur) == (node.surface(), node.texture_blur)
 
 
 class Preparation:
