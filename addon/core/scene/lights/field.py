@@ -130,14 +130,11 @@ class FieldLight(_ComputedLight):
             yield np.maximum(values, 0, out=values) * np.float32(np.pi * weight), direction
 
     def totals(self, reach):
-        grid, field = reach.grid, self.field_of(reach.grid)
-        if field is None:
-            irradiance, flow = np.zeros((2, grid.height, grid.width, 3), np.float32)
-        else:
-            weighted = field.radiance * np.float32(np.pi * WEIGHTS)[:, None, None, None]
-            sums = weighted.sum(axis=0), np.tensordot(weighted.mean(axis=3), DIRECTIONS, (0, 0))
-            irradiance, flow = field.at_texels(grid, sums)
-        return reach.received(np.maximum(irradiance, 0)), reach.covered(flow)
+        irradiance, flow = np.zeros((2, reach.grid.height, reach.grid.width, 3), np.float32)
+        for part, direction in self.parts(reach):
+            irradiance += part
+            flow += part.mean(axis=2, keepdims=True) * direction
+        return reach.received(irradiance), reach.covered(flow)
 
 
 @dataclass(frozen=True, eq=False)
