@@ -34,12 +34,19 @@ double radial_edge(std::size_t edge)
     return edges()[edge];
 }
 
-std::vector<double> radial_edges(RadialDetail detail)
+std::vector<double> profile_radii(RadialDetail detail)
 {
     std::vector<double> radii;
-    for (std::size_t k = 0; k < edge_count; ++k)
-        if (detail == RadialDetail::all || is_bin_edge(k))
-            radii.push_back(radial_edge(k));
+    double inner = 0.0;
+    for (std::size_t k = 0; k < edge_count; ++k) {
+        if (detail == RadialDetail::bins && !is_bin_edge(k))
+            continue;
+        const double outer = radial_edge(k);
+        const bool divided = detail == RadialDetail::bins && inner >= divided_begin && outer <= divided_end;
+        for (int step = divided ? 1 : bin_steps; step <= bin_steps; ++step)
+            radii.push_back(std::lerp(inner, outer, step / double{bin_steps}));
+        inner = outer;
+    }
     return radii;
 }
 

@@ -105,7 +105,7 @@ AngularMedium describe(const ChannelMedium& of, const Incidence& incidence, cons
 
     // Circles that fit into the texel where the beam enters: all that is seen of them is their power.
     const double inside = 0.5 * texel / of.mean_free_path;
-    std::vector<double> radii = radial_edges(medium.mean.detail());
+    std::vector<double> radii = profile_radii(medium.mean.detail());
     while (radii.size() > 1 && radii[1] <= inside)
         radii.erase(radii.begin());
     const auto bins_of = [&](const RadialProfile& profile) {

@@ -57,7 +57,7 @@ std::vector<double> panel_breaks(const RadialWindow& window, double to_paths, Ra
     std::vector<double> breaks;
     for (int r = 0; r < std::min(end, 2.0 * window_end * window.inner); ++r)
         breaks.push_back(r);
-    const std::vector<double> edges = radial_edges(detail);
+    const std::vector<double> edges = profile_radii(detail);
     for (std::size_t k = 0; k < edges.size(); ++k) {
         const double r = edges[k] / to_paths;
         const double next = k + 1 < edges.size() ? edges[k + 1] / to_paths : r;
