@@ -19,6 +19,7 @@ __all__: list[str] = [
     "Light",
     "LightField",
     "Medium",
+    "MemoryLimit",
     "MeshLight",
     "OccluderMesh",
     "Occluders",
@@ -60,6 +61,11 @@ __all__: list[str] = [
 class Cancelled(Exception):
     """
     A progress callback returned False.
+    """
+
+class MemoryLimit(MemoryError):
+    """
+    More memory would be taken than allowed.
     """
 
 class Medium:
@@ -813,6 +819,13 @@ class LightField:
         angles, by the kernels alone: those are off by `tolerance`.
     ldf, albedo, mean_free_path, pitch, tolerance, threads, progress
         As for `convolve`; the progress is that of the choice of terms.
+    memory_limit : int
+        Bytes that what is kept of light to come may take, 0: any. How many they are is known once terms are chosen.
+
+    Raises
+    ------
+    MemoryLimit
+        They would be more.
     """
     def __init__(
         self,
@@ -826,6 +839,7 @@ class LightField:
         pitch: typing.Sequence[float],
         tolerance: float,
         threads: int = 0,
+        memory_limit: int = 0,
         progress: typing.Any = None,
     ) -> None: ...
     def add(self, light: PlaneLight) -> None:

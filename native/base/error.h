@@ -18,6 +18,12 @@ public:
     using std::runtime_error::runtime_error;
 };
 
+// More memory would be taken than the caller allows; the message says how much.
+class MemoryLimit : public std::runtime_error {
+public:
+    using std::runtime_error::runtime_error;
+};
+
 // The caller's progress callback asked to stop: an outcome of its own, not a fault.
 class Cancelled : public std::runtime_error {
 public:

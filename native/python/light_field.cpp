@@ -18,7 +18,8 @@ class HeldField {
 public:
     HeldField(const py::tuple& shape, const Lights& lights, const py::tuple& survey_shape, const Lights& survey,
               const Sources& ldf, const std::vector<double>& albedo, const std::vector<double>& mean_free_path,
-              std::array<double, 2> pitch, double tolerance, int threads, const py::object& progress)
+              std::array<double, 2> pitch, double tolerance, int threads, std::size_t memory_limit,
+              const py::object& progress)
         : m_sources(ldf)
     {
         Problem problem = problem_of(lights, ldf, albedo, mean_free_path, tolerance);
@@ -29,6 +30,7 @@ public:
         problem.to_come.plane.pitch_y *=
             static_cast<double>(problem.plane.height) / static_cast<double>(problem.to_come.plane.height);
         problem.threads = threads;
+        problem.most_for_light = memory_limit;
         for (const HeldLight* held : lights)
             m_lights.push_back(*held);
         for (const HeldLight* held : survey)
@@ -129,13 +131,20 @@ survey : sequence of PlaneLight
     angles, by the kernels alone: those are off by `tolerance`.
 ldf, albedo, mean_free_path, pitch, tolerance, threads, progress
     As for `convolve`; the progress is that of the choice of terms.
+memory_limit : int
+    Bytes that what is kept of light to come may take, 0: any. How many they are is known once terms are chosen.
+
+Raises
+------
+MemoryLimit
+    They would be more.
 )")
         .def(py::init<const py::tuple&, const Lights&, const py::tuple&, const Lights&, const Sources&,
                       const std::vector<double>&, const std::vector<double>&, std::array<double, 2>, double, int,
-                      const py::object&>(),
+                      std::size_t, const py::object&>(),
              py::arg("shape"), py::arg("lights"), py::arg("survey_shape"), py::arg("survey"), py::arg("ldf"),
              py::arg("albedo"), py::arg("mean_free_path"), py::arg("pitch"), py::arg("tolerance"),
-             py::arg("threads") = 0, py::arg("progress") = py::none())
+             py::arg("threads") = 0, py::arg("memory_limit") = 0, py::arg("progress") = py::none())
         .def("add", &HeldField::add, py::arg("light"), ReleaseGil(),
              "Adds a PlaneLight, also one of `lights` that only stood for it.")
         .def("add_rays", &HeldField::add_rays, py::arg("grid"), py::arg("light"), py::arg("color"), py::arg("coverage"),

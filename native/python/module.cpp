@@ -25,6 +25,8 @@ PYBIND11_MODULE(_native, m)
     m.doc() = "Light transport of beamspread; import the package `beamspread` instead.";
     m.attr("__version__") = BEAMSPREAD_VERSION;
     py::register_exception<Cancelled>(m, "Cancelled").doc() = "A progress callback returned False.";
+    py::register_exception<MemoryLimit>(m, "MemoryLimit", PyExc_MemoryError).doc() =
+        "More memory would be taken than allowed.";
     py::register_local_exception_translator(&translate);
     bind_medium(m);
     // Types before the functions that name them in their signatures.

@@ -156,7 +156,7 @@ def test_a_bake_beyond_the_memory_limit_is_refused(monkeypatch):
     monkeypatch.setattr(preferences, "memory_limit", lambda: 1000)
     select(one)
     message = messages_of(bpy.ops.beamspread.bake)
-    assert "32 x 32 texels may take" in message
+    assert "32 x 32 texels take about" in message
     assert "raise the memory limit" in message
     assert state.rows[find_targets([one])[0]].standing == Standing.FAILED
 

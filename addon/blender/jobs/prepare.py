@@ -177,7 +177,7 @@ def check_memory(job: BakeJob, limit: int) -> None:
     limit = limit or machine_bytes()
     size = job.receiver.width, job.receiver.height
     texels = f"{size[0]} x {size[1]} texels"
-    needs = [(job.memory_bytes(), f"{texels} may take")]
+    needs = [(job.memory_bytes(), f"{texels} take about")]
     if job.more_color is not None:
         needs.append((bytes_of_colors(*size), f"Cycles' process for the base color of {texels} takes about"))
     needed, who = max(needs)

@@ -17,8 +17,9 @@ RAY_SECONDS = 6e-7
 DIRECT_SECONDS, DIRECT_SUN_SECONDS = 3e-8, 3e-10
 
 # Bytes of memory beside the host's, whatever the size, and for each texel: where suns alone shine, where all light
-# comes from one direction at each texel, and where other light does. Peaks of processes with 256^2 to 2048^2 texels, a
-# sun, a lamp, a world and a lamp (tests/unit/test_estimate.py), and a twentieth more or over, for Blender's image.
+# comes from one direction at each texel, and where other light does; but for what the fft solver keeps of light, which
+# it counts when it has chosen its terms. Peaks of processes with 256^2 to 2048^2 texels, a sun, a lamp, a world and a
+# lamp (tests/unit/test_estimate.py), and a twentieth more or over, for Blender's image.
 SUNS, NARROW, WIDE = range(3)
 BYTES = {
     "fft": ((50e6, 80), (400e6, 80), (600e6, 80)),
@@ -29,13 +30,9 @@ BYTES = {
 # What arrives alone, without a medium.
 PASS_BYTES = 50e6, 120
 
-# Moments that the fft solver keeps of wide light, for each texel, where it has several colours, and one: of the
-# half-spaces tried those of anisotropy .95 have most.
-MOMENT_BYTES = 1050, 400
-
 # Slabs with an ior above 1 take so much more, over their thickness in mean free paths if that is above 1: light between
-# their sides takes many harmonics. Of wide light as above.
-NARROW_SLAB, WIDE_SLAB = (200e6, 300), ((800e6, 18500), (800e6, 10500))
+# their sides takes many harmonics. Of light of one direction, and other.
+NARROW_SLAB, WIDE_SLAB = (200e6, 300), (800e6, 300)
 
 
 def processors(threads: int = 0) -> int:
@@ -60,14 +57,17 @@ def ray_seconds(texels: int, rays: int, threads: int = 0) -> float:
     return RAY_SECONDS * texels * rays / processors(threads)
 
 
-def bake_bytes(texels: int, solver: str, light: int, has_one_color: bool, mean_free_paths: float) -> float:
-    """The most memory that a bake takes, about; `mean_free_paths`: thickness of a slab with an ior above 1, or inf."""
+def bake_bytes(texels: int, solver: str, light: int, mean_free_paths: float) -> float:
+    """The most memory that a bake takes, about, but for what is kept of light.
+
+    `mean_free_paths` : thickness of a slab with an ior above 1, or inf.
+    """
     fixed, each = BYTES[solver][light]
     if solver == "fft" and light != SUNS:
-        more, more_each = WIDE_SLAB[has_one_color] if light == WIDE else NARROW_SLAB
+        more, more_each = WIDE_SLAB if light == WIDE else NARROW_SLAB
         thinness = 1 / max(mean_free_paths, 1.0)
         fixed += more * thinness
-        each += more_each * thinness + (MOMENT_BYTES[has_one_color] if light == WIDE else 0)
+        each += more_each * thinness
     return fixed + each * texels
 
 

@@ -13,7 +13,17 @@ from ..ldf.library import is_known, library
 from ..progress import Progress, say, stages, timed
 from ..scene.illumination import Illumination
 from ..scene.receiver import Receiver
-from .estimate import NARROW, SUNS, WIDE, bake_bytes, pass_bytes, ray_seconds, simulation_seconds, solver_seconds
+from .estimate import (
+    NARROW,
+    SUNS,
+    WIDE,
+    bake_bytes,
+    machine_bytes,
+    pass_bytes,
+    ray_seconds,
+    simulation_seconds,
+    solver_seconds,
+)
 from .layers import LAYERS, WITHOUT_MEDIUM
 from .luminance import rays_per_texel
 from .margin import extend_margin
@@ -110,18 +120,20 @@ class BakeJob:
         return 0.1 + seconds * len(settings.layers)
 
     def memory_bytes(self) -> float:
-        """The most memory that it takes, about, but for that of the host and of other processes."""
+        """The most memory that it takes, about, but for what is kept of light, and for the host and other processes."""
         texels, lights, surface = self.receiver.coverage.size, self.illumination.lights, self.surface
         if not needs_medium(self.settings):
             return pass_bytes(texels)
-        is_known = self.more_light is None and self.more_color is None
         is_narrow = self.more_light is None and all(light.has_one_direction for light in lights)
         kind = (SUNS if all(light.is_parallel for light in lights) else NARROW) if is_narrow else WIDE
-        is_white = all(chart.grid.color_in is None for chart in self.receiver.charts)
-        has_one_color = is_known and is_white and self.illumination.has_one_color
         is_slab = surface.thickness > 0 and surface.material.ior > 1
         paths = surface.thickness / max(surface.material.mean_free_path) if is_slab else math.inf
-        return bake_bytes(texels, self.settings.solver, kind, has_one_color, paths)
+        return bake_bytes(texels, self.settings.solver, kind, paths)
+
+    def bytes_for_light(self) -> int:
+        """What its limit leaves for what is kept of light; 0: any."""
+        limit = self.settings.memory_limit or machine_bytes()
+        return max(1, int(limit - self.memory_bytes())) if limit else 0
 
     def warnings(self) -> list[str]:
         """What the artist should know before it runs."""

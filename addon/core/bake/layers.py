@@ -25,7 +25,8 @@ Layer = Callable[["BakeJob", Grid, Material, "Progress | None"], np.ndarray]
 
 
 def luminance(job: BakeJob, grid: Grid, material: Material, progress: Progress | None) -> np.ndarray:
-    return bake(grid, job.illumination, material, job.surface.thickness, job.settings, progress)
+    surface, most = job.surface, job.bytes_for_light()
+    return bake(grid, job.illumination, material, surface.thickness, job.settings, progress, most)
 
 
 def irradiance(job: BakeJob, grid: Grid, _material: Material, progress: Progress | None) -> np.ndarray:

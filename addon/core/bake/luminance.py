@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -47,6 +48,7 @@ def bake(
     thickness: float,
     settings: BakeSettings,
     progress: Progress | None = None,
+    bytes_for_light: int = 0,
 ) -> np.ndarray:
     """Luminance of a translucent plane.
 
@@ -56,6 +58,7 @@ def bake(
     material : with its mean free path in the units of the grid.
     thickness : in the units of the grid, 0 for a half-space.
     progress : called with 0..1, returns False to stop.
+    bytes_for_light : of memory, that what the fft solver keeps of light may take; 0: any.
 
     Returns
     -------
@@ -66,7 +69,8 @@ def bake(
     MaterialError
         A property outside its range.
     BakeError
-        Samples that are missing, damaged, or don't reach the albedos and angles of the scene.
+        Samples that are missing, damaged, or don't reach the albedos and angles of the scene; light that takes more
+        memory.
     Cancelled
         `progress` returned False.
     """
@@ -78,7 +82,7 @@ def bake(
         sources = _libraries(material, thickness, settings, media_progress)
     else:
         sources = [load_source(settings.sample_folder, settings.distributions)] * 3
-    return spread(grid, illumination, material, sources, settings, light_progress)
+    return spread(grid, illumination, material, sources, settings, light_progress, bytes_for_light)
 
 
 def spread(
@@ -88,6 +92,7 @@ def spread(
     sources: list,
     settings: BakeSettings,
     progress: Progress | None = None,
+    bytes_for_light: int = 0,
 ) -> np.ndarray:
     """`bake` with the LDF of each channel given; the material is checked, and `settings.quality` does not count."""
     lights = illumination.lights
@@ -96,7 +101,7 @@ def spread(
     if all(light.has_one_direction for light in lights) and bytes_waiting <= MOST_WAITING:
         solve = _spread_together
     elif settings.solver == "fft":
-        solve = _spread_field
+        solve = partial(_spread_field, bytes_for_light)
     else:
         solve = _spread_apart
     medium = {
@@ -109,6 +114,11 @@ def spread(
     }
     try:
         luminance = solve(gatherer, lights, medium, settings.solver, progress)
+    except native.MemoryLimit as error:
+        raise BakeError(
+            f"{grid.width} x {grid.height} texels are too many: {error}. Lower the resolution, or raise the memory "
+            "limit in the add-on's preferences."
+        ) from error
     except ValueError as error:
         if settings.distributions == "library":
             raise
@@ -162,8 +172,10 @@ def _spread_apart(gatherer: Gatherer, lights: Sequence[Light], medium: dict, sol
     return luminance
 
 
-def _spread_field(gatherer: Gatherer, lights: Sequence[Light], medium: dict, _solver: str, progress) -> np.ndarray:
-    """Lights of any number and size, added up as they come."""
+def _spread_field(
+    most_bytes: int, gatherer: Gatherer, lights: Sequence[Light], medium: dict, _solver: str, progress
+) -> np.ndarray:
+    """Lights of any number and size, added up as they come, in so much memory."""
     grid = gatherer.grid
     shape, survey, means = gatherer.survey()
     brightest = sorted(range(len(lights)), key=lambda i: means[i], reverse=True)
@@ -183,7 +195,8 @@ def _spread_field(gatherer: Gatherer, lights: Sequence[Light], medium: dict, _so
     expected = [part for i in lit for part in survey[i]]
     if not parts and not any(means):
         return _dark(grid)
-    field = native.LightField((grid.height, grid.width), parts, shape, expected, progress=choosing, **medium)
+    limits = {"memory_limit": most_bytes, "progress": choosing}
+    field = native.LightField((grid.height, grid.width), parts, shape, expected, **limits, **medium)
     for i, step in zip(later, adding):
         gatherer.add_to(field, lights[i], rays[i], step)
     return field.solve(solving)

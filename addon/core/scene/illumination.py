@@ -47,13 +47,6 @@ class Illumination:
         # By origin and names of the blockers, all of the same origin.
         self._casters: dict = {}
 
-    @property
-    def has_one_color(self) -> bool:
-        """Whether all that arrives surely has the same colour."""
-        colors = {tuple(np.round(light.rgb() / max(light.rgb().max(), 1e-30), 6).tolist()) for light in self.lights}
-        see_through = any(one.mesh.transmittances for one in self._occluders)
-        return len(colors) <= 1 and not see_through and not any(light.is_colored for light in self.lights)
-
     def lighting(self, receiver: str) -> Illumination:
         """The same without the lights that are not linked to an object of that name; shares the hierarchies."""
         linked = copy(self)

@@ -35,7 +35,8 @@ struct Problem {
     int threads = 0;
     std::size_t memory = std::size_t{5} << 26;  // bytes that spectra may take at once; beyond, in tiles
     std::size_t coarsening = 0;  // of the grid that light spreads far on, texels; 1: none, 0: what costs least
-    LightSurvey to_come{};  // in a field of light, see `SpectralField`
+    LightSurvey to_come{};           // in a field of light, see `SpectralField`
+    std::size_t most_for_light = 0;  // bytes that what is kept of light to come may take; 0: any
 };
 
 // Throws InvalidArgument for a plane, media, light or options that solvers don't cover.

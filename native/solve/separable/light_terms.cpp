@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
+#include <sstream>
 #include <utility>
+
+#include "base/error.h"
 
 namespace beamspread {
 
@@ -96,6 +100,17 @@ void add_basis(LightTerms& terms, LowRankBasis basis)
     }
 }
 
+void check_memory(const Problem& problem, std::size_t bytes)
+{
+    if (problem.most_for_light == 0 || bytes <= problem.most_for_light)
+        return;
+    const auto in_gigabytes = [](std::size_t of) { return std::ldexp(static_cast<double>(of), -30); };
+    std::ostringstream text;
+    text << std::fixed << std::setprecision(1) << "their light takes " << in_gigabytes(bytes) << " GB of memory, where "
+         << in_gigabytes(problem.most_for_light) << " GB are left for it";
+    throw MemoryLimit(text.str());
+}
+
 }  // namespace
 
 LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& choose)
@@ -130,6 +145,9 @@ LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& 
             }
         result.changing.resize(kept);
         result.colors.resize(kept);
+        const auto moments = std::count_if(result.terms.begin(), result.terms.end(),
+                                           [](const LightTerm& term) { return term.fixed.empty(); });
+        check_memory(problem, static_cast<std::size_t>(moments) * problem.plane.texels() * sizeof(float));
         for (const LightTerm& term : result.terms)
             result.moments.emplace_back(term.fixed.empty() ? problem.plane.texels() : 0);
     }
