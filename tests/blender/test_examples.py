@@ -1,10 +1,12 @@
-"""The scenes of blend_examples/ are read whole."""
+"""The scenes of blend_examples/ are read whole, and baked."""
 
 from pathlib import Path
 
 import bpy
 import pytest
+from beamspread.blender.jobs.batch import bake_all
 from beamspread.blender.read.lights import read_illumination
+from beamspread.core.batch.options import parse
 
 FOLDER = Path(__file__).resolve().parents[2] / "blend_examples"
 KINDS = {
@@ -29,3 +31,15 @@ def test_all_light_is_understood(name):
     illumination = read_illumination(bpy.context.evaluated_depsgraph_get())
     assert illumination.warnings == ()
     assert sorted(type(light).__name__ for light in illumination.lights) == KINDS[name]
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_all_are_baked(name, tmp_path):
+    # Cycles takes half a minute for the bounced light of each: one has it.
+    arguments = [] if name == "soapstone" else ["--no-indirect"]
+    bpy.ops.wm.open_mainfile(filepath=str(FOLDER / f"{name}.blend"))
+    bpy.context.scene.beamspread.quality = "preview"
+    report = bake_all(parse([*arguments, "--resolution", "64", "--output", str(tmp_path)]))
+    assert report.bakes
+    assert {bake.status for bake in report.bakes} == {"written"}
+    assert not any(bake.dark or bake.left_out for bake in report.bakes)
