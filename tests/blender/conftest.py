@@ -1,7 +1,10 @@
 """Every test starts from an empty file."""
 
+import threading
+
 import bpy
 import pytest
+from beamspread.blender.live import session
 
 
 @pytest.fixture(autouse=True)
@@ -11,3 +14,11 @@ def empty_file():
     bpy.context.scene.render.engine = "CYCLES"
     bpy.context.scene.beamspread.quality = "preview"
     bpy.context.scene.beamspread.use_indirect = False  # starts another Blender; test_indirect.py asks for it
+
+
+@pytest.fixture
+def live_switched_off():
+    """Live ends after the test, and its threads with it."""
+    yield
+    session.end()
+    assert not [thread.name for thread in threading.enumerate() if thread.name.startswith("Beamspread")]

@@ -11,12 +11,25 @@ from beamspread.core.bake.gather import Gatherer
 from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.scene.receiver import build_receiver
 from beamspread.core.scene.uv_map import fit_uv_maps
+from mathutils import Euler, Matrix
 
 TEXELS = 64
 # Cycles samples each texel at random places; with this many their mean is that of the texel to 0.1 %.
 CYCLES_SAMPLES = 256
 # From each texel of ours, where something casts shadows.
 RAYS = 256
+
+TILTED = Matrix.Translation((0.3, -0.2, 0.5)) @ Euler((0.5, -0.4, 0.8)).to_matrix().to_4x4()
+PLANES = {
+    "plain": Matrix(),
+    "tilted": TILTED,
+    "stretched": TILTED @ Matrix.Diagonal((1.6, 0.6, 1, 1)),
+    "mirrored": TILTED @ Matrix.Diagonal((-1.3, 0.9, 1, 1)),
+    "upside_down": TILTED @ Matrix.Diagonal((1, 1, -1, 1)),
+    "inverted": TILTED @ Matrix.Diagonal((-0.7, -1, -1, 1)),
+    "flat": TILTED @ Matrix.Diagonal((1, 1.2, 0.001, 1)),
+    "far_and_small": Matrix.Translation((40, -30, 20)) @ TILTED @ Matrix.Diagonal((0.1, 0.1, 0.1, 1)),
+}
 
 
 def target_material(color, texels):
@@ -33,6 +46,16 @@ def target_material(color, texels):
 def add_receiver(world, uvs=scenes.SQUARE_UVS, texels=TEXELS):
     material, image = target_material((1, 1, 1), texels)
     return scenes.add_plane("Receiver", (2, 2), world, uvs, material), image
+
+
+def frame_of(plane):
+    """The plane's frame without scale, z along the normal of its lit side."""
+    bpy.context.view_layer.update()
+    world = plane.matrix_world
+    normal = (world.to_3x3().inverted().transposed().col[2]).normalized()
+    x_axis = world.col[0].to_3d().normalized()
+    axes = Matrix((x_axis, normal.cross(x_axis), normal)).transposed().to_4x4()
+    return Matrix.Translation(world.translation) @ axes @ Matrix.Scale(world.col[0].length, 4)
 
 
 def cycles_irradiance(plane, image, samples=CYCLES_SAMPLES):

@@ -178,3 +178,50 @@ def fresnel(ior, angle_deg):
     parallel = (ior * cos_i - cos_t) / (ior * cos_i + cos_t)
     perpendicular = (cos_i - ior * cos_t) / (cos_i + ior * cos_t)
     return (parallel**2 + perpendicular**2) / 2
+
+
+def scatter_group(obj):
+    """Instances of an object on the vertices of a mesh, moved."""
+    tree = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
+    if hasattr(tree, "interface"):
+        tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+        tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    else:
+        tree.inputs.new("NodeSocketGeometry", "Geometry")
+        tree.outputs.new("NodeSocketGeometry", "Geometry")
+    names = ("NodeGroupInput", "GeometryNodeInstanceOnPoints", "GeometryNodeTranslateInstances", "NodeGroupOutput")
+    given, points, move, result = (tree.nodes.new(name) for name in names)
+    info = tree.nodes.new("GeometryNodeObjectInfo")
+    info.inputs["Object"].default_value, info.inputs["As Instance"].default_value = obj, True
+    move.name = "Move"
+    tree.links.new(points.inputs["Points"], given.outputs[0])
+    tree.links.new(points.inputs["Instance"], info.outputs["Geometry"])
+    tree.links.new(move.inputs[0], points.outputs[0])
+    tree.links.new(result.inputs[0], move.outputs[0])
+    return tree
+
+
+def add_gobo(kind):
+    """A lamp whose nodes only Cycles understands: a checker of directions."""
+    data = bpy.data.lights.new("Gobo", kind)
+    data.energy, data.shadow_soft_size = 60.0, 0.0
+    if bpy.app.version < (5, 0, 0):
+        data.use_nodes = True
+    tree = data.node_tree
+    emission = next(node for node in tree.nodes if node.type == "EMISSION")
+    checker, place = tree.nodes.new("ShaderNodeTexChecker"), tree.nodes.new("ShaderNodeNewGeometry")
+    checker.inputs["Color1"].default_value, checker.inputs["Color2"].default_value = (1, 0.2, 0.1, 1), (0, 0.5, 1, 1)
+    checker.inputs["Scale"].default_value = 4.0
+    tree.links.new(checker.inputs["Vector"], place.outputs["Normal"])
+    tree.links.new(emission.inputs["Color"], checker.outputs["Color"])
+    lamp = bpy.data.objects.new("Gobo", data)
+    lamp.location = (0.2, 0.1, 1.2)
+    bpy.context.collection.objects.link(lamp)
+
+
+def blender_command(script, *arguments, scene=None):
+    """Command line of a fresh Blender, or of Python where Blender is a module."""
+    if bpy.app.binary_path:
+        opened = [str(scene)] if scene else []
+        return [bpy.app.binary_path, "-b", "--factory-startup", *opened, "--python", str(script), "--", *arguments]
+    return [sys.executable, str(script), *([str(scene)] if scene else []), *arguments]

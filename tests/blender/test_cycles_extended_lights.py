@@ -13,8 +13,8 @@ from beamspread.core.native import native
 from beamspread.core.scene.lights import AreaLight, SphereLight, SphereSpotLight, SunDiskLight
 from beamspread.core.scene.receiver import build_receiver
 from beamspread.core.scene.uv_map import fit_uv_maps
+from cycles_truth import PLANES, TEXELS, add_receiver, cycles_irradiance, frame_of
 from mathutils import Euler, Matrix
-from test_cycles_irradiance import PLANES, TEXELS, add_receiver, cycles_irradiance, frame_of
 
 TOLERANCE = 0.01
 BLOCK = 4

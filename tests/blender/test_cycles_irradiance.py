@@ -7,22 +7,20 @@ import numpy as np
 import pytest
 import scenes
 from beamspread.core.native import native
-from cycles_truth import CYCLES_SAMPLES, TEXELS, add_receiver, around, cycles_irradiance, our_irradiance
+from cycles_truth import (
+    CYCLES_SAMPLES,
+    PLANES,
+    TEXELS,
+    add_receiver,
+    around,
+    cycles_irradiance,
+    frame_of,
+    our_irradiance,
+)
 from mathutils import Euler, Matrix
 
 TOLERANCE = 0.01
 
-TILTED = Matrix.Translation((0.3, -0.2, 0.5)) @ Euler((0.5, -0.4, 0.8)).to_matrix().to_4x4()
-PLANES = {
-    "plain": Matrix(),
-    "tilted": TILTED,
-    "stretched": TILTED @ Matrix.Diagonal((1.6, 0.6, 1, 1)),
-    "mirrored": TILTED @ Matrix.Diagonal((-1.3, 0.9, 1, 1)),
-    "upside_down": TILTED @ Matrix.Diagonal((1, 1, -1, 1)),
-    "inverted": TILTED @ Matrix.Diagonal((-0.7, -1, -1, 1)),
-    "flat": TILTED @ Matrix.Diagonal((1, 1.2, 0.001, 1)),
-    "far_and_small": Matrix.Translation((40, -30, 20)) @ TILTED @ Matrix.Diagonal((0.1, 0.1, 0.1, 1)),
-}
 SQUARE = np.array(scenes.SQUARE_UVS, float)
 UVS = {
     "square": SQUARE,
@@ -49,16 +47,6 @@ def add_lamp(kind, plane, euler=(0, 0, 0), place=(0.3, -0.2, 1.1), scale=(1, 1, 
     bpy.context.collection.objects.link(lamp)
     lamp.matrix_world = frame_of(plane) @ Matrix.LocRotScale(place, Euler(euler), scale)
     return lamp
-
-
-def frame_of(plane):
-    """The plane's frame without scale, z along the normal of its lit side."""
-    bpy.context.view_layer.update()
-    world = plane.matrix_world
-    normal = (world.to_3x3().inverted().transposed().col[2]).normalized()
-    x_axis = world.col[0].to_3d().normalized()
-    axes = Matrix((x_axis, normal.cross(x_axis), normal)).transposed().to_4x4()
-    return Matrix.Translation(world.translation) @ axes @ Matrix.Scale(world.col[0].length, 4)
 
 
 def inside_one_triangle(plane):

@@ -257,29 +257,11 @@ def test_rounds_are_independent():
     assert irradiance.std() / irradiance.mean() == pytest.approx(float(found["noise"]), rel=0.07)
 
 
-def add_gobo(kind):
-    """A lamp whose nodes only Cycles understands: a checker of directions."""
-    data = bpy.data.lights.new("Gobo", kind)
-    data.energy, data.shadow_soft_size = 60.0, 0.0
-    if bpy.app.version < (5, 0, 0):
-        data.use_nodes = True
-    tree = data.node_tree
-    emission = next(node for node in tree.nodes if node.type == "EMISSION")
-    checker, place = tree.nodes.new("ShaderNodeTexChecker"), tree.nodes.new("ShaderNodeNewGeometry")
-    checker.inputs["Color1"].default_value, checker.inputs["Color2"].default_value = (1, 0.2, 0.1, 1), (0, 0.5, 1, 1)
-    checker.inputs["Scale"].default_value = 4.0
-    tree.links.new(checker.inputs["Vector"], place.outputs["Normal"])
-    tree.links.new(emission.inputs["Color"], checker.outputs["Color"])
-    lamp = bpy.data.objects.new("Gobo", data)
-    lamp.location = (0.2, 0.1, 1.2)
-    bpy.context.collection.objects.link(lamp)
-
-
 def test_a_lamp_that_only_cycles_understands():
     """Light and shadow of a checkered lamp beside a plain one against a bake: means of 4 x 4 texels within 2 % of E."""
     floor = scenes.add_plane("Floor", material=scenes.add_material())
     add_wall()
-    add_gobo("POINT")
+    scenes.add_gobo("POINT")
     scenes.add_sun(40, 60, 1.0)
     (bake,) = jobs_of(floor)
     assert "Gobo" not in " ".join(bake.warnings)
@@ -315,7 +297,7 @@ def new_collection(obj, state):
 
 
 @pytest.mark.skipif(bpy.app.version < (4, 0, 0), reason="light linking came in Blender 4.0")
-@pytest.mark.parametrize("add", [lambda: add_gobo("POINT"), add_checkered_panel], ids=["lamp", "mesh"])
+@pytest.mark.parametrize("add", [lambda: scenes.add_gobo("POINT"), add_checkered_panel], ids=["lamp", "mesh"])
 def test_linking_holds_for_what_cycles_computes(add):
     """Light that is linked to the floor, and that the wall does not block, against a bake: all of it within 1.5 %, and
     means of 4 x 4 texels within 4 % of E, as the checker's borders are a node wide. The wall would take a third away.

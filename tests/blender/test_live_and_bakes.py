@@ -9,18 +9,11 @@ from beamspread.blender.images.files import from_srgb
 from beamspread.blender.jobs import stale
 from beamspread.blender.jobs.state import Standing, state
 from beamspread.blender.live import session
-from test_live import live_pixels, make_scene, settle, switched_off_at_the_end  # noqa: F401 - a fixture
+from live_scenes import live_pixels, make_scene, save, settle, switch_off
+
+pytestmark = pytest.mark.usefixtures("live_switched_off")
 
 QUARTER = [(0, 0), (0.5, 0), (0.5, 0.5), (0, 0.5)]
-
-
-def switch_off():
-    bpy.context.scene.beamspread.use_live = False
-    session.step(bpy.context)
-
-
-def save(folder, name="scene.blend"):
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / name))
 
 
 def stored_in_file(plane, folder):

@@ -6,8 +6,9 @@ import pytest
 import scenes
 from beamspread.blender.images.previews import MADE_FOR_PREVIEWS
 from beamspread.blender.live import session
-from test_live import live_pixels, make_scene, settle, switched_off_at_the_end  # noqa: F401 - a fixture
-from test_live_and_bakes import save, switch_off
+from live_scenes import live_pixels, make_scene, save, settle, switch_off
+
+pytestmark = pytest.mark.usefixtures("live_switched_off")
 
 STROKE = np.s_[10:20, 30:40]
 

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 import scenes
 from beamspread.blender.live import session, stand_ins
-from test_live import live_pixels, make_scene, settle, switched_off_at_the_end  # noqa: F401
+from live_scenes import live_pixels, make_scene, settle
+
+pytestmark = pytest.mark.usefixtures("live_switched_off")
 
 REST_SECONDS = session.CALM_SECONDS + stand_ins.PAUSE_SECONDS + 0.1
 
@@ -97,8 +99,8 @@ def test_a_file_that_has_kept_one_shows_the_nodes_own_image(scene, tmp_path):
 
 def test_others_follow_between_two_looks(scene):
     _plane, lamp, material = scene
-    shown = seen(material)
+    before = scenes.pixels(seen(material)).copy()
     lamp.location.x = -0.3
     own = live_pixels(material)  # the exact picture comes last
     assert np.array_equal(scenes.pixels(scenes.node_of(material).node_tree.nodes["Image"].image), own)
-    assert shown is not None
+    assert np.abs(own - before).max() > 0.1 * before.max()

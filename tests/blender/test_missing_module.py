@@ -12,7 +12,7 @@ from pathlib import Path
 import beamspread
 import bpy
 import pytest
-from scenes import add_material, add_plane, add_sun, bake, node_of, pixels
+from scenes import add_material, add_plane, add_sun, bake, blender_command, node_of, pixels
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from spoilt_modules import remove, zeros_within
@@ -60,14 +60,6 @@ def incomplete(tmp_path):
     source = Path(beamspread.__file__).parent
     shutil.copytree(source, tmp_path / "beamspread", ignore=shutil.ignore_patterns("_native*", "__pycache__"))
     return tmp_path
-
-
-def blender_command(script, *arguments, scene=None):
-    """Command line of a fresh Blender, or of Python where Blender is a module."""
-    if bpy.app.binary_path:
-        opened = [str(scene)] if scene else []
-        return [bpy.app.binary_path, "-b", "--factory-startup", *opened, "--python", str(script), "--", *arguments]
-    return [sys.executable, str(script), *([str(scene)] if scene else []), *arguments]
 
 
 def baked_scene(path):

@@ -9,7 +9,7 @@ from pathlib import Path
 import beamspread
 import bpy
 import pytest
-from test_missing_module import blender_command
+from scenes import blender_command
 
 SCRIPT = """
 import importlib, json, os, sys

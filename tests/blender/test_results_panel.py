@@ -1,46 +1,10 @@
-"""What panels say of bakes, drawn into a layout that keeps the lines."""
+"""What panels say of bakes."""
 
-from types import SimpleNamespace
-
-import bpy
 from beamspread.blender.jobs.state import Row, Standing, state
 from beamspread.blender.live import session
 from beamspread.blender.ui import results
 from beamspread.core.bake.runner import Target
-
-
-class Layout:
-    """Takes labels alone."""
-
-    def __init__(self):
-        self.said = ""
-
-    def box(self):
-        return self
-
-    def column(self, **_options):
-        return self
-
-    def row(self, **_options):
-        return self
-
-    def operator(self, *_arguments, **_options):
-        return SimpleNamespace()
-
-    def prop(self, *_arguments, **_options):
-        pass
-
-    def label(self, text, icon):
-        self.said += f"{text} "
-
-
-def context():
-    """That of a panel of Blender's own width."""
-    preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
-    region = SimpleNamespace(width=280)
-    return SimpleNamespace(
-        region=region, preferences=preferences, scene=bpy.context.scene, view_layer=bpy.context.view_layer
-    )
+from panel_layout import Layout, context
 
 
 def test_each_row_says_why_it_is_out_of_date_and_other_sentences_come_once():

@@ -8,7 +8,18 @@ from beamspread.blender.node.node import upgrade_nodes
 from beamspread.core.bake.runner import Bake, Target
 from beamspread.core.batch import options
 from mathutils import Matrix
-from scenes import add_blocker, add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
+from scenes import (
+    add_blocker,
+    add_material,
+    add_plane,
+    add_sun,
+    bake,
+    messages_of,
+    node_of,
+    pixels,
+    scatter_group,
+    select,
+)
 
 PLANE = Target("Plane", "Medium")
 
@@ -297,27 +308,6 @@ def test_what_geometry_nodes_scatter(plane):
     cube.data.update()
     update()
     assert "other objects" in row().sentences[0]
-
-
-def scatter_group(obj):
-    """Instances of an object on the vertices of a mesh, moved."""
-    tree = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
-    if hasattr(tree, "interface"):
-        tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-        tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    else:
-        tree.inputs.new("NodeSocketGeometry", "Geometry")
-        tree.outputs.new("NodeSocketGeometry", "Geometry")
-    names = ("NodeGroupInput", "GeometryNodeInstanceOnPoints", "GeometryNodeTranslateInstances", "NodeGroupOutput")
-    given, points, move, result = (tree.nodes.new(name) for name in names)
-    info = tree.nodes.new("GeometryNodeObjectInfo")
-    info.inputs["Object"].default_value, info.inputs["As Instance"].default_value = obj, True
-    move.name = "Move"
-    tree.links.new(points.inputs["Points"], given.outputs[0])
-    tree.links.new(points.inputs["Instance"], info.outputs["Geometry"])
-    tree.links.new(move.inputs[0], points.outputs[0])
-    tree.links.new(result.inputs[0], move.outputs[0])
-    return tree
 
 
 def test_what_particles_scatter(plane):

@@ -72,3 +72,16 @@ def test_python_imports_point_upwards():
                 if (inside and not allowed) or (package == "core" and name in ("bpy", "mathutils")):
                     wrong.append(f"{path.relative_to(ADDON)} imports {name}")
     assert not wrong
+
+
+def test_no_test_module_imports_from_another():
+    """What several need is in a module of helpers."""
+    wrong = [
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in (ROOT / "tests").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for name in ([node.module or ""] if isinstance(node, ast.ImportFrom) else [one.name for one in node.names])
+        if name.startswith("test_")
+    ]
+    assert not wrong
