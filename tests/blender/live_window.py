@@ -16,6 +16,7 @@ sys.path[:0] = [str(FOLDER), str(FOLDER.parent.parent / "build" / "stage")]
 
 import beamspread  # noqa: E402
 import scenes  # noqa: E402
+from beamspread.blender.images import previews  # noqa: E402
 from beamspread.blender.jobs.state import state  # noqa: E402
 from beamspread.blender.live import canvas, session  # noqa: E402
 from scenario_player import play  # noqa: E402
@@ -90,6 +91,11 @@ def scenario():
     results["painted while dragged"] = results["painted"] - before
     yield is_at_rest
 
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], id=material):
+        bpy.ops.ed.lib_id_generate_preview()
+    results["icons are drawn"] = [bpy.app.is_job_running("RENDER_PREVIEW")]
+    previews.give_back()
+    results["icons are drawn"].append(bpy.app.is_job_running("RENDER_PREVIEW"))
     with override():
         scenes.select(plane)
         results["bake"] = sorted(bpy.ops.beamspread.bake("INVOKE_DEFAULT"))

@@ -121,6 +121,14 @@ def test_a_wall_returns_light_as_in_cycles():
     assert truth[..., 0].sum() > 2 * truth[..., 2].sum()  # orange
 
 
+def test_materials_that_the_scene_does_not_use_are_no_obstacle():
+    """Of a deleted object, or of another scene: the copy that Cycles gets lacks them."""
+    floor = add_scene()
+    expected = irradiance(floor, True)
+    scenes.add_material("Unused").use_fake_user = True
+    np.testing.assert_array_equal(irradiance(floor, True), expected)
+
+
 @pytest.mark.parametrize("in_group", [False, True])
 def test_a_textured_floor_returns_its_colours(in_group):
     """Red on one side, blue on the other, the node's own colour black: against a diffuse floor of the same nodes.

@@ -40,6 +40,11 @@ def test_a_bake_has_the_images_to_itself_and_stays(seen):
     assert seen["the bake stays"]
 
 
+def test_no_image_goes_while_blender_draws_an_icon_with_it(seen):
+    """In a thread, which crashed."""
+    assert seen["icons are drawn"] == [True, False]
+
+
 def test_nothing_ends_it_but_its_switch_and_it_leaves_nothing_behind(seen):
     assert seen["still on after undo"]
     assert seen["failure"] == ""

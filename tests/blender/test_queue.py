@@ -187,12 +187,12 @@ def test_progress_says_what_is_done_and_how_long_it_lasts(monkeypatch):
         # Ten per cent in ten seconds, however far it was before.
         assert state.progress.in_words() == "Baking 50%, all 25%, about 1 min left"
         assert state.progress.in_short() == "25%, 1 min left"
-        # Where it stands still and leaps, the last half of the run counts.
+        # Where it stands still and leaps, the last half of the run counts, or all of it.
         for now[0] in range(111, 151):
             state.update(0.52, 0.26, "Baking")
         now[0] += 1
         state.update(0.54, 0.27, "Baking")
-        assert state.progress.in_short() == "27%, 30 min left"
+        assert state.progress.in_short() == "27%, 5 min left"
         state.update(0.3, 0.3 + 1e-9, "Baking")
         assert state.progress.in_words().startswith("Baking 30%, about ")  # of a run of one, by rounding
         state.ask_to_stop()

@@ -36,7 +36,9 @@ def fields(request, scene, progress) -> dict:
     follow in proportion.
     """
     for name, color in request["reflectances"].items():
-        make_diffuse(bpy.data.materials[name], color, request["textures"].get(name))
+        material = bpy.data.materials.get(name)
+        if material is not None:  # the copy has those that the scene uses
+            make_diffuse(material, color, request["textures"].get(name))
     set_up(scene, request["light"])
     if request["only"]:
         shine_alone(scene, request["only"])

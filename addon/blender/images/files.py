@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.errors import ImageError
 from ..node.tree import FRAMES
-from . import undo
+from . import icons, undo
 from .writing import is_read_only, pixels_of, save_image, scene_linear, set_pixels, write_exr
 
 # Formats of files that keep values above 1.
@@ -66,7 +66,7 @@ def fill_image(image, texture: np.ndarray) -> str:
             image.colorspace_settings.name = scene_linear()  # which it now is, whatever it was
     else:
         _write_like(image, stored, path)
-    image.reload()
+    icons.reload(image)
     undo.stamp(image)
     return str(path)
 

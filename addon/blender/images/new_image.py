@@ -14,7 +14,7 @@ from ...core.bake.runner import Bake, Target
 from ...core.batch.names import stem
 from ...core.errors import ImageError
 from ...core.whole_file import whole_file
-from . import files, undo, writing
+from . import files, icons, undo, writing
 
 
 def name_for(target: Target) -> str:
@@ -47,7 +47,7 @@ def _in_file(name: str, texture: np.ndarray, is_data: bool) -> tuple[str, bpy.ty
     path, made_for = _place(name)
     writing.write_file(path, texture, "EXR", {writing.MADE_FOR: made_for})
     for unused in [one for one in bpy.data.images if files.file_of(one) == path]:
-        bpy.data.images.remove(unused)
+        icons.remove(unused)
     image = bpy.data.images.load(str(path))
     image.name = _free_name(name)
     image.colorspace_settings.is_data = is_data
@@ -75,9 +75,9 @@ def part_from_others(image) -> str:
     size = tuple(image.size)
     _point_to(image, own)
     writing.write_exr(own, files.linear_pixels(image), {writing.MADE_FOR: made_for})
-    image.reload()
+    icons.reload(image)
     if tuple(image.size) != size:
-        image.scale(*size)
+        icons.scale(image, *size)
     return f"'{path.name}' is the file of '{other.name}' and stays: the image '{image.name}' now has '{own.name}'."
 
 

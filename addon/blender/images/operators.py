@@ -7,7 +7,7 @@ import bpy
 from ...core.bake.runner import Bake, Target
 from ..node.find import find_node
 from ..registration import all_or_nothing, classes
-from . import files, previews
+from . import files, icons, previews
 from .new_image import keep_new
 from .owners import KEY
 
@@ -79,7 +79,7 @@ class BEAMSPREAD_OT_resize_image(ImageOperator, bpy.types.Operator):
     def execute(self, context):
         previews.give_back()
         image = image_in(context)
-        image.scale(*wanted_size(image, context.scene.beamspread.resolution))
+        icons.scale(image, *wanted_size(image, context.scene.beamspread.resolution))
         return {"FINISHED"}
 
 

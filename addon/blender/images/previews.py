@@ -9,6 +9,7 @@ from bpy.app.handlers import persistent
 
 from ..node.node import BeamspreadNode
 from ..registration import all_or_nothing, handlers
+from . import icons
 
 # Of an image that was made to show previews, and holds nothing else: as if the node had none.
 MADE_FOR_PREVIEWS = "beamspread_preview"
@@ -81,7 +82,7 @@ def _forget_made(*_arguments) -> None:
         return
     for image in [one for one in bpy.data.images if MADE_FOR_PREVIEWS in one]:
         if holds_previews_alone(image) and not image.is_dirty:
-            bpy.data.images.remove(image)
+            icons.remove(image)
         else:
             leave(image)
 

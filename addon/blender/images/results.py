@@ -13,7 +13,7 @@ from ...core.bake.settings import COMBINED
 from ...core.errors import BakeError
 from ..node.find import find_node
 from ..node.node import link_result
-from . import files, previews
+from . import files, icons, previews
 from .new_image import keep_new, name_for, part_from_others
 from .owners import Parts, note_owner, others_in, overlaps, parts_of, read_parts, users_of, within
 
@@ -84,7 +84,7 @@ class Results:
         """Fill the bake's part of its node's image, and note whose it is; None if it is another's."""
         size = texture.shape[1::-1]
         if tuple(image.size) != size and 0 not in image.size:
-            image.scale(*size)
+            icons.scale(image, *size)
             bake.warnings.append(
                 f"The image '{image.name}' changed its size during the bake: now it has that of before."
             )
@@ -98,7 +98,7 @@ class Results:
     def _store_shown(self, node, bake: Bake, texture: np.ndarray) -> tuple[str, bpy.types.Image]:
         image = node.image
         if image is not None and previews.holds_previews_alone(image):
-            bpy.data.images.remove(image)  # which brings no settings of the user's
+            icons.remove(image)  # which brings no settings of the user's
             image = None
         if image is None:
             return self._new(bake, texture)
@@ -127,7 +127,7 @@ class Results:
             if image is None:
                 return keep_new(name, texture, bake, is_data=True)[0]
             if tuple(image.size) != size and 0 not in image.size:
-                image.scale(*size)
+                icons.scale(image, *size)
             path = self.fill(image, bake, texture, node.image)
             if path is not None:
                 return path

@@ -26,14 +26,15 @@ from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
 from .record import Record, keep_record, record_in, record_of
 from .state import Row, Standing, redraw, state
 
-# After the last change; and after the last look so long that looks take at most such a part of the time.
+# After the last change; and after the last look so long that looks take at most such a part of the time. One alone may
+# take longer: the first of a file, and after undo, reads all meshes, and those that follow don't.
 REST_SECONDS, MOST_OF_THE_TIME = 0.3, 0.1
 
 FIRST_LOOK = "first look"
 
 fingerprints = Fingerprints()
 _waiting: list[tuple[Bake, Parts | None]] = []
-_last = {"change": 0.0, "next": 0.0, "is looking": False}
+_last = {"change": 0.0, "took": 0.0, "next": 0.0, "is looking": False}
 
 
 def refresh(context) -> None:
@@ -172,7 +173,8 @@ def _look() -> float | None:
                 refresh(bpy.context)
         finally:
             ended = time.monotonic()
-            _last["is looking"], _last["next"] = False, ended + (ended - began) / MOST_OF_THE_TIME
+            before, _last["took"] = _last["took"], ended - began
+            _last["is looking"], _last["next"] = False, ended + min(before, _last["took"]) / MOST_OF_THE_TIME
         redraw(bpy.context)
     return None
 

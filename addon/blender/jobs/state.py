@@ -40,7 +40,8 @@ class Row:
 
 
 # The time that is left follows from the pace of the last seconds, once there are enough of them to tell. These are a
-# part of the run's at least: what stands still for long, as Blender while it starts, would make it hours.
+# part of the run's at least: what stands still for long, as Blender while it starts, would make it hours. So would what
+# takes longer than it was reckoned to, and hardly moves by then: no longer than at the pace of the whole run.
 PACE_SECONDS, PACE_PART, LEAST_PACE_SECONDS = 15.0, 0.5, 3.0
 
 
@@ -83,6 +84,7 @@ class State:
         self.progress: Progress | None = None
         self.rows: dict[Target, Row] = {}
         self._paces: deque[tuple[float, float]] = deque()
+        self._first: tuple[float, float] | None = None
         self._began = 0.0
         self._stop_asked = False
         self._said: dict[Target, Row] = {}
@@ -94,6 +96,7 @@ class State:
     def begin(self) -> None:
         """Note that a run begins."""
         self._paces.clear()
+        self._first = None
         self._began = time.monotonic()
         self._stop_asked = False
 
@@ -111,11 +114,12 @@ class State:
             return
         now = time.monotonic()
         self._paces.append((now, everything))
+        self._first = self._first or (now, everything)
         while now - self._paces[0][0] > max(PACE_SECONDS, PACE_PART * (now - self._began)):
             self._paces.popleft()
-        began, before = self._paces[0]
-        if now - began >= LEAST_PACE_SECONDS and everything > before:
-            self.progress.seconds_left = (now - began) * (1 - everything) / (everything - before)
+        if now - self._paces[0][0] >= LEAST_PACE_SECONDS and everything > self._paces[0][1]:
+            paces = ((everything - before) / (now - then) for then, before in (self._first, self._paces[0]))
+            self.progress.seconds_left = (1 - everything) / max(paces)
 
     def stop(self) -> None:
         self.progress = None

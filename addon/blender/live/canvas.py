@@ -8,7 +8,7 @@ import numpy as np
 from ...core.bake.runner import Target
 from ...core.live.picture import Picture
 from ...core.live.subject import Subject
-from ..images import files, undo
+from ..images import files, icons, undo
 from ..images.new_image import name_for
 from ..images.previews import MADE_FOR_PREVIEWS, holds_previews_alone, leave
 from ..images.writing import make_image
@@ -177,7 +177,7 @@ class Canvas:
         if self._made_for is not None:
             if holds_previews_alone(image) and not is_edited:
                 self.name = image.name
-                bpy.data.images.remove(image)
+                icons.remove(image)
             else:
                 if image.source == "GENERATED" and image.packed_file is None:
                     image.pack()

@@ -8,7 +8,7 @@ import weakref
 from pathlib import Path
 
 from ...core.whole_file import whole_file
-from ..images import files
+from ..images import files, icons
 
 
 class Saved:
@@ -50,8 +50,9 @@ def _state(path: Path) -> tuple[int, int]:
 def reread(image) -> None:
     """Show what the image was last saved with."""
     if image.packed_file is None:
-        image.reload()
+        icons.reload(image)
         return
+    icons.stop_drawing()
     # Not `reload`: it would pack the image's file anew, where there is one.
     image.buffers_free()
     image.gl_free()

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
+from ..images import icons
 from ..images.previews import MADE_FOR_PREVIEWS
 from ..node.node import all_nodes, show_own_images
 from ..node.tree import IMAGE
@@ -101,4 +102,4 @@ def _copy(image, pixels: np.ndarray):
 def _remove(name: str) -> None:
     image = bpy.data.images.get(name)
     if image is not None:
-        bpy.data.images.remove(image)
+        icons.remove(image)
