@@ -1,17 +1,20 @@
 """An image belongs to one result, or to charts side by side; where new images are kept; undo; linked data."""
 
 import json
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import pytest
 from beamspread.blender.images import files, owners
 from beamspread.blender.images.results import Results
-from beamspread.blender.jobs import batch
+from beamspread.blender.jobs import batch, stale
 from beamspread.blender.jobs.prepare import prepare_scene
 from beamspread.blender.jobs.state import state
 from beamspread.blender.node.find import find_targets
+from beamspread.blender.ui.image_buttons import draw_image_buttons
 from beamspread.blender.ui.results import warnings_for
+from beamspread.core.bake.runner import Target
 from beamspread.core.batch import options
 from beamspread.core.native import native
 from mathutils import Matrix
@@ -292,7 +295,7 @@ def test_what_clips_is_said_and_make_float_mends_it(tmp_path):
     assert not bpy.ops.beamspread.make_float.poll()
 
 
-def test_an_image_is_resized_only_when_asked(tmp_path, settings):
+def test_an_image_is_resized_only_when_asked(tmp_path, settings, monkeypatch):
     plane = add_plane(size=(2, 1), material=add_material())
     add_sun(0)
     save_scene(tmp_path)
@@ -301,7 +304,19 @@ def test_an_image_is_resized_only_when_asked(tmp_path, settings):
     assert not bpy.ops.beamspread.resize_image.poll()
     settings.resolution = 64
     assert bake(plane)[0].shape == (16, 32, 3)
-    assert bpy.ops.beamspread.resize_image() == {"FINISHED"}
+    asked = []
+    in_render_properties = SimpleNamespace(object=None, view_layer=bpy.context.view_layer, scene=bpy.context.scene)
+    draw_image_buttons(SimpleNamespace(operator=lambda name, **_: asked.append(name)), in_render_properties)
+    assert asked == ["beamspread.resize_image"]
+    bpy.context.view_layer.update()
+    looks = []
+    monkeypatch.setattr(stale, "look_soon", lambda: looks.append(1))
+    with bpy.context.temp_override(object=None):
+        assert bpy.ops.beamspread.resize_image() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    assert looks
+    stale.refresh(bpy.context)
+    assert state.rows[Target("Plane", "Medium")].is_stale
     assert bake(plane)[0].shape == (32, 64, 3)
     assert native.read_exr(str(tmp_path / "textures" / "Plane_Medium.exr"))[0].shape == (32, 64, 3)
 

@@ -62,6 +62,21 @@ def test_a_failed_bake_leaves_no_gap_in_what_live_shows():
     np.testing.assert_array_equal(live_pixels(plane.data.materials[0]), shown)
 
 
+def test_a_picture_that_undo_brings_back_in_mid_bake_is_not_the_images_own():
+    plane, lamp, material = make_scene()
+    before = scenes.bake(plane)[0].copy()
+    lamp.data.energy = 500
+    settle()
+    previews.give_back()
+    image = scenes.node_of(material).image
+    image.pixels.foreach_set(np.full(len(image.pixels), 0.5, np.float32))  # as undo in Blender 5.2 was seen to do
+    session.live.session.forget()
+    np.testing.assert_array_equal(scenes.pixels(image), before)
+    settle()
+    switch_off()
+    np.testing.assert_array_equal(scenes.pixels(scenes.node_of(material).image), before)
+
+
 def test_what_live_shows_is_not_taken_for_painted():
     plane, lamp, material = make_scene()
     scenes.bake(plane)

@@ -7,9 +7,11 @@ import sys
 import bpy
 import numpy as np
 import pytest
+from beamspread.blender import popup
 from beamspread.blender.jobs import stale
 from beamspread.blender.jobs.state import Standing, state
 from beamspread.blender.node import draw, principled
+from beamspread.blender.node.operators import BEAMSPREAD_OT_from_principled
 from beamspread.core.material.principled import ior_of_reflectance, transport_length
 from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
 
@@ -199,13 +201,22 @@ class TestFromPrincipled:
         other = material.node_tree.nodes.new("ShaderNodeBsdfPrincipled")
         assert principled.find_principled(node_of(material)) == bsdf != other
 
-    def test_without_subsurface_the_mean_free_path_stays_and_it_is_said(self, plane, bsdf, capfd):
+    def test_without_subsurface_the_mean_free_path_stays_and_it_is_said(self, plane, bsdf, capfd, monkeypatch):
         set_input(bsdf, 0.0, "Subsurface Weight", "Subsurface")
         bsdf.inputs["Metallic"].default_value = 1.0
+        shown = []
+        monkeypatch.setattr(popup, "show_soon", lambda title, sentences: shown.append((title, sentences)))
+        bpy.ops.beamspread.from_principled()
+        assert not shown
+        monkeypatch.setattr(BEAMSPREAD_OT_from_principled, "_in_window", True)
         bpy.ops.beamspread.from_principled()
         said = capfd.readouterr().out
         assert "no subsurface scattering" in said
         assert "no Metallic" in said
+        ((title, (of_path, of_metal)),) = shown
+        assert bsdf.name in title
+        assert "no subsurface scattering" in of_path
+        assert "no Metallic" in of_metal
         assert list(node_of(plane.data.materials[0]).mean_free_path) == pytest.approx([0.05] * 3)
 
     def test_material_without_one(self, plane):
@@ -220,7 +231,14 @@ def test_specular_of_half_is_an_ior_of_1_5():
 
 @pytest.mark.parametrize(
     ("lengths", "text"),
-    [((4e-4, 4e-4, 4e-4), "0.4 mm"), ((2e-5, 1e-5, 5e-6), "20, 10, 5 µm"), ((0.05, 0.2, 0.1), "0.05, 0.2, 0.1 m")],
+    [
+        ((4e-4, 4e-4, 4e-4), "0.4 mm"),
+        ((2e-5, 1e-5, 5e-6), "20, 10, 5 µm"),
+        ((1.592e-3, 3.18e-4, 1.59e-4), "1.59, 0.318, 0.159 mm"),
+        ((0.05, 0.2, 0.1), "5, 20, 10 cm"),
+        ((2.0, 0.5, 0.0), "2, 0.5, 0 m"),
+        ((0.0, 0.0, 0.0), "0 µm"),
+    ],
 )
 def test_lengths_are_readable(lengths, text):
     assert draw.readable_lengths(lengths) == text

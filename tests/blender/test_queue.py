@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import beamspread
 import bpy
 import pytest
-from beamspread.blender import preferences
+from beamspread.blender import popup, preferences
 from beamspread.blender.cycles.child_denoise import has_denoiser
 from beamspread.blender.images.results import Results
-from beamspread.blender.jobs import operator, popup, prepare, stale
+from beamspread.blender.jobs import operator, prepare, stale
 from beamspread.blender.jobs.operator import BakeThread
 from beamspread.blender.jobs.prepare import read_scene
 from beamspread.blender.jobs.queue import Queue

@@ -17,7 +17,8 @@ sys.path[:0] = [str(FOLDER), str(FOLDER.parent.parent / "build" / "stage")]
 
 import beamspread  # noqa: E402
 import scenes  # noqa: E402
-from beamspread.blender.jobs import operator, popup  # noqa: E402
+from beamspread.blender import popup  # noqa: E402
+from beamspread.blender.jobs import operator  # noqa: E402
 from beamspread.blender.jobs.state import state  # noqa: E402
 from beamspread.blender.node import draw, menu  # noqa: E402
 from beamspread.blender.ui import panels  # noqa: E402

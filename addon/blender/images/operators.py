@@ -14,7 +14,8 @@ from .owners import KEY
 
 def image_in(context):
     """The image of the active material's Beamspread node, or None."""
-    material = getattr(context, "material", None) or getattr(context.object, "active_material", None)
+    # `context.object` is empty in the render properties.
+    material = getattr(context, "material", None) or getattr(context.view_layer.objects.active, "active_material", None)
     node = find_node(material)
     return None if node is None or material.library is not None else node.image
 
@@ -80,6 +81,7 @@ class BEAMSPREAD_OT_resize_image(ImageOperator, bpy.types.Operator):
         previews.give_back()
         image = image_in(context)
         icons.scale(image, *wanted_size(image, context.scene.beamspread.resolution))
+        image.update_tag()  # of itself, Blender tells nobody of a new size
         return {"FINISHED"}
 
 

@@ -11,11 +11,12 @@ from ...core import native
 from ...core.bake.runner import CANCELLED, WRITTEN, Bake, Target
 from ...core.bake.settings import COMBINED
 from ...core.errors import sentence
+from .. import popup
 from ..images import previews
 from ..images.results import Results
 from ..node.find import NOTHING_FOUND, find_bakeable, find_misplaced
 from ..registration import all_or_nothing, classes
-from . import popup, stale
+from . import stale
 from .prepare import read_scene
 from .queue import Queue
 from .state import redraw, state

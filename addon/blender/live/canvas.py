@@ -139,11 +139,13 @@ class Canvas:
             return False
         return image.get(undo.KEY) != self._stamp or (self._is_shown and not self._is_given_back and not image.is_dirty)
 
-    def refresh(self) -> None:
-        """Look at the image's pixels again."""
+    def refresh(self, can_be_painted: bool) -> None:
+        """Look at the image's pixels again, after undo."""
         image = bpy.data.images.get(self.name)
         if image is not None and tuple(image.size) == self.size:
             self._know(image)
+            if self._is_given_back and self._before is None and image.is_dirty and not can_be_painted:
+                self._restore(image)  # undo has brought back a picture: seen in Blender 5.2
             image.pixels.foreach_get(self._pixels)
         self._is_shown = False
 

@@ -86,8 +86,9 @@ class Session:
         self._stand_ins.end()
         self._reader, self._marks = Reader(), Marks()
         self._marks.other = True
+        painted = painted_results(bpy.context)
         for canvas in self._canvases:
-            canvas.refresh()
+            canvas.refresh(canvas.image() in painted)
 
     def step(self, context) -> bool:
         """Look, have it painted, show; whether there is more to come soon."""

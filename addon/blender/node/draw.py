@@ -7,14 +7,14 @@ import bpy
 from .output import former_output, is_in_group, is_shown, plain_of
 from .tree import BASE_COLOR
 
-# The largest unit first: metres of one, its name.
-UNITS = ((1.0, "m"), (1e-2, "cm"), (1e-3, "mm"), (1e-6, "µm"))
+# The largest unit first: the least length that it suits, metres of one, its name.
+UNITS = ((1.0, 1.0, "m"), (1e-2, 1e-2, "cm"), (1e-4, 1e-3, "mm"), (0.0, 1e-6, "µm"))
 
 
 def readable_lengths(metres) -> str:
     """Lengths in the unit that suits the longest of them, three digits each: "0.41, 0.36, 0.3 mm"."""
     longest = max(map(abs, metres))
-    scale, unit = next(((scale, unit) for scale, unit in UNITS if longest >= 0.1 * scale), UNITS[-1])
+    scale, unit = next((scale, unit) for least, scale, unit in UNITS if longest >= least)
     values = [f"{length / scale:.3g}" for length in metres]
     return f"{values[0] if len(set(values)) == 1 else ', '.join(values)} {unit}"
 

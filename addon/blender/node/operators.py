@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from .. import popup
 from ..registration import all_or_nothing, classes
 from . import output, principled
 from .find import find_node
@@ -78,14 +79,24 @@ on the color (Skin, in 3.x Random Walk), times sqrt(3 (1 - reduced albedo)). Len
     bl_idname = "beamspread.from_principled"
     bl_label = "From Principled"
 
+    _in_window = False
+
+    def invoke(self, context, _event):
+        self._in_window = not bpy.app.background
+        return self.execute(context)
+
     def change(self, node):
         source = principled.find_principled(node)
         if source is None:
             self.report({"ERROR"}, "The material has no Principled BSDF: add one, or set the values by hand")
             return {"CANCELLED"}
-        for sentence in principled.take_over(node, source):
+        lost = principled.take_over(node, source)
+        for sentence in lost:
             self.report({"WARNING"}, sentence)
-        self.report({"INFO"}, f"Values taken from '{source.name}'")
+        if lost and self._in_window:
+            popup.show_soon(f"Values taken from '{source.name}'", lost)
+        else:
+            self.report({"INFO"}, f"Values taken from '{source.name}'")
         return {"FINISHED"}
 
 

@@ -41,8 +41,10 @@ class BEAMSPREAD_PT_render(RenderPanel, bpy.types.Panel):
         draw_bake(layout, context)
         column = layout.column()
         settings = context.scene.beamspread
-        for name in ("output", "resolution", "use_indirect"):
+        for name in ("output", "resolution"):
             column.prop(settings, name)
+        draw_image_buttons(column, context)  # where the resolution is changed, which a node's own image doesn't follow
+        column.prop(settings, "use_indirect")
         draw_sentences(column, context, estimates(context), "TIME")
 
 
@@ -134,9 +136,9 @@ class BEAMSPREAD_PT_batch(RenderPanel, bpy.types.Panel):
         layout.prop(context.scene.beamspread, "format")
         if context.scene.beamspread.format == "PNG":
             layout.prop(context.scene.beamspread, "use_view_transform")
-        row = layout.row(align=True)
-        row.operator("beamspread.show_frames", icon="RENDER_ANIMATION")
-        row.operator("beamspread.show_single", icon="IMAGE_DATA")
+        column = layout.column(align=True)
+        column.operator("beamspread.show_frames", icon="RENDER_ANIMATION")
+        column.operator("beamspread.show_single", icon="IMAGE_DATA")
 
 
 class MaterialPanel:

@@ -15,11 +15,11 @@ from ..cycles.colors import bytes_of_colors, seconds_of_colors
 from ..cycles.light import seconds_estimate
 from ..images.files import check_image
 from ..images.results import check_editable
-from ..jobs.popup import wrap
 from ..jobs.state import Row, Standing, state
 from ..jobs.texture import needs_cycles
 from ..live import session
 from ..node.find import find_misplaced, find_node, find_targets, materials_of, places_rendered, was_baked_elsewhere
+from ..popup import wrap
 from ..read.instances import by_name, with_instanced
 from ..read.placed import Placed, check_placed
 
