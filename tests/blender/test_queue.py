@@ -21,7 +21,7 @@ from beamspread.core.bake.estimate import in_words
 from beamspread.core.bake.runner import CANCELLED
 from beamspread.core.ldf import library
 from mathutils import Matrix
-from scenes import add_material, add_plane, add_sun, messages_of, node_of, select
+from scenes import add_material, add_plane, add_sun, messages_of, node_of, pixels, select
 
 KNOWN, UNKNOWN = {"anisotropy": 0.8, "ior": 1.0}, {"anisotropy": 0.8, "ior": 1.37}
 
@@ -148,7 +148,22 @@ def test_what_is_removed_before_its_turn_is_refused():
     bpy.data.materials.remove(planes[1].data.materials[0])
     refused = kept.admit(waiting.next())
     assert refused.job is None
-    assert "was removed during the bake" in refused.error
+    assert "was removed or renamed during the bake" in refused.error
+
+
+def test_an_object_renamed_during_its_bake_gets_its_result():
+    one, kept = plane("Plane"), Results()
+    bpy.ops.beamspread.bake()
+    image = node_of(one.data.materials[0]).image
+    before = pixels(image).mean()
+    bpy.data.lights["Sun"].energy = 3.0
+    bake = kept.admit(queue().next())
+    one.name = "Table"
+    bake.run()
+    bake.keep(kept.store)
+    assert (bake.status, bake.warnings) == ("written", [])
+    assert node_of(one.data.materials[0]).image == image
+    assert pixels(image).mean() == pytest.approx(3 * before, rel=0.01)
 
 
 def test_a_bake_beyond_the_memory_limit_is_refused(monkeypatch):

@@ -46,6 +46,21 @@ def plane():
     return plane
 
 
+def test_a_script_that_removes_objects_is_no_obstacle(plane):
+    """Beside an instance, for which all objects are looked at."""
+    collection = bpy.data.collections.new("Shown")
+    collection.objects.link(bpy.data.objects["Wall"].copy())
+    instance = bpy.data.objects.new("Instance", None)
+    instance.instance_type, instance.instance_collection = "COLLECTION", collection
+    bpy.context.collection.objects.link(instance)
+    update()
+    bpy.data.objects.remove(bpy.data.objects["Wall"])
+    assert row().standing == Standing.STALE
+    bpy.data.objects.remove(add_blocker(2.0))
+    assert bpy.ops.beamspread.bake(objects="ALL") == {"FINISHED"}
+    assert row().standing == Standing.BAKED
+
+
 def remove_inputs(tree):
     """As nodes of the first version were."""
     if hasattr(tree, "interface"):

@@ -67,7 +67,7 @@ class Results:
 
         `shown` is the image of the node, whose owners count, where that is another.
         """
-        receiver, others = bake.job.receiver, self._others(shown or image, bake.target)
+        receiver, others = bake.job.receiver, self._others(shown or image, bake)
         if others:
             parts = [part for other in others for part in self._parts_of(other, image)]
             if overlaps(receiver, parts):
@@ -107,7 +107,7 @@ class Results:
         if path is not None:
             return path, image
         self._check_room(image, bake)
-        owners = " and ".join(f"'{other}'" for other in self._others(image, bake.target))
+        owners = " and ".join(f"'{other}'" for other in self._others(image, bake))
         path, new = self._new(bake, texture)
         bake.warnings.append(
             f"The image '{image.name}' keeps the result of {owners}: '{bake.target}' now has '{new.name}'."
@@ -133,12 +133,22 @@ class Results:
                 return path
         raise BakeError(f"Another object is baked to the same part of the image '{name}'.")
 
-    def _others(self, image, target: Target) -> list[Target]:
+    def _others(self, image, bake: Bake) -> list[Target]:
         """Those whose results the image holds, or will by the end of this run because they came first."""
+        target = bake.target
         planned = self._planned.get(image.name, [])
         first = planned[: planned.index(target)] if target in planned else planned
         users = users_of(image)
-        return list(dict.fromkeys([*others_in(image, target), *(other for other in first if other in users)]))
+        others = dict.fromkeys([*others_in(image, target), *(other for other in first if other in users)])
+        if target.object_name in bpy.data.objects:
+            return list(others)
+        # Renamed during the bake: it isn't another, and others with its material have other parts.
+        return [
+            one for one in others if one.material_name != target.material_name or not self._covers(one, image, bake)
+        ]
+
+    def _covers(self, other: Target, image, bake: Bake) -> bool:
+        return overlaps(bake.job.receiver, self._parts_of(other, image))
 
     def _parts_of(self, target: Target, image) -> Parts:
         """Where the target's charts lie in the image."""
@@ -152,7 +162,7 @@ class Results:
         receiver, target = bake.job.receiver, bake.target
         if receiver.coverage.shape != tuple(image.size)[::-1]:
             return
-        for other in self._others(image, target):
+        for other in self._others(image, bake):
             if other.material_name == target.material_name and overlaps(receiver, self._parts_of(other, image)):
                 raise BakeError(
                     f"'{other.object_name}' is baked to the same part of the image '{image.name}' by the same "
@@ -166,7 +176,7 @@ def _node(target: Target, layers: Collection[str]):
     material = bpy.data.materials.get(target.material_name)
     node = find_node(material)
     if node is None:
-        raise BakeError("The material or its Beamspread node was removed during the bake.")
+        raise BakeError("The material or its Beamspread node was removed or renamed during the bake: bake again.")
     if COMBINED in layers:
         check_editable(material)
     return node

@@ -40,6 +40,7 @@ _last = {"change": 0.0, "took": 0.0, "next": 0.0, "is looking": False}
 def refresh(context) -> None:
     """Bring the rows of all targets of the context's scene up to date."""
     _keep_waiting()
+    context.view_layer.update()  # in 3.4 it has None in place of what a script has just removed
     targets = find_bakeable(context.view_layer, context.scene.objects)
     recorded = {target: record for target in targets if (record := _record(target, context.scene)) is not None}
     now = fingerprints.of(context, recorded) if recorded else {}
