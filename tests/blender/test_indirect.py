@@ -102,6 +102,15 @@ def blocks(values):
     return values.reshape(TEXELS // 4, 4, TEXELS // 4, 4, 3).mean(axis=(1, 3))
 
 
+def test_a_material_of_what_was_deleted_is_in_nobodys_way():
+    """The file still has it, but no copy of the scene does."""
+    floor = add_scene()
+    other = scenes.add_plane("Other", material=scenes.add_material("Deleted"))
+    bpy.data.objects.remove(other)
+    assert "Deleted" in bpy.data.materials
+    assert irradiance(floor, True).mean() > 1.01 * irradiance(floor, False).mean()
+
+
 def test_a_wall_returns_light_as_in_cycles():
     """Bounced several times, as the floor returns it, too: means of 4 x 4 texels within 2 %, and their noise of 1 %."""
     floor = add_scene()

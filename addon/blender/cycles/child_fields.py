@@ -36,7 +36,9 @@ def fields(request, scene, progress) -> dict:
     follow in proportion.
     """
     for name, color in request["reflectances"].items():
-        make_diffuse(bpy.data.materials[name], color, request["textures"].get(name))
+        # The copy has what the scene uses, and not what was deleted since the file was opened, or is another scene's.
+        if name in bpy.data.materials:
+            make_diffuse(bpy.data.materials[name], color, request["textures"].get(name))
     set_up(scene, request["light"])
     if request["only"]:
         shine_alone(scene, request["only"])
