@@ -16,7 +16,8 @@ def stop_drawing() -> None:
     image = bpy.data.images.new(".Beamspread", 1, 1)
     try:
         with bpy.context.temp_override(edit_image=image):
-            bpy.ops.image.reload()
+            if bpy.ops.image.reload.poll():
+                bpy.ops.image.reload()
     finally:
         bpy.data.images.remove(image)
 
