@@ -275,6 +275,16 @@ def test_failures_of_a_material_that_another_has_replaced_are_no_rows(plane):
     assert {str(target) for target in state.rows} == {"Plane / Medium", "Other / Medium.001"}
 
 
+def test_failures_of_an_object_that_is_gone_are_no_rows(plane):
+    other = add_plane("Other", material=plane.data.materials[0])
+    select(other)
+    assert "to the same part of the image" in messages_of(bpy.ops.beamspread.bake)
+    assert row(Target("Other", "Medium")).standing == Standing.FAILED
+    bpy.data.objects.remove(other)
+    stale.refresh(bpy.context)
+    assert {str(target) for target in state.rows} == {"Plane / Medium"}
+
+
 def test_failures_stand_beside_what_was_baked_before(plane):
     plane.hide_render = True
     select(plane)

@@ -49,9 +49,13 @@ def refresh(context) -> None:
 
 
 def _failures_of_others(scene, targets: list[Target]) -> list[Row]:
-    """Of what is no target, as a node inside a group, unless its object has another material in its place by now."""
+    """Of what is no target, as a node inside a group.
+
+    Neither of an object that is gone, nor of one that has another material in its place by now.
+    """
     others = [row for row in state.failures() if row.target not in targets]
     named, objects = {target.object_name for target in targets}, by_name(scene) if others else {}
+    others = [row for row in others if row.target.object_name in objects]
     again = find_misplaced(objects[name] for name in named & {row.target.object_name for row in others})
     misplaced = {bake.target for bake in again}
     return [row for row in others if row.target.object_name not in named or row.target in misplaced]
