@@ -84,6 +84,10 @@ def node_of(material):
     return next(node for node in material.node_tree.nodes if node.bl_idname == "BeamspreadNode")
 
 
+def image_of(obj):
+    return node_of(obj.material_slots[0].material).image
+
+
 def sun_matrix(angle_deg, azimuth_deg=0.0):
     """Orientation of a sun whose light arrives `angle_deg` off -z and travels towards the azimuth (0: +x)."""
     return Matrix.Rotation(math.radians(azimuth_deg), 4, "Z") @ Matrix.Rotation(math.radians(-angle_deg), 4, "Y")

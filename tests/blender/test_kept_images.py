@@ -1,4 +1,4 @@
-"""An image belongs to one result, or to charts side by side; where new images are kept; undo; linked data."""
+"""An image belongs to one result, or to charts side by side; where new images are kept; undo."""
 
 import json
 from types import SimpleNamespace
@@ -13,12 +13,11 @@ from beamspread.blender.jobs.prepare import prepare_scene
 from beamspread.blender.jobs.state import state
 from beamspread.blender.node.find import find_targets
 from beamspread.blender.ui.image_buttons import draw_image_buttons
-from beamspread.blender.ui.results import warnings_for
 from beamspread.core.bake.runner import Target
 from beamspread.core.batch import options
 from beamspread.core.native import native
 from mathutils import Matrix
-from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, save_scene, select
+from scenes import add_material, add_plane, add_sun, bake, image_of, messages_of, node_of, pixels, save_scene, select
 
 HALVES = {"Left": [(0, 0), (0.5, 0), (0.5, 1), (0, 1)], "Right": [(0.5, 0), (1, 0), (1, 1), (0.5, 1)]}
 
@@ -27,10 +26,6 @@ HALVES = {"Left": [(0, 0), (0.5, 0), (0.5, 1), (0, 1)], "Right": [(0.5, 0), (1, 
 def settings():
     bpy.context.scene.beamspread.resolution = 32
     return bpy.context.scene.beamspread
-
-
-def image_of(obj):
-    return node_of(obj.material_slots[0].material).image
 
 
 def duplicate(obj, own_material, turned=0.8):
@@ -345,95 +340,6 @@ def test_a_png_has_the_view_transform_where_that_is_asked_for(tmp_path, settings
     batch.bake_all(options.parse(["--format", "PNG", "--output", str(tmp_path / "filmic")]))
     filmic = bpy.data.images.load(str(tmp_path / "filmic" / "Plane_Medium.png"))
     assert np.abs(pixels(filmic) - shown[True]).max() > 0.03
-
-
-def link_from_library(folder):
-    """Link a plane with a material, and a sun, from another file; the plane."""
-    add_plane(material=add_material())
-    add_sun(0)
-    path = save_scene(folder)
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    bpy.context.scene.beamspread.quality, bpy.context.scene.beamspread.use_indirect = "preview", False
-    bpy.context.scene.beamspread.resolution = 32
-    with bpy.data.libraries.load(str(path), link=True) as (_, wanted):
-        wanted.objects = ["Plane", "Sun"]
-    for obj in wanted.objects:
-        bpy.context.collection.objects.link(obj)
-    return wanted.objects[0]
-
-
-def test_a_linked_material_is_refused_before_the_bake(tmp_path):
-    plane = link_from_library(tmp_path)
-    select(plane)
-    message = messages_of(bpy.ops.beamspread.bake)
-    assert "The material 'Medium' belongs to another .blend file" in message
-    assert image_of(plane) is None
-    (late,) = prepare_scene(bpy.context, find_targets([plane]), for_bake())
-    late.run()
-    late.keep(Results().store)
-    assert "belongs to another .blend file" in late.error
-    # A batch changes nothing in it.
-    report = batch.bake_all(options.parse(["--output", str(tmp_path / "out")]))
-    assert [one.status for one in report.bakes] == ["written"]
-    # Made local, as the sentence says, it keeps its result.
-    bpy.ops.object.make_local(type="SELECT_OBDATA_MATERIAL")
-    plane = bpy.data.objects["Plane"]
-    bake(plane)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "user.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "user.blend"))
-    assert pixels(image_of(bpy.data.objects["Plane"])).any()
-
-
-def test_an_overridden_material_is_refused_and_the_sentence_helps(tmp_path):
-    linked = link_from_library(tmp_path)
-    plane = linked.override_create(remap_local_usages=True)
-    plane.data.override_create(remap_local_usages=True)
-    material = plane.material_slots[0].material.override_create(remap_local_usages=True)
-    assert plane.material_slots[0].material == material
-    assert material.override_library is not None
-    select(plane)
-    message = messages_of(bpy.ops.beamspread.bake)
-    assert "The material 'Medium' belongs to another .blend file" in message
-    assert "Make Local > Selected Objects, Data and Materials" in message
-    said = " ".join(warnings_for(plane, {"Plane": 1}))
-    assert "belongs to another .blend file" in said  # before the bake, in the panel
-    assert image_of(plane) is None
-    bpy.ops.object.make_local(type="SELECT_OBDATA_MATERIAL")
-    plane = next(obj for obj in bpy.context.scene.objects if obj.type == "MESH")
-    assert warnings_for(plane, {plane.name: 1}) == []
-    bake(plane)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "user.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "user.blend"))
-    plane = next(obj for obj in bpy.context.scene.objects if obj.type == "MESH")
-    assert pixels(image_of(plane)).any()
-
-
-def test_a_linked_object_with_a_local_material_is_baked(tmp_path):
-    linked = link_from_library(tmp_path)
-    plane = linked.override_create()
-    bpy.context.collection.objects.link(plane)
-    bpy.context.collection.objects.unlink(linked)
-    plane.material_slots[0].link = "OBJECT"
-    plane.material_slots[0].material = add_material("Own")
-    select(plane)
-    assert bpy.ops.beamspread.bake() == {"FINISHED"}
-    assert pixels(image_of(plane)).any()
-
-
-def test_an_appended_image_is_no_ones(tmp_path):
-    plane = add_plane(material=add_material())
-    add_sun(0)
-    bake(plane)
-    path = str(tmp_path / "copy.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
-    with bpy.data.libraries.load(path) as (_, wanted):
-        wanted.materials = ["Medium"]
-    other = add_plane("Other", matrix=Matrix.Translation((5, 0, 0)), material=wanted.materials[0])
-    image = image_of(other)
-    assert image != image_of(plane)
-    assert json.loads(image[owners.KEY]) == [["Plane", "Medium"]]
-    bake(other)
-    assert image_of(other) == image
 
 
 def test_nothing_is_stored_where_the_part_is_anothers():
