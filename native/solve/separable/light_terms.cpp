@@ -148,8 +148,6 @@ LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& 
         const auto moments = std::count_if(result.terms.begin(), result.terms.end(),
                                            [](const LightTerm& term) { return term.fixed.empty(); });
         check_memory(problem, static_cast<std::size_t>(moments) * problem.plane.texels() * sizeof(float));
-        for (const LightTerm& term : result.terms)
-            result.moments.emplace_back(term.fixed.empty() ? problem.plane.texels() : 0);
     }
     return result;
 }

@@ -42,7 +42,14 @@ LightTerms chosen_terms(const Problem& problem, Progress& progress)
     const auto choose = [&](const KernelDecomposition& kernels, const Incidence& incidence, const LightTerms& light) {
         return choose_terms(kernels, incidence, light, problem.tolerance, progress, choice_work);
     };
-    return light_terms(problem, std::min(1e-2 * problem.tolerance, most_beyond), choose);
+    LightTerms result = light_terms(problem, std::min(1e-2 * problem.tolerance, most_beyond), choose);
+    if (problem.to_come.lights.empty())
+        return result;
+    for (const LightTerm& term : result.terms) {
+        progress.advance(0.0);  // on large planes, zeros take seconds
+        result.moments.emplace_back(term.fixed.empty() ? problem.plane.texels() : 0);
+    }
+    return result;
 }
 
 }  // namespace
