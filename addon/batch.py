@@ -41,8 +41,8 @@ def run(arguments: list[str]) -> int:
     import bpy
 
     from . import blender
-    from .blender.jobs import batch
-    from .core.batch import options as command_line
+    from .blender.jobs.run import batch_run
+    from .core.batch import batch_options as command_line
     from .core.batch.stop import listening
     from .core.native import problem
 
@@ -56,7 +56,7 @@ def run(arguments: list[str]) -> int:
             print(f"Beamspread: {trouble}", file=sys.stderr)
             return 1
         with listening() as stop:
-            report = batch.bake_all(options, stop)
+            report = batch_run.bake_all(options, stop)
             is_saved = _save(report, options.report)
             if stop and not report.all_written():
                 return stop.exit_code
@@ -104,7 +104,7 @@ def main() -> int:
     try:
         package = load_package()
         inside_blender = bool(bpy.app.binary_path)
-        options = importlib.import_module(f"{package}.core.batch.options")
+        options = importlib.import_module(f"{package}.core.batch.batch_options")
         arguments = options.arguments_for_script(sys.argv, inside_blender)
         return importlib.import_module(f"{package}.batch").run(arguments)
     except Exception:  # noqa: BLE001 - Blender would print it and exit with 0

@@ -11,7 +11,7 @@ Each part imports only core and those above it (tests/unit/test_layers.py reads 
     node          the shader node, and where a scene has it
     cycles        what Cycles finds in a process of its own: bounced light, the world's radiance
     images        images of the scene, whole files, whose result an image holds
-    jobs          what becomes a job, and what runs it: operator, engine, batch; the state of a run
+    jobs          how targets are baked (run), how each stands (state), and what changed since (out_of_date)
     live          images that follow the scene while it is worked on
     ui            panels
 """
@@ -19,7 +19,9 @@ Each part imports only core and those above it (tests/unit/test_layers.py reads 
 from . import preferences, settings
 from .images import operators as image_operators
 from .images import previews, sequence, undo
-from .jobs import engine, operator, stale, state
+from .jobs import state
+from .jobs.out_of_date import stale
+from .jobs.run import engine, operator
 from .live import session
 from .node import menu, node
 from .node import operators as node_operators

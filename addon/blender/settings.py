@@ -3,7 +3,7 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
-from ..core.bake.settings import OUTPUTS, BakeSettings
+from ..core.bake.bake_settings import OUTPUTS, BakeSettings
 from . import compat, preferences
 from .registration import all_or_nothing, classes
 

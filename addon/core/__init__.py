@@ -5,6 +5,7 @@ Each package imports only those above it (tests/unit/test_layers.py reads this l
     missing     why the compiled module can't be loaded
     native      the compiled module, or what stands for it where it is missing
     errors      sentences for the artist
+    target      one material of one object, which is what a bake fills an image for
     progress    progress of a job made of stages
     whole_file  files that are whole or as they were
     exr_header  what OpenEXR files say of their channels

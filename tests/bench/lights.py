@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from beamspread import Medium, library, presets
 from beamspread.core.bake import luminance as bakes
+from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.gather import Gatherer
-from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.native import native
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination

@@ -16,8 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from beamspread import Medium, library
-from beamspread.core.bake.runner import Target
-from beamspread.core.bake.settings import BakeSettings
+from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.surface import Surface
 from beamspread.core.live.media import Media
 from beamspread.core.live.picture import Studio, for_live
@@ -27,6 +26,7 @@ from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import PointLight, SunLight
 from beamspread.core.scene.occluders import Mesh
 from beamspread.core.scene.uv_map import Polygons
+from beamspread.core.target import Target
 
 INSIDE = Path(__file__).resolve().parent / "in_blender" / "live.py"
 SCREEN = ["xvfb-run", "-a", "-s", "-screen 0 1600x1000x24 +extension GLX"]

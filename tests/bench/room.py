@@ -12,8 +12,8 @@ import time
 import numpy as np
 from beamspread import presets
 from beamspread.core.bake import luminance as bakes
+from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.gather import Gatherer
-from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import AreaLight, WorldLight

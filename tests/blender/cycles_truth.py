@@ -7,8 +7,8 @@ import numpy as np
 import scenes
 from beamspread.blender.read.geometry import read_polygons
 from beamspread.blender.read.lights import read_illumination
+from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.gather import Gatherer
-from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.scene.receiver import build_receiver
 from beamspread.core.scene.uv_map import fit_uv_maps
 from mathutils import Euler, Matrix

@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 from beamspread.blender import preferences
 from beamspread.blender.cycles import process
-from beamspread.blender.jobs import texture
-from beamspread.blender.jobs.operator import BakeThread
-from beamspread.blender.jobs.prepare import read_scene
-from beamspread.blender.jobs.queue import Queue
+from beamspread.blender.jobs.run import linked_color
+from beamspread.blender.jobs.run.bake_queue import BakeQueue
+from beamspread.blender.jobs.run.operator import BakeThread
+from beamspread.blender.jobs.run.prepare import read_scene
 from beamspread.blender.jobs.state import state
 from beamspread.blender.node.find import find_node
-from beamspread.blender.ui.results import estimates
-from beamspread.core.bake.runner import CANCELLED, Target
+from beamspread.blender.ui.bake_panel import estimates
+from beamspread.core.bake.runner import CANCELLED
+from beamspread.core.target import Target
 from mathutils import Euler, Matrix
 from scenes import (
     add_group_material,
@@ -269,10 +270,10 @@ def test_it_is_asked_for_once_in_a_run_and_only_where_it_counts(plane, monkeypat
         asked.append(target)
         return [np.full((chart.grid.height, chart.grid.width, 3), 0.4, np.float32) for chart in receiver.charts]
 
-    monkeypatch.setattr(texture, "colors_by_cycles", colors)
+    monkeypatch.setattr(linked_color, "colors_by_cycles", colors)
     settings, target = bpy.context.scene.beamspread.for_bake(), Target("Plane", material.name)
     preparation = read_scene(bpy.context, [target], settings)
-    turns = Queue(preparation, [target, target], False)._turns
+    turns = BakeQueue(preparation, [target, target], False)._turns
     assert turns[0].seconds == turns[1].seconds + preparation.color_seconds(target) > turns[1].seconds
     for _ in range(2):
         job, _ = preparation.bake(target).job.colored()

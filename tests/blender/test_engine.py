@@ -7,11 +7,11 @@ from unittest.mock import MagicMock
 import bpy
 import numpy as np
 import pytest
-from beamspread.blender.jobs import stale
-from beamspread.blender.jobs.picture import render_picture
-from beamspread.blender.jobs.state import Standing, state
+from beamspread.blender.jobs.out_of_date import stale
+from beamspread.blender.jobs.run.render_copy import render_picture
+from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.ui.panels import target_of_blender
-from beamspread.core.bake.runner import Target
+from beamspread.core.target import Target
 from mathutils import Matrix
 from scenes import (
     add_material,
@@ -228,18 +228,18 @@ def test_its_own_bake_is_known_of_in_the_image_that_the_node_shows(tmp_path):
     image = add_active_image(plane.data.materials[0])
     select(plane)
     bpy.ops.object.bake(type="COMBINED")
-    assert row().standing == Standing.NEVER
+    assert row().status == Status.NEVER
     node_of(plane.data.materials[0]).image = image
     bpy.ops.object.bake(type="COMBINED")
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
     sun.data.energy = 3
     bpy.context.view_layer.update()
-    assert row().standing == Standing.STALE
+    assert row().status == Status.STALE
     sun.data.energy = 1
     image.pack()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
 
 
 def row():

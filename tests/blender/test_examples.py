@@ -4,9 +4,9 @@ from pathlib import Path
 
 import bpy
 import pytest
-from beamspread.blender.jobs.batch import bake_all
+from beamspread.blender.jobs.run.batch_run import bake_all
 from beamspread.blender.read.lights import read_illumination
-from beamspread.core.batch.options import parse
+from beamspread.core.batch.batch_options import parse
 
 FOLDER = Path(__file__).resolve().parents[2] / "blend_examples"
 KINDS = {

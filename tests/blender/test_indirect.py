@@ -13,11 +13,12 @@ import scenes
 from beamspread.blender.cycles import light, process
 from beamspread.blender.cycles.child_denoise import Denoiser, has_denoiser
 from beamspread.blender.cycles.scene_copy import PREFIX, SceneCopy, remove_stale
-from beamspread.blender.jobs.prepare import prepare_scene
+from beamspread.blender.jobs.run.prepare import prepare_scene
 from beamspread.blender.node.find import find_node
-from beamspread.core.bake.runner import CANCELLED, FAILED, Target
+from beamspread.core.bake.runner import CANCELLED, FAILED
 from beamspread.core.native import native
 from beamspread.core.scene.lights import DIRECTIONS, STRATA, WEIGHTS
+from beamspread.core.target import Target
 from cycles_truth import cycles_bake, target_material
 from mathutils import Euler, Matrix
 

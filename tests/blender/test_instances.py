@@ -5,16 +5,16 @@ import numpy as np
 import pytest
 import scenes
 from beamspread.blender.cycles import light
-from beamspread.blender.jobs import stale
-from beamspread.blender.jobs.batch import bake_all
-from beamspread.blender.jobs.prepare import prepare_scene
-from beamspread.blender.jobs.state import Standing, state
+from beamspread.blender.jobs.out_of_date import stale
+from beamspread.blender.jobs.run.batch_run import bake_all
+from beamspread.blender.jobs.run.prepare import prepare_scene
+from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.live import session
 from beamspread.blender.node.find import find_bakeable
-from beamspread.blender.ui import results
-from beamspread.blender.ui.results import estimates
-from beamspread.core.bake.runner import Target
-from beamspread.core.batch import options
+from beamspread.blender.ui import bake_panel
+from beamspread.blender.ui.bake_panel import estimates
+from beamspread.core.batch import batch_options
+from beamspread.core.target import Target
 from instance_scenes import MIRRORED, SKEWED, WITHIN, add_instancer, add_tile, nest
 from live_scenes import settle
 from mathutils import Euler, Matrix
@@ -136,14 +136,14 @@ def test_what_makes_a_bake_out_of_date(name, change, parts):
     bpy.context.scene.collection.objects.unlink(lamp)
     collection.objects.link(lamp)
     holder = add_instancer(nest(collection)[0], SKEWED)
-    assert row().standing == Standing.NEVER
+    assert row().status == Status.NEVER
     select(holder)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
     change(name)
     assert row().sentences[0] == f"Changed since its bake: {parts}."
     assert bpy.ops.beamspread.bake(objects="STALE") == {"FINISHED"}
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
 
 
 def test_another_instance_makes_it_out_of_date_and_says_why_it_cannot_be_baked_again():
@@ -152,7 +152,7 @@ def test_another_instance_makes_it_out_of_date_and_says_why_it_cannot_be_baked_a
     select(add_instancer(collection, SKEWED))
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
     add_instancer(collection, MIRRORED)
-    assert row().standing == Standing.STALE
+    assert row().status == Status.STALE
     assert "'Tile' stands in 2 places" in messages_of(lambda: bpy.ops.beamspread.bake(objects="STALE"))
 
 
@@ -274,7 +274,7 @@ def test_a_batch_bakes_it(names, tmp_path):
     add_sun(30, 20)
     truth = bake_it(holder)
     chosen = ["--object", *names] if names else []
-    report = bake_all(options.parse([*chosen, "--output", str(tmp_path)]))
+    report = bake_all(batch_options.parse([*chosen, "--output", str(tmp_path)]))
     assert [(one.object, one.status) for one in report.bakes] == [("Tile", "written")]
     image = bpy.data.images.load(str(tmp_path / "Tile_Medium.exr"))
     assert np.array_equal(pixels(image), truth)
@@ -287,7 +287,7 @@ def test_a_batch_follows_the_instance(tmp_path):
     for frame, angle in ((1, 0.0), (2, -0.4)):
         holder.rotation_euler.y = angle
         holder.keyframe_insert("rotation_euler", frame=frame)
-    report = bake_all(options.parse(["--output", str(tmp_path), "--frames", "1-2"]))
+    report = bake_all(batch_options.parse(["--output", str(tmp_path), "--frames", "1-2"]))
     assert report.all_written()
     one, two = (pixels(bpy.data.images.load(one.path)) for one in report.bakes)
     assert np.abs(one - two).max() > 0.1 * one.max()
@@ -322,7 +322,7 @@ def link_tiles(tmp_path, has_image):
 def test_one_of_another_file_is_refused_unless_it_was_baked_there(has_image, tmp_path):
     select(link_tiles(tmp_path, has_image))
     add_sun()
-    problems = results.draw_problems(Layout(), context())
+    problems = bake_panel.draw_problems(Layout(), context())
     assert len(problems) == (not has_image)
     message = messages_of(bpy.ops.beamspread.bake)
     assert all(one in message for one in problems)
@@ -364,10 +364,10 @@ def test_problems_inside_are_said_in_the_panel_and_by_the_bake(sentence):
     tile, collection = add_tile()
     add_sun()
     select(add_instancer(nest(collection)[0], SKEWED))
-    assert results.draw_problems(Layout(), context()) == set()
+    assert bake_panel.draw_problems(Layout(), context()) == set()
     PROBLEMS[sentence](tile)
     layout = Layout()
-    results.draw_problems(layout, context())
+    bake_panel.draw_problems(layout, context())
     assert sentence in layout.said
     assert layout.said.count("Tile: ") == 1
     assert sentence in messages_of(bpy.ops.beamspread.bake)

@@ -12,8 +12,8 @@ import bpy
 import numpy as np
 import pytest
 from beamspread.blender.images import files, writing
-from beamspread.blender.jobs.batch import bake_all
-from beamspread.core.batch import options
+from beamspread.blender.jobs.run.batch_run import bake_all
+from beamspread.core.batch import batch_options
 from beamspread.core.batch.report import BakeRecord, Report
 from beamspread.core.errors import ImageError
 from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
@@ -102,7 +102,7 @@ def test_a_bake_on_a_full_disk_has_failed_and_the_image_shows_what_it_did(tmp_pa
     select(plane)
     with full_after(20000):
         assert "own.bmp cannot be written" in messages_of(bpy.ops.beamspread.bake)
-        report = bake_all(options.parse(["--output", str(tmp_path / "out")]))
+        report = bake_all(batch_options.parse(["--output", str(tmp_path / "out")]))
     assert [one.status for one in report.bakes] == ["failed"]
     assert "cannot be written" in report.bakes[0].message
     assert not [*(tmp_path / "out").iterdir()]

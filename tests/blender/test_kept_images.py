@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 from beamspread.blender.images import files, owners
 from beamspread.blender.images.results import Results
-from beamspread.blender.jobs import batch, stale
-from beamspread.blender.jobs.prepare import prepare_scene
+from beamspread.blender.jobs.out_of_date import stale
+from beamspread.blender.jobs.run import batch_run
+from beamspread.blender.jobs.run.prepare import prepare_scene
 from beamspread.blender.jobs.state import state
 from beamspread.blender.node.find import find_targets
 from beamspread.blender.ui.image_buttons import draw_image_buttons
-from beamspread.core.bake.runner import Target
-from beamspread.core.batch import options
+from beamspread.core.batch import batch_options
 from beamspread.core.native import native
+from beamspread.core.target import Target
 from mathutils import Matrix
 from scenes import add_material, add_plane, add_sun, bake, image_of, messages_of, node_of, pixels, save_scene, select
 
@@ -148,7 +149,7 @@ def test_a_batch_leaves_the_file_of_an_image_to_its_owner(tmp_path):
     before = path.read_bytes()
     duplicate(plane, own_material=True)
     save_scene(tmp_path)
-    own, other = batch.bake_all(options.parse(["--object", "Plane", "Plane.001"])).bakes
+    own, other = batch_run.bake_all(batch_options.parse(["--object", "Plane", "Plane.001"])).bakes
     assert (own.path, other.path) == (str(path), str(tmp_path / "beamspread" / "Plane.001_Medium.001.exr"))
     assert "keeps the result of another" in other.message
     assert path.read_bytes() == before
@@ -162,7 +163,7 @@ def test_a_batch_fills_an_atlas_together(tmp_path):
         add_plane(name, matrix=Matrix.Translation((5 * number, 0, 0)), uvs=uvs, material=material)
     add_sun(0)
     save_scene(tmp_path)
-    report = batch.bake_all(options.parse([]))
+    report = batch_run.bake_all(batch_options.parse([]))
     assert [one.path for one in report.bakes] == [str(path)] * 2
     assert (native.read_exr(str(path))[0] > 0).all()
 
@@ -329,7 +330,9 @@ def test_a_png_has_the_view_transform_where_that_is_asked_for(tmp_path, settings
     shown = {}
     for use in (False, True):
         settings.use_view_transform = use
-        (record,) = batch.bake_all(options.parse(["--format", "PNG", "--output", str(tmp_path / str(use))])).bakes
+        (record,) = batch_run.bake_all(
+            batch_options.parse(["--format", "PNG", "--output", str(tmp_path / str(use))])
+        ).bakes
         image = bpy.data.images.load(record.path)
         image.colorspace_settings.is_data = True
         shown[use] = pixels(image)
@@ -337,7 +340,7 @@ def test_a_png_has_the_view_transform_where_that_is_asked_for(tmp_path, settings
     assert shown[True] == pytest.approx(files.to_srgb(2 * linear), abs=0.005)
     assert scene.render.image_settings.file_format == file_format
     scene.view_settings.view_transform = "Filmic"
-    batch.bake_all(options.parse(["--format", "PNG", "--output", str(tmp_path / "filmic")]))
+    batch_run.bake_all(batch_options.parse(["--format", "PNG", "--output", str(tmp_path / "filmic")]))
     filmic = bpy.data.images.load(str(tmp_path / "filmic" / "Plane_Medium.png"))
     assert np.abs(pixels(filmic) - shown[True]).max() > 0.03
 

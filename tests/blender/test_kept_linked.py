@@ -5,11 +5,11 @@ import json
 import bpy
 from beamspread.blender.images import owners
 from beamspread.blender.images.results import Results
-from beamspread.blender.jobs import batch
-from beamspread.blender.jobs.prepare import prepare_scene
+from beamspread.blender.jobs.run import batch_run
+from beamspread.blender.jobs.run.prepare import prepare_scene
 from beamspread.blender.node.find import find_targets
-from beamspread.blender.ui.results import warnings_for
-from beamspread.core.batch import options
+from beamspread.blender.ui.bake_panel import warnings_for
+from beamspread.core.batch import batch_options
 from mathutils import Matrix
 from scenes import add_material, add_plane, add_sun, bake, image_of, messages_of, pixels, save_scene, select
 
@@ -40,7 +40,7 @@ def test_a_linked_material_is_refused_before_the_bake(tmp_path):
     late.keep(Results().store)
     assert "belongs to another .blend file" in late.error
     # A batch changes nothing in it.
-    report = batch.bake_all(options.parse(["--output", str(tmp_path / "out")]))
+    report = batch_run.bake_all(batch_options.parse(["--output", str(tmp_path / "out")]))
     assert [one.status for one in report.bakes] == ["written"]
     # Made local, as the sentence says, it keeps its result.
     bpy.ops.object.make_local(type="SELECT_OBDATA_MATERIAL")

@@ -10,8 +10,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from beamspread.blender.jobs import stale
-from beamspread.blender.jobs.state import Standing, state
+from beamspread.blender.jobs.out_of_date import stale
+from beamspread.blender.jobs.state import Status, state
 from beamspread.core.native import native
 from scenes import add_material, add_plane, add_sun, bake, node_of, pixels
 
@@ -59,7 +59,7 @@ def row():
     stale.refresh(bpy.context)
     (found,) = state.rows.values()
     said = [one for one in found.sentences if "Undo does not reach files: " in one and "'Plane_Medium.exr'" in one]
-    return found.standing, len(said)
+    return found.status, len(said)
 
 
 @pytest.mark.parametrize("is_own", [False, True])
@@ -78,18 +78,18 @@ def test_a_file_is_not_undone_and_the_results_say_so(is_own, tmp_path):
         bpy.ops.ed.undo_push(message="bake")
     baked, undo, redo = path.read_bytes(), bpy.ops.ed.undo, bpy.ops.ed.redo
     brightness = pixels(bpy.data.images[-1]).mean()
-    assert row() == (Standing.BAKED, 0)
-    later, unlike = (Standing.WARNED, 1), (Standing.STALE, 1)
-    before = unlike if is_own else (Standing.NEVER, 0)  # its image is not there
-    steps = [(undo, later), (undo, unlike), (undo, before), (redo, unlike), (redo, later), (redo, (Standing.BAKED, 0))]
+    assert row() == (Status.BAKED, 0)
+    later, unlike = (Status.WARNED, 1), (Status.STALE, 1)
+    before = unlike if is_own else (Status.NEVER, 0)  # its image is not there
+    steps = [(undo, later), (undo, unlike), (undo, before), (redo, unlike), (redo, later), (redo, (Status.BAKED, 0))]
     for step, expected in steps:
         step()
         assert row() == expected
-        if expected != (Standing.NEVER, 0):
+        if expected != (Status.NEVER, 0):
             assert pixels(node_of(bpy.data.materials["Medium"]).image).mean() == brightness
     assert path.read_bytes() == baked
     undo()
     undo()
     bake(bpy.data.objects["Plane"])
-    assert row() == (Standing.BAKED, 0)
+    assert row() == (Status.BAKED, 0)
     assert path.read_bytes() != baked

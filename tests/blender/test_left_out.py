@@ -5,11 +5,11 @@ from unittest.mock import MagicMock
 import bpy
 import pytest
 from beamspread.blender.compat import add_input_socket
-from beamspread.blender.jobs import stale
-from beamspread.blender.jobs.batch import bake_all
+from beamspread.blender.jobs.out_of_date import stale
+from beamspread.blender.jobs.run.batch_run import bake_all
 from beamspread.blender.jobs.state import state
-from beamspread.blender.ui import results
-from beamspread.core.batch import options
+from beamspread.blender.ui import bake_panel
+from beamspread.core.batch import batch_options
 from mathutils import Matrix
 from scenes import add_group_material, add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
 
@@ -64,7 +64,7 @@ def test_a_node_where_no_bake_can_use_it_is_named(add, name, words, tmp_path):
     assert all(word in message for word in words)
     assert all(word in state.messages()[0] for word in words)
     for arguments in ([], ["--object", name]):
-        report = bake_all(options.parse([*arguments, "--output", str(tmp_path)]))
+        report = bake_all(batch_options.parse([*arguments, "--output", str(tmp_path)]))
         assert [(one.object, one.status) for one in report.bakes] == [(name, "failed")]
         assert all(word in report.bakes[0].message for word in words)
 
@@ -144,7 +144,7 @@ def test_a_light_of_impossible_power_is_named_and_left_out(power, words, tmp_pat
     assert texture == pytest.approx(expected)
     assert messages == [f"The light 'Broken' is left out: {words}."]
     assert f"The light 'Broken' is left out: {words}." in capfd.readouterr().out
-    (record,) = bake_all(options.parse(["--output", str(tmp_path)])).bakes
+    (record,) = bake_all(batch_options.parse(["--output", str(tmp_path)])).bakes
     assert (record.status, record.message) == ("written", messages[0])
 
 
@@ -201,7 +201,7 @@ def test_a_black_bake_says_why(add, words, tmp_path):
     texture, (message,) = baked_with_messages(plane)
     assert not texture.any()
     assert all(word in message for word in words)
-    (record,) = bake_all(options.parse(["--output", str(tmp_path), "--object", "Plane"])).bakes
+    (record,) = bake_all(batch_options.parse(["--output", str(tmp_path), "--object", "Plane"])).bakes
     assert (record.status, record.message) == ("written", message)
     node_of(plane.data.materials[0]).image = None
     bpy.context.scene.render.engine = "BEAMSPREAD"
@@ -215,17 +215,17 @@ def test_a_black_bake_says_why(add, words, tmp_path):
 
 def test_a_panel_says_once_what_both_the_object_and_its_last_bake_say(monkeypatch):
     said = []
-    monkeypatch.setattr(results, "draw_sentences", lambda _layout, _context, messages, _icon: said.extend(messages))
+    monkeypatch.setattr(bake_panel, "draw_sentences", lambda _layout, _context, messages, _icon: said.extend(messages))
     select(add_grouped())
     messages_of(bpy.ops.beamspread.bake)
     (message,) = state.messages()
-    results.draw_bake(MagicMock(), bpy.context)
+    bake_panel.draw_bake(MagicMock(), bpy.context)
     assert said == [message.replace("Grouped / Grouped: ", "Grouped: "), "Grouped: Failed"]
     # Once nothing of it is selected, the bake's own words stay.
     said.clear()
     bpy.ops.object.select_all(action="DESELECT")
     stale.refresh(bpy.context)
-    results.draw_bake(MagicMock(), bpy.context)
+    bake_panel.draw_bake(MagicMock(), bpy.context)
     assert said == ["Grouped: Failed", message.replace("Grouped / Grouped: ", "")]
 
 

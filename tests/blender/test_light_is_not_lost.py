@@ -5,8 +5,8 @@ import math
 import bpy
 import numpy as np
 import pytest
-from beamspread.blender.jobs.batch import bake_all
-from beamspread.core.batch import options
+from beamspread.blender.jobs.run.batch_run import bake_all
+from beamspread.core.batch import batch_options
 from beamspread.core.native import native
 from cycles_truth import TEXELS, add_receiver, cycles_irradiance
 from mathutils import Euler, Matrix
@@ -99,7 +99,7 @@ def compared(tmp_path):
     expected = cycles_irradiance(plane, image, SAMPLES)
     plane.data.materials[0] = add_material()
     arguments = ["--pass", "irradiance", "--no-indirect", "--resolution", str(TEXELS), "--output", str(tmp_path)]
-    (record,) = bake_all(options.parse(arguments)).bakes
+    (record,) = bake_all(batch_options.parse(arguments)).bakes
     assert record.status == "written", record.message
     return record, native.read_exr(record.path)[0], expected
 

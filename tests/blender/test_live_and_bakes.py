@@ -6,8 +6,8 @@ import pytest
 import scenes
 from beamspread.blender.images import previews
 from beamspread.blender.images.files import from_srgb
-from beamspread.blender.jobs import stale
-from beamspread.blender.jobs.state import Standing, state
+from beamspread.blender.jobs.out_of_date import stale
+from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.live import session
 from live_scenes import live_pixels, make_scene, save, settle, switch_off
 
@@ -86,7 +86,7 @@ def test_what_live_shows_is_not_taken_for_painted():
     lamp.location.x = 0.3
     live_pixels(material)
     assert scenes.node_of(material).image.is_dirty
-    assert row(plane).standing == Standing.BAKED
+    assert row(plane).status == Status.BAKED
     assert not row(plane).is_stale
 
 

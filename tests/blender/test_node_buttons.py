@@ -8,8 +8,8 @@ import bpy
 import numpy as np
 import pytest
 from beamspread.blender import popup
-from beamspread.blender.jobs import stale
-from beamspread.blender.jobs.state import Standing, state
+from beamspread.blender.jobs.out_of_date import stale
+from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.node import draw, principled
 from beamspread.blender.node.operators import BEAMSPREAD_OT_from_principled
 from beamspread.core.material.principled import ior_of_reflectance, transport_length
@@ -93,7 +93,7 @@ class TestFormerShader:
         assert f"Info: {sentence}" in said
         row = next(iter(state.rows.values()))
         for _ in range(2):  # as the bake has said it, and as its image remembers it
-            assert row.standing == Standing.BAKED
+            assert row.status == Status.BAKED
             assert sentence in row.sentences[0]
             stale.refresh(bpy.context)
             row = next(iter(state.rows.values()))

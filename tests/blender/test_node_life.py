@@ -6,7 +6,7 @@ import beamspread
 import bpy
 import numpy as np
 import pytest
-from beamspread.blender.jobs.pixels import images_of
+from beamspread.blender.jobs.out_of_date.pixels import images_of
 from beamspread.blender.node.node import upgrade_nodes
 from beamspread.blender.node.tree import BASE_COLOR, EMISSION, IMAGE, UNSEEN
 from scenes import add_material, add_plane, add_sun, bake, node_of, pixels, select

@@ -8,14 +8,15 @@ import beamspread
 import bpy
 import numpy as np
 import pytest
-from beamspread.blender.jobs.batch import bake_all
-from beamspread.blender.jobs.operator import BakeThread
+from beamspread.blender.jobs.run.batch_run import bake_all
+from beamspread.blender.jobs.run.operator import BakeThread
 from beamspread.blender.settings import BeamspreadSettings
+from beamspread.core.bake.bake_settings import COMBINED
 from beamspread.core.bake.layers import LAYERS
-from beamspread.core.bake.runner import CANCELLED, Bake, Target
-from beamspread.core.bake.settings import COMBINED
-from beamspread.core.batch import options
+from beamspread.core.bake.runner import CANCELLED, Bake
+from beamspread.core.batch import batch_options
 from beamspread.core.native import native
+from beamspread.core.target import Target
 from mathutils import Matrix
 from scenes import add_material, add_mesh, add_plane, add_sun, bake, messages_of, node_of, pixels, select
 
@@ -353,7 +354,7 @@ def test_other_layers_have_images_and_files_beside_the_combined_one(monkeypatch,
     assert pixels(bpy.data.images[f"{image.name} Half"]) == pytest.approx(combined / 2)
     bake(plane)
     assert sorted(one.name for one in bpy.data.images) == ["Plane_Medium", "Plane_Medium Half"]
-    report = bake_all(options.parse(["--output", str(tmp_path)]))
+    report = bake_all(batch_options.parse(["--output", str(tmp_path)]))
     assert [Path(one.path).name for one in report.bakes] == ["Plane_Medium.exr"]
     assert native.read_exr(str(tmp_path / "Plane_Medium_Half.exr"))[0] == pytest.approx(combined / 2)
 

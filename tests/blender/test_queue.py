@@ -9,14 +9,15 @@ import pytest
 from beamspread.blender import popup, preferences
 from beamspread.blender.cycles.child_denoise import has_denoiser
 from beamspread.blender.images.results import Results
-from beamspread.blender.jobs import operator, prepare, stale
-from beamspread.blender.jobs.operator import BakeThread
-from beamspread.blender.jobs.prepare import read_scene
-from beamspread.blender.jobs.queue import Queue
-from beamspread.blender.jobs.state import Standing, state
+from beamspread.blender.jobs.out_of_date import stale
+from beamspread.blender.jobs.run import operator, prepare
+from beamspread.blender.jobs.run.bake_queue import BakeQueue
+from beamspread.blender.jobs.run.operator import BakeThread
+from beamspread.blender.jobs.run.prepare import read_scene
+from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.node.draw import draw_node
 from beamspread.blender.node.find import find_targets
-from beamspread.blender.ui.results import estimates
+from beamspread.blender.ui.bake_panel import estimates
 from beamspread.core.bake.estimate import in_words
 from beamspread.core.bake.runner import CANCELLED
 from beamspread.core.ldf import library
@@ -42,7 +43,7 @@ def plane(name, x=0.0, **properties):
 
 def queue(preview_first=True):
     targets = find_targets(bpy.context.scene.objects)
-    return Queue(read_scene(bpy.context, targets, bpy.context.scene.beamspread.for_bake()), targets, preview_first)
+    return BakeQueue(read_scene(bpy.context, targets, bpy.context.scene.beamspread.for_bake()), targets, preview_first)
 
 
 def turns(made):
@@ -173,7 +174,7 @@ def test_a_bake_beyond_the_memory_limit_is_refused(monkeypatch):
     message = messages_of(bpy.ops.beamspread.bake)
     assert "32 x 32 texels take about" in message
     assert "raise the memory limit" in message
-    assert state.rows[find_targets([one])[0]].standing == Standing.FAILED
+    assert state.rows[find_targets([one])[0]].status == Status.FAILED
 
 
 def test_progress_says_what_is_done_and_how_long_it_lasts(monkeypatch):
@@ -363,6 +364,6 @@ def test_a_first_look_is_kept_with_its_sentence():
     stale.refresh(bpy.context)
     row = state.rows[bake.target]
     assert row.is_stale
-    assert row.standing == Standing.WARNED
+    assert row.status == Status.WARNED
     assert "first look" in row.sentences[0]
     assert node_of(one.data.materials[0]).image is not None

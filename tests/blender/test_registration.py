@@ -3,7 +3,7 @@
 import bpy
 import pytest
 from beamspread import blender
-from beamspread.blender.jobs import operator
+from beamspread.blender.jobs.run import operator
 
 
 def handlers():

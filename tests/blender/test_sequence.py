@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 from beamspread.blender.images.sequence import is_sequence
 from beamspread.blender.images.writing import write_exr
-from beamspread.blender.jobs import batch, stale
-from beamspread.blender.jobs.record import ATTRIBUTE
-from beamspread.blender.jobs.state import Standing, state
-from beamspread.core.batch import options
+from beamspread.blender.jobs.out_of_date import stale
+from beamspread.blender.jobs.out_of_date.record import ATTRIBUTE
+from beamspread.blender.jobs.run import batch_run
+from beamspread.blender.jobs.state import Status, state
+from beamspread.core.batch import batch_options
 from beamspread.core.native import native
 from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, save_scene, select
 
@@ -23,7 +24,7 @@ def plane(tmp_path):
         sun.data.keyframe_insert("energy", frame=frame)
     save_scene(tmp_path)
     bake(plane)
-    assert batch.bake_all(options.parse(["--frames", "3-5"])).all_written()
+    assert batch_run.bake_all(batch_options.parse(["--frames", "3-5"])).all_written()
     return plane
 
 
@@ -46,19 +47,19 @@ def test_it_says_of_the_frame_what_has_changed_since(plane, tmp_path):
     shown = "Shows the frames 3 to 5 of a batch"
     for frame in (3, 4, 5):
         row = row_at(frame)
-        assert (row.standing, row.sentences) == (Standing.BAKED, (f"{shown}.",))
+        assert (row.status, row.sentences) == (Status.BAKED, (f"{shown}.",))
     assert row_at(9).sentences == (f"{shown}; what has changed since is not known.",)
     light = bpy.data.lights["Sun"]
     bpy.context.scene.frame_set(4)
     light.keyframe_insert("energy", frame=4)
     light.energy = 7
     light.keyframe_insert("energy", frame=3)
-    assert [row_at(frame).standing for frame in (3, 4)] == [Standing.STALE, Standing.BAKED]
+    assert [row_at(frame).status for frame in (3, 4)] == [Status.STALE, Status.BAKED]
     row = row_at(3)
     assert row.sentences == (f"{shown}. Changed since this one was baked: lights.",)
     assert not row.is_stale  # for a bake of this image
-    assert batch.bake_all(options.parse(["--frames", "3-3"])).all_written()
-    assert row_at(3).standing == Standing.BAKED
+    assert batch_run.bake_all(batch_options.parse(["--frames", "3-3"])).all_written()
+    assert row_at(3).status == Status.BAKED
     # As older ones, and those in PNG.
     write_exr(tmp_path / "beamspread" / "Plane_Medium_0003.exr", np.ones((32, 32, 3), np.float32), {ATTRIBUTE: ""})
     assert row_at(3).sentences == (f"{shown}; what has changed since is not known.",)
@@ -112,10 +113,10 @@ def test_it_is_not_baked_into_and_a_batch_writes_its_frames_again(plane, tmp_pat
     assert "Show Single Images" in messages_of(bpy.ops.beamspread.bake)
     bpy.data.lights["Sun"].animation_data_clear()
     bpy.data.lights["Sun"].energy = 20
-    report = batch.bake_all(options.parse([]))
+    report = batch_run.bake_all(batch_options.parse([]))
     assert [one.path for one in report.bakes] == [str(tmp_path / "beamspread" / "Plane_Medium.exr")]
     assert before == {path: path.read_bytes() for path in before}
-    assert batch.bake_all(options.parse(["--frames", "3-5"])).all_written()
+    assert batch_run.bake_all(batch_options.parse(["--frames", "3-5"])).all_written()
     assert all(path.read_bytes() != content for path, content in before.items())
 
 

@@ -2,11 +2,13 @@
 
 import bpy
 import pytest
-from beamspread.blender.jobs import batch, stale
-from beamspread.blender.jobs.state import Standing, state
+from beamspread.blender.jobs.out_of_date import stale
+from beamspread.blender.jobs.run import batch_run
+from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.node.node import upgrade_nodes
-from beamspread.core.bake.runner import Bake, Target
-from beamspread.core.batch import options
+from beamspread.core.bake.runner import Bake
+from beamspread.core.batch import batch_options
+from beamspread.core.target import Target
 from mathutils import Matrix
 from scenes import (
     add_blocker,
@@ -40,9 +42,9 @@ def plane():
     plane = add_plane(material=add_material())
     add_sun(20)
     add_blocker(1.0)
-    assert row().standing == Standing.NEVER
+    assert row().status == Status.NEVER
     bake(plane)
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
     return plane
 
 
@@ -55,10 +57,10 @@ def test_a_script_that_removes_objects_is_no_obstacle(plane):
     bpy.context.collection.objects.link(instance)
     update()
     bpy.data.objects.remove(bpy.data.objects["Wall"])
-    assert row().standing == Standing.STALE
+    assert row().status == Status.STALE
     bpy.data.objects.remove(add_blocker(2.0))
     assert bpy.ops.beamspread.bake(objects="ALL") == {"FINISHED"}
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
 
 
 def remove_inputs(tree):
@@ -79,11 +81,11 @@ def test_inputs_that_an_older_node_gets_late_are_no_change():
     remove_inputs(node.node_tree)
     assert list(node.inputs) == []
     bake(plane)
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
     upgrade_nodes()
     assert len(node.inputs) == 3
     stale.fingerprints.forget()
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
 
 
 def vertex(_plane):
@@ -142,7 +144,7 @@ def test_what_a_bake_read_makes_it_stale(plane, name):
     change(plane)
     update()
     assert row().is_stale
-    assert row().standing == Standing.STALE
+    assert row().status == Status.STALE
     assert part in row().sentences[0]
 
 
@@ -153,7 +155,7 @@ def test_another_output_of_the_node_before_it(plane):
     bake(plane)
     node.id_data.links.new(node.inputs["Roughness"], place.outputs["Object"])
     update()
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
     node.id_data.links.new(node.inputs["Base Color"], place.outputs["Object"])
     update()
     assert "material" in row().sentences[0]
@@ -171,7 +173,7 @@ def test_what_it_did_not_read_does_not(plane):
     node_of(plane.data.materials[0]).location.x = 9
     bpy.data.objects["Wall"].name = "Pane"
     update()
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
     plane.location.x = 1
     update()
     assert row().is_stale
@@ -184,12 +186,12 @@ def test_bakes_of_other_objects_do_not(plane):
     """Each other's images and links don't count, nor does a bake of one undo the other's."""
     other = add_plane("Other", matrix=Matrix.Translation((5, 0, 0)), material=add_material("Second"))
     update()
-    assert row().standing == Standing.STALE
+    assert row().status == Status.STALE
     bake(plane)
     before = node_of(other.data.materials[0]).image
     bake(other)
-    assert (before, row().standing) == (None, Standing.BAKED)
-    assert row(Target("Other", "Second")).standing == Standing.BAKED
+    assert (before, row().status) == (None, Status.BAKED)
+    assert row(Target("Other", "Second")).status == Status.BAKED
 
 
 def test_only_what_is_stale_is_baked_again(plane):
@@ -215,7 +217,7 @@ def test_it_is_known_after_loading_and_undo(plane, tmp_path):
     update()
     assert row().is_stale
     bpy.ops.wm.open_mainfile(filepath=path)
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
     bpy.data.lights["Sun"].energy = 5.0
     update()
     assert row().sentences == ("Changed since its bake: lights.",)
@@ -232,7 +234,7 @@ def test_a_copy_with_the_same_image_was_never_baked(plane):
     copy = plane.copy()
     copy.location.x = 9
     bpy.context.collection.objects.link(copy)
-    assert row(Target(copy.name, "Medium")).standing == Standing.NEVER
+    assert row(Target(copy.name, "Medium")).status == Status.NEVER
 
 
 def test_dark_is_a_warning_that_stays_with_the_image(tmp_path):
@@ -240,11 +242,11 @@ def test_dark_is_a_warning_that_stays_with_the_image(tmp_path):
     plane = add_plane(material=add_material())
     add_sun(180)
     bake(plane)
-    assert row().standing == Standing.WARNED
+    assert row().status == Status.WARNED
     path = str(tmp_path / "scene.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
-    assert row().standing == Standing.WARNED
+    assert row().status == Status.WARNED
     assert "All lights are behind 'Plane'" in row().sentences[0]
 
 
@@ -262,14 +264,14 @@ def test_paths_of_textures_that_saving_makes_relative_change_nothing(plane, tmp_
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
     assert sky.image.filepath == "//sky.hdr"
     stale.fingerprints.forget()
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
 
 
 def test_failures_of_a_material_that_another_has_replaced_are_no_rows(plane):
     other = add_plane("Other", material=plane.data.materials[0])
     select(other)
     assert "to the same part of the image" in messages_of(bpy.ops.beamspread.bake)
-    assert row(Target("Other", "Medium")).standing == Standing.FAILED
+    assert row(Target("Other", "Medium")).status == Status.FAILED
     other.data.materials[0] = other.data.materials[0].copy()
     stale.refresh(bpy.context)
     assert {str(target) for target in state.rows} == {"Plane / Medium", "Other / Medium.001"}
@@ -279,7 +281,7 @@ def test_failures_of_an_object_that_is_gone_are_no_rows(plane):
     other = add_plane("Other", material=plane.data.materials[0])
     select(other)
     assert "to the same part of the image" in messages_of(bpy.ops.beamspread.bake)
-    assert row(Target("Other", "Medium")).standing == Standing.FAILED
+    assert row(Target("Other", "Medium")).status == Status.FAILED
     bpy.data.objects.remove(other)
     stale.refresh(bpy.context)
     assert {str(target) for target in state.rows} == {"Plane / Medium"}
@@ -289,11 +291,11 @@ def test_failures_stand_beside_what_was_baked_before(plane):
     plane.hide_render = True
     select(plane)
     assert "hidden from render" in messages_of(bpy.ops.beamspread.bake)
-    assert row().standing == Standing.FAILED
+    assert row().status == Status.FAILED
     assert "hidden from render" in row().sentences[0]
     plane.hide_render = False
     bake(plane)
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
 
 
 def test_it_costs_little_to_look(plane):
@@ -324,7 +326,7 @@ def test_what_geometry_nodes_scatter(plane):
     wall.modifiers.new("Scatter", "NODES").node_group = group
     update()
     bake(plane)
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
     group.nodes["Move"].inputs["Translation"].default_value = (0, 0, 0.2)
     update()
     assert "other objects" in row().sentences[0]
@@ -342,7 +344,7 @@ def test_what_particles_scatter(plane):
     settings.type, settings.render_type, settings.instance_object, settings.count = "HAIR", "OBJECT", leaf, 20
     update()
     bake(plane)
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
     wall.particle_systems[0].seed = 5
     update()
     assert "other objects" in row().sentences[0]
@@ -375,22 +377,22 @@ def test_pixels_of_textures(plane, kind, tmp_path):
     else:
         image = add_texture(plane.data.materials[0], node_of(plane.data.materials[0]).inputs["Base Color"], tmp_path)
     bake(plane)
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
     paint(image, 0.5)
     assert "textures" in row().sentences[0]
     bake(plane)
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
     paint(image, 0.7)  # not saved between, and dirty before as after
     assert "textures" in row().sentences[0]
     image.save()
     bake(plane)
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
     (tmp_path / "veil.png").write_bytes((tmp_path / "veil.png").read_bytes()[:-1] + b"x")  # by another program
     assert "textures" in row().sentences[0]
     image.pack()
     update()
     bake(plane)
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
 
 
 def test_a_copy_of_a_file_is_no_other_texture(plane, tmp_path):
@@ -400,16 +402,16 @@ def test_a_copy_of_a_file_is_no_other_texture(plane, tmp_path):
     (tmp_path / "veil.png").unlink()
     (tmp_path / "veil.png").write_bytes(content)
     assert not image.is_dirty
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
 
 
 def test_how_often_light_may_bounce_counts_where_it_may(plane):
     cycles = bpy.context.scene.cycles
     cycles.diffuse_bounces += 1
-    assert row().standing == Standing.BAKED  # without indirect light
+    assert row().status == Status.BAKED  # without indirect light
     bpy.context.scene.beamspread.use_indirect = True
     stale.keep(Bake(PLANE), stale.parts_of(bpy.context, [PLANE])[PLANE])
-    assert row().standing == Standing.BAKED
+    assert row().status == Status.BAKED
     cycles.diffuse_bounces += 1
     assert "settings" in row().sentences[0]
 
@@ -423,11 +425,11 @@ def test_a_batch_that_fills_the_nodes_image_is_a_bake(arguments, tmp_path):
     bake(plane)
     del node_of(plane.data.materials[0]).image["beamspread_bakes"]
     state.forget()
-    assert row().standing == Standing.NEVER
-    assert batch.bake_all(options.parse(arguments)).all_written()
-    expected = Standing.NEVER if "--pass" in arguments else Standing.STALE if arguments else Standing.BAKED
-    assert row().standing == expected
-    if expected == Standing.STALE:
+    assert row().status == Status.NEVER
+    assert batch_run.bake_all(batch_options.parse(arguments)).all_written()
+    expected = Status.NEVER if "--pass" in arguments else Status.STALE if arguments else Status.BAKED
+    assert row().status == expected
+    if expected == Status.STALE:
         assert row().sentences[0] == "Changed since its bake: settings."
 
 

@@ -3,8 +3,8 @@
 import bpy
 import pytest
 import scenes
-from beamspread.blender.jobs import stale
-from beamspread.blender.jobs.state import Standing, state
+from beamspread.blender.jobs.out_of_date import stale
+from beamspread.blender.jobs.state import Status, state
 
 
 def make_baked():
@@ -17,7 +17,7 @@ def make_baked():
 
 def standings():
     stale.refresh(bpy.context)
-    return [row.standing for row in state.rows.values()]
+    return [row.status for row in state.rows.values()]
 
 
 @pytest.mark.parametrize("rename", ["objects", "materials", "images"])
@@ -25,12 +25,12 @@ def test_a_bake_is_known_under_a_new_name(rename):
     plane = make_baked()
     for one in getattr(bpy.data, rename):
         one.name = f"New {rename}"
-    assert standings() == [Standing.BAKED]
+    assert standings() == [Status.BAKED]
     plane.location.z = 1
     bpy.context.view_layer.update()
-    assert standings() == [Standing.STALE]
+    assert standings() == [Status.STALE]
     scenes.bake(plane)
-    assert standings() == [Standing.BAKED]
+    assert standings() == [Status.BAKED]
 
 
 def test_a_copy_is_not_taken_for_the_renamed_original():
@@ -40,7 +40,7 @@ def test_a_copy_is_not_taken_for_the_renamed_original():
     plane.name = "Renamed"
     copy.name = "Copy"
     bpy.context.view_layer.update()
-    assert Standing.BAKED not in standings()
+    assert Status.BAKED not in standings()
 
 
 def test_undo_leaves_a_file_and_what_is_known_of_it(tmp_path):
@@ -55,13 +55,13 @@ def test_undo_leaves_a_file_and_what_is_known_of_it(tmp_path):
     bpy.ops.ed.undo()
     image = scenes.node_of(bpy.data.materials["Medium"]).image
     assert scenes.pixels(image).mean() == pytest.approx(second.mean())
-    assert standings() == [Standing.WARNED]  # the light is that of the file, which undo has not brought back
+    assert standings() == [Status.WARNED]  # the light is that of the file, which undo has not brought back
     bpy.ops.ed.undo()
-    assert standings() == [Standing.STALE]
+    assert standings() == [Status.STALE]
     bpy.ops.ed.redo()
-    assert standings() == [Standing.WARNED]
+    assert standings() == [Status.WARNED]
     bpy.ops.ed.redo()
-    assert standings() == [Standing.BAKED]
+    assert standings() == [Status.BAKED]
 
 
 def test_a_file_that_is_gone_is_said(tmp_path):
@@ -70,9 +70,9 @@ def test_a_file_that_is_gone_is_said(tmp_path):
     make_baked()
     bpy.ops.wm.save_mainfile()
     next((tmp_path / "textures").iterdir()).unlink()
-    assert standings() == [Standing.STALE]
+    assert standings() == [Status.STALE]
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
-    assert standings() == [Standing.STALE]
+    assert standings() == [Status.STALE]
     assert [row.sentences[0] for row in state.rows.values()] == [
         "Changed since its bake: file of the image, which is gone."
     ]

@@ -18,12 +18,12 @@ sys.path[:0] = [str(FOLDER), str(FOLDER.parent.parent / "build" / "stage")]
 import beamspread  # noqa: E402
 import scenes  # noqa: E402
 from beamspread.blender import popup  # noqa: E402
-from beamspread.blender.jobs import operator  # noqa: E402
+from beamspread.blender.jobs.run import operator  # noqa: E402
 from beamspread.blender.jobs.state import state  # noqa: E402
 from beamspread.blender.node import draw, menu  # noqa: E402
+from beamspread.blender.ui import bake_panel as shown  # noqa: E402
 from beamspread.blender.ui import panels  # noqa: E402
-from beamspread.blender.ui import results as shown  # noqa: E402
-from beamspread.core.bake.runner import Target  # noqa: E402
+from beamspread.core.target import Target  # noqa: E402
 from scenario_player import play  # noqa: E402
 
 # The slowest step takes a second or two on an idle machine.
@@ -162,7 +162,7 @@ def scenario():
     sun = scenes.add_sun(0)
     planes = [scenes.add_plane(name, material=scenes.add_material(name)) for name in ("First", "Second")]
     planes[1].location.x = 5
-    scene.render.engine = beamspread.blender.jobs.engine.BeamspreadEngine.bl_idname
+    scene.render.engine = beamspread.blender.jobs.run.engine.BeamspreadEngine.bl_idname
     scenes.select(*planes)
     lay_out(planes[0].data.materials[0])
     yield show_tabs
@@ -212,7 +212,7 @@ def scenario():
     results["seconds to cancel"] = time.monotonic() - began
     results["kept by cancel"] = [brightness(name) for name in ("First", "Second")] == before
     results["messages of cancel"] = state.messages()
-    results["standing after cancel"] = state.said_of(Target("First", "First")).standing.value
+    results["standing after cancel"] = state.status_of(Target("First", "First")).status.value
 
     settings.solver = "fft"
     started(objects="ALL")

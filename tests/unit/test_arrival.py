@@ -6,15 +6,16 @@ from dataclasses import replace
 import beamspread
 import numpy as np
 import pytest
+from beamspread.core.bake.bake_settings import COMBINED, DIRECTION, IRRADIANCE, OUTPUTS, BakeSettings
 from beamspread.core.bake.job import BakeJob
-from beamspread.core.bake.runner import Bake, Target
-from beamspread.core.bake.settings import COMBINED, DIRECTION, IRRADIANCE, OUTPUTS, BakeSettings
+from beamspread.core.bake.runner import Bake
 from beamspread.core.bake.surface import Surface
 from beamspread.core.material.material import Material
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination, Mesh
 from beamspread.core.scene.lights import PointLight, SunLight
 from beamspread.core.scene.receiver import Chart, Receiver
+from beamspread.core.target import Target
 
 from helpers import travel
 

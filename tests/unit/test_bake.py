@@ -7,12 +7,12 @@ import beamspread
 import numpy as np
 import pytest
 from beamspread.core.bake.arrival import arrive
+from beamspread.core.bake.bake_settings import COMBINED, BakeSettings
 from beamspread.core.bake.gather import Gatherer
 from beamspread.core.bake.job import BakeJob
 from beamspread.core.bake.layers import LAYERS
 from beamspread.core.bake.luminance import bake
-from beamspread.core.bake.runner import Bake, Target
-from beamspread.core.bake.settings import COMBINED, BakeSettings
+from beamspread.core.bake.runner import Bake
 from beamspread.core.bake.surface import Surface
 from beamspread.core.errors import MaterialError
 from beamspread.core.material.material import Material
@@ -22,6 +22,7 @@ from beamspread.core.scene.lights import AreaLight, Light, PointLight, SpotLight
 from beamspread.core.scene.occluders import Mesh, Occluder
 from beamspread.core.scene.receiver import Chart, Receiver, build_receiver
 from beamspread.core.scene.uv_map import Polygons, fit_uv_maps
+from beamspread.core.target import Target
 
 SETTINGS = BakeSettings(quality="preview", samples=2, margin=0)
 MATERIAL = Material(albedo=(0.9, 0.9, 0.9), mean_free_path=(0.01, 0.01, 0.01), anisotropy=0.0)

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from beamspread import LdfSample, Medium, simulate
+from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.luminance import bake
-from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.errors import BakeError
 from beamspread.core.ldf.samples import load_source
 from beamspread.core.material.material import Material

@@ -1,7 +1,7 @@
 """Command line of the batch."""
 
 import pytest
-from beamspread.core.batch.options import arguments_for_script, parse
+from beamspread.core.batch.batch_options import arguments_for_script, parse
 
 
 def test_nothing_asked_leaves_all_to_the_scene():

@@ -13,7 +13,7 @@ from dataclasses import replace
 import beamspread
 import numpy as np
 from beamspread.core.bake.job import BakeJob
-from beamspread.core.bake.settings import BakeSettings
+from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.surface import Surface
 from beamspread.core.errors import BakeError
 from beamspread.core.material.material import Material

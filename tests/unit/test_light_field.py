@@ -10,8 +10,8 @@ import beamspread
 import numpy as np
 import pytest
 from beamspread.core.bake import luminance
+from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.luminance import TOLERANCE, bake
-from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.material.material import Material
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination

@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from beamspread import Medium, library
+from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.job import BakeJob
-from beamspread.core.bake.runner import Target
-from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.bake.surface import Surface
 from beamspread.core.live import media
 from beamspread.core.live.pace import BUDGET_SECONDS, FIRST_SIDE, SIDES, Pace
@@ -23,6 +22,7 @@ from beamspread.core.scene.lights import AreaLight, PointLight, SunLight
 from beamspread.core.scene.receiver import Receiver, build_receiver
 from beamspread.core.scene.texture import Texture
 from beamspread.core.scene.uv_map import Polygons, fit_uv_maps
+from beamspread.core.target import Target
 
 CORNERS = np.array([(-1.0, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
 FLOOR = Polygons(CORNERS, CORNERS[:, :2] / 2 + 0.5, np.array([0, 4]), np.array([(0.0, 0, 1)]))

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from beamspread.core.bake.arrival import arrive
+from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.luminance import bake
-from beamspread.core.bake.settings import BakeSettings
 from beamspread.core.material.material import Material
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination

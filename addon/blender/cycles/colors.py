@@ -7,10 +7,10 @@ import os
 import numpy as np
 
 from ...core.bake.margin import extend_margin
-from ...core.bake.runner import Target
 from ...core.errors import BakeError
 from ...core.progress import Progress
 from ...core.scene.receiver import Receiver
+from ...core.target import Target
 from .light import START_SECONDS, CopyForCycles
 from .process import run
 

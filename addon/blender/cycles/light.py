@@ -11,9 +11,9 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
+from ...core.bake.bake_settings import BakeSettings
 from ...core.bake.gather import Gatherer
 from ...core.bake.job import BakeJob
-from ...core.bake.settings import BakeSettings
 from ...core.errors import MaterialError
 from ...core.progress import Progress, stages
 from ...core.scene.illumination import Illumination

@@ -10,9 +10,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core.bake.runner import Bake, Target
+from ...core.bake.runner import Bake
 from ...core.batch.names import stem
 from ...core.errors import ImageError
+from ...core.target import Target
 from ...core.whole_file import whole_file
 from . import files, icons, undo, writing
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ...core.bake.runner import Bake, Target
+from ...core.bake.runner import Bake
+from ...core.target import Target
 from ..node.find import find_node
 from ..registration import all_or_nothing, classes
 from . import files, icons, previews

@@ -7,12 +7,13 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ...core.bake.bake_settings import COMBINED, DIRECTION
 from ...core.bake.layers import LAYERS
-from ...core.bake.runner import Bake, Target
-from ...core.bake.settings import COMBINED, DIRECTION
+from ...core.bake.runner import Bake
+from ...core.batch.batch_options import BatchOptions
 from ...core.batch.names import file_stems
-from ...core.batch.options import BatchOptions
 from ...core.errors import ImageError
+from ...core.target import Target
 from ..node.find import find_node, find_targets
 from ..read.instances import with_instanced
 from . import files, writing

@@ -11,10 +11,10 @@ import bpy
 import numpy as np
 
 from ...core.bake.margin import WHOLE
-from ...core.bake.runner import Target
 from ...core.errors import BakeError
 from ...core.scene.receiver import Receiver, build_receiver
 from ...core.scene.uv_map import fit_uv_maps
+from ...core.target import Target
 from ..node.find import find_node, find_targets
 from ..read.geometry import read_polygons
 from ..read.instances import with_instanced

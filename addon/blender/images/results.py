@@ -7,10 +7,11 @@ from collections.abc import Collection
 import bpy
 import numpy as np
 
+from ...core.bake.bake_settings import COMBINED
 from ...core.bake.margin import extend_margin
-from ...core.bake.runner import Bake, Target
-from ...core.bake.settings import COMBINED
+from ...core.bake.runner import Bake
 from ...core.errors import BakeError
+from ...core.target import Target
 from ..node.find import find_node
 from ..node.node import link_result
 from . import files, icons, previews

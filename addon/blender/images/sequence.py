@@ -7,10 +7,10 @@ from pathlib import Path
 
 import bpy
 
-from ...core.bake.runner import Target
-from ...core.bake.settings import COMBINED
-from ...core.batch.options import parse
+from ...core.bake.bake_settings import COMBINED
+from ...core.batch.batch_options import parse
 from ...core.errors import ImageError
+from ...core.target import Target
 from ..node.find import find_node, find_targets
 from ..node.node import link_result
 from ..node.tree import FRAMES

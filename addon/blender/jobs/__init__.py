@@ -1,1 +1,1 @@
-"""From targets to jobs, and the ways to run them."""
+"""Bakes: `run` makes and runs them, `state` is what panels show of them, `out_of_date` tells which to repeat."""

@@ -13,11 +13,12 @@ from enum import Enum
 from bpy.app.handlers import persistent
 
 from ...core.bake.estimate import in_words
-from ...core.bake.runner import CANCELLED, WRITTEN, Bake, Target
+from ...core.bake.runner import CANCELLED, WRITTEN, Bake
+from ...core.target import Target
 from ..registration import all_or_nothing, handlers
 
 
-class Standing(Enum):
+class Status(Enum):
     """How a target stands, in the words of the panels."""
 
     NEVER = "Never baked"
@@ -34,7 +35,7 @@ class Row:
     """A target, how it stands, what there is to say about it, and whether what its image holds is out of date."""
 
     target: Target
-    standing: Standing
+    status: Status
     sentences: tuple[str, ...] = ()
     is_stale: bool = False
 
@@ -134,23 +135,23 @@ class State:
     def note(self, bake: Bake) -> None:
         """Keep what there is to say of a bake in place of what was said of its target before."""
         self._said.pop(Target(bake.target.object_name), None)  # while nothing of it could be baked
-        standing = {WRITTEN: Standing.BAKED, CANCELLED: Standing.CANCELLED}.get(bake.status, Standing.FAILED)
+        standing = {WRITTEN: Status.BAKED, CANCELLED: Status.CANCELLED}.get(bake.status, Status.FAILED)
         if bake.status != WRITTEN and not bake.error:
             return  # it is still to run
-        if standing == Standing.BAKED and bake.warnings:
-            standing = Standing.WARNED
+        if standing == Status.BAKED and bake.warnings:
+            standing = Status.WARNED
         # That it was cancelled is its standing.
-        sentences = bake.messages()[standing == Standing.CANCELLED :]
+        sentences = bake.messages()[standing == Status.CANCELLED :]
         row = Row(bake.target, standing, tuple(sentences))
         self._said[bake.target] = self.rows[bake.target] = row
 
-    def said_of(self, target: Target) -> Row | None:
+    def status_of(self, target: Target) -> Row | None:
         """How its last bake since the file was opened ended."""
         return self._said.get(target)
 
     def failures(self) -> list[Row]:
         """Of the last bakes that failed or were cancelled."""
-        return [row for row in self._said.values() if row.standing in (Standing.FAILED, Standing.CANCELLED)]
+        return [row for row in self._said.values() if row.status in (Status.FAILED, Status.CANCELLED)]
 
     def forget_failures(self) -> None:
         """Before a run, which says anew what fails."""
@@ -160,7 +161,7 @@ class State:
     def messages(self) -> list[str]:
         """Everything said, each sentence once."""
         said = [
-            f"{row.target}: {sentence}" if not number and row.standing == Standing.FAILED else sentence
+            f"{row.target}: {sentence}" if not number and row.status == Status.FAILED else sentence
             for row in self._said.values()
             for number, sentence in enumerate(row.sentences)
         ]

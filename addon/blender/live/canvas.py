@@ -5,9 +5,9 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...core.bake.runner import Target
 from ...core.live.picture import Picture
 from ...core.live.subject import Subject
+from ...core.target import Target
 from ..images import files, icons, undo
 from ..images.new_image import name_for
 from ..images.previews import MADE_FOR_PREVIEWS, holds_previews_alone, leave

@@ -5,11 +5,11 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...core.bake.runner import Target
 from ...core.errors import sentence
 from ...core.live.picture import for_live
 from ...core.live.subject import Subject
 from ...core.scene.illumination import Illumination
+from ...core.target import Target
 from ..images.files import check_image
 from ..node.find import find_bakeable, find_node
 from ..read.geometry import read_polygons

@@ -9,11 +9,11 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ...core import native
-from ...core.bake.runner import Target
 from ...core.errors import sentence
 from ...core.live.painter import Painter
 from ...core.live.picture import Picture
 from ...core.live.subject import Subject
+from ...core.target import Target
 from ..images.owners import owners_of
 from ..images.previews import holds_previews_alone, leave, previews
 from ..jobs.state import state

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import bpy
 
-from ...core.bake.runner import Target
 from ...core.scene.receiver import build_receiver, texture_size
 from ...core.scene.texture import Texture
 from ...core.scene.uv_map import Polygons, fit_uv_maps
-from ..jobs.texture import UNLINKED, BaseColor, read_texture
+from ...core.target import Target
+from ..jobs.run.linked_color import UNLINKED, BaseColor, read_texture
 from ..node.find import find_place
 from ..read.placed import Placed, find_placed
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from ...core.bake.runner import Bake, Target
+from ...core.bake.runner import Bake
+from ...core.target import Target
 from .. import compat
 from ..read.instances import count_places, with_instanced
 from ..read.visible import render_visible_names

@@ -5,13 +5,13 @@ from __future__ import annotations
 import bpy
 
 from .. import compat
-from ..jobs.engine import BeamspreadEngine, active_image
+from ..jobs.run.engine import BeamspreadEngine, active_image
 from ..node.draw import draw_properties
 from ..node.find import find_node
 from ..preferences import draw_help
 from ..registration import all_or_nothing, classes
+from .bake_panel import draw_bake, draw_sentences, estimates
 from .image_buttons import draw_image_buttons
-from .results import draw_bake, draw_sentences, estimates
 
 
 def _use_columns(layout) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..jobs.engine import BeamspreadEngine
+from ..jobs.run.engine import BeamspreadEngine
 from ..registration import all_or_nothing, classes
 
 

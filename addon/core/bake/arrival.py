@@ -9,8 +9,8 @@ import numpy as np
 from ..progress import Progress, stages
 from ..scene.grid import Grid
 from ..scene.illumination import Illumination
+from .bake_settings import BakeSettings
 from .gather import Gatherer
-from .settings import BakeSettings
 
 # Rays to a light of a size, for each of a texel's samples: no medium blurs the noise of half-shadows. At most 4096.
 RAYS_PER_SAMPLE, MOST_RAYS = 4, 4096

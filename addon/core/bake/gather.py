@@ -13,7 +13,7 @@ from ..scene.grid import Grid
 from ..scene.illumination import Illumination
 from ..scene.lights import Light
 from ..scene.reach import Reach
-from .settings import BakeSettings
+from .bake_settings import BakeSettings
 
 # Of a survey, which only has to know what directions there are.
 SURVEY_TEXELS, SURVEY_RAYS = 96, 4

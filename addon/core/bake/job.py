@@ -13,6 +13,7 @@ from ..ldf.library import is_known, library
 from ..progress import Progress, say, stages, timed
 from ..scene.illumination import Illumination
 from ..scene.receiver import Receiver
+from .bake_settings import COMBINED, BakeSettings
 from .estimate import (
     NARROW,
     SUNS,
@@ -27,7 +28,6 @@ from .estimate import (
 from .layers import LAYERS, WITHOUT_MEDIUM
 from .luminance import rays_per_texel
 from .margin import extend_margin
-from .settings import COMBINED, BakeSettings
 from .surface import Surface
 
 

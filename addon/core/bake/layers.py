@@ -14,8 +14,8 @@ from ..material.material import Material
 from ..progress import Progress
 from ..scene.grid import Grid
 from .arrival import arrive, mean_direction
+from .bake_settings import COMBINED, DIRECTION, IRRADIANCE
 from .luminance import bake
-from .settings import COMBINED, DIRECTION, IRRADIANCE
 
 if TYPE_CHECKING:
     from .job import BakeJob

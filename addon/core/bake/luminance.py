@@ -17,10 +17,10 @@ from ..progress import Progress, stages
 from ..scene.grid import Grid
 from ..scene.illumination import Illumination
 from ..scene.lights import Light
+from .bake_settings import BakeSettings
 from .convolve import solve as convolve_plane_lights
 from .estimate import ray_seconds, solver_seconds
 from .gather import Gatherer
-from .settings import BakeSettings
 from .surface import channel_media
 
 # Shares of the time that a bake takes, roughly: reading an LDF that is known, gathering a light, solving for all.

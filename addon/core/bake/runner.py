@@ -4,27 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import sentence
 from ..native import native
 from ..progress import Progress
+from ..target import Target
 from .job import BakeJob
 
 WRITTEN, SKIPPED, FAILED, CANCELLED = "written", "skipped", "failed", "cancelled"
-
-
-@dataclass(frozen=True)
-class Target:
-    """One material of one object, by name: the host's data may move while a bake runs."""
-
-    object_name: str
-    material_name: str = ""
-
-    def __str__(self) -> str:
-        return f"{self.object_name} / {self.material_name}" if self.material_name else self.object_name
 
 
 class Bake:

@@ -7,10 +7,10 @@ import threading
 import time
 from collections.abc import Sequence
 
-from ..bake.runner import Target
 from ..errors import sentence
 from ..native import native
 from ..progress import Progress
+from ..target import Target
 from .media import Media
 from .pace import SIDES, Pace
 from .picture import Picture, Studio

@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
+from ..bake.bake_settings import COMBINED, BakeSettings
 from ..bake.gather import Gatherer
 from ..bake.luminance import TOLERANCE, spread
 from ..bake.margin import WHOLE, extend_margin
-from ..bake.settings import COMBINED, BakeSettings
 from ..bake.surface import channel_media
 from ..ldf.albedo import albedo_from_reflectance
 from ..ldf.samples import load_source

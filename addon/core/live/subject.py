@@ -8,12 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
-from ..bake.runner import Target
-from ..bake.settings import BakeSettings
+from ..bake.bake_settings import BakeSettings
 from ..bake.surface import Surface
 from ..scene.illumination import Illumination
 from ..scene.texture import Texture
 from ..scene.uv_map import Polygons
+from ..target import Target
 
 # Arrays of more bytes, as of the world, are kept where they are read: another one was read again.
 LOOK_INSIDE = 1 << 20

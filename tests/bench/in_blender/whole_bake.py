@@ -65,7 +65,7 @@ def phases(folder):
     def import_all():
         from beamspread import batch, blender
         from beamspread.blender.images import writing
-        from beamspread.blender.jobs import batch as bakes
+        from beamspread.blender.jobs.run import batch_run as bakes
         from beamspread.core.bake import job, luminance
 
         return batch, blender, writing, bakes, job, luminance

@@ -15,8 +15,8 @@ from ..cycles.colors import bytes_of_colors, seconds_of_colors
 from ..cycles.light import seconds_estimate
 from ..images.files import check_image
 from ..images.results import check_editable
-from ..jobs.state import Row, Standing, state
-from ..jobs.texture import needs_cycles
+from ..jobs.run.linked_color import needs_cycles
+from ..jobs.state import Row, Status, state
 from ..live import session
 from ..node.find import find_misplaced, find_node, find_targets, materials_of, places_rendered, was_baked_elsewhere
 from ..popup import wrap
@@ -27,13 +27,13 @@ from ..read.placed import Placed, check_placed
 MOST_OBJECTS, MOST_LOOKED_AT = 8, 1000
 
 ICONS = {
-    Standing.NEVER: "RADIOBUT_OFF",
-    Standing.BAKED: "CHECKMARK",
-    Standing.WARNED: "ERROR",
-    Standing.FAILED: "CANCEL",
-    Standing.CANCELLED: "PANEL_CLOSE",
-    Standing.STALE: "FILE_REFRESH",
-    Standing.RUNNING: "RENDER_STILL",
+    Status.NEVER: "RADIOBUT_OFF",
+    Status.BAKED: "CHECKMARK",
+    Status.WARNED: "ERROR",
+    Status.FAILED: "CANCEL",
+    Status.CANCELLED: "PANEL_CLOSE",
+    Status.STALE: "FILE_REFRESH",
+    Status.RUNNING: "RENDER_STILL",
 }
 
 # A direct solver of fewer seconds needs no warning.
@@ -159,13 +159,13 @@ def draw_results(layout, context, material_name: str, shown: set[str]) -> None:
     if not rows:
         return
     # First what needs looking at.
-    rows.sort(key=lambda row: row.standing in (Standing.NEVER, Standing.BAKED))
+    rows.sort(key=lambda row: row.status in (Status.NEVER, Status.BAKED))
     box = layout.box().column(align=True)
     for row in rows[:MOST_OBJECTS]:
         standing = _standing(row)
         draw_sentences(box, context, [f"{row.target.object_name}: {standing.value}"], ICONS[standing])
         # Why it is out of date is said of each, other sentences once.
-        is_said_of_each = row.is_stale and row.standing not in (Standing.FAILED, Standing.CANCELLED)
+        is_said_of_each = row.is_stale and row.status not in (Status.FAILED, Status.CANCELLED)
         sentences = [one for one in row.sentences if one not in shown or (is_said_of_each and one == row.sentences[0])]
         shown.update(sentences)
         draw_sentences(box, context, sentences, "DOT")
@@ -173,9 +173,9 @@ def draw_results(layout, context, material_name: str, shown: set[str]) -> None:
         box.label(text=f"And {len(rows) - MOST_OBJECTS} more", icon="BLANK1")
 
 
-def _standing(row: Row) -> Standing:
+def _standing(row: Row) -> Status:
     running = state.progress is not None and state.progress.target == row.target
-    return Standing.RUNNING if running else row.standing
+    return Status.RUNNING if running else row.status
 
 
 def estimates(context) -> list[str]:

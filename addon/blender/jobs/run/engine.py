@@ -9,18 +9,19 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ...core.bake.runner import WRITTEN, Bake, Target
-from ...core.bake.settings import COMBINED, BakeSettings
-from ...core.errors import ImageError, sentence
-from .. import compat
-from ..cycles.light import CopyForCycles
-from ..node.find import NOTHING_FOUND, find_misplaced, find_node, find_targets, materials_of
-from ..registration import all_or_nothing, classes, handlers
-from . import stale
-from .fingerprint import Parts
-from .picture import render_picture, show_by_eevee
+from ....core.bake.bake_settings import COMBINED, BakeSettings
+from ....core.bake.runner import WRITTEN, Bake
+from ....core.errors import ImageError, sentence
+from ....core.target import Target
+from ... import compat
+from ...cycles.light import CopyForCycles
+from ...node.find import NOTHING_FOUND, find_misplaced, find_node, find_targets, materials_of
+from ...registration import all_or_nothing, classes, handlers
+from ..out_of_date import stale
+from ..out_of_date.fingerprint import Parts
+from ..state import state
 from .prepare import Preparation
-from .state import state
+from .render_copy import render_picture, show_by_eevee
 
 
 class BeamspreadEngine(bpy.types.RenderEngine):

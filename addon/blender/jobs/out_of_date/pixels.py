@@ -14,9 +14,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..images.files import file_of
-from ..node.find import find_node
-from ..node.node import BeamspreadNode
+from ...images.files import file_of
+from ...node.find import find_node
+from ...node.node import BeamspreadNode
 
 # Files of more bytes would take more than about 10 ms to read.
 LARGE = 8 << 20

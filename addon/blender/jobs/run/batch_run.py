@@ -9,23 +9,24 @@ from pathlib import Path
 
 import bpy
 
-from ...core.bake.runner import CANCELLED, SKIPPED, WRITTEN, Bake, Target
-from ...core.batch.inventory import Inventory
-from ...core.batch.options import BatchOptions
-from ...core.batch.report import BakeRecord, Report
-from ...core.batch.resume import Earlier
-from ...core.batch.stop import Stop
-from ...core.errors import BakeError
-from ...core.progress import timed
-from ..images.files import file_of
-from ..images.outputs import Outputs
-from ..images.writing import size_of
-from ..node.find import NOTHING_FOUND, find_bakeable, find_misplaced
-from ..read.instances import by_name
-from . import stale
-from .fingerprint import IMAGE, SETTINGS, Parts, settings_part
+from ....core.bake.runner import CANCELLED, SKIPPED, WRITTEN, Bake
+from ....core.batch.batch_options import BatchOptions
+from ....core.batch.inventory import Inventory
+from ....core.batch.report import BakeRecord, Report
+from ....core.batch.resume import Earlier
+from ....core.batch.stop import Stop
+from ....core.errors import BakeError
+from ....core.progress import timed
+from ....core.target import Target
+from ...images.files import file_of
+from ...images.outputs import Outputs
+from ...images.writing import size_of
+from ...node.find import NOTHING_FOUND, find_bakeable, find_misplaced
+from ...read.instances import by_name
+from ..out_of_date import stale
+from ..out_of_date.fingerprint import IMAGE, SETTINGS, Parts, settings_part
+from ..out_of_date.record import Record, in_file
 from .prepare import prepare_scene
-from .record import Record, in_file
 
 
 def bake_all(options: BatchOptions, stop: Stop | None = None) -> Report:

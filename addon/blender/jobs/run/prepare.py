@@ -7,25 +7,26 @@ from dataclasses import dataclass, replace
 
 import bpy
 
-from ...core.bake.estimate import machine_bytes
-from ...core.bake.job import BakeJob, needs_medium, to_simulate
-from ...core.bake.runner import Bake, Target
-from ...core.bake.settings import BakeSettings
-from ...core.bake.surface import Surface
-from ...core.errors import BakeError, sentence
-from ...core.scene.receiver import build_receiver, texture_size
-from ...core.scene.uv_map import fit_uv_maps
-from ..cycles.colors import bytes_of_colors, seconds_of_colors
-from ..cycles.light import CopyForCycles, CyclesLight
-from ..images.files import check_image
-from ..images.sequence import is_sequence, size_of_frames
-from ..node.find import find_place, materials_of
-from ..node.node import BeamspreadNode
-from ..read.geometry import read_polygons
-from ..read.lights import read_illumination
-from ..read.placed import Placed, check_placed, find_placed
-from ..read.visible import as_rendered, render_visible_names
-from .texture import BaseColor, ColorByCycles, read_texture
+from ....core.bake.bake_settings import BakeSettings
+from ....core.bake.estimate import machine_bytes
+from ....core.bake.job import BakeJob, needs_medium, to_simulate
+from ....core.bake.runner import Bake
+from ....core.bake.surface import Surface
+from ....core.errors import BakeError, sentence
+from ....core.scene.receiver import build_receiver, texture_size
+from ....core.scene.uv_map import fit_uv_maps
+from ....core.target import Target
+from ...cycles.colors import bytes_of_colors, seconds_of_colors
+from ...cycles.light import CopyForCycles, CyclesLight
+from ...images.files import check_image
+from ...images.sequence import is_sequence, size_of_frames
+from ...node.find import find_place, materials_of
+from ...node.node import BeamspreadNode
+from ...read.geometry import read_polygons
+from ...read.lights import read_illumination
+from ...read.placed import Placed, check_placed, find_placed
+from ...read.visible import as_rendered, render_visible_names
+from .linked_color import BaseColor, ColorByCycles, read_texture
 
 # Stands for a base color that is found when the job runs.
 SOME_COLOR = (0.5, 0.5, 0.5)

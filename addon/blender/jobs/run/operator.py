@@ -7,19 +7,20 @@ import threading
 import bpy
 from bpy.props import EnumProperty
 
-from ...core import native
-from ...core.bake.runner import CANCELLED, WRITTEN, Bake, Target
-from ...core.bake.settings import COMBINED
-from ...core.errors import sentence
-from .. import popup
-from ..images import previews
-from ..images.results import Results
-from ..node.find import NOTHING_FOUND, find_bakeable, find_misplaced
-from ..registration import all_or_nothing, classes
-from . import stale
+from ....core import native
+from ....core.bake.bake_settings import COMBINED
+from ....core.bake.runner import CANCELLED, WRITTEN, Bake
+from ....core.errors import sentence
+from ....core.target import Target
+from ... import popup
+from ...images import previews
+from ...images.results import Results
+from ...node.find import NOTHING_FOUND, find_bakeable, find_misplaced
+from ...registration import all_or_nothing, classes
+from ..out_of_date import stale
+from ..state import redraw, state
+from .bake_queue import BakeQueue
 from .prepare import read_scene
-from .queue import Queue
-from .state import redraw, state
 
 TIMER_SECONDS = 0.1
 
@@ -169,7 +170,7 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         state.forget_failures()
         self._parts = stale.parts_of(context, targets)
         preparation = read_scene(context, targets, context.scene.beamspread.for_bake())
-        self._queue = Queue(preparation, targets, preview_first)
+        self._queue = BakeQueue(preparation, targets, preview_first)
         for bake in misplaced:
             self._take(bake)
         return True

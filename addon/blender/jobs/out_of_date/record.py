@@ -6,8 +6,8 @@ import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from ...core.bake.runner import Target
-from ...core.exr_header import text_of
+from ....core.exr_header import text_of
+from ....core.target import Target
 from .fingerprint import Parts
 
 # Text, since names of objects may be longer than Blender's own keys.

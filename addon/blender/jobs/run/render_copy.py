@@ -10,11 +10,11 @@ from collections.abc import Callable
 
 import bpy
 
-from ...core.errors import BakeError, sentence
-from ...core.native import native
-from .. import compat
-from ..cycles.process import run
-from ..cycles.scene_copy import SceneCopy
+from ....core.errors import BakeError, sentence
+from ....core.native import native
+from ... import compat
+from ...cycles.process import run
+from ...cycles.scene_copy import SceneCopy
 
 # The window's main thread, which alone may read the scene, may be busy with a long step of the user's.
 PATIENCE_SECONDS = 60.0

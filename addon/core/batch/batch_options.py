@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..bake.settings import OUTPUTS
+from ..bake.bake_settings import OUTPUTS
 
 SOLVERS = ("fft", "direct", "adaptive")
 FORMATS = ("EXR", "PNG")

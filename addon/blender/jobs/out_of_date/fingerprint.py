@@ -12,12 +12,12 @@ from collections.abc import Iterable, Iterator
 import bpy
 import numpy as np
 
-from ...core.bake.runner import Target
-from ...core.errors import sentence
-from .. import compat
-from ..node.find import find_node
-from ..read.instances import by_name, collection_of, rendered_in
-from ..read.visible import render_visible_names
+from ....core.errors import sentence
+from ....core.target import Target
+from ... import compat
+from ...node.find import find_node
+from ...read.instances import by_name, collection_of, rendered_in
+from ...read.visible import render_visible_names
 from .pixels import Pixels, images_of, results
 from .scatter import Scatter, scatters
 

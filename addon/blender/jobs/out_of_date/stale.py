@@ -12,19 +12,20 @@ from dataclasses import replace
 import bpy
 from bpy.app.handlers import persistent
 
-from ...core.bake.runner import Bake, Target
-from ..images import previews
-from ..images.files import file_of
-from ..images.owners import noted_as
-from ..images.sequence import file_at, is_sequence
-from ..images.undo import is_undone
-from ..node.find import find_bakeable, find_misplaced, find_node
-from ..node.tree import FRAMES
-from ..read.instances import by_name
-from ..registration import all_or_nothing, handlers
+from ....core.bake.runner import Bake
+from ....core.target import Target
+from ...images import previews
+from ...images.files import file_of
+from ...images.owners import noted_as
+from ...images.sequence import file_at, is_sequence
+from ...images.undo import is_undone
+from ...node.find import find_bakeable, find_misplaced, find_node
+from ...node.tree import FRAMES
+from ...read.instances import by_name
+from ...registration import all_or_nothing, handlers
+from ..state import Row, Status, redraw, state
 from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
 from .record import Record, keep_record, record_in, record_of
-from .state import Row, Standing, redraw, state
 
 # After the last change; and after the last look so long that looks take at most such a part of the time. One alone may
 # take longer: the first of a file, and after undo, reads all meshes, and those that follow don't.
@@ -108,17 +109,17 @@ def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
         changed.append("pixels of the image")
     if record is not None and _has_lost_its_file(_image(target)):
         changed = [*(name for name in changed if name != IMAGE), "file of the image, which is gone"]
-    said = state.said_of(target)
-    if said is not None and said.standing in (Standing.FAILED, Standing.CANCELLED):
+    said = state.status_of(target)
+    if said is not None and said.status in (Status.FAILED, Status.CANCELLED):
         return replace(said, is_stale=bool(changed))
     if record is None:
-        return Row(target, Standing.NEVER)
+        return Row(target, Status.NEVER)
     warnings = (*_why_later(_image(target)), *record.warnings)
     if changed and changed != [QUALITY]:
         why = f"Changed since its bake: {', '.join(changed)}."
-        return Row(target, Standing.STALE, (why, *warnings, *record.notes), True)
+        return Row(target, Status.STALE, (why, *warnings, *record.notes), True)
     warnings = (*([_why_again(record.parts[QUALITY], now[QUALITY])] if changed else []), *warnings)
-    standing = Standing.WARNED if warnings else Standing.BAKED
+    standing = Status.WARNED if warnings else Status.BAKED
     return Row(target, standing, (*warnings, *record.notes), bool(changed))
 
 
@@ -127,12 +128,12 @@ def _row_of_frames(target: Target, record: Record | None, now: Parts | None) -> 
     first, last, *_ = _image(target)[FRAMES]
     shown = f"Shows the frames {first} to {last} of a batch"
     if record is None or now is None:
-        return Row(target, Standing.BAKED, (f"{shown}; what has changed since is not known.",))
+        return Row(target, Status.BAKED, (f"{shown}; what has changed since is not known.",))
     changed = record.changed(now)
     if changed:
         why = f"{shown}. Changed since this one was baked: {', '.join(changed)}."
-        return Row(target, Standing.STALE, (why, *record.warnings))
-    return Row(target, Standing.WARNED if record.warnings else Standing.BAKED, (f"{shown}.", *record.warnings))
+        return Row(target, Status.STALE, (why, *record.warnings))
+    return Row(target, Status.WARNED if record.warnings else Status.BAKED, (f"{shown}.", *record.warnings))
 
 
 def _has_lost_its_file(image) -> bool:

@@ -9,22 +9,22 @@ from functools import partial
 import bpy
 import numpy as np
 
-from ...core.bake.job import BakeJob, needs_medium
-from ...core.bake.runner import Target
-from ...core.bake.surface import Surface
-from ...core.errors import BakeError, sentence
-from ...core.material.material import RGB
-from ...core.progress import Progress
-from ...core.scene.receiver import Receiver
-from ...core.scene.texture import mean_color, textured
-from ..cycles.colors import colors_by_cycles, seconds_of_colors
-from ..cycles.light import CopyForCycles
-from ..node.find import find_place
-from ..node.tree import BASE_COLOR
-from ..read.base_color import is_understood, read_base_color
-from ..read.image_texture import NotUnderstoodError
-from ..read.node_links import Wanted
-from ..read.placed import Placed
+from ....core.bake.job import BakeJob, needs_medium
+from ....core.bake.surface import Surface
+from ....core.errors import BakeError, sentence
+from ....core.material.material import RGB
+from ....core.progress import Progress
+from ....core.scene.receiver import Receiver
+from ....core.scene.texture import mean_color, textured
+from ....core.target import Target
+from ...cycles.colors import colors_by_cycles, seconds_of_colors
+from ...cycles.light import CopyForCycles
+from ...node.find import find_place
+from ...node.tree import BASE_COLOR
+from ...read.base_color import is_understood, read_base_color
+from ...read.image_texture import NotUnderstoodError
+from ...read.node_links import Wanted
+from ...read.placed import Placed
 
 # Rounding, or a little over by interpolation.
 BRIGHTEST = 1.001

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 
 import bpy
 
-from ...core.bake.estimate import simulation_seconds
-from ...core.bake.runner import Bake, Target
-from ...core.bake.settings import FINAL, PREVIEW
-from ..cycles.light import seconds_estimate
-from ..node.find import find_node
+from ....core.bake.bake_settings import FINAL, PREVIEW
+from ....core.bake.estimate import simulation_seconds
+from ....core.bake.runner import Bake
+from ....core.target import Target
+from ...cycles.light import seconds_estimate
+from ...node.find import find_node
 from .prepare import Preparation
 
 # Of a bake, beside what is known to take long.
@@ -18,7 +19,7 @@ OTHER_SECONDS = 0.5
 
 
 @dataclass(frozen=True)
-class Turn:
+class BakeStep:
     """One bake of a target; `is_first`: it is a first look, `is_again`: the bake that follows one."""
 
     target: Target
@@ -28,7 +29,7 @@ class Turn:
     is_again: bool = False
 
 
-class Queue:
+class BakeQueue:
     """Turns in their order, and how far they are.
 
     With `preview_first` nobody waits for a medium that is not simulated yet: its targets get a first look, by a quick
@@ -45,7 +46,7 @@ class Queue:
         return len(self._turns)
 
     @property
-    def turn(self) -> Turn:
+    def turn(self) -> BakeStep:
         """The last one given out."""
         return self._turns[self._next - 1]
 
@@ -68,7 +69,7 @@ class Queue:
         return done / sum(turn.seconds for turn in self._turns)
 
 
-def _turns(preparation: Preparation, targets: list[Target], preview_first: bool) -> list[Turn]:
+def _turns(preparation: Preparation, targets: list[Target], preview_first: bool) -> list[BakeStep]:
     quality = preparation.settings.quality
     unknown = {target: preparation.to_simulate(target, quality) for target in targets}
     quick = [target for target in targets if preview_first and quality == FINAL and unknown[target]]
@@ -88,12 +89,12 @@ def _turns(preparation: Preparation, targets: list[Target], preview_first: bool)
     for target in targets:
         if target in again:
             chosen = PREVIEW if target in quick else quality
-            turns.append(Turn(target, chosen, seconds(target, chosen), is_first=True))
+            turns.append(BakeStep(target, chosen, seconds(target, chosen), is_first=True))
         else:
-            turns.append(Turn(target, quality, seconds(target, quality) + _indirect_seconds(preparation, target)))
+            turns.append(BakeStep(target, quality, seconds(target, quality) + _indirect_seconds(preparation, target)))
     for target in again:
         took = seconds(target, quality) + _indirect_seconds(preparation, target)
-        turns.append(Turn(target, quality, took, is_again=True))
+        turns.append(BakeStep(target, quality, took, is_again=True))
     return turns
 
 
