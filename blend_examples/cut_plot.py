@@ -69,7 +69,7 @@ def read_cut(path):
 
 
 def leak_depth(profile, fraction, channel=GREEN):
-    """Depth of shadow at which luminance falls to a fraction of what it is far out in the light."""
+    """Depth of shadow at which luminance falls to a fraction of its value far out in the light."""
     lit = profile.value[(profile.u > -17.5) & (profile.u < -13), channel].mean()
     beyond = np.flatnonzero((profile.value[:, channel] < fraction * lit) & (profile.u > 0))
     if len(beyond) == 0:

@@ -2,7 +2,7 @@
 
 In this medium light goes on for 9 to 13 mm (transport mean free path of green and red) before it forgets its direction,
 a good part of the panes' 22 mm: it runs on into the shadow behind each pane, before the pane the shadow stays dark. Its
-ior is 1, so that what the closures of renderers do about a step in refraction plays no part in the comparison.
+ior is 1, so that the closures of renderers, which treat a step in refraction differently, can be compared.
 """
 
 import math
@@ -13,7 +13,7 @@ MM = 0.001
 WIDTH, DEPTH = 190 * MM, 116 * MM
 ANGLE_DEG = 70.0
 ROWS, COLUMNS = 3, 3
-# Of the light on the slab: from pane to pane along it and across, and the bars in between.
+# Sizes of the light on the slab: from pane to pane along it and across, and the bars in between.
 ALONG, BAR_ALONG = 56 * MM, 34 * MM
 ACROSS, BAR_ACROSS = 36 * MM, 11 * MM
 

@@ -102,7 +102,7 @@ def evening_sky(world):
 
 
 def marble():
-    """Measured marble, polished: what is baked, tinted by faint veins, under a coat of glossy reflection."""
+    """Measured marble, polished: the baked light, tinted by faint veins, under a coat of glossy reflection."""
     material, node = parts.medium_material("Marble", preset="marble")
     tree = material.node_tree
     new, link = tree.nodes.new, tree.links.new

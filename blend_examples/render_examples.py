@@ -1,4 +1,4 @@
-"""Renders a baked example with Cycles, as an artist would who opens the scene after the bake:
+"""Renders a baked example with Cycles, as the scene looks when it is opened after the bake:
 
     blender -b --factory-startup SCENE.blend --python-exit-code 1 --python render_examples.py -- REPORT.json OUT_FOLDER
 

@@ -1,4 +1,4 @@
-"""What the example scenes are built from: planes of a medium, plain objects, lamps, cameras."""
+"""Parts of the example scenes: planes of a medium, plain objects, lamps, cameras."""
 
 import math
 
@@ -94,7 +94,7 @@ def glowing_material(name, color, glow, strength):
 
 
 def card_material(name, color, alpha):
-    """For flat pictures; `alpha` is an array (rows upward, columns) of what they cover, 0..1."""
+    """Material of flat pictures; `alpha` is an array (rows upward, columns) of their coverage, 0..1."""
     material = plain_material(name, color, roughness=1.0, specular=0.0)
     height, width = alpha.shape
     image = bpy.data.images.new(name, width, height, alpha=True)
@@ -300,7 +300,7 @@ def camera(location, target, lens=50.0, roll_deg=0.0):
 
 
 def scale_scene(factor):
-    """Make everything smaller or larger around the origin, and keep what point and spot lamps light as bright."""
+    """Scale everything around the origin; surfaces under point and spot lamps keep their brightness."""
     bpy.context.view_layer.update()
     for obj in bpy.context.scene.objects:
         obj.location *= factor

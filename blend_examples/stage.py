@@ -1,6 +1,6 @@
 """The scene stage: coloured spots through haze onto a floor of milky acrylic. Lengths are metres.
 
-Every light has a size, so shadows are soft far from what throws them. The haze is cards, as stages and games have it:
+Every light has a size, so shadows are soft far from their occluders. The haze is cards, as stages and games have it:
 flat pictures of clouds whose alpha lets part of the light through, in patches, and one of slats, a gobo, that lets it
 through in stripes. Light spreads some 7 cm inside the floor, as wide as the gaps between the stripes. The ior is 1, so
 that Cycles can trace paths through the floor, too (with_volume.py).
@@ -63,7 +63,7 @@ def cards():
 
 
 def furniture():
-    """What the beams are for: a microphone, a stool, a wall at the back."""
+    """Targets of the beams: a microphone, a stool, a wall at the back."""
     black = parts.plain_material("Black steel", (0.03, 0.03, 0.032), roughness=0.35, metallic=1.0)
     wood = parts.plain_material("Stool", (0.35, 0.20, 0.10), roughness=0.4)
     cloth = parts.plain_material("Curtain", (0.10, 0.012, 0.016), roughness=0.9, specular=0.1)

@@ -3,9 +3,9 @@
     blender -b --factory-startup SCENE.blend --python-exit-code 1 --python with_volume.py -- OUT.png OURS.exr SAMPLES
 
 The slab is a box below the plane, wide and deep enough to have no ends, of a medium without a step in refraction, which
-paths can be traced through. What leaves it is measured as in cycles_slab.py, by a ghost above it, and shown by the
-Beamspread node. Prints how far OURS.exr, a bake of the same plane, is off: mean over texels of the ghost, and over
-blocks of them, which have less noise.
+paths can be traced through. A ghost above it measures the emitted light, as in cycles_slab.py, and the Beamspread node
+shows it. Prints how far OURS.exr, a bake of the same plane, is off: mean over texels of the ghost, and over blocks of
+them, which have less noise.
 """
 
 import sys
@@ -27,7 +27,7 @@ ENDS = 40  # of the box beyond the plane and below it, in mean free paths
 
 
 def medium(node):
-    """As cycles_slab.py builds it, with the node's values."""
+    """Slab of cycles_slab.py with the node's values."""
     length = node.mean_free_path[0]
     if node.ior != 1.0 or set(node.mean_free_path) != {length}:
         raise SystemExit("with_volume.py takes a medium of ior 1 and of one mean free path")
@@ -109,13 +109,13 @@ def resampled(texture, shape):
 
 
 def compare(baked, passes, size):
-    """Print the mean error over blocks of `size` squared texels of the ghost, and what noise of Cycles is of it."""
+    """Print the mean error over blocks of `size` squared texels of the ghost, and the share of Cycles' noise in it."""
     rows, columns = passes.shape[1] // size, passes.shape[2] // size
     blocks = passes[:, : rows * size, : columns * size].reshape(PASSES, rows, size, columns, size, 3)
     blocks = np.nanmean(blocks, axis=(2, 4))
     truth, noise = blocks.mean(axis=0), blocks.std(axis=0, ddof=1) / np.sqrt(PASSES)
     off = abs(resampled(baked, (rows, columns)) - truth).mean() / truth.mean()
-    # Of Gaussian noise, the mean absolute value is sqrt(2 / pi) of the deviation.
+    # The mean absolute value of Gaussian noise is sqrt(2 / pi) of its deviation.
     expected = np.sqrt(2 / np.pi) * noise.mean() / truth.mean()
     print(f"{rows} x {columns} blocks: off by {off:.2%} in the mean, by noise of Cycles alone {expected:.2%}")
 

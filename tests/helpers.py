@@ -1,4 +1,4 @@
-"""What tests of several modules share."""
+"""Helpers that several test modules share."""
 
 import csv
 from pathlib import Path

@@ -1,6 +1,6 @@
-"""Goes once through everything that the native module does, for runs under a sanitizer: a mistake ends the process.
+"""Calls everything that the native module offers once, under a sanitizer: a mistake ends the process.
 
-Plain Python instead of pytest, so that nothing else is in the process; what comes out is only checked for sanity.
+Plain Python instead of pytest, so that nothing else is in the process. Results are only checked for sanity.
 """
 
 import tempfile

@@ -1,6 +1,6 @@
 """Ways in which a package's native module for this Python can be of no use.
 
-Each spoils the module of a copy of the package and returns what is to be said of it.
+Each spoils the module of a copy of the package and returns the expected message.
 """
 
 import hashlib

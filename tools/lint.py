@@ -17,7 +17,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 TOOLS = ROOT / "build/venv/bin"
 NATIVE = ROOT / "native"
-# Of the preset that compiles each file by itself.
+# Commands of the preset that compiles each file by itself.
 COMPILE_COMMANDS = ROOT / "build/dev/compile_commands.json"
 STAMPS = ROOT / "build/.tidy"
 PYTHON_FOLDERS = ["addon", "tests", "tools", "blend_examples", "docs"]

@@ -29,7 +29,7 @@ MODULE = re.compile(r"^_native\.(?P<abi>cpython-3\d+|cp3\d+|abi3)[^/]*\.(so|pyd)
 
 
 def platform_here() -> str:
-    """This system in the words of Blender's manifests: what is packed was built here."""
+    """This system in the words of Blender's manifests; the packed modules were built here."""
     system = {"linux": "linux", "darwin": "macos", "win32": "windows"}[sys.platform]
     return f"{system}-{'arm64' if platform.machine().lower() in {'arm64', 'aarch64'} else 'x64'}"
 
@@ -63,7 +63,7 @@ def content(staged: Path, further_modules: Path, licences_folder: Path) -> dict[
     modules = [name for name in files if MODULE.match(name)]
     if not modules:
         sys.exit(f"{staged} has no native module: build first")
-    # So that a file that was damaged on its way is found before it is run.
+    # Checksums: a file that was damaged on its way is found before it runs.
     sums = "".join(f"{hashlib.sha256(files[name]).hexdigest()}  {name}\n" for name in sorted(modules))
     return {**files, **licences(licences_folder), CHECKSUMS: sums.encode()}
 

@@ -1,12 +1,11 @@
-"""The version of Beamspread: `tools/version.py` says it, `tools/version.py 0.2.0` changes it everywhere.
+"""The version of Beamspread: `tools/version.py` prints it, `tools/version.py 0.2.0` changes it everywhere.
 
 addon/VERSION is the one that counts: CMake, the native module, the wheel and the zip read it. Blender reads two more
 without running anything, so that they must be written out: bl_info of addon/__init__.py (legacy add-on) and the
 extension's manifest. tests/unit/test_version.py compares them, and no zip is made while they differ.
 
-Formats of files have numbers of their own, which say when old files can't be read, not what is new: libraries
-(native/ldf/library/library_format.h) and what their simulation was asked for (_FILE_VERSION of
-addon/core/ldf/library.py).
+Formats of files have numbers of their own, which change only when old files can't be read: libraries
+(native/ldf/library/library_format.h) and the request for their simulation (_FILE_VERSION of addon/core/ldf/library.py).
 """
 
 import ast
@@ -22,7 +21,7 @@ def of_file(addon: Path) -> str:
 
 
 def of_bl_info(addon: Path) -> str:
-    """As Blender finds it: from the syntax tree, without running the file."""
+    """Version in bl_info, read from the syntax tree as Blender does, without running the file."""
     tree = ast.parse((addon / "__init__.py").read_text(encoding="utf-8"))
     (value,) = (
         node.value
@@ -38,7 +37,7 @@ def of_manifest(addon: Path) -> str:
 
 
 def versions(addon: Path) -> dict[str, str]:
-    """What each place says, by its file."""
+    """Version that each file states."""
     return {
         "VERSION": of_file(addon),
         "__init__.py": of_bl_info(addon),

@@ -1,4 +1,4 @@
-"""What weights that are linear in the albedo do: samples at .2 and .999, everything between them interpolated."""
+"""Effect of weights that are linear in the albedo: samples at .2 and .999, everything between them interpolated."""
 
 import beamspread as bs
 import numpy as np

@@ -61,7 +61,7 @@ def resampled(sample, space, phi, psi):
 
 def make():
     draw_angles()
-    # As in Fig. 7.
+    # The same numbers as in Fig. 7.
     image = paper.laser_image(bs.library(fig7.SLAB), ANGLE, ALBEDO, SIZE, fig7.UNIT, fig7.DIAMETER)
     sample = bs.LdfSample(image * fig7.UNIT**2, 1.0, ANGLE, ALBEDO, fig7.DIAMETER)  # lengths in units
     space = bs.AngularSpace((0, 0), sample.brightest, HEIGHT)

@@ -13,7 +13,7 @@ METHODS = ("planar", "angular", "adaptive")
 ZOOM = 12.0  # units around O
 SCALE = 2.0  # % of the peak, the paper's
 
-# What the paper leaves open: length of a unit in mean free paths, diameter of the beam in units, its profile.
+# Values that the paper does not state: length of a unit in mean free paths, diameter of the beam in units, its profile.
 VARIANTS = (
     (1.0, 40, "Gaussian"),
     (1.0, 24, "Gaussian"),
@@ -81,7 +81,7 @@ def draw_row(library):
 
 
 def draw_errors(library):
-    """(b): 15 degrees by every method, and what is wrong with it."""
+    """(b): 15 degrees by every method, and the error of each."""
     found, exact, _ = errors(library)
     peak = exact.image.max()
     where = np.arange(paper.WINDOW) + 0.5 - paper.WINDOW / 2

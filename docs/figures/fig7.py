@@ -74,7 +74,7 @@ def make():
     wide = by_samples(library, WIDE_WINDOW)
     exact = exactly(library)
     made, axes = style.figure(9.2, 9.6, 2, 2)
-    # The brightest texel is four times as bright as the screen: what scatters far shows.
+    # The brightest texel is four times as bright as the screen, to show light that scatters far.
     exposure = 4 / blind.max()
     draw(axes[0, 0], blind, exposure, "(a) blind to direction")
     draw(axes[0, 1], published, exposure, "(b) the paper's method")

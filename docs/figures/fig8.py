@@ -1,4 +1,4 @@
-"""Fig. 8 and 9: a round obstacle in slanting light, by equal beams and by beams as large as what is lit."""
+"""Fig. 8 and 9: a round obstacle in slanting light, by equal beams and by beams as large as the lit squares."""
 
 import time
 
@@ -42,7 +42,7 @@ def exactly(ldf, mask, azimuth, albedos, **solver):
 
 
 def timed(job):
-    """What it returns, and the processor's seconds that it took on all cores; the best of three."""
+    """Result of a function, and its CPU seconds on all cores, the best of three."""
     seconds = []
     for _ in range(3):
         begin = time.process_time()
@@ -67,7 +67,7 @@ def into_shadow(picture):
 
 
 def draw_pictures(library):
-    """Fig. 8; also returns what gets into the shadow of (a), by the paper's method and exactly."""
+    """Fig. 8; returns the light in the shadow of (a), too, by the paper's method and exactly."""
     masks = {side: lit(azimuth) for side, azimuth in AZIMUTHS.items()}
     cases = [(side, albedos) for albedos in (paper.ALBEDO_RGB, paper.ALBEDO_RGB_SWAPPED) for side in AZIMUTHS]
     methods = {

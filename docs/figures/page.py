@@ -1,4 +1,4 @@
-"""Makes the figures and puts what they measured into docs/method.md, between its markers."""
+"""Makes the figures and writes their measurements into docs/method.md, between its markers."""
 
 import argparse
 import time
@@ -13,7 +13,7 @@ HEAD = ("", "paper", "ours by its method", "ours exact")
 
 
 def filled(text, name, block):
-    """The page with what stands between a block's markers replaced."""
+    """The page with the text between a block's markers replaced."""
     begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
     before, found, rest = text.partition(begin)
     _, closed, after = rest.partition(end)

@@ -13,7 +13,7 @@ from scipy.ndimage import gaussian_filter, rotate, uniform_filter
 
 UNIT = 1.0  # mean free paths
 SLAB = bs.Medium(g=0.8, ior=1.0, thickness=750 * UNIT)
-WINDOW = 150  # units: what of an LDF the paper keeps
+WINDOW = 150  # units: the part of an LDF that the paper keeps
 LASER_DIAMETER = 40.0  # units, where irradiance is 1 / e^2 of its peak
 
 # Samples and colours of Fig. 7 to 9.

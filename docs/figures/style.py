@@ -36,13 +36,13 @@ def save(made, name):
 
 
 def srgb(luminance, exposure):
-    """Linear light to what a screen shows (IEC 61966-2-1); `exposure` x luminance = 1 is the brightest that it can."""
+    """Linear light to values of a screen (IEC 61966-2-1); `exposure` x luminance = 1 is the brightest that it can."""
     x = np.clip(np.asarray(luminance, float) * exposure, 0, 1)
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
 
 
 def extent(shape, unit=1.0):
-    """Of an image whose centre is the origin."""
+    """Coordinates of an image whose centre is the origin."""
     height, width = shape[:2]
     return (-width / 2 * unit, width / 2 * unit, -height / 2 * unit, height / 2 * unit)
 

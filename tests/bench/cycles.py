@@ -1,4 +1,4 @@
-"""What the same picture costs with the solvers, with SciPy's convolutions and with Cycles: time and error per texel.
+"""Time and error per texel of one picture by the solvers, by SciPy's convolutions and by Cycles.
 
     PYTHONPATH=build/stage build/venv/bin/python tests/bench/cycles.py [--plot FILE.png]
 
@@ -8,8 +8,8 @@ shadow border; 1024 x 1024 texels of a quarter of a mean free path. Prints a mar
 Error: root mean square over the texels within 18 mean free paths of the border, over their mean, green (albedo .9).
 Cycles: its noise, for bakes are unbiased and the picture does not change along the border. It falls with one over the
 square root of the samples, which two runs of 1152 texels check; the time for 1 % at 1024 x 1024 follows from that.
-All others: the distance from the border in blend_examples/cycles_edge.csv, a run of 36 minutes, less that file's own
-noise, which hides what is smaller. The noise of the simulated library is part of it.
+All others: the distance from the border in blend_examples/cycles_edge.csv, a run of 36 minutes, less the noise of that
+file, which hides smaller errors. The noise of the simulated library is part of it.
 
 Seconds are CPU seconds of all threads. Kernels for SciPy are made beforehand and not counted; `direct`, whose time goes
 with the square of the number of texels, is extrapolated from 256 x 256.
@@ -68,7 +68,7 @@ def resolution():
 
 
 def edge_error(luminance):
-    """Of a baked (H, W, 3), across the border in its middle row."""
+    """Middle row of a baked (H, W, 3), across the border."""
     mean, noise = read_edge()
     first = (luminance.shape[1] - len(mean)) // 2
     profile = luminance[luminance.shape[0] // 2, first : first + len(mean), GREEN]
@@ -94,7 +94,7 @@ def kernels(library):
 
 
 def with_scipy(convolve, kernel):
-    """As `scipy.signal` is used: one call per channel, the part that lies over the texture."""
+    """One call of `scipy.signal` per channel; returns the part that lies over the texture."""
     lit = half_lit(SIZE)
     return np.stack(
         [convolve(lit, kernel[..., c], mode="full")[SIZE - 1 : -SIZE + 1, SIZE - 1 : -SIZE + 1] for c in range(3)],

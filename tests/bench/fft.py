@@ -1,9 +1,9 @@
-"""The fft solver, counted in padded real transforms of about twice the plane's size (T), beside what else there is.
+"""The fft solver, counted in padded real transforms of about twice the plane's size (T), beside other libraries.
 
 PYTHONPATH=build/stage build/venv/bin/python tests/bench/fft.py [--quick]
 
-Times are CPU seconds of all threads, the least of several runs, so that they hold on a machine that is busy with
-other things; T is taken next to what it is compared with.
+Times are CPU seconds of all threads, the least of several runs, so that other load does not count; T is measured beside
+each time that it divides.
 """
 
 import argparse
@@ -34,7 +34,7 @@ def seconds(runs, function, *arguments, **options):
 
 
 def padded_size(size):
-    """Of twice the size, or what is faster: lines whole pages apart share few lines of the cache."""
+    """Twice the size or a faster one: lines whole pages apart share few lines of the cache."""
     return _native.fast_size(2 * size)
 
 
@@ -128,7 +128,7 @@ for irradiance, direction, y in zip(*light, across):
 
 
 def memory(sizes):
-    """Of a process of its own, with input and result."""
+    """Peak memory of a separate process, input and result included."""
     print("\nRGB, gray irradiance, ior 1.4, albedo .999: peak memory of the process, wall clock and CPU seconds")
     lights = {"sun": SUN_LIGHT.format(sun=SUN), "lamp": LAMP_LIGHT}
     for size in sizes:

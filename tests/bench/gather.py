@@ -1,5 +1,4 @@
-"""What finding shadows without rays saves: beams with and without it, by light, occluders and size of the grid; and
-how many rays of lights of a size are traced.
+"""Time that shadows without rays save, by light, occluders and grid size; rays per second of lights with a size.
 
 PYTHONPATH=build/stage build/venv/bin/python tests/bench/gather.py [--sizes N ...]
 """
@@ -70,7 +69,7 @@ EXTENDED = {
 
 
 def print_ray_rates(grid, rays=16):
-    """Million rays a second and core of lights of a size, besides what occluders take."""
+    """Million rays per second and core for lights with a size, without the time to build occluders."""
     print(f"{'10^6 rays/CPU s':23}" + "".join(f"{name:>10}" for name in EXTENDED))
     for name, vertices in SCENES.items():
         triangles = None if vertices is None else np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)

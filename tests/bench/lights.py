@@ -62,7 +62,7 @@ def bake(size, lights, material, shadows=0):
 
 
 def transforms(size, lights, material):
-    """Of the light, as the solver chooses."""
+    """Number of terms that the solver chooses for the light."""
     grid = floor(size)
     gatherer = Gatherer(grid, Illumination(lights), SETTINGS)
     arriving = [part for light in lights for part in gatherer.plane_lights(light)]
@@ -97,7 +97,7 @@ print([line.split()[1] for line in open("/proc/self/status") if line.startswith(
 
 
 def memory(size, counts):
-    """Of a process of its own."""
+    """Peak memory of a separate process."""
     print(f"\nmarble, {size} x {size}: lamps, wall clock and CPU seconds, peak memory of the process, 30 cards")
     for count in counts:
         code = MEMORY.format(folder=str(Path(__file__).parent), size=size, count=count)

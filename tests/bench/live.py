@@ -1,9 +1,9 @@
-"""How soon the picture follows in a window, and how far it is off while it does.
+"""Delay of the image in a window, and its error meanwhile.
 
     PYTHONPATH=build/stage build/venv/bin/python tests/bench/live.py [--resolution N]
 
-In Blender's window under Xvfb: seconds from a change to the texture, and until the 3D View has drawn it. There the
-processor draws, too: what drawing alone takes stands above. Then, without Blender, quick pictures beside bakes.
+In Blender's window under Xvfb: seconds from a change to the texture, and until the 3D View has drawn it. The processor
+draws there, too; the time of drawing alone stands above. Then, without Blender, quick images beside bakes.
 """
 
 import argparse

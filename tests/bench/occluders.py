@@ -1,4 +1,4 @@
-"""Occluders: time and memory to build and trace many triangles, as copies and as instances; what see-through ones cost.
+"""Occluders: time and memory to build and trace many triangles, as copies and as instances; cost of see-through ones.
 
 PYTHONPATH=build/stage build/venv/bin/python tests/bench/occluders.py [--quick]
 

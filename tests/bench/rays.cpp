@@ -1,7 +1,8 @@
-// Rays per CPU second that gathering light traces, beside those of Embree alone: the same rays, made before the clock runs.
+// Rays per CPU second that gathering light traces, beside those of Embree alone: the same rays, made before the clock
+// runs.
 //
-// A floor below a million triangles, lit by an area lamp and by an even sky. Gathering draws the rays, traces them, and
-// adds up what arrives; Embree alone says of each whether something is in its way, a ray at a time and in packets of 16.
+// A floor below a million triangles, lit by an area lamp and by an even sky. Gathering draws the rays, traces them and
+// adds up their light. Embree alone tests each ray for an obstacle, one at a time and in packets of 16.
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -78,7 +79,7 @@ private:
     std::atomic<std::size_t> m_rays{0};
 };
 
-// Of all processor cores together.
+// Seconds of all processor cores together.
 double seconds_of(const std::function<void()>& work)
 {
     const std::clock_t start = std::clock();
@@ -177,8 +178,8 @@ double in_packets(const Tracer& tracer, const std::vector<RTCRay>& work)
 
 void compare(const char* name, const ExtendedLight& light, const Shapes& shapes, const Tracer& tracer)
 {
-    const ReceiverGrid grid{{-2.0, -2.0, 0.0}, {1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}, 4.0 / side, 4.0 / side,
-                            side, side};
+    const ReceiverGrid grid{{-2.0, -2.0, 0.0}, {1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}, 4.0 / side, 4.0 /
+    side, side, side};
     const OccluderMesh mesh{.vertices = shapes.vertices, .triangles = shapes.triangles};
     const Occluders occluders({&mesh, 1}, {}, {});
     const std::unique_ptr<const ExtendedLight> facing = light.facing(grid.normal);
@@ -189,12 +190,12 @@ void compare(const char* name, const ExtendedLight& light, const Shapes& shapes,
     Progress progress;
     const double gathering = seconds_of([&] { gather_rays(grid, light, &occluders, settings, count, progress); });
     const std::vector<RTCRay> work = rays_to(prepared, grid);
-    const auto millions = [](std::size_t number, double seconds) { return 1e-6 * static_cast<double>(number) / seconds; };
-    const double traced = millions(work.size(), gathering);
+    const auto millions = [](std::size_t number, double seconds) { return 1e-6 * static_cast<double>(number) / seconds;
+    }; const double traced = millions(work.size(), gathering);
     const double single = millions(work.size(), alone(tracer, work));
     const double together = millions(work.size(), in_packets(tracer, work));
-    std::printf("%-10s gathered %.1f million rays per CPU second (%zu of %zu added); Embree alone %.1f, in packets %.1f: %.0f %%\n", name,
-                traced, count.rays(), work.size(), single, together, 100.0 * traced / std::max(single, together));
+    std::printf("%-10s gathered %.1f million rays per CPU second (%zu of %zu added); Embree alone %.1f, in packets %.1f:
+    %.0f %%\n", name, traced, count.rays(), work.size(), single, together, 100.0 * traced / std::max(single, together));
 }
 
 }  // namespace

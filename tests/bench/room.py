@@ -2,7 +2,8 @@
 
 PYTHONPATH=build/stage build/venv/bin/python tests/bench/room.py [SIZE]
 
-Noise is what two bakes with other rays differ by, over the square root of two, relative to the mean of 17 x 17 texels.
+Noise is the difference of two bakes with other rays, over the square root of two, relative to the mean of 17 x 17
+texels.
 """
 
 import resource

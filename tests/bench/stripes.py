@@ -1,4 +1,4 @@
-"""Stripes of two albedos: what the convention for textures is off by, against a photon simulation of the stripes.
+"""Stripes of two albedos: error of the convention for textures, against a photon simulation of the stripes.
 
 PYTHONPATH=build/stage build/venv/bin/python tests/bench/stripes.py [PHOTONS]
 

@@ -1,9 +1,9 @@
-"""The choice of terms where directions change: transforms, time and errors over lights that are hard for it.
+"""The choice of terms where directions change: transforms, time and errors for difficult lights.
 
 PYTHONPATH=build/stage build/venv/bin/python tests/bench/terms.py [SIZE]
 
-Errors against all terms, of the worst texel relative to the mean of the 17 x 17 around and of the sum, both as parts of
-what is allowed; CPU seconds of the choice together with the transforms.
+Errors against all terms, of the worst texel relative to the mean of the 17 x 17 around and of the sum, both as
+fractions of the allowed error; CPU seconds of the choice together with the transforms.
 """
 
 import sys

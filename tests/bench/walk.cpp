@@ -1,6 +1,6 @@
 // Figure of merit, 1 / (variance x time), of the simulation against a plain photon walk, at albedo .999 and 45 degrees.
 //
-// The plain walk is what a textbook gives: photons lose weight at every scattering, leave when they cross the surface
+// The plain walk follows the textbooks: photons lose weight at every scattering, leave when they cross the surface
 // (Fresnel decides), are ended by roulette when their weight is small, and one albedo is tallied. Both are compiled
 // with the same flags.
 #include <algorithm>
@@ -48,7 +48,7 @@ Ring mid_range(const Medium& medium)
     return {1.0 / (1.0 - medium.g), 2.0 / (1.0 - medium.g)};
 }
 
-// Returns what the photon brings to the total and to the ring.
+// Returns the photon's weight in the total and in the ring.
 Result plain_photon(const Medium& medium, double theta_inside, const Ring& ring, Random& random)
 {
     double x = 0.0, y = 0.0, z = 0.0;
@@ -221,9 +221,9 @@ int main()
     std::printf(
         "albedo %g, %g degrees; error: relative, of one photon; FOM: 1 / (variance x CPU time) over the plain walk's.\n"
         "`calibrated` is what library() returns: the fastest walk, totals corrected by adding-doubling, whose time is\n"
-        "counted and whose error, with interpolation's, stands for the total's; 200 000 photons, `final` those that library()\n"
-        "takes for slabs, 4 million, and a million for half-spaces, which take as long for each however many there are\n",
-        albedo, angle_deg);
+        "counted and whose error, with interpolation's, stands for the total's; 200 000 photons, `final` those that
+        library()\n" "takes for slabs, 4 million, and a million for half-spaces, which take as long for each however
+        many there are\n", albedo, angle_deg);
     for (const Medium& medium :
          {Medium{0.8, 1.0}, Medium{0.8, 1.4}, Medium{0.0, 1.0}, Medium{0.95, 1.3}, Medium{0.8, 1.0, 10.0},
           Medium{0.8, 1.4, 1.0}}) {

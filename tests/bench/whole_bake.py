@@ -45,11 +45,11 @@ def command(program, scene, script, *arguments):
 
 
 def run(arguments):
-    """Wall and CPU seconds of a process, and what it printed."""
+    """Wall and CPU seconds of a process, and its output."""
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     path = [STAGE, BPY_MODULE] if arguments[0] == sys.executable else [STAGE]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, path))}
-    # Python keeps what it has compiled, as it does for those who don't forbid it.
+    # Python keeps its compiled files, its default.
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     done = subprocess.run(arguments, env=environment, capture_output=True, text=True)
     wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)

@@ -9,7 +9,7 @@ from beamspread.blender.live import session
 
 @pytest.fixture(autouse=True)
 def empty_file():
-    """Nothing but a scene, in Cycles; the add-on stays registered."""
+    """An empty scene for Cycles; the add-on stays registered."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.render.engine = "CYCLES"
     bpy.context.scene.beamspread.quality = "preview"

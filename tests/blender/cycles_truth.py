@@ -63,7 +63,7 @@ def cycles_irradiance(plane, image, samples=CYCLES_SAMPLES):
 
 
 def cycles_bake(floor, image, passes, samples):
-    """Pi times what Cycles bakes."""
+    """Irradiance: pi times the radiance that Cycles bakes."""
     scene = bpy.context.scene
     scene.cycles.samples, scene.cycles.use_adaptive_sampling, scene.cycles.use_denoising = samples, False, False
     scene.cycles.sample_clamp_indirect = 0

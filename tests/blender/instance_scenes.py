@@ -32,7 +32,7 @@ def add_instancer(collection, matrix, name="Holder", within=None):
 
 
 def nest(collection):
-    """A collection with an instance of another, and where what is in the latter stands in it."""
+    """A collection with an instance of another collection, and the transform of the inner objects."""
     outer = bpy.data.collections.new("Outer")
     add_instancer(collection, MIRRORED, "Middle", outer)
     return outer, MIRRORED @ Matrix.Translation(-collection.instance_offset)

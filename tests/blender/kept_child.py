@@ -1,4 +1,4 @@
-"""What test_kept_files.py kills: writes its image to the file again and again, until then.
+"""Runs until test_kept_files.py kills it: writes its image to the file again and again.
 
 blender -b --python THIS -- FILE
 """

@@ -31,7 +31,7 @@ class Layout:
 
 
 def context():
-    """That of a panel of Blender's own width."""
+    """Height of a panel of Blender's default width."""
     preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
     region = SimpleNamespace(width=280)
     return SimpleNamespace(

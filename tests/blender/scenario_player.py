@@ -1,4 +1,4 @@
-"""Plays what a test does in a Blender with a window, step by step between the window's own events."""
+"""Plays the steps of a test in a Blender with a window, between the window's events."""
 
 import json
 import sys
@@ -13,13 +13,13 @@ import bpy
 def play(
     steps: Iterator[Callable[[], bool]], results: dict, patience: float, pause: float = 0.05, first: float = 0.1
 ) -> None:
-    """Go on with the scenario whenever what it waits for has come; then write `results` and quit.
+    """Resume the scenario as soon as its condition holds; at its end write `results` and quit.
 
     Parameters
     ----------
-    steps : yields what it waits for.
+    steps : yields the conditions that it waits for.
     results : "complete" or "error" joins them; they go to the file that the command line names last, as JSON.
-    patience, pause, first : seconds that one step may take, from one look to the next, and until the first.
+    patience, pause, first : seconds that one step may take, between two checks, and until the first.
     """
     waiting = {"for": lambda: True, "since": time.monotonic()}
 

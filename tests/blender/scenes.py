@@ -157,7 +157,7 @@ def batch_command(scene, *arguments, program=()):
 
 
 def messages_of(callable_):
-    """What an operator reports as errors: Blender raises them in Python."""
+    """Error message of an operator: Blender raises it in Python."""
     try:
         callable_()
     except RuntimeError as error:

@@ -71,7 +71,7 @@ def our_irradiance(plane, light, occluders=None, texels=TEXELS):
 
 
 def in_the_middle_of_texels(plane, light):
-    """Over the middle half of each side, which is what Cycles samples of a texel."""
+    """Mean over the middle half of each side, the part of a texel that Cycles samples."""
     return our_irradiance(plane, light, texels=4 * TEXELS).reshape(TEXELS, 4, TEXELS, 4, 3)[:, 1:3, :, 1:3].mean((1, 3))
 
 
@@ -126,7 +126,7 @@ def test_spread(shape, spread):
 @pytest.mark.skipif(IS_OLD, reason="Blender's spread begins at one degree")
 @pytest.mark.parametrize("shape", ["RECTANGLE", "DISK"])
 def test_parallel_light_of_an_area(shape):
-    """Only blocks wholly lit: Cycles' total is off by what it samples of texels at the border."""
+    """Only blocks wholly lit: Cycles samples a part of each texel, which biases its total at the border."""
     plane, image = add_receiver(PLANES["plain"])
     lamp = add_light("AREA", plane, (0, 0.3, 0), (0, 0, 1), shape=shape, size=0.75, size_y=0.5, spread=0)
     cycles, ours = (
@@ -166,7 +166,7 @@ MODELS = [True] if IS_OLD else [True, False]
 @pytest.mark.parametrize("place", [(0.3, -0.2, 1.1), (0.3, -0.2, 0.35), (0.3, -0.2, 0.1), (0.2, 0, -0.1)], ids=str)
 @pytest.mark.parametrize("kind", ["POINT", "SPOT"])
 def test_radius(kind, place, soft):
-    """Also where the lamp is partly below the plane, and texels within it."""
+    """Includes lamps that are partly below the plane, and texels inside of them."""
     if kind == "SPOT" and place[2] < 0 and soft:
         place = (*place[:2], 0.03)  # lower down, as a disk it lights the plane by a thousandth at most
     plane, image = add_receiver(PLANES["plain"])

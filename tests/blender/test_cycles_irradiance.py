@@ -61,7 +61,7 @@ def inside_one_triangle(plane):
 
 
 def near_a_border(values):
-    """Where a texel's surroundings vary by more than a fifth: at the border of a shadow or a cone."""
+    """True for texels whose surroundings vary by more than a fifth: at the border of a shadow or a cone."""
     return np.ptp(around(values), axis=0) > 0.2 * values
 
 
@@ -184,6 +184,6 @@ def test_shadows_do_not_drift_far_from_the_world_origin(distance):
     bpy.context.view_layer.update()
     there, _ = our_irradiance(plane)
     assert (here.max(axis=2) == 0).sum() > 100
-    # Of 64 rays per texel single ones pass an edge within rounding, 2^-11 of a texel: in 3 % of the texels along edges.
+    # Single rays of a texel's 64 pass an edge within rounding, 2^-11 of a texel: in 3 % of the texels along edges.
     np.testing.assert_allclose(there, here, rtol=1e-5, atol=0.02 * here.max())
     assert np.abs(there - here).sum() < 2e-4 * here.sum()

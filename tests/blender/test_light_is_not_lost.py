@@ -12,8 +12,8 @@ from cycles_truth import TEXELS, add_receiver, cycles_irradiance
 from mathutils import Euler, Matrix
 from scenes import add_blocker, add_material, add_mesh, add_plane, add_sun
 
-# Of Cycles: the noise of a texel is at most 1 / sqrt(1024) = 3 % of its light where light is partly hidden or varies by
-# as much as its mean, on average below 1 %; that of the sum of 64 x 64 texels below 0.1 %.
+# Noise of Cycles: that of a texel is at most 1 / sqrt(1024) = 3 % of its light where light is partly hidden or varies
+# by as much as its mean, on average below 1 %; that of the sum of 64 x 64 texels below 0.1 %.
 SAMPLES = 1024
 TOTAL = 0.01
 TEXEL = 0.02
@@ -94,7 +94,7 @@ def without_margin():
 
 
 def compared(tmp_path):
-    """What the batch says of the receiver, the irradiance that it bakes, and Cycles'."""
+    """The batch's messages about the receiver, its irradiance, and Cycles' irradiance."""
     plane, image = add_receiver(Matrix())
     expected = cycles_irradiance(plane, image, SAMPLES)
     plane.data.materials[0] = add_material()

@@ -79,7 +79,7 @@ def test_uv_map_turned_and_mirrored(upright, turns, mirrored):
 
 @pytest.mark.parametrize("scale", [(-1, 1, 1), (1, -1, 1), (-1, -1, 1)])
 def test_mirrored_object_mirrors_its_texture(upright, scale):
-    """Same place in the world, so what is baked there is the same; the UV map is mirrored with the object."""
+    """The mirrored object bakes the same light at the same position in the world; its UV map is mirrored, too."""
     expected = upright[:: scale[1], :: scale[0]]
     assert scene_texture(object_matrix=Matrix.Diagonal((*scale, 1))) == pytest.approx(
         expected, abs=TOLERANCE * upright.max()
@@ -116,7 +116,7 @@ def test_flipped_face_takes_light_from_the_other_side(upright):
 
 
 def test_chart_in_a_corner(upright):
-    """Half-size chart in a square texture: the same picture in its corner, at half the density."""
+    """A half-size chart in a square texture shows the same image in its corner, at half the density."""
     uvs = np.array(SQUARE_UVS) * 0.5 + [0.5, 0.0]
     image = bpy.data.images.new("Atlas", 128, 96, float_buffer=True)
     plane = add_plane(size=SIZE, uvs=uvs, material=add_material(image=image))
@@ -141,7 +141,7 @@ def test_turned_chart_in_the_texture(upright):
     add_sun(45, azimuth_deg=25)
     bpy.context.scene.beamspread.margin = 0
     (texture,) = bake(plane)
-    # Of a texel across the edge, the chart has some light, and less than all of it.
+    # The chart has a part of the light of a texel across the edge.
     area, coverage = (3.2 / 102) ** 2, native.coverage(uvs * 102, np.array([4], np.uint32), 102, 102)
     assert coverage.sum() * area == pytest.approx(SIZE[0] * SIZE[1], rel=1e-5)
     whole, touched = ((texture * weight[..., None]).sum() * area for weight in (coverage > 0.999, coverage > 0))

@@ -205,7 +205,7 @@ def test_blenders_own_bake_fills_the_active_image_unless_the_node_shows_it(setti
 
 
 class Layout:
-    """Notes what a panel draws."""
+    """Records the labels that a panel draws."""
 
     def __init__(self):
         self.properties, self.text = [], []
@@ -233,7 +233,7 @@ def drawn(*panels_drawn):
 
 
 class Context:
-    """Of a panel 300 pixels wide; without a window, Blender has no scale of its interface."""
+    """Characters that fit a panel 300 pixels wide; without a window, Blender has no scale of its interface."""
 
     region = SimpleNamespace(width=300)
     preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
@@ -242,7 +242,7 @@ class Context:
         return getattr(bpy.context, name)
 
 
-def test_the_panel_shows_what_counts_and_what_it_costs(settings):
+def test_the_panel_shows_the_settings_that_count_and_their_cost(settings):
     plain, expert = panels.BEAMSPREAD_PT_render, panels.BEAMSPREAD_PT_expert
     select(add_plane(material=add_material()))
     assert {"output", "use_indirect"} <= set(drawn(plain).properties)

@@ -45,7 +45,7 @@ def test_colours_and_strengths_of_several_suns_add():
     assert not dark.any()
 
 
-def test_base_color_is_what_diffuse_light_would_show():
+def test_base_color_is_the_reflectance_under_diffuse_light():
     """Suns at the nodes of a Gauss-Legendre rule stand for diffuse light: irradiance 2 mu d mu over mu = 0..1."""
     scene, color = bpy.context.scene.beamspread, (0.7, 0.4, 0.1)
     scene.resolution, scene.quality = 32, "final"
@@ -55,7 +55,7 @@ def test_base_color_is_what_diffuse_light_would_show():
         # Its irradiance is strength times cosine: weight / 2 of the rule over 0..1, times 2 mu.
         add_sun(math.degrees(math.acos(cosine)), strength=weight)
     (texture,) = bake(plane)
-    # That of the interior above.
+    # Reflectance of the interior above.
     assert math.pi * texture[16, 16] == pytest.approx(color, rel=0.01)
 
 

@@ -1,4 +1,4 @@
-"""What tests/matrix.sh has every Blender do, one phase per process, without pytest: a zip's life as users live it.
+"""Phases that tests/matrix.sh runs in every Blender, one per process, without pytest: the life of a zip with a user.
 
     blender -b --python drive.py -- PHASE FOLDER        python drive.py PHASE FOLDER (where Blender is a module)
 
@@ -32,7 +32,7 @@ NODE = {
 
 
 class Failed(Exception):
-    """What the artist would have seen go wrong."""
+    """Errors that an artist would have seen."""
 
 
 def expect(condition, text):
@@ -46,7 +46,7 @@ def package(part=""):
 
 
 def place() -> Path:
-    """Where Blender keeps the installed package."""
+    """Folder of the installed package."""
     if IS_EXTENSION:
         return Path(bpy.utils.user_resource("EXTENSIONS")) / "user_default" / "beamspread"
     return Path(bpy.utils.user_resource("SCRIPTS")) / "addons" / "beamspread"
@@ -69,7 +69,7 @@ def install(zip_path):
 
 
 def phase_install(folder):
-    """Install the older zip, if a command has not done so, set what an upgrade must keep, install the newer."""
+    """Install the older zip unless a command did, set preferences that an upgrade must keep, install the newer zip."""
     older, newer = sorted(folder.glob("beamspread-*.zip"), key=version_of)
     if not place().is_dir():
         install(older)
@@ -100,7 +100,7 @@ def phase_install(folder):
 
 
 def phase_work(folder):
-    """After a restart: what was kept; bakes of the examples; a node's life."""
+    """After a restart: preferences that were kept; bakes of the examples; a node's life."""
     kept_preferences(folder)
     write_facts(folder)
     if problem():
@@ -112,7 +112,7 @@ def phase_work(folder):
 
 
 def phase_remove(folder):
-    """Disable, enable, disable and remove; what is left."""
+    """Disable, enable, disable and remove; then look for leftovers."""
     scene_with_node()
     save(folder / "last.blend")
     for operator in (bpy.ops.preferences.addon_disable, bpy.ops.preferences.addon_enable):
@@ -187,7 +187,7 @@ def kept_preferences(folder):
 
 
 def kept_file(folder):
-    """What was baked and cached before the upgrade."""
+    """Bakes and caches from before the upgrade."""
     bpy.ops.wm.open_mainfile(filepath=str(folder / "before_upgrade.blend"))
     expect(node_is_as_set(), "a node of the older version's file changed")
     image = node_of(bpy.data.materials["Medium"]).image
@@ -205,7 +205,7 @@ def user_preferences(folder):
     if bpy.app.version >= (4, 5, 0):
         bpy.ops.wm.read_userpref()
         return
-    # That ends the process of 4.2.23, whatever is installed: here what was saved is set once more.
+    # Loading preferences ends the process of 4.2.23 with any add-on: the saved values are set once more instead.
     bpy.ops.preferences.addon_enable(module=MODULE)
     set_preferences(folder)
 
@@ -228,7 +228,7 @@ def write_facts(folder):
 
 
 def without_module(folder):
-    """No module for this Python: what it says, and that nothing is lost."""
+    """No module for this Python: the message, and that nothing is lost."""
     said = problem()
     for part in (
         f"Python {sys.version_info[0]}.{sys.version_info[1]} in {place()}",
@@ -254,7 +254,7 @@ def without_module(folder):
 
 def bake_examples(folder):
     batch = package(".batch")
-    # Blender 3.5 has changed the shape of spot lights, which bakes follow: what is compared is the same light.
+    # Blender 3.5 has changed the shape of spot lights, which bakes follow: compare the same light.
     package(".blender.compat").spot_falloff = lambda: "scaled"
     for scene in sorted((folder / "scenes").glob("*.blend")):
         if scene.stem == "node_before_sockets":
@@ -374,7 +374,7 @@ def node_life(folder):
 
 
 def copies_and_undo():
-    """Of the open file's material."""
+    """Node of the open file's material."""
     trees = len(bpy.data.node_groups)
     other = bpy.data.materials["Medium"].copy()
     node_of(other).ior = 1.6

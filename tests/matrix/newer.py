@@ -1,4 +1,4 @@
-"""A zip that is newer by one patch version than a given one and has one file less: what an upgrade is tested with.
+"""Makes a zip for testing upgrades: newer by one patch version than a given one, with one file less.
 
     newer.py ZIP OUTPUT_FOLDER
 

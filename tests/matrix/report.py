@@ -1,4 +1,4 @@
-"""The line of one Blender in tests/matrix.sh: report.py NAME FOLDER REFERENCE_FOLDER SECONDS [WHAT FAILED]
+"""The line of one Blender in tests/matrix.sh: report.py NAME FOLDER REFERENCE_FOLDER SECONDS [FAILURES]
 
 Compares the images of FOLDER/out with those of the reference, by one reader, of the staged module: no texel may differ
 by more than 1e-4 of the image's maximum. Exit code 0 if all is well.

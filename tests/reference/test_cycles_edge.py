@@ -16,9 +16,9 @@ ALBEDO = np.array((0.6, 0.9, 0.3))
 # Exact R of the half-space at 55 degrees, by a discrete adding-doubling solution with 60 quadrature points that
 # reproduces every half-space row of adding_doubling.csv with g 0.8 and ior 1 to its last digit.
 EXACT_REFLECTANCE = np.array((0.050972, 0.227163, 0.014491))
-# Of the kernel: Monte Carlo noise of the library below, and its bins.
+# Error of the kernel: Monte Carlo noise and bins of the library below.
 RELATIVE_TOLERANCE = 0.01
-# Of the lit level; in the depth of the shadow the library's radial bins are wide.
+# Fraction of the lit level; in the depth of the shadow the library's radial bins are wide.
 ABSOLUTE_TOLERANCE = 0.0005
 BIN = 0.25
 HALF_WIDTH = 64.0  # of the grid along u, in mean free paths; along v it is as wide, in coarse texels

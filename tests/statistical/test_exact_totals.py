@@ -1,4 +1,4 @@
-"""Totals by adding-doubling: against published numbers, against Monte Carlo, and what libraries are calibrated to."""
+"""Totals by adding-doubling against published numbers, Monte Carlo and calibrated libraries."""
 
 import functools
 import itertools
@@ -50,7 +50,7 @@ def test_van_de_hulst(medium, angle, albedo, reflectance, transmittance):
 
 
 def test_giovanelli():
-    """Half-space of ior 1.5, isotropic (Giovanelli 1955, in the MCML manual): four digits, specular 0.04 included."""
+    """A half-space of ior 1.5, isotropic (Giovanelli 1955, in the MCML manual): four digits, specular 0.04 included."""
     assert exact_totals(Medium(0.0, 1.5), [0], [0.9])[0][0, 0] + 0.04 == pytest.approx(0.2600, abs=1e-4)
 
 
@@ -170,7 +170,7 @@ CALIBRATED = [
 def test_calibrated_totals(medium):
     """Within .2 % of exact (.3 % of totals below .05; 1 % from 75 degrees) between simulated angles and albedos.
 
-    1e-6 of the incident power is left: what crosses 10 mean free paths at low albedos may be less than that.
+    An absolute 1e-6 of the incident power is allowed: light that crosses 10 mean free paths at low albedos may be less.
     The 3000 photons per angle alone would leave errors of 5 %.
     """
     angles, albedos = np.array([7, 33, 52, 68, 74.5, 78, 84]), np.array([0.05, 0.5, 0.97, 0.9995])
@@ -189,7 +189,7 @@ def test_calibrated_totals(medium):
 def test_calibration_where_orders_are_missing(seed):
     """No photon crosses this slab in so few scatterings as low albedos need: bins meet the limits of their scales.
 
-    What high albedos transmit is right all the same, within 1 %.
+    Transmittance at high albedos is right within 1 %.
     """
     medium, angles, albedos = Medium(0.0, 1.0, 10.0), [0, 30, 47, 57, 70], [0.97, 0.9995]
     library = simulate(medium, angles, 3000, seed=seed).calibrated()
@@ -198,7 +198,7 @@ def test_calibration_where_orders_are_missing(seed):
 
 
 @pytest.mark.parametrize("medium", CALIBRATED, ids=str)
-def test_calibrated_standard_errors_cover_what_is_left(medium):
+def test_calibrated_standard_errors_cover_the_remaining_errors(medium):
     """4 of them, over a sweep of angles and albedos; and none is zero."""
     library = calibrated(medium)
     off = standard_errors_off(library, np.linspace(0, 85, 18), [0.003, 0.07, 0.4, 0.85, 0.96, 0.992, 0.9991, 0.9999])
@@ -248,7 +248,7 @@ FEW = [
 @pytest.mark.parametrize("medium", FEW, ids=str)
 @pytest.mark.parametrize(("photons", "tolerance"), [(100, 0.03), (1000, 0.01)])
 def test_calibration_of_few_photons(medium, photons, tolerance):
-    """What `calibrated` says of itself: totals next to exact, and never more light than arrives.
+    """Calibrated totals are nearly exact and never exceed the incident light.
 
     Uncalibrated totals are up to 40 % too large. Albedos beyond .99999 ask for orders that a handful of walks reach:
     1.5 % too much is possible there.

@@ -25,7 +25,7 @@ def harmonics(image):
 
 
 def quantities(library):
-    """Totals, and what the image holds near O and in its harmonics, for low and high orders."""
+    """Totals, light near O and harmonics of the image, for low and high orders."""
     medium = library.medium
     sides = ["reflected"] if np.isinf(medium.thickness) else ["reflected", "transmitted"]
     values = []
@@ -63,7 +63,7 @@ def test_kernel_agrees_with_the_scalar_walk(medium, kernel):
 def test_light_prefers_no_azimuth(kernel):
     """Next to normal incidence no harmonic but m = 0 is left: t-test over 24 simulations, 99.9 % for all together.
 
-    What a grid of square texels makes of m = 0 is taken from normal incidence itself, where a library keeps m = 0 only.
+    Square texels add harmonics to m = 0; these are measured at normal incidence, where a library has m = 0 only.
     """
     photons = 3_000 if kernel == "scalar" else 40_000
 
@@ -78,7 +78,8 @@ def test_light_prefers_no_azimuth(kernel):
 
 @pytest.mark.parametrize("kernel", walk_kernels())
 def test_kernels_walk_every_photon(kernel):
-    """At an albedo next to 1 nothing is absorbed in a slab: what is reflected and transmitted adds up to what enters.
+    """At an albedo next to 1 nothing is absorbed in a slab: reflectance and transmittance add up to the light that
+    enters.
 
     Numbers of photons that fill no whole vectors, where one lost or walked twice would show. Within 5 standard errors,
     from the scatter between seeds (by chance one in 1e5 tests).

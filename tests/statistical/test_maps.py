@@ -62,7 +62,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("medium", "angle", "albedo", "pitch", "side"), CASES, ids=str)
-def test_image_is_what_brute_force_counts(medium, angle, albedo, pitch, side):
+def test_image_agrees_with_brute_force(medium, angle, albedo, pitch, side):
     """Texel means within 5 standard errors of the count, plus 2 % for angular and azimuthal resolution.
 
     Among 225 texels 5 standard errors happen by chance in 1 of 8000 tests. Standard errors: the count's own, and
@@ -79,7 +79,7 @@ def test_image_is_what_brute_force_counts(medium, angle, albedo, pitch, side):
 
 @pytest.mark.parametrize(("medium", "angle", "albedo", "pitch", "side"), CASES, ids=str)
 def test_map_distance_is_the_noise_of_the_count(medium, angle, albedo, pitch, side):
-    """Relative L1 distance to the counted map at most 2 % above what that map's noise alone makes."""
+    """The relative L1 distance to the counted map exceeds that of the map's noise by at most 2 %."""
     counted, error, _ = counted_map(medium, angle, albedo, pitch, side)
     image = library_of(medium).image(angle, albedo, SIZE, pitch, side=side) * pitch**2
     noise = np.sqrt(2 / np.pi) * error.sum() / counted.sum()  # mean of |normal deviate|
@@ -131,7 +131,7 @@ def test_fine_texels_show_mirror_images(medium, angle, side):
     ids=str,
 )
 def test_exitance_is_not_below_zero(medium, angle, side):
-    """Of all power at most .2 % lies below zero for texels as fine as the peaks.
+    """At most .2 % of the power lies below zero for texels as fine as the peaks.
 
     Noise makes up to .09 % with so few photons, a fortieth of that with as many as `library` takes; were harmonics just
     cut off, it would be 1 %.
@@ -218,7 +218,7 @@ def test_far_field_is_shifted_along_the_beam(radius):
     ("medium", "angle"), [(Medium(0.9, 1.5, 0.5), 45), (Medium(0.95, 1.6, 0.5), 45), (Medium(0.9, 1.4, 1.0), 33)]
 )
 def test_solvers_show_mirror_images(medium, angle):
-    """What one texel gives off is the map of a beam, within 1 %, be the images' light around one pole or its own.
+    """One lit texel shows the map of a beam, within 1 %, with the images' light around one pole or its own.
 
     Between simulated angles, for texels of half a mean free path and one; unscattered light, of which `image` knows the
     place within a texel, is left out.
@@ -244,7 +244,7 @@ def far_field(albedo, pitch):
 
 @pytest.mark.parametrize("medium", [Medium(0.8, 1.4), Medium(0.0, 1.0, 2.0), Medium(0.8, 1.4, 0.5)], ids=str)
 def test_a_bake_keeps_energy(medium):
-    """What a large plane gives off is the exact reflectance times the power it receives, to .1 %."""
+    """A large plane emits the exact reflectance times the power that it receives, to .1 %."""
     irradiance = np.zeros((96, 96), np.float32)
     irradiance[40:56, 44:52] = np.random.default_rng(1).random((16, 8)) + 0.5
     albedo = (0.5, 0.97, 0.9995)

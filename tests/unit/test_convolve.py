@@ -1,4 +1,4 @@
-"""The solvers: against each other, against brute force in numpy, and for what leaves the plane."""
+"""The solvers against each other and against brute force in numpy, and their light outside the plane."""
 
 import math
 
@@ -48,7 +48,7 @@ def test_fft_equals_direct(library, seed, height, width, angle, azimuth, mean_fr
 @pytest.mark.parametrize("mean_free_path", [0.02, 0.4, 1.5, 6.0, 60.0])
 @pytest.mark.parametrize("angle", [20, 70, 84])
 def test_fft_equals_direct_where_spectra_are_tabulated(library, angle, mean_free_path, pitch):
-    """What a kernel outside its window holds beyond the Nyquist frequency: more than usual for this noisy library.
+    """Error of kernels beyond the Nyquist frequency outside their window: more than usual for this noisy library.
 
     Toward grazing also the harmonics that the window's border is too narrow for: 3e-4 of the power.
     """
@@ -70,7 +70,7 @@ def thin():
 @pytest.mark.parametrize("mean_free_path", [2.0, 12.0, 40.0])
 @pytest.mark.parametrize(("angle", "azimuth"), [(50, 33), (80, -140)])
 def test_fft_equals_direct_on_thin_slabs(thin, angle, azimuth, mean_free_path, pitch):
-    """A tenth of what is stated, 1e-3: on so small a plane less lies outside the kernels' centre."""
+    """A tenth of the stated 1e-3: on a small plane less light lies outside the kernels' centre."""
     rng = np.random.default_rng(9)
     beams = rng.random((70, 110), np.float32) * (rng.random((70, 110)) < 0.3)
     arguments = (beams, travel(angle, azimuth), thin, ALBEDO, mean_free_path, pitch)
@@ -93,7 +93,7 @@ def random_directions(height, width):
 @pytest.mark.parametrize("field", [random_directions, lamp_directions, "near", "grazing"])
 @pytest.mark.parametrize("mean_free_path", [0.05, 0.4, 4.0, 64.0])
 def test_fft_keeps_the_tolerance_where_directions_change(library, field, mean_free_path):
-    """As `convolve` says, the sum even below .3 of it; deep shadow is off by a fraction of the brightest texel."""
+    """Errors that `convolve` promises, the sum's below .3 of them; deep shadow is off by a part of the brightest."""
     heights = {"near": 0.1, "grazing": 0.02}
     direction = lamp_directions(48, 48, heights[field]) if field in heights else field(48, 48)
     rng = np.random.default_rng(13)
@@ -110,7 +110,7 @@ def test_fft_keeps_the_tolerance_where_directions_change(library, field, mean_fr
 
 @pytest.mark.parametrize("memory", [250_000, 100_000])
 def test_tiles_are_seamless(library, memory):
-    """What tiles leave out lies beyond the reach of the kernels: a millionth of their power."""
+    """Tiles omit light beyond the reach of the kernels: a millionth of their power."""
     beams = np.random.default_rng(11).random((150, 230), np.float32)
     rest = ([library] * 3, ALBEDO, [0.1, 0.2, 0.5], (1.0, 1.0), "fft", 1e-3, 0, None)
     for direction in (travel(40, 70).astype(np.float32), lamp_directions(150, 230)):
@@ -209,7 +209,7 @@ def test_light_spreads_further_where_it_travels_to(library):
 @pytest.mark.parametrize("paths_per_texel", [1e-3, 0.02, 1, 50, 20 * 33])
 @pytest.mark.parametrize("solver", ["fft", "direct"])
 def test_all_power_is_found_again(library, solver, paths_per_texel):
-    """One lit texel: what the plane shows is the LDF integrated over the plane; all of R for a short mean free path."""
+    """One lit texel: the plane shows the LDF integrated over the plane; all of R for a short mean free path."""
     size = 33
     beams = np.zeros((size, size), np.float32)
     beams[16, 16] = math.pi
@@ -231,7 +231,7 @@ def test_uniform_light_on_a_large_plane(library):
 
 
 def test_texels_need_not_be_square(library):
-    """Three flat texels on top of each other see what the square one in their place sees."""
+    """Three flat texels on top of each other get the light of the square one at their position."""
     coarse, fine = np.zeros((11, 11), np.float32), np.zeros((33, 11), np.float32)
     coarse[5, 5] = fine[16, 5] = 1
     expected = convolve(coarse, travel(50, 33), library, ALBEDO, 1.0, 1.0)
@@ -342,7 +342,7 @@ def test_an_angle_outside_the_library(library):
 
 
 def test_transforms_of_many_sizes_at_once(library):
-    """Transforms of different sizes follow each other on several threads: what they share must be locked."""
+    """Transforms of different sizes follow each other on several threads: their shared plans must be locked."""
     sizes = np.random.default_rng(8).integers(40, 160, (60, 2))
     for height, width in sizes:
         result = convolve(np.ones((height, width), np.float32), DOWN, library, 0.5, 0.01, 1.0)

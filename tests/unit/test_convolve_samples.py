@@ -32,7 +32,7 @@ def one_texel(size=25):
 @pytest.mark.parametrize("pitch", [1.0, 2.5])
 @pytest.mark.parametrize("azimuth", [0, 70, 200])
 def test_kernels_are_those_of_the_library(library, samples, solver, pitch, azimuth):
-    """Up to what the rings and texels of the image blur, and the 1 % of the light that is outside of it."""
+    """Tolerance: the blur of the image's rings and texels, and the 1 % of the light outside of it."""
     direction = travel(40, azimuth)
     result = convolve(one_texel(), direction, samples, 0.9, 1.0, pitch, solver=solver)
     expected = convolve(one_texel(), direction, library, 0.9, 1.0, pitch, solver="direct")

@@ -1,4 +1,4 @@
-"""README is short, and what it and docs/ point to exists."""
+"""README is short, and the targets of all links in the pages exist."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""EXR files: what is written is checked with a reader of its own, what is read comes from a writer of its own."""
+"""EXR files: an independent reader checks written files, and an independent writer makes the files to read."""
 
 import resource
 import struct
@@ -325,7 +325,7 @@ def sound_files(tmp_path_factory):
 @settings(max_examples=400, deadline=None)
 @given(
     kind=st.integers(0, 2),
-    # Most of what can be damaged is in the first few hundred bytes.
+    # The header, the first few hundred bytes, holds most of the format.
     flips=st.lists(
         st.tuples(st.integers(0, 9999), st.sampled_from([400, 600, 9999]), st.integers(0, 255)), min_size=1, max_size=4
     ),

@@ -1,4 +1,4 @@
-"""Each compiled variant of the Fourier transforms against numpy's in double precision, and what may run where."""
+"""Each compiled variant of the Fourier transforms against numpy in double precision, and the choice among them."""
 
 import functools
 import re
@@ -14,7 +14,7 @@ ROUNDING = 2.0**-24
 
 # Powers of two, other even sizes, odd ones, primes (those above some hundred as convolutions of twice the length).
 SIZES = [1, 2, 3, 4, 7, 16, 30, 105, 243, 256, 1000, 1009, 1155, 2048, 2310, 4099, 8192, 10007]
-# Of the solver: multiples of what the vectors hold, and not.
+# Sizes of the solver: multiples of the vectors' length, and others.
 LINES = [1, 5, 16, 37]
 
 
@@ -41,7 +41,7 @@ def random_lines(count, size, kind):
 
 @pytest.mark.parametrize("instruction_set", SETS)
 @pytest.mark.parametrize("size", SIZES)
-def test_lines_are_what_numpy_has(size, instruction_set):
+def test_lines_agree_with_numpy(size, instruction_set):
     for count in LINES:
         real, lines = random_lines(count, size, float), random_lines(count, size, complex)
         half = native.real_lines(real, instruction_set)
@@ -54,7 +54,7 @@ def test_lines_are_what_numpy_has(size, instruction_set):
 
 @pytest.mark.parametrize("instruction_set", SETS)
 @pytest.mark.parametrize(("height", "width"), [(1, 2), (64, 128), (45, 98), (101, 1000), (243, 30)])
-def test_planes_are_what_numpy_has(height, width, instruction_set):
+def test_planes_agree_with_numpy(height, width, instruction_set):
     values = random_lines(height, width, float)
     wanted = np.fft.rfft2(values.astype(float))
     error = np.abs(native.real_transform(values, instruction_set=instruction_set) - wanted)
@@ -143,7 +143,7 @@ def test_only_functions_for_newer_processors_use_their_instructions():
     found = {function for path in objects for _, function in functions_with_new_instructions(path)}
     chosen = re.compile(r"\.(avx2|avx512f)$|\d+beamspread6N_AVX[23]\d+")
     assert {name for name in found if not chosen.search(name)} == set()
-    assert any(name.endswith(".avx2") for name in found)  # the check finds what there is
+    assert any(name.endswith(".avx2") for name in found)  # the check itself works
 
 
 @needs_objects

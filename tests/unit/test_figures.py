@@ -1,4 +1,4 @@
-"""The figures of docs/method.md, in small: what they claim, and their paper's method against the library."""
+"""The claims of the figures of docs/method.md at a small size; the paper's method against the library."""
 
 import re
 import sys
@@ -70,7 +70,7 @@ def test_squares_cover_the_mask():
 
 @pytest.mark.parametrize("azimuth", [0.0, 180.0])
 def test_the_papers_convolution_at_a_sample(library, azimuth):
-    """Nothing is interpolated there, and albedo .2 spreads no farther than the window: it is the library's own."""
+    """No interpolation is needed there, and light at albedo .2 stays inside the window: the result is the library's."""
     mask = fig8.lit(azimuth, 60)
     direction = paper.travel(60, azimuth)
     exact = bs.convolve(mask, direction, library, 0.2, 1.0, 1.0)

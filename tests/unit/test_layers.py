@@ -1,4 +1,4 @@
-"""Folders include only what stands above them: CMakeLists.txt says which those are, docstrings say it of addon/."""
+"""Folders include only folders above them: CMakeLists.txt lists those of native/, docstrings those of addon/."""
 
 import ast
 import re
@@ -38,7 +38,7 @@ def listed(package):
 
 
 def imports(path):
-    """Absolute names of what a module of addon/ imports of the package, and top names of what else."""
+    """Absolute names of the imports from the package, and top names of all other imports."""
     package = path.relative_to(ADDON).parent.parts
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
@@ -75,7 +75,7 @@ def test_python_imports_point_upwards():
 
 
 def test_no_test_module_imports_from_another():
-    """What several need is in a module of helpers."""
+    """Code that several tests need is in a module of helpers."""
     wrong = [
         f"{path.relative_to(ROOT)} imports {name}"
         for path in (ROOT / "tests").rglob("*.py")

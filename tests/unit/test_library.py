@@ -1,4 +1,4 @@
-"""LdfLibrary: what it promises beside the physics (that is in tests/statistical)."""
+"""LdfLibrary without its physics, which tests/statistical checks."""
 
 import math
 import os
@@ -103,7 +103,7 @@ def test_damaged_files_are_refused(fixture, request, tmp_path):
             assert str(path) in str(error)  # noqa: PT017 - either outcome is fine, a crash is not
             refused += 1
         else:
-            assert same(loaded, library)  # what was hit does not matter to us: OpenEXR's own attributes
+            assert same(loaded, library)  # the damaged byte does not matter: attributes of OpenEXR itself
     assert refused > 200
 
 
@@ -216,7 +216,7 @@ def test_an_angle_next_to_0(nearly):
 
 
 @pytest.mark.parametrize("which", ["reflected", "transmitted"])
-def test_image_at_the_ends_of_what_is_allowed(small, slab, which):
+def test_image_at_the_ends_of_the_allowed_range(small, slab, which):
     """Power per area: around O the same seen from ever nearer (a pencil's as 1 / pitch), evenly in a huge disk."""
     library = small if which == "reflected" else slab
     total = library.reflectance(30, 0.9) if which == "reflected" else library.transmittance(30, 0.9)
@@ -250,7 +250,7 @@ def test_an_error_in_the_callback_comes_through():
 
 
 def test_an_error_in_the_callback_stops_every_thread():
-    """What each thread has in hand would take it half a minute."""
+    """The work in hand of each thread would take half a minute."""
     begin = time.monotonic()
     with pytest.raises(KeyError, match="mine"):
         simulate(Medium(), [0], 10**8, threads=4, progress=lambda f: f == 0 or {}["mine"])

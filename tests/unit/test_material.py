@@ -52,8 +52,8 @@ def test_regular_milk_has_the_coefficients_of_narasimhans_table():
         ("gatorade", [0.0024574, 0.003007, 0.0037325]),
     ],
 )
-def test_reduced_scattering_is_what_others_derived_from_the_same_table(name, reduced):
-    """As in pbrt's table of media, per mm; the columns for sigma_s and g must belong together."""
+def test_reduced_scattering_agrees_with_others_who_used_the_same_table(name, reduced):
+    """The values of pbrt's table of media, per mm; the columns for sigma_s and g must belong together."""
     material = presets()[name]
     assert coefficients(material)[0] * (1 - np.array(material.anisotropy_rgb)) == pytest.approx(reduced, rel=1e-4)
 
@@ -79,7 +79,7 @@ def test_one_anisotropy_keeps_absorption_and_reduced_scattering():
     assert marble.with_one_anisotropy() is marble
 
 
-def test_preset_without_measured_absorption_says_what_it_assumes():
+def test_preset_without_measured_absorption_states_its_assumption():
     assert "assumed" in presets()["spectralon"].source
     assert "assumed" not in presets()["marble"].source
 
@@ -100,7 +100,7 @@ def test_preset_without_measured_absorption_says_what_it_assumes():
         ({"ior": math.inf}, ["IOR", "inf"]),
     ],
 )
-def test_check_names_what_is_wrong(values, words):
+def test_check_names_the_fault(values, words):
     with pytest.raises(MaterialError) as caught:
         Material(**(GOOD | values)).check()
     assert all(word in str(caught.value) for word in words)
@@ -119,7 +119,7 @@ def test_albedo_from_reflectance_inverts():
         )
 
 
-def test_what_a_medium_cannot_reflect_becomes_its_extreme():
+def test_a_color_that_a_medium_cannot_reflect_becomes_its_extreme():
     assert albedo_from_reflectance(0.95, lambda albedo: 0.2 + 0.7 * albedo) == HIGHEST_ALBEDO
     assert albedo_from_reflectance(0.1, lambda albedo: 0.2 + 0.7 * albedo) == 0
 
@@ -168,7 +168,7 @@ def test_colors_may_be_numbers_or_arrays(noisy):
 @pytest.mark.parametrize(
     "color", [(0.1, 1.01, 0.1), -0.5, math.nan, (0.5, 0.5), "red", [[0.5, 0.5, 0.5]], None, 0.5 + 0.1j]
 )
-def test_what_is_no_color_is_refused(color):
+def test_values_that_are_no_color_are_refused(color):
     with pytest.raises(ValueError, match=r"argument 'color' is .*; allowed: .* 0 to 1"):
         albedo_from_color(color, beamspread.Medium())
 

@@ -129,7 +129,7 @@ def test_takes_nothing_but_python_from_a_host():
     ).stdout
     names = [line.split()[-1] for line in symbols.splitlines()]
     ours = {n for n in names if not re.match(r"_?Py|.*@(GLIBC|GCC)_[0-9.]+$", n)}
-    # What any compiler asks for, and does without.
+    # Symbols that every compiler asks for and does without.
     assert ours <= {"__gmon_start__", "_ITM_deregisterTMCloneTable", "_ITM_registerTMCloneTable", "__cxa_pure_virtual"}
     needed = subprocess.run(["readelf", "--dynamic", native_file()], capture_output=True, text=True, check=True).stdout
     libraries = re.findall(r"\(NEEDED\).*\[(.*?)\]", needed)
@@ -156,7 +156,7 @@ def test_libraries_of_the_host_do_not_win(how):
 
 
 def test_runs_with_an_allocator_of_the_host():
-    """Debian's Blender brings jemalloc: what one allocator gave, the other must not be asked to free."""
+    """Debian's Blender brings jemalloc: memory of one allocator must never go to the other."""
     jemalloc = next(Path("/usr/lib").glob("*/libjemalloc.so.2"))
     loaded = "\nprint('jemalloc' in open('/proc/self/maps').read())"
     assert run_python(ASK_EMBREE + EVERY_KIND_OF_CALL + loaded, LD_PRELOAD=str(jemalloc)).split() == ["31305", "True"]

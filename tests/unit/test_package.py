@@ -20,7 +20,7 @@ LIBRARIES = {"ducc", "eigen", "embree", "glm", "highway", "imath", "openexr", "p
 
 
 def packed(folder, staged=STAGED):
-    """The module of another Python is made up: what is in it isn't looked at."""
+    """The module of another Python is made up: its content isn't read."""
     modules = folder / "more"
     modules.mkdir(exist_ok=True)
     (modules / OTHER_MODULE).write_bytes(b"another Python's")
@@ -61,7 +61,7 @@ def test_all_of_it_is_in_one_folder_which_is_named(path, files):
         assert archive.namelist()[0] == "beamspread/"
 
 
-def test_it_holds_what_was_staged_and_licences_and_nothing_else(files):
+def test_it_holds_the_staged_files_and_licences_and_nothing_else(files):
     names = {name.removeprefix("beamspread/") for name in files}
     staged = {path.relative_to(STAGED).as_posix() for path in STAGED.rglob("*") if path.is_file()}
     staged = {name for name in staged if "__pycache__" not in name and not name.endswith((".pyi", "py.typed"))}

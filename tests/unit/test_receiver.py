@@ -195,7 +195,7 @@ def replaced(**changes):
         (replaced(normals=np.array([[0, 0, 1.0], [0, 0, -1.0]]), starts=np.array([0, 4, 4])), "opposite side"),
     ],
 )
-def test_what_cannot_be_baked_says_why(polygons, words):
+def test_a_surface_that_cannot_be_baked_gets_a_reason(polygons, words):
     with pytest.raises(ReceiverError, match=words):
         fit_uv_maps(polygons)
 

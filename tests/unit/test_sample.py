@@ -25,7 +25,7 @@ def sample(**changes):
     return LdfSample(**values)
 
 
-def test_keeps_what_it_is_given():
+def test_keeps_its_arguments():
     made = sample()
     assert (made.pitch, made.angle, made.albedo, made.beam_diameter, made.g) == (0.5, 30.0, 0.9, 2.0, 0.8)
     assert made.image.dtype == np.float32
@@ -156,7 +156,7 @@ def pixel(value):
         ({"values": pixel(-1)}, "texel of -1"),
     ],
 )
-def test_says_what_is_wrong_with_a_file(tmp_path, changes, message):
+def test_names_the_fault_of_a_file(tmp_path, changes, message):
     path = write(tmp_path / "a.exr", **changes)
     with pytest.raises(OSError, match=message) as error:
         LdfSample.load(path)

@@ -65,7 +65,7 @@ def test_light_goes_out_by_the_color_of_each_texel(grid):
     assert luminance(replace(grid, color_out=out), "sun") == pytest.approx(luminance(grid, "sun") * out)
 
 
-def test_what_arrives_knows_nothing_of_it(grid):
+def test_irradiance_does_not_depend_on_it(grid):
     dark = np.zeros((SIZE, SIZE, 3), np.float32)
     plain, _ = arrive(grid, Illumination([LIGHTS["sun"]]), SETTINGS)
     assert np.array_equal(arrive(replace(grid, color_in=dark), Illumination([LIGHTS["sun"]]), SETTINGS)[0], plain)

@@ -1,4 +1,4 @@
-"""One version, whoever asks."""
+"""All files state one version."""
 
 import shutil
 import sys
@@ -42,7 +42,7 @@ def test_a_place_that_differs_is_seen(addon):
     assert len(set(version.versions(addon).values())) == 2
 
 
-def test_what_is_no_version_is_refused(addon):
+def test_a_text_that_is_no_version_is_refused(addon):
     before = version.versions(addon)
     for text in ("1.2", "1.2.3.4", "1.x.0"):
         with pytest.raises(ValueError):  # noqa: PT011

@@ -1,8 +1,8 @@
-"""What bounced.py runs in Blender as a module: SCENE [REFERENCE_SAMPLES]. Prints rows of a table.
+"""Runs in Blender for bounced.py: SCENE [REFERENCE_SAMPLES]. Prints rows of a table.
 
-The child process's own mirrors gather what bounces; errors are those of the irradiance at its nodes, between them as
-texels get it, and of means of 4 x 4 nodes. Of two references each takes the other's noise out of the square: they share
-none.
+The mirrors of the child process gather bounced light. Errors are those of the irradiance at the nodes, of texels
+between them, and of means of 4 x 4 nodes. Two references with independent noise: the product of both differences has no
+noise of its own.
 """
 
 import math

@@ -18,7 +18,7 @@ import cycles_slab
 def main():
     path, *counts = sys.argv[sys.argv.index("--") + 1 :]
     _, image = cycles_slab.build_scene(1)
-    cycles_slab.bake_texels(image, seed=1)  # compiles and builds what every bake needs
+    cycles_slab.bake_texels(image, seed=1)  # compiles and builds for every later bake
     results = {}
     for count in map(int, counts):
         cycles_slab.set_up_cycles(count)

@@ -1,4 +1,4 @@
-"""What live.py runs in a Blender with a window: moves things and times how long it takes until the picture is drawn.
+"""Runs for live.py in a Blender with a window: moves objects and measures the time until the image is drawn.
 
 blender --factory-startup --window-geometry 0 0 1600 1000 --python THIS -- RESULTS.json SHADING RESOLUTION
 """
@@ -78,7 +78,7 @@ def shade(shading):
 
 
 class Stopwatch:
-    """Times of changes and of what follows, in seconds."""
+    """Times of changes and of their results, in seconds."""
 
     def __init__(self):
         self.began, self.stored, self.drawn = 0.0, [], []

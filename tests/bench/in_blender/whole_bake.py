@@ -1,4 +1,4 @@
-"""What whole_bake.py runs inside Blender: `make` its scenes, `save` an image, or bake and time the `phases`.
+"""Runs inside Blender for whole_bake.py: `make` its scenes, `save` an image, or bake and time the `phases`.
 
     blender -b [SCENE] --python THIS -- make FOLDER RESOLUTION
     blender -b SCENE --python THIS -- save IMAGE RESOLUTION
