@@ -14,7 +14,7 @@ from beamspread.core.bake.surface import Surface
 from beamspread.core.live import media
 from beamspread.core.live.pace import BUDGET_SECONDS, FIRST_SIDE, SIDES, Pace
 from beamspread.core.live.painter import Painter
-from beamspread.core.live.picture import FramedReceiver, Studio, enlarged, for_live
+from beamspread.core.live.picture import FramedReceiver, Studio, for_live
 from beamspread.core.live.subject import Subject
 from beamspread.core.material.material import Material
 from beamspread.core.scene.illumination import Illumination
@@ -83,13 +83,6 @@ def test_few_texels_show_the_same_at_the_size_of_the_image():
     picture = studio.quick(wanted, 64)
     assert picture.texture.shape == (256, 256, 3)
     assert off(picture, studio.exact(wanted))[0] < 0.02
-
-
-def test_enlarged_keeps_what_is_linear():
-    x = (np.arange(16, dtype=np.float32) + 0.5) / 16
-    large = enlarged(np.repeat(np.tile(x, (8, 1))[..., None], 3, axis=2), 64, 32)
-    inner = slice(2, -2)
-    np.testing.assert_allclose(large[3, inner, 0], ((np.arange(64) + 0.5) / 64)[inner], rtol=1e-5)
 
 
 def test_around_a_chart_its_border_goes_on():

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..bake.bake_settings import COMBINED, BakeSettings
 from ..bake.gather import Gatherer
-from ..bake.luminance import TOLERANCE, spread
+from ..bake.luminance import spread
 from ..bake.margin import WHOLE, extend_margin
 from ..bake.surface import channel_media
 from ..ldf.albedo import albedo_from_reflectance
@@ -21,6 +21,7 @@ from ..recent import keep_recent
 from ..scene.grid import Grid
 from ..scene.lights import Light
 from ..scene.receiver import Receiver, build_receiver, texture_size
+from ..scene.sampling import resized
 from ..scene.uv_map import fit_uv_maps
 from .fields import Fields
 from .media import Media
@@ -80,7 +81,7 @@ class Studio:
             for chart in receiver.receiver.charts
         ]
         texture, whole = receiver.continued(receiver.receiver.to_texture(values)), self._receiver(subject, size)
-        texture = enlarged(texture, *size)
+        texture = resized(texture, size[1], size[0])
         if whole.color_out is not None:
             texture *= whole.color_out  # which keeps all detail
         return Picture(subject, texture, whole.region)
@@ -226,30 +227,6 @@ def _common_color(gatherer: Gatherer, lights: Sequence[Light]) -> np.ndarray | N
     return None if differ or any(map(gatherer.is_colored, lights)) else colors[0]
 
 
-def enlarged(texture: np.ndarray, width: int, height: int) -> np.ndarray:
-    """Bilinear between texels' centres."""
-    return _along(_along(texture, height, 0), width, 1)
-
-
-def _along(texture: np.ndarray, length: int, axis: int) -> np.ndarray:
-    own = texture.shape[axis]
-    if own == length:
-        return texture
-    place = np.clip((np.arange(length) + 0.5) * own / length - 0.5, 0, own - 1)
-    below = np.minimum(place.astype(int), max(own - 2, 0))
-    part = (place - below).astype(np.float32)
-    part = part[:, None, None] if axis == 0 else part[None, :, None]
-    lower = np.take(texture, below, axis)
-    step = np.take(texture, np.minimum(below + 1, own - 1), axis)
-    step -= lower
-    step *= part
-    lower += step
-    return lower
-
-
 def for_live(settings: BakeSettings) -> BakeSettings:
     """What of a scene's settings counts."""
     return replace(settings, solver="fft", indirect=False, layers=(COMBINED,))
-
-
-__all__ = ["TOLERANCE", "Picture", "Studio", "enlarged", "for_live"]

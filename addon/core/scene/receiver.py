@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import ReceiverError
 from ..native import native
 from .grid import Grid
+from .sampling import bilinear
 from .uv_map import UvMap
 
 # Texels that a chart enters by less than this fraction are left out of the grid (rounding of float32 UVs).
@@ -77,7 +78,7 @@ class Chart:
         rows, columns = np.nonzero(inside)
         centres = columns + self.offset[0] + 0.5, rows + self.offset[1] + 0.5, np.ones(len(rows))
         x, y = self.texel_to_grid @ np.stack(centres)
-        part[rows, columns] = bilinear(values, x - 0.5, y - 0.5)
+        part[rows, columns] = bilinear(values, x, y)
 
     def read(self, texture: np.ndarray) -> np.ndarray:
         """Values of its grid (grid height, grid width, C) from a texture (height, width, C)."""
@@ -85,7 +86,7 @@ class Chart:
             return self.part_of(texture)
         height, width = texture.shape[:2]
         x, y = np.moveaxis(self.uvs(width, height).reshape(-1, 2) * [width, height], -1, 0)
-        return bilinear(texture, x - 0.5, y - 0.5).reshape(self.grid.height, self.grid.width, -1).astype(np.float32)
+        return bilinear(texture, x, y).reshape(self.grid.height, self.grid.width, -1).astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,15 +178,3 @@ def _coverage(faces: list[np.ndarray], width: int, height: int) -> np.ndarray:
     corners = np.ascontiguousarray(np.concatenate(faces), np.float64)
     counts = np.array([len(face) for face in faces], np.uint32)
     return native.coverage(corners, counts, width, height)
-
-
-def bilinear(values: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Values (H, W, C) at fractional columns x and rows y, held constant beyond the border."""
-    height, width = values.shape[:2]
-    x, y = np.clip(x, 0, width - 1), np.clip(y, 0, height - 1)
-    column, row = np.minimum(x.astype(int), max(width - 2, 0)), np.minimum(y.astype(int), max(height - 2, 0))
-    next_column, next_row = np.minimum(column + 1, width - 1), np.minimum(row + 1, height - 1)
-    weight_x, weight_y = (x - column)[:, None], (y - row)[:, None]
-    bottom = values[row, column] * (1 - weight_x) + values[row, next_column] * weight_x
-    top = values[next_row, column] * (1 - weight_x) + values[next_row, next_column] * weight_x
-    return bottom * (1 - weight_y) + top * weight_y

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .receiver import Chart, Receiver, bilinear
+from .receiver import Chart, Receiver
+from .sampling import bilinear
 
 # Places along a texel, at most, where a finer texture is looked at.
 MOST_PLACES = 4
@@ -73,5 +74,5 @@ class Texture:
         total = np.zeros((other.grid.height * other.grid.width, 3), np.float32)
         for at in ((across, up) for across in middles for up in middles):
             x, y = chart.grid_places(other.uvs(receiver.width, receiver.height, at), self.receiver)
-            total += bilinear(color, x - 0.5, y - 0.5)
+            total += bilinear(color, x, y)
         return (total / count**2).reshape(other.grid.height, other.grid.width, 3)
