@@ -7,7 +7,6 @@ makes OUTPUT_FOLDER/beamspread-VERSION-PLATFORM.zip with one folder, `beamspread
 the archive's root. The same files give the same bytes. CMake's target `package` calls this.
 """
 
-import hashlib
 import platform
 import re
 import sys
@@ -18,7 +17,6 @@ from version import versions
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = "beamspread"
-CHECKSUMS = "native.sha256"
 # The earliest that a zip knows.
 TIME = (1980, 1, 1, 0, 0, 0)
 MOST_BYTES = 40_000_000
@@ -60,12 +58,9 @@ def content(staged: Path, further_modules: Path, licences_folder: Path) -> dict[
         if path.suffix not in SUFFIXES and name != "VERSION":
             sys.exit(f"{path}: no such file belongs into a package; tools/make_package.py lists what does")
         files[name] = path.read_bytes()
-    modules = [name for name in files if MODULE.match(name)]
-    if not modules:
+    if not any(MODULE.match(name) for name in files):
         sys.exit(f"{staged} has no native module: build first")
-    # Checksums: a file that was damaged on its way is found before it runs.
-    sums = "".join(f"{hashlib.sha256(files[name]).hexdigest()}  {name}\n" for name in sorted(modules))
-    return {**files, **licences(licences_folder), CHECKSUMS: sums.encode()}
+    return {**files, **licences(licences_folder)}
 
 
 def write(path: Path, files: dict[str, bytes]) -> None:

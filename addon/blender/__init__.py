@@ -17,8 +17,7 @@ Each part imports only core and those above it (tests/unit/test_layers.py reads 
 """
 
 from . import preferences, settings
-from .images import operators as image_operators
-from .images import previews, sequence, undo
+from .images import image_operators, previews, sequence, undo
 from .jobs import state
 from .jobs.out_of_date import stale
 from .jobs.run import engine, operator

@@ -2,12 +2,12 @@
 
 Each package imports only those above it (tests/unit/test_layers.py reads this list):
 
-    missing     why the compiled module can't be loaded
+    missing     message if the compiled module can't be loaded
     native      the compiled module, or what stands for it where it is missing
     errors      sentences for the artist
     target      one material of one object, which is what a bake fills an image for
     progress    progress of a job made of stages
-    whole_file  files that are whole or as they were
+    whole_file  files that are complete or unchanged
     exr_header  what OpenEXR files say of their channels
     recent      what was used last, kept
     arrays      array arguments, converted only where nothing is lost

@@ -1,4 +1,4 @@
-"""The native module, which carries its libraries: nothing of the host's is taken for them, or the other way round."""
+"""The compiled module, or a stand-in that raises a message if the module can't be loaded."""
 
 import importlib
 from pathlib import Path
@@ -7,19 +7,18 @@ from . import missing
 
 
 class _Missing:
-    """Stands for the module where it can't be loaded: an add-on must be able to register and say why."""
+    """Lets the add-on register without the module: every use raises ImportError with the message."""
 
     def __getattr__(self, name: str):
         raise ImportError(problem)
 
 
 problem = ""
-"""Why the module is missing, in a few sentences; empty when all is well."""
+"""Message that says why the module can't be used; empty if it can."""
 
 _FOLDER = Path(__file__).resolve().parents[1]
 
 try:
-    missing.check(_FOLDER)
     native = importlib.import_module(".._native", __package__)
     missing.check_version(_FOLDER, native.__version__)
 except (ImportError, OSError) as error:

@@ -1,40 +1,50 @@
-"""Files that are whole or as they were: written beside, checked, then renamed."""
+"""Files that are complete or unchanged: written beside the target, checked, then renamed."""
 
 from __future__ import annotations
 
-import hashlib
-import itertools
 import os
-import platform
 import re
 import shutil
 import time
+import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-_numbers = itertools.count()
+try:
+    import fcntl
+except ImportError:  # Windows: temporary files of killed processes stay
+    fcntl = None
+
+_TEMPORARY = re.compile(r".+\.beamspread-[0-9a-f]{8}\.tmp(\.\w+)?")
+"""Names of temporary files. A running process holds a lock on each of its own."""
+
+_SPARE_BYTES = 1 << 16
+"""Room that a disk must have left after a file is written. Blender and other writers ignore errors of a full disk."""
+
+_MIN_AGE_SECONDS = 60.0
+"""Age from which an unlocked temporary file counts as a leftover. A younger one may not be locked yet."""
+
 _tidied: set[Path] = set()
-
-# Of this machine: on a disk that several share, none tells whether another's processes still run.
-_MACHINE = hashlib.sha256(platform.node().encode()).hexdigest()[:6]
-
-_TEMPORARY = re.compile(rf".+\.{_MACHINE}-(\d+)-\d+\.tmp(\.\w+)?")
-
-# So old at least is what is left behind; where nobody can tell whether a process runs, a day.
-LEFT_SECONDS, SURE_SECONDS = 60.0, 86400.0
+"""Folders that this process has searched for leftovers."""
 
 
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """Path of a new file beside `path`, with its ending: takes its name once the block has written and checked it.
+    """Path of a temporary file beside `path`, with the same ending; it replaces `path` when the block ends.
 
-    Where the block raises, the new file is removed and what had the name keeps it. A link stays one. OSError where it
-    can't be kept. What processes of this machine that were killed have left in the folder goes.
+    If the block raises, the temporary file is removed and `path` keeps its content. A link stays a link, and a file
+    keeps its permissions. Temporary files that killed processes left in the folder are removed.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written completely.
     """
     target = Path(path).resolve()
-    _tidy(target.parent)
-    temporary = target.with_name(f"{target.stem}.{_MACHINE}-{os.getpid()}-{next(_numbers)}.tmp{target.suffix}")
+    _remove_leftovers(target.parent)
+    temporary = target.with_name(f"{target.stem}.beamspread-{uuid.uuid4().hex[:8]}.tmp{target.suffix}")
+    lock = _create_locked(temporary)
     try:
         yield temporary
         _flush(temporary)
@@ -43,39 +53,59 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         temporary.replace(target)
     finally:
         temporary.unlink(missing_ok=True)
+        if lock is not None:
+            os.close(lock)
 
 
-def _tidy(folder: Path) -> None:
-    """Remove temporary files of processes that are gone, once per folder."""
-    if folder in _tidied:
-        return
-    _tidied.add(folder)
+def _create_locked(temporary: Path) -> int | None:
+    """Create the file and lock it; the descriptor that holds the lock, None on systems without locks."""
+    if fcntl is None:
+        return None
+    lock = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o666)
+    _try_lock(lock)
+    return lock
+
+
+def _try_lock(descriptor: int) -> bool:
+    """True if no other process holds the lock; False also on file systems without locks."""
     try:
-        left = [one for one in os.scandir(folder) if (found := _TEMPORARY.fullmatch(one.name)) and _is_left(one, found)]
-        for one in left:
-            Path(one).unlink(missing_ok=True)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
-        return  # writing says what is wrong with the folder
-
-
-def _is_left(entry: os.DirEntry, found: re.Match) -> bool:
-    age = time.time() - entry.stat(follow_symlinks=False).st_mtime
-    if os.name != "posix":  # there the question would end the process
-        return age > SURE_SECONDS
-    return age > LEFT_SECONDS and not _runs(int(found[1]))
-
-
-def _runs(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
         return False
-    except OSError:
-        pass  # another user's
     return True
 
 
-def _flush(path: Path) -> None:
-    """Have the system write what it still holds back: some disks say only then that they are full."""
+def _remove_leftovers(folder: Path) -> None:
+    """Remove temporary files that no process has locked, once per folder."""
+    if fcntl is None or folder in _tidied:
+        return
+    _tidied.add(folder)
+    try:
+        leftovers = [entry.path for entry in os.scandir(folder) if _is_old_temporary(entry)]
+        for path in leftovers:
+            _remove_unlocked(Path(path))
+    except OSError:
+        return  # the writer reports problems of the folder
+
+
+def _is_old_temporary(entry: os.DirEntry) -> bool:
+    return bool(_TEMPORARY.fullmatch(entry.name)) and time.time() - entry.stat().st_mtime > _MIN_AGE_SECONDS
+
+
+def _remove_unlocked(path: Path) -> None:
     with path.open("r+b") as file:
+        if _try_lock(file.fileno()):
+            path.unlink()
+
+
+def _flush(path: Path) -> None:
+    """Write everything to the disk, and raise OSError if the disk is full."""
+    with path.open("r+b") as file:
+        size = file.seek(0, os.SEEK_END)
+        file.write(bytes(_SPARE_BYTES))
+        file.flush()
+        os.fsync(file.fileno())
+        if size == 0:
+            raise OSError("nothing was written")
+        file.truncate(size)
         os.fsync(file.fileno())

@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from beamspread.blender.images import writing
+from beamspread.blender.images import files
 from beamspread.blender.jobs.run.batch_run import bake_all
 from beamspread.core.batch import batch_options
 from beamspread.core.native import native
@@ -158,7 +158,7 @@ def test_resume_bakes_what_is_missing_damaged_or_older(tmp_path):
 
 def test_resume_takes_an_images_own_file_only_by_its_report(tmp_path):
     path = tmp_path / "own.png"
-    writing.write_file(path, np.full((16, 16, 3), 0.5, np.float32), "PNG")
+    files.write_file(path, np.full((16, 16, 3), 0.5, np.float32), "PNG")
     add_plane(material=add_material(image=bpy.data.images.load(str(path))))
     add_sun(0)
     os.utime(save_scene(tmp_path), (time.time() - 100,) * 2)

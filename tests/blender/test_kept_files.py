@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from beamspread.blender.images import files, writing
+from beamspread.blender.images import files
 from beamspread.blender.jobs.run.batch_run import bake_all
 from beamspread.core.batch import batch_options
 from beamspread.core.batch.report import BakeRecord, Report
@@ -37,7 +37,7 @@ def full_after(size):
 def saved_image(path, file_format, side=SIDE, is_float=False):
     """An image with a file of its own, gray noise."""
     image = bpy.data.images.new("Target", side, side, float_buffer=is_float)
-    writing.set_pixels(image, np.random.default_rng(2).random((side, side, 3), np.float32))
+    files.set_pixels(image, np.random.default_rng(2).random((side, side, 3), np.float32))
     image.filepath_raw, image.file_format = str(path), file_format
     image.save()
     bpy.data.images.remove(image)
@@ -78,17 +78,17 @@ def test_an_images_file_keeps_its_format_and_is_whole_or_old(tmp_path, file_form
     assert image.file_format == file_format.removesuffix("_RAW") or file_format == "TARGA_RAW"
 
 
-@pytest.mark.parametrize("file_format", writing.EXTENSIONS)
+@pytest.mark.parametrize("file_format", files.EXTENSIONS)
 @pytest.mark.parametrize("part", [0.01, 0.5, 0.999])
 def test_an_output_is_whole_or_old(tmp_path, file_format, part):
-    path = tmp_path / f"out{writing.EXTENSIONS[file_format]}"
-    writing.write_file(path, 1 - NOISE, file_format)
+    path = tmp_path / f"out{files.EXTENSIONS[file_format]}"
+    files.write_file(path, 1 - NOISE, file_format)
     size = path.stat().st_size
-    writing.write_file(path, NOISE, file_format)
+    files.write_file(path, NOISE, file_format)
     before = path.read_bytes()
     for target in (path, tmp_path / "new" / path.name):
-        with full_after(int(part * size)), pytest.raises(ImageError, match=r"not all|too large"):
-            writing.write_file(target, 1 - NOISE, file_format)
+        with full_after(int(part * size)), pytest.raises(ImageError, match="too large"):
+            files.write_file(target, 1 - NOISE, file_format)
     assert path.read_bytes() == before
     assert [*tmp_path.rglob("*.*")] == [path]
 
@@ -118,16 +118,16 @@ def test_a_really_full_disk(tmp_path):
     if subprocess.run(mount, capture_output=True, check=False).returncode:
         pytest.skip("mounting a small disk takes an administrator")
     try:
-        for file_format in writing.EXTENSIONS:
-            old = disk / f"old{writing.EXTENSIONS[file_format]}"
+        for file_format in files.EXTENSIONS:
+            old = disk / f"old{files.EXTENSIONS[file_format]}"
             small = NOISE[:16, :16]
-            writing.write_file(old, small, file_format)
+            files.write_file(old, small, file_format)
             before = old.read_bytes()
             large = np.random.default_rng(3).random((256, 256, 3), np.float32)
-            with pytest.raises(ImageError, match=r"cannot be written.*(No space left|not all of it)"):
-                writing.write_file(old, large, file_format)
+            with pytest.raises(ImageError, match=r"cannot be written.*No space left"):
+                files.write_file(old, large, file_format)
             assert old.read_bytes() == before
-        assert len(list(disk.iterdir())) == len(writing.EXTENSIONS)
+        assert len(list(disk.iterdir())) == len(files.EXTENSIONS)
     finally:
         subprocess.run(["umount", "-l", str(disk)], check=True)
 
@@ -165,7 +165,7 @@ def test_killed_while_it_writes_the_old_file_is_whole(tmp_path, file_format):
         image = bpy.data.images.load(str(path), check_existing=False)
         assert tuple(image.size) == (side, side)
         assert (pixels(image).std(axis=(1, 2)) > 0.1).all()  # noise in every row
-        assert writing.ENDS.get(file_format, b"") in path.read_bytes()[-12:]
+        assert file_format != "PNG" or b"IEND" in path.read_bytes()[-12:]
         for rest in tmp_path.iterdir():
             if rest != path:
                 rest.unlink()
@@ -182,10 +182,10 @@ def begun(path, whole):
 def test_a_link_stays_one_and_a_file_keeps_its_mode(tmp_path):
     (tmp_path / "there").mkdir()
     real, link = tmp_path / "there" / "real.exr", tmp_path / "link.exr"
-    writing.write_file(real, NOISE, "EXR")
+    files.write_file(real, NOISE, "EXR")
     real.chmod(0o640)
     link.symlink_to(real)
-    writing.write_file(link, 1 - NOISE, "EXR")
+    files.write_file(link, 1 - NOISE, "EXR")
     assert link.is_symlink()
     assert real.stat().st_mode & 0o777 == 0o640
     assert pixels(bpy.data.images.load(str(real))) == pytest.approx(1 - NOISE, abs=1e-6)

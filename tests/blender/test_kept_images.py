@@ -1,12 +1,12 @@
 """An image belongs to one result, or to charts side by side; where new images are kept; undo."""
 
-import json
 from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import pytest
-from beamspread.blender.images import files, owners
+from beamspread.blender.images import files
+from beamspread.blender.images.facts import KEY, facts_of
 from beamspread.blender.images.results import Results
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.run import batch_run
@@ -106,7 +106,7 @@ def test_a_removed_owners_image_is_free(removed):
         bpy.context.collection.objects.unlink(plane)
     bake(copy)
     assert image_of(copy) == image
-    assert json.loads(image[owners.KEY]) == [["Plane.001", "Medium"]]
+    assert [*facts_of(image).bakes] == [Target("Plane.001", "Medium")]
 
 
 def test_a_shared_material_is_refused_before_the_bake_and_says_what_to_do():
@@ -130,7 +130,7 @@ def test_an_atlas_is_baked_part_by_part():
     sun = add_sun(0)
     (together,) = bake(*planes)[:1]
     image.pixels.foreach_set(np.zeros(32 * 16 * 4, np.float32))
-    del image[owners.KEY]
+    del image[KEY]
     for plane in planes:
         bake(plane)
     assert pixels(image) == pytest.approx(together, abs=1e-5)
@@ -284,7 +284,7 @@ def test_what_clips_is_said_and_make_float_mends_it(tmp_path):
     assert image.is_float
     assert node_of(plane.data.materials[0]).node_tree.nodes["Image"].image == image
     assert pixels(image) == pytest.approx(linear, abs=1e-5)
-    assert json.loads(image[owners.KEY]) == [["Plane", "Medium"]]
+    assert [*facts_of(image).bakes] == [Target("Plane", "Medium")]
     sun.data.energy = 100.0
     assert bake(plane)[0].max() > 1
     assert not any("clips" in line for line in state.messages())

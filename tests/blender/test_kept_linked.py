@@ -1,15 +1,14 @@
 """What comes from another .blend file: refused where its result could not be kept, and else nothing of it is lost."""
 
-import json
-
 import bpy
-from beamspread.blender.images import owners
+from beamspread.blender.images.facts import facts_of
 from beamspread.blender.images.results import Results
 from beamspread.blender.jobs.run import batch_run
 from beamspread.blender.jobs.run.prepare import prepare_scene
 from beamspread.blender.node.find import find_targets
 from beamspread.blender.ui.bake_panel import warnings_for
 from beamspread.core.batch import batch_options
+from beamspread.core.target import Target
 from mathutils import Matrix
 from scenes import add_material, add_plane, add_sun, bake, image_of, messages_of, pixels, save_scene, select
 
@@ -99,6 +98,6 @@ def test_an_appended_image_is_no_ones(tmp_path):
     other = add_plane("Other", matrix=Matrix.Translation((5, 0, 0)), material=wanted.materials[0])
     image = image_of(other)
     assert image != image_of(plane)
-    assert json.loads(image[owners.KEY]) == [["Plane", "Medium"]]
+    assert [*facts_of(image).bakes] == [Target("Plane", "Medium")]
     bake(other)
     assert image_of(other) == image

@@ -1,7 +1,4 @@
-"""A package whose native module is missing or useless: one clear message, never a traceback, and nothing lost.
-
-tests/unit/test_missing.py has more ways in which a module can be of no use.
-"""
+"""A package whose native module is missing or useless: one clear message, no traceback, and nothing lost."""
 
 import json
 import shutil
@@ -15,7 +12,7 @@ import pytest
 from scenes import add_material, add_plane, add_sun, bake, blender_command, node_of, pixels
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from spoilt_modules import remove, zeros_within
+from spoilt_modules import empty, remove
 
 IN_BLENDER = """
 import json, sys
@@ -46,9 +43,9 @@ beamspread.unregister()
 """
 
 
-@pytest.fixture(params=[remove, zeros_within], ids=lambda damage: damage.__name__)
+@pytest.fixture(params=[remove, empty], ids=lambda spoil: spoil.__name__)
 def spoilt(request, tmp_path):
-    """Folder that holds the package with a module of no use, and what is said of it."""
+    """Folder that holds the package with a useless module, and words of the message."""
     source = Path(beamspread.__file__).parent
     shutil.copytree(source, tmp_path / "beamspread", ignore=shutil.ignore_patterns("__pycache__"))
     return tmp_path, request.param(tmp_path / "beamspread")
@@ -74,8 +71,8 @@ def baked_scene(path):
     return pixels(node_of(material).image)
 
 
-def test_add_on_registers_says_what_is_missing_and_loses_nothing(spoilt):
-    folder, said = spoilt
+def test_the_add_on_registers_with_a_message_and_loses_nothing(spoilt):
+    folder, cause = spoilt
     scene = folder / "baked.blend"
     before = baked_scene(scene)
     assert before.max() > 0
@@ -89,9 +86,9 @@ def test_add_on_registers_says_what_is_missing_and_loses_nothing(spoilt):
     # In the log as well, for those who don't see the panel.
     (logged,) = [line for line in done.stderr.splitlines() if line.startswith("Beamspread: ")]
     for text in (message, logged):
-        assert said in text
+        assert cause in text
         assert f"Needed: _native.cpython-{sys.version_info[0]}{sys.version_info[1]}-" in text
-        assert "To mend it: get the zip" in text
+        assert "Install the zip of Beamspread" in text
     assert "AGAIN Error: beamspread has no working native module" in output
     (seen,) = [json.loads(line[5:]) for line in output.splitlines() if line.startswith("SEEN ")]
     assert seen["type"] == "BeamspreadNode"
@@ -105,7 +102,7 @@ def test_add_on_registers_says_what_is_missing_and_loses_nothing(spoilt):
     assert (pixels(node.image) == before).all()
 
 
-def test_batch_says_what_is_missing(incomplete):
+def test_a_batch_ends_with_the_message(incomplete):
     add_plane(material=add_material())
     scene = incomplete / "scene.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(scene))

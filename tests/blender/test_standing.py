@@ -423,7 +423,7 @@ def test_a_batch_that_fills_the_nodes_image_is_a_bake(arguments, tmp_path):
     add_sun(20)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
     bake(plane)
-    del node_of(plane.data.materials[0]).image["beamspread_bakes"]
+    del node_of(plane.data.materials[0]).image["beamspread"]
     state.forget()
     assert row().status == Status.NEVER
     assert batch_run.bake_all(batch_options.parse(arguments)).all_written()

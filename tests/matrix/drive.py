@@ -234,7 +234,7 @@ def without_module(folder):
         f"Python {sys.version_info[0]}.{sys.version_info[1]} in {place()}",
         "Found there: _native",
         "Needed: ",
-        "To mend it: ",
+        "Install the zip of Beamspread",
     ):
         expect(part in said, f"{part!r} is not in {said!r}")
     bpy.ops.wm.open_mainfile(filepath=str(folder / "scenes" / "node_before_sockets.blend"))

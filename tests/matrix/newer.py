@@ -2,10 +2,9 @@
 
     newer.py ZIP OUTPUT_FOLDER
 
-The native module says its version too, in as many characters, which are changed in place; so is its checksum.
+The native module says its version too, in as many characters, which are changed in place.
 """
 
-import hashlib
 import sys
 import zipfile
 from pathlib import Path
@@ -19,7 +18,6 @@ def main(path: Path, folder: Path) -> Path:
     with zipfile.ZipFile(path) as archive:
         files = {entry: archive.read(entry) for entry in archive.namelist()}
     del files["beamspread/LICENSE"]
-    sums = []
     for entry, data in files.items():
         base = entry.partition("/")[2]
         if base in {"VERSION", "blender_manifest.toml"}:
@@ -31,8 +29,6 @@ def main(path: Path, folder: Path) -> Path:
             if len(old) != len(new) or data.count(old.encode() + b"\0") != 1:
                 raise SystemExit(f"{entry}: no single place of the version {old}")
             files[entry] = data.replace(old.encode() + b"\0", new.encode() + b"\0")
-            sums.append(f"{hashlib.sha256(files[entry]).hexdigest()}  {base}\n")
-    files["beamspread/native.sha256"] = "".join(sums).encode()
     target = folder / f"{name}-{new}-{rest}"
     with zipfile.ZipFile(target, "w", zipfile.ZIP_STORED) as archive:
         for entry, data in files.items():

@@ -1,7 +1,6 @@
 """The zip that artists install."""
 
 import ast
-import hashlib
 import re
 import subprocess
 import sys
@@ -66,7 +65,7 @@ def test_it_holds_the_staged_files_and_licences_and_nothing_else(files):
     staged = {path.relative_to(STAGED).as_posix() for path in STAGED.rglob("*") if path.is_file()}
     staged = {name for name in staged if "__pycache__" not in name and not name.endswith((".pyi", "py.typed"))}
     licences = {name for name in names if name.startswith("LICENSES/")}
-    assert names == staged | licences | {"LICENSE", "native.sha256", OTHER_MODULE}
+    assert names == staged | licences | {"LICENSE", OTHER_MODULE}
     assert licences == {f"LICENSES/{name}.txt" for name in LIBRARIES}
     for name in ("__init__.py", "blender_manifest.toml", "batch.py", "data/materials.csv", "VERSION"):
         assert f"beamspread/{name}" in files
@@ -81,14 +80,6 @@ def test_help_buttons_find_their_pages(files):
     }
     assert len(pages) >= 5
     assert {f"beamspread/docs/{page}.md" for page in pages} <= set(files)
-
-
-def test_every_module_has_its_checksum(files):
-    sums = dict(reversed(line.split("  ")) for line in files["beamspread/native.sha256"].decode().splitlines())
-    modules = {name.removeprefix("beamspread/") for name in files if name.endswith((".so", ".pyd"))}
-    assert set(sums) == modules
-    for name in modules:
-        assert sums[name] == hashlib.sha256(files[f"beamspread/{name}"]).hexdigest()
 
 
 def test_blender_reads_its_bl_info_without_running_it(files):

@@ -1,20 +1,31 @@
-"""Images of the scene: what can be baked into, and filling them."""
+"""Images and their files: pixels, encoding, and writing files completely or not at all."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
 import numpy as np
 
 from ...core.errors import ImageError
-from ..node.tree import FRAMES
+from ...core.exr_header import is_half, text_of
+from ...core.native import native
+from ...core.whole_file import whole_file
+from .. import compat
 from . import icons, undo
-from .writing import is_read_only, pixels_of, save_image, scene_linear, set_pixels, write_exr
+from .facts import facts_of
 
-# Formats of files that keep values above 1.
-WITH_RANGE = {".exr", ".hdr"}
+EXTENSIONS = {"EXR": ".exr", "PNG": ".png"}
+"""Extensions of the formats that bakes are written in."""
+
+EXTENSIONS_WITH_RANGE = {".exr", ".hdr"}
+"""Extensions of the formats that hold values above 1."""
+
+MADE_FOR = "beamspread:madeFor"
+"""EXR attribute that names the .blend file and the image that the file belongs to."""
 
 
 def file_of(image) -> Path | None:
@@ -25,11 +36,11 @@ def file_of(image) -> Path | None:
 
 
 def check_image(image) -> None:
-    """Raise ImageError with one sentence if a bake could not be kept in the image."""
+    """Raise ImageError with one sentence if a bake could not be stored in the image."""
     name = f"The image '{image.name}'"
     if image.source == "TILED":
         raise ImageError(f"{name} has UDIM tiles, which cannot be baked yet: choose a single image in the node.")
-    if image.source == "SEQUENCE" and FRAMES in image:
+    if image.source == "SEQUENCE" and facts_of(image).frames:
         raise ImageError(f"{name} holds the frames of a batch: Show Single Images (Render > Beamspread > Batch) first.")
     if image.source not in {"FILE", "GENERATED"}:
         raise ImageError(f"{name} is a sequence, movie or viewer: choose a single image in the node.")
@@ -46,41 +57,67 @@ def check_image(image) -> None:
 
 
 def fill_image(image, texture: np.ndarray) -> str:
-    """Put linear RGB (height, width, 3) into an image and keep it; the path of its file, "" where it is packed.
+    """Put linear RGB (height, width, 3) into an image and save it; the path of its file, "" if it is packed.
 
-    Where the file can't be written (ImageError), the old pixels remain.
+    Raises
+    ------
+    ImageError
+        The image can't be saved. It keeps its pixels.
     """
     check_image(image)
     if tuple(image.size) != texture.shape[1::-1]:
         raise ImageError(f"The image '{image.name}' changed its size during the bake: bake it again.")
     path = file_of(image)
-    stored = to_srgb(texture) if _is_encoded(image) else texture
+    encoded = to_srgb(texture) if _is_encoded(image) else texture
     if path is None:
-        set_pixels(image, stored)
+        set_pixels(image, encoded)
         image.pack()
         undo.stamp(image)
         return ""
     if path.suffix.lower() == ".exr":
         write_exr(path, texture)
         if not image.colorspace_settings.is_data:
-            image.colorspace_settings.name = scene_linear()  # which it now is, whatever it was
+            image.colorspace_settings.name = scene_linear()  # the new file is linear, whatever the old one was
     else:
-        _write_like(image, stored, path)
+        _write_like(image, encoded, path)
     icons.reload(image)
     undo.stamp(image)
     return str(path)
 
 
-def _write_like(image, stored: np.ndarray, path: Path) -> None:
-    """Write pixels to a file of the image's own format."""
-    copy = image.copy()
+def make_image(name: str, width: int, height: int, is_data: bool = False):
+    """Make a float image; Blender gives it the scene-linear color space unless `is_data`."""
+    return bpy.data.images.new(name, width, height, alpha=False, float_buffer=True, is_data=is_data)
+
+
+def scene_linear() -> str:
+    """Name of the color space of linear values, which differs between versions and configurations."""
+    image = make_image("Beamspread", 1, 1)
     try:
-        if copy.size[:] != image.size[:]:
-            copy.scale(*image.size)  # as the image was since it was loaded
-        set_pixels(copy, stored)
-        save_image(copy, path)
+        return image.colorspace_settings.name
     finally:
-        bpy.data.images.remove(copy)
+        bpy.data.images.remove(image)
+
+
+def set_pixels(image, texture: np.ndarray) -> None:
+    """Replace all pixels; `texture` float (height, width, 3), row 0 at the bottom, in the image's own encoding."""
+    pixels = np.ones(texture.shape[:2] + (4,), np.float32)
+    pixels[..., :3] = texture
+    image.pixels.foreach_set(pixels.ravel())
+    image.update()
+
+
+def pixels_of(image) -> np.ndarray:
+    """Float32 (height, width, 3), row 0 at the bottom, in the image's own encoding."""
+    values = np.empty(image.size[0] * image.size[1] * image.channels, np.float32)
+    image.pixels.foreach_get(values)
+    return values.reshape(image.size[1], image.size[0], image.channels)[..., :3]
+
+
+def linear_pixels(image) -> np.ndarray:
+    """Pixels of an image as linear RGB (height, width, 3)."""
+    encoded = pixels_of(image)
+    return from_srgb(encoded) if _is_encoded(image) else encoded
 
 
 def to_srgb(linear: np.ndarray) -> np.ndarray:
@@ -89,22 +126,130 @@ def to_srgb(linear: np.ndarray) -> np.ndarray:
     return np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055).astype(np.float32)
 
 
-def linear_pixels(image) -> np.ndarray:
-    """What an image shows, linear RGB (height, width, 3)."""
-    stored = pixels_of(image)
-    return from_srgb(stored) if _is_encoded(image) else stored
-
-
-def clips(image) -> bool:
-    """Whether an image, or its file, holds no values above 1."""
-    path = file_of(image)
-    return not image.is_float or (path is not None and path.suffix.lower() not in WITH_RANGE)
-
-
-def _is_encoded(image) -> bool:
-    return not image.is_float and not image.colorspace_settings.is_data
-
-
 def from_srgb(encoded: np.ndarray) -> np.ndarray:
     """Linear values from those of `to_srgb`."""
     return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def clips(image) -> bool:
+    """True if the image or its file holds no values above 1."""
+    path = file_of(image)
+    return not image.is_float or (path is not None and path.suffix.lower() not in EXTENSIONS_WITH_RANGE)
+
+
+def is_read_only(path: Path) -> bool:
+    """True if a file or folder is write-protected, also for an administrator, who could write to it anyway."""
+    return not os.access(path, os.W_OK) or not path.stat().st_mode & 0o222
+
+
+def write_file(
+    path: Path, texture: np.ndarray, file_format: str, attributes: dict[str, str] | None = None, view_of=None
+) -> None:
+    """Write linear RGB (height, width, 3), row 0 at the bottom, as EXR, with its attributes, or as PNG.
+
+    `view_of` is the scene whose view transform a PNG gets, None for plain sRGB.
+    """
+    folder = path.parent
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ImageError(f"The output folder {folder} cannot be made: {error.strerror}.") from error
+    protected = next((part for part in (path, folder) if part.exists() and is_read_only(part)), None)
+    if protected is not None:
+        raise ImageError(f"The output cannot be written because {protected} is read-only.")
+    if file_format == "EXR":
+        write_exr(path, texture, attributes)
+    else:
+        write_png(path, texture, view_of)
+
+
+def write_exr(path: Path, texture: np.ndarray, attributes: dict[str, str] | None = None) -> None:
+    """Write linear RGB without compression, as Blender does; in 16 bits if the old file has 16 and the values fit.
+
+    The file keeps its `MADE_FOR` attribute.
+    """
+    texture = np.ascontiguousarray(texture, np.float32)
+    half = is_half(path) and np.abs(texture).max() <= np.finfo(np.float16).max
+    owner = {MADE_FOR: made_for(path)} if made_for(path) else {}
+    with _whole_image(path) as temporary:
+        native.write_exr(
+            str(temporary), texture, ["R", "G", "B"], owner | (attributes or {}), compression="none", half=bool(half)
+        )
+
+
+def made_for(path: Path) -> str:
+    """Text of a file's `MADE_FOR` attribute; "" if it has none."""
+    return text_of(path, MADE_FOR)
+
+
+def write_png(path: Path, texture: np.ndarray, view_of=None) -> None:
+    """Write a PNG for viewing. Blender converts float images to the color space of byte images."""
+    height, width = texture.shape[:2]
+    image = make_image("Beamspread PNG", width, height)
+    try:
+        set_pixels(image, texture)
+        image.file_format = "PNG"
+        if view_of is None:
+            save_image(image, path)
+            return
+        with _whole_image(path) as temporary, compat.saving_png(view_of):
+            image.save_render(str(temporary), scene=view_of)
+    finally:
+        bpy.data.images.remove(image)
+
+
+def save_image(image, path: Path) -> None:
+    """Write an image of our own making to a file of its format; the image's path changes."""
+    with _whole_image(path) as temporary:
+        image.filepath_raw = str(temporary)
+        image.save()
+
+
+def size_of(path: Path) -> tuple[int, int] | None:
+    """Width and height of an image file; None if the file is missing or damaged."""
+    if not path.is_file():
+        return None
+    if path.suffix.lower() == EXTENSIONS["EXR"]:
+        try:
+            height, width = native.read_exr(str(path))[0].shape[:2]
+        except OSError:
+            return None
+        return width, height
+    image = bpy.data.images.load(str(path))
+    try:
+        return None if 0 in image.size else tuple(image.size)
+    finally:
+        bpy.data.images.remove(image)
+
+
+def _write_like(image, encoded: np.ndarray, path: Path) -> None:
+    """Write pixels to a file of the image's own format."""
+    copy = image.copy()
+    try:
+        if copy.size[:] != image.size[:]:
+            copy.scale(*image.size)  # the image was scaled after it was loaded
+        set_pixels(copy, encoded)
+        save_image(copy, path)
+    finally:
+        bpy.data.images.remove(copy)
+
+
+def _is_encoded(image) -> bool:
+    """True if the image's pixels are sRGB-encoded."""
+    return not image.is_float and not image.colorspace_settings.is_data
+
+
+@contextmanager
+def _whole_image(path: Path) -> Iterator[Path]:
+    """As `whole_file`; raises ImageError that names the file if it can't be written."""
+    try:
+        with whole_file(path) as temporary:
+            yield temporary
+    except (OSError, RuntimeError) as error:
+        raise ImageError(f"The file {path} cannot be written and stays as it was: {_reason(error)}.") from error
+
+
+def _reason(error: Exception) -> str:
+    """First line of an error's text, without the name of the temporary file."""
+    first = (str(error).strip().splitlines() or [type(error).__name__])[0]
+    return getattr(error, "strerror", None) or first.removeprefix("Error: ").rpartition("': ")[2]

@@ -15,7 +15,7 @@ from ...core.batch.names import stem
 from ...core.errors import ImageError
 from ...core.target import Target
 from ...core.whole_file import whole_file
-from . import files, icons, undo, writing
+from . import files, icons, undo
 
 
 def name_for(target: Target) -> str:
@@ -34,7 +34,7 @@ def keep_new(name: str, texture: np.ndarray, bake: Bake, is_data: bool = False) 
             return _in_file(name, texture, is_data)
         except ImageError as error:
             bake.warnings.append(f"{error} The new image is packed into the .blend file instead.")
-    image = writing.make_image(name, *texture.shape[1::-1], is_data=is_data)
+    image = files.make_image(name, *texture.shape[1::-1], is_data=is_data)
     return files.fill_image(image, texture), image
 
 
@@ -46,7 +46,7 @@ def uses_files() -> bool:
 
 def _in_file(name: str, texture: np.ndarray, is_data: bool) -> tuple[str, bpy.types.Image]:
     path, made_for = _place(name)
-    writing.write_file(path, texture, "EXR", {writing.MADE_FOR: made_for})
+    files.write_file(path, texture, "EXR", {files.MADE_FOR: made_for})
     for unused in [one for one in bpy.data.images if files.file_of(one) == path]:
         icons.remove(unused)
     image = bpy.data.images.load(str(path))
@@ -75,7 +75,7 @@ def part_from_others(image) -> str:
         raise ImageError(f"The file {own} cannot be written: {error.strerror}.") from error
     size = tuple(image.size)
     _point_to(image, own)
-    writing.write_exr(own, files.linear_pixels(image), {writing.MADE_FOR: made_for})
+    files.write_exr(own, files.linear_pixels(image), {files.MADE_FOR: made_for})
     icons.reload(image)
     if tuple(image.size) != size:
         icons.scale(image, *size)
@@ -84,7 +84,7 @@ def part_from_others(image) -> str:
 
 def _scene_of(path: Path) -> Path | None:
     """The .blend file for which a file was made, from where it lies."""
-    scene, separator, _name = writing.made_for(path).partition(": ")
+    scene, separator, _name = files.made_for(path).partition(": ")
     return (path.parent / scene).resolve() if separator else None
 
 
@@ -114,7 +114,7 @@ def _free_path(folder: Path, plain: str, made_for: str) -> Path:
     stems = itertools.chain([plain], (f"{plain}_{number}" for number in itertools.count(2)))
     paths = (folder / f"{one}.exr" for one in stems)
     free = (path for path in paths if path not in taken)
-    return next(path for path in free if not path.exists() or writing.made_for(path) == made_for)
+    return next(path for path in free if not path.exists() or files.made_for(path) == made_for)
 
 
 def _free_name(name: str) -> str:

@@ -16,7 +16,7 @@ from ...core.errors import ImageError
 from ...core.target import Target
 from ..node.find import find_node, find_targets
 from ..read.instances import with_instanced
-from . import files, writing
+from . import files
 from .results import Results
 
 
@@ -43,7 +43,7 @@ class Outputs:
         if layer == DIRECTION and file_format == "PNG":
             raise ImageError("A PNG can't hold directions, which have negative parts: choose EXR.")
         number = f"_{frame:04d}" if options.frames else ""
-        name = f"{self._stems[_names(target, layer)]}{number}{writing.EXTENSIONS[file_format]}"
+        name = f"{self._stems[_names(target, layer)]}{number}{files.EXTENSIONS[file_format]}"
         return Path(bpy.path.abspath(folder)).absolute() / name
 
     def own_image(self, target: Target, layer: str):
@@ -68,8 +68,8 @@ class Outputs:
             )
         path = self.path(bake.target, layer, frame)
         said = attributes if self._options.frames else None
-        writing.write_file(path, texture, _format_of(path), said, view_of=self._view_of)
-        if path.suffix == writing.EXTENSIONS["PNG"] and texture.max() > 1 and self._view_of is None:
+        files.write_file(path, texture, _format_of(path), said, view_of=self._view_of)
+        if path.suffix == files.EXTENSIONS["PNG"] and texture.max() > 1 and self._view_of is None:
             bake.warnings.append("Values above 1 were clipped: EXR keeps them.")
         return str(path)
 
@@ -79,4 +79,4 @@ def _names(target: Target, layer: str) -> tuple[str, ...]:
 
 
 def _format_of(path: Path) -> str | None:
-    return next((name for name, ending in writing.EXTENSIONS.items() if path.suffix.lower() == ending), None)
+    return next((name for name, ending in files.EXTENSIONS.items() if path.suffix.lower() == ending), None)

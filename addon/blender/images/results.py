@@ -8,15 +8,24 @@ import bpy
 import numpy as np
 
 from ...core.bake.bake_settings import COMBINED
-from ...core.bake.margin import extend_margin
+from ...core.bake.margin import WHOLE, extend_margin
 from ...core.bake.runner import Bake
 from ...core.errors import BakeError
+from ...core.scene.receiver import Receiver, build_receiver
+from ...core.scene.uv_map import fit_uv_maps
 from ...core.target import Target
 from ..node.find import find_node
 from ..node.node import link_result
+from ..read.geometry import read_polygons
 from . import files, icons, previews
+from .facts import note_bake, owners_of, users_of
 from .new_image import keep_new, name_for, part_from_others
-from .owners import Parts, note_owner, others_in, overlaps, parts_of, read_parts, users_of, within
+
+OVERLAP_TOLERANCE = 0.01
+"""Fraction of a receiver's texels that may lie in another's charts: rounding at a common border is less."""
+
+Parts = tuple[tuple[int, int, np.ndarray], ...]
+"""Charts in a texture: column and row of the first texel, and coverage of each texel, float32 (rows, columns)."""
 
 
 class Results:
@@ -91,7 +100,7 @@ class Results:
             )
         path = self.fill(image, bake, texture)
         if path is not None:
-            note_owner(image, bake.target)
+            note_bake(image, bake.target)
             if texture.max() > 1 and files.clips(image):
                 bake.warnings.append(f"The image '{image.name}' clips values above 1: Make Float keeps them.")
         return path
@@ -117,7 +126,7 @@ class Results:
 
     def _new(self, bake: Bake, texture: np.ndarray) -> tuple[str, bpy.types.Image]:
         path, image = keep_new(name_for(bake.target), texture, bake)
-        note_owner(image, bake.target)
+        note_bake(image, bake.target)
         return path, image
 
     def _store_beside(self, node, bake: Bake, layer: str, texture: np.ndarray) -> str:
@@ -140,7 +149,8 @@ class Results:
         planned = self._planned.get(image.name, [])
         first = planned[: planned.index(target)] if target in planned else planned
         users = users_of(image)
-        others = dict.fromkeys([*others_in(image, target), *(other for other in first if other in users)])
+        others = dict.fromkeys([*owners_of(image), *(other for other in first if other in users)])
+        others.pop(target, None)
         if target.object_name in bpy.data.objects:
             return list(others)
         # Renamed during the bake: it isn't another, and others with its material have other parts.
@@ -190,3 +200,29 @@ def check_editable(material) -> None:
             f"The material '{material.name}' belongs to another .blend file, so this one can't keep its image: make it "
             "local (Object > Relations > Make Local > Selected Objects, Data and Materials), or bake in that file."
         )
+
+
+def parts_of(receiver: Receiver) -> Parts:
+    """Charts of a receiver in its texture."""
+    return tuple((*chart.offset, chart.coverage) for chart in receiver.charts)
+
+
+def read_parts(target: Target, width: int, height: int) -> Parts:
+    """Charts of a target in a texture of that size; the whole texture if they are unknown."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    try:
+        obj = bpy.data.objects[target.object_name].evaluated_get(depsgraph)
+        return parts_of(build_receiver(fit_uv_maps(read_polygons(obj, target.material_name)), width, height))
+    except BakeError:
+        return ((0, 0, np.ones((height, width), np.float32)),)
+
+
+def within(texture: np.ndarray, column: int, row: int, coverage: np.ndarray) -> np.ndarray:
+    """View of the texels of a texture (height, width) on which a chart lies."""
+    return texture[row : row + coverage.shape[0], column : column + coverage.shape[1]]
+
+
+def overlaps(receiver: Receiver, parts: Parts) -> bool:
+    """True if the receiver's charts overlap others in the same texture by more than rounding."""
+    shared = sum(int(((within(receiver.coverage, *part) > WHOLE) & (part[2] > 0)).sum()) for part in parts)
+    return shared > OVERLAP_TOLERANCE * receiver.inside().sum()

@@ -6,62 +6,51 @@ A file is not undone: what its image says of the bakes in it stays, too, and tha
 from __future__ import annotations
 
 import uuid
+from dataclasses import replace
 
 import bpy
 from bpy.app.handlers import persistent
 
 from ..registration import all_or_nothing, handlers
-
-OURS = "beamspread_"
-"""How the names of all that an image says of bakes begin."""
-
-# Of an image: a number of the last bake in it, which travels with undo as the packed file does.
-KEY = f"{OURS}stamp"
+from .facts import ImageFacts, facts_of, set_facts
 
 _shown: dict[str, str] = {}
-"""Stamp of the pixels that an image shows, by its name, where this session baked them: others may be painted."""
+"""Stamp of the pixels that an image shows, by its name, if this session baked them."""
 
-UNDONE = f"{OURS}undone"
-"""Of an image: the bake that its file holds was undone."""
-
-_in_files: dict[tuple[str, str], dict[str, str]] = {}
-"""What images with files said of their bakes before the last undo at which they were there, by name and path."""
+_in_files: dict[tuple[str, str], ImageFacts] = {}
+"""Facts of images with files before the last undo that had these images, by name and path."""
 
 
 def stamp(image) -> None:
-    """Note that the image shows what it has just packed, or what has just been written to its file."""
-    image[KEY] = _shown[image.name] = uuid.uuid4().hex
-    image.pop(UNDONE, None)
+    """Note that the image shows the pixels that were just packed or written to its file."""
+    _shown[image.name] = uuid.uuid4().hex
+    set_facts(image, replace(facts_of(image), stamp=_shown[image.name], is_undone=False))
 
 
 def is_undone(image) -> bool:
-    """Whether the last bake in the image's file was undone, which the file was not."""
-    return UNDONE in image
+    """True if the last bake in the image's file was undone, which the file was not."""
+    return facts_of(image).is_undone
 
 
 @persistent
 def _note_files(*_arguments) -> None:
-    _in_files.update({_key(image): _said(image) for image in bpy.data.images if KEY in image and _has_file(image)})
+    facts = {_key(image): facts_of(image) for image in bpy.data.images if _has_file(image)}
+    _in_files.update((key, known) for key, known in facts.items() if known.stamp)
 
 
 @persistent
-def _show_what_is_kept(*_arguments) -> None:
+def _show_packed_pixels(*_arguments) -> None:
     for image in bpy.data.images:
+        facts = facts_of(image)
         if _key(image) in _in_files and _has_file(image):
-            said = _in_files[_key(image)]
-            is_other = image.get(KEY) != said[KEY]
-            for key, text in said.items():
-                image[key] = text
-            if is_other:
-                image[UNDONE] = "yes"
-            else:
-                image.pop(UNDONE, None)
-        kept = image.get(KEY, "")
-        if _shown.get(image.name, kept) != kept:
-            # Not `reload`: it would pack the image's file anew, where there is one.
+            in_file = _in_files[_key(image)]
+            facts = replace(in_file, is_undone=facts.stamp != in_file.stamp)
+            set_facts(image, facts)
+        if _shown.get(image.name, facts.stamp) != facts.stamp:
+            # `reload` would pack the image's file again, if there is one.
             image.buffers_free()
             image.gl_free()
-            _shown[image.name] = kept
+            _shown[image.name] = facts.stamp
 
 
 def _key(image) -> tuple[str, str]:
@@ -70,10 +59,6 @@ def _key(image) -> tuple[str, str]:
 
 def _has_file(image) -> bool:
     return image.source == "FILE" and image.packed_file is None
-
-
-def _said(image) -> dict[str, str]:
-    return {key: value for key, value in image.items() if key.startswith(OURS)}
 
 
 @persistent
@@ -86,8 +71,8 @@ register, unregister = all_or_nothing(
     *handlers(
         undo_pre=_note_files,
         redo_pre=_note_files,
-        undo_post=_show_what_is_kept,
-        redo_post=_show_what_is_kept,
+        undo_post=_show_packed_pixels,
+        redo_post=_show_packed_pixels,
         load_pre=_forget,
     )
 )

@@ -8,10 +8,11 @@ import numpy as np
 from ...core.live.picture import Picture
 from ...core.live.subject import Subject
 from ...core.target import Target
-from ..images import files, icons, undo
+from ..images import files, icons
+from ..images.facts import facts_of
+from ..images.files import make_image
 from ..images.new_image import name_for
 from ..images.previews import MADE_FOR_PREVIEWS, holds_previews_alone, leave
-from ..images.writing import make_image
 from ..node.find import find_node
 from .saved import Saved, can_be_read_again, reread
 
@@ -52,7 +53,7 @@ class Canvas:
 
     def _know(self, image) -> None:
         self.name, self.size, self._pointer = image.name, tuple(image.size), image.as_pointer()
-        self._stamp = image.get(undo.KEY)
+        self._stamp = facts_of(image).stamp
 
     def image(self):
         """The image, also where it is called otherwise by now; None where it is gone."""
@@ -137,7 +138,9 @@ class Canvas:
         image = self.image()
         if image is None:
             return False
-        return image.get(undo.KEY) != self._stamp or (self._is_shown and not self._is_given_back and not image.is_dirty)
+        return facts_of(image).stamp != self._stamp or (
+            self._is_shown and not self._is_given_back and not image.is_dirty
+        )
 
     def refresh(self, can_be_painted: bool) -> None:
         """Look at the image's pixels again, after undo."""

@@ -14,7 +14,7 @@ from ...core.live.painter import Painter
 from ...core.live.picture import Picture
 from ...core.live.subject import Subject
 from ...core.target import Target
-from ..images.owners import owners_of
+from ..images.facts import owners_of
 from ..images.previews import holds_previews_alone, leave, previews
 from ..jobs.state import state
 from ..registration import all_or_nothing, handlers

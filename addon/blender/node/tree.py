@@ -10,9 +10,6 @@ IMAGE, FRESNEL, COAT, GLOSSY = "Image", "Fresnel", "Coat", "Glossy"
 FACING = "Facing"
 INPUT, EMISSION, UNSEEN = "Input", "Emission", "Unseen"
 
-# Of an image sequence: its first and last frame, width and height.
-FRAMES = "beamspread_frames"
-
 # Of the coat where no input has changed it; older trees have it in their Glossy node.
 ROUGHNESS_BEFORE = 0.1
 
@@ -112,15 +109,18 @@ def _normal_or_plain(tree, given):
 
 
 def show_values(tree, image, ior: float) -> None:
-    """Bring an image and an index of refraction into the tree; a sequence follows the frame."""
+    """Bring an image and an index of refraction into the tree."""
     tree.nodes[IMAGE].image = image
-    if image is not None and image.source == "SEQUENCE" and FRAMES in image:
-        (first, last, *_), user = image[FRAMES], tree.nodes[IMAGE].image_user
-        user.frame_start, user.frame_duration, user.frame_offset = first, last - first + 1, first - 1
-        user.use_auto_refresh = True
     tree.nodes[FRESNEL].inputs["IOR"].default_value = max(ior, 1.0)
     # Without a step in refraction there is no coat, whatever the renderer's Fresnel node says at grazing angles.
     tree.nodes[COAT].inputs[1].default_value = 1.0 if ior > 1 else 0.0
+
+
+def follow_frames(tree, first: int, last: int) -> None:
+    """Have the tree's image, a sequence, follow the scene's frame from the first to the last file."""
+    user = tree.nodes[IMAGE].image_user
+    user.frame_start, user.frame_duration, user.frame_offset = first, last - first + 1, first - 1
+    user.use_auto_refresh = True
 
 
 def _add(tree, kind: str, name: str, location: tuple[int, int]):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..images.files import clips
-from ..images.operators import image_in, wanted_size
+from ..images.image_operators import image_in, wanted_size
 from ..images.previews import holds_previews_alone
 
 

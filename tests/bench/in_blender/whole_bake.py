@@ -64,20 +64,20 @@ def phases(folder):
 
     def import_all():
         from beamspread import batch, blender
-        from beamspread.blender.images import writing
+        from beamspread.blender.images import files
         from beamspread.blender.jobs.run import batch_run as bakes
         from beamspread.core.bake import job, luminance
 
-        return batch, blender, writing, bakes, job, luminance
+        return batch, blender, files, bakes, job, luminance
 
-    batch, blender, writing, bakes, job, luminance = timed("import", import_all)()
+    batch, blender, files, bakes, job, luminance = timed("import", import_all)()
     time_calls("register", blender, "register")
     time_calls("extract", bakes, "prepare_scene")
     time_calls("library from the cache", luminance, "_libraries")
     time_calls("beams and visibility", luminance, "gather_unit")
     time_calls("solve", luminance, "_spread")
     time_calls("margin", job, "extend_margin")
-    time_calls("image file", writing, "write_file")
+    time_calls("image file", files, "write_file")
     time_calls("unregister", blender, "unregister")
     batch.run(["--output", folder, "--report", str(Path(folder) / "report.json")])
     rest = [

@@ -15,17 +15,15 @@ from bpy.app.handlers import persistent
 from ....core.bake.runner import Bake
 from ....core.target import Target
 from ...images import previews
+from ...images.facts import Record, facts_of, note_bake, record_in, record_of
 from ...images.files import file_of
-from ...images.owners import noted_as
 from ...images.sequence import file_at, is_sequence
 from ...images.undo import is_undone
 from ...node.find import find_bakeable, find_misplaced, find_node
-from ...node.tree import FRAMES
 from ...read.instances import by_name
 from ...registration import all_or_nothing, handlers
 from ..state import Row, Status, redraw, state
 from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
-from .record import Record, keep_record, record_in, record_of
 
 # After the last change; and after the last look so long that looks take at most such a part of the time. One alone may
 # take longer: the first of a file, and after undo, reads all meshes, and those that follow don't.
@@ -75,7 +73,7 @@ def keep(bake: Bake, parts: Parts | None, is_first_look: bool = False) -> None:
     parts = parts | {IMAGE: image_part(image)}  # the bake may have made it
     if is_first_look:
         parts[QUALITY] = FIRST_LOOK
-    keep_record(image, bake.target, Record(parts, tuple(bake.warnings), image.is_dirty, tuple(bake.notes)))
+    note_bake(image, bake.target, Record(parts, tuple(bake.warnings), image.is_dirty, tuple(bake.notes)))
 
 
 def keep_later(bake: Bake, parts: Parts | None) -> None:
@@ -98,7 +96,7 @@ def _record(target: Target, scene) -> Record | None:
     if is_sequence(image):
         path = file_at(image, scene.frame_current)
         return path and record_in(path)
-    return None if image is None else record_of(image, noted_as(image, target))
+    return None if image is None else record_of(image, target)
 
 
 def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
@@ -125,7 +123,7 @@ def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
 
 def _row_of_frames(target: Target, record: Record | None, now: Parts | None) -> Row:
     """Of a sequence, by the frame that is shown; a bake does not make it anew, and so it is not up for one."""
-    first, last, *_ = _image(target)[FRAMES]
+    first, last, *_ = facts_of(_image(target)).frames
     shown = f"Shows the frames {first} to {last} of a batch"
     if record is None or now is None:
         return Row(target, Status.BAKED, (f"{shown}; what has changed since is not known.",))

@@ -18,14 +18,13 @@ from ....core.batch.stop import Stop
 from ....core.errors import BakeError
 from ....core.progress import timed
 from ....core.target import Target
-from ...images.files import file_of
+from ...images.facts import Record, attributes_of
+from ...images.files import file_of, size_of
 from ...images.outputs import Outputs
-from ...images.writing import size_of
 from ...node.find import NOTHING_FOUND, find_bakeable, find_misplaced
 from ...read.instances import by_name
 from ..out_of_date import stale
 from ..out_of_date.fingerprint import IMAGE, SETTINGS, Parts, settings_part
-from ..out_of_date.record import Record, in_file
 from .prepare import prepare_scene
 
 
@@ -174,7 +173,7 @@ class _Batch:
             bake.cancel()
         # A sequence does not tell its size.
         read = {name: one for name, one in (parts or {}).items() if name != IMAGE}
-        said = in_file(Record(read, tuple(bake.warnings))) if read else {}
+        said = attributes_of(Record(read, tuple(bake.warnings))) if read else {}
         bake.keep(lambda bake: self._outputs.write(bake, frame, said))
 
 

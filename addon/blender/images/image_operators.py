@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 
 from ...core.bake.runner import Bake
@@ -9,8 +11,8 @@ from ...core.target import Target
 from ..node.find import find_node
 from ..registration import all_or_nothing, classes
 from . import files, icons, previews
+from .facts import facts_of, set_facts
 from .new_image import keep_new
-from .owners import KEY
 
 
 def image_in(context):
@@ -52,13 +54,12 @@ class BEAMSPREAD_OT_make_float(ImageOperator, bpy.types.Operator):
     def execute(self, context):
         previews.give_back()
         image = image_in(context)
-        name, owners = image.name, image.get(KEY)
+        name, bakes = image.name, facts_of(image).bakes
         said = Bake(Target(""))
         _path, new = keep_new(name, files.linear_pixels(image), said, image.colorspace_settings.is_data)
         image.user_remap(new)
         image.name, new.name = f"{name} (8 bit)", name
-        if owners is not None:
-            new[KEY] = owners
+        set_facts(new, replace(facts_of(new), bakes=bakes))
         for material in bpy.data.materials:
             node = find_node(material)
             if node is not None and node.image == new:

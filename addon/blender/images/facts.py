@@ -1,0 +1,187 @@
+"""Facts that an image keeps about the bakes in it: one text under one key of the image.
+
+A target whose bake is recorded in an image owns its part of it, so that no other bake overwrites the result unasked.
+Targets are recorded by name: pointers would keep deleted objects in the file.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+import bpy
+
+from ...core.target import Target
+from ...core.exr_header import text_of
+from ..node.find import find_node, find_targets
+from ..read.instances import with_instanced
+
+KEY = "beamspread"
+"""Key of the group in an image: "facts", JSON, and "former", a pointer that keeps that image in the file."""
+
+VERSION = 1
+"""Version of the JSON."""
+
+OLD_KEYS = {name: f"beamspread_{name}" for name in ("results", "bakes", "stamp", "undone", "frames", "former")}
+"""Keys of images in files of earlier versions, one for each fact."""
+
+ATTRIBUTE = "beamspread:bake"
+"""EXR attribute that holds the record of a frame of a batch."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """One bake.
+
+    Attributes
+    ----------
+    parts : digest of each part of the scene that the bake read; empty if unknown.
+    warnings, notes : messages of the bake.
+    is_dirty : True if the image had unsaved pixels right after the bake.
+    """
+
+    parts: dict[str, str] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    is_dirty: bool = False
+    notes: tuple[str, ...] = ()
+
+    def changed(self, now: dict[str, str]) -> list[str]:
+        """Names of the parts whose digest differs. Parts that the record lacks count as unchanged."""
+        return [name for name, digest in now.items() if self.parts.get(name, digest) != digest]
+
+
+class Frames(NamedTuple):
+    """First and last frame of an image sequence, and the size of its images in texels."""
+
+    first: int
+    last: int
+    width: int
+    height: int
+
+
+@dataclass
+class ImageFacts:
+    """Facts about one image.
+
+    Attributes
+    ----------
+    bakes : record of each target whose result the image holds.
+    stamp : identifies the last bake in the image; undo restores it together with packed pixels.
+    is_undone : True if the last bake was undone, which leaves the image's file as it is.
+    frames : frames of a batch; None unless the image is such a sequence.
+    former : image that the node showed before this sequence.
+    """
+
+    bakes: dict[Target, Record] = field(default_factory=dict)
+    stamp: str = ""
+    is_undone: bool = False
+    frames: Frames | None = None
+    former: bpy.types.Image | None = None
+
+
+def facts_of(image) -> ImageFacts:
+    """Facts of an image; empty ones if it has none."""
+    group = image.get(KEY)
+    if group is None:
+        return _migrated(image)
+    known = _parsed(group["facts"])
+    return ImageFacts(
+        {Target(*names): _record(entry) for *names, entry in known.get("bakes", [])},
+        known.get("stamp", ""),
+        known.get("is_undone", False),
+        Frames(*known["frames"]) if known.get("frames") else None,
+        group.get("former"),
+    )
+
+
+def set_facts(image, facts: ImageFacts) -> None:
+    """Replace the facts of an image."""
+    bakes = [(target.object_name, target.material_name, asdict(record)) for target, record in facts.bakes.items()]
+    known = {"version": VERSION, "bakes": bakes, "stamp": facts.stamp, "is_undone": facts.is_undone}
+    pointers = {} if facts.former is None else {"former": facts.former}
+    image[KEY] = {"facts": json.dumps(known | {"frames": facts.frames}), **pointers}
+    for key in OLD_KEYS.values():
+        image.pop(key, None)
+
+
+def note_bake(image, target: Target, record: Record | None = None) -> None:
+    """Record a bake of the target; without a record, only that the target owns its part of the image.
+
+    Targets that were renamed get their new names. Targets that no longer show the image lose their record.
+    """
+    facts = facts_of(image)
+    users = users_of(image) if facts.bakes else []
+    bakes = {user: entry for name, entry in facts.bakes.items() for user in _known_as(name, users)}
+    facts.bakes = bakes | {target: record or bakes.get(target, Record())}
+    set_facts(image, facts)
+
+
+def record_of(image, target: Target) -> Record | None:
+    """Record of the target's bake in the image, or None. The target may have been renamed since."""
+    bakes = facts_of(image).bakes
+    users = users_of(image) if bakes and target not in bakes else []
+    renamed = (name for name in bakes if name not in users and _known_as(name, users) == [target])
+    record = bakes.get(target if target in bakes else next(renamed, None))
+    return record if record is not None and record.parts else None
+
+
+def owners_of(image) -> list[Target]:
+    """Targets whose results the image holds and that still show it, by their present names."""
+    bakes = facts_of(image).bakes
+    users = users_of(image) if bakes else []
+    return list(dict.fromkeys(user for name in bakes for user in _known_as(name, users)))
+
+
+def users_of(image) -> list[Target]:
+    """Targets in any scene whose Beamspread node shows the image."""
+    return [
+        target
+        for target in find_targets(with_instanced(obj for obj in bpy.data.objects if obj.users_scene))
+        if find_node(bpy.data.materials[target.material_name]).image == image
+    ]
+
+
+def record_in(path: Path) -> Record | None:
+    """Record of the bake in an EXR file, or None."""
+    entry = _parsed(text_of(path, ATTRIBUTE))
+    return _record(entry) if entry else None
+
+
+def attributes_of(record: Record) -> dict[str, str]:
+    """Attributes of an EXR file from which `record_in` reads the record."""
+    return {ATTRIBUTE: json.dumps(asdict(record))}
+
+
+def _known_as(name: Target, users: list[Target]) -> list[Target]:
+    """Users of the image that a recorded name stands for: itself, else those of its material, else of its object."""
+    if name in users:
+        return [name]
+    same_material = [user for user in users if user.material_name == name.material_name]
+    return same_material or [user for user in users if user.object_name == name.object_name]
+
+
+def _migrated(image) -> ImageFacts:
+    """Facts of an image from a file of an earlier version."""
+    old = {name: image[key] for name, key in OLD_KEYS.items() if key in image}
+    owners = [Target(*names) for names in json.loads(old.get("results", "[]"))]
+    records = {name: _record(entry) for name, entry in _parsed(old.get("bakes", "{}")).items()}
+    bakes = {owner: records.pop(str(owner), Record()) for owner in owners}
+    bakes |= {Target(*name.split(" / ", 1)): record for name, record in records.items()}
+    frames = Frames(*old["frames"]) if "frames" in old else None
+    return ImageFacts(bakes, old.get("stamp", ""), "undone" in old, frames, old.get("former"))
+
+
+def _parsed(text: str) -> dict:
+    """Content of a JSON text; an empty dictionary if it is damaged."""
+    try:
+        known = json.loads(text)
+    except (TypeError, ValueError):
+        return {}
+    return known if isinstance(known, dict) else {}
+
+
+def _record(entry: dict) -> Record:
+    warnings, notes = entry.get("warnings", ()), entry.get("notes", ())
+    return Record(entry.get("parts", {}), tuple(warnings), entry.get("is_dirty", False), tuple(notes))
