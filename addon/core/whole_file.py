@@ -19,7 +19,7 @@ except ImportError:  # Windows: temporary files of killed processes stay
 _TEMPORARY = re.compile(r".+\.beamspread-[0-9a-f]{8}\.tmp(\.\w+)?")
 """Names of temporary files. A running process holds a lock on each of its own."""
 
-_SPARE_BYTES = 1 << 16
+_SPARE_BYTES = 1 << 14
 """Room that a disk must have left after a file is written. Blender and other writers ignore errors of a full disk."""
 
 _MIN_AGE_SECONDS = 60.0

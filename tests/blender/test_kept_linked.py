@@ -101,3 +101,8 @@ def test_an_appended_image_is_no_ones(tmp_path):
     assert [*facts_of(image).bakes] == [Target("Plane", "Medium")]
     bake(other)
     assert image_of(other) == image
+
+
+def test_frames_are_not_shown_in_linked_materials_and_the_operator_says_so(tmp_path):
+    link_from_library(tmp_path)
+    assert "There are no frames of a batch: bake them with --frames A-B" in messages_of(bpy.ops.beamspread.show_frames)

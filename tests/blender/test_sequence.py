@@ -123,7 +123,7 @@ def test_it_is_not_baked_into_and_a_batch_writes_its_frames_again(plane, tmp_pat
 def test_gaps_and_no_frames_are_said(plane, tmp_path, capfd):
     (tmp_path / "beamspread" / "Plane_Medium_0004.exr").unlink()
     bpy.ops.beamspread.show_frames()
-    assert "1 are missing" in capfd.readouterr().out
+    assert "1 of the frames 3 to 5 of 'Plane / Medium' are missing" in capfd.readouterr().out
     for path in (tmp_path / "beamspread").iterdir():
         path.unlink()
     bpy.ops.beamspread.show_single()
