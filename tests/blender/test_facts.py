@@ -7,10 +7,11 @@ import bpy
 import pytest
 from beamspread.blender.images.facts import KEY, Frames, ImageFacts, Record, facts_of, note_bake, record_of, set_facts
 from beamspread.blender.images.sequence import is_sequence
-from beamspread.blender.jobs import batch, stale
-from beamspread.blender.jobs.state import Standing, state
-from beamspread.core.bake.runner import Target
-from beamspread.core.batch import options
+from beamspread.blender.jobs.out_of_date import stale
+from beamspread.blender.jobs.run import batch_run
+from beamspread.blender.jobs.state import Status, state
+from beamspread.core.batch import batch_options
+from beamspread.core.target import Target
 from scenes import add_material, add_plane, add_sun, bake, image_of, save_scene
 
 PLANE = Target("Plane", "Medium")
@@ -71,13 +72,13 @@ def test_a_bake_in_a_file_of_an_earlier_version_is_known(tmp_path):
     bpy.ops.wm.open_mainfile(filepath=path)
     state.forget()
     stale.refresh(bpy.context)
-    assert state.rows[PLANE].standing == Standing.BAKED
+    assert state.rows[PLANE].status == Status.BAKED
     bpy.data.objects["Sun"].data.energy *= 2
     stale.refresh(bpy.context)
-    assert state.rows[PLANE].standing == Standing.STALE
+    assert state.rows[PLANE].status == Status.STALE
     bake(bpy.data.objects["Plane"])
     stale.refresh(bpy.context)
-    assert state.rows[PLANE].standing == Standing.BAKED
+    assert state.rows[PLANE].status == Status.BAKED
     assert [key for key in image_of(bpy.data.objects["Plane"]).keys() if key.startswith("beamspread")] == [KEY]  # noqa: SIM118
 
 
@@ -88,7 +89,7 @@ def test_frames_of_an_earlier_version_are_shown(tmp_path):
     save_scene(tmp_path)
     bake(plane)
     own = image_of(plane).name
-    assert batch.bake_all(options.parse(["--frames", "3-4"])).all_written()
+    assert batch_run.bake_all(batch_options.parse(["--frames", "3-4"])).all_written()
     bpy.ops.beamspread.show_frames()
     use_keys_of_earlier_versions(image_of(plane))
     assert is_sequence(image_of(plane))

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import bpy
 
-from ...core.target import Target
 from ...core.exr_header import text_of
+from ...core.target import Target
 from ..node.find import find_node, find_targets
 from ..read.instances import with_instanced
 
