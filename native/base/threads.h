@@ -3,6 +3,10 @@
 
 #include <cstddef>
 #include <functional>
+#include <vector>
+
+#include <oneapi/tbb/cache_aligned_allocator.h>
+#include <oneapi/tbb/enumerable_thread_specific.h>
 
 namespace beamspread {
 
@@ -19,5 +23,14 @@ void parallel_for(std::size_t count, const std::function<void(std::size_t)>& bod
 // Calls make(i) in parallel, and what it returns one at a time in the order of i, so that sums come out the same, bit
 // for bit, for any number of threads. At most a few results exist at once.
 void parallel_ordered(std::size_t count, const std::function<std::function<void()>(std::size_t)>& make);
+
+// Begins with a line of the cache: vectors that are loaded from it don't straddle two.
+template <class T>
+using AlignedVector = std::vector<T, oneapi::tbb::cache_aligned_allocator<T>>;
+
+// An object for each thread that asks by `local()`, which comes with what it held. No parallel loop may begin while it is
+// in use, as its thread may help other loops.
+template <class T>
+using PerThread = oneapi::tbb::enumerable_thread_specific<T>;
 
 }  // namespace beamspread

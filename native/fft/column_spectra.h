@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <memory>
 
-#include "base/huge_pages.h"
+#include "base/platform.h"
 #include "fft/fft.h"
 
 namespace beamspread {

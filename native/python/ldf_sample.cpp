@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "ldf/library/ldf_image.h"
-#include "ldf/samples/brightest.h"
+#include "ldf/samples/angular_space.h"
 #include "python/casters.h"
 
 namespace beamspread {

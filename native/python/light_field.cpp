@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "base/error.h"
-#include "base/working_memory.h"
+#include "base/threads.h"
 #include "python/problem.h"
 #include "scene/ray_gather.h"
 #include "solve/light_field.h"

@@ -8,7 +8,6 @@
 
 #include "base/constants.h"
 #include "base/error.h"
-#include "base/gauss_rule.h"
 #include "scene/checks.h"
 #include "scene/polygon.h"
 

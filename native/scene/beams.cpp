@@ -10,7 +10,6 @@
 
 #include "base/error.h"
 #include "base/threads.h"
-#include "base/working_memory.h"
 #include "scene/checks.h"
 #include "scene/ray_start.h"
 #include "scene/shadows.h"

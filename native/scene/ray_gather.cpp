@@ -12,7 +12,6 @@
 #include "base/sobol.h"
 #include "base/threads.h"
 #include "base/vec.h"
-#include "base/working_memory.h"
 #include "scene/beams.h"
 #include "scene/checks.h"
 #include "scene/open_irradiance.h"

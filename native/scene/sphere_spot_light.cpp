@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "base/gauss_rule.h"
+#include "base/constants.h"
 #include "scene/cone.h"
 
 namespace beamspread {

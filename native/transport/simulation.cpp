@@ -11,7 +11,7 @@
 #include "base/error.h"
 #include "base/threads.h"
 #include "medium/fresnel.h"
-#include "transport/tally/harmonic_choice.h"
+#include "transport/tally/tally_statistics.h"
 
 namespace beamspread {
 
@@ -20,7 +20,7 @@ namespace {
 // Half takes 1.03 times the CPU time, an eighth 1.17 times, twice .92 times for half as many threads; of 800,000 photons.
 constexpr std::uint64_t enough_photons_per_job = 200'000;
 
-// Consecutive ones, see transport/tally/map_scatter.h.
+// Consecutive ones, see transport/tally/tally_statistics.h.
 constexpr std::size_t batches_per_group = batch_count / group_count;
 
 SideTallies empty_tallies(const Medium& medium, double theta_inside)

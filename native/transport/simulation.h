@@ -8,7 +8,7 @@
 
 #include "base/progress.h"
 #include "medium/medium.h"
-#include "transport/tally/map_scatter.h"
+#include "transport/tally/tally_statistics.h"
 #include "transport/walk/walk.h"
 
 namespace beamspread {
@@ -21,13 +21,13 @@ inline constexpr std::size_t batch_count = 32;
 struct SideResult {
     std::vector<float> power;         // [row][radius bin]; empty: nothing leaves here
     std::size_t radii = 0;            // radius bins up to the last that is not empty, at least 1
-    std::vector<std::size_t> harmonics;  // [row]: how many are kept, at least 1, see transport/tally/harmonic_choice.h
+    std::vector<std::size_t> harmonics;  // [row]: how many are kept, at least 1, see transport/tally/tally_statistics.h
     std::vector<float>
         ratios;  // means of cos(m phi) weighted by power, m > 0: [row][harmonic][radius bin], as half holds them
     std::vector<float> mean_order;  // [order bin]
     std::vector<float> order_variance;  // [order bin]
     std::vector<float> batch_totals;  // [batch][order bin], power
-    std::vector<float> deviations;  // of groups of batches, see transport/tally/map_scatter.h
+    std::vector<float> deviations;  // of groups of batches, see transport/tally/tally_statistics.h
 };
 
 struct AngleResult {

@@ -15,7 +15,6 @@
 
 #include "base/constants.h"
 #include "base/random.h"
-#include "ldf/library/calibration.h"
 #include "ldf/library/library.h"
 #include "medium/fresnel.h"
 #include "medium/henyey_greenstein.h"

@@ -1,4 +1,4 @@
-#include "ldf/library/calibration.h"
+#include "ldf/library/library.h"
 
 #include <algorithm>
 #include <cmath>

@@ -8,8 +8,8 @@
 #include "base/constants.h"
 #include "base/error.h"
 #include "base/threads.h"
-#include "ldf/radial/fading.h"
-#include "ldf/radial/recentred.h"
+#include "ldf/radial/radial_function.h"
+#include "ldf/radial/radial_profile.h"
 #include "medium/fresnel.h"
 #include "transport/exact/adding_doubling.h"
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/progress.h"
-#include "ldf/library/angle_nodes.h"
+#include "ldf/library/angle_spline.h"
 #include "ldf/radial/ldf_source.h"
 #include "medium/medium.h"
 #include "transport/simulation.h"
@@ -45,7 +45,7 @@ public:
     std::uint64_t seed() const { return m_seed; }
     const std::vector<AngleResult>& results() const { return m_results; }
     const std::vector<double>& angles_deg() const { return m_simulated.angles_deg(); }
-    bool is_calibrated() const { return !m_residuals.empty(); }  // see ldf/library/calibration.h
+    bool is_calibrated() const { return !m_residuals.empty(); }  // see `calibrated`
     const std::vector<SideResiduals>& residuals() const { return m_residuals; }
 
     // Power that leaves one side per unit power incident, unscattered light included, specular reflection
@@ -100,6 +100,12 @@ private:
 
 LdfLibrary simulate_library(const Medium& medium, const std::vector<double>& angles_deg, std::uint64_t photons,
                             std::uint64_t seed, int threads, std::string_view kernel, Progress& progress);
+
+// A copy in which the power p_b of every order bin, with the distribution that it comes with, is scaled by the s_b that
+// minimize  sum_b (s_b - 1)^2 / v_b + sum_k ((sum_b a_k^n_b s_b p_b - T_k) / e_k)^2:  v_b is the relative variance of
+// p_b, and T_k the exact total at albedo a_k, every other one of `compared_albedos`, to within e_k. The batches follow,
+// so that their scatter is the statistical error that remains. Throws InvalidArgument for a library of too few photons.
+LdfLibrary calibrated(const LdfLibrary& library, int threads);
 
 // One multi-part OpenEXR file; see library_format.h for the layout. Throw IoError.
 void save_library(const LdfLibrary& library, const std::filesystem::path& path);

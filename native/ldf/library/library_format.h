@@ -12,7 +12,7 @@
 //   "<side>.<j>.orders"  columns: order bins; line 0 and 1: mean and variance of the order; then one
 //                        line per batch: power that leaves;
 //   "<side>.<j>.scatter" columns: [pole][albedo][harmonic][radius bin], lines: groups of batches: their deviations
-//                        (transport/tally/map_scatter.h), half precision.
+//                        (transport/tally/tally_statistics.h), half precision.
 // One channel each: OpenEXR takes longer to sort channels into pixels than to read.
 #pragma once
 

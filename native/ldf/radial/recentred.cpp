@@ -1,11 +1,11 @@
-#include "ldf/radial/recentred.h"
+#include "ldf/radial/radial_profile.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "base/constants.h"
-#include "ldf/radial/fading.h"
+#include "ldf/radial/radial_function.h"
 
 namespace beamspread {
 

@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "base/constants.h"
 #include "base/error.h"
-#include "base/gauss_rule.h"
 #include "base/threads.h"
 
 namespace beamspread {

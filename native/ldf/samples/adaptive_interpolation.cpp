@@ -19,7 +19,7 @@
 //    doi:10.1364/AO.28.005243): Q stands above O at a height of the root
 //    mean square radius of each sample, that of the result is their geometric mean, and g height^2 is blended, which
 //    keeps the power. log g is linear in log(1 - g). Along the other axes one height does for all, and cancels out.
-#include "ldf/samples/adaptive_interpolation.h"
+#include "ldf/samples/interpolate.h"
 
 #include <algorithm>
 #include <array>

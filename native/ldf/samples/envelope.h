@@ -1,11 +1,16 @@
-// A smooth positive version of an LDF's image, whose logarithm noise cannot spoil.
+// Smoothing of noisy images.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "ldf/samples/sample.h"
 
 namespace beamspread {
+
+// Means of (height, width) values, weighted by a Gaussian of `sigma` texels (0: the values themselves) within the
+// image.
+std::vector<double> blur(const std::vector<double>& values, std::size_t width, std::size_t height, double sigma);
 
 // The image where its relative noise is below 10 %. Elsewhere m blur(image) / blur(m), with m the mean over rings
 // around O: averages over as few texels as bring the noise below 10 %, which a steep decline doesn't shift as m has it

@@ -3,9 +3,7 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "ldf/samples/adaptive_interpolation.h"
 #include "ldf/samples/angular_space.h"
-#include "ldf/samples/brightest.h"
 #include "ldf/samples/sample_grid.h"
 
 namespace beamspread {

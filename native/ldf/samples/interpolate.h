@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "ldf/samples/sample.h"
+#include "ldf/samples/sample_grid.h"
 
 namespace beamspread {
 
@@ -26,5 +27,8 @@ enum class Interpolation { angular, adaptive, planar };
 // A sample that is asked for comes out as it is. Throws InvalidArgument.
 LdfSample interpolate(const std::vector<const LdfSample*>& samples, double angle_deg, double albedo,
                       std::optional<double> g, Interpolation method, std::optional<double> height);
+
+// The image at a place inside the cell.
+std::vector<float> adaptive_image(const SampleCell& cell, double angle_deg, double albedo, std::optional<double> g);
 
 }  // namespace beamspread

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "base/constants.h"
-#include "base/gauss_rule.h"
 #include "base/threads.h"
 #include "ldf/radial/texel_integral.h"
 #include "simd/loops.h"

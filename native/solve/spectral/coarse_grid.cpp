@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "base/threads.h"
-#include "base/working_memory.h"
 #include "simd/loops.h"
 
 namespace beamspread {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/progress.h"
-#include "base/working_memory.h"
+#include "base/threads.h"
 #include "fft/column_spectra.h"
 #include "solve/separable/light_terms.h"
 #include "solve/spectral/kernel_spectra.h"

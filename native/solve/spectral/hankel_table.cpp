@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "base/constants.h"
-#include "base/gauss_rule.h"
 #include "base/threads.h"
 #include "fft/fft.h"
 #include "simd/loops.h"

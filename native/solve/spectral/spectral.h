@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/progress.h"
-#include "base/working_memory.h"
+#include "base/threads.h"
 #include "solve/problem/problem.h"
 #include "solve/separable/term_row.h"
 #include "solve/spectral/coarse_grid.h"

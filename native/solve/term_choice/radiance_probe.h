@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "base/working_memory.h"
+#include "base/threads.h"
 #include "solve/separable/light_terms.h"
 
 namespace beamspread {

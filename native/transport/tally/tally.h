@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "base/huge_pages.h"
+#include "base/platform.h"
 #include "transport/tally/bins.h"
 #include "transport/tally/poles.h"
 

@@ -7,7 +7,6 @@
 #include "base/vec.h"
 #include "medium/fresnel.h"
 #include "medium/henyey_greenstein.h"
-#include "transport/walk/walk_plan.h"
 
 namespace beamspread {
 

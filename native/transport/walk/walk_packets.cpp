@@ -14,9 +14,8 @@
 #include "hwy/contrib/math/math-inl.h"
 #include "transport/walk/packet_flight-inl.h"
 #include "transport/walk/packet_math-inl.h"
-#include "transport/walk/packet_optics-inl.h"
 #include "transport/walk/packet_tally-inl.h"
-#include "transport/walk/walk_plan.h"
+#include "transport/walk/walk.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace beamspread {

@@ -1,6 +1,7 @@
-// Scatter of the maps between groups of batches: what the standard error of an image comes from.
+// Statistics of finished tallies: the harmonics above the noise, and the scatter of maps between groups of batches.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -8,6 +9,10 @@
 #include "transport/tally/tally.h"
 
 namespace beamspread {
+
+// Leading harmonics of each row that are worth keeping, at least one, from two halves of a simulation. Their sums
+// differ by noise only, and their product's mean is what is there.
+std::array<std::size_t, row_count> harmonics_worth_keeping(const Tally& half, const Tally& other);
 
 // Batches are taken together in this many groups, each a simulation of its own: errors of single texels are known to
 // 1 / sqrt(2 (8 - 1)), 27 %; with half as many to 41 %, with twice, and files of twice the deviations, to 18 %.
