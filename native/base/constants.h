@@ -1,4 +1,4 @@
-// Mathematical constants in double precision, and a quadrature rule.
+// Mathematical constants and a quadrature rule, in double precision.
 #pragma once
 
 #include <array>

@@ -45,7 +45,7 @@ void* allocate_pages(std::size_t bytes, std::size_t alignment)
     void* memory = std::aligned_alloc(alignment, bytes);
 #ifdef __linux__
     if (memory != nullptr)
-        madvise(memory, bytes, MADV_HUGEPAGE);  // a hint: it may fail
+        madvise(memory, bytes, MADV_HUGEPAGE);  // a hint, allowed to fail
 #endif
     return memory;
 }

@@ -1,13 +1,13 @@
-// What differs between operating systems, compilers and processors. Built and tested: Linux on x86-64 with GCC; the other
-// branches are written after their documentation and have not run.
+// Differences between operating systems, compilers and processors. Linux on x86-64 with GCC is built and tested; the
+// other branches follow their documentation and have not run.
 #pragma once
 
 #include <cstddef>
 #include <new>
 #include <string>
 
-// A function compiled for several instruction sets, the best chosen when the program is loaded (by ELF's indirect
-// functions). Without contraction to fused multiply-add the results are the same for all.
+// Compiles a function for several instruction sets. The loader chooses the best one (ELF's indirect functions). Results
+// do not depend on the choice because the build forbids contraction to fused multiply-add.
 #if defined(__ELF__) && defined(__x86_64__)
 #define BEAMSPREAD_CLONES __attribute__((target_clones("default", "avx2", "avx512f")))
 #else
@@ -16,17 +16,17 @@
 
 namespace beamspread {
 
-// Memory that starts at a multiple of `alignment` (a power of two that divides `bytes`), in huge pages where the system
-// has them; nullptr if there is none. Only for free_pages().
+// Allocates memory that starts at a multiple of `alignment` (a power of two that divides `bytes`), in huge pages where
+// the system has them. Returns nullptr on failure. Release it with free_pages().
 void* allocate_pages(std::size_t bytes, std::size_t alignment);
 void free_pages(void* memory);
 
 long process_id();
 
-// Whether this user may write a file that is there.
+// True if this user may write the existing file.
 bool may_write(const std::string& path);
 
-// For containers, in whole huge pages: the first touch of memory in pages of 4 KB took a fifth of a short simulation.
+// Allocator for containers, in whole huge pages: the first touch of pages of 4 KB took a fifth of a short simulation.
 template <class T>
 struct HugePageAllocator {
     using value_type = T;

@@ -8,7 +8,7 @@
 namespace beamspread {
 
 namespace {
-// Often enough for a smooth bar and a prompt Esc, rare enough that the host's interpreter costs nothing.
+// Time between two reports. Longer: less time in the host's interpreter, a coarser bar and a slower Esc.
 constexpr std::chrono::milliseconds report_interval{50};
 }  // namespace
 
@@ -46,7 +46,7 @@ void Progress::report(double fraction)
         if (!m_callback(fraction))
             m_cancelled = true;
     } catch (...) {
-        // The other threads stop as well, and with the same exception: whichever is first gets through.
+        // All threads stop with the same exception; the loop rethrows the first.
         m_error = std::current_exception();
         m_cancelled = true;
     }

@@ -9,14 +9,13 @@
 
 namespace beamspread {
 
-// Counts finished work from any thread and reports its fraction through a callback on the thread
-// that made the object; a callback that returns false makes every later `advance` throw Cancelled, and
-// one that throws makes it throw the same.
+// Counts finished work from any thread and reports its fraction through a callback on the thread that made the object.
+// After a callback that returns false, every `advance` throws Cancelled; after one that throws, it throws the same.
 class Progress {
 public:
     using Callback = std::function<bool(double)>;
 
-    // Without a callback nothing is reported, and nothing can be cancelled.
+    // Without a callback, work is neither reported nor cancellable.
     explicit Progress(Callback callback = {});
     Progress(const Progress&) = delete;
     Progress& operator=(const Progress&) = delete;

@@ -7,7 +7,7 @@
 
 namespace beamspread {
 
-// SplitMix64 (Steele, Lea, Flood 2014): spreads consecutive keys over all 64 bits.
+// SplitMix64 (Steele, Lea, Flood 2014, doi:10.1145/2660193.2660195): spreads consecutive keys over all 64 bits.
 inline std::uint64_t split_mix(std::uint64_t& state)
 {
     std::uint64_t z = (state += 0x9e3779b97f4a7c15ULL);
@@ -16,7 +16,7 @@ inline std::uint64_t split_mix(std::uint64_t& state)
     return z ^ (z >> 31);
 }
 
-// xoshiro256+ (Blackman, Vigna 2021): its upper bits pass all tests, and only those are used.
+// xoshiro256+ (Blackman, Vigna 2021, doi:10.1145/3460772). Only the upper bits, which pass all tests, are used.
 class Random {
 public:
     Random(std::uint64_t seed, std::uint64_t stream, std::uint64_t item)

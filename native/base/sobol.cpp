@@ -13,7 +13,7 @@ using Numbers = std::array<std::array<std::uint32_t, 32>, GridSobol::dimensions>
 
 constexpr Numbers make_direction_numbers()
 {
-    // Degree, coefficients and first numbers of each dimension's polynomial; the first dimension has none.
+    // Primitive polynomial of a dimension after the first.
     struct Polynomial {
         std::size_t degree;
         std::uint32_t coefficients;
@@ -60,7 +60,7 @@ std::uint64_t spread_bits(std::uint64_t value)
     return (value & 0xaaaaaaaau) >> 1 | (value & 0x55555555u) << 1;
 }
 
-// Wang's and Mueller's mixers, as good as random for seeds.
+// Integer hash with full avalanche, after T. Mueller.
 std::uint32_t hash(std::uint32_t value)
 {
     value = (value ^ value >> 16) * 0x45d9f3bu;
@@ -68,7 +68,8 @@ std::uint32_t hash(std::uint32_t value)
     return value ^ value >> 16;
 }
 
-// Every bit is flipped or not by those below it (Laine, Karras 2011, with Burley's constants).
+// Hash in which each bit depends on the lower bits alone (Laine, Karras 2011, with
+// the constants of Burley 2020).
 [[gnu::always_inline]] inline std::uint32_t flip_upwards(std::uint32_t value, std::uint32_t seed)
 {
     value ^= value * 0x3d20adeau;
@@ -83,7 +84,8 @@ std::uint32_t scramble(std::uint32_t digits, std::uint32_t seed)
     return reverse_bits(flip_upwards(reverse_bits(digits), seed));
 }
 
-// One coordinate of points, each after two numbers: of a block's first point and the points' offsets from it.
+// Writes one coordinate of a block's points to every second element of `result`. `block` is the digits of the block's
+// first point, `offsets` those of the points relative to it.
 BEAMSPREAD_CLONES void scatter(double* __restrict result, const std::uint32_t* offsets, std::uint32_t block,
                                std::uint32_t seed, std::size_t count)
 {
@@ -108,21 +110,21 @@ GridSobol::GridSobol(std::size_t points_per_cell, std::uint32_t seed)
 void GridSobol::points(std::size_t x, std::size_t y, std::size_t first, std::size_t count, Vec2* front,
                        Vec2* back) const
 {
-    // Where the whole grid has more than 2^32 points, it is tiled by sequences with seeds of their own.
+    // Tile grids of more than 2^32 points by sequences with different seeds.
     const std::uint64_t cell = spread_bits(x) | spread_bits(y) << 1;
     const int cell_bits = 32 - m_bits;
     const std::uint32_t seed = hash(m_seed ^ hash(static_cast<std::uint32_t>(cell >> cell_bits) + 1));
     const auto within = static_cast<std::uint32_t>(cell & ((std::uint64_t{1} << cell_bits) - 1));
     const Bits block = sequence(shuffle(within, hash(seed)) << m_bits);
     for (std::size_t d = 0; d < dimensions; ++d) {
-        // Sobol's points are linear over bits: those of a block are the block's first one plus the first ones.
+        // Sobol's points are linear over GF(2): a block is its first point plus (xor) the points of block 0.
         double* const into = &(d < 2 ? front : back)->x + d % 2;
         scatter(into, m_offsets[d].data() + first, block[d],
                 hash(seed + 0x9e3779b9u * static_cast<std::uint32_t>(d + 1)), count);
     }
 }
 
-// A permutation of all numbers of so many bits that keeps aligned blocks together.
+// Permutes the cell numbers so that aligned blocks of 4^k cells stay together.
 std::uint32_t GridSobol::shuffle(std::uint32_t cell, std::uint32_t seed) const
 {
     const int unused = m_bits;  // of 32

@@ -15,7 +15,7 @@ void with_threads(int threads, const std::function<void()>& body)
 {
     if (threads < 0)
         reject("threads", threads, "0 (all) or more");
-    // More threads than cores gain nothing, and TBB would warn of them on the host's stderr.
+    // More threads than cores gain nothing and make TBB write a warning to the host's stderr.
     const int cores = tbb::info::default_concurrency();
     tbb::task_arena arena(threads == 0 ? cores : std::min(threads, cores));
     arena.execute(body);
@@ -34,7 +34,7 @@ void parallel_for(std::size_t count, const std::function<void(std::size_t)>& bod
 void parallel_ordered(std::size_t count, const std::function<std::function<void()>(std::size_t)>& make)
 {
     using Use = std::function<void()>;
-    // Twice as many results in flight as threads: enough to hide uneven work items.
+    // Two results in flight per thread hide uneven work items.
     const auto in_flight = 2 * thread_count();
     std::size_t next = 0;
     const auto take =

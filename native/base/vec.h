@@ -19,8 +19,7 @@ using Vec2f = glm::vec2;
 using Vec3f = glm::vec3;
 using Mat3 = glm::dmat3;
 
-// Two unit vectors at right angles to the unit vector and each other (Duff et al. 2017, "Building an orthonormal basis,
-// revisited", JCGT 6(1)).
+// Orthonormal basis around a unit vector z (Duff et al. 2017, "Building an orthonormal basis, revisited", JCGT 6(1)).
 struct Frame {
     Vec3 x, y, z;
 

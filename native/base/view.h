@@ -1,4 +1,4 @@
-// Non-owning strided views of two-dimensional arrays; rows go up the plane unless said otherwise.
+// Non-owning strided views of two-dimensional arrays. Rows go up the plane.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@ struct View2D {
     T* row(std::size_t y) const { return data + static_cast<std::ptrdiff_t>(y) * row_stride; }
 };
 
-// Texels [x, x + count) of a row, one after the other.
+// Copies texels [x, x + count) of a row to contiguous memory.
 template <class T>
 void copy_row(const View2D<const T>& view, std::size_t y, std::size_t x, std::size_t count, T* values)
 {

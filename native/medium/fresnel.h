@@ -7,8 +7,8 @@
 
 namespace beamspread {
 
-// Fresnel reflectance for cos_theta_i in [0, 1] on the side of incidence; eta is the index behind
-// the boundary over the index before it. 1 for total internal reflection.
+// Fresnel reflectance for cos_theta_i in [0, 1] on the side of incidence; 1 for total internal reflection. `eta` is the
+// refractive index behind the boundary over the index before it.
 inline double fresnel(double cos_theta_i, double eta)
 {
     if (eta == 1.0)
@@ -22,7 +22,7 @@ inline double fresnel(double cos_theta_i, double eta)
     return 0.5 * (r_parallel * r_parallel + r_perpendicular * r_perpendicular);
 }
 
-// Angle inside the medium, radians, of light that arrives at theta (radians) outside (Snell).
+// Snell's law: angle inside the medium (radians) of light that arrives at `theta` (radians) outside.
 inline double refracted_angle(double theta, double ior)
 {
     return std::asin(std::min(1.0, std::sin(theta) / ior));

@@ -18,7 +18,7 @@ inline double henyey_greenstein_pdf(double cos_theta, double g)
 // Cosine of a deflection, by inverting the distribution function at u in [0, 1).
 inline double henyey_greenstein_sample(double g, double u)
 {
-    // Below this |g| the formula loses more digits to cancellation than isotropy is wrong by.
+    // Below this |g| the formula's cancellation error exceeds the error of isotropic scattering.
     if (std::abs(g) < 1e-4)
         return 1.0 - 2.0 * u;
     const double ratio = (1.0 - g * g) / (1.0 - g + 2.0 * g * u);

@@ -8,7 +8,7 @@ namespace beamspread {
 
 void validate(const Medium& medium)
 {
-    // Negated comparisons, so that NaN is rejected too.
+    // Negated comparisons reject NaN too.
     if (!(std::abs(medium.g) <= 0.99))
         reject("g", medium.g, "-0.99 <= g <= 0.99");
     if (!(medium.ior >= 1.0 && medium.ior <= 3.0))

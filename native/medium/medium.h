@@ -18,7 +18,7 @@ struct Medium {
 // Throws InvalidArgument for a medium that the simulation does not cover.
 void validate(const Medium& medium);
 
-// Of single scattering; throws InvalidArgument unless 0 <= albedo < 1.
+// Throws InvalidArgument unless the single-scattering albedo is in [0, 1).
 void check_albedo(double albedo);
 
 }  // namespace beamspread
