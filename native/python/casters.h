@@ -68,7 +68,7 @@ void bind_medium(py::module_& m);
 void bind_transport(py::module_& m);
 void bind_ldf(py::module_& m);
 void bind_ldf_sample(py::module_& m);
-void bind_ldf_interpolate(py::module_& m);
+void bind_interpolation(py::module_& m);
 void bind_image(py::module_& m);
 void bind_lights(py::module_& m);
 void bind_occluders(py::module_& m);

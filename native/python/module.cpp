@@ -32,7 +32,7 @@ PYBIND11_MODULE(_native, m)
     // Types before the functions that name them in their signatures.
     bind_ldf(m);
     bind_ldf_sample(m);
-    bind_ldf_interpolate(m);
+    bind_interpolation(m);
     bind_transport(m);
     bind_image(m);
     bind_scene(m);

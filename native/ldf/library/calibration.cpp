@@ -1,4 +1,4 @@
-#include "ldf/library/library.h"
+#include "ldf/library/ldf_library.h"
 
 #include <algorithm>
 #include <cmath>

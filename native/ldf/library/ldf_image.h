@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "ldf/library/library.h"
+#include "ldf/library/ldf_library.h"
 
 namespace beamspread {
 

@@ -5,7 +5,7 @@
 // j-th angle and each side, radius bins up to the last that is not empty, rows as in transport/bins.h, there are
 //   "<side>.<j>"         columns: radius bins, lines: rows up to the last that is not empty: power that leaves
 //                        per unit power that entered; attribute harmonics: how many each row has; of a calibrated
-//                        library also residuals and residualsHalfway (ldf/library/library.h);
+//                        library also residuals and residualsHalfway (ldf/library/ldf_library.h);
 //   "<side>.<j>.ratios"  means of cos(m phi) over each ring, weighted by power, m = 1 and on: [row][m][radius
 //                        bin], in lines of a fixed length, filled up with zeros, half precision; left out where no row
 //                        has any;
@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "image/exr.h"
-#include "ldf/library/library.h"
+#include "ldf/library/ldf_library.h"
 
 namespace beamspread::library_format {
 

@@ -8,7 +8,7 @@
 #include "base/error.h"
 #include "base/threads.h"
 #include "image/exr.h"
-#include "ldf/library/library.h"
+#include "ldf/library/ldf_library.h"
 #include "ldf/library/library_format.h"
 
 namespace beamspread {

@@ -3,7 +3,7 @@
 #include <map>
 
 #include "image/exr.h"
-#include "ldf/library/library.h"
+#include "ldf/library/ldf_library.h"
 #include "ldf/library/library_format.h"
 
 namespace beamspread {

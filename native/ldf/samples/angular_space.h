@@ -2,7 +2,7 @@
 #pragma once
 
 #include "base/vec.h"
-#include "ldf/samples/sample.h"
+#include "ldf/samples/ldf_sample.h"
 
 namespace beamspread {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "ldf/samples/sample.h"
+#include "ldf/samples/ldf_sample.h"
 
 namespace beamspread {
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "ldf/samples/sample.h"
+#include "ldf/samples/ldf_sample.h"
 #include "ldf/samples/sample_grid.h"
 
 namespace beamspread {

@@ -14,7 +14,7 @@
 
 #include "base/error.h"
 #include "image/exr.h"
-#include "ldf/samples/sample.h"
+#include "ldf/samples/ldf_sample.h"
 
 namespace beamspread {
 

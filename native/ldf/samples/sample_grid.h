@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "ldf/samples/sample.h"
+#include "ldf/samples/ldf_sample.h"
 
 namespace beamspread {
 

@@ -1,4 +1,4 @@
-#include "ldf/samples/sample.h"
+#include "ldf/samples/ldf_sample.h"
 
 #include <algorithm>
 #include <cmath>

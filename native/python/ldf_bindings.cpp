@@ -2,7 +2,7 @@
 #include <memory>
 
 #include "ldf/library/ldf_image.h"
-#include "ldf/library/library.h"
+#include "ldf/library/ldf_library.h"
 #include "python/casters.h"
 
 namespace beamspread {
