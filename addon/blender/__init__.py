@@ -22,10 +22,9 @@ from .jobs import state
 from .jobs.out_of_date import stale
 from .jobs.run import engine, operator
 from .live import session
-from .node import menu, node
-from .node import operators as node_operators
+from .node import buttons, menu, node
 from .registration import all_or_nothing
-from .ui import panels, picture
+from .ui import panels
 
 PARTS = (
     preferences,
@@ -36,14 +35,13 @@ PARTS = (
     undo,
     node,
     menu,
-    node_operators,
+    buttons,
     state,
     stale,
     engine,
     operator,
     session,
     panels,
-    picture,
 )
 
 

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from beamspread.blender.cycles import light
+from beamspread.blender.cycles import cycles_light
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.run.batch_run import bake_all
 from beamspread.blender.jobs.run.prepare import prepare_scene
@@ -153,7 +153,7 @@ def test_another_instance_makes_it_out_of_date_and_says_why_it_cannot_be_baked_a
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
     add_instancer(collection, MIRRORED)
     assert row().status == Status.STALE
-    assert "'Tile' stands in 2 places" in messages_of(lambda: bpy.ops.beamspread.bake(objects="STALE"))
+    assert "'Tile' has 2 instances" in messages_of(lambda: bpy.ops.beamspread.bake(objects="STALE"))
 
 
 def scatter(tile):
@@ -169,7 +169,7 @@ def test_particles_count_as_places():
     add_instancer(collection, SKEWED)
     scatter(tile)
     add_sun()
-    assert "'Tile' stands in 6 places" in messages_of(lambda: bpy.ops.beamspread.bake(objects="ALL"))
+    assert "'Tile' has 6 instances" in messages_of(lambda: bpy.ops.beamspread.bake(objects="ALL"))
 
 
 def test_instances_of_other_meshes_under_its_name_are_no_places():
@@ -352,7 +352,7 @@ def hide_within(tile):
 
 PROBLEMS = {
     "'Grouped' is in the node group 'Outer'": use_shared_group,
-    "The object 'Tile' stands in 2 places": instance_again,
+    "The object 'Tile' has 2 instances": instance_again,
     "UV map": remove_uvs,
     "The albedo's red is 1": make_black_holes,
     "The object 'Tile' is hidden from render": hide_within,
@@ -401,9 +401,9 @@ def test_light_is_linked_to_what_the_instancer_shows():
 
 def test_indirect_light_is_that_of_what_is_made_real(monkeypatch):
     """Of a bright wall of the collection and of a card of the scene, by the same random numbers."""
-    monkeypatch.setattr(light, "NODES", 16)
+    monkeypatch.setattr(cycles_light, "NODES", 16)
     for name in ("LEAST_NOISE", "MOST_NOISE"):
-        monkeypatch.setattr(light, name, 0.02)
+        monkeypatch.setattr(cycles_light, name, 0.02)
     holder, collection, matrix = nested()
     bpy.data.objects["Wall"].data.materials.append(scenes.diffuse_material((0.8, 0.1, 0.1)))
     card = add_plane("Card", (3, 3), matrix @ WITHIN @ Matrix.Translation((0, -1, 1)) @ Matrix.Rotation(1.2, 4, "X"))

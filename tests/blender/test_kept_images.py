@@ -13,7 +13,7 @@ from beamspread.blender.jobs.run import batch_run
 from beamspread.blender.jobs.run.prepare import prepare_scene
 from beamspread.blender.jobs.state import state
 from beamspread.blender.node.find import find_targets
-from beamspread.blender.ui.image_buttons import draw_image_buttons
+from beamspread.blender.ui.panels import draw_image_buttons
 from beamspread.core.batch import batch_options
 from beamspread.core.native import native
 from beamspread.core.target import Target

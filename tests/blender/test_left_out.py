@@ -49,7 +49,7 @@ def add_curve():
 
 MISPLACED = [
     (add_grouped, "Grouped", ["'Grouped' is in the node group 'Outer'", "Ctrl Alt G"]),
-    (add_instances, "Shown", ["'Shown' stands in 2 places", "Make Instances Real", "Make Single User"]),
+    (add_instances, "Shown", ["'Shown' has 2 instances", "Make Instances Real", "Make Single User"]),
     (add_curve, "Spline", ["'Spline' is no mesh", "Convert"]),
 ]
 
@@ -119,7 +119,7 @@ def test_instances_of_what_was_baked_are_no_mistake():
     node_of(bpy.data.materials["Medium"]).image = bpy.data.images.new("Baked", 4, 4)
     assert "No mesh has a material" in messages_of(lambda: bpy.ops.beamspread.bake(objects="ALL"))
     select(holder)
-    assert "'Shown' stands in 2 places" in messages_of(bpy.ops.beamspread.bake)
+    assert "'Shown' has 2 instances" in messages_of(bpy.ops.beamspread.bake)
 
 
 def baked_with_messages(plane):
@@ -170,7 +170,7 @@ def add_foggy_world():
     output, fog = tree.nodes.new("ShaderNodeOutputWorld"), tree.nodes.new("ShaderNodeVolumeScatter")
     tree.links.new(output.inputs["Volume"], fog.outputs[0])
     bpy.context.scene.world = world
-    return "The world 'Hazy' is filled with a volume: what that takes from the light, or adds, is not baked."
+    return "The volume of the world 'Hazy' is not baked: neither the light that it absorbs nor its own light."
 
 
 @pytest.mark.parametrize("add", [add_hair, add_volume, add_foggy_world])

@@ -44,7 +44,7 @@ def test_a_change_is_looked_at_before_the_next_step(change, monkeypatch):
 def test_a_moved_lamp_reads_no_mesh(monkeypatch):
     _, lamp, material = make_scene()
     first = live_pixels(material)
-    monkeypatch.setattr("beamspread.blender.read.occluders.local_mesh", lambda *_: pytest.fail("a mesh was read"))
+    monkeypatch.setattr("beamspread.blender.read.geometry.local_mesh", lambda *_: pytest.fail("a mesh was read"))
     monkeypatch.setattr("beamspread.blender.live.reader.read_polygons", lambda *_: pytest.fail("a mesh was read"))
     lamp.location.x = -0.4
     assert np.abs(live_pixels(material) - first).max() > 0.1 * first.max()
@@ -263,7 +263,7 @@ def test_an_object_that_casts_no_light_is_not_read_again_for_its_node(monkeypatc
     """While a value of the medium is dragged."""
     _plane, _lamp, material = make_scene()
     live_pixels(material)
-    monkeypatch.setattr("beamspread.blender.read.occluders.local_mesh", lambda *_: pytest.fail("a mesh was read"))
+    monkeypatch.setattr("beamspread.blender.read.geometry.local_mesh", lambda *_: pytest.fail("a mesh was read"))
     node = scenes.node_of(material)
     node.ior = 1.3  # tells handlers, unlike other values that scripts set
     bpy.context.view_layer.update()

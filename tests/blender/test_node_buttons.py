@@ -11,7 +11,7 @@ from beamspread.blender import popup
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.node import draw, principled
-from beamspread.blender.node.operators import BEAMSPREAD_OT_from_principled
+from beamspread.blender.node.buttons import BEAMSPREAD_OT_from_principled
 from beamspread.core.material.principled import ior_of_reflectance, transport_length
 from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
 

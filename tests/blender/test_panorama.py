@@ -3,8 +3,8 @@
 import bpy
 import numpy as np
 import scenes
+from beamspread.blender.cycles.cycles_light import world_panorama
 from beamspread.blender.cycles.scene_copy import SceneCopy
-from beamspread.blender.cycles.world import world_panorama
 from cycles_truth import cycles_bake, target_material
 
 

@@ -249,7 +249,7 @@ def test_what_is_not_understood_is_named():
     add_panel(material=material)
     reason = "the node 'Noise Texture' is not understood"
     assert read().lights == ()
-    assert read().by_cycles == {"Panel": f"What glows of 'Panel' is left out: {reason}."}
+    assert read().by_cycles == {"Panel": f"The light of 'Panel' is left out: {reason}."}
 
 
 def test_negative_light_is_named():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from beamspread.blender.read.lights import read_illumination
 from beamspread.blender.read.textures import MOST_WIDE, shrunk
-from beamspread.blender.read.world import directions
+from beamspread.blender.read.world_light import directions
 from cycles_truth import add_receiver, cycles_irradiance
 from mathutils import Euler, Matrix
 

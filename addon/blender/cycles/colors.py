@@ -11,7 +11,7 @@ from ...core.errors import BakeError
 from ...core.progress import Progress
 from ...core.scene.receiver import Receiver
 from ...core.target import Target
-from .light import START_SECONDS, CopyForCycles
+from .cycles_light import START_SECONDS, CopyForCycles
 from .process import run
 
 # In a texel of a small texture; of larger ones fewer, down to the least, so that it takes seconds.

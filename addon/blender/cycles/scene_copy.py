@@ -12,7 +12,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..read.instances import with_instanced
+from ..read.visibility import with_instanced
 
 PREFIX = "beamspread-cycles-"
 FILE, IMAGES = "scene.blend", "images.npz"

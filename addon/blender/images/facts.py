@@ -16,7 +16,7 @@ import bpy
 from ...core.exr_header import text_of
 from ...core.target import Target
 from ..node.find import find_node, find_targets
-from ..read.instances import with_instanced
+from ..read.visibility import with_instanced
 
 KEY = "beamspread"
 """Key of the group in an image: "facts", JSON, and "former", a pointer that keeps that image in the file."""

@@ -15,7 +15,7 @@ from ...core.batch.names import file_stems
 from ...core.errors import ImageError
 from ...core.target import Target
 from ..node.find import find_node, find_targets
-from ..read.instances import with_instanced
+from ..read.visibility import with_instanced
 from . import files
 from .results import Results
 

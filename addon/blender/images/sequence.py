@@ -14,7 +14,7 @@ from ...core.target import Target
 from ..node.find import find_node, find_targets
 from ..node.node import link_result
 from ..node.tree import follow_frames
-from ..read.instances import with_instanced
+from ..read.visibility import with_instanced
 from ..registration import all_or_nothing, classes
 from .facts import Frames, facts_of, set_facts
 from .files import file_of

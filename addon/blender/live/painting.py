@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..node.find import find_node, find_targets
-from ..read.instances import with_instanced
+from ..read.visibility import with_instanced
 
 
 def painted_results(context) -> list:

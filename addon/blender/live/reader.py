@@ -13,10 +13,9 @@ from ...core.target import Target
 from ..images.files import check_image
 from ..node.find import find_bakeable, find_node
 from ..read.geometry import read_polygons
-from ..read.kept import Kept
 from ..read.lights import read_illumination, with_lamps
-from ..read.placed import Placed, check_placed, find_placed
-from ..read.visible import render_visible_names
+from ..read.scene_cache import SceneCache
+from ..read.visibility import ObjectInstance, check_instance, find_instances, render_visible_names
 from .marks import Marks
 from .textures import Textures
 
@@ -42,7 +41,7 @@ class Reader:
     def __init__(self) -> None:
         self.errors: dict[Target, str] = {}
         self.left_out: list[str] = []
-        self._kept = Kept()
+        self._kept = SceneCache()
         self._illumination: Illumination | None = None
         self._lit: dict[str, Illumination] = {}  # by object: what shines on it
         self._polygons: dict[Target, object] = {}
@@ -104,18 +103,18 @@ class Reader:
             is_known = target in self._polygons and obj is not None and not marks.other
             if not is_known or obj.name in changed or obj.data.name in changed:
                 due.append(target)
-        placed = find_placed(depsgraph, {target.object_name for target in due})
+        placed = find_instances(depsgraph, {target.object_name for target in due})
         for target in due:
             self._read_polygons(target, placed.get(target.object_name), layer)
         self._polygons = {target: self._polygons[target] for target in self._targets if target in self._polygons}
 
-    def _read_polygons(self, target: Target, placed: Placed | None, view_layer) -> None:
+    def _read_polygons(self, target: Target, placed: ObjectInstance | None, view_layer) -> None:
         self.errors.pop(target, None)
         before = self._polygons.pop(target, None)
         if placed is None:
             return
         try:
-            check_placed(target.object_name, placed, view_layer)
+            check_instance(target.object_name, placed, view_layer)
             polygons = read_polygons(placed.obj, target.material_name, placed.matrix)
         except Exception as error:  # noqa: BLE001 - the others are still to be read
             self.errors[target] = sentence(error)

@@ -12,8 +12,8 @@ from ...core.scene.texture import Texture
 from ...core.scene.uv_map import Polygons, fit_uv_maps
 from ...core.target import Target
 from ..jobs.run.linked_color import UNLINKED, BaseColor, read_texture
-from ..node.find import find_place
-from ..read.placed import Placed, find_placed
+from ..node.find import find_node_in_groups
+from ..read.visibility import ObjectInstance, find_instances
 
 # Texels along the longer side where nodes are evaluated: more would keep the window waiting.
 MOST_TEXELS = 1024
@@ -49,13 +49,13 @@ class Textures:
 
         `size` is the image's, or the texels along its longer side.
         """
-        node, groups = find_place(bpy.data.materials[target.material_name])
+        node, groups = find_node_in_groups(bpy.data.materials[target.material_name])
         if not node.has_texture():
             self._read.pop(target, None)
             return None
         known = self._read.get(target)
         if known is None or known.polygons is not polygons or known.size != size:
-            placed = find_placed(depsgraph, {target.object_name})[target.object_name]
+            placed = find_instances(depsgraph, {target.object_name})[target.object_name]
             known = _evaluated(node, groups, placed, polygons, size)
         elif known.texture is not None and known.texture.blur != node.texture_blur:
             known = replace(known, texture=replace(known.texture, blur=node.texture_blur))
@@ -76,7 +76,7 @@ def _unknown(target: Target, read: Read) -> str:
     return f"{what}, because {read.base_color.unknown} not understood, so {UNLINKED}: bakes have Cycles evaluate it."
 
 
-def _evaluated(node, groups: tuple, placed: Placed, polygons: Polygons, size: tuple[int, int] | int) -> Read:
+def _evaluated(node, groups: tuple, placed: ObjectInstance, polygons: Polygons, size: tuple[int, int] | int) -> Read:
     maps = fit_uv_maps(polygons)
     width, height = texture_size(maps, size) if isinstance(size, int) else size
     shrink = min(1.0, MOST_TEXELS / max(width, height))

@@ -7,8 +7,7 @@ from collections.abc import Iterable, Iterator
 from ...core.bake.runner import Bake
 from ...core.target import Target
 from .. import compat
-from ..read.instances import count_places, with_instanced
-from ..read.visible import render_visible_names
+from ..read.visibility import count_instances, render_visible_names, with_instanced
 from .node import BeamspreadNode
 from .output import is_linked
 
@@ -17,11 +16,11 @@ NOTHING_FOUND = "No mesh has a material with a Beamspread node: add one in the S
 
 def find_node(material):
     """The material's Beamspread node (one that is linked rather than one that is not), or None."""
-    found = find_place(material)
+    found = find_node_in_groups(material)
     return found and found[0]
 
 
-def find_place(material) -> tuple | None:
+def find_node_in_groups(material) -> tuple | None:
     """The node, and the group nodes around it: a node group counts if nothing else uses it, since it has one image."""
     if material is None or not compat.uses_nodes(material):
         return None
@@ -65,7 +64,7 @@ def find_bakeable(view_layer, chosen: Iterable | None = None) -> list[Target]:
     inner = with_instanced(objects)[len(objects) :]
     own = {obj.name for obj in (*view_layer.objects, *objects)} if inner else set()
     found = [(obj, material) for obj in inner if obj.name not in own for material in materials_of(obj)]
-    places = places_rendered(view_layer) if found and chosen is None else {}
+    places = rendered_counts(view_layer) if found and chosen is None else {}
     targets = find_targets(objects)
     for obj, material in found:
         if not was_baked_elsewhere(material) and (places.get(obj.name, 0) <= 1 or find_node(material).image is None):
@@ -79,10 +78,10 @@ def was_baked_elsewhere(material) -> bool:
     return not is_local and find_node(material).image is not None
 
 
-def places_rendered(view_layer) -> dict[str, int]:
+def rendered_counts(view_layer) -> dict[str, int]:
     """By name, in how many places a render shows objects; where they stand themselves, others don't count."""
     visible = render_visible_names(view_layer)
-    shown = count_places(obj for obj in view_layer.objects if obj.name in visible)
+    shown = count_instances(obj for obj in view_layer.objects if obj.name in visible)
     return {**shown, **dict.fromkeys(visible, 1)}
 
 

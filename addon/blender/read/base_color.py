@@ -8,9 +8,9 @@ from ...core.scene.receiver import Receiver
 from .image_texture import MISSING, NotUnderstoodError, Pixels
 from .node_links import End, Wanted, follow
 from .node_values import converted
-from .placed import Placed
 from .places import ON_NO_PATH, Places
 from .textures import Images
+from .visibility import ObjectInstance
 
 # Places evaluated at a time, and the most of them along each side of a texel, for images finer than the texture.
 PLACES_AT_ONCE, MOST_PLACES = 1 << 20, 4
@@ -29,7 +29,7 @@ class _OnChart(Places):
         return super().own_value(end)
 
 
-def read_base_color(wanted: Wanted, placed: Placed, receiver: Receiver) -> list[np.ndarray]:
+def read_base_color(wanted: Wanted, placed: ObjectInstance, receiver: Receiver) -> list[np.ndarray]:
     """Float32 (grid height, grid width, 3) of each chart, not below 0: the linear colour, averaged over each texel.
 
     Parameters

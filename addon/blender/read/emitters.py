@@ -1,4 +1,4 @@
-"""Glowing meshes: what their materials emit, triangle by triangle."""
+"""EmissiveMeshing meshes: what their materials emit, triangle by triangle."""
 
 from __future__ import annotations
 
@@ -55,37 +55,37 @@ class Materials:
         return light if light.any() else None
 
 
-class Glow:
+class EmissiveMesh:
     """What the triangles of an evaluated object emit, and where its instances stand."""
 
     def __init__(self, obj, materials: Materials) -> None:
         self._images = materials.images
         self._parts: list[tuple[np.ndarray, np.ndarray]] = []
-        self._places: list[np.ndarray] = []
+        self._matrices: list[np.ndarray] = []
         self.reason = ""
         found = {slot: materials.read(one.material) for slot, one in enumerate(obj.material_slots)}
         glowing = {slot: light for slot, light in found.items() if light is not None}
         if glowing:
             self._add(obj, glowing)
 
-    def unplaced(self) -> Glow:
+    def without_instances(self) -> EmissiveMesh:
         """The same without any instance."""
-        glow = copy(self)
-        glow._places = []
-        return glow
+        mesh = copy(self)
+        mesh._matrices = []
+        return mesh
 
-    def place(self, matrix) -> None:
-        """Put an instance of it at a 4 x 4 matrix."""
+    def add_instance(self, matrix) -> None:
+        """Add an instance at a 4 x 4 matrix."""
         if self._parts:
-            self._places.append(np.array(matrix, dtype=float))
+            self._matrices.append(np.array(matrix, dtype=float))
 
     def light(self, common: tuple) -> MeshLight | None:
         """All instances in the world, or None if all is dark."""
-        if not self._places:
+        if not self._matrices:
             return None
         corners = np.concatenate([corners for corners, _ in self._parts]).reshape(-1, 3)
-        vertices = np.concatenate([corners @ place[:3, :3].T + place[:3, 3] for place in self._places])
-        light = np.concatenate([light for _, light in self._parts] * len(self._places))
+        vertices = np.concatenate([corners @ matrix[:3, :3].T + matrix[:3, 3] for matrix in self._matrices])
+        light = np.concatenate([light for _, light in self._parts] * len(self._matrices))
         return MeshLight(*common, vertices, np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3), light)
 
     def _add(self, obj, glowing: dict) -> None:

@@ -1,19 +1,62 @@
-"""Evaluated objects as triangles that throw shadows and as polygons that receive light."""
+"""Evaluated objects as occluders, which cast shadows, and as polygons, which receive light."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ...core.errors import ReceiverError
-from ...core.scene.occluders import Mesh
+from ...core.scene.occluders import Mesh, Occluder
 from ...core.scene.uv_map import Polygons
+from .scene_cache import SceneCache
 
-# A depsgraph has curves, text and metaballs as they are and, as instances of themselves, as meshes: these count.
+# A depsgraph holds curves, text and metaballs also as meshes, which are instances of themselves: only these are read.
 GEOMETRY_TYPES = {"MESH"}
 
 
+class OccluderReader:
+    """Collects occluders from the instances of a depsgraph; each mesh and each material is read once."""
+
+    def __init__(self, cache: SceneCache) -> None:
+        self._cache = cache
+        self._matrices: dict[tuple, list] = {}  # of the instances, by object name and key of the mesh
+
+    def add(self, instance) -> None:
+        """Add an entry of `depsgraph.object_instances` that renders, of any type, if it casts shadows."""
+        obj, meshes = instance.object, self._cache.meshes
+        owners = (obj, instance.parent) if instance.is_instance else (obj,)
+        if obj.type not in GEOMETRY_TYPES or not all(getattr(owner, "visible_shadow", True) for owner in owners):
+            return
+        data = obj if obj.data is None else obj.data
+        key = (
+            data.as_pointer(),
+            data.name,
+            *(slot.material.name_full if slot.material else None for slot in obj.material_slots),
+        )
+        if key not in meshes:
+            meshes[key] = local_mesh(obj, self._cache.transparency)
+            self._cache.note(meshes, key, instance)
+        if meshes[key] is not None:
+            matrix = instance.matrix_world
+            self._matrices.setdefault((obj.name, key), []).append((*matrix[0], *matrix[1], *matrix[2]))
+
+    @property
+    def warnings(self) -> list[str]:
+        return self._cache.transparency.warnings
+
+    def occluders(self) -> list[Occluder]:
+        return [
+            Occluder(name, self._cache.meshes[key], np.array(matrices, float).reshape(-1, 3, 4))
+            for (name, key), matrices in self._matrices.items()
+        ]
+
+
 def local_mesh(obj, materials) -> Mesh | None:
-    """Triangles of an evaluated object in its own frame, with what `materials` read of its slots; None without any."""
+    """Triangles of an evaluated object in its own frame, None without any.
+
+    Parameters
+    ----------
+    materials : `transparency.Materials`, which gives the transmittance of each slot.
+    """
     mesh = obj.to_mesh()
     if mesh is None:
         return None
@@ -41,18 +84,18 @@ def local_mesh(obj, materials) -> Mesh | None:
 
 
 def _image_uvs(mesh, slots: list, numbers: np.ndarray, corners: np.ndarray) -> np.ndarray | None:
-    """Where each triangle's corners lie in its material's image, float32 (M, 3, 2)."""
-    if all(slot.place is None for slot in slots):
+    """UVs of each triangle's corners in its material's image, float32 (M, 3, 2)."""
+    if all(slot.uv_transform is None for slot in slots):
         return None
-    found = np.zeros((*corners.shape, 2), np.float32)
+    image_uvs = np.zeros((*corners.shape, 2), np.float32)
     for number, slot in enumerate(slots):
         chosen = numbers == number
-        if slot.place is not None and chosen.any():
-            uvs = _uvs(mesh, slot.place.uv_map)
+        if slot.uv_transform is not None and chosen.any():
+            uvs = _uvs(mesh, slot.uv_transform.uv_map)
             at = np.zeros((chosen.sum(), 3, 2)) if uvs is None else uvs[corners[chosen]]
-            matrix = np.array(slot.place.matrix)
-            found[chosen] = at @ matrix[:, :2].T + matrix[:, 2]
-    return np.clip(np.nan_to_num(found), -1e6, 1e6)  # beyond, an image has no texels in single precision
+            matrix = np.array(slot.uv_transform.matrix)
+            image_uvs[chosen] = at @ matrix[:, :2].T + matrix[:, 2]
+    return np.clip(np.nan_to_num(image_uvs), -1e6, 1e6)  # larger UVs have no texels in single precision
 
 
 def _vertices(mesh) -> np.ndarray:
@@ -67,9 +110,11 @@ def _transform(points: np.ndarray, matrix) -> np.ndarray:
 
 
 def read_polygons(obj, material_name: str, matrix=None) -> Polygons:
-    """The faces of an evaluated mesh object that carry the material, in world space.
+    """Faces of an evaluated mesh object that carry the material, in world space.
 
-    `matrix` is where it stands, None: its own.
+    Parameters
+    ----------
+    matrix : transform to the world; None: the object's own.
     """
     matrix = obj.matrix_world if matrix is None else matrix
     mesh = obj.to_mesh()
@@ -104,7 +149,7 @@ def read_polygons(obj, material_name: str, matrix=None) -> Polygons:
 
 
 def _flat_scale(world: np.ndarray) -> np.ndarray:
-    """A plane may well have scale 0 along its normal: give that axis a length, which its normal alone needs."""
+    """The matrix with a length along the one axis of scale 0: a plane may have it, and only its normal needs it."""
     scales = np.linalg.norm(world, axis=0)
     if (scales == 0).sum() != 1:
         raise ReceiverError("The object's scale is zero along more than one axis: reset it (Alt+S).")
@@ -115,7 +160,7 @@ def _flat_scale(world: np.ndarray) -> np.ndarray:
 
 
 def _uvs(mesh, name: str = "") -> np.ndarray | None:
-    """Of each loop, of the map of that name or, without, the one that renders; float32 (N, 2)."""
+    """UVs of each loop, float32 (N, 2), in the map of that name, or without a name in the map that renders."""
     layer = next((layer for layer in mesh.uv_layers if (layer.name == name if name else layer.active_render)), None)
     if layer is None:
         return None
@@ -125,7 +170,7 @@ def _uvs(mesh, name: str = "") -> np.ndarray | None:
 
 
 def _has_material(obj, slots: np.ndarray, material_name: str) -> np.ndarray:
-    """Which faces carry the material; Blender gives faces with a slot too high the last one."""
+    """True for each face that carries the material; faces with a slot too high have the last one, as in Blender."""
     names = [slot.material.name if slot.material else None for slot in obj.material_slots]
     matches = np.array([name == material_name for name in names] or [False])
     return matches[np.clip(slots, 0, len(matches) - 1)]

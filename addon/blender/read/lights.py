@@ -1,4 +1,4 @@
-"""The light of a scene: its lamps, its glowing meshes and its world, and what casts shadows."""
+"""Illumination of a scene: its lamps, emissive meshes and world, and the occluders that cast shadows."""
 
 from __future__ import annotations
 
@@ -10,27 +10,24 @@ import bpy
 from ...core.scene.illumination import Illumination
 from ...core.scene.lights import Light
 from .. import compat
-from .emitters import Glow
-from .geometry import GEOMETRY_TYPES
-from .kept import Kept
+from .emitters import EmissiveMesh
+from .geometry import GEOMETRY_TYPES, OccluderReader
 from .lamps import fault, is_portal, read_lamp
-from .left_out import left_out, left_out_of_world
-from .linking import links_of
-from .occluders import OccluderReader
-from .visible import render_visible_names, renders
-from .world import read_world
+from .scene_cache import SceneCache
+from .visibility import left_out, left_out_of_world, render_visible_names, renders, with_instanced
+from .world_light import read_world
 
 
-def read_illumination(depsgraph, kept: Kept | None = None) -> Illumination:
-    """Lights and shadow casters of all objects and instances that render; nothing that is `kept` is read again."""
-    kept = kept or Kept()
+def read_illumination(depsgraph, cache: SceneCache | None = None) -> Illumination:
+    """Lights and occluders of all objects and instances that render; entries of the cache are not read again."""
+    cache = cache or SceneCache()
     visible = render_visible_names(depsgraph.view_layer)
-    lights, occluders = _Lights(depsgraph, kept), OccluderReader(kept)
+    lights, occluders = _Lights(depsgraph, cache), OccluderReader(cache)
     for instance in depsgraph.object_instances:
         if not renders(instance, visible):
             continue
         obj = instance.object
-        lights.say(left_out(obj))
+        lights.warn(left_out(obj))
         asks_instancer = instance.is_instance and (obj.type != "LIGHT" or compat.instancer_hides_lamps())
         lights_surfaces = obj.visible_diffuse and (not asks_instancer or instance.parent.visible_diffuse)
         if obj.type == "LIGHT" and lights_surfaces:
@@ -40,7 +37,7 @@ def read_illumination(depsgraph, kept: Kept | None = None) -> Illumination:
         occluders.add(instance)
     world = compat.world_of(depsgraph)
     lights.add_world(depsgraph.view_layer, world)
-    lights.say(left_out_of_world(world))
+    lights.warn(left_out_of_world(world))
     return Illumination(
         lights.all(),
         occluders.occluders(),
@@ -52,42 +49,43 @@ def read_illumination(depsgraph, kept: Kept | None = None) -> Illumination:
 
 
 def with_lamps(depsgraph, illumination: Illumination, names: Collection[str]) -> Illumination | None:
-    """The same with these lamps read again; None where more has changed than a look at each can tell."""
+    """The illumination with these lamps read again; None if the lamps alone can't tell all that has changed."""
     lights = list(illumination.lights)
     for name in names:
-        places = [place for place, light in enumerate(lights) if light.name == name]
+        indices = [index for index, light in enumerate(lights) if light.name == name]
         obj = depsgraph.view_layer.objects.get(name)
-        if len(places) != 1 or obj is None or name in illumination.by_cycles:
+        if len(indices) != 1 or obj is None or name in illumination.by_cycles:
             return None
         evaluated = obj.evaluated_get(depsgraph)
         light, reason = read_lamp(evaluated, evaluated.matrix_world)
         if light is None or reason or fault(light):
             return None
-        old = lights[places[0]]
-        lights[places[0]] = replace(light, blockers=old.blockers, receivers=old.receivers)
+        before = lights[indices[0]]
+        lights[indices[0]] = replace(light, blockers=before.blockers, receivers=before.receivers)
     return illumination.with_lights(lights)
 
 
 class _Lights:
-    """What was read so far, and what there is to say about it."""
+    """Collects the lights of a scene, and warnings about those that are left out."""
 
-    def __init__(self, depsgraph, kept: Kept) -> None:
-        self._kept = kept
-        self._names = {one.name for one in depsgraph.ids if isinstance(one, bpy.types.Object)}
+    def __init__(self, depsgraph, cache: SceneCache) -> None:
+        self._cache = cache
+        self._names = {data.name for data in depsgraph.ids if isinstance(data, bpy.types.Object)}
         self._lights: list[Light] = []
-        self._glows: dict[tuple[str, int], Glow] = {}  # by name and mesh: geometry nodes may give an object several
+        # By object name and mesh: geometry nodes may give an object several meshes.
+        self._emissive: dict[tuple[str, int], EmissiveMesh] = {}
         self._links: dict[str, dict] = {}
         self.warnings: dict[str, None] = {}  # in order, each once
         self.by_cycles: dict[str, str] = {}  # see Illumination
         self.receivers: dict[str, frozenset[str]] = {}
 
     def all(self) -> list[Light]:
-        glowing = [glow.light((name, 1.0, (1.0, 1.0, 1.0), True)) for (name, _), glow in self._glows.items()]
-        for light in filter(None, glowing):
+        meshes = [mesh.light((name, 1.0, (1.0, 1.0, 1.0), True)) for (name, _), mesh in self._emissive.items()]
+        for light in filter(None, meshes):
             self._add(light, self._links[light.name])
         return self._lights
 
-    def say(self, sentence: str) -> None:
+    def warn(self, sentence: str) -> None:
         if sentence:
             self.warnings[sentence] = None
 
@@ -103,25 +101,25 @@ class _Lights:
             self._add(light, links)
 
     def add_mesh(self, instance) -> None:
-        """Instances of a mesh become one light."""
-        obj = instance.object
+        """Add an instance of a mesh; all instances of a mesh become one light."""
+        obj, meshes = instance.object, self._cache.emissive
         key = obj.name, obj.data.as_pointer()
-        if key not in self._glows:
-            if key not in self._kept.glows:
-                self._kept.glows[key] = Glow(obj, self._kept.emission)
-                self._kept.note(self._kept.glows, key, instance)
-            self._glows[key] = glow = self._kept.glows[key].unplaced()
+        if key not in self._emissive:
+            if key not in meshes:
+                meshes[key] = EmissiveMesh(obj, self._cache.emission)
+                self._cache.note(meshes, key, instance)
+            self._emissive[key] = mesh = meshes[key].without_instances()
             self._links[obj.name] = links_of(obj, self._names)
-            if glow.reason:
-                why = f"What glows of '{obj.name}' is left out: {glow.reason} not understood."
+            if mesh.reason:
+                why = f"The light of '{obj.name}' is left out: {mesh.reason} not understood."
                 self._leave_to_cycles(obj.name, why, self._links[obj.name])
-        self._glows[key].place(instance.matrix_world)
+        self._emissive[key].add_instance(instance.matrix_world)
 
     def add_world(self, view_layer, world) -> None:
-        known = world and (world.name, view_layer.use_sky)
-        if self._kept.world is None or self._kept.world[0] != known:
-            self._kept.world = known, read_world(view_layer, world, self._kept.emission.images)
-        light, reason = self._kept.world[1]
+        key = world and (world.name, view_layer.use_sky)
+        if self._cache.world is None or self._cache.world[0] != key:
+            self._cache.world = key, read_world(view_layer, world, self._cache.emission.images)
+        light, reason = self._cache.world[1]
         if reason:
             self.by_cycles[world.name] = f"The world '{world.name}' is left out: {reason} not understood."
         if light is not None:
@@ -134,6 +132,44 @@ class _Lights:
 
     def _add(self, light: Light, links: dict) -> None:
         if why := fault(light):
-            self.say(f"The light '{light.name}' is left out: {why}.")
+            self.warn(f"The light '{light.name}' is left out: {why}.")
         else:
             self._lights.append(replace(light, **links))
+
+
+def links_of(obj, names: set[str]) -> dict[str, frozenset[str] | None]:
+    """The fields `receivers` and `blockers` of an object's light (light linking, Blender 4.0 on).
+
+    Parameters
+    ----------
+    names : of all objects of the scene.
+    """
+    linking = getattr(obj, "light_linking", None)
+    if linking is None:
+        return {}
+    return {
+        "receivers": _linked(linking.receiver_collection, names),
+        "blockers": _linked(linking.blocker_collection, names),
+    }
+
+
+def _linked(collection, names: set[str]) -> frozenset[str] | None:
+    """Names of the objects that a collection links; None: all.
+
+    Measured in Blender 4.5: a collection that only excludes objects links all others. Its own objects win over those
+    of collections in it, whose own states don't count. An instancer stands for the objects that it instances.
+    """
+    states = {}
+    if collection is not None:
+        for link, child in zip(collection.collection_children, collection.children):
+            states |= {name: link.light_linking.link_state for obj in child.all_objects for name in _shown_by(obj)}
+        for link, obj in zip(collection.collection_objects, collection.objects):
+            states |= dict.fromkeys(_shown_by(obj), link.light_linking.link_state)
+    if not states:
+        return None
+    included = {name for name, state in states.items() if state == "INCLUDE"}
+    return frozenset(included or names - set(states))
+
+
+def _shown_by(obj) -> set[str]:
+    return {inner.name for inner in with_instanced([obj])}

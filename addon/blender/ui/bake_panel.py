@@ -12,16 +12,15 @@ from ...core.bake.luminance import MOST_RAYS, rays_per_texel
 from ...core.errors import BakeError
 from ..cycles.child_denoise import has_denoiser
 from ..cycles.colors import bytes_of_colors, seconds_of_colors
-from ..cycles.light import seconds_estimate
+from ..cycles.cycles_light import seconds_estimate
 from ..images.files import check_image
 from ..images.results import check_editable
 from ..jobs.run.linked_color import needs_cycles
 from ..jobs.state import Row, Status, state
 from ..live import session
-from ..node.find import find_misplaced, find_node, find_targets, materials_of, places_rendered, was_baked_elsewhere
+from ..node.find import find_misplaced, find_node, find_targets, materials_of, rendered_counts, was_baked_elsewhere
 from ..popup import wrap
-from ..read.instances import by_name, with_instanced
-from ..read.placed import Placed, check_placed
+from ..read.visibility import ObjectInstance, by_name, check_instance, with_instanced
 
 # Objects whose warnings, and rows, that a panel shows; and of collections that are looked at (7 ms): it is drawn often.
 MOST_OBJECTS, MOST_LOOKED_AT = 8, 1000
@@ -43,7 +42,7 @@ LONG_SECONDS = 10.0
 def warnings_for(obj, places: dict[str, int]) -> list[str]:
     """What would keep the object from being baked, as far as it is known without baking.
 
-    `places`: see `places_rendered`.
+    `places`: see `rendered_counts`.
     """
     messages = [bake.error for bake in find_misplaced([obj] if obj.instance_type == "NONE" else [])]
     materials, view_layer = materials_of(obj), bpy.context.view_layer
@@ -54,7 +53,7 @@ def warnings_for(obj, places: dict[str, int]) -> list[str]:
     if not obj.data.uv_layers:
         messages.append("The mesh has no UV map: unwrap it first.")
     times = places.get(obj.name, 0)
-    checks = [lambda: check_placed(obj.name, Placed(obj, None, times) if times else None, view_layer)]
+    checks = [lambda: check_instance(obj.name, ObjectInstance(obj, None, times) if times else None, view_layer)]
     for material in materials:
         if bpy.context.scene.beamspread.output == "LUMINANCE":
             checks.append(lambda material=material: check_editable(material))
@@ -113,7 +112,7 @@ def draw_problems(layout, context) -> set[str]:
     """What would keep selected objects, and what they show of collections, from being baked; the sentences."""
     # `context.object` is empty in the render properties.
     view_layer = context.view_layer
-    chosen, places = list(view_layer.objects.selected)[:MOST_OBJECTS], places_rendered(view_layer)
+    chosen, places = list(view_layer.objects.selected)[:MOST_OBJECTS], rendered_counts(view_layer)
     inner = with_instanced(chosen)[len(chosen) :][:MOST_LOOKED_AT]
     own = {obj.name for obj in view_layer.objects} if inner else set()
     shown, left = set(), MOST_OBJECTS

@@ -5,13 +5,15 @@ from __future__ import annotations
 import bpy
 
 from .. import compat
+from ..images.files import clips
+from ..images.image_operators import image_in, wanted_size
+from ..images.previews import holds_previews_alone
 from ..jobs.run.engine import BeamspreadEngine, active_image
 from ..node.draw import draw_properties
 from ..node.find import find_node
 from ..preferences import draw_help
 from ..registration import all_or_nothing, classes
 from .bake_panel import draw_bake, draw_sentences, estimates
-from .image_buttons import draw_image_buttons
 
 
 def _use_columns(layout) -> None:
@@ -19,8 +21,21 @@ def _use_columns(layout) -> None:
     layout.use_property_decorate = False
 
 
+def draw_image_buttons(layout, context) -> None:
+    """Make Float where it clips, Resize where the scene's resolution is another."""
+    image = image_in(context)
+    if image is None or holds_previews_alone(image) or 0 in image.size or image.library is not None:
+        return
+    if clips(image):
+        layout.operator("beamspread.make_float", text="Make Float: it clips values above 1", icon="IMAGE_DATA")
+    size = wanted_size(image, context.scene.beamspread.resolution)
+    if tuple(image.size) != size:
+        text = f"Resize {image.size[0]} x {image.size[1]} to {size[0]} x {size[1]}"
+        layout.operator("beamspread.resize_image", text=text, icon="FULLSCREEN_ENTER")
+
+
 class RenderPanel:
-    """Placed in the render properties."""
+    """ObjectInstance in the render properties."""
 
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
@@ -141,6 +156,22 @@ class BEAMSPREAD_PT_batch(RenderPanel, bpy.types.Panel):
         column.operator("beamspread.show_single", icon="IMAGE_DATA")
 
 
+class BEAMSPREAD_PT_render_with(RenderPanel, bpy.types.Panel):
+    """Engine that renders images while the render engine is Beamspread."""
+
+    bl_label = "Render With"
+    bl_parent_id = "BEAMSPREAD_PT_render"
+
+    @classmethod
+    def poll(cls, context):
+        return context.engine == BeamspreadEngine.bl_idname
+
+    def draw(self, context):
+        _use_columns(self.layout)
+        self.layout.prop(context.scene.beamspread, "render_engine")
+        self.layout.label(text="The viewport shows EEVEE", icon="INFO")
+
+
 class MaterialPanel:
     """Shown while the active material has a Beamspread node."""
 
@@ -190,6 +221,7 @@ _classes = (
     BEAMSPREAD_PT_active_image,
     BEAMSPREAD_PT_images,
     BEAMSPREAD_PT_batch,
+    BEAMSPREAD_PT_render_with,
     BEAMSPREAD_PT_material,
     BEAMSPREAD_PT_node_editor,
 )

@@ -16,8 +16,7 @@ from ....core.errors import sentence
 from ....core.target import Target
 from ... import compat
 from ...node.find import find_node
-from ...read.instances import by_name, collection_of, rendered_in
-from ...read.visible import render_visible_names
+from ...read.visibility import by_name, collection_of, render_visible_names, rendered_in
 from .pixels import Pixels, images_of, results
 from .scatter import Scatter, scatters
 

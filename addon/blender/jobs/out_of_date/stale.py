@@ -20,7 +20,7 @@ from ...images.files import file_of
 from ...images.sequence import file_at, is_sequence
 from ...images.undo import is_undone
 from ...node.find import find_bakeable, find_misplaced, find_node
-from ...read.instances import by_name
+from ...read.visibility import by_name
 from ...registration import all_or_nothing, handlers
 from ..state import Row, Status, redraw, state
 from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part

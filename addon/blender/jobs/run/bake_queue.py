@@ -10,7 +10,7 @@ from ....core.bake.bake_settings import FINAL, PREVIEW
 from ....core.bake.estimate import simulation_seconds
 from ....core.bake.runner import Bake
 from ....core.target import Target
-from ...cycles.light import seconds_estimate
+from ...cycles.cycles_light import seconds_estimate
 from ...node.find import find_node
 from .prepare import Preparation
 

@@ -22,7 +22,7 @@ from ...images.facts import Record, attributes_of
 from ...images.files import file_of, size_of
 from ...images.outputs import Outputs
 from ...node.find import NOTHING_FOUND, find_bakeable, find_misplaced
-from ...read.instances import by_name
+from ...read.visibility import by_name
 from ..out_of_date import stale
 from ..out_of_date.fingerprint import IMAGE, SETTINGS, Parts, settings_part
 from .prepare import prepare_scene

@@ -14,7 +14,7 @@ from ....core.bake.runner import WRITTEN, Bake
 from ....core.errors import ImageError, sentence
 from ....core.target import Target
 from ... import compat
-from ...cycles.light import CopyForCycles
+from ...cycles.cycles_light import CopyForCycles
 from ...node.find import NOTHING_FOUND, find_misplaced, find_node, find_targets, materials_of
 from ...registration import all_or_nothing, classes, handlers
 from ..out_of_date import stale

@@ -18,13 +18,13 @@ from ....core.scene.receiver import Receiver
 from ....core.scene.texture import mean_color, textured
 from ....core.target import Target
 from ...cycles.colors import colors_by_cycles, seconds_of_colors
-from ...cycles.light import CopyForCycles
-from ...node.find import find_place
+from ...cycles.cycles_light import CopyForCycles
+from ...node.find import find_node_in_groups
 from ...node.tree import BASE_COLOR
 from ...read.base_color import is_understood, read_base_color
 from ...read.image_texture import NotUnderstoodError
 from ...read.node_links import Wanted
-from ...read.placed import Placed
+from ...read.visibility import ObjectInstance
 
 # Rounding, or a little over by interpolation.
 BRIGHTEST = 1.001
@@ -70,7 +70,7 @@ class BaseColor:
         return replace(job, receiver=textured(job.receiver, self.colors, self.blur)) if self.colors else job
 
 
-def read_texture(node, groups: tuple, placed: Placed, receiver: Receiver) -> BaseColor:
+def read_texture(node, groups: tuple, placed: ObjectInstance, receiver: Receiver) -> BaseColor:
     """What is linked to the node, at the places of an object's receiver.
 
     `groups` are the group nodes around the node.
@@ -84,7 +84,7 @@ def read_texture(node, groups: tuple, placed: Placed, receiver: Receiver) -> Bas
 
 def needs_cycles(obj, material_name: str) -> bool:
     """Whether a bake of one of an object's materials has Cycles evaluate a texture."""
-    place = find_place(bpy.data.materials.get(material_name))
+    place = find_node_in_groups(bpy.data.materials.get(material_name))
     if place is None or not place[0].has_texture():
         return False
     return not is_understood(Wanted(place[0].inputs[BASE_COLOR], place[1]), obj)
@@ -93,7 +93,7 @@ def needs_cycles(obj, material_name: str) -> bool:
 class ColorByCycles:
     """A texture that only Cycles knows, of one target; what was found, or that nothing was, holds for all its jobs."""
 
-    def __init__(self, target: Target, surface: Surface, blur: float, placed: Placed) -> None:
+    def __init__(self, target: Target, surface: Surface, blur: float, placed: ObjectInstance) -> None:
         self._target, self._surface, self._blur = target, surface, blur
         # Plain, as it goes to a thread.
         self._matrix = np.array(placed.matrix).tolist() if placed.is_instance else None

@@ -17,15 +17,14 @@ from ....core.scene.receiver import build_receiver, texture_size
 from ....core.scene.uv_map import fit_uv_maps
 from ....core.target import Target
 from ...cycles.colors import bytes_of_colors, seconds_of_colors
-from ...cycles.light import CopyForCycles, CyclesLight
+from ...cycles.cycles_light import CopyForCycles, CyclesLight
 from ...images.files import check_image
 from ...images.sequence import is_sequence, size_of_frames
-from ...node.find import find_place, materials_of
+from ...node.find import find_node_in_groups, materials_of
 from ...node.node import BeamspreadNode
 from ...read.geometry import read_polygons
 from ...read.lights import read_illumination
-from ...read.placed import Placed, check_placed, find_placed
-from ...read.visible import as_rendered, render_visible_names
+from ...read.visibility import ObjectInstance, as_rendered, check_instance, find_instances, render_visible_names
 from .linked_color import BaseColor, ColorByCycles, read_texture
 
 # Stands for a base color that is found when the job runs.
@@ -50,7 +49,7 @@ def read_scene(context, targets: list[Target], settings: BakeSettings, resolutio
     depsgraph = context.evaluated_depsgraph_get()
     for material in {bpy.data.materials[target.material_name] for target in targets}:
         evaluated = material.evaluated_get(depsgraph).node_tree
-        groups = [group.node_tree for group in find_place(material)[1]]
+        groups = [group.node_tree for group in find_node_in_groups(material)[1]]
         # No more than needs it is tagged: views, and the material's icons, would start again.
         for tree, copy in [(material.node_tree, evaluated), *((one, one.evaluated_get(depsgraph)) for one in groups)]:
             if not all(map(_is_current, tree.nodes, copy.nodes)):
@@ -92,14 +91,14 @@ class Preparation:
         self._plans: dict[Target, _Plan | str] = {}
         try:
             self._illumination, self._by_cycles = read_illumination(depsgraph), CyclesLight(depsgraph, copy)
-            placed = find_placed(depsgraph, {target.object_name for target in targets}, visible)
+            placed = find_instances(depsgraph, {target.object_name for target in targets}, visible)
         except Exception as error:  # noqa: BLE001 - each bake asked for needs an answer
             self._plans = dict.fromkeys(targets, sentence(error))
             return
         for target in targets:
             try:
                 here = placed.get(target.object_name)
-                check_placed(target.object_name, here, depsgraph.view_layer)
+                check_instance(target.object_name, here, depsgraph.view_layer)
                 self._plans[target] = _read_target(depsgraph, target, here, resolution, size)
             except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
                 self._plans[target] = sentence(error)
@@ -151,9 +150,11 @@ class _Plan:
 
 
 def _read_target(
-    depsgraph, target: Target, placed: Placed, resolution: int | None, size: tuple[int, int] | None
+    depsgraph, target: Target, placed: ObjectInstance, resolution: int | None, size: tuple[int, int] | None
 ) -> _Plan:
-    node, groups = find_place(next(one for one in materials_of(placed.obj) if one.name == target.material_name))
+    node, groups = find_node_in_groups(
+        next(one for one in materials_of(placed.obj) if one.name == target.material_name)
+    )
     surface = node.surface()
     surface.check()
     if size is None and node.image is not None:

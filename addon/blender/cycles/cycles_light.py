@@ -20,13 +20,12 @@ from ...core.scene.illumination import Illumination
 from ...core.scene.lights import STRATA, Field, FieldLight, LampFieldLight, Light, WorldLight
 from ...core.scene.receiver import Receiver
 from .. import compat
-from ..node.find import find_place
+from ..node.find import find_node_in_groups
 from ..node.tree import BASE_COLOR
-from ..read.visible import render_visible_names, renders
+from ..read.visibility import SOLID_TYPES, render_visible_names, renders
 from .child_denoise import has_denoiser
 from .process import run
 from .scene_copy import SceneCopy
-from .world import world_panorama
 
 # Nodes along the longest side of a receiver; the nodes of all its charts fill so many squares of that side at most.
 NODES, MOST_SQUARES = 64, 2.0
@@ -51,8 +50,11 @@ START_SECONDS, PATHS_PER_NODE, PATHS_TO_DENOISE, PATHS_PER_SECOND = 3.0, 600, 25
 # Of a node, how high above the receiver its light is gathered: nothing that stands there may be below.
 LIFT = 1e-3
 
-# What light bounces from.
-SOLID = {"MESH", "CURVE", "CURVES", "SURFACE", "FONT", "META", "VOLUME", "POINTCLOUD"}
+# Samples of each texel of the world's panorama, and of those in tiles around a sun: 16 and 256 give the same irradiance
+# to 1e-6.
+WORLD_SAMPLES, SUN_SAMPLES = 2, 256
+# Seconds that a panorama takes about, for the progress: a sky in Blender 3.4 on two cores.
+WORLD_SECONDS = 8.0
 
 WHITE = 1.0, (1.0, 1.0, 1.0)
 UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -63,7 +65,7 @@ class CopyForCycles:
 
     def __init__(self, scene, view_layer) -> None:
         self.scene = SceneCopy(scene, view_layer)
-        places = {one.name: find_place(one) for one in bpy.data.materials}
+        places = {one.name: find_node_in_groups(one) for one in bpy.data.materials}
         places = {name: place for name, place in places.items() if place is not None}
         self.reflectances = {name: _reflectance(node.surface()) for name, (node, _) in places.items()}
         # Where the texture is: the groups around a node, the node, its input.
@@ -228,7 +230,7 @@ def _corners_of_solids(depsgraph) -> np.ndarray:
     visible = render_visible_names(depsgraph.view_layer)
     corners = [np.zeros((0, 3))]
     for instance in depsgraph.object_instances:
-        if instance.object.type in SOLID and renders(instance, visible):
+        if instance.object.type in SOLID_TYPES and renders(instance, visible):
             world = np.array(instance.matrix_world, dtype=float)
             corners.append(np.array(instance.object.bound_box) @ world[:3, :3].T + world[:3, 3])
     return np.concatenate(corners)
@@ -246,3 +248,25 @@ def _reflectance(surface) -> list[float]:
         return surface.reflectance()
     except MaterialError:  # of another object: it can't be baked, and says so when it is tried
         return [0.0, 0.0, 0.0]
+
+
+def world_panorama(
+    copy: SceneCopy, width: int = 4096, height: int = 2048, progress: Progress | None = None
+) -> np.ndarray:
+    """Radiance of the world by direction, for light on a diffuse surface.
+
+    Returns
+    -------
+    float32 (height, width, 3), W/(m^2 sr), row 0 at the bottom: what an Environment Texture node (equirectangular)
+    would show the same world with. The direction of the point (u, v), each 0..1, has the azimuth 2 pi (0.5 - u) around
+    +Z from +X, and the elevation pi (v - 0.5).
+
+    Raises
+    ------
+    BakeError
+        Cycles failed.
+    Cancelled
+        `progress` returned False.
+    """
+    request = {"width": width, "height": height, "samples": WORLD_SAMPLES, "fine_samples": SUN_SAMPLES}
+    return run(copy, "world", request, progress, "Rendering the world", WORLD_SECONDS)["radiance"]
