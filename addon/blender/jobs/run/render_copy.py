@@ -42,7 +42,7 @@ def render_picture(engine, depsgraph) -> None:
     except native.Cancelled:
         pass
     except Exception as error:  # noqa: BLE001 - Blender would swallow it
-        remedy = " EEVEE needs OpenGL: try Cycles (Render > Beamspread > Pictures)." if name == "EEVEE" else ""
+        remedy = " EEVEE needs OpenGL: try Cycles (Render > Beamspread > Render With)." if name == "EEVEE" else ""
         engine.report({"ERROR"}, sentence(error) + remedy)
     finally:
         engine.end_result(result, cancel=not filled)
