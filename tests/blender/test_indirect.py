@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from beamspread.blender.cycles import light, process
+from beamspread.blender.cycles import cycles_light, process
 from beamspread.blender.cycles.child_denoise import Denoiser, has_denoiser
 from beamspread.blender.cycles.scene_copy import PREFIX, SceneCopy, remove_stale
 from beamspread.blender.jobs.run.prepare import prepare_scene
@@ -28,9 +28,9 @@ TEXELS, GREY = 32, 0.5
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch):
     """Few nodes, with noise of 2 % at each."""
-    monkeypatch.setattr(light, "NODES", 32)
+    monkeypatch.setattr(cycles_light, "NODES", 32)
     for name in ("LEAST_NOISE", "MOST_NOISE"):
-        monkeypatch.setattr(light, name, 0.02)
+        monkeypatch.setattr(cycles_light, name, 0.02)
     bpy.context.scene.beamspread.use_indirect = True
     bpy.context.scene.beamspread.margin = 0
 
@@ -341,7 +341,7 @@ def irradiance_of_jobs(floor, linking, receivers, blockers):
 
 def test_what_leaks_into_a_closed_box_is_no_light(monkeypatch):
     """Blender's first cube around a plane as wide: some ten-millionth of the light gets in along the edges."""
-    monkeypatch.setattr(light, "NODES", 64)
+    monkeypatch.setattr(cycles_light, "NODES", 64)
     floor = scenes.add_plane("Floor", material=scenes.add_material())
     bpy.ops.mesh.primitive_cube_add()
     scenes.add_sun(40, 60, 10.0)
@@ -351,7 +351,7 @@ def test_what_leaks_into_a_closed_box_is_no_light(monkeypatch):
     bake.run()
     assert not bake.error
     assert bake.is_dark
-    assert light.NOTHING_BOUNCES in bake.warnings
+    assert cycles_light.NOTHING_BOUNCES in bake.warnings
     assert "No light reaches 'Floor'" in " ".join(bake.warnings)
 
 
@@ -401,7 +401,7 @@ def folders():
 
 def test_the_scene_stays_as_it_is(monkeypatch, tmp_path):
     floor = add_scene()
-    monkeypatch.setattr(light, "MOST_SAMPLES", 8)
+    monkeypatch.setattr(cycles_light, "MOST_SAMPLES", 8)
     dirty = bpy.data.images.new("In memory", 8, 8)
     dirty.pixels[0] = 0.5
     bpy.context.scene.frame_set(7)
@@ -434,9 +434,9 @@ def test_the_scene_stays_as_it_is(monkeypatch, tmp_path):
 
 def test_cancelling_kills_the_process(monkeypatch):
     floor = add_scene()
-    monkeypatch.setattr(light, "LEAST_NOISE", 1e-4)
-    monkeypatch.setattr(light, "MOST_NOISE", 1e-4)
-    monkeypatch.setattr(light, "MOST_SAMPLES", 10**4)
+    monkeypatch.setattr(cycles_light, "LEAST_NOISE", 1e-4)
+    monkeypatch.setattr(cycles_light, "MOST_NOISE", 1e-4)
+    monkeypatch.setattr(cycles_light, "MOST_SAMPLES", 10**4)
     children = []
 
     class Popen(subprocess.Popen):

@@ -5,10 +5,9 @@ import math
 import bpy
 import numpy as np
 import pytest
-from beamspread.blender.read.image_texture import NotUnderstoodError
 from beamspread.blender.read.node_math import BLENDS, LUMINANCE, MATH, VECTOR_MATH
-from beamspread.blender.read.places import Places
-from beamspread.blender.read.shaders import radiance, surface_of
+from beamspread.blender.read.nodes import NotUnderstoodError, surface_of
+from beamspread.blender.read.shading import ShadingPoints
 from cycles_truth import add_receiver, cycles_irradiance
 from mathutils import Matrix
 
@@ -44,7 +43,7 @@ class World:
         self.link(output, self.background.inputs["Color"])
 
     def ours(self):
-        return radiance(Places(), surface_of(self.tree))
+        return ShadingPoints().value(surface_of(self.tree))
 
     def cycles(self, samples):
         return cycles_irradiance(self.plane, self.image, samples).mean(axis=(0, 1)) / math.pi

@@ -5,8 +5,8 @@ import math
 import bpy
 import numpy as np
 import pytest
+from beamspread.blender.read.image_nodes import MAX_WIDTH, shrunk
 from beamspread.blender.read.lights import read_illumination
-from beamspread.blender.read.textures import MOST_WIDE, shrunk
 from beamspread.blender.read.world_light import directions
 from cycles_truth import add_receiver, cycles_irradiance
 from mathutils import Euler, Matrix
@@ -240,9 +240,9 @@ def test_alpha_of_images(is_float, mode):
 
 def test_huge_images_are_averaged_with_their_energy():
     rng = np.random.default_rng(1)
-    pixels = rng.random((64, 2 * MOST_WIDE, 4), np.float32)
+    pixels = rng.random((64, 2 * MAX_WIDTH, 4), np.float32)
     small = shrunk(pixels)
-    assert small.shape == (32, MOST_WIDE, 4)
+    assert small.shape == (32, MAX_WIDTH, 4)
 
     def energy(values):
         edges = np.sin(np.linspace(-0.5 * math.pi, 0.5 * math.pi, len(values) + 1))

@@ -300,7 +300,7 @@ def test_color_of_an_image_tints(color_space, uses_alpha):
 def test_a_volume_alone_lets_light_through_and_says_so():
     tree = Tree("Haze")
     add_card(tree.finish(tree.add("VolumeScatter", {"Density": 1e-6}), "Volume"))
-    words = "The material 'Haze' has a volume alone: it throws no shadow, whatever the volume takes."
+    words = "The material 'Haze' has only a volume: it casts no shadow, whatever the volume absorbs."
     assert assert_agree(warnings=[words]).min() > 0
 
 
@@ -312,7 +312,7 @@ def test_what_is_not_understood_is_opaque_and_named():
     scenes.add_sun(20, 30)
     ours, warnings = our_irradiance(plane)
     assert not ours[112, 136].any()
-    words = "The material 'Mottled' throws opaque shadows: the node 'Noise Texture' is not understood."
+    words = "The material 'Mottled' casts opaque shadows: the node 'Noise Texture' is not understood."
     assert list(warnings) == [words]
 
 

@@ -29,13 +29,19 @@ def find_node_in_groups(material) -> tuple | None:
     return next(iter(found), None)
 
 
-def _nodes_in(tree, groups: tuple = ()) -> Iterator[tuple]:
-    """Beamspread nodes, each with the group nodes around it, in a tree and its groups (which can't form circles)."""
-    for node in tree.nodes:
-        if node.bl_idname == BeamspreadNode.bl_idname:
+def _nodes_in(tree) -> Iterator[tuple]:
+    """Beamspread nodes of a tree and its groups, each with the group nodes around it; every group is entered once."""
+    entered, stack = set(), [(iter(tree.nodes), ())]
+    while stack:
+        nodes, groups = stack[-1]
+        node = next(nodes, None)
+        if node is None:
+            stack.pop()
+        elif node.bl_idname == BeamspreadNode.bl_idname:
             yield node, groups
-        elif node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
-            yield from _nodes_in(node.node_tree, (*groups, node))
+        elif node.bl_idname == "ShaderNodeGroup" and node.node_tree not in {None, *entered}:
+            entered.add(node.node_tree)
+            stack.append((iter(node.node_tree.nodes), (*groups, node)))
 
 
 def _is_own(group) -> bool:

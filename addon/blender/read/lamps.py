@@ -1,4 +1,4 @@
-"""Blender's lights. A new kind is a function here and its line in `READERS`."""
+"""Blender's lamps. A new kind is a function here and its line in `READERS`."""
 
 from __future__ import annotations
 
@@ -17,9 +17,8 @@ from ...core.scene.lights import (
     SunLight,
 )
 from .. import compat
-from .image_texture import NotUnderstoodError
-from .places import Places
-from .shaders import radiance, surface_of
+from .nodes import NotUnderstoodError, surface_of
+from .shading import ShadingPoints
 
 
 def _frame(axes: np.ndarray) -> tuple:
@@ -63,30 +62,30 @@ def _area(data, axes: np.ndarray, common: tuple) -> Light:
     return AreaLight(*brighter, _position(axes), _frame(axes), data.size, size_y, is_round, data.spread)
 
 
-# By Blender's type: (light data, matrix to the world, name, strength, color and shadow) -> Light.
+# Functions of the light data, the matrix to the world, and (name, strength, color, shadow), by Blender's type.
 READERS = {"SUN": _sun, "POINT": _point, "SPOT": _spot, "AREA": _area}
 
 
 def is_portal(data) -> bool:
-    """Whether a lamp only shows Cycles where the world's light comes in."""
+    """True for a lamp that only guides Cycles to the light of the world."""
     return data.type == "AREA" and data.cycles.is_portal
 
 
 def fault(light: Light) -> str:
-    """See `Light.fault`; a spot's cone takes the lamp's scale."""
+    """Reason why a light can't be baked, see `Light.fault`; a spot's cone depends on the lamp's scale."""
     if isinstance(light, SpotLight | SphereSpotLight) and np.linalg.matrix_rank(light.frame) < 3:
         return "its scale is 0"
     return light.fault()
 
 
 def read_lamp(obj, matrix) -> tuple[Light | None, str]:
-    """The light, or None if it is dark; and why only Cycles knows how it shines, if so: then it is as without nodes."""
+    """The light, None if it is dark, and the reason why its nodes are ignored if they are not understood."""
     data, axes = obj.data, np.array(matrix, dtype=float)
     color, reason = np.array(compat.light_color(data)), ""
     if data.use_nodes and data.node_tree is not None:
         surface = surface_of(data.node_tree)
         try:
-            color = color * (0 if surface is None else radiance(Places(), surface))
+            color = color * (0 if surface is None else ShadingPoints().value(surface))
         except NotUnderstoodError as error:
             reason = str(error)
     strength = compat.light_strength(data) * _area_factor(data, axes)
@@ -97,7 +96,7 @@ def read_lamp(obj, matrix) -> tuple[Light | None, str]:
 
 
 def _area_factor(data, axes: np.ndarray) -> float:
-    """What a light without `normalize` is brighter by (Blender 4.5 on): its area as Cycles counts it, measured."""
+    """Factor of a light without `normalize` (Blender 4.5 on): its area as measured in Cycles."""
     if getattr(data, "normalize", True):
         return 1.0
     if data.type == "SUN":
@@ -106,5 +105,5 @@ def _area_factor(data, axes: np.ndarray) -> float:
         size_y = data.size_y if data.shape in ("RECTANGLE", "ELLIPSE") else data.size
         part = 0.25 * math.pi if data.shape in ("DISK", "ELLIPSE") else 1.0
         return part * data.size * size_y * math.prod(np.linalg.norm(axes[:3, :2], axis=0))
-    # Without a radius it is as of one watt per steradian and square metre.
+    # A lamp without a radius has one watt per steradian and square meter.
     return 4 * math.pi * data.shadow_soft_size**2 or 4.0

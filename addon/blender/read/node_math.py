@@ -1,20 +1,18 @@
-"""What the nodes compute that know nothing but their inputs, by Cycles' formulas.
+"""Nodes that depend on their inputs alone, by Cycles' formulas.
 
-Each function takes a `Node` (node_values.py) and returns its value, or None for a mode that it does not know.
+Each function takes a `Node` (nodes.py) and returns its value, or None for a mode that it does not know.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from . import blackbody
-
-# Rec. 709, by which Cycles turns colours into numbers.
+# Weights by which Cycles turns colors into numbers (Rec. 709).
 LUMINANCE = np.array((0.2126729, 0.7151522, 0.0721750))
 
 
 def _safe(function):
-    """Cycles' nodes give 0 where there is no number."""
+    """The function with 0 in place of infinity and NaN, as Cycles' nodes have it."""
 
     def safe(*values):
         with np.errstate(all="ignore"):
@@ -63,7 +61,7 @@ VECTOR_MATH = {name: MATH[name] for name in ("ADD", "SUBTRACT", "MULTIPLY", "DIV
     name: MATH[name] for name in ("ABSOLUTE", "MINIMUM", "MAXIMUM", "FLOOR", "CEIL", "SINE", "COSINE", "TANGENT")
 }
 
-# (factor, first colour, second colour) -> colour
+# (factor, first color, second color) -> color
 BLENDS = {
     "MIX": lambda t, a, b: a + t * (b - a),
     "ADD": lambda t, a, b: a + t * b,
@@ -78,7 +76,7 @@ BLENDS = {
 
 
 def _number(node):
-    """Value and RGB nodes keep it in their output."""
+    """Value and RGB nodes, which keep their value in their output."""
     return np.atleast_1d(np.asarray(node.output.default_value, float))[:3]
 
 
@@ -130,7 +128,7 @@ def _mix_rgb(node):
 
 def _blend(node, kind: str, factor, first, second):
     if kind == "MIX" and not (factor.any() and (factor != 1).any()):
-        return node[second if factor.any() else first]  # the other need not be understood
+        return node[second if factor.any() else first]  # the unused input need not be understood
     return BLENDS[kind](factor, node[first], node[second]) if kind in BLENDS else None
 
 
@@ -150,7 +148,7 @@ def _clamp(node):
 
 
 def _color_ramp(node):
-    """Through a table of 256 entries, as Cycles."""
+    """Color Ramp, by a table of 256 entries as in Cycles."""
     ramp, steps = node.node.color_ramp, np.linspace(0, 1, 256)
     table = np.array([ramp.evaluate(step) for step in steps])
     table = table[:, 3:] if node.output.name == "Alpha" else table[:, :3]
@@ -189,7 +187,7 @@ def _invert(node):
 
 
 def _hue_saturation(node):
-    """Turns the hue, and scales saturation and value, of Smith's hexagonal HSV (1978)."""
+    """Hue turned, saturation and value scaled, in Smith's hexagonal HSV (1978)."""
     hue, saturation, strength, factor, color = (node[i] for i in range(5))
     peak, low = color.max(axis=-1, keepdims=True), color.min(axis=-1, keepdims=True)
     chroma = np.where(peak > low, peak - low, 1)
@@ -207,11 +205,12 @@ def _hue_saturation(node):
 
 
 def _mapping(node):
-    """Point, Texture, Vector, Normal: scaled, turned and moved, or back."""
+    """Mapping: scales, rotates and moves points; Texture does the inverse."""
     kind, vector = node.node.vector_type, node["Vector"]
-    rotation, scale = _rotation(node["Rotation"]), node["Scale"]
-    if rotation is None:
+    angles, scale = node["Rotation"], node["Scale"]
+    if angles.ndim > 1:  # differs from point to point
         return None
+    rotation = rotation_matrix(angles)
     if kind == "TEXTURE":
         return _safe(np.divide)((vector - node["Location"]) @ rotation, scale)
     if kind == "NORMAL":
@@ -221,10 +220,8 @@ def _mapping(node):
     return turned + node["Location"] if kind == "POINT" else turned
 
 
-def _rotation(angles):
-    """The matrix of Blender's Euler angles, about x first; None where they differ from place to place."""
-    if angles.ndim > 1:
-        return None
+def rotation_matrix(angles) -> np.ndarray:
+    """3 x 3 matrix of Blender's Euler angles in radians, about x first."""
     (cos_x, cos_y, cos_z), (sin_x, sin_y, sin_z) = np.cos(angles), np.sin(angles)
     about_x = np.array([[1, 0, 0], [0, cos_x, -sin_x], [0, sin_x, cos_x]])
     about_y = np.array([[cos_y, 0, sin_y], [0, 1, 0], [-sin_y, 0, cos_y]])
@@ -232,10 +229,29 @@ def _rotation(angles):
     return about_z @ about_y @ about_x
 
 
+# Blackbody: polynomials of 1000 K / temperature for linear red, green and blue at a luminance of 1, lowest power first.
+# Fitted to Cycles; agrees with Blender 3.4 and 4.5 to 0.3 % of the strongest channel.
+BLACKBODY = np.array(
+    [
+        (0.63575, 1.63766, 8.10316, -10.26485, 5.87697, -1.38757),
+        (0.95478, 0.88502, -5.48236, 6.76964, -4.15069, 1.06245),
+        (2.43557, -12.0266, 20.99363, -13.1999, 0.0, 0.0),
+    ]
+)
+# Temperatures, kelvin, beyond which Cycles' blackbody keeps its color.
+MIN_KELVIN, MAX_KELVIN = 800.0, 12000.0
+
+
+def blackbody(kelvin: np.ndarray) -> np.ndarray:
+    """Linear RGB (..., 3) of a temperature (..., 1)."""
+    powers = (1000.0 / np.clip(kelvin, MIN_KELVIN, MAX_KELVIN)) ** np.arange(BLACKBODY.shape[1])
+    return np.maximum(powers @ BLACKBODY.T, 0.0)
+
+
 FUNCTIONS = {
     "ShaderNodeValue": _number,
     "ShaderNodeRGB": _number,
-    "ShaderNodeBlackbody": lambda node: blackbody.color(node[0]),
+    "ShaderNodeBlackbody": lambda node: blackbody(node[0]),
     "ShaderNodeMath": _math,
     "ShaderNodeVectorMath": _vector_math,
     "ShaderNodeMix": _mix,

@@ -1,51 +1,157 @@
-"""What materials let through of the light that shadow rays ask for, as Cycles without caustics.
+"""Transmittance of materials for shadow rays, as in Cycles without caustics.
 
-Only transparent closures let light through: Transparent BSDF and what alpha leaves of a Principled BSDF, mixed and
-added. Glass, refraction and translucent BSDFs bend or spread light, and throw full shadows.
+Only transparent closures let light through: Transparent BSDF, and Principled BSDF with alpha below 1, mixed and added.
+Glass, refraction and translucent BSDFs bend or spread light, and cast full shadows.
 """
 
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...core.native import native
 from .. import compat
-from .image_texture import NotUnderstoodError, Pixels, TexturePlace
-from .node_links import Wanted, follow
-from .texels import FINE_SIDE, Texels
+from .image_nodes import Pixels, UVTransform, alpha_of, color_of, resampled, uv_transform_of
+from .nodes import Evaluator, InputSocket, Links, NotUnderstoodError, Source, converted, shows_bake, surface_of
 
-# A size that tells what comes from images from what is constant.
+# Size of the first evaluation, which tells images from constants.
 PROBE = (2, 2)
 
-BLACK = np.zeros((1, 1, 1), np.float32)
+# Cycles interpolates an image before nodes change it. Where nodes are not linear, images are evaluated between their
+# texels, too, unless their longer side has this number of texels.
+FINE_SIDE = 1024
+
+LINEAR = {f"ShaderNode{name}" for name in ("Invert", "RGBToBW", "SeparateColor", "SeparateRGB")} | {
+    f"ShaderNode{name}" for name in ("CombineColor", "CombineRGB", "TexImage")
+}
+
+OPAQUE = np.zeros((1, 1, 1), np.float32)
+
+
+class TexelEvaluator(Evaluator):
+    """Evaluates nodes at each texel of their images, all of which must have the same UV transform.
+
+    Values are (1, 1, channels), or (H, W, channels) if they come from images. The quantity of a shader is the weight of
+    its transparent closures.
+
+    Attributes
+    ----------
+    transform : UV transform of the images; None without images.
+    largest : size of the largest image, (height, width).
+    is_bent : True if an image passes a function that is not linear.
+    """
+
+    NO_SHADER = OPAQUE
+
+    def __init__(
+        self,
+        pixels: Pixels,
+        size: tuple[int, int] = (1, 1),
+        is_outside: bool = False,
+        links: Links | None = None,
+        check: Callable[[], None] | None = None,
+    ) -> None:
+        """`size` of the result; `is_outside` evaluates beyond the border of clipped images, where they are 0."""
+        super().__init__(links, check)
+        self._pixels = pixels
+        self._size = size
+        self._is_outside = is_outside
+        self.transform: UVTransform | None = None
+        self.largest = (1, 1)
+        self.is_bent = False
+
+    def own_value(self, source: Source) -> np.ndarray | None:
+        if source.node.bl_idname == "ShaderNodeTexImage":
+            return self._texture(source)
+        if source.node.bl_idname == "ShaderNodeLightPath":
+            return self._light_path(source)
+        return None
+
+    def computed(self, source: Source) -> np.ndarray:
+        value = super().computed(source)
+        node = source.node
+        is_sum = node.bl_idname == "ShaderNodeMath" and node.operation in ("ADD", "SUBTRACT") and not node.use_clamp
+        if not (is_sum or node.bl_idname in LINEAR):
+            self._bend(value)
+        return value
+
+    def shader(self, source: Source) -> np.ndarray:
+        kind = source.node.bl_idname
+        if shows_bake(source.node):
+            return OPAQUE
+        if kind == "ShaderNodeBsdfTransparent":
+            return self._of_type(source.input("Color"), "RGBA")
+        if kind == "ShaderNodeBsdfPrincipled":
+            return 1 - np.clip(self._of_type(source.input("Alpha"), "VALUE"), 0, 1)
+        if kind == "ShaderNodeAddShader":
+            return self.value(source.input(0)) + self.value(source.input(1))
+        if kind == "ShaderNodeMixShader":
+            return self._mix(source)
+        return OPAQUE
+
+    def _mix(self, source: Source) -> np.ndarray:
+        first, second = self.value(source.input(1)), self.value(source.input(2))
+        if first is second or (self.transform is None and np.array_equal(first, second)):
+            return first  # for any factor
+        factor = np.clip(self._of_type(source.input(0), "VALUE"), 0, 1)
+        if first.shape[:2] != (1, 1) or second.shape[:2] != (1, 1):
+            self._bend(factor)
+        return (1 - factor) * first + factor * second
+
+    def _of_type(self, wanted: InputSocket, kind: str) -> np.ndarray:
+        value = converted(self.value(wanted), wanted.socket.type, kind)
+        return value[None, None] if value.ndim == 1 else value
+
+    def _bend(self, value: np.ndarray) -> None:
+        self.is_bent |= value.ndim == 3 and value.shape[:2] != (1, 1)
+
+    def _texture(self, source: Source) -> np.ndarray:
+        node = source.node
+        stored, evaluate = self._pixels(node.image), color_of
+        if source.socket.name == "Alpha":
+            stored, evaluate = stored[..., 3:], alpha_of
+        if stored.shape[:2] != (1, 1):
+            transform = uv_transform_of(self.links, source)
+            if self.transform not in (None, transform):
+                raise NotUnderstoodError(f"the node '{node.name}', which places its image otherwise than another, is")
+            self.transform = transform
+            self.largest = tuple(map(max, self.largest, stored.shape[:2]))
+            stored = np.zeros_like(stored[:1, :1]) if self._is_outside else resampled(stored, transform, self._size)
+        return evaluate(node, stored)
+
+    def _light_path(self, source: Source) -> np.ndarray:
+        """Light Path, which answers for shadow rays of any origin."""
+        if not source.socket.name.startswith("Is "):
+            raise NotUnderstoodError(f"the output '{source.socket.name}' of the node '{source.node.name}' is")
+        return np.array([float(source.socket.name == "Is Shadow Ray")])
 
 
 @dataclass(frozen=True, eq=False)
-class LetThrough:
-    """A native `Transmittance`, and where its image lies if it has one."""
+class MaterialTransmittance:
+    """A native `Transmittance`, and the UV transform of its image if it has one."""
 
     transmittance: object
-    place: TexturePlace | None = None
+    uv_transform: UVTransform | None = None
 
 
 @functools.cache
-def plain(part: int) -> LetThrough:
-    """What lets everything or nothing through: 1 or 0."""
-    return LetThrough(native.Transmittance((part, part, part)))
+def constant(value: int) -> MaterialTransmittance:
+    """Transmittance 1 (everything) or 0 (nothing)."""
+    return MaterialTransmittance(native.Transmittance((value, value, value)))
 
 
 class Materials:
-    """Evaluates each material once; `warnings` are sentences about what is not understood."""
+    """Transmittances of materials, each evaluated once; `warnings` are sentences about those not understood."""
 
     def __init__(self) -> None:
         self.warnings: list[str] = []
-        self._known: dict[str | None, LetThrough] = {None: plain(0)}
+        self._known: dict[str | None, MaterialTransmittance] = {None: constant(0)}
 
-    def read(self, material) -> LetThrough:
-        """`material` None: Cycles' default, which is opaque."""
+    def read(self, material) -> MaterialTransmittance:
+        """Transmittance of a material; None stands for Cycles' default, which is opaque."""
         name = material and material.name_full
         if name not in self._known:
             self._known[name] = self._read(material)
@@ -55,42 +161,42 @@ class Materials:
         """Evaluate a material of that full name again."""
         self._known.pop(name, None)
 
-    def _read(self, material) -> LetThrough:
+    def _read(self, material) -> MaterialTransmittance:
         if not (compat.uses_nodes(material) and compat.has_transparent_shadow(material)):
-            return plain(0)
-        output = material.node_tree.get_output_node("CYCLES")
-        if output is None:
-            return plain(0)
-        if not output.inputs["Surface"].is_linked:
-            if not output.inputs["Volume"].is_linked:
-                return plain(0)
+            return constant(0)
+        surface = surface_of(material.node_tree)
+        if surface is None:
+            return constant(0)
+        if not surface.socket.is_linked:
+            if not surface.socket.node.inputs["Volume"].is_linked:
+                return constant(0)
             self.warnings.append(
-                f"The material '{material.name}' has a volume alone: it throws no shadow, whatever the volume takes."
+                f"The material '{material.name}' has only a volume: it casts no shadow, whatever the volume absorbs."
             )
-            return plain(1)
+            return constant(1)
         try:
-            return self._evaluate(Wanted(output.inputs["Surface"], ()))
-        except NotUnderstoodError as what:
-            self.warnings.append(f"The material '{material.name}' throws opaque shadows: {what} not understood.")
-            return plain(0)
+            return self._evaluate(surface)
+        except NotUnderstoodError as reason:
+            self.warnings.append(f"The material '{material.name}' casts opaque shadows: {reason} not understood.")
+            return constant(0)
 
-    def _evaluate(self, surface: Wanted) -> LetThrough:
-        pixels = Pixels()  # of this material alone: they may take gigabytes
-        # Once to see which images there are, then at the texels of the largest of them, or between.
-        values = Texels(pixels, PROBE)
-        transmittance = transparency(values, surface)
-        place = values.place
-        if place is None:
-            return LetThrough(native.Transmittance(_color(transmittance)))
-        finer = max(1, FINE_SIDE // max(values.largest)) if values.is_bent else 1
-        size = tuple(side * finer for side in values.largest)
-        texels = _in_range(transparency(Texels(pixels, size), surface))
+    def _evaluate(self, surface: InputSocket) -> MaterialTransmittance:
+        # Pixels of this material alone: they may take gigabytes.
+        pixels, links = Pixels(), Links()
+        probe = TexelEvaluator(pixels, PROBE, links=links)
+        weight, transform = probe.value(surface), probe.transform
+        if transform is None:
+            return MaterialTransmittance(native.Transmittance(_color(weight)))
+        # At the texels of the largest image, or between them.
+        finer = max(1, FINE_SIDE // max(probe.largest)) if probe.is_bent else 1
+        size = tuple(side * finer for side in probe.largest)
+        texels = _in_range(TexelEvaluator(pixels, size, links=links).value(surface))
         if (texels[..., :1] == texels).all():
             texels = texels[..., :1]
         texels = np.ascontiguousarray(texels, np.float32)
-        outside = _color(transparency(Texels(pixels, is_outside=True), surface))
-        image = native.Transmittance.from_image(texels, place.extension, place.is_smooth, outside)
-        return LetThrough(image, place)
+        outside = _color(TexelEvaluator(pixels, is_outside=True, links=links).value(surface))
+        image = native.Transmittance.from_image(texels, transform.extension, transform.is_smooth, outside)
+        return MaterialTransmittance(image, transform)
 
 
 def _in_range(transmittance: np.ndarray) -> np.ndarray:
@@ -99,26 +205,3 @@ def _in_range(transmittance: np.ndarray) -> np.ndarray:
 
 def _color(transmittance: np.ndarray) -> list[float]:
     return np.broadcast_to(_in_range(transmittance)[0, 0], 3).tolist()
-
-
-def transparency(values: Texels, wanted: Wanted) -> np.ndarray:
-    """The weight of a shader's transparent closures, as of `Texels`."""
-    end = follow(wanted)
-    if not end.socket.is_output or end.node.mute:
-        return BLACK
-    kind = end.node.bl_idname
-    if kind == "ShaderNodeBsdfTransparent":
-        return values.color(end.input("Color"))
-    if kind == "ShaderNodeBsdfPrincipled":
-        return 1 - np.clip(values.number(end.input("Alpha")), 0, 1)
-    if kind == "ShaderNodeAddShader":
-        return transparency(values, end.input(0)) + transparency(values, end.input(1))
-    if kind == "ShaderNodeMixShader":
-        first, second = (transparency(values, end.input(i)) for i in (1, 2))
-        if first is second or (values.place is None and np.array_equal(first, second)):
-            return first  # whatever the factor is
-        part = np.clip(values.number(end.input(0)), 0, 1)
-        if first.shape[:2] != (1, 1) or second.shape[:2] != (1, 1):
-            values.bent(part)
-        return (1 - part) * first + part * second
-    return BLACK

@@ -70,9 +70,16 @@ def values_of(struct, skipped: Iterable[str] = (), depth: int = 0) -> list:
     return found
 
 
-def tree_values(tree) -> list:
-    """Nodes with their values, and links; groups from inside. Names and places in the editor don't count."""
-    return [[_node_values(node) for node in tree.nodes], _links_between(tree.nodes, tree.links)]
+def tree_values(tree, entered: dict | None = None) -> list | int:
+    """Nodes with their values, and links; names and positions in the editor don't count.
+
+    A group that was `entered` before is named by its number.
+    """
+    entered = {} if entered is None else entered
+    if tree in entered:
+        return entered[tree]
+    entered[tree] = len(entered)
+    return [[_node_values(node, entered) for node in tree.nodes], _links_between(tree.nodes, tree.links)]
 
 
 def _links_between(nodes: Iterable, links: Iterable) -> list:
@@ -90,7 +97,7 @@ def _links_between(nodes: Iterable, links: Iterable) -> list:
     return sorted(end for end in ends if None not in end)
 
 
-def _node_values(node) -> list:
+def _node_values(node, entered: dict) -> list:
     inner = getattr(node, "node_tree", None)
     inputs = []
     for socket in node.inputs:
@@ -98,7 +105,7 @@ def _node_values(node) -> list:
             value = socket.default_value
             inputs.append(value if isinstance(value, int | float | str) else _plain(value))
     skipped = _NODE_LOOKS | {"node_tree"}
-    return [node.bl_idname, values_of(node, skipped), inputs, tree_values(inner) if inner else None]
+    return [node.bl_idname, values_of(node, skipped), inputs, tree_values(inner, entered) if inner else None]
 
 
 def _plain(value) -> object:
@@ -281,7 +288,8 @@ def _upstream(socket) -> list:
         return []
     nodes = [node for node in tree.nodes if node.bl_idname not in LEFT_OUT]
     links = [link for link in tree.links if link.to_node != socket.node or link.to_socket == socket]
-    return [[_node_values(node) for node in nodes], _links_between([*nodes, socket.node], links)]
+    entered: dict = {}
+    return [[_node_values(node, entered) for node in nodes], _links_between([*nodes, socket.node], links)]
 
 
 def image_part(image) -> str:

@@ -84,9 +84,12 @@ def results() -> set:
 
 
 def _images_in(tree) -> Iterator:
-    for node in tree.nodes:
-        if hasattr(node, "image") and node.bl_idname != BeamspreadNode.bl_idname:
-            yield node.image
-        inner = getattr(node, "node_tree", None)
-        if inner is not None and node.bl_idname != BeamspreadNode.bl_idname:
-            yield from _images_in(inner)
+    trees = [tree]
+    for tree in trees:
+        for node in tree.nodes:
+            if node.bl_idname == BeamspreadNode.bl_idname:
+                continue
+            if hasattr(node, "image"):
+                yield node.image
+            if getattr(node, "node_tree", None) not in {None, *trees}:
+                trees.append(node.node_tree)

@@ -22,8 +22,7 @@ from ...cycles.cycles_light import CopyForCycles
 from ...node.find import find_node_in_groups
 from ...node.tree import BASE_COLOR
 from ...read.base_color import is_understood, read_base_color
-from ...read.image_texture import NotUnderstoodError
-from ...read.node_links import Wanted
+from ...read.nodes import InputSocket, NotUnderstoodError
 from ...read.visibility import ObjectInstance
 
 # Rounding, or a little over by interpolation.
@@ -76,7 +75,7 @@ def read_texture(node, groups: tuple, placed: ObjectInstance, receiver: Receiver
     `groups` are the group nodes around the node.
     """
     try:
-        colors = read_base_color(Wanted(node.inputs[BASE_COLOR], groups), placed, receiver)
+        colors = read_base_color(InputSocket(node.inputs[BASE_COLOR], groups), placed, receiver)
     except NotUnderstoodError as reason:
         return BaseColor(blur=node.texture_blur, unknown=str(reason))
     return BaseColor.of(colors, receiver, node.texture_blur, placed.obj.name)
@@ -87,7 +86,7 @@ def needs_cycles(obj, material_name: str) -> bool:
     place = find_node_in_groups(bpy.data.materials.get(material_name))
     if place is None or not place[0].has_texture():
         return False
-    return not is_understood(Wanted(place[0].inputs[BASE_COLOR], place[1]), obj)
+    return not is_understood(InputSocket(place[0].inputs[BASE_COLOR], place[1]), obj)
 
 
 class ColorByCycles:
