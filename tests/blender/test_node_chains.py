@@ -5,7 +5,7 @@ import tracemalloc
 import bpy
 import numpy as np
 import pytest
-from beamspread.blender.jobs.fingerprint import tree_values
+from beamspread.blender.jobs.out_of_date.fingerprint import tree_values
 from beamspread.blender.node.find import find_node, find_node_in_groups
 from beamspread.blender.read import shading
 from beamspread.blender.read.image_nodes import Pixels, uv_transform_of
