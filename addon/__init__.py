@@ -30,7 +30,7 @@ if problem:
         raise ImportError(problem)
     __all__ = ["register", "unregister"]
 else:
-    from .core.bake.convolve import adaptive_beams, convolve, convolve_lights
+    from .core.bake.convolve import adaptive_beams, convolve, convolve_lights, luminance
     from .core.ldf.albedo import albedo_from_color
     from .core.ldf.library import library
     from .core.material.material import Material
@@ -59,15 +59,13 @@ else:
         "exact_totals",
         "interpolate",
         "library",
+        "luminance",
         "presets",
-        "register",
         "simulate",
-        "unregister",
-        "walk_kernels",
     ]
 
 
-def register():
+def register() -> None:
     from . import blender
 
     if problem:
@@ -75,7 +73,7 @@ def register():
     blender.register()
 
 
-def unregister():
+def unregister() -> None:
     from . import blender
 
     blender.unregister()

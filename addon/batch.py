@@ -117,11 +117,11 @@ def main() -> int:
 def leave(code: int) -> None:
     """End the process with this exit code.
 
-    Blender as a module crashes (4.2.23) once Python is gone if an add-on's properties had callbacks, as ours have.
+    Blender as a module (4.2.23) crashes after Python has ended if an add-on's properties had callbacks, as ours have.
     """
     import bpy
 
-    if bpy.app.binary_path or bpy.app.version >= (4, 5, 0):
+    if bpy.app.binary_path:
         sys.exit(code)
     sys.stdout.flush()
     sys.stderr.flush()

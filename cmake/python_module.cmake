@@ -31,7 +31,16 @@ execute_process(COMMAND ${Python_EXECUTABLE} -c "import sysconfig; print(sysconf
                 OUTPUT_VARIABLE suffix OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
 string(SUBSTRING ${suffix} 1 -1 own_tag)
 python_module(_native ${own_tag} ${BEAMSPREAD_STAGE_DIR}/beamspread ${Python_INCLUDE_DIRS})
-# What pip takes.
+# Types for editors and type checkers. A module with a sanitizer can't be imported to ask for them.
+get_filename_component(python_folder ${Python_EXECUTABLE} DIRECTORY)
+find_program(PYBIND11_STUBGEN pybind11-stubgen HINTS ${python_folder} ${CMAKE_SOURCE_DIR}/build/venv/bin)
+if(PYBIND11_STUBGEN AND NOT BEAMSPREAD_SANITIZE)
+  add_custom_command(TARGET _native POST_BUILD
+                     COMMAND ${CMAKE_COMMAND} -DSTUBGEN=${PYBIND11_STUBGEN} -DFOLDER=${BEAMSPREAD_STAGE_DIR}/beamspread
+                             -P ${CMAKE_SOURCE_DIR}/cmake/stubs.cmake VERBATIM)
+  install(FILES ${BEAMSPREAD_STAGE_DIR}/beamspread/_native.pyi DESTINATION beamspread COMPONENT python)
+endif()
+# The files that pip installs.
 install(TARGETS _native LIBRARY DESTINATION beamspread COMPONENT python)
 install(DIRECTORY addon/ DESTINATION beamspread COMPONENT python PATTERN __pycache__ EXCLUDE PATTERN "*.pyc" EXCLUDE)
 install(DIRECTORY ${BEAMSPREAD_DEPENDENCIES}/licenses DESTINATION beamspread COMPONENT python)

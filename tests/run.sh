@@ -116,7 +116,6 @@ fi
 
 step "format" "$python" tools/lint.py format
 step "ruff" "$python" tools/lint.py ruff
-step "stubs" tools/stubs.sh
 if [ $all = 1 ]; then
     step "clang-tidy" "$python" tools/lint.py tidy
     step "sanitizers" sanitized

@@ -2,7 +2,7 @@
 
 Each part imports only core and those above it (tests/unit/test_layers.py reads this list):
 
-    compat        differences between Blender versions
+    compat        all differences between Blender versions
     registration  what parts add to Blender, all of it or nothing
     popup         sentences that nobody should miss
     preferences   what holds for all files of a user

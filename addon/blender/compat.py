@@ -1,4 +1,7 @@
-"""Differences between Blender versions, bridged in this one place."""
+"""Differences between Blender versions. All checks of a version or of a name that not every version has are here.
+
+The child processes of `cycles` import this module by itself, so it uses nothing else of the package.
+"""
 
 import math
 from collections.abc import Iterator
@@ -7,28 +10,55 @@ from contextlib import contextmanager
 import bpy
 import numpy as np
 
-# A path property has to say that it understands "//" since Blender 4.5; earlier ones don't know the option.
 PATH_OPTIONS = {"ANIMATABLE", "PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else {"ANIMATABLE"}
+"""Options of a path property that understands "//". Blender before 4.5 does not know the second one."""
+
+SHADER_MENUS = ("NODE_MT_category_shader_shader", "NODE_MT_category_SH_NEW_SHADER")
+"""Names of the menu Add > Shader: of the Shader Editor in newer versions, and in Blender 3.4."""
 
 
 def engine_id(name: str) -> str:
-    """Of CYCLES or EEVEE, whose name differs."""
+    """Identifier of the engine CYCLES or EEVEE."""
     if name == "EEVEE":
         return "BLENDER_EEVEE_NEXT" if (4, 2, 0) <= bpy.app.version < (5, 0, 0) else "BLENDER_EEVEE"
     return name
 
 
 def register_node_class(node_class, base: str) -> None:
-    """Register a class of nodes derived from the type `base`, also again.
+    """Register a class of nodes derived from the type `base`, for the first time or again.
 
-    Blender (4.2 to 5.0, measured) makes a new Python class of that type meanwhile, and takes subclasses of that alone.
+    Blender (4.2 to 5.0, measured) replaces the Python class of `base` in between and accepts only subclasses of the new
+    one.
     """
     node_class.__bases__ = (getattr(bpy.types, base),)
     bpy.utils.register_class(node_class)
 
 
+def unregisters_node_classes_in_use() -> bool:
+    """True if a node class can be unregistered while nodes use it.
+
+    Blender up to 4.3 (3.4.1 and 4.3.2 measured) frees the type but not the evaluated copies of nodes that point to it,
+    and crashes when these are freed, at the latest on exit. In 4.5 a class that stays keeps the process from exiting.
+    """
+    return bpy.app.version >= (4, 5, 0)
+
+
+def shader_menu():
+    """The menu Add > Shader, or all of Add if a version has another name for it."""
+    return next((getattr(bpy.types, name) for name in SHADER_MENUS if hasattr(bpy.types, name)), bpy.types.NODE_MT_add)
+
+
+def draw_progress_bar(layout, fraction: float, text: str) -> None:
+    """Draw a bar with a text (a widget since Blender 4.0, letters before)."""
+    if hasattr(layout, "progress"):
+        layout.progress(factor=fraction, text=text)
+    else:
+        full = round(10 * fraction)
+        layout.label(text=f"{chr(0x2588) * full}{chr(0x2591) * (10 - full)} {text}", icon="BLANK1")
+
+
 def give_new_node_its_tree(node, tree) -> None:
-    """In `init`, after which Blender 5.0 counts the node as a user of its tree once more."""
+    """Set the tree of a node in `init`. Blender 5.0 counts the node as a user of the tree once more afterwards."""
     node.node_tree = tree
     if bpy.app.version >= (5, 0, 0):
         has_fake_user = tree.use_fake_user
@@ -45,7 +75,7 @@ def add_output_socket(tree, socket_type: str, name: str) -> None:
 
 
 def add_input_socket(tree, socket_type: str, name: str, default=None, hide_value: bool = False) -> None:
-    """Give a node group an input with links alone if `hide_value`, "NodeSocketFloat" being a factor from 0 to 1."""
+    """Give a node group an input. A "NodeSocketFloat" is a factor from 0 to 1; `hide_value` leaves only the link."""
     if hasattr(tree, "interface"):
         socket = tree.interface.new_socket(name, in_out="INPUT", socket_type=socket_type)
         if socket_type == "NodeSocketFloat":
@@ -60,7 +90,7 @@ def add_input_socket(tree, socket_type: str, name: str, default=None, hide_value
 
 
 def has_input_socket(tree, name: str) -> bool:
-    """Whether a node group has an input of that name."""
+    """True if a node group has an input of that name."""
     if hasattr(tree, "interface"):
         return any(
             item.item_type == "SOCKET" and item.in_out == "INPUT" and item.name == name
@@ -69,27 +99,33 @@ def has_input_socket(tree, name: str) -> bool:
     return name in tree.inputs
 
 
+def use_nodes(material) -> None:
+    """Give a material a node tree (since Blender 5.0 every material has one)."""
+    if bpy.app.version < (5, 0, 0):
+        material.use_nodes = True
+
+
 def uses_nodes(material) -> bool:
-    """Whether a material has a node tree in use (`use_nodes` is deprecated since Blender 5.0, where all have)."""
+    """True if a material uses its node tree (since Blender 5.0 every material does)."""
     if material.node_tree is None:
         return False
     return bpy.app.version >= (5, 0, 0) or material.use_nodes
 
 
 def has_transparent_shadow(material) -> bool:
-    """Whether Cycles looks at transparency in shadows (the switch moved to the material itself in Blender 4.2)."""
+    """True if shadows of the material are transparent in Cycles (Blender 4.2 moved the switch to the material)."""
     owner = material if hasattr(material, "use_transparent_shadow") else getattr(material, "cycles", None)
     return bool(getattr(owner, "use_transparent_shadow", True))
 
 
 def transparent_bounces(scene) -> int | None:
-    """How many see-through surfaces a shadow ray of Cycles crosses; None where Blender comes without Cycles."""
+    """Number of transparent surfaces that a shadow ray of Cycles crosses; None if Blender has no Cycles."""
     return getattr(getattr(scene, "cycles", None), "transparent_max_bounces", None)
 
 
 @contextmanager
 def saving_png(scene) -> Iterator[None]:
-    """Have what the scene renders saved as PNG of 8 bits (since Blender 5.0, a kind of media limits the formats)."""
+    """Save renders of the scene as 8-bit PNG within the block (since Blender 5.0 a media type limits the formats)."""
     settings = scene.render.image_settings
     names = [name for name in ("media_type", "file_format", "color_mode", "color_depth") if hasattr(settings, name)]
     before = {name: getattr(settings, name) for name in names}
@@ -108,8 +144,52 @@ def saving_png(scene) -> Iterator[None]:
             setattr(settings, name, value)
 
 
+def save_as_multilayer_exr(scene) -> None:
+    """Save renders of the scene as multi-layer EXR of 32 bits (since Blender 5.0 a media type limits the formats)."""
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "MULTI_LAYER_IMAGE"
+    settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
+
+
+def compositor_of(scene):
+    """Empty compositor tree of a scene, and its output node (Blender 5.0 uses a node group)."""
+    if hasattr(scene, "compositing_node_group"):
+        tree = scene.compositing_node_group = bpy.data.node_groups.new("Compositor", "CompositorNodeTree")
+        add_output_socket(tree, "NodeSocketColor", "Image")
+        return tree, tree.nodes.new("NodeGroupOutput")
+    scene.use_nodes = True
+    tree = scene.node_tree
+    tree.nodes.clear()
+    return tree, tree.nodes.new("CompositorNodeComposite")
+
+
+def set_panorama(camera) -> None:
+    """Make a camera show an equirectangular panorama in Cycles (newer versions have the setting on the camera)."""
+    camera.type = "PANO"
+    owner = camera if hasattr(camera, "panorama_type") else camera.cycles
+    owner.panorama_type = "EQUIRECTANGULAR"
+
+
+def has_denoiser() -> bool:
+    """True if Blender was built with OpenImageDenoise, which Debian's is not."""
+    import _cycles  # Blender's own module, which exists only while Blender runs
+
+    return bool(getattr(_cycles, "with_openimagedenoise", False))
+
+
+def light_linking(obj):
+    """Light linking of an object; None before Blender 4.0."""
+    return getattr(obj, "light_linking", None)
+
+
+def indirect_bakes_lack_lamps() -> bool:
+    """True if a bake of indirect light lacks light that lamps send to other objects (3.4 measured, 4.5 does not)."""
+    return bpy.app.version < (4, 5, 0)
+
+
 def light_casts_shadow(light) -> bool:
-    """Cycles' own shadow switch where it has one, else the light's."""
+    """True if Cycles' own shadow switch is on, or the light's if Cycles has none."""
     cycles = getattr(light, "cycles", None)
     if hasattr(cycles, "cast_shadow"):
         return bool(cycles.cast_shadow)
@@ -117,49 +197,54 @@ def light_casts_shadow(light) -> bool:
 
 
 def spot_falloff() -> str:
-    """How Cycles shapes a spot's cone (see native/scene/lights.h)."""
+    """Shape of a spot's cone in Cycles."""
     return "scaled" if bpy.app.version >= (3, 5, 0) else "legacy"
 
 
 def world_of(depsgraph):
-    """The evaluated world that a render has, or None (view layers may have their own since Blender 4.4)."""
-    world = getattr(depsgraph.view_layer, "world_override", None) or depsgraph.scene.world
+    """Evaluated world that a render of the depsgraph uses, or None."""
+    world = original_world(depsgraph.view_layer, depsgraph.scene)
     return world and world.evaluated_get(depsgraph)
 
 
+def original_world(view_layer, scene):
+    """World that a render of the view layer uses, or None (view layers may have their own since Blender 4.4)."""
+    return getattr(view_layer, "world_override", None) or scene.world
+
+
 def sun_disk() -> str:
-    """How Cycles shapes a sun with an angle (see `SunDiskLight`): measured in 3.4 and 4.5, not between."""
+    """Shape of a sun with an angle in Cycles (measured in 3.4 and 4.5, not in between)."""
     return "flat" if bpy.app.version < (4, 0, 0) else "even"
 
 
 def area_lamp_factor() -> float:
-    """Over `AreaLight`'s radiance of P / (4 A): Cycles has P / (pi A) from 4.2 on. 4.0 is not measured."""
+    """Radiance of an area lamp relative to P / (4 A): P / (pi A) in Cycles from 4.2 on (4.0 is not measured)."""
     return 1.0 if bpy.app.version < (4, 0, 0) else 4 / math.pi
 
 
 def flat_area_lamps_shine() -> bool:
-    """Whether Cycles lights by area lamps of scale 0 along their axis (3.4 does, 4.5 does not)."""
+    """True if area lamps of scale 0 along their axis shine in Cycles (3.4 measured, 4.5 does not)."""
     return bpy.app.version < (4, 0, 0)
 
 
 def instancer_hides_lamps() -> bool:
-    """Whether Cycles asks the instancer's visibility, too, of lamps (4.5 does, 3.4 of meshes alone)."""
+    """True if the instancer's visibility counts for lamps (4.5 measured; in 3.4 it counts for meshes only)."""
     return bpy.app.version >= (4, 4, 0)
 
 
 def round_lamp_model(light) -> str:
-    """How Cycles shapes a lamp with a radius (see `SphereLight`)."""
+    """Shape of a lamp with a radius in Cycles."""
     soft = getattr(light, "use_soft_falloff", bpy.app.version < (4, 0, 0))
     return "disk" if soft else "sphere"
 
 
 def light_strength(light) -> float:
-    """Energy with exposure (Blender 4.5 on) applied."""
+    """Energy of a light times its exposure (Blender 4.5 on)."""
     return light.energy * 2.0 ** getattr(light, "exposure", 0.0)
 
 
 def light_color(light) -> tuple[float, float, float]:
-    """Colour with the temperature's (Blender 4.5 on) applied."""
+    """Color of a light times that of its temperature (Blender 4.5 on)."""
     color = tuple(light.color)
     if getattr(light, "use_temperature", False):
         color = tuple(a * b for a, b in zip(color, light.temperature_color))
@@ -174,9 +259,9 @@ def read_pass(render_pass, width: int, height: int) -> np.ndarray:
 
 
 def baked_triangles(passes, width: int, height: int) -> np.ndarray:
-    """Int32 (height, width): the triangle that each texel shows, negative where none or another image's."""
+    """Int32 (height, width): triangle of each texel, negative without one or if it belongs to another image."""
     primitives = read_pass(passes["BakePrimitive"], width, height)
-    # The number comes as the bits of a float: 3.4 gives seed, triangle, u, v, later versions u, v, triangle.
+    # The number is stored as the bits of a float: 3.4 gives seed, triangle, u, v, later versions u, v, triangle.
     channel = 1 if primitives.shape[2] == 4 else 2
     return np.ascontiguousarray(primitives[..., channel]).view(np.int32)
 
@@ -188,7 +273,7 @@ def write_pass(render_pass, values: np.ndarray) -> None:
 
 
 def _foreach(access, values: np.ndarray) -> None:
-    """Newer versions take a flat array alone; 3.4 counts rows, and writes past the end of a flat one of that length."""
+    """Copy pixels. Newer versions accept flat arrays only; 3.4 counts rows and writes past the end of a flat array."""
     try:
         access(values.ravel())
     except TypeError:
@@ -196,12 +281,12 @@ def _foreach(access, values: np.ndarray) -> None:
 
 
 def set_shader_color(tree) -> None:
-    """Have nodes of this group wear the colour of shaders (seen in 5.2; 4.3 knows the tag, and custom groups don't)."""
+    """Give nodes of this group the color of shaders (shown in 5.2; 4.3 ignores the tag on custom groups)."""
     if hasattr(tree, "color_tag"):
         tree.color_tag = "SHADER"
 
 
 def has_fixed_radius(principled) -> bool:
-    """Whether Cycles takes a Principled BSDF's radius as it is, whatever its colour (names changed in Blender 4.0)."""
-    other = "RANDOM_WALK_SKIN" if bpy.app.version >= (4, 0, 0) else "RANDOM_WALK"
-    return principled.subsurface_method != other
+    """True if Cycles uses a Principled BSDF's radius independent of its color (Blender 4.0 changed the names)."""
+    color_dependent = "RANDOM_WALK_SKIN" if bpy.app.version >= (4, 0, 0) else "RANDOM_WALK"
+    return principled.subsurface_method != color_dependent

@@ -2,6 +2,7 @@
 
 import importlib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from . import missing
 
@@ -18,9 +19,14 @@ problem = ""
 
 _FOLDER = Path(__file__).resolve().parents[1]
 
-try:
-    native = importlib.import_module(".._native", __package__)
-    missing.check_version(_FOLDER, native.__version__)
-except (ImportError, OSError) as error:
-    problem = missing.problem_of(_FOLDER, error)
-    native = _Missing()
+if TYPE_CHECKING:
+    from .. import _native
+
+    native = _native
+else:
+    try:
+        native = importlib.import_module(".._native", __package__)
+        missing.check_version(_FOLDER, native.__version__)
+    except (ImportError, OSError) as error:
+        problem = missing.problem_of(_FOLDER, error)
+        native = _Missing()

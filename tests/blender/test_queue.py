@@ -7,7 +7,7 @@ import beamspread
 import bpy
 import pytest
 from beamspread.blender import popup, preferences
-from beamspread.blender.cycles.child_denoise import has_denoiser
+from beamspread.blender.compat import has_denoiser
 from beamspread.blender.images.results import Results
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.run import operator, prepare

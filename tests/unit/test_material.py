@@ -188,3 +188,17 @@ def test_base_color_makes_the_albedo_irrelevant():
 def test_base_color_out_of_range(value):
     with pytest.raises(MaterialError, match=r"base colour's green is .* between 0 and 1"):
         Surface(Material(**GOOD), base_color=(0.5, value, 0.5)).check()
+
+
+def test_media_differ_where_anisotropy_or_thickness_in_mean_free_paths_does():
+    marble, milk = presets()["marble"], presets()["regular_milk"]
+    assert marble.medium() == beamspread.Medium(g=marble.anisotropy, ior=marble.ior)
+    assert [medium.g for medium in milk.medium()] == list(milk.anisotropy_rgb)
+    slabs = marble.medium(thickness=0.01)
+    assert [slab.thickness for slab in slabs] == pytest.approx([0.01 / length for length in marble.mean_free_path])
+
+
+@pytest.mark.parametrize("thickness", [0, -1, math.nan])
+def test_a_thickness_that_is_no_length_is_refused(thickness):
+    with pytest.raises(ValueError, match=r"argument 'thickness' is .*allowed: metres above 0"):
+        presets()["marble"].medium(thickness)

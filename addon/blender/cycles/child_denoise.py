@@ -8,16 +8,11 @@ import tempfile
 from pathlib import Path
 
 import bpy
+import compat
 import numpy as np
 
 # Around each map goes its mirror image, so many nodes wide: neither the borders nor other maps show within it.
 MARGIN = 16
-
-
-def has_denoiser() -> bool:
-    import _cycles  # Blender's own, known only while it runs
-
-    return bool(getattr(_cycles, "with_openimagedenoise", False))
 
 
 class Denoiser:
@@ -30,15 +25,7 @@ class Denoiser:
         settings.use_compositing, settings.use_sequencer = True, False
         settings.image_settings.file_format = "OPEN_EXR"
         settings.image_settings.color_mode, settings.image_settings.color_depth = "RGB", "32"
-        if hasattr(self._scene, "compositing_node_group"):  # from Blender 5.0 on
-            tree = self._scene.compositing_node_group = bpy.data.node_groups.new("Denoise", "CompositorNodeTree")
-            tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
-            output = tree.nodes.new("NodeGroupOutput")
-        else:
-            self._scene.use_nodes = True
-            tree = self._scene.node_tree
-            tree.nodes.clear()
-            output = tree.nodes.new("CompositorNodeComposite")
+        tree, output = compat.compositor_of(self._scene)
         self._source, denoise = tree.nodes.new("CompositorNodeImage"), tree.nodes.new("CompositorNodeDenoise")
         tree.links.new(denoise.inputs["Image"], self._source.outputs["Image"])
         tree.links.new(output.inputs[0], denoise.outputs["Image"])

@@ -6,8 +6,9 @@ Part of the child process (child.py).
 import traceback
 
 import bpy
+import compat
 import numpy as np
-from child_denoise import Denoiser, has_denoiser
+from child_denoise import Denoiser
 from child_ghost import add_ghost, draw_anew
 
 # Samples per node and stratum of the first two rounds, from which the noise follows. Later rounds take twice as many
@@ -17,10 +18,6 @@ LOOK = 4
 # How much noisier irradiance may be than it is wanted, where a denoiser follows. Measured in a room and beside a wall,
 # 64 x 64 nodes (tests/bench/bounced.py): errors of 7 and 5 % become 2.4 and 2.3 %, and 19, 14 and 10 % 8, 6 and 5 %.
 DENOISED = 2.0
-
-# In 3.4 a bake of indirect light alone lacks what lamps send to other objects. The difference of two bakes does not;
-# with the same seed they follow the same paths, so what arrives directly is gone without noise.
-INDIRECT_LACKS_LAMPS = bpy.app.version < (4, 5, 0)
 
 
 def fields(request, scene, progress) -> dict:
@@ -75,7 +72,7 @@ def fields(request, scene, progress) -> dict:
 
 def working_denoiser(request, mean):
     """None where there is none, or where it fails."""
-    if not has_denoiser():
+    if not compat.has_denoiser():
         return None
     try:
         denoise = Denoiser()
@@ -141,10 +138,7 @@ def linked_source(tree, groups, node: str, socket: str):
 
 
 def add_output(tree, name: str) -> None:
-    if hasattr(tree, "interface"):  # from Blender 4.0 on
-        tree.interface.new_socket(name, in_out="OUTPUT", socket_type="NodeSocketColor")
-    else:
-        tree.outputs.new("NodeSocketColor", name)
+    compat.add_output_socket(tree, "NodeSocketColor", name)
     if not any(node.type == "GROUP_OUTPUT" for node in tree.nodes):
         tree.nodes.new("NodeGroupOutput")
 
@@ -164,7 +158,7 @@ def shine_alone(scene, names) -> None:
     """Switch off all light but that of these objects; whoever asks for it has seen to it that it is linked there."""
     scene.world = None
     for name in names:
-        linking = getattr(bpy.data.objects[name], "light_linking", None)  # from Blender 4.0 on
+        linking = compat.light_linking(bpy.data.objects[name])
         if linking is not None:
             linking.receiver_collection = None
     own = {slot.material for name in names for slot in bpy.data.objects[name].material_slots}
@@ -242,7 +236,8 @@ class Baker:
         self.rounds += 1
         draw_anew(self.ghost, self.rounds)
         self.scene.cycles.seed, self.scene.cycles.samples = self.rounds, samples
-        if self.light == "INDIRECT" and INDIRECT_LACKS_LAMPS:
+        if self.light == "INDIRECT" and compat.indirect_bakes_lack_lamps():
+            # With the same seed both bakes follow the same paths, so direct light cancels without noise.
             return self.bake_passes({"DIRECT", "INDIRECT"}) - self.bake_passes({"DIRECT"})
         return self.bake_passes({self.light})
 

@@ -8,6 +8,7 @@ so one bake gathers all. Rays other than those of volumes don't see the mirrors,
 """
 
 import bpy
+import compat
 import numpy as np
 
 STRATUM, AXES = "stratum", ("x_axis", "y_axis", "z_axis")
@@ -132,8 +133,7 @@ def _diffuse(image):
 
 def _new_material():
     material = bpy.data.materials.new("Beamspread ghost")
-    if bpy.app.version < (5, 0, 0):
-        material.use_nodes = True
+    compat.use_nodes(material)
     material.node_tree.nodes.clear()
     return material
 

@@ -3,6 +3,7 @@
 import re
 
 import bpy
+import compat
 import numpy as np
 
 # What engines say of how far they are, from Blender 5.0 on to handlers alone.
@@ -29,10 +30,7 @@ def render(request, scene, progress) -> dict:
     scene.render.use_crop_to_border = True
     scene.render.use_overwrite, scene.render.use_placeholder = True, False
     scene.render.filepath, scene.render.use_file_extension = request["picture"], False
-    settings = scene.render.image_settings
-    if hasattr(settings, "media_type"):
-        settings.media_type = "MULTI_LAYER_IMAGE"
-    settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
+    compat.save_as_multilayer_exr(scene)
     bpy.app.handlers.render_stats.append(lambda said, *_: _tell(progress, said))
     bpy.ops.render.render(write_still=True, scene=scene.name, layer=request["view_layer"])
     return {"frame": np.array(scene.frame_current)}

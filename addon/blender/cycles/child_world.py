@@ -8,6 +8,7 @@ import tempfile
 from pathlib import Path
 
 import bpy
+import compat
 import numpy as np
 
 # What Light Path nodes tell the light that a receiver gets: Cycles itself asks for it with all flags off where it
@@ -20,7 +21,7 @@ TILE, TILES = 32, 12
 
 def panorama(request, scene, progress) -> dict:
     """The task `world`; the request has width, height, samples and fine_samples."""
-    world = getattr(bpy.context.view_layer, "world_override", None) or scene.world
+    world = compat.original_world(bpy.context.view_layer, scene)
     size = request["width"], request["height"]
     if world is None or not lights_diffuse(world):
         return {"radiance": np.zeros((size[1], size[0], 3), np.float32)}
@@ -79,9 +80,7 @@ def without_volume(world) -> None:
 def set_up(studio, width: int, height: int) -> None:
     """Nothing but the world around a panoramic camera; linear EXR without view transform."""
     data = bpy.data.cameras.new("Panorama")
-    data.type = "PANO"
-    owner = data if hasattr(data, "panorama_type") else data.cycles
-    owner.panorama_type = "EQUIRECTANGULAR"
+    compat.set_panorama(data)
     camera = bpy.data.objects.new("Panorama", data)
     # Upright, looking along +X: the camera's picture then is what an environment texture would have.
     camera.rotation_euler = (math.pi / 2, 0.0, -math.pi / 2)

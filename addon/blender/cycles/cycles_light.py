@@ -23,7 +23,6 @@ from .. import compat
 from ..node.find import find_node_in_groups
 from ..node.tree import BASE_COLOR
 from ..read.visibility import SOLID_TYPES, render_visible_names, renders
-from .child_denoise import has_denoiser
 from .process import run
 from .scene_copy import SceneCopy
 
@@ -221,7 +220,7 @@ def seconds_estimate(width: int, height: int) -> float:
     some six times.
     """
     nodes = NODES * max(1, round(NODES * min(width, height) / max(width, height)))
-    paths = nodes * (PATHS_TO_DENOISE if has_denoiser() else PATHS_PER_NODE)
+    paths = nodes * (PATHS_TO_DENOISE if compat.has_denoiser() else PATHS_PER_NODE)
     return START_SECONDS + paths / (PATHS_PER_SECOND * (os.cpu_count() or 1))
 
 

@@ -293,8 +293,9 @@ def _upgrade(tree) -> None:
 
 
 def _add_class() -> None:
-    # Another version's class that stays, see below, would be taken away; there is no baking until a restart anyway.
-    stays = bpy.app.version < (4, 5, 0) and bpy.types.Node.bl_rna_get_subclass_py(BeamspreadNode.bl_idname) is not None
+    # Registering would replace a class that another version of the add-on left in use.
+    in_use = bpy.types.Node.bl_rna_get_subclass_py(BeamspreadNode.bl_idname) is not None
+    stays = in_use and not compat.unregisters_node_classes_in_use()
     if not (BeamspreadNode.is_registered or stays):
         compat.register_node_class(BeamspreadNode, "ShaderNodeCustomGroup")
     # While Blender starts, add-ons see no file, and load_post comes later.
@@ -303,10 +304,8 @@ def _add_class() -> None:
 
 
 def _remove_class() -> None:
-    # Blender up to 4.3 (3.4.1 and 4.3.2 were seen to) frees the type but not the evaluated copies of nodes that point
-    # to it, and crashes when those go, at the latest on exit: there a class in use stays. In 4.5 a class that stays
-    # keeps the process from exiting.
-    if BeamspreadNode.is_registered and (bpy.app.version >= (4, 5, 0) or not any(all_nodes())):
+    may_go = compat.unregisters_node_classes_in_use() or not any(all_nodes())
+    if BeamspreadNode.is_registered and may_go:
         bpy.utils.unregister_class(BeamspreadNode)
 
 

@@ -10,7 +10,7 @@ from ...core import native
 from ...core.bake.estimate import in_words, ray_seconds, solver_seconds
 from ...core.bake.luminance import MOST_RAYS, rays_per_texel
 from ...core.errors import BakeError
-from ..cycles.child_denoise import has_denoiser
+from .. import compat
 from ..cycles.colors import bytes_of_colors, seconds_of_colors
 from ..cycles.cycles_light import seconds_estimate
 from ..images.files import check_image
@@ -140,16 +140,8 @@ def draw_progress(layout, context) -> None:
     progress = state.progress
     column = layout.column(align=True)
     draw_sentences(column, context, [f"{progress.doing or 'Baking'}: {progress.target}"], "RENDER_STILL")
-    if hasattr(column, "progress"):  # from Blender 4.0 on
-        column.progress(factor=progress.everything, text=progress.in_short())
-    else:
-        column.label(text=f"{_bar(progress.everything)} {progress.in_short()}", icon="BLANK1")
+    compat.draw_progress_bar(column, progress.everything, progress.in_short())
     column.operator("beamspread.cancel", icon="X")
-
-
-def _bar(fraction: float, length: int = 10) -> str:
-    full = round(fraction * length)
-    return "\u2588" * full + "\u2591" * (length - full)
 
 
 def draw_results(layout, context, material_name: str, shown: set[str]) -> None:
@@ -189,7 +181,7 @@ def estimates(context) -> list[str]:
     if settings.use_indirect:
         seconds = in_words(sum(seconds_estimate(*size) for size in sizes))
         them = "them" if len(sizes) > 1 else "it"
-        slower = "" if has_denoiser() else " This Blender has no denoiser: it traces more rays instead."
+        slower = "" if compat.has_denoiser() else " This Blender has no denoiser: it traces more rays instead."
         found.append(f"Indirect light: about {seconds}{_of_many(sizes)}, where something stands above {them}.{slower}")
     objects = by_name(context.scene) if settings.output == "LUMINANCE" else {}
     pairs = [(target, size) for target, size in zip(chosen, sizes) if target.object_name in objects]

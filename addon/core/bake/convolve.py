@@ -1,24 +1,110 @@
 """Luminance of beams on a plane."""
 
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TypeAlias
+
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import float_array
+from ..ldf.library import library
+from ..material.material import Material
 from ..native import native
+from ..progress import Progress, stages
+
+Ldf: TypeAlias = (
+    "native.LdfSource | native.LdfSample | Sequence[native.LdfSample]"
+    " | Sequence[native.LdfSource | native.LdfSample | Sequence[native.LdfSample]]"
+)
+"""LDFs of all channels: a library or samples, or three of either."""
+
+SOLVE_WEIGHT = 3.0
+"""Time that the solver takes, relative to reading one library."""
+
+
+def luminance(
+    irradiance: ArrayLike,
+    direction: ArrayLike,
+    material: Material,
+    pitch: float | Sequence[float],
+    thickness: float = math.inf,
+    quality: str = "final",
+    solver: str = "fft",
+    tolerance: float = 1e-3,
+    threads: int = 0,
+    progress: Progress | None = None,
+) -> NDArray[np.float32]:
+    """Luminance that beams on a regular grid cause on a plane of a material.
+
+    This is `convolve` with the LDFs, albedo and mean free path of the material, each color channel with its own
+    anisotropy.
+
+    Parameters
+    ----------
+    irradiance, direction, pitch, solver, tolerance, threads, progress
+        As for `convolve`.
+    material : Material
+        From `presets`, or made by hand.
+    thickness : float
+        Metres; inf for a half-space.
+    quality : {"final", "preview"}
+        Quality of the LDFs, as for `library`.
+
+    Returns
+    -------
+    float32, shape (H, W, 3)
+        Luminance, radiance in W/(m^2 sr).
+
+    Raises
+    ------
+    ValueError
+        Names the argument or the material's property, its value and what is allowed.
+    Cancelled
+        `progress` returned False.
+
+    Examples
+    --------
+    >>> milk = beamspread.presets()["regular_milk"]
+    >>> beamspread.luminance(np.ones((64, 64)), (0.8, 0, -0.6), milk, pitch=2e-4).shape
+    (64, 64, 3)
+    """
+    if not isinstance(material, Material):
+        raise ValueError(f"argument 'material' is {material!r}; allowed: a Material")
+    material.check()
+    media = material.channel_media(thickness)
+    distinct = list(dict.fromkeys(media))
+    *reading, solving = stages(progress, [1.0] * len(distinct) + [SOLVE_WEIGHT])
+    ldfs = {medium: library(medium, quality, part, threads) for medium, part in zip(distinct, reading)}
+    return convolve(
+        irradiance,
+        direction,
+        [ldfs[medium] for medium in media],
+        material.albedo,
+        material.mean_free_path,
+        pitch,
+        solver,
+        tolerance,
+        threads,
+        solving,
+    )
 
 
 def convolve(
-    irradiance,
-    direction,
-    ldf,
-    albedo,
-    mean_free_path,
-    pitch,
-    solver="fft",
-    tolerance=1e-3,
-    threads=0,
-    progress=None,
-    interpolation="angular",
-):
+    irradiance: ArrayLike,
+    direction: ArrayLike,
+    ldf: Ldf,
+    albedo: float | Sequence[float],
+    mean_free_path: float | Sequence[float],
+    pitch: float | Sequence[float],
+    solver: str = "fft",
+    tolerance: float = 1e-3,
+    threads: int = 0,
+    progress: Progress | None = None,
+    interpolation: str = "angular",
+) -> NDArray[np.float32]:
     """Luminance that beams on a regular grid of a plane cause (Manabe et al. 2012, Eq. 2).
 
     Parameters
@@ -29,10 +115,10 @@ def convolve(
         Unit vectors along which light travels, in the plane's frame (x along columns, y along rows, z the outward
         normal): z < 0. One for all beams, or one per texel.
     ldf : LdfLibrary, or LdfSamples, or a sequence of three of either
-        One per channel where anisotropy or thickness in mean free paths differ. Samples (one, or a sequence as for
-        `interpolate`) stand for the LDFs between them, and each texel for a beam of their diameter; angles and albedos
-        outside of them are errors. Their images enter as rings around O with azimuthal harmonics: power is
-        kept, detail finer than a fifth of the distance from O is not.
+        One per channel if the channels differ in anisotropy or in thickness in mean free paths. Samples (one, or a
+        sequence as for `interpolate`) represent the LDFs between them and beams of their diameter; angles and albedos
+        outside of them are errors. Their images enter as rings around O with azimuthal harmonics, which keep their
+        power but no detail finer than a fifth of the distance from O.
     albedo : float or sequence of three
         Single-scattering albedo, 0 <= albedo < 1.
     mean_free_path : float or sequence of three
@@ -40,20 +126,15 @@ def convolve(
     pitch : float or (float, float)
         Side of a texel in metres, along x and y.
     solver : {"fft", "direct", "adaptive"}
-        `direct` visits every pair of texels: exact and slow. `adaptive` lights evenly lit squares by one beam each
-        (section 3.3 of the paper) and looks at small beams more coarsely from farther away.
+        `direct` visits every pair of texels: exact and slow. `adaptive` replaces evenly lit squares by one beam each
+        (section 3.3 of the paper) and resolves small beams more coarsely at a distance.
     tolerance : float
-        `fft`: the sum over all texels of the absolute error stays below `tolerance` times the sum of the luminance,
-        and the error of each texel below `tolerance` times the mean of the 17 x 17 texels around. Whatever the
-        tolerance, `fft` is besides off by some 1e-5 of the brightest texel: by 4e-5 at most, by 7e-5 beyond 80 degrees
-        with ior 1, and for thin slabs with an ior above 1 by up to 1e-3, beyond 80 degrees 2e-3. Beyond 192 x 192
-        texels the bound rests on a look at 1000 to 1500 texels, and of more than four lights at the four brightest,
-        which may use up .25 of it; over lights, shadows and media that are hard for it the worst of all texels uses up
-        .2 to .6 (tests/bench/terms.py). `adaptive`: the sum as for `fft`, for which
-        what each beam's kernel is off by is integrated and added up in full; the error of each texel stays below
-        `tolerance` times the brightest one, which is measured: the worst used up .1 of it.
+        Largest error of `fft` and `adaptive`. The sum of the absolute errors of all texels stays below `tolerance`
+        times the sum of the luminance. The error of a texel stays below `tolerance` times the mean of the 17 x 17
+        texels around it (`fft`) or the brightest texel (`adaptive`). `fft` has a rounding error of some 1e-5 of the
+        brightest texel on top; docs/accuracy.md has the measurements.
     threads : int
-        0: all. The result does not depend on it.
+        Number of threads, 0 for all. The result does not depend on it.
     progress : callable, optional
         Called with the finished fraction; returning False stops.
     interpolation : {"angular", "adaptive", "planar"}
@@ -78,26 +159,25 @@ def convolve(
 
 
 def convolve_lights(
-    lights,
-    ldf,
-    albedo,
-    mean_free_path,
-    pitch,
-    solver="fft",
-    tolerance=1e-3,
-    threads=0,
-    progress=None,
-    interpolation="angular",
-):
-    """Luminance of several lights together.
+    lights: Sequence[tuple[ArrayLike, ArrayLike]],
+    ldf: Ldf,
+    albedo: float | Sequence[float],
+    mean_free_path: float | Sequence[float],
+    pitch: float | Sequence[float],
+    solver: str = "fft",
+    tolerance: float = 1e-3,
+    threads: int = 0,
+    progress: Progress | None = None,
+    interpolation: str = "angular",
+) -> NDArray[np.float32]:
+    """Luminance of several lights together: the sum of the results of `convolve` for each.
 
-    The sum of what `convolve` gives for each; but `fft` adds all lights up to the same moments of the direction, and
-    transforms hardly more for many lights than for one.
+    `fft` adds up the moments of all lights first, so the number of transforms hardly grows with the number of lights.
 
     Parameters
     ----------
     lights : sequence of (irradiance, direction)
-        Each as for `convolve`, which describes the other parameters, too.
+        Each as for `convolve`, which describes the other parameters.
 
     Returns
     -------
@@ -113,9 +193,18 @@ def convolve_lights(
 
 
 def solve(
-    lights, ldf, albedo, mean_free_path, pitch, solver, tolerance, threads=0, progress=None, interpolation="angular"
-):
-    """`convolve_lights` of native `PlaneLight`s, which know their color and what is known of their directions."""
+    lights: Sequence[native.PlaneLight],
+    ldf: Ldf,
+    albedo: float | Sequence[float],
+    mean_free_path: float | Sequence[float],
+    pitch: float | Sequence[float],
+    solver: str,
+    tolerance: float,
+    threads: int = 0,
+    progress: Progress | None = None,
+    interpolation: str = "angular",
+) -> NDArray[np.float32]:
+    """`convolve_lights` for native lights, which have a color and may have one direction for all texels."""
     return native.convolve(
         lights,
         _sources(ldf, interpolation),
@@ -129,7 +218,7 @@ def solve(
     )
 
 
-def _irradiance(values):
+def _irradiance(values: ArrayLike) -> NDArray[np.float32]:
     array = float_array("irradiance", values)
     if array.ndim == 2 or (array.ndim == 3 and array.shape[2] == 3):
         return array
@@ -139,12 +228,14 @@ def _irradiance(values):
 BEAM = np.dtype([("row", np.int64), ("column", np.int64), ("size", np.int64), ("power", np.float64)])
 
 
-def adaptive_beams(irradiance, direction, pitch=1.0, tolerance=1e-3):
+def adaptive_beams(
+    irradiance: ArrayLike, direction: ArrayLike, pitch: float | Sequence[float] = 1.0, tolerance: float = 1e-3
+) -> NDArray[np.void]:
     """Beams by which ``convolve(..., solver="adaptive")`` lights a plane (Manabe et al. 2012, section 3.3, Fig. 5).
 
-    A beam is a square of 2^k texels, the largest that is wholly and evenly lit: its irradiance and its direction
-    vary by less than a share of the tolerance. The paper searches a mask of lit and dark texels; light that varies
-    within a square splits it.
+    A beam is a square of 2^k texels, the largest one that is completely and evenly lit: its irradiance and its
+    direction vary by less than a fraction of the tolerance. The paper searches a mask of lit and dark texels; here,
+    light that varies within a square splits the square.
 
     Parameters
     ----------
@@ -175,7 +266,7 @@ def adaptive_beams(irradiance, direction, pitch=1.0, tolerance=1e-3):
     return beams
 
 
-def _numbers(name, values, count):
+def _numbers(name: str, values: float | Sequence[float], count: int) -> list[float]:
     """`count` floats from one number or a sequence of `count`."""
     try:
         array = np.asarray(values, dtype=np.float64)
@@ -188,19 +279,19 @@ def _numbers(name, values, count):
     return np.broadcast_to(array, count).tolist()
 
 
-def _rgb(name, values):
+def _rgb(name: str, values: float | Sequence[float]) -> list[float]:
     return _numbers(name, values, 3)
 
 
-def _pair(name, values):
+def _pair(name: str, values: float | Sequence[float]) -> list[float]:
     return _numbers(name, values, 2)
 
 
-def _sources(ldf, interpolation):
+def _sources(ldf: Ldf, interpolation: str) -> list[native.LdfSource]:
     """Native sources of LDFs, one per channel."""
-    one = _source(ldf, interpolation)
-    if one is not None:
-        return [one] * 3
+    shared = _source(ldf, interpolation)
+    if shared is not None:
+        return [shared] * 3
     each = [_source(entry, interpolation) for entry in ldf] if isinstance(ldf, list | tuple) else []
     if len(each) != 3 or None in each:
         raise ValueError(
@@ -209,8 +300,8 @@ def _sources(ldf, interpolation):
     return each
 
 
-def _source(ldf, interpolation):
-    """A library as it is, or samples as a source; None for anything else."""
+def _source(ldf: object, interpolation: str) -> native.LdfSource | None:
+    """The library itself, or a source made of samples; None for anything else."""
     if isinstance(ldf, native.LdfSource):
         return ldf
     samples = [ldf] if isinstance(ldf, native.LdfSample) else ldf

@@ -14,9 +14,8 @@ from ..progress import Progress, stages
 
 
 def channel_media(material: Material, thickness: float) -> list:
-    """The native `Medium` of each channel; of a material and a thickness in the same unit, 0 for a half-space."""
-    depths = [thickness / length if thickness else math.inf for length in material.mean_free_path]
-    return [native.Medium(g, material.ior, depth) for g, depth in zip(material.channel_anisotropy, depths)]
+    """The native `Medium` of each channel; the thickness has the unit of the mean free path, 0 for a half-space."""
+    return list(material.channel_media(thickness or math.inf))
 
 
 @dataclass(frozen=True)

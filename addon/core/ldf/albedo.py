@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays import float_array
 from ..material.material import RGB
+from ..native import native
 from ..progress import Progress
 from .library import library
 
@@ -15,7 +17,9 @@ HIGHEST_ALBEDO = 0.99999
 """What a colour too bright for its medium becomes: simulations follow light for enough scatterings up to here."""
 
 
-def albedo_from_color(color, medium, quality: str = "final", progress: Progress | None = None, threads: int = 0) -> RGB:
+def albedo_from_color(
+    color: ArrayLike, medium: native.Medium, quality: str = "final", progress: Progress | None = None, threads: int = 0
+) -> RGB:
     """Single-scattering albedo whose reflectance under uniform diffuse light is `color`.
 
     It grows with the colour, from 0 for black. No medium reflects everything: some light is reflected before it
@@ -45,7 +49,7 @@ def albedo_from_color(color, medium, quality: str = "final", progress: Progress 
     return tuple(albedos[value] for value in channels)
 
 
-def _channels(color) -> list[float]:
+def _channels(color: ArrayLike) -> list[float]:
     allowed = "one number or three (red, green, blue), each 0 to 1"
     values = float_array("color", color, np.float64, allowed)
     if values.shape not in ((), (3,)) or not ((values >= 0) & (values <= 1)).all():

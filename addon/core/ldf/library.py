@@ -1,12 +1,15 @@
 """LDF libraries of any medium: from the cache, or simulated now and cached."""
 
+from __future__ import annotations
+
 import hashlib
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from ..native import native
-from ..progress import say
+from ..progress import Progress, say
 from ..recent import keep_recent
 
 PHOTONS = {"preview": 80_000, "final": 4_000_000}
@@ -24,7 +27,7 @@ SHIPPED_FOLDER = Path(__file__).resolve().parents[2] / "library"
 """Libraries that came with the package, made by ``tools/make_library.py``."""
 
 
-def angles_for(medium):
+def angles_for(medium: native.Medium) -> Sequence[float]:
     """Angles of incidence to simulate, degrees.
 
     Refraction lets the light inside change slowly with the angle outside; without it, the more a phase function peaks
@@ -49,12 +52,12 @@ def angles_for(medium):
 _chosen = {"folder": ""}
 
 
-def choose_cache_folder(folder):
+def choose_cache_folder(folder: str | Path) -> None:
     """Keep libraries in a folder of the user's from now on; empty: where `cache_folder` has it otherwise."""
     _chosen["folder"] = str(folder)
 
 
-def cache_folder():
+def cache_folder() -> Path:
     """Folder of cached libraries: ``$BEAMSPREAD_CACHE``, the one chosen, or the user's cache folder."""
     if folder := os.environ.get("BEAMSPREAD_CACHE") or _chosen["folder"]:
         return Path(folder)
@@ -67,7 +70,7 @@ def cache_folder():
     return Path(base) / "beamspread"
 
 
-def photons_for(medium, quality):
+def photons_for(medium: native.Medium, quality: str) -> int:
     """Photons per angle that take about the same time in every medium.
 
     The number of scatterings before light leaves grows like 1 / (1 - g), in a slab no further than with its thickness,
@@ -77,19 +80,21 @@ def photons_for(medium, quality):
     return round(min(5.0 * PHOTONS[quality] / scatterings / medium.ior**2, _MAX_PHOTONS))
 
 
-def make(medium, quality, progress=None, kernel="", threads=0):
+def make(
+    medium: native.Medium, quality: str, progress: Progress | None = None, kernel: str = "", threads: int = 0
+) -> native.LdfLibrary:
     """Simulate the library of a medium and make its totals exact."""
     photons = photons_for(medium, quality)
     simulated = native.simulate(medium, angles_for(medium), photons, progress=progress, kernel=kernel, threads=threads)
     return simulated.calibrated()
 
 
-def file_name(medium, quality):
+def file_name(medium: native.Medium, quality: str) -> str:
     """Name of the file that holds the library of a medium."""
     return f"g{medium.g:g}_ior{medium.ior:g}_thickness{medium.thickness:g}_{quality}.exr"
 
 
-def _cache_path(medium, quality):
+def _cache_path(medium: native.Medium, quality: str) -> Path:
     key = repr(
         (_FILE_VERSION, medium.g, medium.ior, medium.thickness, angles_for(medium), photons_for(medium, quality))
     )
@@ -98,7 +103,7 @@ def _cache_path(medium, quality):
     return cache_folder() / f"{name.stem}_{digest}.exr"
 
 
-def _load(path, medium):
+def _load(path: Path, medium: native.Medium) -> native.LdfLibrary | None:
     """The library in a file; None where there is no such file, or where it is damaged or another medium's."""
     try:
         found = native.LdfLibrary.load(path)
@@ -108,7 +113,7 @@ def _load(path, medium):
     return found if whole and found.medium == medium else None
 
 
-def _load_shipped(medium, quality):
+def _load_shipped(medium: native.Medium, quality: str) -> native.LdfLibrary | None:
     """A shipped library of at least this quality, or None."""
     for name in (quality, "final"):
         if found := _load(SHIPPED_FOLDER / file_name(medium, name), medium):
@@ -116,7 +121,7 @@ def _load_shipped(medium, quality):
     return None
 
 
-def _store(result, path):
+def _store(result: native.LdfLibrary, path: Path) -> None:
     """Caching is a convenience: a full or read-only disk must not cost the bake."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -125,7 +130,7 @@ def _store(result, path):
         pass
 
 
-def cached_files():
+def cached_files() -> list[Path]:
     """The files of the cache, which hold libraries only: whatever else lies in the folder is not ours."""
     try:
         return sorted(path for path in cache_folder().glob("g*_ior*_thickness*_*.exr") if path.is_file())
@@ -133,7 +138,7 @@ def cached_files():
         return []
 
 
-def clear_cache():
+def clear_cache() -> int:
     """Remove the libraries from the cache, and forget those in memory; the bytes freed."""
     freed = 0
     for path in cached_files():
@@ -147,20 +152,22 @@ def clear_cache():
     return freed
 
 
-def is_known(medium, quality):
+def is_known(medium: native.Medium, quality: str) -> bool:
     """Whether `library` need not simulate, as far as names of files tell: a damaged file is made again."""
     path = _cache_path(medium, quality)
     shipped = (SHIPPED_FOLDER / file_name(medium, name) for name in (quality, "final"))
     return path in _loaded or path.is_file() or any(one.is_file() for one in shipped)
 
 
-_loaded = {}
+_loaded: dict[Path, native.LdfLibrary] = {}
 """The libraries used last, by path, oldest first."""
 
 _LOADED_LIMIT = 8
 
 
-def library(medium, quality="final", progress=None, threads=0):
+def library(
+    medium: native.Medium, quality: str = "final", progress: Progress | None = None, threads: int = 0
+) -> native.LdfLibrary:
     """LDF library of a medium for every angle of incidence and albedo.
 
     Parameters
@@ -199,12 +206,12 @@ def library(medium, quality="final", progress=None, threads=0):
     return keep_recent(_loaded, path, made, _LOADED_LIMIT)
 
 
-def known_library(medium):
+def known_library(medium: native.Medium) -> native.LdfLibrary | None:
     """The best library of a medium that came with the package or is cached; None where one would be simulated."""
     return _at_hand(medium, "final") or _at_hand(medium, "preview")
 
 
-def _at_hand(medium, quality):
+def _at_hand(medium: native.Medium, quality: str) -> native.LdfLibrary | None:
     path = _cache_path(medium, quality)
     found = _loaded.get(path) or _load_shipped(medium, quality) or _load(path, medium)
     return found and keep_recent(_loaded, path, found, _LOADED_LIMIT)

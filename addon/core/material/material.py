@@ -1,15 +1,20 @@
-"""What a surface is made of: the Material and its checks."""
+"""Optical properties of a surface: the Material and its checks."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 from ..errors import MaterialError
+from ..native import native
 
 CHANNELS = ("red", "green", "blue")
 
 RGB = tuple[float, float, float]
+
+Media: TypeAlias = "native.Medium | tuple[native.Medium, native.Medium, native.Medium]"
+"""One medium for all channels, or one for each."""
 
 
 @dataclass(frozen=True)
@@ -19,11 +24,11 @@ class Material:
     Attributes
     ----------
     albedo : single-scattering albedo per channel, each in [0, 1).
-    mean_free_path : per channel, metres (any length unit will do if the grid has the same).
-    anisotropy : Henyey-Greenstein g in (-1, 1); the mean of the channels where they differ.
+    mean_free_path : per channel, metres (or any length unit that the grid has, too).
+    anisotropy : Henyey-Greenstein g in (-1, 1); the mean of the channels if they differ.
     ior : index of refraction, inside over outside, >= 1.
-    source : where the numbers come from.
-    anisotropy_rgb : g per channel where they differ, and then the one that a bake uses; None: `anisotropy` for all.
+    source : origin of the numbers.
+    anisotropy_rgb : g per channel, which replaces `anisotropy` in bakes; None if all channels have `anisotropy`.
     """
 
     albedo: RGB
@@ -35,7 +40,28 @@ class Material:
 
     @property
     def channel_anisotropy(self) -> RGB:
+        """Anisotropy of each channel."""
         return self.anisotropy_rgb or (self.anisotropy,) * 3
+
+    def medium(self, thickness: float = math.inf) -> Media:
+        """The `Medium` of the material, for `library` and `simulate`; three, one per channel, if the channels differ.
+
+        Parameters
+        ----------
+        thickness : metres, inf for a half-space. In mean free paths, a slab's thickness differs between channels.
+        """
+        red, green, blue = self.channel_media(thickness)
+        return red if red == green == blue else (red, green, blue)
+
+    def channel_media(self, thickness: float = math.inf) -> tuple[native.Medium, native.Medium, native.Medium]:
+        """The `Medium` of each channel, as `medium`."""
+        if not thickness > 0:
+            raise ValueError(f"argument 'thickness' is {thickness!r}; allowed: metres above 0, inf for a half-space")
+        red, green, blue = (
+            native.Medium(g, self.ior, thickness / length)
+            for g, length in zip(self.channel_anisotropy, self.mean_free_path)
+        )
+        return red, green, blue
 
     def with_one_anisotropy(self) -> Material:
         """The similar material with `anisotropy` in every channel.

@@ -257,7 +257,7 @@ class Fingerprints:
         return [repr(node.surface()), getattr(node, "side", ""), inputs]
 
     def _world(self, scene, view_layer) -> str:
-        world = getattr(view_layer, "world_override", None) or scene.world
+        world = compat.original_world(view_layer, scene)
         if world is None or not view_layer.use_sky:
             return ""
         return self._keep(world, lambda: digest(tuple(world.color), _tree_of(world), world.cycles_visibility.diffuse))
@@ -273,7 +273,7 @@ def _matrix(obj) -> list:
 
 def _links(obj) -> list:
     """Collections of light linking (Blender 4.0 on), by name."""
-    linking = getattr(obj, "light_linking", None)
+    linking = compat.light_linking(obj)
     return values_of(linking) if linking is not None else []
 
 
