@@ -87,7 +87,7 @@ def test_an_output_is_whole_or_old(tmp_path, file_format, part):
     files.write_file(path, NOISE, file_format)
     before = path.read_bytes()
     for target in (path, tmp_path / "new" / path.name):
-        with full_after(int(part * size)), pytest.raises(ImageError, match="too large"):
+        with full_after(int(part * size)), pytest.raises(ImageError, match=r"too large|not all of it"):
             files.write_file(target, 1 - NOISE, file_format)
     assert path.read_bytes() == before
     assert [*tmp_path.rglob("*.*")] == [path]
@@ -124,7 +124,7 @@ def test_a_really_full_disk(tmp_path):
             files.write_file(old, small, file_format)
             before = old.read_bytes()
             large = np.random.default_rng(3).random((256, 256, 3), np.float32)
-            with pytest.raises(ImageError, match=r"cannot be written.*No space left"):
+            with pytest.raises(ImageError, match=r"cannot be written.*(No space left|not all of it)"):
                 files.write_file(old, large, file_format)
             assert old.read_bytes() == before
         assert len(list(disk.iterdir())) == len(files.EXTENSIONS)

@@ -194,6 +194,7 @@ def write_png(path: Path, texture: np.ndarray, view_of=None) -> None:
             return
         with _whole_image(path) as temporary, compat.saving_png(view_of):
             image.save_render(str(temporary), scene=view_of)
+            _check_written(temporary, (width, height))
     finally:
         bpy.data.images.remove(image)
 
@@ -201,8 +202,10 @@ def write_png(path: Path, texture: np.ndarray, view_of=None) -> None:
 def save_image(image, path: Path) -> None:
     """Write an image of our own making to a file of its format; the image's path changes."""
     with _whole_image(path) as temporary:
+        size = tuple(image.size)
         image.filepath_raw = str(temporary)
         image.save()
+        _check_written(temporary, size)
 
 
 def size_of(path: Path) -> tuple[int, int] | None:
@@ -237,6 +240,12 @@ def _write_like(image, encoded: np.ndarray, path: Path) -> None:
 def _is_encoded(image) -> bool:
     """True if the image's pixels are sRGB-encoded."""
     return not image.is_float and not image.colorspace_settings.is_data
+
+
+def _check_written(path: Path, size: tuple[int, int]) -> None:
+    """Raise OSError if the file can't be loaded: Blender does not report all errors of writing."""
+    if size_of(path) != size:
+        raise OSError("not all of it could be written, as on a full disk")
 
 
 @contextmanager
