@@ -144,7 +144,7 @@ def links_of(obj, names: set[str]) -> dict[str, frozenset[str] | None]:
     ----------
     names : of all objects of the scene.
     """
-    linking = getattr(obj, "light_linking", None)
+    linking = compat.light_linking(obj)
     if linking is None:
         return {}
     return {
