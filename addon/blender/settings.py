@@ -13,7 +13,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
 
     resolution: IntProperty(
         name="Resolution",
-        description="Texels along the longer side of images that a bake makes. A node's own image keeps its size",
+        description="Longer side of new images, in pixels. Existing images keep their size: use Resize",
         default=1024,
         min=1,
         soft_min=64,
@@ -23,28 +23,28 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     solver: EnumProperty(
         name="Solver",
-        description="How light is spread inside the medium. The result is the same but for each one's tolerance",
+        description="Method that computes the scattering of light. All give the same result within their tolerance",
         items=[
-            ("fft", "FFT", "Fast convolution: seconds for any number of lights", 0),
+            ("fft", "FFT", "Takes seconds for any number of lights", 0),
             (
                 "direct",
                 "Direct",
-                "Adds up every beam at every texel. Under a lamp: minutes for 256 x 256 texels, days for 2048 x 2048",
+                "Reference, very slow: minutes for 256 x 256 pixels under a lamp, days for 2048 x 2048",
                 1,
             ),
-            ("adaptive", "Adaptive", "Lights evenly lit squares by one beam each, as Manabe et al. 2012", 2),
+            ("adaptive", "Adaptive", "Method of the paper (Manabe et al. 2012)", 2),
         ],
         default="fft",
     )
     quality: EnumProperty(
         name="Quality",
-        description="Of the light transport simulation, which is made once per material and then kept",
+        description="Quality of the material simulation, which runs once for each material",
         items=[
-            ("preview", "Preview", "Simulated in a few seconds; slightly noisy", 0),
+            ("preview", "Preview", "A few seconds for a new material; slightly noisy", 0),
             (
                 "final",
                 "Final",
-                "Simulated in a minute or two, unless it comes with the add-on. A first look is shown meanwhile",
+                "1 to 2 minutes for a new material, with a quick preview meanwhile; built-in materials are instant",
                 1,
             ),
         ],
@@ -52,33 +52,32 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     distributions: EnumProperty(
         name="Distributions",
-        description="Where the luminance distribution functions come from",
+        description="Source of the light distributions (LDFs). Samples are for research",
         items=[
-            ("LIBRARY", "Library", "Simulated for each material: every angle and albedo", 0),
-            ("ANGULAR", "Samples, Angular", "Your own samples, interpolated as Manabe et al. 2012", 1),
+            ("LIBRARY", "Library", "Simulated for each material, for all angles and albedos", 0),
+            ("ANGULAR", "Samples, Angular", "Your own samples, interpolated as in Manabe et al. 2012", 1),
             (
                 "ADAPTIVE",
                 "Samples, Adaptive",
-                "Your own samples, their logarithms interpolated: more exact",
+                "Your own samples, with interpolated logarithms: more accurate",
                 2,
             ),
-            ("PLANAR", "Samples, Planar", "Your own samples, blended in place: for comparison", 3),
+            ("PLANAR", "Samples, Planar", "Your own samples, blended linearly: for comparison", 3),
         ],
         default="LIBRARY",
     )
     sample_folder: StringProperty(
         name="LDF Samples",
-        description="Folder of EXR files, one LDF sample each. They replace anisotropy, index of refraction and "
-        "thickness of all materials; albedos and angles of light must lie between theirs",
+        description="Folder of EXR files with one LDF sample each. They replace anisotropy, index of refraction and "
+        "thickness of all materials. Albedos and angles of light must lie between those of the samples",
         default="",
         subtype="DIR_PATH",
         options=compat.PATH_OPTIONS,
     )
     samples: IntProperty(
         name="Samples",
-        description="Rays per texel, as the root of their number: 4 makes 16 to each lamp without a size, and up to "
-        "1024 to all lamps with one, glowing meshes and the world together, as many as the medium needs; 8 makes four "
-        "times as many",
+        description="Quality of soft shadows. Doubling the value takes four times as long: 4 casts 16 rays per pixel "
+        "to each lamp without a size, and up to 1024 to all other lights together",
         default=4,
         min=1,
         soft_max=16,
@@ -86,7 +85,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     margin: IntProperty(
         name="Margin",
-        description="Texels beyond the border of the UV map that continue the result, so that none unbaked shows",
+        description="Pixels by which the result extends past UV borders, as in Blender's Bake > Margin",
         default=16,
         min=0,
         soft_max=64,
@@ -94,27 +93,32 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         subtype="PIXEL",
     )
     output: EnumProperty(
-        name="Bake",
-        description="What the texels hold. All but luminance goes into images of its own, named after the node's",
+        name="Output",
+        description="Quantity to bake. Irradiance and Direction go to extra images, named after the node's",
         items=[
-            ("LUMINANCE", "Luminance", "What leaves the surface, in W/(m² sr): the node shows it", 0),
+            ("LUMINANCE", "Luminance", "Scattered light that leaves the surface, W/(m² sr): the node shows it", 0),
             (
                 "IRRADIANCE",
                 "Irradiance",
-                "What arrives on the surface, in W/m²: π times a white diffuse bake",
+                "Light that arrives at the surface, W/m²: π times a white diffuse bake",
                 1,
             ),
-            ("DIRECTION", "Direction", "The mean way that arriving light goes: right, up and out of the texture", 2),
+            (
+                "DIRECTION",
+                "Direction",
+                "Mean direction in which the arriving light travels: right, up and out of the texture",
+                2,
+            ),
         ],
         default="LUMINANCE",
     )
     use_indirect: BoolProperty(
         name="Indirect Light",
-        description="Light that arrives by way of other objects counts, too: Cycles finds it before each bake",
+        description="Include light that bounces from other objects, computed with Cycles",
         default=True,
     )
     output_dir: StringProperty(
-        name="Output",
+        name="Folder",
         description="Folder that a batch writes to",
         default="//beamspread/",
         subtype="DIR_PATH",
@@ -122,45 +126,43 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     image_storage: EnumProperty(
         name="Storage",
-        description="Where images are kept that a bake makes because a node has none",
+        description="Storage of new images",
         items=[
-            ("FILES", "Files", "OpenEXR files; packed as long as the scene was never saved", 0),
-            ("PACKED", "Packed", "In the .blend file, which grows: by 200 MB for 4096 x 4096 texels", 1),
+            ("FILES", "Files", "OpenEXR files. In a scene that was never saved, images are packed", 0),
+            ("PACKED", "Packed", "In the .blend file, which grows by 200 MB for 4096 x 4096 pixels", 1),
         ],
         default="FILES",
     )
     image_dir: StringProperty(
         name="Folder",
-        description="Where the files of new images go",
+        description="Folder of the files of new images",
         default="//textures/",
         subtype="DIR_PATH",
         options=compat.PATH_OPTIONS,
     )
     image_name: StringProperty(
         name="Name",
-        description="Of new images and their files: {object} and {material} stand for what they are called",
+        description="Name of new images and their files. {object} and {material} are replaced by the names of both",
         default="{object}_{material}",
     )
     use_view_transform: BoolProperty(
         name="View Transform",
-        description="PNG files look as a render would: with the view transform, exposure and look of Color Management",
+        description="Give PNG files the view transform, exposure and look of Color Management, as in a render",
         default=False,
     )
     render_engine: EnumProperty(
-        name="Pictures By",
-        description="What renders pictures (F12) while the render engine is Beamspread, with the baked images in them",
+        name="Render With",
+        description="Engine that renders images (F12) with the bakes in them, while the render engine is Beamspread",
         items=[
-            ("CYCLES", "Cycles", "Path traced, also where there is no OpenGL", 0),
+            ("CYCLES", "Cycles", "Path tracing; needs no OpenGL", 0),
             ("EEVEE", "EEVEE", "Faster; needs OpenGL", 1),
         ],
         default="CYCLES",
     )
     use_live: BoolProperty(
         name="Live",
-        description="While lights, things in their way, and materials change, the images of Beamspread nodes follow in "
-        "Material Preview and Rendered view: quickly, then as a bake without indirect light. These pixels are a "
-        "preview that is neither packed nor saved, but renders show them: switched off, images have the pixels of "
-        "their last bake again",
+        description="Preview the bake while you change lights, objects and materials, without indirect light. "
+        "Switch off to see the last bake again",
         default=False,
     )
     format: EnumProperty(
@@ -168,7 +170,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         description="File format that a batch writes",
         items=[
             ("EXR", "OpenEXR", "Linear, 32-bit float, W/(m^2 sr)", 0),
-            ("PNG", "PNG", "For looking at: values above 1 are clipped", 1),
+            ("PNG", "PNG", "8 bits; values above 1 are clipped", 1),
         ],
         default="EXR",
     )
@@ -176,7 +178,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     def for_bake(
         self, solver: str | None = None, output: str | None = None, indirect: bool | None = None
     ) -> BakeSettings:
-        """What core needs of them; arguments override the scene's."""
+        """The settings as core needs them; arguments override the scene's."""
         return BakeSettings(
             solver=solver or self.solver,
             layers=(OUTPUTS[output or self.output],),

@@ -255,3 +255,5 @@ def test_the_panel_says_what_blenders_own_bake_fills():
     texture.image = bpy.data.images.new("Filled", 4, 4)
     material.node_tree.nodes.active = texture
     assert target_of_blender(material) == "Fills 'Filled', the image of the selected Image Texture node."
+    material.node_tree.links.new(node_of(material).inputs["Base Color"], material.node_tree.nodes.active.outputs[0])
+    assert "'Filled' is the base color" in target_of_blender(material)

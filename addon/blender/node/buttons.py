@@ -1,4 +1,4 @@
-"""What the node's buttons do."""
+"""Operators of the node's buttons."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from .find import find_node
 
 
 def active_material(context):
-    """The material that the editor or the properties show, or the active object's."""
+    """Material that the editor or the properties show, else the active object's."""
     material = getattr(context, "material", None)
     if material is None and context.space_data is not None and context.space_data.type == "NODE_EDITOR":
-        shown = context.space_data.id
-        material = shown if isinstance(shown, bpy.types.Material) else None
+        owner = context.space_data.id
+        material = owner if isinstance(owner, bpy.types.Material) else None
     return material or getattr(context.object, "active_material", None)
 
 
 class NodeOperator:
-    """Acts on the Beamspread node of the material that is shown."""
+    """Operator on the Beamspread node of the active material."""
 
     bl_options = {"REGISTER", "UNDO"}
 
@@ -40,10 +40,10 @@ class NodeOperator:
 
 
 class BEAMSPREAD_OT_toggle_result(NodeOperator, bpy.types.Operator):
-    """Swap what the material shows: the baked result, or the shader that was there before. Both stay in the tree"""
+    """Switch the material between the baked result and the shader that it had before. Both stay in the tree"""
 
     bl_idname = "beamspread.toggle_result"
-    bl_label = "Swap Baked Result and Former Shader"
+    bl_label = "Switch Baked Result and Former Shader"
 
     def change(self, node):
         shown = output.toggle(node)
@@ -57,8 +57,7 @@ class BEAMSPREAD_OT_toggle_result(NodeOperator, bpy.types.Operator):
 
 
 class BEAMSPREAD_OT_make_plain(NodeOperator, bpy.types.Operator):
-    """Show the bake by a group of ordinary nodes (image, emission, coat), which renders where this add-on is not \
-installed, as on farms. The node stays, and bakes fill the same image. Again: take the group away"""
+    """Replace the node by standard Blender nodes, for machines without this add-on, or put the node back"""
 
     bl_idname = "beamspread.make_plain"
     bl_label = "Make Plain Nodes"
@@ -72,9 +71,7 @@ installed, as on farms. The node stays, and bakes fill the same image. Again: ta
 
 
 class BEAMSPREAD_OT_from_principled(NodeOperator, bpy.types.Operator):
-    """Take over base color, roughness, normal map and IOR of the material's Principled BSDF, and its subsurface \
-radius as a mean free path, as Cycles' random walk has it: radius times scale, over 4 pi; for the method that depends \
-on the color (Skin, in 3.x Random Walk), times sqrt(3 (1 - reduced albedo)). Lengths stay in scene units"""
+    """Copy color, roughness, normal map, IOR and subsurface radius from the Principled BSDF"""
 
     bl_idname = "beamspread.from_principled"
     bl_label = "From Principled"
@@ -88,15 +85,15 @@ on the color (Skin, in 3.x Random Walk), times sqrt(3 (1 - reduced albedo)). Len
     def change(self, node):
         source = principled.find_principled(node)
         if source is None:
-            self.report({"ERROR"}, "The material has no Principled BSDF: add one, or set the values by hand")
+            self.report({"ERROR"}, "The material has no Principled BSDF. Add one, or set the values by hand")
             return {"CANCELLED"}
-        lost = principled.take_over(node, source)
-        for sentence in lost:
+        warnings = principled.take_over(node, source)
+        for sentence in warnings:
             self.report({"WARNING"}, sentence)
-        if lost and self._in_window:
-            popup.show_soon(f"Values taken from '{source.name}'", lost)
+        if warnings and self._in_window:
+            popup.show_soon(f"Values copied from '{source.name}'", warnings)
         else:
-            self.report({"INFO"}, f"Values taken from '{source.name}'")
+            self.report({"INFO"}, f"Values copied from '{source.name}'")
         return {"FINISHED"}
 
 

@@ -1,28 +1,27 @@
-"""How the node looks: its properties in the node editor and in panels, and its buttons."""
+"""Layout of the node's properties and buttons, in the node editor and in panels."""
 
 from __future__ import annotations
 
 import bpy
 
 from .output import former_output, is_in_group, is_shown, plain_of
-from .tree import BASE_COLOR
 
-# The largest unit first: the least length that it suits, metres of one, its name.
+# Units of length: shortest length shown in it, its length in meters, its name; the largest unit first.
 UNITS = ((1.0, 1.0, "m"), (1e-2, 1e-2, "cm"), (1e-4, 1e-3, "mm"), (0.0, 1e-6, "µm"))
 
 
-def readable_lengths(metres) -> str:
-    """Lengths in the unit that suits the longest of them, three digits each: "0.41, 0.36, 0.3 mm"."""
-    longest = max(map(abs, metres))
-    scale, unit = next((scale, unit) for least, scale, unit in UNITS if longest >= least)
-    values = [f"{length / scale:.3g}" for length in metres]
+def readable_lengths(meters) -> str:
+    """Lengths in one unit, which suits the longest of them, with three digits: "0.41, 0.36, 0.3 mm"."""
+    longest = max(map(abs, meters))
+    scale, unit = next((scale, unit) for shortest, scale, unit in UNITS if longest >= shortest)
+    values = [f"{length / scale:.3g}" for length in meters]
     return f"{values[0] if len(set(values)) == 1 else ', '.join(values)} {unit}"
 
 
 def draw_node(node, layout) -> None:
-    """In the node editor: with the Bake button on top."""
+    """Draw the node in the node editor: the Bake button, then its properties."""
     if not hasattr(bpy.types, "BEAMSPREAD_OT_bake"):
-        # Before Blender 4.5 the node's class stays while nodes use it.
+        # Before Blender 4.5 the node's class stays registered while nodes use it.
         layout.label(text="The add-on Beamspread is disabled.", icon="ERROR")
         return
     row = layout.row()
@@ -32,13 +31,13 @@ def draw_node(node, layout) -> None:
 
 
 def draw_properties(node, layout) -> None:
-    """The node's properties, in the node editor and in panels."""
+    """Draw the node's properties and buttons."""
     layout.prop(node, "preset")
     _draw_color(node, layout)
-    _draw_channels(layout, node, "mean_free_path", "Path")
-    metres = bpy.context.scene.unit_settings.scale_length
-    # In few letters: side bars are narrow.
-    layout.label(text=readable_lengths([length * metres for length in node.mean_free_path]), icon="DRIVER_DISTANCE")
+    _draw_channels(layout, node, "mean_free_path", "Mean Free Path")
+    meters = bpy.context.scene.unit_settings.scale_length
+    lengths = readable_lengths([length * meters for length in node.mean_free_path])
+    layout.label(text=f"Mean free path: {lengths}", icon="DRIVER_DISTANCE")
     layout.prop(node, "anisotropy")
     layout.prop(node, "ior")
     layout.prop(node, "thickness")
@@ -48,14 +47,14 @@ def draw_properties(node, layout) -> None:
 
 def _draw_color(node, layout) -> None:
     if node.has_texture():
-        layout.label(text=f"Color: the texture at {BASE_COLOR}", icon="TEXTURE")
+        layout.label(text="Color: from texture", icon="TEXTURE")
         layout.prop(node, "texture_blur")
         return
     layout.prop(node, "color_mode")
     if node.color_mode == "BASE_COLOR":
         layout.prop(node, "base_color")
     else:
-        _draw_channels(layout, node, "albedo", "Albedo")
+        _draw_channels(layout, node, "albedo", "Scattering Albedo")
 
 
 def _draw_actions(node, layout) -> None:
@@ -73,5 +72,5 @@ def _draw_actions(node, layout) -> None:
 
 def _draw_channels(layout, node, name: str, label: str) -> None:
     column = layout.column(align=True)
-    for index, channel in enumerate(("Red", "Green", "Blue")):
+    for index, channel in enumerate("RGB"):
         column.prop(node, name, index=index, text=channel if index else f"{label} {channel}")

@@ -7,7 +7,7 @@ from .node import BeamspreadNode
 
 def _draw(self, context) -> None:
     if getattr(context.space_data, "tree_type", "") == "ShaderNodeTree":
-        self.layout.separator()  # what is last in the menu has no more to do with it than all others
+        self.layout.separator()
         operator = self.layout.operator("node.add_node", text=BeamspreadNode.bl_label)
         operator.type = BeamspreadNode.bl_idname
         operator.use_transform = True

@@ -26,12 +26,12 @@ from .tree import (
 
 CUSTOM_PRESET = "CUSTOM"
 
-# What new nodes have. The properties' own defaults stand for what older files, which don't hold them, were baked with.
+# Index of refraction of new nodes. The property's own default is that of older files, which don't hold a value.
 NEW_IOR = 1.4
 
 
 def _preset_items() -> list[tuple]:
-    # A saved file keeps the number: it counts the rows of the table, to whose end new materials go.
+    # Files hold the number, which is the row in the table: new materials go to its end.
     items = [
         (name, name.replace("_", " ").title(), material.source, number)
         for number, (name, material) in enumerate(presets().items(), start=1)
@@ -44,7 +44,7 @@ _nodes_being_filled: set[int] = set()
 
 @contextlib.contextmanager
 def filling(node):
-    """While values are set that leave the preset's name as it is."""
+    """Keep the preset's name while values are set in a `with` block."""
     key = node.as_pointer()
     _nodes_being_filled.add(key)
     try:
@@ -58,18 +58,18 @@ def _apply_preset(node, context) -> None:
         return
     # The node has one anisotropy for all channels.
     material = presets()[node.preset].with_one_anisotropy()
-    # Lengths are stored in scene units, which `scale_length` metres make one of.
-    metres_per_unit = context.scene.unit_settings.scale_length if context and context.scene else 1.0
+    # Lengths are in scene units, of `scale_length` meters each.
+    meters_per_unit = context.scene.unit_settings.scale_length if context and context.scene else 1.0
     with filling(node):
         node.color_mode = "ALBEDO"
         node.albedo = material.albedo
-        node.mean_free_path = [length / metres_per_unit for length in material.mean_free_path]
+        node.mean_free_path = [length / meters_per_unit for length in material.mean_free_path]
         node.anisotropy = material.anisotropy
         node.ior = material.ior
 
 
 def _edited(node, _context) -> None:
-    """What a preset has filled in is no longer its own."""
+    """Take the preset's name away, since a value differs from it."""
     if node.as_pointer() not in _nodes_being_filled and node.preset != CUSTOM_PRESET:
         node.preset = CUSTOM_PRESET
 
@@ -80,10 +80,10 @@ def _ior_edited(node, context) -> None:
 
 
 def _show(node, _context) -> None:
-    """Bring image and IOR into the inner tree, the node's own from here on.
+    """Bring image and IOR into the inner tree, and give the node a tree of its own first.
 
-    A copied node shares the original's tree until then: assigning another in `copy()`, while Blender has not counted
-    the users of the new node yet, leaves the original's with too few, and Blender drops it when it saves.
+    A copied node shares the original's tree until then. In `copy()` Blender has not counted the users of the new node
+    yet: another tree would leave the original's with too few, and Blender would drop it when it saves.
     """
     tree = node.node_tree
     if tree is None:
@@ -100,12 +100,12 @@ def _show(node, _context) -> None:
 
 
 def _is_shared(tree, plain=None) -> bool:
-    """Whether nodes of other materials show the tree, too; its fake user counts as a user.
+    """True if nodes of other materials use the tree, too; its fake user counts as a user.
 
     Before Blender 4.5, a copied material counts one user too many until the file is opened again.
     """
-    own = 1 + (plain is not None and plain.node_tree == tree)
-    return tree.users - tree.use_fake_user > own
+    users = 1 + (plain is not None and plain.node_tree == tree)
+    return tree.users - tree.use_fake_user > users
 
 
 def link_result(node, image) -> tuple[list[str], list[str]]:
@@ -129,16 +129,22 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
     )
     color_mode: EnumProperty(
         name="Color",
+        description="Way to set the color of the material",
         items=[
-            ("BASE_COLOR", "Base Color", "The colour under even light; the albedo follows from it", 0),
-            ("ALBEDO", "Albedo", "Single-scattering albedo: what one scattering leaves of the light", 1),
+            ("BASE_COLOR", "Base Color", "Set the visible color; the albedo is computed", 0),
+            (
+                "ALBEDO",
+                "Scattering Albedo",
+                "Set the share of light that survives each scattering event. For a bright material it is above 0.99",
+                1,
+            ),
         ],
         default="ALBEDO",
         update=_edited,
     )
     base_color: FloatVectorProperty(
         name="Base Color",
-        description="Seen under even light; where the medium can't be as bright, it becomes as bright as it can be",
+        description="Color of the surface in white, uniform light. Limited to the colors that this medium can reach",
         subtype="COLOR",
         size=3,
         default=(0.6, 0.6, 0.6),
@@ -146,8 +152,8 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         soft_max=1.0,
     )
     albedo: FloatVectorProperty(
-        name="Albedo",
-        description="Part of the light that one scattering leaves, below 1",
+        name="Scattering Albedo",
+        description="Share of light that survives each scattering event, below 1. Bright materials have above 0.99",
         size=3,
         default=(0.9, 0.9, 0.9),
         soft_min=0.0,
@@ -158,7 +164,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
     )
     mean_free_path: FloatVectorProperty(
         name="Mean Free Path",
-        description="How far light goes between two scatterings, for red, green and blue",
+        description="Mean distance that light travels between two scattering events, for red, green and blue",
         subtype="XYZ_LENGTH",
         unit="LENGTH",
         size=3,
@@ -171,7 +177,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
     )
     anisotropy: FloatProperty(
         name="Anisotropy",
-        description="Henyey-Greenstein: 0 scatters evenly, towards 1 forward",
+        description="0: light scatters in all directions. Near 1: it keeps going forward (Henyey-Greenstein)",
         default=0.8,
         soft_min=-0.95,
         soft_max=0.95,
@@ -179,7 +185,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
     )
     ior: FloatProperty(
         name="IOR",
-        description="Index of refraction, inside over outside; 1 has no coat",
+        description="Index of refraction. 1 = no glossy coat",
         default=1.0,
         soft_min=1.0,
         soft_max=2.0,
@@ -187,7 +193,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
     )
     thickness: FloatProperty(
         name="Thickness",
-        description="Of the slab under the surface; 0 is endlessly thick",
+        description="Thickness of the material. 0 = infinitely thick",
         subtype="DISTANCE",
         default=0.0,
         soft_min=0.0,
@@ -195,20 +201,22 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         precision=5,
     )
     image: PointerProperty(
-        name="Image", description="Target of the bake; none: one is made", type=bpy.types.Image, update=_show
+        name="Image",
+        description="Image that the bake fills. Empty: a new image is created",
+        type=bpy.types.Image,
+        update=_show,
     )
     texture_blur: FloatProperty(
         name="Texture Blur",
-        description="Part of the texture at Base Color that light meets on its way in, and that is blurred with it; "
-        "the rest it meets on its way out, sharp",
+        description="How much scattering blurs the texture at Base Color. 0 = sharp, 1 = fully blurred",
         subtype="FACTOR",
         default=0.5,
         min=0.0,
         max=1.0,
     )
-    former_node: StringProperty(options={"HIDDEN"}, description="What the material showed before the bake")
-    former_socket: StringProperty(options={"HIDDEN"}, description="The output of that node")
-    plain_node: StringProperty(options={"HIDDEN"}, description="The group that shows the bake without this add-on")
+    former_node: StringProperty(options={"HIDDEN"}, description="Node that the material showed before the bake")
+    former_socket: StringProperty(options={"HIDDEN"}, description="Output of that node")
+    plain_node: StringProperty(options={"HIDDEN"}, description="Group that shows the bake without this add-on")
 
     def init(self, _context) -> None:
         self.width = 240
@@ -221,7 +229,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
             self.node_tree.use_fake_user = False
 
     def surface(self) -> Surface:
-        """The values; lengths stay in scene units, as the geometry's."""
+        """Values of the node; lengths are in scene units, as those of the geometry."""
         material = Material(
             albedo=tuple(map(_decimal, self.albedo)),
             mean_free_path=tuple(map(_decimal, self.mean_free_path)),
@@ -232,7 +240,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         return Surface(material, _decimal(self.thickness), base_color)
 
     def has_texture(self) -> bool:
-        """Whether the base colour comes from what is linked, and neither from the base colour nor the albedo here."""
+        """True if the base color comes from a link, and not from the node's own base color or albedo."""
         return BASE_COLOR in self.inputs and self.inputs[BASE_COLOR].is_linked
 
     def draw_buttons(self, _context, layout) -> None:
@@ -243,12 +251,12 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
 
 
 def _decimal(value: float) -> float:
-    """The number typed, from Blender's 32-bit float: 0.8, not 0.800000012, which would be another medium."""
+    """Number as typed, from Blender's 32-bit float: 0.8 and not 0.800000012, which would be another medium."""
     return float(f"{value:.7g}")
 
 
 def all_nodes():
-    """Every Beamspread node of the file, in materials and in groups."""
+    """Beamspread nodes of the file, in materials and in groups."""
     trees = [material.node_tree for material in bpy.data.materials if material.node_tree] + list(bpy.data.node_groups)
     return (node for tree in trees for node in tree.nodes if node.bl_idname == BeamspreadNode.bl_idname)
 
@@ -271,9 +279,9 @@ def upgrade_nodes(*_arguments) -> None:
 
 @persistent
 def release_unused_trees(*_arguments) -> None:
-    """Let inner trees go that no node shows any more: those of a material that was removed, of which no node is told.
+    """Release inner trees without a node: no node is told when its material is removed.
 
-    To remove them here would crash on undo; without their fake user they are not saved.
+    Removing them here would crash on undo. Without their fake user they are not saved.
     """
     trees = [
         tree for tree in bpy.data.node_groups if is_inner_tree(tree) and tree.library is None and tree.use_fake_user
@@ -286,7 +294,7 @@ def release_unused_trees(*_arguments) -> None:
 def _upgrade(tree) -> None:
     if tree.library is not None or not add_missing_inputs(tree):
         return
-    # Nodes that are there get a new input before it has a default.
+    # Existing nodes get a new input before it has a default.
     for node in all_nodes():
         if node.node_tree == tree:
             node.inputs[ROUGHNESS].default_value = ROUGHNESS_BEFORE
@@ -298,7 +306,7 @@ def _add_class() -> None:
     stays = in_use and not compat.unregisters_node_classes_in_use()
     if not (BeamspreadNode.is_registered or stays):
         compat.register_node_class(BeamspreadNode, "ShaderNodeCustomGroup")
-    # While Blender starts, add-ons see no file, and load_post comes later.
+    # While Blender starts, add-ons see no file; load_post comes later.
     if isinstance(bpy.data, bpy.types.BlendData):
         upgrade_nodes()
 

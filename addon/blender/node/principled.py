@@ -1,4 +1,4 @@
-"""Takes over the look of a material's Principled BSDF."""
+"""Copies the look of a material's Principled BSDF to the node."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from .tree import BASE_COLOR, NORMAL, ROUGHNESS
 
 PRINCIPLED = "ShaderNodeBsdfPrincipled"
 
-# Over 1 an index of refraction would be endless; 0.25 is one of 3.
-HIGHEST_REFLECTANCE = 0.25
+# Largest reflectance at normal incidence; it is that of an index of refraction of 3.
+MAX_REFLECTANCE = 0.25
 
-# Parts of a Principled BSDF that a translucent surface has not.
+# Inputs of a Principled BSDF that the node lacks.
 LOST = ("Metallic", "Transmission", "Transmission Weight", "Sheen", "Sheen Weight", "Clearcoat", "Coat Weight")
 
 
 def find_principled(node):
-    """The Principled BSDF that the node may follow: what its material showed before, else the only or active one."""
+    """Principled BSDF to copy: the one that the material showed before, else one that is linked, else any; or None."""
     former = former_output(node)
     if former is not None and former.node.bl_idname == PRINCIPLED:
         return former.node
-    found = [one for one in node.id_data.nodes if one.bl_idname == PRINCIPLED]
-    linked = [one for one in found if one.outputs[0].is_linked]
-    return next(iter(linked + found), None)
+    candidates = [candidate for candidate in node.id_data.nodes if candidate.bl_idname == PRINCIPLED]
+    linked = [candidate for candidate in candidates if candidate.outputs[0].is_linked]
+    return next(iter(linked + candidates), None)
 
 
 @dataclass(frozen=True)
 class _Inputs:
-    """A Principled BSDF's inputs, by any of the names that they have had."""
+    """Inputs of a Principled BSDF, by any of their names in different versions of Blender."""
 
     node: object
 
@@ -48,20 +48,20 @@ class _Inputs:
         return default if socket is None else socket.default_value
 
     def source(self, *names: str):
-        """The output that is linked to it, or None."""
+        """Output that is linked to an input, or None."""
         socket = self.socket(*names)
         return socket.links[0].from_socket if socket is not None and socket.is_linked else None
 
 
 def take_over(node, principled) -> list[str]:
-    """Set the node's values and links from the Principled BSDF's; sentences on what it can't have."""
+    """Copy the Principled BSDF's values and links to the node; returns sentences on those that it lacks."""
     inputs, notes = _Inputs(principled), []
     weight = inputs.value("Subsurface Weight", "Subsurface")
     color = _take_color(node, inputs, weight)
     node.ior = _ior(inputs)
     lengths = _mean_free_path(inputs, principled, weight, color)
     if lengths is None:
-        notes.append(f"'{principled.name}' has no subsurface scattering: the mean free path stays as it was.")
+        notes.append(f"'{principled.name}' has no subsurface scattering: the mean free path stays unchanged.")
     else:
         node.anisotropy = inputs.value("Subsurface Anisotropy")
         node.mean_free_path = [length * (1 - node.anisotropy) for length in lengths]
@@ -70,16 +70,16 @@ def take_over(node, principled) -> list[str]:
     linked = [name for name in ("Subsurface Radius", "Subsurface Scale", "IOR") if inputs.source(name) is not None]
     if linked:
         notes.append(
-            f"The node has one value of {', '.join(linked)}: what is linked there in '{principled.name}' is lost."
+            f"The node can't have textures for {', '.join(linked)}: the links in '{principled.name}' are ignored."
         )
     lost = [name for name in LOST if inputs.value(name) > 0 or inputs.source(name) is not None]
     if lost:
-        notes.append(f"A translucent surface has no {', '.join(lost)}: this part of '{principled.name}' is lost.")
+        notes.append(f"The node has no {', '.join(lost)}: these values of '{principled.name}' are ignored.")
     return notes
 
 
 def _take_color(node, inputs: _Inputs, weight: float) -> tuple[float, float, float]:
-    """Value or texture; before Blender 4.0 scattered light had a colour of its own, mixed in by its weight."""
+    """Copy the color or its texture; before Blender 4.0 scattered light had a color of its own, mixed by its weight."""
     names = ["Base Color"]
     if weight > 0.5 and inputs.socket("Subsurface Color") is not None:
         names.insert(0, "Subsurface Color")
@@ -95,17 +95,19 @@ def _take_color(node, inputs: _Inputs, weight: float) -> tuple[float, float, flo
 
 
 def _ior(inputs: _Inputs) -> float:
-    """From what is reflected straight on: 8 % times Specular before Blender 4.0, twice the level times that of the IOR
-    since."""
+    """Index of refraction with the reflectance at normal incidence of the Principled BSDF.
+
+    The reflectance is 8 % times Specular before Blender 4.0. From 4.0 on it is that of the IOR, times twice the level.
+    """
     if inputs.socket("Specular IOR Level") is None:
         reflected = 0.08 * inputs.value("Specular", default=0.5)
     else:
         reflected = reflectance_of_ior(inputs.value("IOR")) * 2 * inputs.value("Specular IOR Level")
-    return ior_of_reflectance(min(max(reflected, 0.0), HIGHEST_REFLECTANCE))
+    return ior_of_reflectance(min(max(reflected, 0.0), MAX_REFLECTANCE))
 
 
 def _mean_free_path(inputs: _Inputs, principled, weight: float, color) -> list[float] | None:
-    """Per channel, at an anisotropy of 0 and in scene units, or None where nothing is scattered."""
+    """Mean free path of each channel at an anisotropy of 0, in scene units; None without subsurface scattering."""
     scale = inputs.value("Subsurface Scale", default=weight)
     radii = [radius * scale for radius in inputs.value("Subsurface Radius")]
     if weight <= 0 or not all(radius > 0 for radius in radii):

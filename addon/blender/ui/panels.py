@@ -10,8 +10,10 @@ from ..images.image_operators import image_in, wanted_size
 from ..images.previews import holds_previews_alone
 from ..jobs.run.engine import BeamspreadEngine, active_image
 from ..node.draw import draw_properties
-from ..node.find import find_node
+from ..node.find import find_node, find_node_in_groups
+from ..node.tree import BASE_COLOR
 from ..preferences import draw_help
+from ..read.nodes import InputSocket, Links
 from ..registration import all_or_nothing, classes
 from .bake_panel import draw_bake, draw_sentences, estimates
 
@@ -22,12 +24,12 @@ def _use_columns(layout) -> None:
 
 
 def draw_image_buttons(layout, context) -> None:
-    """Make Float where it clips, Resize where the scene's resolution is another."""
+    """Draw Make Float if the node's image clips, and Resize if its size differs from the scene's resolution."""
     image = image_in(context)
     if image is None or holds_previews_alone(image) or 0 in image.size or image.library is not None:
         return
     if clips(image):
-        layout.operator("beamspread.make_float", text="Make Float: it clips values above 1", icon="IMAGE_DATA")
+        layout.operator("beamspread.make_float", text="Make Float: image clips values above 1", icon="IMAGE_DATA")
     size = wanted_size(image, context.scene.beamspread.resolution)
     if tuple(image.size) != size:
         text = f"Resize {image.size[0]} x {image.size[1]} to {size[0]} x {size[1]}"
@@ -43,7 +45,7 @@ class RenderPanel:
 
 
 class BEAMSPREAD_PT_render(RenderPanel, bpy.types.Panel):
-    """Settings of the bake; shown for every engine, since results are looked at in Cycles and EEVEE."""
+    """Settings of the bake. Every engine shows them, since results are seen in Cycles and EEVEE."""
 
     bl_label = "Beamspread"
 
@@ -58,13 +60,13 @@ class BEAMSPREAD_PT_render(RenderPanel, bpy.types.Panel):
         settings = context.scene.beamspread
         for name in ("output", "resolution"):
             column.prop(settings, name)
-        draw_image_buttons(column, context)  # where the resolution is changed, which a node's own image doesn't follow
+        draw_image_buttons(column, context)  # beside the resolution, which existing images don't follow
         column.prop(settings, "use_indirect")
         draw_sentences(column, context, estimates(context), "TIME")
 
 
 class BEAMSPREAD_PT_expert(RenderPanel, bpy.types.Panel):
-    """What is well as it is for most."""
+    """Settings that most artists leave as they are."""
 
     bl_label = "Expert"
     bl_parent_id = "BEAMSPREAD_PT_render"
@@ -108,15 +110,26 @@ class BEAMSPREAD_PT_active_image(RenderPanel, bpy.types.Panel):
 
 
 def target_of_blender(material) -> str:
-    """What Blender's own Bake fills, in a sentence."""
+    """A sentence that names the image that Blender's own Bake fills."""
     image = active_image(material)
     if image is None:
         return "Select an Image Texture node with an image in the Shader Editor: Blender's Bake fills that."
+    if image in _base_color_images(material):
+        return f"'{image.name}' is the base color, which the bake would erase: select another Image Texture node."
     return f"Fills '{image.name}', the image of the selected Image Texture node."
 
 
+def _base_color_images(material) -> set:
+    found = find_node_in_groups(material)
+    if found is None or BASE_COLOR not in found[0].inputs:
+        return set()
+    node, groups = found
+    sources = Links().readers(InputSocket(node.inputs[BASE_COLOR], groups))
+    return {getattr(source.node, "image", None) for source in sources if source.socket.is_output}
+
+
 class BEAMSPREAD_PT_images(RenderPanel, bpy.types.Panel):
-    """Where the images go that bakes make."""
+    """Storage of new images."""
 
     bl_label = "New Images"
     bl_parent_id = "BEAMSPREAD_PT_render"
@@ -135,9 +148,9 @@ class BEAMSPREAD_PT_images(RenderPanel, bpy.types.Panel):
 
 
 class BEAMSPREAD_PT_batch(RenderPanel, bpy.types.Panel):
-    """Where a batch writes."""
+    """Folder of a batch, and the frames in it."""
 
-    bl_label = "Batch"
+    bl_label = "Animation"
     bl_parent_id = "BEAMSPREAD_PT_render"
     bl_options = {"DEFAULT_CLOSED"}
 
@@ -189,7 +202,7 @@ class MaterialPanel:
         layout = self.layout
         _use_columns(layout)
         material = _active_material(context)
-        # First what changes by itself: the properties are in the node and in Blender's Surface panel, too.
+        # The state of the bake comes first: the properties are in the node and in Blender's Surface panel, too.
         draw_bake(layout, context, material.name)
         draw_properties(find_node(material), layout)
         draw_image_buttons(layout, context)
