@@ -4,7 +4,7 @@ Each part imports only core and those above it (tests/unit/test_layers.py reads 
 
     compat        all differences between Blender versions
     registration  what parts add to Blender, all of it or nothing
-    popup         sentences that nobody should miss
+    popup         popups with important messages
     preferences   what holds for all files of a user
     settings      scene.beamspread
     read          geometry, lights and what a render would show

@@ -1,17 +1,21 @@
-"""Sentences that nobody should miss: a popup in the window, since Blender's own reports of a modal operator hide."""
+"""Popups with important messages. Blender hides the reports of a modal operator in the Info editor."""
 
 from __future__ import annotations
 
 import bpy
 
-LETTERS, MOST_SENTENCES = 80, 8
+MAX_LETTERS = 80
+"""Letters in a line."""
 
-# Blender shows no popup from within the operator that is about to end.
+MAX_MESSAGES = 8
+"""Messages in a popup."""
+
 DELAY_SECONDS = 0.05
+"""Time until a popup opens. Blender shows none while the operator that asks for it still runs."""
 
 
 def wrap(text: str, width: int) -> list[str]:
-    """Lines of at most so many letters, if no word is longer."""
+    """Lines of at most `width` letters, unless a word is longer."""
     lines = [""]
     for word in text.split():
         if lines[-1] and len(lines[-1]) + len(word) >= width:
@@ -20,15 +24,15 @@ def wrap(text: str, width: int) -> list[str]:
     return lines
 
 
-def show_soon(title: str, sentences: list[str]) -> None:
-    """Open the popup where the mouse is, once whatever runs has ended."""
+def show_soon(title: str, messages: list[str]) -> None:
+    """Open a popup at the mouse once the running operator has ended."""
 
     def draw(menu, _context) -> None:
-        for sentence in sentences[:MOST_SENTENCES]:
-            for number, line in enumerate(wrap(sentence, LETTERS)):
+        for message in messages[:MAX_MESSAGES]:
+            for number, line in enumerate(wrap(message, MAX_LETTERS)):
                 menu.layout.label(text=line, icon="BLANK1" if number else "ERROR")
-        if len(sentences) > MOST_SENTENCES:
-            menu.layout.label(text=f"And {len(sentences) - MOST_SENTENCES} more, in the panel.", icon="BLANK1")
+        if len(messages) > MAX_MESSAGES:
+            menu.layout.label(text=f"And {len(messages) - MAX_MESSAGES} more, in the panel.", icon="BLANK1")
 
     def show() -> None:
         manager = bpy.context.window_manager

@@ -1,6 +1,6 @@
-"""Preferences of the add-on, which hold for all files of a user.
+"""Preferences of the add-on, which apply to all files of a user.
 
-Where the package is registered without being an enabled add-on, as batch.py does, there are none: then defaults hold.
+There are none if the package is registered without being an enabled add-on, as batch.py does: then defaults apply.
 """
 
 from __future__ import annotations
@@ -17,33 +17,34 @@ from ..core.ldf import library
 from . import compat
 from .registration import all_or_nothing, classes
 
-# Of the add-on: "beamspread", or "bl_ext.REPOSITORY.beamspread" as an extension.
 PACKAGE = __package__.rpartition(".")[0]
+"""Name of the add-on: "beamspread", or "bl_ext.REPOSITORY.beamspread" as an extension."""
 
-# In the package, or beside it where it is used from its sources.
 DOCS = [folder / "docs" for folder in Path(__file__).resolve().parents[1:3]]
+"""Possible folders of the documentation: in the package, or beside it in the sources."""
 
 
 def preferences(context=None):
-    """Those of the user, or None."""
+    """Preferences of the user, or None."""
     addon = (context or bpy.context).preferences.addons.get(PACKAGE)
     return None if addon is None else addon.preferences
 
 
 def threads() -> int:
-    own = preferences()
-    return own.threads if own else 0
+    """Number of threads of a bake; 0 for all."""
+    chosen = preferences()
+    return chosen.threads if chosen else 0
 
 
 def memory_limit() -> int:
-    """In bytes; 0: no other than the machine's."""
-    own = preferences()
-    return own.memory_limit * 2**20 if own else 0
+    """Bytes that a bake may use; 0 for all of the machine's memory."""
+    chosen = preferences()
+    return chosen.memory_limit * 2**20 if chosen else 0
 
 
 @functools.cache
 def documentation(name: str) -> str:
-    """A page of the documentation as a URL; empty where it is not on this machine."""
+    """URL of a page of the documentation; empty if it is not on this machine."""
     return next((page.as_uri() for folder in DOCS if (page := folder / f"{name}.md").is_file()), "")
 
 
@@ -53,25 +54,25 @@ def draw_help(layout, name: str) -> None:
         layout.operator("wm.url_open", text="", icon="HELP", emboss=False).url = url
 
 
-def _use_cache_folder(own, _context) -> None:
-    library.choose_cache_folder(bpy.path.abspath(own.cache_folder) if own.cache_folder else "")
+def _use_cache_folder(chosen, _context) -> None:
+    library.choose_cache_folder(bpy.path.abspath(chosen.cache_folder) if chosen.cache_folder else "")
 
 
 class BeamspreadPreferences(bpy.types.AddonPreferences):
-    """What depends on the machine and not on the scene."""
+    """Settings of the machine."""
 
     bl_idname = PACKAGE
 
     cache_folder: StringProperty(
         name="Cache Folder",
-        description="Where simulated media are kept, a few megabytes each. Empty: the user's cache folder",
+        description="Folder for simulated media, a few megabytes each. Empty: the user's cache folder",
         subtype="DIR_PATH",
         options=compat.PATH_OPTIONS - {"PATH_SUPPORTS_BLEND_RELATIVE"},
         update=_use_cache_folder,
     )
     threads: IntProperty(
         name="Threads",
-        description="Threads that a bake uses. 0: one for each of the processor's",
+        description="Number of threads of a bake. 0: one for each thread of the processor",
         default=0,
         min=0,
         soft_max=64,
@@ -79,7 +80,7 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
     )
     memory_limit: IntProperty(
         name="Memory Limit",
-        description="A bake that would need more megabytes is refused beforehand. 0: all of the machine's memory",
+        description="Megabytes that a bake may use; larger bakes are refused. 0: all of the machine's memory",
         default=0,
         min=0,
         soft_max=65536,
@@ -103,13 +104,13 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
         row = layout.row()
         row.label(text=f"{len(files)} simulated media, {megabytes:.1f} MB, in")
         row.operator("beamspread.clear_cache", icon="TRASH")
-        layout.label(text=str(library.cache_folder()))  # by itself: beside a button it would be cut
+        layout.label(text=str(library.cache_folder()))  # a row of its own: a button would cut it off
         if url := documentation("node"):
             layout.operator("wm.url_open", text="Documentation", icon="HELP").url = url
 
 
 class BEAMSPREAD_OT_clear_cache(bpy.types.Operator):
-    """Delete the simulated media that are kept; those that come with the add-on stay"""
+    """Delete all simulated media from the cache. The media that come with the add-on stay"""
 
     bl_idname = "beamspread.clear_cache"
     bl_label = "Clear"
@@ -120,13 +121,13 @@ class BEAMSPREAD_OT_clear_cache(bpy.types.Operator):
 
     def execute(self, _context):
         freed = library.clear_cache()
-        self.report({"INFO"}, f"Freed {freed / 2**20:.1f} MB: these media are simulated anew when they are next baked")
+        self.report({"INFO"}, f"Freed {freed / 2**20:.1f} MB. The next bakes simulate their media again")
         return {"FINISHED"}
 
 
 def _choose_folder() -> None:
-    if own := preferences():
-        _use_cache_folder(own, None)
+    if chosen := preferences():
+        _use_cache_folder(chosen, None)
 
 
 register, unregister = all_or_nothing(

@@ -1,4 +1,4 @@
-"""What parts add to Blender: all of it or nothing, and taken away in reverse."""
+"""Registration of a part's classes and handlers in Blender: completely or not at all, and undone in reverse order."""
 
 from __future__ import annotations
 
@@ -7,40 +7,46 @@ from collections.abc import Callable
 import bpy
 
 Step = tuple[Callable[[], object], Callable[[], object]]
-"""What adds something, and what takes it away again."""
+"""A function that adds something to Blender, and the function that removes it."""
 
 
-def classes(*found: type) -> list[Step]:
+def classes(*types: type) -> list[Step]:
     """Steps that register classes."""
     return [
-        (lambda one=one: bpy.utils.register_class(one), lambda one=one: bpy.utils.unregister_class(one))
-        for one in found
+        (lambda cls=cls: bpy.utils.register_class(cls), lambda cls=cls: bpy.utils.unregister_class(cls))
+        for cls in types
     ]
 
 
 def handlers(**functions: Callable) -> list[Step]:
-    """Steps that have Blender call functions, by the names of its lists in `bpy.app.handlers`."""
-    lists = [(getattr(bpy.app.handlers, name), function) for name, function in functions.items()]
-    return [(lambda one=one: one[0].append(one[1]), lambda one=one: one[0].remove(one[1])) for one in lists]
+    """Steps that add functions to the lists of these names in `bpy.app.handlers`."""
+    return [
+        (lambda name=name, call=call: _list(name).append(call), lambda name=name, call=call: _list(name).remove(call))
+        for name, call in functions.items()
+    ]
 
 
 def all_or_nothing(*steps: Step) -> tuple[Callable[[], None], Callable[[], None]]:
-    """`register` and `unregister` of a part: where a step fails, those before go again and the error surfaces."""
+    """`register` and `unregister` of a part. A step that fails undoes the steps before it and raises."""
 
     def register() -> None:
         for number, (add, _) in enumerate(steps):
             try:
                 add()
             except BaseException:
-                _take_back(steps[:number])
+                _undo(steps[:number])
                 raise
 
     def unregister() -> None:
-        _take_back(steps)
+        _undo(steps)
 
     return register, unregister
 
 
-def _take_back(steps: tuple[Step, ...]) -> None:
+def _undo(steps: tuple[Step, ...]) -> None:
     for _, remove in reversed(steps):
         remove()
+
+
+def _list(name: str) -> list[Callable]:
+    return getattr(bpy.app.handlers, name)
