@@ -4,7 +4,8 @@ Each package imports only those above it (tests/unit/test_layers.py reads this l
 
     missing     message if the compiled module can't be loaded
     native      the compiled module, or what stands for it where it is missing
-    errors      sentences for the artist
+    messages    what a bake has to tell the artist
+    errors      exceptions that become messages
     target      one material of one object, which is what a bake fills an image for
     progress    progress of a job made of stages
     whole_file  files that are complete or unchanged

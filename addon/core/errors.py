@@ -1,8 +1,22 @@
-"""Errors that reach the artist: each is one sentence that says what is wrong and how to mend it."""
+"""Errors that reach the artist: each says in whole sentences what is wrong and how to mend it."""
+
+from __future__ import annotations
+
+from .messages import Level, Message
 
 
 class BakeError(ValueError):
-    """A bake that cannot start or finish; its text is shown to the artist as it stands."""
+    """A bake cannot start or finish.
+
+    Attributes
+    ----------
+    text : says what is wrong.
+    remedy : says what the artist can do; "" if `text` does.
+    """
+
+    def __init__(self, text: str, remedy: str = "") -> None:
+        super().__init__(f"{text} {remedy}".strip())
+        self.text, self.remedy = text, remedy
 
 
 class ReceiverError(BakeError):
@@ -17,13 +31,34 @@ class ImageError(BakeError):
     """The target image or output file cannot be filled."""
 
 
-def sentence(error: Exception) -> str:
-    """What to tell the artist about an exception."""
+class NotSupportedError(BakeError):
+    """A node or an image that only Cycles can evaluate.
+
+    Parameters
+    ----------
+    kind : "node" or "image".
+    name : of the node or image.
+    reason : clause that says which of its settings is not supported; "" if the whole kind is not.
+    """
+
+    def __init__(self, kind: str, name: str, reason: str = "") -> None:
+        super().__init__(f"The {kind} '{name}' is not supported{': ' if reason else ''}{reason}.")
+
+
+def message_of(error: Exception, subject: str = "") -> Message:
+    """The message that tells the artist about an exception."""
+    if isinstance(error, BakeError):
+        return Message(Level.ERROR, subject, error.text, error.remedy)
     if isinstance(error, MemoryError):
-        return "There is not enough memory: lower the resolution."
+        return Message(Level.ERROR, subject, "There is not enough memory.", "Lower the resolution.")
     if not isinstance(error, ValueError | OSError):
-        # Nothing that an artist does should lead here: keep what a bug report needs.
+        # Nothing that an artist does should lead here: keep the details for a bug report.
         import logging
 
         logging.getLogger(__name__).error("unexpected error", exc_info=error)
-    return str(error) or type(error).__name__
+    return Message(Level.ERROR, subject, str(error) or type(error).__name__)
+
+
+def text_of(error: Exception) -> str:
+    """The text and remedy of `message_of`."""
+    return str(message_of(error))

@@ -84,7 +84,7 @@ def scenario():
     in_window(bpy.ops.ed.undo)
     results["still runs"] = state.is_running()
     yield ended
-    results["said"] = state.messages()
+    results["said"] = state.lines()
     noted("baked across undo")
     in_window(bpy.ops.ed.undo)
     yield lambda: True

@@ -49,3 +49,8 @@ def switch_off():
 
 def save(folder, name="scene.blend"):
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / name))
+
+
+def live_lines() -> list[str]:
+    """Messages about Live, a line each."""
+    return [message.line() for message in session.messages()]

@@ -45,7 +45,7 @@ def test_on_top_it_multiplies_the_bake_of_its_mean(plane):
     link(material, add_image(material).outputs["Color"])
     node_of(material).texture_blur, node_of(material).base_color = 0.0, (0.1, 0.1, 0.1)
     assert bake(plane)[0] == pytest.approx(plain * texels(COLORS) / (0.5, 0.6, 0.5), rel=1e-4)
-    assert state.messages() == []
+    assert state.lines() == []
 
 
 def test_blurred_it_is_softer_than_on_top(plane):
@@ -112,7 +112,7 @@ def test_colors_above_one_are_cut_and_said(plane):
     link(material, add_image(material, COLORS * 2).outputs["Color"])
     found = bake(plane)[0]
     assert np.isfinite(found).all()
-    assert "cut to 1" in state.messages()[0]
+    assert "cut to 1" in state.lines()[0]
 
 
 def test_the_default_is_half_and_half():

@@ -121,7 +121,7 @@ def test_a_checker_by_node_is_one_by_an_image(plane):
     node_of(material).texture_blur = 0.0
     add_checker(material, CELLS, DARK, BRIGHT)
     ours = bake(plane)[0].copy()
-    assert state.messages() == []
+    assert state.lines() == []
 
     fine = 16 * CELLS  # pixels along each side: looked up at 3 x 3 places in each texel
     rows, columns = np.mgrid[:fine, :fine] // 16
@@ -238,7 +238,7 @@ def test_a_child_that_fails_is_said_and_the_own_color_counts(plane, monkeypatch,
     broken.write_text("import os\nprint('what went wrong', flush=True)\nos._exit(5)\n")
     monkeypatch.setattr(process, "CHILD", broken)
     assert bake(plane)[0] == pytest.approx(own, rel=1e-6)
-    (message,) = state.messages()
+    (message,) = state.lines()
     assert "has not evaluated the Base Color of 'Plane'" in message
     assert "what went wrong" in message
 
@@ -317,5 +317,5 @@ def test_blenders_own_bake_has_it(plane):
     bpy.context.scene.render.bake.margin = 0
     select(plane)
     assert bpy.ops.object.bake(type="COMBINED") == {"FINISHED"}
-    assert state.messages() == []
+    assert state.lines() == []
     assert pixels(image) == pytest.approx(ours, abs=1e-6)

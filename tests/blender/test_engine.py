@@ -50,7 +50,7 @@ def test_same_as_the_operator():
     image = add_active_image(plane.data.materials[0])
     select(plane)
     assert bpy.ops.object.bake(type="COMBINED") == {"FINISHED"}
-    assert state.messages() == []
+    assert state.lines() == []
     filled = pixels(image)
     assert (filled > 0).all()
     assert filled == pytest.approx(bake(plane)[0], abs=1e-6)
@@ -79,7 +79,7 @@ def test_two_materials_of_one_object_fill_their_images():
     images = [add_active_image(material, material.name) for material in corner.data.materials]
     select(corner)
     assert bpy.ops.object.bake(type="COMBINED") == {"FINISHED"}
-    assert state.messages() == []
+    assert state.lines() == []
     # The sun meets the floor at 30 degrees and the wall at 60: totals as in test_reflectance.py, and to its tolerance.
     for image, angle in zip(images, (30, 60)):
         expected = diffuse_reflectance(1.0, 0.8, 0.9, angle) * math.cos(math.radians(angle)) / math.pi
@@ -92,11 +92,11 @@ def test_failure_is_reported_and_does_not_touch_the_rest():
     add_active_image(plane.data.materials[0])
     select(plane)
     messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
-    assert len(state.messages()) == 1
-    assert "albedo's red is 1" in state.messages()[0]
+    assert len(state.lines()) == 1
+    assert "albedo's red is 1" in state.lines()[0]
     node_of(plane.data.materials[0]).albedo = (0.5, 0.5, 0.5)
     bpy.ops.object.bake(type="COMBINED")
-    assert state.messages() == []
+    assert state.lines() == []
 
 
 @pytest.mark.parametrize("is_active", [True, False])
@@ -114,7 +114,7 @@ def test_a_texture_of_the_node_is_not_baked_to(is_active):
         material.node_tree.nodes.active = node_of(material)
     select(plane)
     messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
-    assert "reload it" in state.messages()[0]
+    assert "reload it" in state.lines()[0]
     texture.reload()
     assert np.array_equal(pixels(texture), np.full((32, 32, 3), 0.5))
 
@@ -125,7 +125,7 @@ def test_plain_material_is_refused():
     add_active_image(plane.data.materials[0])
     select(plane)
     messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
-    assert "Beamspread node" in state.messages()[-1]
+    assert "Beamspread node" in state.lines()[-1]
 
 
 def test_viewport_hidden_caster_and_modifiers_render():

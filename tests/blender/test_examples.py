@@ -29,7 +29,7 @@ def test_all_are_listed():
 def test_all_light_is_understood(name):
     bpy.ops.wm.open_mainfile(filepath=str(FOLDER / f"{name}.blend"))
     illumination = read_illumination(bpy.context.evaluated_depsgraph_get())
-    assert illumination.warnings == ()
+    assert illumination.messages == ()
     assert sorted(type(light).__name__ for light in illumination.lights) == KINDS[name]
 
 

@@ -42,7 +42,7 @@ def duplicate(obj, own_material, turned=0.8):
 
 def warnings_of(obj):
     """What the last bake said of the object."""
-    return [line for line in state.messages() if f"'{obj.name}" in line]
+    return [line for line in state.lines() if f"'{obj.name}" in line]
 
 
 def test_a_copy_with_a_material_of_its_own_gets_an_image_of_its_own():
@@ -56,7 +56,7 @@ def test_a_copy_with_a_material_of_its_own_gets_an_image_of_its_own():
     assert np.array_equal(pixels(image_of(plane)), before)
     assert not np.allclose(other, before)
     (sentence,) = warnings_of(copy)
-    assert sentence.startswith(f"The image '{image_of(plane).name}' keeps the result of 'Plane / Medium': ")
+    assert sentence.startswith(f"The image '{image_of(plane).name}' belongs to 'Plane / Medium': ")
     # From here on each has its own, in whatever order, and in one run.
     assert np.array_equal(bake(plane)[0], before)
     assert np.array_equal(bake(copy)[0], other)
@@ -151,7 +151,7 @@ def test_a_batch_leaves_the_file_of_an_image_to_its_owner(tmp_path):
     save_scene(tmp_path)
     own, other = batch_run.bake_all(batch_options.parse(["--object", "Plane", "Plane.001"])).bakes
     assert (own.path, other.path) == (str(path), str(tmp_path / "beamspread" / "Plane.001_Medium.001.exr"))
-    assert "keeps the result of another" in other.message
+    assert "belongs to another" in other.message
     assert path.read_bytes() == before
 
 
@@ -232,7 +232,7 @@ def test_folder_name_and_storage_are_settings(tmp_path, settings):
     settings.image_storage, settings.image_dir = "FILES", str(tmp_path / "mine" / "light_of_Plane.exr")
     bake(plane)
     assert image_of(plane).packed_file is not None
-    assert any("packed into the .blend file instead" in line for line in state.messages())
+    assert any("packed into the .blend file instead" in line for line in state.lines())
 
 
 def test_an_exr_file_that_was_read_as_srgb_is_read_as_what_it_is(tmp_path):
@@ -270,11 +270,11 @@ def test_what_clips_is_said_and_make_float_mends_it(tmp_path):
     plane = add_plane(material=add_material(image=image))
     sun = add_sun(0)
     bake(plane)
-    assert not any("clips" in line for line in state.messages())
+    assert not any("clips" in line for line in state.lines())
     linear = files.linear_pixels(image)
     sun.data.energy = 100.0
     bake(plane)
-    assert any("'Bytes' clips values above 1: Make Float" in line for line in state.messages())
+    assert any("'Bytes' clips values above 1. Make Float" in line for line in state.lines())
     sun.data.energy = 1.0
     bake(plane)
     select(plane)
@@ -287,7 +287,7 @@ def test_what_clips_is_said_and_make_float_mends_it(tmp_path):
     assert [*facts_of(image).bakes] == [Target("Plane", "Medium")]
     sun.data.energy = 100.0
     assert bake(plane)[0].max() > 1
-    assert not any("clips" in line for line in state.messages())
+    assert not any("clips" in line for line in state.lines())
     assert not bpy.ops.beamspread.make_float.poll()
 
 
@@ -387,7 +387,7 @@ def test_a_result_is_kept_where_the_image_was_resized_meanwhile():
     image_of(plane).scale(8, 4)
     one.keep(Results().store)
     assert one.status == "written"
-    assert "changed its size during the bake" in one.warnings[-1]
+    assert "was resized during the bake" in str(list(one.messages)[-1])
     assert pixels(image_of(plane)).shape == (16, 16, 3)
 
 

@@ -6,7 +6,7 @@ from beamspread.blender.images.results import Results
 from beamspread.blender.jobs.run import batch_run
 from beamspread.blender.jobs.run.prepare import prepare_scene
 from beamspread.blender.node.find import find_targets
-from beamspread.blender.ui.bake_panel import warnings_for
+from beamspread.blender.ui.bake_panel import problems_of
 from beamspread.core.batch import batch_options
 from beamspread.core.target import Target
 from mathutils import Matrix
@@ -61,12 +61,12 @@ def test_an_overridden_material_is_refused_and_the_sentence_helps(tmp_path):
     message = messages_of(bpy.ops.beamspread.bake)
     assert "The material 'Medium' belongs to another .blend file" in message
     assert "Make Local > Selected Objects, Data and Materials" in message
-    said = " ".join(warnings_for(plane, {"Plane": 1}))
+    said = " ".join(map(str, problems_of(plane, {"Plane": 1})))
     assert "belongs to another .blend file" in said  # before the bake, in the panel
     assert image_of(plane) is None
     bpy.ops.object.make_local(type="SELECT_OBDATA_MATERIAL")
     plane = next(obj for obj in bpy.context.scene.objects if obj.type == "MESH")
-    assert warnings_for(plane, {plane.name: 1}) == []
+    assert not problems_of(plane, {plane.name: 1})
     bake(plane)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "user.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "user.blend"))

@@ -55,10 +55,11 @@ def test_a_running_bake_survives_undo_and_keeps_its_result(seen):
 
 
 def row():
-    """How the one target stands, and whether its sentences speak of undo."""
+    """Status of the one target, and whether its messages speak of undo."""
     stale.refresh(bpy.context)
     (found,) = state.rows.values()
-    said = [one for one in found.sentences if "Undo does not reach files: " in one and "'Plane_Medium.exr'" in one]
+    texts = map(str, found.messages)
+    said = [text for text in texts if "Undo does not restore files: 'Plane_Medium.exr'" in text]
     return found.status, len(said)
 
 

@@ -62,7 +62,7 @@ def test_a_node_where_no_bake_can_use_it_is_named(add, name, words, tmp_path):
     message = messages_of(bpy.ops.beamspread.bake)
     assert "No mesh has a material" not in message
     assert all(word in message for word in words)
-    assert all(word in state.messages()[0] for word in words)
+    assert all(word in state.lines()[0] for word in words)
     for arguments in ([], ["--object", name]):
         report = bake_all(batch_options.parse([*arguments, "--output", str(tmp_path)]))
         assert [(one.object, one.status) for one in report.bakes] == [(name, "failed")]
@@ -86,7 +86,7 @@ def test_a_node_in_a_group_of_its_own_is_baked():
     inner = bpy.data.node_groups["Inner"]
     node = next(node for node in inner.nodes if node.bl_idname == "BeamspreadNode")
     assert (pixels(node.image) > 0).all()
-    assert "link the BSDF of the node in 'Inner'" in state.messages()[0]
+    assert "Link the BSDF of the node in 'Inner'" in state.lines()[0]
     assert [one.bl_idname for one in inner.nodes] == ["BeamspreadNode"]
 
 
@@ -125,12 +125,12 @@ def test_instances_of_what_was_baked_are_no_mistake():
 def baked_with_messages(plane):
     """Pixels of the plane, and what the window says of the bake."""
     (texture,) = bake(plane)
-    return texture, state.messages()
+    return texture, state.lines()
 
 
 @pytest.mark.parametrize(
     ("power", "words"),
-    [(float("nan"), "its power is nan"), (-3.0, "its power is -3, and a bake can't take light away")],
+    [(float("nan"), "is nan"), (-3.0, "is -3, and a bake cannot remove light")],
 )
 def test_a_light_of_impossible_power_is_named_and_left_out(power, words, tmp_path, capfd):
     plane = add_plane(material=add_material())
@@ -142,8 +142,8 @@ def test_a_light_of_impossible_power_is_named_and_left_out(power, words, tmp_pat
     bpy.context.scene.collection.objects.link(broken)
     texture, messages = baked_with_messages(plane)
     assert texture == pytest.approx(expected)
-    assert messages == [f"The light 'Broken' is left out: {words}."]
-    assert f"The light 'Broken' is left out: {words}." in capfd.readouterr().out
+    assert messages == [f"The light 'Broken' is left out. The power of 'Broken' {words}."]
+    assert f"The light 'Broken' is left out. The power of 'Broken' {words}." in capfd.readouterr().out
     (record,) = bake_all(batch_options.parse(["--output", str(tmp_path)])).bakes
     assert (record.status, record.message) == ("written", messages[0])
 
@@ -210,15 +210,15 @@ def test_a_black_bake_says_why(add, words, tmp_path):
     plane.data.materials[0].node_tree.nodes.active = active
     state.forget()
     bpy.ops.object.bake(type="COMBINED")
-    assert state.messages() == [message]
+    assert state.lines() == [message]
 
 
 def test_a_panel_says_once_what_both_the_object_and_its_last_bake_say(monkeypatch):
     said = []
-    monkeypatch.setattr(bake_panel, "draw_sentences", lambda _layout, _context, messages, _icon: said.extend(messages))
+    monkeypatch.setattr(bake_panel, "draw_lines", lambda _layout, _context, messages, _icon: said.extend(messages))
     select(add_grouped())
     messages_of(bpy.ops.beamspread.bake)
-    (message,) = state.messages()
+    (message,) = state.lines()
     bake_panel.draw_bake(MagicMock(), bpy.context)
     assert said == [message.replace("Grouped / Grouped: ", "Grouped: "), "Grouped: Failed"]
     # Once nothing of it is selected, the bake's own words stay.
@@ -231,6 +231,6 @@ def test_a_panel_says_once_what_both_the_object_and_its_last_bake_say(monkeypatc
 
 def test_messages_go_with_the_file():
     baked_with_messages(flipped())
-    assert state.messages()
+    assert state.lines()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    assert state.messages() == []
+    assert state.lines() == []

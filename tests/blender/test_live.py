@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scenes
 from beamspread.blender.live import session
-from live_scenes import live_pixels, make_scene, settle
+from live_scenes import live_lines, live_pixels, make_scene, settle
 
 pytestmark = pytest.mark.usefixtures("live_switched_off")
 
@@ -164,7 +164,7 @@ def test_what_live_leaves_out_is_said():
     _plane, _lamp, material = make_scene()
     bpy.context.scene.beamspread.use_indirect = True
     live_pixels(material)
-    assert session.sentences() == ["Live leaves out indirect light."]
+    assert live_lines() == ["Live leaves out indirect light."]
 
 
 def test_what_cannot_follow_is_said_and_the_others_follow():
@@ -173,7 +173,7 @@ def test_what_cannot_follow_is_said_and_the_others_follow():
     bent.location.x = 5
     bent.data.vertices[0].co.z = 0.5
     assert live_pixels(material).max() > 0
-    (said,) = session.sentences()
+    (said,) = live_lines()
     assert said.startswith("Bent / Other: The faces are not flat")
 
 
@@ -290,7 +290,7 @@ def test_a_texture_at_base_color_is_followed(monkeypatch):
     texture = add_stripes(material)
     live = live_pixels(material).copy()
     assert np.abs(live - plain).max() > 0.1 * plain.max()
-    assert session.sentences() == []
+    assert live_lines() == []
     node.texture_blur = 0.1
     sharper = live_pixels(material).copy()
     assert np.abs(sharper - live).max() > 0.05 * live.max()
@@ -311,4 +311,4 @@ def test_a_texture_that_is_not_understood_is_said():
     noise = material.node_tree.nodes.new("ShaderNodeTexNoise")
     material.node_tree.links.new(scenes.node_of(material).inputs["Base Color"], noise.outputs["Color"])
     assert live_pixels(material).max() > 0
-    assert "Live can't evaluate the Base Color of 'Plane'" in session.sentences()[0]
+    assert "Live can't evaluate the Base Color of 'Plane'" in live_lines()[0]

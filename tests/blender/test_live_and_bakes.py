@@ -9,7 +9,7 @@ from beamspread.blender.images.files import from_srgb
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.live import session
-from live_scenes import live_pixels, make_scene, save, settle, switch_off
+from live_scenes import live_lines, live_pixels, make_scene, save, settle, switch_off
 
 pytestmark = pytest.mark.usefixtures("live_switched_off")
 
@@ -207,4 +207,4 @@ def test_a_copy_leaves_the_image_to_the_original_and_live_says_so(has_own_materi
     for _ in range(3):
         live = live_pixels(material)
     assert live.mean() == pytest.approx(baked.mean(), rel=0.1)
-    assert [said for said in session.sentences() if "A copy" in said and "of its own" in said]
+    assert [said for said in live_lines() if "A copy" in said and "of its own" in said]

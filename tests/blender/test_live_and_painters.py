@@ -6,7 +6,7 @@ import pytest
 import scenes
 from beamspread.blender.images.previews import MADE_FOR_PREVIEWS
 from beamspread.blender.live import session
-from live_scenes import live_pixels, make_scene, save, settle, switch_off
+from live_scenes import live_lines, live_pixels, make_scene, save, settle, switch_off
 
 pytestmark = pytest.mark.usefixtures("live_switched_off")
 
@@ -42,9 +42,9 @@ def test_what_is_drawn_into_a_picture_is_the_images_own(is_float):
     draw(node.image)
     lamp.location.x = -0.2
     assert not (live_pixels(material)[STROKE] == 0.5).any()
-    assert "keeps the change" in " ".join(session.sentences())
+    assert "keeps the change" in " ".join(live_lines())
     switch_off()
-    assert "keeps the change" in " ".join(session.sentences())
+    assert "keeps the change" in " ".join(live_lines())
     after = scenes.pixels(node.image)
     np.testing.assert_allclose(after[STROKE], 0.5, atol=1 / 255)
     after[STROKE] = baked[STROKE]
@@ -78,7 +78,9 @@ def test_live_waits_while_its_image_can_be_painted_on(kind, monkeypatch):
         monkeypatch.setattr("beamspread.blender.live.painting._painted", lambda _context: [image])
     session.step(bpy.context)
     np.testing.assert_array_equal(scenes.pixels(image), baked)
-    assert f"Live waits while the image '{image.name}' can be painted on." in session.sentences()
+    assert f"Live waits while the image '{image.name}' can be painted on." in [
+        message.line() for message in session.messages()
+    ]
     draw(image)
     for _ in range(3):
         session.step(bpy.context)
@@ -118,7 +120,7 @@ def test_painting_on_an_image_that_live_has_made(monkeypatch):
     switch_off()
     assert scenes.node_of(material).image == image
     assert (scenes.pixels(image)[STROKE] == 0.5).all()
-    assert "which Live has made, stays" in " ".join(session.sentences())
+    assert "which Live has made, stays" in " ".join(live_lines())
 
 
 USES = {
@@ -144,7 +146,7 @@ def test_an_image_that_live_has_made_stays_once_it_is_used(use):
     assert scenes.node_of(material).image == image
     assert MADE_FOR_PREVIEWS not in image
     assert scenes.pixels(image).max() > 0
-    assert "which Live has made, stays" in " ".join(session.sentences())
+    assert "which Live has made, stays" in " ".join(live_lines())
 
 
 def test_one_that_is_saved_to_a_file_stays(tmp_path):
@@ -179,7 +181,7 @@ def test_one_that_nobody_used_goes():
     switch_off()
     assert scenes.node_of(material).image is None
     assert not bpy.data.images.get("Plane_Medium")
-    assert not session.sentences()
+    assert not live_lines()
 
 
 def test_what_was_painted_and_saved_in_a_pause_is_what_images_are_saved_with(monkeypatch, tmp_path):

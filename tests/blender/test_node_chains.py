@@ -10,9 +10,10 @@ from beamspread.blender.node.find import find_node, find_node_in_groups
 from beamspread.blender.read import shading
 from beamspread.blender.read.image_nodes import Pixels, uv_transform_of
 from beamspread.blender.read.node_math import FUNCTIONS
-from beamspread.blender.read.nodes import InputSocket, Links, NotUnderstoodError, surface_of
+from beamspread.blender.read.nodes import InputSocket, Links, surface_of
 from beamspread.blender.read.shading import ShadingPoints
 from beamspread.blender.read.transparency import TexelEvaluator
+from beamspread.core.errors import NotSupportedError
 from scenes import add_material, diffuse_material, node_of
 
 LONG = 400
@@ -163,7 +164,7 @@ def test_an_error_is_found_once_and_named(material):
     noise = add(tree, "ShaderNodeTexNoise", name="Clouds")
     light = emission(tree)
     tree.links.new(light.inputs["Strength"], chain(tree, "ShaderNodeMath", 40, noise.outputs[0]))
-    with pytest.raises(NotUnderstoodError, match="the node 'Clouds' is"):
+    with pytest.raises(NotSupportedError, match="The node 'Clouds' is not supported"):
         ShadingPoints().value(show(material, light.outputs[0]))
 
 

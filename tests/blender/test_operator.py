@@ -362,7 +362,7 @@ def test_other_layers_have_images_and_files_beside_the_combined_one(monkeypatch,
 class EndlessJob:
     """Goes on until it is told to stop; `BakeJob` in all that a thread asks of it."""
 
-    def warnings(self):
+    def messages(self):
         return []
 
     def colored(self, progress):
@@ -394,7 +394,7 @@ class DeafJob(EndlessJob):
     def is_dark(self, layers):
         return False
 
-    def warnings_after(self, layers):
+    def messages_after(self, layers):
         return []
 
 

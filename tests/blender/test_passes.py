@@ -195,12 +195,12 @@ def test_blenders_own_bake_fills_the_active_image_unless_the_node_shows_it(setti
     select(plane)
     with_active_image(plane.data.materials[0], shown)
     messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
-    assert "The image 'Shown' shows luminance in the Beamspread node" in state.messages()[0]
+    assert "The image 'Shown' shows luminance in the Beamspread node" in state.lines()[0]
     assert not pixels(shown).any()
     state.forget()
     with_active_image(plane.data.materials[0], other)
     assert bpy.ops.object.bake(type="COMBINED") == {"FINISHED"}
-    assert state.messages() == []
+    assert state.lines() == []
     assert pixels(other) == pytest.approx(np.full((16, 16, 3), 3.0))
 
 

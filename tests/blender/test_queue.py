@@ -162,7 +162,7 @@ def test_an_object_renamed_during_its_bake_gets_its_result():
     one.name = "Table"
     bake.run()
     bake.keep(kept.store)
-    assert (bake.status, bake.warnings) == ("written", [])
+    assert (bake.status, [*bake.messages]) == ("written", [])
     assert node_of(one.data.materials[0]).image == image
     assert pixels(image).mean() == pytest.approx(3 * before, rel=0.01)
 
@@ -365,5 +365,5 @@ def test_a_first_look_is_kept_with_its_sentence():
     row = state.rows[bake.target]
     assert row.is_stale
     assert row.status == Status.WARNED
-    assert "first look" in row.sentences[0]
+    assert "Quick preview" in row.messages[0].text
     assert node_of(one.data.materials[0]).image is not None

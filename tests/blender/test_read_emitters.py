@@ -247,12 +247,12 @@ def test_what_is_not_understood_is_named():
     tree = material.node_tree
     tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs[0], emission.inputs["Strength"])
     add_panel(material=material)
-    reason = "the node 'Noise Texture' is not understood"
     assert read().lights == ()
-    assert read().by_cycles == {"Panel": f"The light of 'Panel' is left out: {reason}."}
+    text = "The emission of 'Panel' is left out. The node 'Noise Texture' is not supported."
+    assert {name: str(message) for name, message in read().by_cycles.items()} == {"Panel": text}
 
 
 def test_negative_light_is_named():
     add_panel(material=glowing_material(-1)[0])
-    sentence = "The light 'Panel' is left out: its radiance has values that are negative or not numbers."
-    assert (read().lights, read().warnings) == ((), (sentence,))
+    text = "The light 'Panel' is left out. The radiance of 'Panel' has negative values, or values that are not numbers."
+    assert (read().lights, [*map(str, read().messages)]) == ((), [text])

@@ -50,7 +50,7 @@ def read():
 
 def the_light():
     illumination = read()
-    assert (illumination.warnings, len(illumination.lights)) == ((), 1)
+    assert (illumination.messages, len(illumination.lights)) == ((), 1)
     return illumination.lights[0]
 
 
@@ -180,7 +180,7 @@ def test_dark_lamps(darken):
     if darken is not portal:  # of a portal without a world Cycles 4.5 crashes
         assert cycles_irradiance(plane, image, 16).max() == 0
     illumination = read()
-    assert (illumination.lights, illumination.warnings) == ((), ())
+    assert (illumination.lights, illumination.messages) == ((), ())
 
 
 def zero_size(lamp):
@@ -212,8 +212,8 @@ def test_no_size_at_all(kind, shrink):
     cycles = np.nan_to_num(cycles_irradiance(plane, image, 64))
     ours, _ = our_irradiance(plane)
     if not illumination.lights:
-        (warning,) = illumination.warnings
-        assert "'Lamp' is left out" in warning
+        (warning,) = illumination.messages
+        assert "'Lamp' is left out" in warning.text
     elif cycles.any():
         bpy.data.objects.remove(plane)
         assert_agrees()
@@ -260,9 +260,9 @@ def test_a_falloff_of_another_kind_is_left_to_cycles(output):
     falloff.inputs["Smooth"].default_value = 1
     tree.links.new(falloff.outputs[output], emission.inputs["Strength"])
     illumination = read()
-    sentence = "The light 'Lamp' counts as if it had no nodes: the node 'Light Falloff' is not understood."
-    assert illumination.by_cycles == {"Lamp": sentence}
-    assert illumination.warnings == (sentence,)
+    text = "The light 'Lamp' is baked without its nodes. The node 'Light Falloff' is not supported."
+    assert {name: str(message) for name, message in illumination.by_cycles.items()} == {"Lamp": text}
+    assert [*map(str, illumination.messages)] == [text]
     assert len(illumination.lights) == 1
 
 

@@ -6,8 +6,9 @@ import bpy
 import numpy as np
 import pytest
 from beamspread.blender.read.node_math import BLENDS, LUMINANCE, MATH, VECTOR_MATH
-from beamspread.blender.read.nodes import NotUnderstoodError, surface_of
+from beamspread.blender.read.nodes import surface_of
 from beamspread.blender.read.shading import ShadingPoints
+from beamspread.core.errors import NotSupportedError
 from cycles_truth import add_receiver, cycles_irradiance
 from mathutils import Matrix
 
@@ -271,7 +272,7 @@ def test_shaders(world):
 def test_what_is_not_understood_is_named(world):
     noise = world.add("ShaderNodeTexNoise", name="Clouds")
     world.show(noise.outputs["Color"])
-    with pytest.raises(NotUnderstoodError, match="the node 'Clouds' is"):
+    with pytest.raises(NotSupportedError, match="The node 'Clouds' is not supported"):
         world.ours()
     for size in (0.0, 1.0):
         world.background.inputs["Strength"].default_value = size
@@ -279,5 +280,5 @@ def test_what_is_not_understood_is_named(world):
             assert not world.assert_agree().any()
     curves = world.add("ShaderNodeMath", operation="PINGPONG")
     world.show(curves.outputs[0])
-    with pytest.raises(NotUnderstoodError, match="the node 'Math' is"):
+    with pytest.raises(NotSupportedError, match="The node 'Math' is not supported"):
         world.ours()

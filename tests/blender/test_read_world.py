@@ -121,7 +121,7 @@ def test_a_dark_world_is_no_light(darken):
     plane, image = add_receiver(Matrix(), texels=4)
     assert cycles_irradiance(plane, image, 4).max() == 0
     assert read().lights == ()
-    assert read().warnings == ()
+    assert read().messages == ()
 
 
 @pytest.mark.parametrize("tilt", TILTS.values(), ids=TILTS.keys())
@@ -220,7 +220,7 @@ def test_color_spaces_of_images(kind, space, tmp_path):
     illumination = read()
     if kind == "PNG" and space == "Filmic sRGB":
         assert illumination.lights == ()
-        assert "the color space Filmic sRGB of the image 'image' is not understood" in illumination.by_cycles["World"]
+        assert "its color space is Filmic sRGB" in illumination.by_cycles["World"].text
         return
     # Blender reads 8 bits of HDR files a little differently from Cycles.
     assert_agrees(the_world(), TILTS["up"], 1024, 0.02 if kind == "HDR" else 0.005)
@@ -256,12 +256,13 @@ def test_what_is_not_understood_is_left_to_cycles():
     tree = background.id_data
     tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], background.inputs["Color"])
     illumination = read()
-    sentence = "The world 'World' is left out: the node 'Noise Texture' is not understood."
-    assert (illumination.lights, illumination.by_cycles) == ((), {"World": sentence})
-    assert illumination.warnings == (sentence,)
+    text = "The world 'World' is left out. The node 'Noise Texture' is not supported."
+    assert illumination.lights == ()
+    assert {name: str(message) for name, message in illumination.by_cycles.items()} == {"World": text}
+    assert [*map(str, illumination.messages)] == [text]
 
 
 def test_negative_light_is_named():
     add_world(-1)
     assert read().lights == ()
-    assert "The light 'World' is left out: its color is -1, -1, -1" in read().warnings[0]
+    assert "The light 'World' is left out. The color of 'World' is -1, -1, -1" in read().messages[0].text

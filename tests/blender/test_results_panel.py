@@ -3,24 +3,29 @@
 from beamspread.blender.jobs.state import Row, Status, state
 from beamspread.blender.live import session
 from beamspread.blender.ui import bake_panel
+from beamspread.core.messages import Level, Message, Messages, note, warning
 from beamspread.core.target import Target
 from panel_layout import Layout, context
 
 
-def test_each_row_says_why_it_is_out_of_date_and_other_sentences_come_once():
+def test_each_row_says_why_it_is_out_of_date_and_other_messages_come_once():
     layout = Layout()
-    sentences = ("Changed since its bake: lights.", "A lamp was left out.")
+    why, left_out = "Changed since its bake: lights.", "A lamp was left out."
     targets = [Target("First", "One"), Target("Second", "Two")]
-    state.rows = {target: Row(target, Status.STALE, sentences, True) for target in targets}
-    bake_panel.draw_results(layout, context(), "", set())
-    assert layout.said.count(sentences[0]) == 2
-    assert layout.said.count(sentences[1]) == 1
+    state.rows = {
+        target: Row(target, Status.STALE, (warning(str(target), why), warning("", left_out)), True)
+        for target in targets
+    }
+    bake_panel.draw_results(layout, context(), "", Messages())
+    assert layout.said.count(why) == 2
+    assert layout.said.count(left_out) == 1
 
 
 def test_why_it_failed_is_not_said_again_below_what_is_in_the_way():
     layout, why, target = Layout(), "The albedo's red is 1.", Target("First", "One")
-    state.rows = {target: Row(target, Status.FAILED, (why,), is_stale=True)}
-    bake_panel.draw_results(layout, context(), "", {why})
+    message = Message(Level.ERROR, str(target), why)
+    state.rows = {target: Row(target, Status.FAILED, (message,), is_stale=True)}
+    bake_panel.draw_results(layout, context(), "", Messages([message]))
     assert "First: Failed" in layout.said
     assert why not in layout.said
 
@@ -28,8 +33,9 @@ def test_why_it_failed_is_not_said_again_below_what_is_in_the_way():
 def test_what_keeps_live_from_following_is_said_once(monkeypatch):
     layout, why = Layout(), "It is not flat."
     target = Target("First", "One")
-    state.rows = {target: Row(target, Status.FAILED, (why,))}
-    monkeypatch.setattr(session, "sentences", lambda: [f"{target}: {why}", "Live leaves out indirect light."])
+    message = Message(Level.ERROR, str(target), why)
+    state.rows = {target: Row(target, Status.FAILED, (message,))}
+    monkeypatch.setattr(session, "messages", lambda: [message, note("", "Live leaves out indirect light.")])
     bake_panel.draw_bake(layout, context())
     assert layout.said.count(why) == 1
     assert "indirect" in layout.said

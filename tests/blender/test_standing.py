@@ -145,7 +145,7 @@ def test_what_a_bake_read_makes_it_stale(plane, name):
     update()
     assert row().is_stale
     assert row().status == Status.STALE
-    assert part in row().sentences[0]
+    assert part in row().messages[0].text
 
 
 def test_another_output_of_the_node_before_it(plane):
@@ -158,7 +158,7 @@ def test_another_output_of_the_node_before_it(plane):
     assert row().status == Status.BAKED
     node.id_data.links.new(node.inputs["Base Color"], place.outputs["Object"])
     update()
-    assert "material" in row().sentences[0]
+    assert "material" in row().messages[0].text
 
 
 def test_what_it_did_not_read_does_not(plane):
@@ -220,14 +220,14 @@ def test_it_is_known_after_loading_and_undo(plane, tmp_path):
     assert row().status == Status.BAKED
     bpy.data.lights["Sun"].energy = 5.0
     update()
-    assert row().sentences == ("Changed since its bake: lights.",)
+    assert [*map(str, row().messages)] == ["Changed since its bake: lights."]
 
 
 def test_painting_in_the_image(plane):
     image = node_of(plane.data.materials[0]).image
     image.pixels.foreach_set([0.5] * len(image.pixels))
     image.update()
-    assert "pixels of the image" in row().sentences[0]
+    assert "pixels of the image" in row().messages[0].text
 
 
 def test_a_copy_with_the_same_image_was_never_baked(plane):
@@ -247,7 +247,7 @@ def test_dark_is_a_warning_that_stays_with_the_image(tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
     assert row().status == Status.WARNED
-    assert "All lights are behind 'Plane'" in row().sentences[0]
+    assert "All lights are behind 'Plane'" in row().messages[0].text
 
 
 def test_paths_of_textures_that_saving_makes_relative_change_nothing(plane, tmp_path):
@@ -292,7 +292,7 @@ def test_failures_stand_beside_what_was_baked_before(plane):
     select(plane)
     assert "hidden from render" in messages_of(bpy.ops.beamspread.bake)
     assert row().status == Status.FAILED
-    assert "hidden from render" in row().sentences[0]
+    assert "hidden from render" in row().messages[0].text
     plane.hide_render = False
     bake(plane)
     assert row().status == Status.BAKED
@@ -329,12 +329,12 @@ def test_what_geometry_nodes_scatter(plane):
     assert row().status == Status.BAKED
     group.nodes["Move"].inputs["Translation"].default_value = (0, 0, 0.2)
     update()
-    assert "other objects" in row().sentences[0]
+    assert "other objects" in row().messages[0].text
     bake(plane)
     cube.data.vertices[0].co.x -= 0.5
     cube.data.update()
     update()
-    assert "other objects" in row().sentences[0]
+    assert "other objects" in row().messages[0].text
 
 
 def test_what_particles_scatter(plane):
@@ -347,7 +347,7 @@ def test_what_particles_scatter(plane):
     assert row().status == Status.BAKED
     wall.particle_systems[0].seed = 5
     update()
-    assert "other objects" in row().sentences[0]
+    assert "other objects" in row().messages[0].text
 
 
 def add_texture(material, socket, folder):
@@ -379,16 +379,16 @@ def test_pixels_of_textures(plane, kind, tmp_path):
     bake(plane)
     assert row().status == Status.BAKED
     paint(image, 0.5)
-    assert "textures" in row().sentences[0]
+    assert "textures" in row().messages[0].text
     bake(plane)
     assert row().status == Status.BAKED
     paint(image, 0.7)  # not saved between, and dirty before as after
-    assert "textures" in row().sentences[0]
+    assert "textures" in row().messages[0].text
     image.save()
     bake(plane)
     assert row().status == Status.BAKED
     (tmp_path / "veil.png").write_bytes((tmp_path / "veil.png").read_bytes()[:-1] + b"x")  # by another program
-    assert "textures" in row().sentences[0]
+    assert "textures" in row().messages[0].text
     image.pack()
     update()
     bake(plane)
@@ -413,7 +413,7 @@ def test_how_often_light_may_bounce_counts_where_it_may(plane):
     stale.keep(Bake(PLANE), stale.parts_of(bpy.context, [PLANE])[PLANE])
     assert row().status == Status.BAKED
     cycles.diffuse_bounces += 1
-    assert "settings" in row().sentences[0]
+    assert "settings" in row().messages[0].text
 
 
 @pytest.mark.parametrize("arguments", [[], ["--solver", "direct"], ["--pass", "IRRADIANCE"]])
@@ -430,7 +430,7 @@ def test_a_batch_that_fills_the_nodes_image_is_a_bake(arguments, tmp_path):
     expected = Status.NEVER if "--pass" in arguments else Status.STALE if arguments else Status.BAKED
     assert row().status == expected
     if expected == Status.STALE:
-        assert row().sentences[0] == "Changed since its bake: settings."
+        assert row().messages[0].text == "Changed since its bake: settings."
 
 
 def test_looks_follow_a_change_at_once_and_take_at_most_a_tenth_of_the_time(monkeypatch):

@@ -95,7 +95,7 @@ def our_irradiance(plane):
     for lamp in illumination.lights:
         light, _ = lamp.gather(grid, illumination.caster(grid, lamp), samples=2, clearance=grid.clearance)
         total += (light if light.ndim == 3 else light[..., None]) * lamp.rgb()
-    return receiver.to_texture([total]), illumination.warnings
+    return receiver.to_texture([total]), [*map(str, illumination.messages)]
 
 
 def in_texels(fine):
@@ -300,7 +300,7 @@ def test_color_of_an_image_tints(color_space, uses_alpha):
 def test_a_volume_alone_lets_light_through_and_says_so():
     tree = Tree("Haze")
     add_card(tree.finish(tree.add("VolumeScatter", {"Density": 1e-6}), "Volume"))
-    words = "The material 'Haze' has only a volume: it casts no shadow, whatever the volume absorbs."
+    words = "The material 'Haze' has a volume and no surface: it casts no shadow."
     assert assert_agree(warnings=[words]).min() > 0
 
 
@@ -312,7 +312,7 @@ def test_what_is_not_understood_is_opaque_and_named():
     scenes.add_sun(20, 30)
     ours, warnings = our_irradiance(plane)
     assert not ours[112, 136].any()
-    words = "The material 'Mottled' casts opaque shadows: the node 'Noise Texture' is not understood."
+    words = "The material 'Mottled' casts opaque shadows. The node 'Noise Texture' is not supported."
     assert list(warnings) == [words]
 
 

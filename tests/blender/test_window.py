@@ -71,7 +71,7 @@ def test_a_first_look_is_there_before_the_simulation_and_stays_if_that_is_cancel
     steps = [step for step in seen["steps"] if step != "Baking"]  # which may be over before anyone looks
     assert steps == ["Simulating the medium, once (preview)", "Simulating the medium, once"]
     assert seen["first look"][0]
-    assert "first look" in seen["first look"][1]
+    assert "Quick preview" in seen["first look"][1]
     assert seen["out of date"]
 
 

@@ -75,13 +75,13 @@ def prepare_panels() -> None:
     panels.BEAMSPREAD_PT_node_editor.bl_category = "Node"
     count_draws(draw, "draw_properties")
     count_draws(menu, "_draw")
-    draw_sentences = shown.draw_sentences
+    draw_lines = shown.draw_lines
 
     def record(layout, context, messages, icon):
         results["shown"].extend(message for message in messages if message not in results["shown"])
-        draw_sentences(layout, context, messages, icon)
+        draw_lines(layout, context, messages, icon)
 
-    shown.draw_sentences = record
+    shown.draw_lines = record
     show_soon = popup.show_soon
 
     def note(title, sentences):
@@ -211,14 +211,14 @@ def scenario():
     yield ended
     results["seconds to cancel"] = time.monotonic() - began
     results["kept by cancel"] = [brightness(name) for name in ("First", "Second")] == before
-    results["messages of cancel"] = state.messages()
+    results["messages of cancel"] = state.lines()
     results["standing after cancel"] = state.status_of(Target("First", "First")).status.value
 
     settings.solver = "fft"
     started(objects="ALL")
     bpy.data.materials.remove(bpy.data.materials["First"])
     yield ended
-    results["messages of removal"] = state.messages()
+    results["messages of removal"] = state.lines()
     results["baked after removal"] = brightness("Second") / before[1]
     yield lambda: results["messages of removal"][0].partition(": ")[2] in results["shown"]
 
@@ -234,8 +234,8 @@ def scenario():
     looked = brightness("Second")
     bpy.ops.beamspread.cancel()
     yield ended
-    yield lambda: state.rows[target].sentences
-    results["first look"] = [looked == brightness("Second"), state.rows[target].sentences[0]]
+    yield lambda: state.rows[target].messages
+    results["first look"] = [looked == brightness("Second"), state.rows[target].messages[0].text]
     results["out of date"] = state.rows[target].is_stale
     settings.quality = "preview"
 
@@ -250,10 +250,10 @@ def scenario():
         started()
         yield ended
         setattr(operator.BEAMSPREAD_OT_bake, where, works)
-        results["of errors"].append([results["popups"][before:], state.messages(), len(operator._timers)])
+        results["of errors"].append([results["popups"][before:], state.lines(), len(operator._timers)])
         results["after errors"] = [sorted(started())]
         yield ended
-        results["after errors"].append(state.messages())
+        results["after errors"].append(state.lines())
 
     # An error would raise here, and Blender would open a popup of its own beside ours.
     scenes.node_of(bpy.data.materials["Second"]).albedo = (1, 1, 1)

@@ -135,8 +135,8 @@ def test_what_is_surely_dark_takes_no_simulation(lights, layer, without_media):
     assert list(one.layers) == [layer]
     assert one.layers[layer].shape == (SIZE, SIZE, 3)
     assert not one.layers[layer].any()
-    (warning,) = one.warnings
-    assert "black" in warning
+    (warning,) = one.messages
+    assert "black" in warning.text
 
 
 def test_the_medium_is_checked_in_the_dark_too():
@@ -150,8 +150,8 @@ def test_a_bake_in_the_shadow_is_dark_and_says_so(layer):
     for one in (dark, lit):
         one.run()
     assert (dark.is_dark, lit.is_dark) == (True, False)
-    assert [("No light reaches 'Plane'" in warning) for warning in dark.warnings] == [True]
-    assert lit.warnings == []
+    assert [("No light reaches 'Plane'" in warning.text) for warning in dark.messages] == [True]
+    assert not lit.messages
 
 
 def test_what_absorbs_all_light_is_not_dark():
@@ -164,14 +164,14 @@ def test_what_absorbs_all_light_is_not_dark():
 def test_light_behind_a_slab_is_named():
     above, below = LAMP, replace(LAMP, name="Low lamp", position=(0.0, 0.0, -1.0))
     rising = replace(SUN, name="Rising sun", direction=(0.0, 0.6, 0.8))
-    assert job([above, SUN], thickness=0.1).warnings() == []
-    assert job([above, below, rising]).warnings() == []  # endlessly thick
+    assert job([above, SUN], thickness=0.1).messages() == []
+    assert job([above, below, rising]).messages() == []  # endlessly thick
     assert (
-        job([above, below], IRRADIANCE, thickness=0.1).warnings() == []
+        job([above, below], IRRADIANCE, thickness=0.1).messages() == []
     )  # of what arrives in front, nothing is missing
-    (some,) = job([above, below, rising], thickness=0.1).warnings()
-    assert some.startswith("What shines through the slab 'Plane' from behind is not baked yet")
-    assert some.endswith("light of 'Low lamp', 'Rising sun'.")
-    through, black = job([below], thickness=0.1).warnings()
-    assert through.endswith("light of 'Low lamp'.")
-    assert "it is black" in black
+    (some,) = job([above, below, rising], thickness=0.1).messages()
+    assert some.text.startswith("Light that shines through the slab 'Plane' from behind is not baked yet")
+    assert some.text.endswith("that of 'Low lamp', 'Rising sun'.")
+    through, black = job([below], thickness=0.1).messages()
+    assert through.text.endswith("that of 'Low lamp'.")
+    assert "it is black" in black.text

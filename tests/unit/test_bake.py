@@ -16,6 +16,7 @@ from beamspread.core.bake.runner import Bake
 from beamspread.core.bake.surface import Surface
 from beamspread.core.errors import MaterialError
 from beamspread.core.material.material import Material
+from beamspread.core.messages import warning
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import AreaLight, Light, PointLight, SpotLight, SunLight
@@ -306,22 +307,22 @@ BEHIND = "All lights are behind 'Plane'"
 
 
 def test_a_plane_lit_from_the_back_alone_says_so_before_it_is_baked():
-    assert job([SUN, LAMP]).warnings() == []
+    assert job([SUN, LAMP]).messages() == []
     for lights in ([SUN], [LAMP], [SUN, LAMP]):
-        (warning,) = job(lights, **DOWN).warnings()
-        assert warning.startswith(BEHIND)
-        assert "Flip" in warning
+        (warning,) = job(lights, **DOWN).messages()
+        assert warning.text.startswith(BEHIND)
+        assert "Flip" in warning.remedy
     in_front = replace(LAMP, position=(0.0, 0.0, -2.0))
-    assert job([SUN, in_front], **DOWN).warnings() == []
-    (none_at_all,) = job([]).warnings()
-    assert "No light of the scene can be baked" in none_at_all
+    assert job([SUN, in_front], **DOWN).messages() == []
+    (none_at_all,) = job([]).messages()
+    assert "The scene has no light that can be baked" in none_at_all.text
 
 
 def test_a_bake_that_no_light_reached_says_so_once():
     def said(one):
         bake = Bake(Target("Plane"), one)
         bake.run()
-        return bake.warnings
+        return [*map(str, bake.messages)]
 
     (shadow,) = said(job([SUN], ROOF))
     assert "No light reaches 'Plane'" in shadow
@@ -334,13 +335,13 @@ def test_a_bake_that_no_light_reached_says_so_once():
 @pytest.mark.parametrize(
     ("light", "words"),
     [
-        (replace(SUN, strength=math.nan), "its power is nan"),
-        (replace(SUN, strength=math.inf), "its power is inf"),
-        (replace(LAMP, strength=-5.0), "its power is -5, and a bake can't take light away"),
-        (replace(LAMP, color=(1.0, -0.5, 0.0)), "its color is 1, -0.5, 0"),
-        (replace(LAMP, color=(1.0, math.nan, 0.0)), "its color is 1, nan, 0"),
-        (replace(SUN, direction=(math.nan,) * 3), "its place or direction is not a number"),
-        (replace(LAMP, position=(0.0, 0.0, math.inf)), "its place or direction is not a number"),
+        (replace(SUN, strength=math.nan), "The power of 'Sun' is nan."),
+        (replace(SUN, strength=math.inf), "The power of 'Sun' is inf."),
+        (replace(LAMP, strength=-5.0), "The power of 'Lamp' is -5, and a bake cannot remove light."),
+        (replace(LAMP, color=(1.0, -0.5, 0.0)), "The color of 'Lamp' is 1, -0.5, 0."),
+        (replace(LAMP, color=(1.0, math.nan, 0.0)), "The color of 'Lamp' is 1, nan, 0."),
+        (replace(SUN, direction=(math.nan,) * 3), "The position or direction of 'Sun' is not a number."),
+        (replace(LAMP, position=(0.0, 0.0, math.inf)), "The position or direction of 'Lamp' is not a number."),
         (SUN, ""),
         (LAMP, ""),
     ],
@@ -393,8 +394,8 @@ class FailingJob:
     def __init__(self, outcome):
         self.outcome = outcome
 
-    def warnings(self):
-        return ["Careful."]
+    def messages(self):
+        return [warning("", "Careful.")]
 
     def colored(self, progress):
         return self, progress
@@ -404,7 +405,7 @@ class FailingJob:
     def is_dark(self, layers):
         return False
 
-    def warnings_after(self, layers):
+    def messages_after(self, layers):
         return []
 
     def run(self, progress):
@@ -421,7 +422,7 @@ LAYER = {COMBINED: np.ones((2, 2, 3), np.float32)}
     [
         (LAYER, "written", ""),
         (ValueError("No."), "failed", "No."),
-        (MemoryError(), "failed", "There is not enough memory: lower the resolution."),
+        (MemoryError(), "failed", "There is not enough memory. Lower the resolution."),
         (KeyboardInterrupt(), "cancelled", "The bake was cancelled."),
         (beamspread.Cancelled(), "cancelled", "The bake was cancelled."),
     ],
@@ -434,7 +435,7 @@ def test_a_bake_notes_what_became_of_it(outcome, status, error):
     assert (one.status, one.error) == (status, error)
     assert stored == ([LAYER] if status == "written" else [])
     assert one.path == ("plane.exr" if status == "written" else "")
-    assert one.messages() == [*([error] if error else []), "Careful."]
+    assert [*map(str, one.messages)] == [*([error] if error else []), "Careful."]
     assert one.layers == {}
 
 
@@ -455,14 +456,14 @@ def test_a_job_gets_the_colors_that_it_lacks_before_it_runs():
     def color(one, progress):
         progress(0.0)
         progress(1.0)
-        said = one.illumination.warning("Paler than it looks.")
+        said = one.illumination.with_messages(warning("", "Paler than it looks."))
         return replace(one, surface=Surface(MATERIAL, base_color=(0.3,) * 3), illumination=said)
 
     late = replace(before, more_color=color, color_seconds=1e6)
     bake = Bake(Target("Plane"), late)
-    assert bake.warnings == []
+    assert not bake.messages
     bake.run(fractions.append)
-    assert bake.warnings == ["Paler than it looks."]
+    assert [*map(str, bake.messages)] == ["Paler than it looks."]
     truth = replace(before, surface=Surface(MATERIAL, base_color=(0.3,) * 3)).run()
     assert bake.layers[COMBINED] == pytest.approx(truth[COMBINED])
     assert fractions[0] == 0

@@ -177,7 +177,7 @@ def test_a_job_bakes_the_light_that_it_finds():
 
     surface = Surface(Material(albedo=(0.9,) * 3, mean_free_path=(0.1,) * 3))
     job = BakeJob("Floor", receiver, Illumination([]), surface, BakeSettings(layers=(IRRADIANCE,)), find)
-    assert job.warnings() == []
+    assert job.messages() == []
     np.testing.assert_allclose(job.lit()[0].run()[IRRADIANCE], np.pi, rtol=1e-5)
     assert seen == [receiver]
     with pytest.raises(native.Cancelled):

@@ -15,6 +15,7 @@ from ...core.bake.bake_settings import BakeSettings
 from ...core.bake.gather import Gatherer
 from ...core.bake.job import BakeJob
 from ...core.errors import MaterialError
+from ...core.messages import warning
 from ...core.progress import Progress, stages
 from ...core.scene.illumination import Illumination
 from ...core.scene.lights import STRATA, Field, FieldLight, LampFieldLight, Light, WorldLight
@@ -37,7 +38,9 @@ MOST_SAMPLES = 128
 # Less bounced light is none, beside what the lights would send without anything in their way: what leaks into a closed
 # box with sun and lamp outside, at a single node beside its edges, is 1.3e-7.
 NEGLIGIBLE = 1e-6
-NOTHING_BOUNCES = "Indirect light is left out: it is less than a millionth of what the lights send without obstacles."
+NOTHING_BOUNCES = warning(
+    "", "Indirect light is left out: it is less than a millionth of what the lights send without obstacles."
+)
 
 # Of light that comes directly, with its shadows, and is not understood by our readers.
 DIRECT_NODES, DIRECT_NOISE = 256, 0.02
@@ -101,9 +104,10 @@ class CyclesLight:
         if not (world or bounced or others):
             return job
         if self.copy() is None:
-            missing = "Blender's own Bake could not ask Cycles for light that only it knows: use Bake Beamspread."
-            return replace(job, illumination=illumination.warning(missing))
-        illumination = illumination.found({world, *others} - {""}).warning(*self._copy.scene.warnings)
+            text = "Blender's own Bake could not ask Cycles for light that only Cycles can evaluate."
+            missing = warning("", text, "Use Bake Beamspread.")
+            return replace(job, illumination=illumination.with_messages(missing))
+        illumination = illumination.found({world, *others} - {""}).with_messages(*self._copy.scene.warnings)
         return replace(
             job,
             illumination=illumination,
@@ -145,7 +149,7 @@ class CyclesLight:
             if irradiance >= NEGLIGIBLE * direct:
                 illumination = illumination.lit_by([FieldLight("Bounced light", *WHITE, False, fields)])
             elif irradiance > 0:
-                illumination = illumination.warning(NOTHING_BOUNCES)
+                illumination = illumination.with_messages(NOTHING_BOUNCES)
         found = [self._direct(receiver, name, step) for name, step in zip(others, each)]
         return replace(job, illumination=illumination.lit_by(found))
 

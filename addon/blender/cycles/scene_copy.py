@@ -12,6 +12,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ...core.messages import Message, warning
 from ..read.visibility import with_instanced
 
 PREFIX = "beamspread-cycles-"
@@ -30,14 +31,14 @@ class SceneCopy:
     Attributes
     ----------
     request : what every process on it needs to know, as plain data: scene, view layer, whether drivers may run Python.
-    warnings : sentences on what the copy can't have.
+    warnings : messages about images whose unsaved pixels the copy lacks.
     """
 
     def __init__(self, scene, view_layer) -> None:
         remove_stale()
         self.folder = Path(tempfile.mkdtemp(prefix=f"{PREFIX}{os.getpid()}-"))
         self.remove = weakref.finalize(self, shutil.rmtree, self.folder, ignore_errors=True)
-        self.warnings: list[str] = []
+        self.warnings: list[Message] = []
         self.binary = bpy.app.binary_path
         self.request = {
             "scene": scene.name,
@@ -71,7 +72,8 @@ class SceneCopy:
         for image in bpy.data.images:
             if not image.is_dirty or image.library is not None or image.source not in {"GENERATED", "FILE"}:
                 if image.is_dirty and image.source == "TILED":
-                    self.warnings.append(f"The image '{image.name}' is not saved: Cycles sees its files.")
+                    text = f"The image '{image.name}' is not saved: Cycles reads its files."
+                    self.warnings.append(warning(image.name, text))
                 continue
             if not image.size[0] or not image.users:
                 continue

@@ -13,7 +13,9 @@ from typing import NamedTuple
 
 import bpy
 
+from ...core.bake.runner import Bake
 from ...core.exr_header import text_of
+from ...core.messages import Level, Message, note, warning
 from ...core.target import Target
 from ..node.find import find_node, find_targets
 from ..read.visibility import with_instanced
@@ -51,6 +53,10 @@ class Record:
         """Names of the parts whose digest differs. Parts that the record lacks count as unchanged."""
         return [name for name, digest in now.items() if self.parts.get(name, digest) != digest]
 
+    def messages(self) -> tuple[Message, ...]:
+        """Messages of the bake, whose subjects are not recorded."""
+        return (*(warning("", text) for text in self.warnings), *(note("", text) for text in self.notes))
+
 
 class Frames(NamedTuple):
     """First and last frame of an image sequence, and the size of its images in texels."""
@@ -79,6 +85,12 @@ class ImageFacts:
     is_undone: bool = False
     frames: Frames | None = None
     former: bpy.types.Image | None = None
+
+
+def record_of_bake(bake: Bake, parts: dict[str, str], is_dirty: bool = False) -> Record:
+    """Record of a bake that has read these parts."""
+    warnings, notes = (tuple(map(str, bake.messages.of(level))) for level in (Level.WARNING, Level.INFO))
+    return Record(parts, warnings, is_dirty, notes)
 
 
 def facts_of(image) -> ImageFacts:

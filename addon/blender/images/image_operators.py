@@ -64,8 +64,8 @@ class BEAMSPREAD_OT_make_float(ImageOperator, bpy.types.Operator):
             node = find_node(material)
             if node is not None and node.image == new:
                 node.image = new  # shows it
-        for warning in said.warnings:
-            self.report({"WARNING"}, warning)
+        for message in said.messages:
+            self.report({message.level.value}, str(message))
         return {"FINISHED"}
 
 

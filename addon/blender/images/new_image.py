@@ -13,6 +13,7 @@ import numpy as np
 from ...core.bake.runner import Bake
 from ...core.batch.names import stem
 from ...core.errors import ImageError
+from ...core.messages import Message, warning
 from ...core.target import Target
 from ...core.whole_file import whole_file
 from . import files, icons, undo
@@ -33,7 +34,7 @@ def keep_new(name: str, texture: np.ndarray, bake: Bake, is_data: bool = False) 
         try:
             return _in_file(name, texture, is_data)
         except ImageError as error:
-            bake.warnings.append(f"{error} The new image is packed into the .blend file instead.")
+            bake.warn(name, f"{error} The new image is packed into the .blend file instead.")
     image = files.make_image(name, *texture.shape[1::-1], is_data=is_data)
     return files.fill_image(image, texture), image
 
@@ -57,15 +58,15 @@ def _in_file(name: str, texture: np.ndarray, is_data: bool) -> tuple[str, bpy.ty
     return str(path), image
 
 
-def part_from_others(image) -> str:
-    """Give the image a file of its own where it shows that of another .blend file, as after Save As; a sentence then.
+def part_from_others(image) -> tuple[Message, ...]:
+    """Give the image a file of its own where it shows that of another .blend file, as after Save As; a warning then.
 
     ImageError where that can't be written.
     """
     path = files.file_of(image)
     other = _scene_of(path) if path is not None and bpy.data.filepath else None
     if other is None or other == Path(bpy.data.filepath).resolve() or not other.exists():
-        return ""  # renamed or moved, else
+        return ()  # renamed or moved, else
     own, made_for = _place(image.name)
     try:
         own.parent.mkdir(parents=True, exist_ok=True)
@@ -79,7 +80,8 @@ def part_from_others(image) -> str:
     icons.reload(image)
     if tuple(image.size) != size:
         icons.scale(image, *size)
-    return f"'{path.name}' is the file of '{other.name}' and stays: the image '{image.name}' now has '{own.name}'."
+    text = f"'{path.name}' belongs to '{other.name}': the image '{image.name}' now has the file '{own.name}'."
+    return (warning(image.name, text),)
 
 
 def _scene_of(path: Path) -> Path | None:

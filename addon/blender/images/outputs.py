@@ -63,14 +63,13 @@ class Outputs:
             filled = self._results.fill_shown(image, bake, texture)
             if filled is not None:
                 return filled
-            bake.warnings.append(
-                f"The image '{image.name}' keeps the result of another: this one has a file of its own."
-            )
+            text = f"The image '{image.name}' belongs to another object: '{bake.target}' has a file of its own."
+            bake.warn(image.name, text)
         path = self.path(bake.target, layer, frame)
         said = attributes if self._options.frames else None
         files.write_file(path, texture, _format_of(path), said, view_of=self._view_of)
         if path.suffix == files.EXTENSIONS["PNG"] and texture.max() > 1 and self._view_of is None:
-            bake.warnings.append("Values above 1 were clipped: EXR keeps them.")
+            bake.warn(path.name, f"'{path.name}' clips values above 1.", "EXR keeps them.")
         return str(path)
 
 

@@ -42,7 +42,7 @@ class Results:
         try:
             self._plan(_node(bake.target, bake.job.settings.layers).image, bake)
         except BakeError as error:
-            return Bake(bake.target, error=str(error))
+            return Bake(bake.target, error=error)
         return bake
 
     def _plan(self, image, bake: Bake) -> None:
@@ -64,9 +64,7 @@ class Results:
         for layer, texture in bake.layers.items():
             if layer == COMBINED:
                 path, image = self._store_shown(node, bake, texture)
-                warnings, notes = link_result(node, image)
-                bake.warnings += warnings
-                bake.notes += notes
+                bake.messages.add(*link_result(node, image))
             else:
                 path = self._store_beside(node, bake, layer, texture)
             paths.append(path)
@@ -95,14 +93,14 @@ class Results:
         size = texture.shape[1::-1]
         if tuple(image.size) != size and 0 not in image.size:
             icons.scale(image, *size)
-            bake.warnings.append(
-                f"The image '{image.name}' changed its size during the bake: now it has that of before."
+            bake.warn(
+                image.name, f"The image '{image.name}' was resized during the bake. It has its former size again."
             )
         path = self.fill(image, bake, texture)
         if path is not None:
             note_bake(image, bake.target)
             if texture.max() > 1 and files.clips(image):
-                bake.warnings.append(f"The image '{image.name}' clips values above 1: Make Float keeps them.")
+                bake.warn(image.name, f"The image '{image.name}' clips values above 1.", "Make Float keeps them.")
         return path
 
     def _store_shown(self, node, bake: Bake, texture: np.ndarray) -> tuple[str, bpy.types.Image]:
@@ -112,16 +110,14 @@ class Results:
             image = None
         if image is None:
             return self._new(bake, texture)
-        bake.warnings += filter(None, [part_from_others(image)])
+        bake.messages.add(*part_from_others(image))
         path = self.fill_shown(image, bake, texture)
         if path is not None:
             return path, image
         self._check_room(image, bake)
         owners = " and ".join(f"'{other}'" for other in self._others(image, bake))
         path, new = self._new(bake, texture)
-        bake.warnings.append(
-            f"The image '{image.name}' keeps the result of {owners}: '{bake.target}' now has '{new.name}'."
-        )
+        bake.warn(image.name, f"The image '{image.name}' belongs to {owners}: '{bake.target}' now has '{new.name}'.")
         return path, new
 
     def _new(self, bake: Bake, texture: np.ndarray) -> tuple[str, bpy.types.Image]:

@@ -10,6 +10,7 @@ import bpy
 from ...core.bake.bake_settings import COMBINED
 from ...core.batch.batch_options import parse
 from ...core.errors import ImageError
+from ...core.messages import Message, warning
 from ...core.target import Target
 from ..node.find import find_node, find_targets
 from ..node.node import link_result
@@ -56,8 +57,8 @@ def find_frames(scene, target: Target) -> tuple[list[int], Path]:
     return numbers, path.with_name(f"{start}{numbers[0]:04d}{ending}") if numbers else path
 
 
-def show_frames(node, numbers: list[int], path: Path) -> tuple[list[str], list[str]]:
-    """Have the node show the sequence that begins with the file; warnings and notes, as for a bake."""
+def show_frames(node, numbers: list[int], path: Path) -> list[Message]:
+    """Have the node show the sequence that begins with the file; messages as of `link_result`."""
     former = (is_sequence(node.image) and facts_of(node.image).former) or node.image
     image = bpy.data.images.load(str(path))
     size = tuple(image.size)  # a sequence has none
@@ -100,13 +101,13 @@ Each node keeps its own image for Show Single Images"""
         return {"FINISHED"}
 
     def _show(self, target: Target, numbers: list[int], path: Path) -> None:
-        warnings, notes = show_frames(_node(target), numbers, path)
+        messages = show_frames(_node(target), numbers, path)
         missing = numbers[-1] - numbers[0] + 1 - len(numbers)
         if missing:
-            warnings.append(f"{missing} of the frames {numbers[0]} to {numbers[-1]} of '{target}' are missing.")
-        for level, sentences in (("WARNING", warnings), ("INFO", notes)):
-            for sentence in sentences:
-                self.report({level}, sentence)
+            text = f"{missing} of the frames {numbers[0]} to {numbers[-1]} of '{target}' are missing."
+            messages.append(warning(str(target), text))
+        for message in messages:
+            self.report({message.level.value}, str(message))
 
 
 class BEAMSPREAD_OT_show_single(bpy.types.Operator):

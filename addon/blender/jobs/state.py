@@ -14,6 +14,7 @@ from bpy.app.handlers import persistent
 
 from ...core.bake.estimate import in_words
 from ...core.bake.runner import CANCELLED, WRITTEN, Bake
+from ...core.messages import Level, Message
 from ...core.target import Target
 from ..registration import all_or_nothing, handlers
 
@@ -32,11 +33,11 @@ class Status(Enum):
 
 @dataclass(frozen=True)
 class Row:
-    """A target, how it stands, what there is to say about it, and whether what its image holds is out of date."""
+    """A target, its status, the messages about it, and True if the bake in its image is out of date."""
 
     target: Target
     status: Status
-    sentences: tuple[str, ...] = ()
+    messages: tuple[Message, ...] = ()
     is_stale: bool = False
 
 
@@ -88,7 +89,7 @@ class State:
         self._first: tuple[float, float] | None = None
         self._began = 0.0
         self._stop_asked = False
-        self._said: dict[Target, Row] = {}
+        self._last: dict[Target, Row] = {}
 
     def is_running(self) -> bool:
         """Whether a bake runs in the window."""
@@ -134,41 +135,36 @@ class State:
 
     def note(self, bake: Bake) -> None:
         """Keep what there is to say of a bake in place of what was said of its target before."""
-        self._said.pop(Target(bake.target.object_name), None)  # while nothing of it could be baked
-        standing = {WRITTEN: Status.BAKED, CANCELLED: Status.CANCELLED}.get(bake.status, Status.FAILED)
+        self._last.pop(Target(bake.target.object_name), None)  # while nothing of it could be baked
+        status = {WRITTEN: Status.BAKED, CANCELLED: Status.CANCELLED}.get(bake.status, Status.FAILED)
         if bake.status != WRITTEN and not bake.error:
             return  # it is still to run
-        if standing == Status.BAKED and bake.warnings:
-            standing = Status.WARNED
-        # That it was cancelled is its standing.
-        sentences = bake.messages()[standing == Status.CANCELLED :]
-        row = Row(bake.target, standing, tuple(sentences))
-        self._said[bake.target] = self.rows[bake.target] = row
+        if status == Status.BAKED and bake.messages.of(Level.WARNING):
+            status = Status.WARNED
+        # The status already says that the bake was cancelled.
+        levels = (Level.WARNING, Level.INFO) if status == Status.CANCELLED else Level
+        row = Row(bake.target, status, bake.messages.of(*levels))
+        self._last[bake.target] = self.rows[bake.target] = row
 
     def status_of(self, target: Target) -> Row | None:
         """How its last bake since the file was opened ended."""
-        return self._said.get(target)
+        return self._last.get(target)
 
     def failures(self) -> list[Row]:
         """Of the last bakes that failed or were cancelled."""
-        return [row for row in self._said.values() if row.status in (Status.FAILED, Status.CANCELLED)]
+        return [row for row in self._last.values() if row.status in (Status.FAILED, Status.CANCELLED)]
 
     def forget_failures(self) -> None:
         """Before a run, which says anew what fails."""
         for row in self.failures():
-            del self._said[row.target]
+            del self._last[row.target]
 
-    def messages(self) -> list[str]:
-        """Everything said, each sentence once."""
-        said = [
-            f"{row.target}: {sentence}" if not number and row.status == Status.FAILED else sentence
-            for row in self._said.values()
-            for number, sentence in enumerate(row.sentences)
-        ]
-        return list(dict.fromkeys(said))
+    def lines(self) -> list[str]:
+        """All messages of the last bakes, each once, in one line each."""
+        return list(dict.fromkeys(message.line() for row in self._last.values() for message in row.messages))
 
     def forget(self) -> None:
-        self._said.clear()
+        self._last.clear()
         self.rows.clear()
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...core.errors import sentence
+from ...core.errors import text_of
 from ...core.live.picture import for_live
 from ...core.live.subject import Subject
 from ...core.scene.illumination import Illumination
@@ -117,7 +117,7 @@ class Reader:
             check_instance(target.object_name, placed, view_layer)
             polygons = read_polygons(placed.obj, target.material_name, placed.matrix)
         except Exception as error:  # noqa: BLE001 - the others are still to be read
-            self.errors[target] = sentence(error)
+            self.errors[target] = text_of(error)
             return
         self._polygons[target] = before if before is not None and _are_equal(before, polygons) else polygons
 
@@ -155,7 +155,7 @@ class Reader:
             try:
                 check_image(node.image)
             except ValueError as error:
-                self.errors[target] = sentence(error)
+                self.errors[target] = text_of(error)
                 return None
             size = tuple(node.image.size)
         if target.object_name not in self._lit:
@@ -164,7 +164,7 @@ class Reader:
         try:
             texture = self._textures.read(depsgraph, target, self._polygons[target], size or settings.resolution)
         except Exception as error:  # noqa: BLE001 - the others are still to be read
-            self.errors[target] = sentence(error)
+            self.errors[target] = text_of(error)
             return None
         parts = {
             "polygons": self._polygons[target],

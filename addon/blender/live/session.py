@@ -9,10 +9,11 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ...core import native
-from ...core.errors import sentence
+from ...core.errors import text_of
 from ...core.live.painter import Painter
 from ...core.live.picture import Picture
 from ...core.live.subject import Subject
+from ...core.messages import Level, Message, note
 from ...core.target import Target
 from ..images.facts import owners_of
 from ..images.previews import holds_previews_alone, leave, previews
@@ -136,16 +137,17 @@ class Session:
         """Whether pictures are still to come."""
         return bool(self._marks) or self._painter.is_busy()
 
-    def sentences(self) -> list[str]:
-        """What there is to say."""
+    def messages(self) -> list[Message]:
+        """Messages about the preview."""
+        errors = (self._reader.errors | self._errors).items()
         said = [f"Live waits while the image '{name}' can be painted on." for name in self._painted_on]
-        said += [f"{target}: {why}" for target, why in (self._reader.errors | self._errors).items()]
         if self._painter.media.simulating:
             said.append(f"The medium ({self._painter.media.simulating}) is simulated: the most similar one stands in.")
         said += self._reader.sentences()
         if self._reader.left_out:
             said.append(f"Live leaves out {', '.join(self._reader.left_out)}.")
-        return said + self.kept()
+        notes = [note("", text) for text in said + self.kept()]
+        return [*(Message(Level.ERROR, str(target), why) for target, why in errors), *notes]
 
     def kept(self) -> list[str]:
         """What images keep of what others have drawn into pictures, in sentences."""
@@ -305,11 +307,12 @@ class _Live:
 live = _Live()
 
 
-def sentences() -> list[str]:
-    """What panels say of Live."""
+def messages() -> list[Message]:
+    """Messages about Live for panels."""
     if live.session is not None:
-        return live.session.sentences()
-    return [*([f"Live was switched off: {live.failure}"] if live.failure else []), *live.kept]
+        return live.session.messages()
+    ended = [f"Live was switched off: {live.failure}"] if live.failure else []
+    return [note("", text) for text in (*ended, *live.kept)]
 
 
 def step(context) -> float:
@@ -342,7 +345,7 @@ def _tick() -> float:
     try:
         return step(bpy.context)
     except Exception as error:  # noqa: BLE001 - Blender would drop the timer, and Live would be on and dead
-        live.failure = sentence(error)
+        live.failure = text_of(error)
         end()
         bpy.context.scene.beamspread.use_live = False
         return OFF_SECONDS

@@ -11,7 +11,7 @@ from ...core.scene.receiver import build_receiver, texture_size
 from ...core.scene.texture import Texture
 from ...core.scene.uv_map import Polygons, fit_uv_maps
 from ...core.target import Target
-from ..jobs.run.linked_color import UNLINKED, BaseColor, read_texture
+from ..jobs.run.linked_color import BaseColor, read_texture
 from ..node.find import find_node_in_groups
 from ..read.visibility import ObjectInstance, find_instances
 
@@ -64,7 +64,7 @@ class Textures:
 
     def sentences(self) -> list[str]:
         """What there is to say."""
-        said = [warning for read in self._read.values() for warning in read.base_color.warnings]
+        said = [str(message) for read in self._read.values() for message in read.base_color.warnings]
         said += [_unknown(target, read) for target, read in self._read.items() if read.base_color.unknown]
         coarse = dict.fromkeys(target.material_name for target, read in self._read.items() if read.is_coarse)
         said += [f"Live has the texture of '{name}' with {MOST_TEXELS} texels along a side." for name in coarse]
@@ -72,8 +72,8 @@ class Textures:
 
 
 def _unknown(target: Target, read: Read) -> str:
-    what = f"Live can't evaluate the Base Color of '{target.object_name}'"
-    return f"{what}, because {read.base_color.unknown} not understood, so {UNLINKED}: bakes have Cycles evaluate it."
+    shown = f"Live can't evaluate the Base Color of '{target.object_name}' and shows the node's own color"
+    return f"{shown}; bakes have Cycles evaluate it. {read.base_color.unknown}"
 
 
 def _evaluated(node, groups: tuple, placed: ObjectInstance, polygons: Polygons, size: tuple[int, int] | int) -> Read:

@@ -9,6 +9,7 @@ from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, PointerP
 from ...core.bake.surface import Surface
 from ...core.material.material import Material
 from ...core.material.presets import presets
+from ...core.messages import Message
 from .. import compat
 from ..registration import all_or_nothing, handlers
 from .draw import draw_node
@@ -108,8 +109,8 @@ def _is_shared(tree, plain=None) -> bool:
     return tree.users - tree.use_fake_user > users
 
 
-def link_result(node, image) -> tuple[list[str], list[str]]:
-    """Show `image` in the node, and the node at its material's output; warnings and notes, see `link_output`."""
+def link_result(node, image) -> list[Message]:
+    """Show `image` in the node, and the node at its material's output; messages as of `link_output`."""
     if node.node_tree is None:
         node.node_tree = make_inner_tree()
     node.image = image

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ...core.messages import Message, note, warning
 from .tree import NORMAL, ROUGHNESS
 
 PLAIN_LABEL = "Baked Light"
@@ -34,31 +35,32 @@ def is_shown(node) -> bool:
     return surface.links[0].from_node in (node, plain_of(node))
 
 
-def link_output(node) -> tuple[list[str], list[str]]:
+def link_output(node) -> list[Message]:
     """Put the node at its material's output, unless something uses it or the user has chosen.
 
-    What was there stays in the tree, and the node remembers it. Sentences: warnings, where the bake is not shown, and
-    notes on what it replaces.
+    The former shader stays in the tree, and the node remembers it. A warning says that the bake is not shown, a note
+    which shader it replaces.
     """
     tree = node.id_data
     if is_in_group(node):
         if is_linked(node):
-            return [], []
-        return [f"Nothing shows what is baked: link the BSDF of the node in '{tree.name}' to the group's output."], []
+            return []
+        remedy = f"Link the BSDF of the node in '{tree.name}' to the group's output."
+        return [warning(tree.name, "Nothing shows the bake.", remedy)]
     output = tree.get_output_node("ALL") or tree.nodes.new("ShaderNodeOutputMaterial")
     surface = output.inputs["Surface"]
     if not surface.is_linked:
         _link(surface, node)
-        return [], []
+        return []
     if is_linked(node):
-        return [], []
+        return []
     name, shader = _owner_name(tree), surface.links[0].from_node
     if former_output(node) is not None:
-        hidden = f"'{name}' shows '{shader.name}', and not what is baked: Show Baked Result in its node changes that."
-        return [hidden], []
+        text = f"'{name}' shows '{shader.name}' instead of the bake."
+        return [warning(name, text, "Show Baked Result in its node changes that.")]
     _remember(node, surface.links[0])
     _link(surface, node)
-    return [], [f"'{name}' now shows the baked result; '{shader.name}' is kept: Show Former Shader brings it back."]
+    return [note(name, f"'{name}' now shows the bake.", f"Show Former Shader brings '{shader.name}' back.")]
 
 
 def toggle(node) -> str:

@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...core.errors import NotSupportedError
 from ...core.scene.receiver import Receiver
 from .image_nodes import MISSING, Images, Pixels
-from .nodes import Evaluator, InputSocket, Links, NotUnderstoodError, Source, converted, shows_bake
+from .nodes import Evaluator, InputSocket, Links, Source, converted, shows_bake
 from .shading import ON_NO_PATH, ShadingPoints
 from .visibility import ObjectInstance
 
@@ -45,7 +46,7 @@ def read_base_color(
 
     Raises
     ------
-    NotUnderstoodError
+    NotSupportedError
         Names the first node that is not understood.
     """
     to_local, images, links = np.array(instance.matrix.inverted_safe(), dtype=float), Images(), Links()
@@ -71,7 +72,7 @@ def is_understood(wanted: InputSocket, obj) -> bool:
     nowhere = _outputs(np.zeros((1, 1, 2)), np.zeros((1, 1, 3)), np.eye(4))
     try:
         _OnChart(nowhere, Images(_Unread()), _uv_map(obj)).value(wanted)
-    except NotUnderstoodError:
+    except NotSupportedError:
         return False
     return True
 

@@ -6,10 +6,11 @@ from copy import copy
 
 import numpy as np
 
+from ...core.errors import NotSupportedError
 from ...core.scene.lights import MeshLight
 from .. import compat
 from .image_nodes import Images
-from .nodes import InputSocket, NotUnderstoodError, surface_of
+from .nodes import InputSocket, surface_of
 from .shading import ON_NO_PATH, ShadingPoints
 
 # Number of triangles that a mesh with an emissive image is cut into, at least; each has the mean of the image over it.
@@ -44,7 +45,7 @@ class Materials:
             return None
         try:
             light = ShadingPoints(images=self.images).value(surface)
-        except NotUnderstoodError:
+        except NotSupportedError:
             return surface
         return light if light.any() else None
 
@@ -99,7 +100,7 @@ class EmissiveMesh:
                 continue
             try:
                 self._parts.append(self._textured(light, corners[chosen], None if uvs is None else uvs[chosen]))
-            except NotUnderstoodError as error:
+            except NotSupportedError as error:
                 self.reason = str(error)
 
     def _textured(self, surface, corners: np.ndarray, uvs: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...core.errors import NotSupportedError
 from .node_math import rotation_matrix
-from .nodes import Links, NotUnderstoodError, Source
+from .nodes import Links, Source
 
 MISSING = np.array([1.0, 0.0, 1.0, 1.0], np.float32)  # Cycles' color for an image that it can't load
 EXTENSIONS = {"REPEAT": "repeat", "EXTEND": "extend", "CLIP": "clip", "MIRROR": "mirror"}
@@ -35,10 +36,10 @@ class UVTransform:
 
 
 def uv_transform_of(links: Links, texture: Source) -> UVTransform:
-    """UV transform of an Image Texture node; NotUnderstoodError names the node that has none."""
+    """UV transform of an Image Texture node; NotSupportedError names the node that has none."""
     node = texture.node
     if node.projection != "FLAT":
-        raise NotUnderstoodError(f"the projection of the node '{node.name}' is")
+        raise NotSupportedError("node", node.name, "its projection is not flat")
     uv_map, matrix = _uvs(links, texture)
     rows = tuple(tuple(float(value) for value in row) for row in matrix[:2])
     return UVTransform(uv_map, rows, EXTENSIONS[node.extension], node.interpolation != "Closest")
@@ -58,19 +59,19 @@ def _uvs(links: Links, texture: Source) -> tuple[str, np.ndarray]:
         return node.uv_map, matrix
     if node.bl_idname == "ShaderNodeAttribute" and node.attribute_type == "GEOMETRY" and source.socket.name != "Alpha":
         return node.attribute_name, matrix
-    raise NotUnderstoodError(f"the texture coordinates of the node '{node.name}' are")
+    raise NotSupportedError("node", node.name, "its coordinates are not those of a UV map")
 
 
 def _mapping(links: Links, mapping: Source) -> np.ndarray:
     """3 x 3 matrix of homogeneous UVs."""
     kind = mapping.node.vector_type
     if kind == "NORMAL":
-        raise NotUnderstoodError(f"the texture coordinates of the node '{mapping.node.name}' are")
+        raise NotSupportedError("node", mapping.node.name, "its coordinates are not those of a UV map")
 
     def numbers(name: str) -> np.ndarray:
         source = links.source(mapping.input(name))
         if source.socket.is_output:
-            raise NotUnderstoodError(f"the node '{mapping.node.name}', whose values are linked, is")
+            raise NotSupportedError("node", mapping.node.name, "its values are linked")
         return np.array(source.socket.default_value, float)
 
     rotation, scale, shift = rotation_matrix(numbers("Rotation")), numbers("Scale"), np.zeros(3)
@@ -96,7 +97,7 @@ class Pixels:
         if image is None:
             return MISSING[None, None]
         if image.source not in ("FILE", "GENERATED", "VIEWER"):
-            raise NotUnderstoodError(f"the image '{image.name}', which is no single one, is")
+            raise NotSupportedError("image", image.name, "it is a sequence, a movie or tiled")
         if image.name_full not in self._known:
             self._known[image.name_full] = self._read(image)
         return self._known[image.name_full]
@@ -131,7 +132,7 @@ class Images:
         return self._environments[name]
 
     def check(self, node) -> None:
-        """Raise NotUnderstoodError if a node's image can't be looked up."""
+        """Raise NotSupportedError if a node's image can't be looked up."""
         self._stored(node)
 
     def at(self, node, uvs: np.ndarray) -> dict[str, np.ndarray]:
@@ -146,7 +147,7 @@ class Images:
         if image is not None and not image.is_float:
             space = image.colorspace_settings
             if not (space.is_data or space.name == "sRGB" or space.name in ("Linear", "Linear Rec.709")):
-                raise NotUnderstoodError(f"the color space {space.name} of the image '{image.name}' is")
+                raise NotSupportedError("image", image.name, f"its color space is {space.name}")
         return self._pixels(image)
 
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ...core.errors import NotSupportedError
 from ...core.scene.lights import (
     AreaLight,
     Light,
@@ -17,7 +18,7 @@ from ...core.scene.lights import (
     SunLight,
 )
 from .. import compat
-from .nodes import NotUnderstoodError, surface_of
+from .nodes import surface_of
 from .shading import ShadingPoints
 
 
@@ -72,21 +73,21 @@ def is_portal(data) -> bool:
 
 
 def fault(light: Light) -> str:
-    """Reason why a light can't be baked, see `Light.fault`; a spot's cone depends on the lamp's scale."""
+    """The sentence that says why a light can't be baked; a spot's cone depends on the lamp's scale."""
     if isinstance(light, SpotLight | SphereSpotLight) and np.linalg.matrix_rank(light.frame) < 3:
-        return "its scale is 0"
+        return f"The scale of '{light.name}' is 0."
     return light.fault()
 
 
 def read_lamp(obj, matrix) -> tuple[Light | None, str]:
-    """The light, None if it is dark, and the reason why its nodes are ignored if they are not understood."""
+    """The light, None if it is dark, and the reason why its nodes are ignored if only Cycles can evaluate them."""
     data, axes = obj.data, np.array(matrix, dtype=float)
     color, reason = np.array(compat.light_color(data)), ""
     if data.use_nodes and data.node_tree is not None:
         surface = surface_of(data.node_tree)
         try:
             color = color * (0 if surface is None else ShadingPoints().value(surface))
-        except NotUnderstoodError as error:
+        except NotSupportedError as error:
             reason = str(error)
     strength = compat.light_strength(data) * _area_factor(data, axes)
     if strength == 0 or not color.any():

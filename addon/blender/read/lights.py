@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import bpy
 
+from ...core.messages import Message, Messages, warning
 from ...core.scene.illumination import Illumination
 from ...core.scene.lights import Light
 from .. import compat
@@ -41,7 +42,7 @@ def read_illumination(depsgraph, cache: SceneCache | None = None) -> Illuminatio
     return Illumination(
         lights.all(),
         occluders.occluders(),
-        (*lights.warnings, *dict.fromkeys(occluders.warnings)),
+        Messages([*lights.messages, *occluders.warnings]),
         compat.transparent_bounces(depsgraph.scene),
         lights.by_cycles,
         lights.receivers,
@@ -75,8 +76,8 @@ class _Lights:
         # By object name and mesh: geometry nodes may give an object several meshes.
         self._emissive: dict[tuple[str, int], EmissiveMesh] = {}
         self._links: dict[str, dict] = {}
-        self.warnings: dict[str, None] = {}  # in order, each once
-        self.by_cycles: dict[str, str] = {}  # see Illumination
+        self.messages: list[Message] = []
+        self.by_cycles: dict[str, Message] = {}  # see Illumination
         self.receivers: dict[str, frozenset[str]] = {}
 
     def all(self) -> list[Light]:
@@ -85,9 +86,9 @@ class _Lights:
             self._add(light, self._links[light.name])
         return self._lights
 
-    def warn(self, sentence: str) -> None:
-        if sentence:
-            self.warnings[sentence] = None
+    def warn(self, message: Message | None) -> None:
+        if message is not None:
+            self.messages.append(message)
 
     def add_lamp(self, obj, matrix) -> None:
         if is_portal(obj.data):
@@ -95,8 +96,7 @@ class _Lights:
         light, reason = read_lamp(obj, matrix)
         links = links_of(obj, self._names)
         if reason:
-            why = f"The light '{obj.name}' counts as if it had no nodes: {reason} not understood."
-            self._leave_to_cycles(obj.name, why, links)
+            self._leave_to_cycles(obj.name, f"The light '{obj.name}' is baked without its nodes. {reason}", links)
         if light is not None:
             self._add(light, links)
 
@@ -111,8 +111,8 @@ class _Lights:
             self._emissive[key] = mesh = meshes[key].without_instances()
             self._links[obj.name] = links_of(obj, self._names)
             if mesh.reason:
-                why = f"The light of '{obj.name}' is left out: {mesh.reason} not understood."
-                self._leave_to_cycles(obj.name, why, self._links[obj.name])
+                text = f"The emission of '{obj.name}' is left out. {mesh.reason}"
+                self._leave_to_cycles(obj.name, text, self._links[obj.name])
         self._emissive[key].add_instance(instance.matrix_world)
 
     def add_world(self, view_layer, world) -> None:
@@ -121,18 +121,18 @@ class _Lights:
             self._cache.world = key, read_world(view_layer, world, self._cache.emission.images)
         light, reason = self._cache.world[1]
         if reason:
-            self.by_cycles[world.name] = f"The world '{world.name}' is left out: {reason} not understood."
+            self.by_cycles[world.name] = warning(world.name, f"The world '{world.name}' is left out. {reason}")
         if light is not None:
             self._add(light, {})
 
-    def _leave_to_cycles(self, name: str, why: str, links: dict) -> None:
-        self.by_cycles[name] = why
+    def _leave_to_cycles(self, name: str, text: str, links: dict) -> None:
+        self.by_cycles[name] = warning(name, text)
         if links.get("receivers") is not None:
             self.receivers[name] = links["receivers"]
 
     def _add(self, light: Light, links: dict) -> None:
         if why := fault(light):
-            self.warn(f"The light '{light.name}' is left out: {why}.")
+            self.warn(warning(light.name, f"The light '{light.name}' is left out. {why}"))
         else:
             self._lights.append(replace(light, **links))
 

@@ -12,15 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...core.errors import NotSupportedError
 from .node_math import FUNCTIONS, LUMINANCE
 
 OWN_NODE = "BeamspreadNode"
 # Name of the node's inner tree. Its nodes show a bake, which neither shines on other objects nor lets light through.
 INNER_TREE = ".Beamspread"
-
-
-class NotUnderstoodError(Exception):
-    """What of a node tree is not understood, as the beginning of a sentence about it."""
 
 
 class Source(NamedTuple):
@@ -156,8 +153,8 @@ class Evaluator:
 
         Raises
         ------
-        NotUnderstoodError
-            Names the first node that is not understood.
+        NotSupportedError
+            Names the first node that only Cycles can evaluate.
         """
         source, is_shader = self.links.source(wanted), wanted.socket.type == "SHADER"
         if source.socket.is_output and not source.node.mute:
@@ -183,7 +180,7 @@ class Evaluator:
         known = FUNCTIONS.get(source.node.bl_idname)
         value = None if known is None else known(Node(self, source))
         if value is None:
-            raise NotUnderstoodError(f"the node '{source.node.name}' is")
+            raise NotSupportedError("node", source.node.name)
         return np.asarray(value, float)
 
     def _outcome(self, wanted: InputSocket, key: tuple[Source, bool]) -> np.ndarray:
@@ -193,11 +190,11 @@ class Evaluator:
             outcome = self._outcomes[key]
         else:
             raise _MissingError(key)
-        if isinstance(outcome, NotUnderstoodError):
+        if isinstance(outcome, NotSupportedError):
             raise outcome.with_traceback(None)
         return outcome
 
-    def _evaluate(self, wanted: InputSocket, key: tuple[Source, bool]) -> np.ndarray | NotUnderstoodError:
+    def _evaluate(self, wanted: InputSocket, key: tuple[Source, bool]) -> np.ndarray | NotSupportedError:
         readers = self.links.readers(wanted)
         self._outcomes, stack = {}, {key: None}
         try:
@@ -210,12 +207,10 @@ class Evaluator:
                     outcome = self.shader(source) if is_shader else self._value_of(source)
                 except _MissingError as missing:
                     if missing.key in stack:
-                        raise NotUnderstoodError(
-                            f"the node '{source.node.name}', which is linked in a circle, is"
-                        ) from None
+                        raise NotSupportedError("node", source.node.name, "it is linked in a circle") from None
                     stack[missing.key] = None
                     continue
-                except NotUnderstoodError as error:
+                except NotSupportedError as error:
                     outcome = error
                 del stack[last]
                 self._outcomes[last] = outcome

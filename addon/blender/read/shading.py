@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from ...core.errors import NotSupportedError
 from .image_nodes import Images, environment_coordinates, lookup
-from .nodes import Evaluator, InputSocket, Links, NotUnderstoodError, Source, converted, shows_bake
+from .nodes import Evaluator, InputSocket, Links, Source, converted, shows_bake
 
 ZERO, DARK = np.zeros(1), np.zeros(3)
 
@@ -111,7 +112,7 @@ def _product(points: ShadingPoints, source: Source, *names: str) -> np.ndarray:
     for name in names:
         try:
             product = product * points.value(source.input(name))
-        except NotUnderstoodError as error:
+        except NotSupportedError as error:
             reason = reason or error
     if reason and product.any():
         raise reason
@@ -135,7 +136,7 @@ def _add(points: ShadingPoints, source: Source) -> np.ndarray:
 def _mix(points: ShadingPoints, source: Source) -> np.ndarray:
     try:
         factor = np.clip(points.value(source.input(0)), 0, 1)
-    except NotUnderstoodError:
+    except NotSupportedError:
         if points.value(source.input(1)).any() or points.value(source.input(2)).any():
             raise
         return DARK

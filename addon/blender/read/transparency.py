@@ -12,10 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...core.errors import NotSupportedError
+from ...core.messages import Message, warning
 from ...core.native import native
 from .. import compat
 from .image_nodes import Pixels, UVTransform, alpha_of, color_of, resampled, uv_transform_of
-from .nodes import Evaluator, InputSocket, Links, NotUnderstoodError, Source, converted, shows_bake, surface_of
+from .nodes import Evaluator, InputSocket, Links, Source, converted, shows_bake, surface_of
 
 # Size of the first evaluation, which tells images from constants.
 PROBE = (2, 2)
@@ -116,7 +118,7 @@ class TexelEvaluator(Evaluator):
         if stored.shape[:2] != (1, 1):
             transform = uv_transform_of(self.links, source)
             if self.transform not in (None, transform):
-                raise NotUnderstoodError(f"the node '{node.name}', which places its image otherwise than another, is")
+                raise NotSupportedError("node", node.name, "its UV transform is not that of the other images")
             self.transform = transform
             self.largest = tuple(map(max, self.largest, stored.shape[:2]))
             stored = np.zeros_like(stored[:1, :1]) if self._is_outside else resampled(stored, transform, self._size)
@@ -125,7 +127,7 @@ class TexelEvaluator(Evaluator):
     def _light_path(self, source: Source) -> np.ndarray:
         """Light Path, which answers for shadow rays of any origin."""
         if not source.socket.name.startswith("Is "):
-            raise NotUnderstoodError(f"the output '{source.socket.name}' of the node '{source.node.name}' is")
+            raise NotSupportedError("node", source.node.name, f"its output '{source.socket.name}' is used")
         return np.array([float(source.socket.name == "Is Shadow Ray")])
 
 
@@ -144,10 +146,10 @@ def constant(value: int) -> MaterialTransmittance:
 
 
 class Materials:
-    """Transmittances of materials, each evaluated once; `warnings` are sentences about those not understood."""
+    """Transmittances of materials, each evaluated once; `warnings` are about those that only Cycles can evaluate."""
 
     def __init__(self) -> None:
-        self.warnings: list[str] = []
+        self.warnings: list[Message] = []
         self._known: dict[str | None, MaterialTransmittance] = {None: constant(0)}
 
     def read(self, material) -> MaterialTransmittance:
@@ -170,14 +172,14 @@ class Materials:
         if not surface.socket.is_linked:
             if not surface.socket.node.inputs["Volume"].is_linked:
                 return constant(0)
-            self.warnings.append(
-                f"The material '{material.name}' has only a volume: it casts no shadow, whatever the volume absorbs."
-            )
+            text = f"The material '{material.name}' has a volume and no surface: it casts no shadow."
+            self.warnings.append(warning(material.name, text))
             return constant(1)
         try:
             return self._evaluate(surface)
-        except NotUnderstoodError as reason:
-            self.warnings.append(f"The material '{material.name}' casts opaque shadows: {reason} not understood.")
+        except NotSupportedError as error:
+            text = f"The material '{material.name}' casts opaque shadows. {error}"
+            self.warnings.append(warning(material.name, text))
             return constant(0)
 
     def _evaluate(self, surface: InputSocket) -> MaterialTransmittance:

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from ...core.errors import BakeError
+from ...core.messages import Message, warning
 from .. import compat
 
 # Types of objects whose surfaces become meshes, and of all objects that light bounces from.
@@ -232,23 +233,25 @@ def _instances(obj, name: str) -> bool:
     return any(inner.name == name for inner in with_instanced([obj]) if inner != obj)
 
 
-def left_out(obj) -> str:
-    """A sentence about an evaluated object whose shadow and light a bake leaves out, wholly or in part, or ""."""
+def left_out(obj) -> Message | None:
+    """Warning about an evaluated object if a bake leaves out its shadow and light, wholly or in part."""
     if obj.type in UNKNOWN_TYPES:
-        return f"'{obj.name}' is {UNKNOWN_TYPES[obj.type]}: its shadow and its own light are not baked."
+        text = f"'{obj.name}' is {UNKNOWN_TYPES[obj.type]}: its shadow and its own light are not baked."
+        return warning(obj.name, text)
     if any(_draws_hair(system.settings) for system in getattr(obj, "particle_systems", ())):
-        return f"The hair of '{obj.name}' is not baked: neither its shadow nor its own light."
-    return ""
+        return warning(obj.name, f"The hair of '{obj.name}' is not baked: neither its shadow nor its own light.")
+    return None
 
 
-def left_out_of_world(world) -> str:
-    """A sentence about a world whose fog a bake leaves out, or ""."""
+def left_out_of_world(world) -> Message | None:
+    """Warning about a world whose fog a bake leaves out."""
     if world is None or not compat.uses_nodes(world):
-        return ""
+        return None
     output = world.node_tree.get_output_node("CYCLES")
     if output is None or not output.inputs["Volume"].is_linked:
-        return ""
-    return f"The volume of the world '{world.name}' is not baked: neither the light that it absorbs nor its own light."
+        return None
+    text = f"The volume of the world '{world.name}' is not baked: neither the light that it absorbs nor its own light."
+    return warning(world.name, text)
 
 
 def _draws_hair(settings) -> bool:

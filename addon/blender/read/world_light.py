@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...core.errors import NotSupportedError
 from ...core.scene.lights import WorldLight
 from .. import compat
 from .image_nodes import MAX_WIDTH, Images
-from .nodes import InputSocket, NotUnderstoodError, surface_of
+from .nodes import InputSocket, surface_of
 from .shading import ON_NO_PATH, ShadingPoints
 
 # Size in texels of a panorama without images: a quarter of a degree per texel.
@@ -27,7 +28,7 @@ def read_world(view_layer, world, images: Images) -> tuple[WorldLight | None, st
         return None, ""
     try:
         return _panorama(world.name, surface, images), ""
-    except NotUnderstoodError as error:
+    except NotSupportedError as error:
         return None, str(error)
 
 

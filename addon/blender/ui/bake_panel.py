@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from types import SimpleNamespace
 
 import bpy
@@ -9,7 +10,10 @@ import bpy
 from ...core import native
 from ...core.bake.estimate import in_words, ray_seconds, solver_seconds
 from ...core.bake.luminance import MOST_RAYS, rays_per_texel
-from ...core.errors import BakeError
+from ...core.errors import BakeError, message_of
+from ...core.messages import Messages
+from ...core.scene.uv_map import check_uvs
+from ...core.target import Target
 from .. import compat
 from ..cycles.colors import bytes_of_colors, seconds_of_colors
 from ..cycles.cycles_light import seconds_estimate
@@ -39,33 +43,35 @@ ICONS = {
 LONG_SECONDS = 10.0
 
 
-def warnings_for(obj, places: dict[str, int]) -> list[str]:
-    """What would keep the object from being baked, as far as it is known without baking.
+def problems_of(obj, places: dict[str, int]) -> Messages:
+    """Errors that a bake of the object would end with, as far as they are known without baking.
 
-    `places`: see `rendered_counts`.
+    `places` is the result of `rendered_counts`. An error of the object as a whole comes once for each of its targets.
     """
-    messages = [bake.error for bake in find_misplaced([obj] if obj.instance_type == "NONE" else [])]
+    misplaced = find_misplaced([obj] if obj.instance_type == "NONE" else [])
+    messages = Messages(message for bake in misplaced for message in bake.messages)
     materials, view_layer = materials_of(obj), bpy.context.view_layer
     if materials and obj.name not in view_layer.objects:  # an instance alone
         materials = [one for one in materials if not was_baked_elsewhere(one)]
     if not materials:
         return messages
-    if not obj.data.uv_layers:
-        messages.append("The mesh has no UV map: unwrap it first.")
     times = places.get(obj.name, 0)
-    checks = [lambda: check_instance(obj.name, ObjectInstance(obj, None, times) if times else None, view_layer)]
     for material in materials:
+        node = find_node(material)
+        checks = [
+            lambda: obj.data.uv_layers or check_uvs(None),
+            lambda: check_instance(obj.name, ObjectInstance(obj, None, times) if times else None, view_layer),
+            lambda node=node: node.surface().check(),
+        ]
         if bpy.context.scene.beamspread.output == "LUMINANCE":
             checks.append(lambda material=material: check_editable(material))
-        node = find_node(material)
-        checks.append(lambda node=node: node.surface().check())
         if node.image is not None:
             checks.append(lambda node=node: check_image(node.image))
-    for check in checks:
-        try:
-            check()
-        except BakeError as error:
-            messages.append(str(error))
+        for check in checks:
+            try:
+                check()
+            except BakeError as error:
+                messages.add(message_of(error, str(Target(obj.name, material.name))))
     return messages
 
 
@@ -73,26 +79,22 @@ def warnings_for(obj, places: dict[str, int]) -> list[str]:
 BORDER_PIXELS, LETTER_PIXELS = 60, 6.4
 
 
-def draw_warnings(layout, context, messages: list[str]) -> None:
-    draw_sentences(layout, context, messages, "ERROR")
-
-
-def draw_sentences(layout, context, messages: list[str], icon: str) -> None:
-    """Wrapped to the panel's width, each after an icon."""
+def draw_lines(layout, context, lines: Iterable[str], icon: str) -> None:
+    """Draw texts after an icon each, wrapped to the panel's width."""
     pixels = context.region.width / context.preferences.system.ui_scale
     width = max(20, int((pixels - BORDER_PIXELS) / LETTER_PIXELS))
-    for message in messages:
+    for text in lines:
         column = layout.column(align=True)
-        for number, line in enumerate(wrap(message, width)):
+        for number, line in enumerate(wrap(text, width)):
             column.label(text=line, icon="BLANK1" if number else icon)
 
 
 def draw_bake(layout, context, material_name: str = "") -> None:
     """The progress, or problems of the selected objects and the Bake buttons; then how targets stand."""
     if native.problem:
-        draw_warnings(layout, context, [native.problem])
+        draw_lines(layout, context, [native.problem], "ERROR")
         return
-    shown: set[str] = set()
+    shown = Messages()
     if state.is_running():
         draw_progress(layout, context)
     else:
@@ -101,26 +103,26 @@ def draw_bake(layout, context, material_name: str = "") -> None:
         row = layout.row()
         row.use_property_split = False  # as wide as the buttons above
         row.prop(context.scene.beamspread, "use_live", toggle=True, icon="PLAY")
-        # What keeps an object from being baked keeps it from following, too.
-        said = [one for one in session.sentences() if one.partition(": ")[2] not in shown]
-        draw_sentences(layout, context, said, "INFO")
-        shown.update(one.partition(": ")[2] for one in said)
+        # An error that keeps an object from being baked keeps Live from following it, too.
+        new = Messages(message for message in session.messages() if message not in shown)
+        draw_lines(layout, context, [message.line() for message in new], "INFO")
+        shown.add(*new)
     draw_results(layout, context, material_name, shown)
 
 
-def draw_problems(layout, context) -> set[str]:
-    """What would keep selected objects, and what they show of collections, from being baked; the sentences."""
+def draw_problems(layout, context) -> Messages:
+    """Draw and return the errors that selected objects, and the objects that these instance, would end with."""
     # `context.object` is empty in the render properties.
     view_layer = context.view_layer
     chosen, places = list(view_layer.objects.selected)[:MOST_OBJECTS], rendered_counts(view_layer)
     inner = with_instanced(chosen)[len(chosen) :][:MOST_LOOKED_AT]
     own = {obj.name for obj in view_layer.objects} if inner else set()
-    shown, left = set(), MOST_OBJECTS
+    shown, left = Messages(), MOST_OBJECTS
     for obj in [*chosen, *(one for one in inner if one.name not in own)]:
-        warnings = warnings_for(obj, places) if left else []
-        draw_warnings(layout, context, [f"{obj.name}: {message}" for message in warnings])
-        shown.update(warnings)
-        left -= bool(warnings)
+        problems = problems_of(obj, places) if left else Messages()
+        draw_lines(layout, context, dict.fromkeys(f"{obj.name}: {message}" for message in problems), "ERROR")
+        shown.add(*problems)
+        left -= bool(problems)
     return shown
 
 
@@ -139,32 +141,29 @@ def draw_progress(layout, context) -> None:
     """What is being done, a bar where Blender has one, the time left, and Cancel."""
     progress = state.progress
     column = layout.column(align=True)
-    draw_sentences(column, context, [f"{progress.doing or 'Baking'}: {progress.target}"], "RENDER_STILL")
+    draw_lines(column, context, [f"{progress.doing or 'Baking'}: {progress.target}"], "RENDER_STILL")
     compat.draw_progress_bar(column, progress.everything, progress.in_short())
     column.operator("beamspread.cancel", icon="X")
 
 
-def draw_results(layout, context, material_name: str, shown: set[str]) -> None:
-    """How each target stands, with what there is to say about it; those of one material, or of all."""
+def draw_results(layout, context, material_name: str, shown: Messages) -> None:
+    """Draw the status of each target of one material, or of all, with the messages that are not `shown` yet."""
     rows = [row for row in state.rows.values() if material_name in ("", row.target.material_name)]
     if not rows:
         return
-    # First what needs looking at.
+    # Rows that need attention come first.
     rows.sort(key=lambda row: row.status in (Status.NEVER, Status.BAKED))
     box = layout.box().column(align=True)
     for row in rows[:MOST_OBJECTS]:
-        standing = _standing(row)
-        draw_sentences(box, context, [f"{row.target.object_name}: {standing.value}"], ICONS[standing])
-        # Why it is out of date is said of each, other sentences once.
-        is_said_of_each = row.is_stale and row.status not in (Status.FAILED, Status.CANCELLED)
-        sentences = [one for one in row.sentences if one not in shown or (is_said_of_each and one == row.sentences[0])]
-        shown.update(sentences)
-        draw_sentences(box, context, sentences, "DOT")
+        status = _status(row)
+        draw_lines(box, context, [f"{row.target.object_name}: {status.value}"], ICONS[status])
+        draw_lines(box, context, [str(message) for message in row.messages if message not in shown], "DOT")
+        shown.add(*row.messages)
     if len(rows) > MOST_OBJECTS:
         box.label(text=f"And {len(rows) - MOST_OBJECTS} more", icon="BLANK1")
 
 
-def _standing(row: Row) -> Status:
+def _status(row: Row) -> Status:
     running = state.progress is not None and state.progress.target == row.target
     return Status.RUNNING if running else row.status
 

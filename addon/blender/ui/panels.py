@@ -15,7 +15,7 @@ from ..node.tree import BASE_COLOR
 from ..preferences import draw_help
 from ..read.nodes import InputSocket, Links
 from ..registration import all_or_nothing, classes
-from .bake_panel import draw_bake, draw_sentences, estimates
+from .bake_panel import draw_bake, draw_lines, estimates
 
 
 def _use_columns(layout) -> None:
@@ -62,7 +62,7 @@ class BEAMSPREAD_PT_render(RenderPanel, bpy.types.Panel):
             column.prop(settings, name)
         draw_image_buttons(column, context)  # beside the resolution, which existing images don't follow
         column.prop(settings, "use_indirect")
-        draw_sentences(column, context, estimates(context), "TIME")
+        draw_lines(column, context, estimates(context), "TIME")
 
 
 class BEAMSPREAD_PT_expert(RenderPanel, bpy.types.Panel):
@@ -103,7 +103,7 @@ class BEAMSPREAD_PT_active_image(RenderPanel, bpy.types.Panel):
         layout = self.layout
         _use_columns(layout)
         active = context.view_layer.objects.active  # `context.object` is empty in the render properties
-        draw_sentences(layout, context, [target_of_blender(getattr(active, "active_material", None))], "INFO")
+        draw_lines(layout, context, [target_of_blender(getattr(active, "active_material", None))], "INFO")
         layout.operator("object.bake", text="Bake Active Image", icon="RENDER_STILL")
         layout.prop(context.scene.render.bake, "margin")
         layout.prop(context.scene.render.bake, "use_clear", text="Clear Image")

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import BakeError
 from ..ldf.library import is_known, library
+from ..messages import Message, warning
 from ..progress import Progress, say, stages, timed
 from ..scene.illumination import Illumination
 from ..scene.receiver import Receiver
@@ -135,39 +136,38 @@ class BakeJob:
         limit = self.settings.memory_limit or machine_bytes()
         return max(1, int(limit - self.memory_bytes())) if limit else 0
 
-    def warnings(self) -> list[str]:
-        """What the artist should know before it runs."""
-        return [*self.left_out(), *filter(None, [self._surely_dark()])]
+    def messages(self) -> list[Message]:
+        """What the artist should know before the job runs."""
+        return [*self.left_out(), *self._surely_dark()]
 
-    def left_out(self) -> list[str]:
-        """Light that is missing from it, in sentences."""
-        return [*self.illumination.warnings, *filter(None, [self._shining_through()])]
+    def left_out(self) -> list[Message]:
+        """Messages about light that is missing from the job."""
+        return [*self.illumination.messages, *self._shining_through()]
 
-    def _shining_through(self) -> str:
-        """Of a slab, the lights that can reach its back: from there, light comes through to the side that is baked."""
+    def _shining_through(self) -> list[Message]:
+        """The warning about lights behind a slab: they shine through to the side that is baked."""
         if COMBINED not in self.settings.layers or not self.surface.thickness:
-            return ""
+            return []
         backs = [replace(one.grid, normal=tuple(-value for value in one.grid.normal)) for one in self.receiver.charts]
         lights = [light for light in self.illumination.lights if not all(light.is_behind(back) for back in backs)]
         if not lights:
-            return ""
+            return []
         names = ", ".join(f"'{light.name}'" for light in lights)
-        return f"What shines through the slab '{self.name}' from behind is not baked yet: light of {names}."
+        text = f"Light that shines through the slab '{self.name}' from behind is not baked yet: that of {names}."
+        return [warning(self.name, text)]
 
-    def _surely_dark(self) -> str:
-        return "" if self.more_light is not None else self._dark_by_lights()
+    def _surely_dark(self) -> list[Message]:
+        return [] if self.more_light is not None else self._dark_by_lights()
 
-    def _dark_by_lights(self) -> str:
-        """Why none of its own lights can reach it, whatever stands in their way; empty where one can."""
+    def _dark_by_lights(self) -> list[Message]:
+        """The warning that none of the lights can reach the receiver, whatever the occluders."""
         lights = self.illumination.lights
         if not lights:
-            return "No light of the scene can be baked: it is black."
+            return [warning("", "The scene has no light that can be baked, so the result is black.")]
         if all(light.is_behind(chart.grid) for light in lights for chart in self.receiver.charts):
-            return (
-                f"All lights are behind '{self.name}', where its normals don't point, so it is black: "
-                "flip them (Mesh > Normals > Flip in Edit Mode)."
-            )
-        return ""
+            text = f"All lights are behind '{self.name}', so it is black."
+            return [warning(self.name, text, "Flip its normals (Mesh > Normals > Flip in Edit Mode).")]
+        return []
 
     def is_dark(self, layers: dict[str, np.ndarray]) -> bool:
         """Whether its result shows that no light arrived; what absorbs everything is black in any light."""
@@ -177,12 +177,12 @@ class BakeJob:
         telling = [texture for name, texture in layers.items() if name in WITHOUT_MEDIUM or any(color)]
         return bool(telling) and not any(texture.any() for texture in telling)
 
-    def warnings_after(self, layers: dict[str, np.ndarray]) -> list[str]:
-        """What only its result shows."""
+    def messages_after(self, layers: dict[str, np.ndarray]) -> list[Message]:
+        """The messages that follow from the result."""
         if self._surely_dark() or not self.is_dark(layers):
             return []
-        in_the_way = f"No light reaches '{self.name}', so it is black: look for what stands in its way."
-        return [self._dark_by_lights() or in_the_way]
+        text = f"No light reaches '{self.name}', so it is black."
+        return self._dark_by_lights() or [warning(self.name, text, "Look for objects that block the light.")]
 
 
 def needs_medium(settings: BakeSettings) -> bool:

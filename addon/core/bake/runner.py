@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..errors import sentence
+from ..errors import message_of
+from ..messages import Level, Message, Messages, warning
 from ..native import native
 from ..progress import Progress
 from ..target import Target
@@ -22,24 +23,39 @@ class Bake:
     Attributes
     ----------
     job : None where there can be none; `error` says why.
-    layers : once it has run; see `BakeJob.run`.
-    path : the file that `keep` has written, if it has.
-    seconds : that run and keep took.
-    error : one sentence unless `status` is "written".
-    warnings : sentences that hold whatever the status.
-    notes : sentences on what it has changed as planned.
-    is_dark : once it has run, whether no light arrived.
+    status : one of the constants above; FAILED until `keep` has stored the result.
+    messages : all messages for the artist; an error among them unless the status is WRITTEN.
+    layers : results of the job, see `BakeJob.run`; empty before it has run and once they are stored.
+    path : file that `keep` has written, if any.
+    seconds : wall-clock time of `run` and `keep`.
+    is_dark : True if the job has run and no light arrived.
     """
 
-    def __init__(self, target: Target, job: BakeJob | None = None, error: str = "") -> None:
-        self.target, self.job, self.error = target, job, error
+    def __init__(self, target: Target, job: BakeJob | None = None, error: Exception | str = "") -> None:
+        self.target, self.job = target, job
         self.status = FAILED
+        self.messages = Messages(job.messages() if job else ())
         self.layers: dict[str, np.ndarray] = {}
         self.path = ""
         self.is_dark = False
         self.seconds = 0.0
-        self.warnings = job.warnings() if job else []
-        self.notes: list[str] = []
+        if error:
+            self.fail(error)
+
+    @property
+    def error(self) -> str:
+        """Why there is no result; "" if there is no error."""
+        return " ".join(map(str, self.messages.of(Level.ERROR)))
+
+    def fail(self, error: Exception | str) -> None:
+        """Note why there is no result."""
+        if isinstance(error, str):
+            self.messages.add(Message(Level.ERROR, str(self.target), error))
+        else:
+            self.messages.add(message_of(error, str(self.target)))
+
+    def warn(self, subject: str, text: str, remedy: str = "") -> None:
+        self.messages.add(warning(subject, text, remedy))
 
     def run(self, progress: Progress | None = None) -> None:
         """Make the layers. Touches nothing of the host's, so that it may run in any thread."""
@@ -49,22 +65,21 @@ class Bake:
         try:
             self.job, rest = self.job.colored(progress)
             job, rest = self.job.lit(rest)  # not kept: what was found is large
-            self._warn(job.warnings())
+            self.messages.add(*job.messages())
             self.layers = job.run(rest)
             self.is_dark = job.is_dark(self.layers)
-            self._warn(job.warnings_after(self.layers))
+            self.messages.add(*job.messages_after(self.layers))
         except (KeyboardInterrupt, native.Cancelled):
             self.cancel()
         except Exception as error:  # noqa: BLE001 - the others are still to be baked
-            self.error = sentence(error)
+            self.fail(error)
         self.seconds += time.monotonic() - start
 
-    def _warn(self, sentences: list[str]) -> None:
-        self.warnings += [one for one in sentences if one not in self.warnings]
-
     def cancel(self) -> None:
-        """Drop what it has made, so that nothing is kept."""
-        self.layers, self.status, self.error = {}, CANCELLED, "The bake was cancelled."
+        """Drop the result, so that nothing is kept."""
+        self.layers, self.status = {}, CANCELLED
+        self.messages = Messages(self.messages.of(Level.WARNING, Level.INFO))
+        self.fail("The bake was cancelled.")
 
     def keep(self, store: Callable[[Bake], str]) -> None:
         """Have `store` put the layers where they belong; it returns the path of the file written, if one was."""
@@ -73,13 +88,9 @@ class Bake:
         start = time.monotonic()
         try:
             self.path = store(self)
-            self.status, self.error = WRITTEN, ""
+            self.status = WRITTEN
         except Exception as error:  # noqa: BLE001 - e.g. the material was deleted meanwhile
-            self.error = sentence(error)
+            self.fail(error)
         finally:
             self.layers = {}  # large
         self.seconds += time.monotonic() - start
-
-    def messages(self) -> list[str]:
-        """The error, if there is one, the warnings and the notes."""
-        return [*filter(None, [self.error]), *self.warnings, *self.notes]

@@ -32,7 +32,7 @@ class Inventory:
 def _light(illumination: Illumination) -> Iterator[str]:
     yield f"{len(illumination.lights)} lights; {illumination.triangle_count} triangles in the light's way"
     yield from map(_one_light, illumination.lights)
-    yield from illumination.warnings
+    yield from map(str, illumination.messages)
 
 
 def _one_light(light: Light) -> str:

@@ -43,10 +43,10 @@ class BakeRecord:
     def of(cls, bake: Bake, frame: int) -> BakeRecord:
         """What became of a bake."""
         job, subject = bake.job, (bake.target.object_name, bake.target.material_name, frame, bake.path)
-        outcome = round(bake.seconds, 3), bake.status, " ".join(bake.messages())
+        outcome = round(bake.seconds, 3), bake.status, " ".join(map(str, bake.messages))
         if job is None:
             return cls(*subject, 0, 0, *outcome)
-        lights = len(job.illumination.lights), job.left_out(), job.settings.indirect
+        lights = len(job.illumination.lights), [str(message) for message in job.left_out()], job.settings.indirect
         size = job.receiver.width, job.receiver.height
         return cls(*subject, *size, *outcome, job.settings.output, *lights, bake.is_dark)
 

@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Sequence
 
-from ..errors import sentence
+from ..errors import text_of
 from ..native import native
 from ..progress import Progress
 from ..target import Target
@@ -164,7 +164,7 @@ class Painter:
         except native.Cancelled:
             raise
         except Exception as error:  # noqa: BLE001 - the window says it, and the others are still to be painted
-            picture = Picture(subject, error=sentence(error))
+            picture = Picture(subject, error=text_of(error))
         self._pictures.put((epoch, picture))
         return not picture.error
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from copy import copy
 
 import numpy as np
 
+from ..messages import Message, Messages
 from .grid import Grid
 from .lights import Light
 from .occluders import Mesh, Occluder, build
@@ -24,8 +25,7 @@ class Illumination:
     Attributes
     ----------
     lights : those that can be baked.
-    warnings : sentences that name what is left out.
-    by_cycles : names of the lights that only Cycles knows, each with the sentence that says what counts instead.
+    by_cycles : names of the lights that only Cycles can evaluate, each with the message for a bake without Cycles.
     receivers : of these lights the names of the objects that they are linked to, of those that are not linked to all.
     """
 
@@ -33,15 +33,15 @@ class Illumination:
         self,
         lights: Sequence[Light],
         occluders: Sequence[Occluder] | Mesh | None = None,
-        warnings: Sequence[str] = (),
+        messages: Iterable[Message] = (),
         most_crossings: int | None = None,
-        by_cycles: Mapping[str, str] | None = None,
+        by_cycles: Mapping[str, Message] | None = None,
         receivers: Mapping[str, Collection[str]] | None = None,
     ) -> None:
         """`most_crossings`: light that crossed so many see-through surfaces ends at the next; None: it never does."""
         self.lights = tuple(lights)
         self.by_cycles, self.receivers = dict(by_cycles or {}), dict(receivers or {})
-        self.warnings = (*warnings, *self.by_cycles.values())
+        self._messages = tuple(messages)
         self._occluders = (Occluder("", occluders),) if isinstance(occluders, Mesh) else tuple(occluders or ())
         self._most_crossings = most_crossings
         # By origin and names of the blockers, all of the same origin.
@@ -55,18 +55,21 @@ class Illumination:
         return linked.found(beyond & set(self.by_cycles))
 
     def found(self, names: Collection[str]) -> Illumination:
-        """The same without those lights of `by_cycles`, as Cycles takes them over: what counted instead is gone."""
+        """The same without these lights of `by_cycles`, which Cycles takes over, and without their messages."""
         rest = copy(self)
-        said = {self.by_cycles[name] for name in names}
-        rest.by_cycles = {name: why for name, why in self.by_cycles.items() if name not in names}
-        rest.warnings = tuple(one for one in self.warnings if one not in said)
+        rest.by_cycles = {name: message for name, message in self.by_cycles.items() if name not in names}
         rest.lights = tuple(light for light in self.lights if light.name not in names)
         return rest
 
-    def warning(self, *sentences: str) -> Illumination:
-        """The same with more to say."""
+    @property
+    def messages(self) -> tuple[Message, ...]:
+        """Messages about light that is left out."""
+        return tuple(Messages([*self._messages, *self.by_cycles.values()]))
+
+    def with_messages(self, *messages: Message) -> Illumination:
+        """The same with more messages."""
         more = copy(self)
-        more.warnings = tuple(dict.fromkeys((*self.warnings, *sentences)))
+        more._messages = (*self._messages, *messages)
         return more
 
     def lit_by(self, lights: Sequence[Light]) -> Illumination:

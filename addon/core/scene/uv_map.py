@@ -80,7 +80,7 @@ def fit_uv_maps(polygons: Polygons) -> list[UvMap]:
             f"The faces are not flat (they depart from a plane by {deviation:.3g} units): "
             "only flat surfaces can be baked, so flatten them or split the object."
         )
-    _check_uvs(uvs)
+    check_uvs(uvs)
     return [_fit_affine(polygons, normal, size)]
 
 
@@ -96,7 +96,7 @@ def _common_normal(normals: np.ndarray) -> np.ndarray:
     return total
 
 
-def _check_uvs(uvs: np.ndarray | None) -> None:
+def check_uvs(uvs: np.ndarray | None) -> None:
     if uvs is None or len(uvs) == 0:
         raise ReceiverError("The mesh has no UV map: unwrap it first (UV > Unwrap in Edit Mode).")
     if not np.isfinite(uvs).all():

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 import bpy
 import numpy as np
 
-from ....core.errors import sentence
+from ....core.errors import text_of
 from ....core.target import Target
 from ... import compat
 from ...node.find import find_node
@@ -313,7 +313,7 @@ def _mesh(obj, depsgraph) -> str:
     try:
         mesh = evaluated.to_mesh()
     except RuntimeError as error:
-        return sentence(error)
+        return text_of(error)
     if mesh is None:
         return ""
     try:

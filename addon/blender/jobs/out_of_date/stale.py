@@ -13,9 +13,10 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ....core.bake.runner import Bake
+from ....core.messages import Level, Message, note, warning
 from ....core.target import Target
 from ...images import previews
-from ...images.facts import Record, facts_of, note_bake, record_in, record_of
+from ...images.facts import Record, facts_of, note_bake, record_in, record_of, record_of_bake
 from ...images.files import file_of
 from ...images.sequence import file_at, is_sequence
 from ...images.undo import is_undone
@@ -73,7 +74,7 @@ def keep(bake: Bake, parts: Parts | None, is_first_look: bool = False) -> None:
     parts = parts | {IMAGE: image_part(image)}  # the bake may have made it
     if is_first_look:
         parts[QUALITY] = FIRST_LOOK
-    note_bake(image, bake.target, Record(parts, tuple(bake.warnings), image.is_dirty, tuple(bake.notes)))
+    note_bake(image, bake.target, record_of_bake(bake, parts, image.is_dirty))
 
 
 def keep_later(bake: Bake, parts: Parts | None) -> None:
@@ -112,26 +113,27 @@ def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
         return replace(said, is_stale=bool(changed))
     if record is None:
         return Row(target, Status.NEVER)
-    warnings = (*_why_later(_image(target)), *record.warnings)
+    earlier = (*_why_later(_image(target)), *record.messages())
+    subject = str(target)
     if changed and changed != [QUALITY]:
-        why = f"Changed since its bake: {', '.join(changed)}."
-        return Row(target, Status.STALE, (why, *warnings, *record.notes), True)
-    warnings = (*([_why_again(record.parts[QUALITY], now[QUALITY])] if changed else []), *warnings)
-    standing = Status.WARNED if warnings else Status.BAKED
-    return Row(target, standing, (*warnings, *record.notes), bool(changed))
+        why = warning(subject, f"Changed since its bake: {', '.join(changed)}.")
+        return Row(target, Status.STALE, (why, *earlier), True)
+    again = [warning(subject, _why_again(record.parts[QUALITY], now[QUALITY]))] if changed else []
+    status = Status.WARNED if any(one.level == Level.WARNING for one in (*again, *earlier)) else Status.BAKED
+    return Row(target, status, (*again, *earlier), bool(changed))
 
 
 def _row_of_frames(target: Target, record: Record | None, now: Parts | None) -> Row:
     """Of a sequence, by the frame that is shown; a bake does not make it anew, and so it is not up for one."""
     first, last, *_ = facts_of(_image(target)).frames
-    shown = f"Shows the frames {first} to {last} of a batch"
+    subject, shown = str(target), f"Shows the frames {first} to {last} of a batch."
     if record is None or now is None:
-        return Row(target, Status.BAKED, (f"{shown}; what has changed since is not known.",))
-    changed = record.changed(now)
+        return Row(target, Status.BAKED, (note(subject, f"{shown} Changes since then are not known."),))
+    warnings, changed = record.messages(), record.changed(now)
     if changed:
-        why = f"{shown}. Changed since this one was baked: {', '.join(changed)}."
-        return Row(target, Status.STALE, (why, *record.warnings))
-    return Row(target, Status.WARNED if record.warnings else Status.BAKED, (f"{shown}.", *record.warnings))
+        why = warning(subject, f"{shown} Changed since this frame was baked: {', '.join(changed)}.")
+        return Row(target, Status.STALE, (why, *warnings))
+    return Row(target, Status.WARNED if warnings else Status.BAKED, (note(subject, shown), *warnings))
 
 
 def _has_lost_its_file(image) -> bool:
@@ -143,16 +145,16 @@ def _is_painted(image) -> bool:
     return image.is_dirty and not previews.covers(image)
 
 
-def _why_later(image) -> list[str]:
+def _why_later(image) -> list[Message]:
     if not is_undone(image):
         return []
-    shown = f"Undo does not reach files: the image shows the later bake, which '{file_of(image).name}' holds."
-    return [f"{shown} For the earlier one, undo what was changed between them, too, and bake again."]
+    text = f"Undo does not restore files: '{file_of(image).name}' still holds the later bake."
+    return [warning(image.name, text, "To get the earlier one, undo the changes between them as well and bake again.")]
 
 
 def _why_again(baked: str, wanted: str) -> str:
     if baked == FIRST_LOOK:
-        return "A first look, coarse and by direct light alone: its final bake has not ended."
+        return "Quick preview by direct light alone: its final bake has not ended."
     return f"Baked in {baked} quality, and not in {wanted}."
 
 

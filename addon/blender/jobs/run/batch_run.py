@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -18,7 +19,7 @@ from ....core.batch.stop import Stop
 from ....core.errors import BakeError
 from ....core.progress import timed
 from ....core.target import Target
-from ...images.facts import Record, attributes_of
+from ...images.facts import attributes_of, record_of_bake
 from ...images.files import file_of, size_of
 from ...images.outputs import Outputs
 from ...node.find import NOTHING_FOUND, find_bakeable, find_misplaced
@@ -173,7 +174,7 @@ class _Batch:
             bake.cancel()
         # A sequence does not tell its size.
         read = {name: one for name, one in (parts or {}).items() if name != IMAGE}
-        said = attributes_of(Record(read, tuple(bake.warnings))) if read else {}
+        said = attributes_of(replace(record_of_bake(bake, read), notes=())) if read else {}
         bake.keep(lambda bake: self._outputs.write(bake, frame, said))
 
 

@@ -11,7 +11,7 @@ from bpy.app.handlers import persistent
 
 from ....core.bake.bake_settings import COMBINED, BakeSettings
 from ....core.bake.runner import WRITTEN, Bake
-from ....core.errors import ImageError, sentence
+from ....core.errors import ImageError, text_of
 from ....core.target import Target
 from ... import compat
 from ...cycles.cycles_light import CopyForCycles
@@ -59,16 +59,14 @@ def bake_active_image(engine, depsgraph, obj, width: int, height: int) -> None:
             bake.keep(lambda bake: _put(pixels, bake))
             state.note(bake)
         for bake in bakes:
-            warnings, notes = [("WARNING", one) for one in bake.warnings], [("INFO", one) for one in bake.notes]
-            for level, message in [("ERROR", bake.error), *warnings, *notes]:
-                if message:
-                    engine.report({level}, f"{bake.target}: {message}")
+            for message in bake.messages:
+                engine.report({message.level.value}, f"{bake.target}: {message}")
         if all(bake.status == WRITTEN for bake in bakes):
             compat.write_pass(passes["Combined"], pixels)
             filled = True
             fillings.add([bake for bake in bakes if _fills_own_image(bake)])
     except Exception as error:  # noqa: BLE001 - Blender would swallow it
-        engine.report({"ERROR"}, sentence(error))
+        engine.report({"ERROR"}, text_of(error))
     finally:
         engine.end_result(result, cancel=not filled)
 
@@ -83,7 +81,7 @@ def _prepare(depsgraph, obj, passes, size: tuple[int, int]) -> list[Bake]:
         preparation = Preparation(depsgraph, targets, settings, size=size, copy=fillings.copy)
         bakes = [preparation.bake(target) for target in targets] or find_misplaced([obj])
     except Exception as error:  # noqa: BLE001 - Blender would swallow it
-        return [Bake(Target(obj.name), error=sentence(error))]
+        return [Bake(Target(obj.name), error=error)]
     return bakes or [Bake(Target(obj.name), error=NOTHING_FOUND)]
 
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from ....core.bake.job import BakeJob, needs_medium
 from ....core.bake.surface import Surface
-from ....core.errors import BakeError, sentence
+from ....core.errors import BakeError, NotSupportedError, text_of
 from ....core.material.material import RGB
+from ....core.messages import Message, warning
 from ....core.progress import Progress
 from ....core.scene.receiver import Receiver
 from ....core.scene.texture import mean_color, textured
@@ -22,14 +23,11 @@ from ...cycles.cycles_light import CopyForCycles
 from ...node.find import find_node_in_groups
 from ...node.tree import BASE_COLOR
 from ...read.base_color import is_understood, read_base_color
-from ...read.nodes import InputSocket, NotUnderstoodError
+from ...read.nodes import InputSocket
 from ...read.visibility import ObjectInstance
 
 # Rounding, or a little over by interpolation.
 BRIGHTEST = 1.001
-
-# What counts where a texture does not.
-UNLINKED = "the colour or albedo counts that its node shows without a link"
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,22 +38,22 @@ class BaseColor:
     ----------
     colors : float32 (grid height, grid width, 3) of each chart, up to 1; none where they are not known.
     blur : part of the texture that light meets on its way in.
-    warnings : sentences.
-    unknown : what of the nodes is not understood, as the beginning of a sentence; empty where all is.
+    warnings : messages about the colors.
+    unknown : sentence that names what only Cycles can evaluate; "" if there is nothing.
     """
 
     colors: tuple[np.ndarray, ...] = ()
     mean: RGB | None = None
     blur: float = 0.0
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Message, ...] = ()
     unknown: str = ""
 
     @classmethod
     def of(cls, colors: Sequence[np.ndarray], receiver: Receiver, blur: float, object_name: str) -> BaseColor:
         warnings = ()
         if max(color.max(initial=0) for color in colors) > BRIGHTEST:
-            what = f"The Base Color of '{object_name}' is above 1 in places, which reflects more than arrives"
-            warnings = (f"{what}: cut to 1.",)
+            text = f"The Base Color of '{object_name}' is above 1 in places, which reflects more light than arrives."
+            warnings = (warning(object_name, text, "It is cut to 1."),)
         colors = tuple(color.clip(0, 1) for color in colors)
         return cls(colors, mean_color(receiver, colors), blur, warnings)
 
@@ -65,7 +63,7 @@ class BaseColor:
 
     def in_job(self, job: BakeJob) -> BakeJob:
         """A job on such a surface with the rest."""
-        job = replace(job, illumination=job.illumination.warning(*self.warnings))
+        job = replace(job, illumination=job.illumination.with_messages(*self.warnings))
         return replace(job, receiver=textured(job.receiver, self.colors, self.blur)) if self.colors else job
 
 
@@ -76,8 +74,8 @@ def read_texture(node, groups: tuple, placed: ObjectInstance, receiver: Receiver
     """
     try:
         colors = read_base_color(InputSocket(node.inputs[BASE_COLOR], groups), placed, receiver)
-    except NotUnderstoodError as reason:
-        return BaseColor(blur=node.texture_blur, unknown=str(reason))
+    except NotSupportedError as error:
+        return BaseColor(blur=node.texture_blur, unknown=str(error))
     return BaseColor.of(colors, receiver, node.texture_blur, placed.obj.name)
 
 
@@ -103,9 +101,9 @@ class ColorByCycles:
         if not needs_medium(job.settings):
             return job
         if copy is not None:
-            job = replace(job, illumination=job.illumination.warning(*copy.scene.warnings))
+            job = replace(job, illumination=job.illumination.with_messages(*copy.scene.warnings))
         elif self._found is None:
-            self._found = self._missing("there is no copy of the scene for it")
+            self._found = self._missing("There is no copy of the scene.")
         seconds = seconds_of_colors(job.receiver.width, job.receiver.height) if self._found is None else 0.0
         return replace(job, more_color=partial(self._color, copy), color_seconds=seconds)
 
@@ -115,9 +113,10 @@ class ColorByCycles:
                 colors = colors_by_cycles(copy, self._target, self._matrix, job.receiver, progress)
                 self._found = BaseColor.of(colors, job.receiver, self._blur, self._target.object_name)
             except (BakeError, OSError) as error:
-                self._found = self._missing(sentence(error))
+                self._found = self._missing(text_of(error))
         return self._found.in_job(replace(job, surface=self._found.on(self._surface)))
 
     def _missing(self, why: str) -> BaseColor:
-        what = f"Cycles has not evaluated the Base Color of '{self._target.object_name}', so {UNLINKED}"
-        return BaseColor(warnings=(f"{what}: {why}",))
+        name = self._target.object_name
+        text = f"Cycles could not evaluate the Base Color of '{name}': the node's own color is used. {why}"
+        return BaseColor(warnings=(warning(name, text),))

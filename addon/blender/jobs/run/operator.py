@@ -10,7 +10,8 @@ from bpy.props import EnumProperty
 from ....core import native
 from ....core.bake.bake_settings import COMBINED
 from ....core.bake.runner import CANCELLED, WRITTEN, Bake
-from ....core.errors import sentence
+from ....core.errors import text_of
+from ....core.messages import Level, Message, Messages, warning
 from ....core.target import Target
 from ... import popup
 from ...images import previews
@@ -117,11 +118,11 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         try:
             return step(context)
         except Exception as error:  # noqa: BLE001 - whatever it is, the run ends and says so
-            why = f"An error of the add-on has ended the bake: {sentence(error)}"
+            text = f"An error of the add-on has ended the bake: {text_of(error)}"
             if state.progress is not None:
-                state.note(Bake(state.progress.target, error=why))
+                state.note(Bake(state.progress.target, error=text))
             _end_threads()
-            self._fail(why)
+            self._fail(Message(Level.ERROR, "", text))
             return self._finish(context)
 
     def _begin(self, context):
@@ -157,14 +158,14 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
 
     def _prepare(self, context, preview_first: bool) -> bool:
         """Make the queue of bakes; False if there is nothing to do at all."""
-        self._written, self._said, self._results = [], set(), Results()
-        self._problems: list[str] = []
+        self._written, self._reported, self._results = [], Messages(), Results()
+        self._problems = Messages()
         if native.problem:
-            self._fail(native.problem)
+            self._fail(Message(Level.ERROR, "", native.problem))
             return False
         targets, misplaced = self._chosen(context)
         if not targets and not misplaced:
-            self._fail(NOTHING_STALE if self.objects == "STALE" else NOTHING_FOUND)
+            self._fail(Message(Level.ERROR, "", NOTHING_STALE if self.objects == "STALE" else NOTHING_FOUND))
             return False
         previews.give_back()  # what is only shown is neither kept nor written beside a result
         state.forget_failures()
@@ -219,7 +220,8 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         layers = set(bake.layers)
         bake.keep(self._results.store)
         if bake.status == CANCELLED and self._queue.turn.is_again:
-            self._say("WARNING", f"{bake.target}: the final bake was cancelled, a first look is kept")
+            text = f"The final bake of '{bake.target}' was cancelled: its quick preview is kept."
+            self._report(warning(str(bake.target), text))
             return
         state.note(bake)
         if bake.status == WRITTEN:
@@ -228,32 +230,33 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
                 parts, is_first_look = self._parts.get(bake.target), self._queue.turn.is_first
                 stale.keep(bake, parts, is_first_look)
             if bake.is_dark:
-                self._problems += bake.warnings
+                self._problems.add(*bake.messages.of(Level.WARNING))
         elif bake.status == CANCELLED:
-            self._say("WARNING", "Bake cancelled: the image keeps what it had")
+            self._report(warning("", "The bake was cancelled: images keep their former pixels."))
         else:
-            self._fail(f"{bake.target}: {bake.error}")
-        for level, sentences in (("WARNING", bake.warnings), ("INFO", bake.notes)):
-            for one in sentences:
-                self._say(level, one)
+            for message in bake.messages.of(Level.ERROR):
+                self._fail(message)
+        for message in bake.messages.of(Level.WARNING, Level.INFO):
+            self._report(message)
 
-    def _fail(self, message: str) -> None:
-        # In the window a popup of ours says it: for an error Blender would open one of its own beside that.
-        self._say("WARNING" if self._in_window else "ERROR", message)
-        self._problems.append(message)
+    def _fail(self, message: Message) -> None:
+        self._report(message)
+        self._problems.add(message)
 
-    def _say(self, level: str, message: str) -> None:
-        if message not in self._said:
-            self.report({level}, message)
-            self._said.add(message)
+    def _report(self, message: Message) -> None:
+        if message in self._reported:
+            return
+        self._reported.add(message)
+        # In the window our own popup shows errors: Blender would open a second one for them.
+        is_error = message.level == Level.ERROR
+        self.report({"WARNING" if is_error and self._in_window else message.level.value}, message.line())
 
     def _finish(self, context):
         stale.look_soon()
         redraw(context)
-        problems = list(dict.fromkeys(self._problems))
-        if problems and self._in_window:
-            title = "Beamspread: not all is well" if self._written else "Beamspread: nothing was baked"
-            popup.show_soon(title, problems)
+        if self._problems and self._in_window:
+            title = "Beamspread: some bakes need attention" if self._written else "Beamspread: nothing was baked"
+            popup.show_soon(title, [message.line() for message in self._problems])
         if not self._written:
             return {"CANCELLED"}
         self.report({"INFO"}, f"Baked {', '.join(map(str, dict.fromkeys(self._written)))}")

@@ -12,7 +12,7 @@ from ....core.bake.estimate import machine_bytes
 from ....core.bake.job import BakeJob, needs_medium, to_simulate
 from ....core.bake.runner import Bake
 from ....core.bake.surface import Surface
-from ....core.errors import BakeError, sentence
+from ....core.errors import BakeError
 from ....core.scene.receiver import build_receiver, texture_size
 from ....core.scene.uv_map import fit_uv_maps
 from ....core.target import Target
@@ -88,12 +88,12 @@ class Preparation:
         copy: CopyForCycles | None = None,
     ) -> None:
         self.settings = settings
-        self._plans: dict[Target, _Plan | str] = {}
+        self._plans: dict[Target, _Plan | Exception] = {}
         try:
             self._illumination, self._by_cycles = read_illumination(depsgraph), CyclesLight(depsgraph, copy)
             placed = find_instances(depsgraph, {target.object_name for target in targets}, visible)
         except Exception as error:  # noqa: BLE001 - each bake asked for needs an answer
-            self._plans = dict.fromkeys(targets, sentence(error))
+            self._plans = dict.fromkeys(targets, error)
             return
         for target in targets:
             try:
@@ -101,28 +101,30 @@ class Preparation:
                 check_instance(target.object_name, here, depsgraph.view_layer)
                 self._plans[target] = _read_target(depsgraph, target, here, resolution, size)
             except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
-                self._plans[target] = sentence(error)
+                self._plans[target] = error
 
     def size(self, target: Target) -> tuple[int, int] | None:
         """Of the target's image, in texels."""
         plan = self._plans[target]
-        return None if isinstance(plan, str) else plan.size
+        return None if isinstance(plan, Exception) else plan.size
 
     def to_simulate(self, target: Target, quality: str) -> list:
         """The media that its bake would have to simulate first."""
         plan = self._plans[target]
-        return [] if isinstance(plan, str) else to_simulate(plan.surface, replace(self.settings, quality=quality))
+        return [] if isinstance(plan, Exception) else to_simulate(plan.surface, replace(self.settings, quality=quality))
 
     def color_seconds(self, target: Target) -> float:
         """About how long Cycles takes for its base colour, where it does."""
         plan = self._plans[target]
-        asks = needs_medium(self.settings) and not isinstance(plan, str) and isinstance(plan.texture, ColorByCycles)
+        asks = (
+            needs_medium(self.settings) and not isinstance(plan, Exception) and isinstance(plan.texture, ColorByCycles)
+        )
         return seconds_of_colors(*plan.size) if asks else 0.0
 
     def bake(self, target: Target, settings: BakeSettings | None = None) -> Bake:
         """The target's bake, with its job or the reason why there is none; in the main thread."""
         plan = self._plans[target]
-        if isinstance(plan, str):
+        if isinstance(plan, Exception):
             return Bake(target, error=plan)
         try:
             receiver = build_receiver(plan.maps, *plan.size)
@@ -136,7 +138,7 @@ class Preparation:
             check_memory(job, self.settings.memory_limit)
             return Bake(target, job)
         except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
-            return Bake(target, error=sentence(error))
+            return Bake(target, error=error)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import bpy
 
-from ....core.errors import BakeError, sentence
+from ....core.errors import BakeError, text_of
 from ....core.native import native
 from ... import compat
 from ...cycles.process import run
@@ -43,7 +43,7 @@ def render_picture(engine, depsgraph) -> None:
         pass
     except Exception as error:  # noqa: BLE001 - Blender would swallow it
         remedy = " EEVEE needs OpenGL: try Cycles (Render > Beamspread > Render With)." if name == "EEVEE" else ""
-        engine.report({"ERROR"}, sentence(error) + remedy)
+        engine.report({"ERROR"}, text_of(error) + remedy)
     finally:
         engine.end_result(result, cancel=not filled)
 

@@ -108,7 +108,7 @@ class _ComputedLight(Light):
 
     def fault(self):
         if not all(np.isfinite(field.radiance).all() and (field.radiance >= 0).all() for field in self.fields):
-            return "its radiance has values that are negative or not numbers"
+            return f"The radiance of '{self.name}' has negative values, or values that are not numbers."
         return super().fault()
 
 

@@ -124,16 +124,16 @@ class Light(ABC):
         return np.asarray(self.color, np.float32) * np.float32(self.strength)
 
     def fault(self) -> str:
-        """Why it can't be baked, as the end of a sentence about it; empty when all is well."""
+        """The sentence that says why the light cannot be baked; "" if it can."""
         if not np.isfinite(self.strength):
-            return f"its power is {self.strength:g}"
+            return f"The power of '{self.name}' is {self.strength:g}."
         if self.strength < 0:
-            return f"its power is {self.strength:g}, and a bake can't take light away"
+            return f"The power of '{self.name}' is {self.strength:g}, and a bake cannot remove light."
         if not (np.isfinite(self.color).all() and min(self.color) >= 0):
-            return f"its color is {', '.join(f'{value:g}' for value in self.color)}"
+            return f"The color of '{self.name}' is {', '.join(f'{value:g}' for value in self.color)}."
         values = [getattr(self, item.name) for item in fields(self)]
         if not all(np.isfinite(value).all() for value in values if isinstance(value, float | tuple)):
-            return "its place or direction is not a number"
+            return f"The position or direction of '{self.name}' is not a number."
         return ""
 
 

@@ -37,7 +37,7 @@ class MeshLight(ExtendedLight):
 
     def fault(self):
         if not np.isfinite(self.vertices).all():
-            return "its place is not a number"
+            return f"The position of '{self.name}' is not a number."
         if not (np.isfinite(self.radiance).all() and (self.radiance >= 0).all()):
-            return "its radiance has values that are negative or not numbers"
+            return f"The radiance of '{self.name}' has negative values, or values that are not numbers."
         return super().fault()

@@ -37,5 +37,5 @@ class WorldLight(ExtendedLight):
 
     def fault(self):
         if not (np.isfinite(self.radiance).all() and (self.radiance >= 0).all()):
-            return "its radiance has values that are negative or not numbers"
+            return f"The radiance of '{self.name}' has negative values, or values that are not numbers."
         return super().fault()
