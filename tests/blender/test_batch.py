@@ -274,7 +274,7 @@ def in_shadow():
 
 def without_lights():
     add_plane(material=add_material())
-    return "No light of the scene can be baked"
+    return "The scene has no light that can be baked"
 
 
 @pytest.mark.parametrize("add", [behind, in_shadow, without_lights])
@@ -314,7 +314,7 @@ def test_a_lamp_behind_a_slab_is_named_and_nothing_is_simulated(tmp_path, monkey
     code, bakes, _ = run_batch(scene, "--no-indirect", "--output", tmp_path)
     assert code == 1
     (sentence,) = bakes[0]["left_out"]
-    assert sentence == "What shines through the slab 'Plane' from behind is not baked yet: light of 'Sun'."
+    assert sentence == "Light that shines through the slab 'Plane' from behind is not baked yet: that of 'Sun'."
     assert sentence in bakes[0]["message"]
     assert not (tmp_path / "cache").exists()
     # From the front it is lit, and then there is a simulation.

@@ -47,8 +47,8 @@ def test_it_says_of_the_frame_what_has_changed_since(plane, tmp_path):
     shown = "Shows the frames 3 to 5 of a batch"
     for frame in (3, 4, 5):
         row = row_at(frame)
-        assert (row.status, row.sentences) == (Status.BAKED, (f"{shown}.",))
-    assert row_at(9).sentences == (f"{shown}; what has changed since is not known.",)
+        assert (row.status, *map(str, row.messages)) == (Status.BAKED, f"{shown}.")
+    assert [*map(str, row_at(9).messages)] == [f"{shown}. Changes since then are not known."]
     light = bpy.data.lights["Sun"]
     bpy.context.scene.frame_set(4)
     light.keyframe_insert("energy", frame=4)
@@ -56,13 +56,13 @@ def test_it_says_of_the_frame_what_has_changed_since(plane, tmp_path):
     light.keyframe_insert("energy", frame=3)
     assert [row_at(frame).status for frame in (3, 4)] == [Status.STALE, Status.BAKED]
     row = row_at(3)
-    assert row.sentences == (f"{shown}. Changed since this one was baked: lights.",)
+    assert [*map(str, row.messages)] == [f"{shown}. Changed since this frame was baked: lights."]
     assert not row.is_stale  # for a bake of this image
     assert batch_run.bake_all(batch_options.parse(["--frames", "3-3"])).all_written()
     assert row_at(3).status == Status.BAKED
     # As older ones, and those in PNG.
     write_exr(tmp_path / "beamspread" / "Plane_Medium_0003.exr", np.ones((32, 32, 3), np.float32), {ATTRIBUTE: ""})
-    assert row_at(3).sentences == (f"{shown}; what has changed since is not known.",)
+    assert [*map(str, row_at(3).messages)] == [f"{shown}. Changes since then are not known."]
 
 
 def test_it_follows_the_frame(plane, tmp_path):
@@ -70,7 +70,7 @@ def test_it_follows_the_frame(plane, tmp_path):
     own = node.image
     assert bpy.ops.beamspread.show_frames() == {"FINISHED"}
     assert is_sequence(node.image)
-    assert row_at(5).sentences == ("Shows the frames 3 to 5 of a batch.",)
+    assert [*map(str, row_at(5).messages)] == ["Shows the frames 3 to 5 of a batch."]
     assert [file_shown(node.node_tree, frame) for frame in (1, 3, 4, 5, 9)] == [3, 3, 4, 5, 5]
     rendered = [render_brightness(plane, frame, tmp_path) for frame in (3, 4, 5)]
     written = [native.read_exr(str(path))[0].mean() for path in sorted((tmp_path / "beamspread").iterdir())]
