@@ -239,7 +239,7 @@ def test_a_child_that_fails_is_said_and_the_own_color_counts(plane, monkeypatch,
     monkeypatch.setattr(process, "CHILD", broken)
     assert bake(plane)[0] == pytest.approx(own, rel=1e-6)
     (message,) = state.lines()
-    assert "has not evaluated the Base Color of 'Plane'" in message
+    assert "could not evaluate the Base Color of 'Plane'" in message
     assert "what went wrong" in message
 
 
