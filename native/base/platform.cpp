@@ -1,5 +1,6 @@
 #include "base/platform.h"
 
+#include <cerrno>
 #include <cstdlib>
 
 #ifdef _WIN32
@@ -38,6 +39,16 @@ bool may_write(const std::string& path)
     return _access(path.c_str(), write) == 0;
 }
 
+bool seek_file(std::FILE* file, std::uint64_t position)
+{
+    return _fseeki64(file, static_cast<long long>(position), SEEK_SET) == 0;
+}
+
+bool flush_to_disk(std::FILE* file)
+{
+    return std::fflush(file) == 0 && _commit(_fileno(file)) == 0;
+}
+
 #else
 
 void* allocate_pages(std::size_t bytes, std::size_t alignment)
@@ -63,6 +74,17 @@ long process_id()
 bool may_write(const std::string& path)
 {
     return access(path.c_str(), W_OK) == 0;
+}
+
+bool seek_file(std::FILE* file, std::uint64_t position)
+{
+    return fseeko(file, static_cast<off_t>(position), SEEK_SET) == 0;
+}
+
+bool flush_to_disk(std::FILE* file)
+{
+    // Pipes and some file systems have nothing to synchronize: EINVAL.
+    return std::fflush(file) == 0 && (fsync(fileno(file)) == 0 || errno == EINVAL);
 }
 
 #endif

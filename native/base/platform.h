@@ -1,18 +1,12 @@
-// Differences between operating systems, compilers and processors. Linux on x86-64 with GCC is built and tested; the
+// Differences between operating systems. Linux on x86-64 with GCC is built and tested; the
 // other branches follow their documentation and have not run.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <cstdio>
 #include <new>
 #include <string>
-
-// Compiles a function for several instruction sets. The loader chooses the best one (ELF's indirect functions). Results
-// do not depend on the choice because the build forbids contraction to fused multiply-add.
-#if defined(__ELF__) && defined(__x86_64__)
-#define BEAMSPREAD_CLONES __attribute__((target_clones("default", "avx2", "avx512f")))
-#else
-#define BEAMSPREAD_CLONES
-#endif
 
 namespace beamspread {
 
@@ -25,6 +19,12 @@ long process_id();
 
 // True if this user may write the existing file.
 bool may_write(const std::string& path);
+
+// Moves the position of an open file, in bytes from its start. False, with errno set, if that fails.
+bool seek_file(std::FILE* file, std::uint64_t position);
+
+// Writes every buffered byte to the disk. False, with errno set, if that fails.
+bool flush_to_disk(std::FILE* file);
 
 // Allocator for containers, in whole huge pages: the first touch of pages of 4 KB took a fifth of a short simulation.
 template <class T>

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "base/platform.h"
+#include "simd/loops.h"
 
 namespace beamspread {
 
@@ -51,15 +51,6 @@ std::uint64_t spread_bits(std::uint64_t value)
     return (value | value << 1) & 0x5555555555555555ULL;
 }
 
-[[gnu::always_inline]] inline std::uint32_t reverse_bits(std::uint32_t value)
-{
-    value = value >> 16 | value << 16;
-    value = (value & 0xff00ff00u) >> 8 | (value & 0x00ff00ffu) << 8;
-    value = (value & 0xf0f0f0f0u) >> 4 | (value & 0x0f0f0f0fu) << 4;
-    value = (value & 0xccccccccu) >> 2 | (value & 0x33333333u) << 2;
-    return (value & 0xaaaaaaaau) >> 1 | (value & 0x55555555u) << 1;
-}
-
 // Integer hash with full avalanche, after T. Mueller.
 std::uint32_t hash(std::uint32_t value)
 {
@@ -68,31 +59,9 @@ std::uint32_t hash(std::uint32_t value)
     return value ^ value >> 16;
 }
 
-// Hash in which each bit depends on the lower bits alone (Laine, Karras 2011, with
-// the constants of Burley 2020).
-[[gnu::always_inline]] inline std::uint32_t flip_upwards(std::uint32_t value, std::uint32_t seed)
-{
-    value ^= value * 0x3d20adeau;
-    value += seed;
-    value *= (seed >> 16) | 1u;
-    value ^= value * 0x05526c56u;
-    return value ^ value * 0x53a22864u;
-}
-
 std::uint32_t scramble(std::uint32_t digits, std::uint32_t seed)
 {
     return reverse_bits(flip_upwards(reverse_bits(digits), seed));
-}
-
-// Writes one coordinate of a block's points to every second element of `result`. `block` is the digits of the block's
-// first point, `offsets` those of the points relative to it.
-BEAMSPREAD_CLONES void scatter(double* __restrict result, const std::uint32_t* offsets, std::uint32_t block,
-                               std::uint32_t seed, std::size_t count)
-{
-    for (std::size_t i = 0; i < count; ++i) {
-        const std::uint32_t scrambled = reverse_bits(flip_upwards(block ^ offsets[i], seed));
-        result[2 * i] = (scrambled + 0.5) * 0x1.0p-32;
-    }
 }
 
 }  // namespace
@@ -119,8 +88,8 @@ void GridSobol::points(std::size_t x, std::size_t y, std::size_t first, std::siz
     for (std::size_t d = 0; d < dimensions; ++d) {
         // Sobol's points are linear over GF(2): a block is its first point plus (xor) the points of block 0.
         double* const into = &(d < 2 ? front : back)->x + d % 2;
-        scatter(into, m_offsets[d].data() + first, block[d],
-                hash(seed + 0x9e3779b9u * static_cast<std::uint32_t>(d + 1)), count);
+        scatter_bits(into, m_offsets[d].data() + first, block[d],
+                     hash(seed + 0x9e3779b9u * static_cast<std::uint32_t>(d + 1)), count);
     }
 }
 

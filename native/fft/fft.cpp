@@ -1,6 +1,9 @@
 #include "fft/fft.h"
 
+#include <hwy/targets.h>
+
 #include <algorithm>
+#include <cstdint>
 #include <vector>
 
 #include "base/error.h"
@@ -18,22 +21,20 @@ struct Named {
 // Fastest first.
 const std::vector<Named>& runnable_sets()
 {
-    static const std::vector<Named> runnable = [] {
-        std::vector<Named> found;
+    static const std::vector<Named> sets = [] {
+        std::vector<Named> runnable;
 #ifdef BEAMSPREAD_FFT_INSTRUCTION_SETS
-        __builtin_cpu_init();
-        // What the compiler's levels x86-64-v4 and -v3 stand for.
-        if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-            __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
-            __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2"))
-            found.push_back({"avx512", beamspread_fft_avx512()});
-        if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2"))
-            found.push_back({"avx2", beamspread_fft_avx2()});
+        // Highway's targets need the same instructions as the compiler's levels x86-64-v4 and -v3.
+        const std::int64_t supported = hwy::SupportedTargets();
+        if (supported & HWY_AVX3)
+            runnable.push_back({"avx512", beamspread_fft_avx512()});
+        if (supported & HWY_AVX2)
+            runnable.push_back({"avx2", beamspread_fft_avx2()});
 #endif
-        found.push_back({"baseline", beamspread_fft_baseline()});
-        return found;
+        runnable.push_back({"baseline", beamspread_fft_baseline()});
+        return runnable;
     }();
-    return runnable;
+    return sets;
 }
 
 }  // namespace

@@ -16,10 +16,10 @@ struct ExrPart {
     std::string name;  // may be empty where the file has one part only
     int width = 0;
     int height = 0;
-    std::vector<std::string> channels;  // kept in this order, although the format sorts them by name
+    std::vector<std::string> channels;  // in this order, although the format sorts them by name
     std::vector<float> pixels;          // height * width * channels; row 0 is the first line of the file
     std::map<std::string, ExrAttribute> attributes;
-    bool half = false;  // write the numbers in half precision, rounded
+    bool half = false;  // true if the file stores all numbers in half precision, rounded
 };
 
 // Larger images are refused in both directions: a 16384 x 16384 image of four channels just fits.
@@ -43,5 +43,8 @@ void write_exr_bottom_up(const std::string& path, const ExrPart& part, std::span
 // Reads every part of a flat file, scan lines or tiles, half, float or unsigned channels. Throws IoError, naming the
 // path, where the file is missing, damaged, too large, deep, or has subsampled channels.
 std::vector<ExrPart> read_exr_parts(const std::string& path);
+
+// The same parts without their pixels: reads only the start of the file.
+std::vector<ExrPart> read_exr_headers(const std::string& path);
 
 }  // namespace beamspread

@@ -140,6 +140,14 @@ std::vector<std::string> get_channels(const Imf::Header& header)
     return channels;
 }
 
+bool is_half(const Imf::Header& header)
+{
+    for (auto entry = header.channels().begin(); entry != header.channels().end(); ++entry)
+        if (entry.channel().type != Imf::HALF)
+            return false;
+    return true;
+}
+
 std::string as_utf8(std::string text)
 {
     if (!is_utf8(text))

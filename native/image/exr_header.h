@@ -1,4 +1,4 @@
-// What the reader and the writer of OpenEXR files share: attributes and the order of channels. Not for others.
+// Attributes and channels of OpenEXR headers, for the reader and the writer of native/image alone.
 #pragma once
 
 #include <OpenEXR/ImfHeader.h>
@@ -21,14 +21,17 @@ std::map<std::string, ExrAttribute> get_attributes(const Imf::Header& header);
 
 void set_channels(Imf::Header& header, const std::vector<std::string>& channels, Imf::PixelType type);
 
-// As the file spells them. As written by us; of foreign files R, G, B, A first within each layer, then the others by
-// name.
+// Names as the file spells them, in the order in which they were written. Files of other programs do not tell: there R,
+// G, B, A come first within each layer, then the rest by name.
 std::vector<std::string> get_channels(const Imf::Header& header);
+
+// True if all channels have 16 bits.
+bool is_half(const Imf::Header& header);
 
 // The text if it is valid UTF-8, else with "?" for its bytes outside ASCII: hosts such as Python take nothing else.
 std::string as_utf8(std::string text);
 
-// What OpenEXR says of a fault, without its own mention of the file's path.
+// OpenEXR's message about a fault, without its mention of the file's path.
 std::string reason_of(const std::exception& error, const std::string& path);
 
 }  // namespace beamspread::detail

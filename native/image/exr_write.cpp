@@ -1,13 +1,13 @@
 #include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfIO.h>
+#include <OpenEXR/ImfMultiPartInputFile.h>
 #include <OpenEXR/ImfMultiPartOutputFile.h>
 #include <OpenEXR/ImfOutputPart.h>
 #include <OpenEXR/ImfPartType.h>
-#include <OpenEXR/ImfStdIO.h>
 
-#include <cerrno>
-#include <fstream>
+#include <new>
 #include <set>
-#include <system_error>
+#include <stdexcept>
 
 #include "base/error.h"
 #include "image/exr.h"
@@ -99,7 +99,7 @@ void write_pixels(Imf::OutputPart output, const ExrPart& part, Imf::PixelType ty
     output.writePixels(part.height);
 }
 
-// `bottom_up`, if there are any, in place of the part's own pixels.
+// `bottom_up`, unless it is empty, replaces the part's pixels.
 void write_part(const Imf::OutputPart& output, const ExrPart& part, std::span<const float> bottom_up)
 {
     const bool goes_up = !bottom_up.empty();
@@ -110,17 +110,34 @@ void write_part(const Imf::OutputPart& output, const ExrPart& part, std::span<co
         write_pixels(output, part, Imf::FLOAT, pixels, goes_up);
 }
 
-void check(const std::ofstream& stream)
+// Passes the bytes of OpenEXR on to the pending file.
+class PendingStream final : public Imf::OStream {
+public:
+    explicit PendingStream(PendingFile& file) : OStream(file.path().c_str()), m_file(file) {}
+
+    void write(const char* data, int count) override { m_file.write(data, static_cast<std::size_t>(count)); }
+    std::uint64_t tellp() override { return m_file.position(); }
+    void seekp(std::uint64_t position) override { m_file.seek(position); }
+
+private:
+    PendingFile& m_file;
+};
+
+// Destructors of OpenEXR write the table of line offsets and swallow every exception, that of a failed allocation too:
+// a file with a gap in its tables is incomplete.
+void check_complete(const PendingFile& file, std::size_t parts)
 {
-    if (!stream)
-        throw std::system_error(errno, std::generic_category());
+    constexpr int no_pool = 0;  // OpenEXR's thread pool is global state of the host's process
+    constexpr bool reconstruct = false;
+    const Imf::MultiPartInputFile written(file.path().c_str(), no_pool, reconstruct);
+    for (std::size_t i = 0; i < parts; ++i)
+        if (!written.partComplete(static_cast<int>(i)))
+            throw std::runtime_error("its table of lines is incomplete");
 }
 
 void write_file(const std::string& path, std::span<const ExrPart> parts, ExrCompression compression,
                 std::span<const float> bottom_up)
 {
-    PendingFile file(path);
-
     // The format wants one display window for all parts.
     Imath::Box2i display_window({0, 0}, {0, 0});
     for (const ExrPart& part : parts)
@@ -129,23 +146,21 @@ void write_file(const std::string& path, std::span<const ExrPart> parts, ExrComp
     for (const ExrPart& part : parts)
         headers.push_back(make_header(part, display_window, compression));
 
-    constexpr int own_threads = 0;  // OpenEXR's thread pool is global state of the host's process
+    PendingFile file(path);
     try {
-        // OpenEXR writes line by line, which costs the system thrice as much as writing the whole.
-        std::vector<char> buffer(std::size_t{1} << 20);
-        std::ofstream stream;
-        stream.rdbuf()->pubsetbuf(buffer.data(), static_cast<std::streamsize>(buffer.size()));
-        stream.open(file.path(), std::ios::binary);
-        check(stream);
         {
-            Imf::StdOFStream named(stream, file.path().c_str());
-            Imf::MultiPartOutputFile output(named, headers.data(), static_cast<int>(headers.size()), false,
-                                            own_threads);
+            constexpr int no_pool = 0;
+            PendingStream stream(file);
+            Imf::MultiPartOutputFile output(stream, headers.data(), static_cast<int>(headers.size()), false, no_pool);
             for (std::size_t i = 0; i < parts.size(); ++i)
                 write_part(Imf::OutputPart(output, static_cast<int>(i)), parts[i], bottom_up);
         }
-        stream.close();
-        check(stream);
+        file.close();
+        check_complete(file, parts.size());
+    } catch (const IoError&) {
+        throw;
+    } catch (const std::bad_alloc&) {
+        throw;
     } catch (const std::exception& error) {
         throw IoError("cannot write '" + path + "': " + detail::reason_of(error, file.path()));
     }

@@ -1,4 +1,4 @@
-// Python names of native/image: write_exr, read_exr.
+// Python names of native/image: write_exr, read_exr, read_exr_header.
 #include "image/exr.h"
 
 #include <algorithm>
@@ -72,6 +72,22 @@ void write_exr(const std::string& path, const py::array& array, const std::vecto
     write_exr_bottom_up(path, part, pixels, packing);
 }
 
+// The named part, or the only one if there is no name.
+const ExrPart& choose_part(const std::string& path, const std::vector<ExrPart>& parts,
+                           const std::optional<std::string>& name)
+{
+    const auto chosen =
+        std::ranges::find_if(parts, [&](const ExrPart& part) { return name ? part.name == *name : parts.size() == 1; });
+    if (chosen != parts.end())
+        return *chosen;
+    std::string names;
+    for (const ExrPart& part : parts)
+        names += (names.empty() ? "'" : ", '") + part.name + "'";
+    throw IoError("cannot read '" + path + "': it has " +
+                  (name ? "no part '" + *name + "', only " + names
+                        : std::to_string(parts.size()) + " parts; name one of them, " + names));
+}
+
 py::tuple read_exr(const std::string& path, const std::optional<std::string>& part_name)
 {
     std::vector<ExrPart> parts;
@@ -79,22 +95,22 @@ py::tuple read_exr(const std::string& path, const std::optional<std::string>& pa
         const py::gil_scoped_release released;
         parts = read_exr_parts(path);
     }
-    const auto found = std::ranges::find_if(
-        parts, [&](const ExrPart& one) { return part_name ? one.name == *part_name : parts.size() == 1; });
-    if (found == parts.end()) {
-        std::string names;
-        for (const ExrPart& one : parts)
-            names += (names.empty() ? "'" : ", '") + one.name + "'";
-        throw IoError("cannot read '" + path + "': it has " +
-                      (part_name ? "no part '" + *part_name + "', only " + names
-                                 : std::to_string(parts.size()) + " parts; name one of them, " + names));
-    }
-    const ExrPart& part = *found;
+    const ExrPart& part = choose_part(path, parts, part_name);
     Array<float> array({static_cast<py::ssize_t>(part.height), static_cast<py::ssize_t>(part.width),
                         static_cast<py::ssize_t>(part.channels.size())});
     flip_rows(part.pixels.data(), array.mutable_data(), static_cast<std::size_t>(part.height),
               static_cast<std::size_t>(part.width) * part.channels.size());
     return py::make_tuple(array, part.channels, part.attributes);
+}
+
+py::list read_exr_header(const std::string& path)
+{
+    py::list result;
+    for (const ExrPart& part : read_exr_headers(path))
+        result.append(py::dict(py::arg("name") = part.name, py::arg("width") = part.width,
+                               py::arg("height") = part.height, py::arg("channels") = part.channels,
+                               py::arg("half") = part.half, py::arg("attributes") = part.attributes));
+    return result;
 }
 
 }  // namespace
@@ -150,6 +166,19 @@ Raises
 ------
 OSError
     The file is missing, damaged or larger than 2^30 numbers, has deep data or subsampled channels, or no such part.
+)");
+    m.def("read_exr_header", &read_exr_header, py::arg("path"), R"(Read the headers of an OpenEXR file, without pixels.
+
+Returns
+-------
+list of dict
+    One for each part: `name`, `width`, `height`, `channels` and `attributes` as `read_exr` returns them, and `half`, True
+    if all channels have 16 bits.
+
+Raises
+------
+OSError
+    The file is missing, or `read_exr` would refuse its header.
 )");
 }
 

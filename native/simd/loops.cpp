@@ -1,26 +1,35 @@
-#include "simd/loops.h"
+// Every loop is compiled for each target of Highway, which chooses the best at run time. The compiler vectorizes plain
+// code; without contraction to fused multiply-add the results are the same for all targets.
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3_DL)
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "simd/loops.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
 
 #include <array>
+#include <cmath>
 #include <cstring>
 
-#include "base/platform.h"
+#include "simd/loops.h"
 
+HWY_BEFORE_NAMESPACE();
 namespace beamspread {
+namespace HWY_NAMESPACE {
 
-BEAMSPREAD_CLONES void add_scaled(float* __restrict sum, const float* values, float factor, std::size_t count)
+void add_scaled(float* __restrict sum, const float* values, float factor, std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i)
         sum[i] += factor * values[i];
 }
 
-BEAMSPREAD_CLONES void add_scaled(double* sum, const double* values, double factor, std::size_t count)
+void add_scaled_double(double* sum, const double* values, double factor, std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i)
         sum[i] += factor * values[i];
 }
 
-BEAMSPREAD_CLONES void multiply_rows(float* __restrict product, const float* factors, const float* rows,
-                                     std::size_t columns, std::size_t count, std::size_t width)
+void multiply_rows(float* __restrict product, const float* factors, const float* rows, std::size_t columns,
+                   std::size_t count, std::size_t width)
 {
     using Values = float __attribute__((vector_size(values_per_block * sizeof(float))));
     // As many as keep an adder busy and fit into registers; what is read of the rows serves all.
@@ -43,27 +52,25 @@ BEAMSPREAD_CLONES void multiply_rows(float* __restrict product, const float* fac
     }
 }
 
-BEAMSPREAD_CLONES void scale(float* __restrict product, const float* values, float factor, std::size_t count)
+void scale(float* __restrict product, const float* values, float factor, std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i)
         product[i] = factor * values[i];
 }
 
-BEAMSPREAD_CLONES void multiply(float* __restrict product, const float* a, const float* b, std::size_t count)
+void multiply(float* __restrict product, const float* a, const float* b, std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i)
         product[i] = a[i] * b[i];
 }
 
-BEAMSPREAD_CLONES void add_scaled_product(float* __restrict sum, const float* a, const float* b, float factor,
-                                          std::size_t count)
+void add_scaled_product(float* __restrict sum, const float* a, const float* b, float factor, std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i)
         sum[i] += factor * (a[i] * b[i]);
 }
 
-BEAMSPREAD_CLONES void add_product(std::complex<float>* sum, const float* factor, const std::complex<float>* values,
-                                   std::size_t count)
+void add_product(std::complex<float>* sum, const float* factor, const std::complex<float>* values, std::size_t count)
 {
     // std::complex is two floats by definition ([complex.numbers]).
     auto* s = reinterpret_cast<float*>(sum);
@@ -74,16 +81,16 @@ BEAMSPREAD_CLONES void add_product(std::complex<float>* sum, const float* factor
     }
 }
 
-BEAMSPREAD_CLONES void interpolate(float* __restrict result, const float* table, std::size_t stride,
-                                   const float* weight, std::size_t count)
+void interpolate(float* __restrict result, const float* table, std::size_t stride, const float* weight,
+                 std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i)
         result[i] = weight[0] * table[i] + weight[1] * table[stride + i] + weight[2] * table[2 * stride + i] +
                     weight[3] * table[3 * stride + i];
 }
 
-BEAMSPREAD_CLONES void rotate(float* __restrict cosine, float* __restrict sine, const float* cos_beta,
-                              const float* sin_beta, std::size_t count)
+void rotate(float* __restrict cosine, float* __restrict sine, const float* cos_beta, const float* sin_beta,
+            std::size_t count)
 {
     for (std::size_t i = 0; i < count; ++i) {
         const float next = cosine[i] * cos_beta[i] - sine[i] * sin_beta[i];
@@ -92,8 +99,8 @@ BEAMSPREAD_CLONES void rotate(float* __restrict cosine, float* __restrict sine, 
     }
 }
 
-BEAMSPREAD_CLONES void find_steps(std::uint32_t* __restrict step, float* __restrict part, const float* half_tangent,
-                                  float first, float per_step, std::uint32_t steps, std::size_t count)
+void find_steps(std::uint32_t* __restrict step, float* __restrict part, const float* half_tangent, float first,
+                float per_step, std::uint32_t steps, std::size_t count)
 {
     const auto end = static_cast<float>(steps);
     const auto last = static_cast<std::int32_t>(steps - 1);
@@ -108,7 +115,232 @@ BEAMSPREAD_CLONES void find_steps(std::uint32_t* __restrict step, float* __restr
     }
 }
 
-// Pairs are loaded at once, faster than any gather.
+using Block = float __attribute__((vector_size(harmonics_per_block * sizeof(float))));
+
+[[gnu::always_inline]] inline void rotate_block(Block& cosine, Block& sine, const Block& by_cos, const Block& by_sin)
+{
+    const Block next = cosine * by_cos - sine * by_sin;
+    sine = sine * by_cos + cosine * by_sin;
+    cosine = next;
+}
+
+void multiple_angles(float* cosine, float cos_angle, float sin_angle, float factor, std::size_t count)
+{
+    // The angle times i bit by bit of i: few steps, each for all of a block at once.
+    constexpr std::array<Block, 3> bits = {Block{0, 1, 0, 1, 0, 1, 0, 1}, Block{0, 0, 1, 1, 0, 0, 1, 1},
+                                           Block{0, 0, 0, 0, 1, 1, 1, 1}};
+    Block cos_m = Block{} + factor;
+    Block sin_m{};
+    for (const Block& bit : bits) {
+        rotate_block(cos_m, sin_m, 1.0f + bit * (cos_angle - 1.0f), bit * sin_angle);
+        const float twice = 2.0f * cos_angle * sin_angle;
+        cos_angle = cos_angle * cos_angle - sin_angle * sin_angle;
+        sin_angle = twice;
+    }
+    for (std::size_t m = 0; m < count; m += harmonics_per_block) {
+        std::memcpy(cosine + m, &cos_m, sizeof(cos_m));
+        rotate_block(cos_m, sin_m, Block{} + cos_angle, Block{} + sin_angle);
+    }
+}
+
+void add_harmonics(float* __restrict sum, const float* values, const float* by_harmonic, float factor,
+                   const std::size_t* first, std::size_t blocks)
+{
+    for (std::size_t block = 0; block < blocks; ++block) {
+        const float* harmonics = by_harmonic + first[block];
+        for (std::size_t i = 0; i < harmonics_per_block; ++i)
+            sum[i] += factor * values[i] * harmonics[i];
+        sum += harmonics_per_block;
+        values += harmonics_per_block;
+    }
+}
+
+// Direction of a texel's light; straight down where the texel is dark.
+struct Travel {
+    float x, y, z;
+};
+
+[[gnu::always_inline]] inline Travel travel_of(const float* direction, float irradiance)
+{
+    const bool lit = irradiance != 0.0f;
+    const float x = direction[0];
+    const float y = direction[1];
+    const float z = direction[2];
+    return {lit ? x : 0.0f, lit ? y : 0.0f, lit ? z : -1.0f};
+}
+
+void find_angles(const float* directions, const float* irradiance, float* __restrict cos_beta,
+                 float* __restrict sin_beta, float* __restrict half_tangent, std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i) {
+        const auto [x, y, z] = travel_of(directions + 3 * i, irradiance[i]);
+        const float across = std::sqrt(x * x + y * y);
+        const float length = std::sqrt(x * x + y * y + z * z);
+        const bool slants = across > 0.0f;
+        const float per_across = 1.0f / (slants ? across : 1.0f);
+        cos_beta[i] = slants ? x * per_across : 1.0f;
+        sin_beta[i] = y * per_across;
+        half_tangent[i] = across / (length - z);
+    }
+}
+
+// A vector at any address of doubles.
+using Lanes = double __attribute__((vector_size(64), aligned(8), may_alias));
+static_assert(2 * sizeof(Lanes) == target_columns * sizeof(double));
+
+void add_sources(double* const* sums, std::ptrdiff_t x, const LitColumn* source, std::ptrdiff_t last,
+                 const double* kernel)
+{
+    static_assert(target_rows == 4);
+    auto* to0 = reinterpret_cast<Lanes*>(sums[0] + x);
+    auto* to1 = reinterpret_cast<Lanes*>(sums[1] + x);
+    auto* to2 = reinterpret_cast<Lanes*>(sums[2] + x);
+    auto* to3 = reinterpret_cast<Lanes*>(sums[3] + x);
+    Lanes left0 = to0[0], right0 = to0[1];
+    Lanes left1 = to1[0], right1 = to1[1];
+    Lanes left2 = to2[0], right2 = to2[1];
+    Lanes left3 = to3[0], right3 = to3[1];
+    for (; source->x <= last; ++source) {
+        const auto* values = reinterpret_cast<const Lanes*>(kernel + (x - source->x));
+        const Lanes left = values[0];
+        const Lanes right = values[1];
+        left0 += source->light[0] * left;
+        right0 += source->light[0] * right;
+        left1 += source->light[1] * left;
+        right1 += source->light[1] * right;
+        left2 += source->light[2] * left;
+        right2 += source->light[2] * right;
+        left3 += source->light[3] * left;
+        right3 += source->light[3] * right;
+    }
+    to0[0] = left0;
+    to0[1] = right0;
+    to1[0] = left1;
+    to1[1] = right1;
+    to2[0] = left2;
+    to2[1] = right2;
+    to3[0] = left3;
+    to3[1] = right3;
+}
+
+void scatter_bits(double* __restrict result, const std::uint32_t* offsets, std::uint32_t block, std::uint32_t seed,
+                  std::size_t count)
+{
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::uint32_t scrambled = reverse_bits(flip_upwards(block ^ offsets[i], seed));
+        result[2 * i] = (scrambled + 0.5) * 0x1.0p-32;
+    }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace beamspread
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace beamspread {
+
+namespace {
+
+HWY_EXPORT(add_scaled);
+HWY_EXPORT(add_scaled_double);
+HWY_EXPORT(multiply_rows);
+HWY_EXPORT(scale);
+HWY_EXPORT(multiply);
+HWY_EXPORT(add_scaled_product);
+HWY_EXPORT(add_product);
+HWY_EXPORT(interpolate);
+HWY_EXPORT(rotate);
+HWY_EXPORT(find_steps);
+HWY_EXPORT(multiple_angles);
+HWY_EXPORT(add_harmonics);
+HWY_EXPORT(find_angles);
+HWY_EXPORT(add_sources);
+HWY_EXPORT(scatter_bits);
+
+}  // namespace
+
+void add_scaled(float* sum, const float* values, float factor, std::size_t count)
+{
+    HWY_DYNAMIC_DISPATCH(add_scaled)(sum, values, factor, count);
+}
+
+void add_scaled(double* sum, const double* values, double factor, std::size_t count)
+{
+    HWY_DYNAMIC_DISPATCH(add_scaled_double)(sum, values, factor, count);
+}
+
+void multiply_rows(float* product, const float* factors, const float* rows, std::size_t columns, std::size_t count,
+                   std::size_t width)
+{
+    HWY_DYNAMIC_DISPATCH(multiply_rows)(product, factors, rows, columns, count, width);
+}
+
+void scale(float* product, const float* values, float factor, std::size_t count)
+{
+    HWY_DYNAMIC_DISPATCH(scale)(product, values, factor, count);
+}
+
+void multiply(float* product, const float* a, const float* b, std::size_t count)
+{
+    HWY_DYNAMIC_DISPATCH(multiply)(product, a, b, count);
+}
+
+void add_scaled_product(float* sum, const float* a, const float* b, float factor, std::size_t count)
+{
+    HWY_DYNAMIC_DISPATCH(add_scaled_product)(sum, a, b, factor, count);
+}
+
+void add_product(std::complex<float>* sum, const float* factor, const std::complex<float>* values, std::size_t count)
+{
+    HWY_DYNAMIC_DISPATCH(add_product)(sum, factor, values, count);
+}
+
+void interpolate(float* result, const float* table, std::size_t stride, const float* weight, std::size_t count)
+{
+    HWY_DYNAMIC_DISPATCH(interpolate)(result, table, stride, weight, count);
+}
+
+void rotate(float* cosine, float* sine, const float* cos_beta, const float* sin_beta, std::size_t count)
+{
+    HWY_DYNAMIC_DISPATCH(rotate)(cosine, sine, cos_beta, sin_beta, count);
+}
+
+void find_steps(std::uint32_t* step, float* part, const float* half_tangent, float first, float per_step,
+                std::uint32_t steps, std::size_t count)
+{
+    HWY_DYNAMIC_DISPATCH(find_steps)(step, part, half_tangent, first, per_step, steps, count);
+}
+
+void multiple_angles(float* cosine, float cos_angle, float sin_angle, float factor, std::size_t count)
+{
+    HWY_DYNAMIC_DISPATCH(multiple_angles)(cosine, cos_angle, sin_angle, factor, count);
+}
+
+void add_harmonics(float* sum, const float* values, const float* by_harmonic, float factor, const std::size_t* first,
+                   std::size_t blocks)
+{
+    HWY_DYNAMIC_DISPATCH(add_harmonics)(sum, values, by_harmonic, factor, first, blocks);
+}
+
+void find_angles(const float* directions, const float* irradiance, float* cos_beta, float* sin_beta,
+                 float* half_tangent, std::size_t count)
+{
+    HWY_DYNAMIC_DISPATCH(find_angles)(directions, irradiance, cos_beta, sin_beta, half_tangent, count);
+}
+
+void add_sources(double* const* sums, std::ptrdiff_t x, const LitColumn* source, std::ptrdiff_t last,
+                 const double* kernel)
+{
+    HWY_DYNAMIC_DISPATCH(add_sources)(sums, x, source, last, kernel);
+}
+
+void scatter_bits(double* result, const std::uint32_t* offsets, std::uint32_t block, std::uint32_t seed,
+                  std::size_t count)
+{
+    HWY_DYNAMIC_DISPATCH(scatter_bits)(result, offsets, block, seed, count);
+}
+
+// Not vectorized: one load of a pair is faster than a gather.
 void look_up(float* __restrict result, const TableStep* table, const std::uint32_t* step, const float* part,
              std::size_t count)
 {
@@ -119,3 +351,4 @@ void look_up(float* __restrict result, const TableStep* table, const std::uint32
 }
 
 }  // namespace beamspread
+#endif

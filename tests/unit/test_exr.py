@@ -2,6 +2,8 @@
 
 import resource
 import struct
+from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -124,6 +126,34 @@ def test_a_text_is_told_by_the_header(tmp_path):
         assert text_of(path, "owner") == ""
 
 
+def test_a_negative_attribute_size_ends_the_reading(tmp_path):
+    """These 18 bytes lead a reader that trusts the size back to the attribute's start, without end."""
+    path = tmp_path / "a.exr"
+    path.write_bytes(struct.pack("<ii", MAGIC, 2) + b"a\0b\0" + struct.pack("<i", -8) + b"xx")
+    assert not is_half(path)
+    assert text_of(path, "owner") == ""
+    for read in (native.read_exr, native.read_exr_header):
+        with pytest.raises(OSError, match="cannot read"):
+            read(str(path))
+
+
+def test_header_tells_the_facts_of_each_part(tmp_path):
+    path = tmp_path / "a.exr"
+    native.write_exr(str(path), image(5, 7, 2), ["Y", "B"], {"owner": "me", "list": [1.0, 2.0]}, half=True)
+    (part,) = native.read_exr_header(str(path))
+    assert part == {
+        "name": "",
+        "width": 7,
+        "height": 5,
+        "channels": ["Y", "B"],
+        "half": True,
+        "attributes": {"owner": "me", "list": [1.0, 2.0]},
+    }
+    path.write_bytes(plain_multi_part({"a": (image(3, 4, 1), [("Y", HALF)]), "b": (image(3, 4, 1), [("Y", FLOAT)])}))
+    parts = native.read_exr_header(str(path))
+    assert [(part["name"], part["width"], part["half"]) for part in parts] == [("a", 4, True), ("b", 4, False)]
+
+
 def test_layers_keep_together(tmp_path):
     path = tmp_path / "a.exr"
     names = ["A", "B", "G", "R", "Z", "far.B", "far.G", "far.R"]
@@ -228,7 +258,7 @@ def test_missing_and_foreign_files(tmp_path):
         ({"width": 30_000, "height": 30_000, "compression": 3}, "more pixels than a file of its length"),
         ({"width": 2**31 - 1, "height": 1}, "its size|display window"),
         ({"width": 4, "height": 4, "sampling": 2}, "subsampled"),
-        ({"width": 4, "height": 4, "channels": []}, "channel list|no channels"),
+        ({"width": 4, "height": 4, "channels": []}, "[Aa]t least one channel|no channels"),
     ],
 )
 def test_hostile_headers_are_refused_before_memory_is_taken(tmp_path, options, reason):
@@ -236,6 +266,39 @@ def test_hostile_headers_are_refused_before_memory_is_taken(tmp_path, options, r
     options = {"channels": [("Y", FLOAT)]} | options
     path.write_bytes(struct.pack("<ii", MAGIC, 2) + header(**options) + bytes(400_000))
     with pytest.raises(OSError, match=reason):
+        native.read_exr(str(path))
+
+
+@contextmanager
+def little_memory():
+    """At most 300 MB more than the process has now."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + 300_000_000, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+@pytest.mark.parametrize("kind", ["string", "unknown", "floatvector", "stringvector", "preview", "chlist"])
+def test_attributes_cannot_claim_more_than_the_file_holds(kind, tmp_path):
+    path = tmp_path / "a.exr"
+    claim = b"note\0" + kind.encode() + b"\0" + struct.pack("<i", 2**31 - 4)
+    content = struct.pack("<ii", MAGIC, 2) + claim + struct.pack("<ii", 20_000, 20_000) + bytes(1000)
+    path.write_bytes(content)
+    with little_memory():
+        for read in (native.read_exr, native.read_exr_header):
+            with pytest.raises(OSError, match="cannot read"):
+                read(str(path))
+
+
+@pytest.mark.parametrize("compression", range(10))
+def test_pixels_cannot_be_more_than_the_file_holds(compression, tmp_path):
+    path = tmp_path / "a.exr"
+    start = struct.pack("<ii", MAGIC, 2) + header(25_000, 25_000, [("Y", FLOAT)], compression=compression)
+    path.write_bytes(start + bytes(10_000))
+    with little_memory(), pytest.raises(OSError, match=r"more pixels than a file of its length|not complete|early"):
         native.read_exr(str(path))
 
 

@@ -4,11 +4,13 @@
 #include <cstddef>
 #include <vector>
 
+#include "simd/loops.h"
+
 namespace beamspread {
 
-// Targets that are summed at a time: so many of each of so many rows, whose sums stay in registers.
-inline constexpr std::ptrdiff_t targets_at_once = 16;
-inline constexpr std::size_t rows_at_once = 4;
+// Targets that are summed at a time, whose sums stay in registers.
+inline constexpr std::ptrdiff_t targets_at_once = target_columns;
+inline constexpr std::size_t rows_at_once = target_rows;
 
 // Values on a grid, row by row; rows are filled up with zeros to a multiple of the targets summed at a time.
 struct Grid {

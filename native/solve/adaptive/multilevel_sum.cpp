@@ -4,7 +4,6 @@
 #include <array>
 #include <limits>
 
-#include "base/platform.h"
 #include "base/threads.h"
 #include "simd/loops.h"
 
@@ -99,20 +98,14 @@ void add_interpolated(Grid& fine, const Grid& coarse, const GridLevel& level, co
     });
 }
 
-// Light of a column of `rows_at_once` texels.
-struct Source {
-    std::ptrdiff_t x;
-    std::array<double, rows_at_once> light;
-};
-
 // Sources other than zero of the rows from each row on, from left to right, and one that is never reached; first those
 // that begin before the grid.
-std::vector<std::vector<Source>> source_rows(const Grid& light)
+std::vector<std::vector<LitColumn>> source_rows(const Grid& light)
 {
-    std::vector<std::vector<Source>> rows(light.height + rows_at_once - 1);
+    std::vector<std::vector<LitColumn>> rows(light.height + rows_at_once - 1);
     parallel_for(rows.size(), [&](std::size_t first) {
         for (std::size_t x = 0; x < light.width; ++x) {
-            Source source{static_cast<std::ptrdiff_t>(x), {}};
+            LitColumn source{static_cast<std::ptrdiff_t>(x), {}};
             bool lit = false;
             for (std::size_t i = 0; i < rows_at_once; ++i)
                 if (const std::size_t y = first + i + 1 - rows_at_once; y < light.height) {
@@ -127,52 +120,12 @@ std::vector<std::vector<Source>> source_rows(const Grid& light)
     return rows;
 }
 
-using Lanes = double __attribute__((vector_size(64), aligned(8), may_alias));
-static_assert(2 * sizeof(Lanes) == targets_at_once * sizeof(double));
-
-// Adds sources up to column `last` to the targets from column x on, each row's to the row of targets as far below or
-// above; the kernel's row at dx = 0.
-BEAMSPREAD_CLONES void add_sources(double* const* sums, std::ptrdiff_t x, const Source* source, std::ptrdiff_t last,
-                                   const double* kernel)
-{
-    static_assert(rows_at_once == 4);
-    auto* to0 = reinterpret_cast<Lanes*>(sums[0] + x);
-    auto* to1 = reinterpret_cast<Lanes*>(sums[1] + x);
-    auto* to2 = reinterpret_cast<Lanes*>(sums[2] + x);
-    auto* to3 = reinterpret_cast<Lanes*>(sums[3] + x);
-    Lanes left0 = to0[0], right0 = to0[1];
-    Lanes left1 = to1[0], right1 = to1[1];
-    Lanes left2 = to2[0], right2 = to2[1];
-    Lanes left3 = to3[0], right3 = to3[1];
-    for (; source->x <= last; ++source) {
-        const auto* values = reinterpret_cast<const Lanes*>(kernel + (x - source->x));
-        const Lanes left = values[0];
-        const Lanes right = values[1];
-        left0 += source->light[0] * left;
-        right0 += source->light[0] * right;
-        left1 += source->light[1] * left;
-        right1 += source->light[1] * right;
-        left2 += source->light[2] * left;
-        right2 += source->light[2] * right;
-        left3 += source->light[3] * left;
-        right3 += source->light[3] * right;
-    }
-    to0[0] = left0;
-    to0[1] = right0;
-    to1[0] = left1;
-    to1[1] = right1;
-    to2[0] = left2;
-    to2[1] = right2;
-    to3[0] = left3;
-    to3[1] = right3;
-}
-
 }  // namespace
 
 void add_pairs(Grid& sum, const Grid& light, const KernelTable& kernel, Progress& progress, double work,
                const Targets* only)
 {
-    const std::vector<std::vector<Source>> sources = source_rows(light);
+    const std::vector<std::vector<LitColumn>> sources = source_rows(light);
     const auto width = static_cast<std::ptrdiff_t>(sum.width);
     const std::size_t groups = (sum.height + rows_at_once - 1) / rows_at_once;
     parallel_for(groups, [&](std::size_t group) {
@@ -185,7 +138,7 @@ void add_pairs(Grid& sum, const Grid& light, const KernelTable& kernel, Progress
         const std::ptrdiff_t first = std::max(-before, y - kernel.reach_y());
         const std::ptrdiff_t end = std::min(static_cast<std::ptrdiff_t>(light.height), y + kernel.reach_y() + 1);
         for (std::ptrdiff_t source_y = first; source_y < end; ++source_y) {
-            const Source* source = sources[static_cast<std::size_t>(source_y + before)].data();
+            const LitColumn* source = sources[static_cast<std::size_t>(source_y + before)].data();
             const double* row = kernel.row(y - source_y);
             std::ptrdiff_t reach = kernel.reach_x();
             while (reach > 0 && row[reach] == 0.0 && row[-reach] == 0.0)

@@ -76,11 +76,6 @@ struct BeamRow {
     bool read(const Plane& plane, const PlaneLight& light, const RowSpan& span);
 };
 
-// Azimuths beta and tan(theta / 2) of directions of travel of any length, (x, y, z) after (x, y, z). Where the irradiance
-// is zero the direction may be anything.
-void find_angles(const float* directions, const float* irradiance, float* cos_beta, float* sin_beta,
-                 float* half_tangent, std::size_t count);
-
 // The first, row by row, of the brightest texels.
 Texel brightest(const View2D<const float>& irradiance);
 
