@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include <Eigen/Dense>
+
 #include "base/constants.h"
 #include "base/error.h"
 
@@ -11,61 +13,31 @@ namespace beamspread {
 
 namespace {
 
-// Solves A X = B in place (X replaces B) by Gaussian elimination with row pivoting; both n x n.
-void solve_dense(std::vector<double>& a, std::vector<double>& b, std::size_t n)
-{
-    for (std::size_t column = 0; column < n; ++column) {
-        std::size_t pivot = column;
-        for (std::size_t row = column + 1; row < n; ++row)
-            if (std::abs(a[row * n + column]) > std::abs(a[pivot * n + column]))
-                pivot = row;
-        for (std::size_t k = 0; k < n; ++k) {
-            std::swap(a[pivot * n + k], a[column * n + k]);
-            std::swap(b[pivot * n + k], b[column * n + k]);
-        }
-        for (std::size_t row = 0; row < n; ++row) {
-            if (row == column)
-                continue;
-            const double factor = a[row * n + column] / a[column * n + column];
-            for (std::size_t k = 0; k < n; ++k) {
-                a[row * n + k] -= factor * a[column * n + k];
-                b[row * n + k] -= factor * b[column * n + k];
-            }
-        }
-    }
-    for (std::size_t row = 0; row < n; ++row)
-        for (std::size_t k = 0; k < n; ++k)
-            b[row * n + k] /= a[row * n + row];
-}
+// Row-major, as AngleSpline stores it.
+using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// Second derivatives at the points of the splines that are 1 at one point and 0 at the others.
-std::vector<double> cardinal_second_derivatives(const std::vector<double>& x)
+// Second derivatives of the cardinal splines, which are 1 at one point and 0 at the others: [point][spline].
+Matrix cardinal_second_derivatives(const std::vector<double>& x)
 {
-    const std::size_t n = x.size();
-    std::vector<double> a(n * n, 0.0);
-    std::vector<double> b(n * n, 0.0);
-    for (std::size_t i = 1; i + 1 < n; ++i) {
-        const double h0 = x[i] - x[i - 1];
-        const double h1 = x[i + 1] - x[i];
-        a[i * n + i - 1] = h0;
-        a[i * n + i] = 2.0 * (h0 + h1);
-        a[i * n + i + 1] = h1;
-        b[i * n + i - 1] = 6.0 / h0;
-        b[i * n + i] = -6.0 / h0 - 6.0 / h1;
-        b[i * n + i + 1] = 6.0 / h1;
+    const auto n = static_cast<Eigen::Index>(x.size());
+    Matrix a = Matrix::Zero(n, n);
+    Matrix b = Matrix::Zero(n, n);
+    const auto step = [&](Eigen::Index i) {
+        return x[static_cast<std::size_t>(i + 1)] - x[static_cast<std::size_t>(i)];
+    };
+    for (Eigen::Index i = 1; i + 1 < n; ++i) {
+        const double h0 = step(i - 1);
+        const double h1 = step(i);
+        a.row(i).segment(i - 1, 3) << h0, 2.0 * (h0 + h1), h1;
+        b.row(i).segment(i - 1, 3) << 6.0 / h0, -6.0 / h0 - 6.0 / h1, 6.0 / h1;
     }
-    // Not-a-knot: the third derivative does not jump at the last points but one.
-    const auto end_condition = [&](std::size_t row, std::size_t i) {
-        const double h0 = x[i] - x[i - 1];
-        const double h1 = x[i + 1] - x[i];
-        a[row * n + i - 1] = h1;
-        a[row * n + i] = -(h0 + h1);
-        a[row * n + i + 1] = h0;
+    // Not-a-knot: the third derivative does not jump at the second point and at the last but one.
+    const auto end_condition = [&](Eigen::Index row, Eigen::Index i) {
+        a.row(row).segment(i - 1, 3) << step(i), -(step(i - 1) + step(i)), step(i - 1);
     };
     end_condition(0, 1);
     end_condition(n - 1, n - 2);
-    solve_dense(a, b, n);
-    return b;
+    return a.partialPivLu().solve(b);
 }
 
 // Closer nodes would only amplify the simulation's noise: at this distance 1e-3 of it are a slope of 1 per radian, which is
@@ -80,8 +52,10 @@ AngleSpline::AngleSpline(std::vector<double> nodes) : m_nodes(std::move(nodes))
         if (*node > 0.0)
             m_points.push_back(-*node);
     m_points.insert(m_points.end(), m_nodes.begin(), m_nodes.end());
-    if (m_points.size() > 4)
-        m_second_derivative = cardinal_second_derivatives(m_points);
+    if (m_points.size() > 4) {
+        const Matrix derivatives = cardinal_second_derivatives(m_points);
+        m_second_derivative.assign(derivatives.data(), derivatives.data() + derivatives.size());
+    }
 }
 
 std::vector<double> AngleSpline::weights(double x, Parity parity) const
