@@ -105,7 +105,7 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
         row.label(text=f"{len(files)} simulated media, {megabytes:.1f} MB, in")
         row.operator("beamspread.clear_cache", icon="TRASH")
         layout.label(text=str(library.cache_folder()))  # a row of its own: a button would cut it off
-        if url := documentation("node"):
+        if url := documentation("guide"):
             layout.operator("wm.url_open", text="Documentation", icon="HELP").url = url
 
 

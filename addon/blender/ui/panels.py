@@ -50,7 +50,7 @@ class BEAMSPREAD_PT_render(RenderPanel, bpy.types.Panel):
     bl_label = "Beamspread"
 
     def draw_header_preset(self, _context):
-        draw_help(self.layout, "lights")
+        draw_help(self.layout, "guide")
 
     def draw(self, context):
         layout = self.layout
@@ -136,7 +136,7 @@ class BEAMSPREAD_PT_images(RenderPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header_preset(self, _context):
-        draw_help(self.layout, "images")
+        draw_help(self.layout, "guide")
 
     def draw(self, context):
         layout, settings = self.layout, context.scene.beamspread
@@ -155,7 +155,7 @@ class BEAMSPREAD_PT_batch(RenderPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header_preset(self, _context):
-        draw_help(self.layout, "cli")
+        draw_help(self.layout, "python-and-batch")
 
     def draw(self, context):
         layout = self.layout
@@ -196,7 +196,7 @@ class MaterialPanel:
         return material is not None and compat.uses_nodes(material) and find_node(material) is not None
 
     def draw_header_preset(self, _context):
-        draw_help(self.layout, "node")
+        draw_help(self.layout, "guide")
 
     def draw(self, context):
         layout = self.layout
