@@ -111,9 +111,9 @@ def rays(library):
     occluders = native.Occluders([tinted], (0, 0, 0))
     image = np.random.default_rng(0).random((8, 16, 3)).astype(np.float32)
     lights = [
-        native.SunDiskLight((0.3, 0, -1), 0.2),
+        native.SunLight((0.3, 0, -1), 0.2),
         native.AreaLight((0.1, 0, 1), np.eye(3), 0.3, 0.3),
-        native.SphereLight((0.1, 0, 1), 0.1, "sphere"),
+        native.PointLight((0.1, 0, 1), 0.1, "sphere"),
         native.EnvironmentLight(image, np.eye(3)),
         native.MeshLight(corners + (0, 0, 0.5), faces, np.ones((2, 3), np.float32)),
     ]

@@ -232,7 +232,7 @@ def instancer_hides_lamps() -> bool:
     return bpy.app.version >= (4, 4, 0)
 
 
-def round_lamp_model(light) -> str:
+def round_lamp_shape(light) -> str:
     """Shape of a lamp with a radius in Cycles."""
     soft = getattr(light, "use_soft_falloff", bpy.app.version < (4, 0, 0))
     return "disk" if soft else "sphere"

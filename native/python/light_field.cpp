@@ -42,7 +42,7 @@ public:
 
     void add(const HeldLight& light) { m_field->add(light.light); }
 
-    void add_rays(const ReceiverGrid& grid, const ExtendedLight& light, const std::vector<double>& color,
+    void add_rays(const ReceiverGrid& grid, const Light& light, const std::vector<double>& color,
                   const Array<float>& coverage, const Occluders* occluders, int rays, std::uint32_t seed, int threads,
                   double clearance, int even_rays, const py::object& progress)
     {
@@ -54,7 +54,9 @@ public:
         Progress report(progress_callback(progress));
         Sink sink(*m_field, color, light.is_colored(), coverage.data());
         const py::gil_scoped_release release;
-        gather_rays(grid, light, occluders, {rays, threads, clearance, seed, even_rays}, sink, report);
+        gather_rays(grid, light, occluders,
+                    {.rays = rays, .even_rays = even_rays, .seed = seed, .clearance = clearance, .threads = threads},
+                    sink, report);
     }
 
     Array<float> solve(const py::object& progress)
@@ -80,15 +82,16 @@ private:
         {
         }
 
-        void add(const RayRow& row) override
+        void add(const RayRun& run) override
         {
             std::vector<Vec3f>& covered = m_scratch.local();
-            covered.resize(row.width);
-            const float* coverage = m_coverage + row.y * m_field.problem().plane.width + row.x;
-            for (std::size_t i = 0; i < row.width; ++i)
-                covered[i] = coverage[i] * row.irradiance[i];
+            covered.resize(run.count);
+            for (std::size_t i = 0; i < run.count; ++i)
+                covered[i] = m_coverage[run.sample + i] * run.irradiance[i];
             static_assert(sizeof(Vec3f) == 3 * sizeof(float));
-            m_field.add({row.y, row.x, row.width, &row.travel->x, &covered.front().x}, m_color, m_is_colored);
+            const std::size_t width = m_field.problem().plane.width;
+            m_field.add({run.sample / width, run.sample % width, run.count, &run.travel->x, &covered.front().x},
+                        m_color, m_is_colored);
         }
 
     private:

@@ -1,76 +1,43 @@
 // Python names of the lights in native/scene.
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "base/constants.h"
 #include "python/vectors.h"
 #include "scene/area_light.h"
 #include "scene/environment_light.h"
-#include "scene/light.h"
 #include "scene/mesh_light.h"
 #include "scene/receiver.h"
-#include "scene/sphere_spot_light.h"
-#include "scene/sun_disk_light.h"
+#include "scene/spot_light.h"
+#include "scene/sun_light.h"
 
 namespace beamspread {
 
 namespace {
 
-SpotCone to_spot_cone(const Numbers& frame, double spot_size, double blend, const std::string& falloff)
+BallShape to_shape(const std::string& name)
 {
-    const auto kind =
-        named<SpotFalloff>("falloff", falloff, {{"scaled", SpotFalloff::scaled}, {"legacy", SpotFalloff::legacy}});
-    return {to_axes("frame", frame), spot_size, blend, kind};
+    return named<BallShape>("shape", name, {{"sphere", BallShape::sphere}, {"disk", BallShape::disk}});
 }
 
-std::unique_ptr<SunLight> make_sun(const Numbers& direction)
+std::unique_ptr<SunLight> make_sun(const Numbers& direction, double angle, const std::string& disk)
 {
-    return std::make_unique<SunLight>(to_vec3("direction", direction));
+    const auto kind = named<SunDisk>("disk", disk, {{"even", SunDisk::even}, {"flat", SunDisk::flat}});
+    return std::make_unique<SunLight>(to_vec3("direction", direction), angle, kind);
 }
 
-std::unique_ptr<PointLight> make_point(const Numbers& position)
+std::unique_ptr<PointLight> make_point(const Numbers& position, double radius, const std::string& shape)
 {
-    return std::make_unique<PointLight>(to_vec3("position", position));
+    return std::make_unique<PointLight>(to_vec3("position", position), radius, to_shape(shape));
 }
 
 std::unique_ptr<SpotLight> make_spot(const Numbers& position, const Numbers& frame, double spot_size, double blend,
-                                     const std::string& falloff)
+                                     const std::string& falloff, double radius, const std::string& shape)
 {
-    return std::make_unique<SpotLight>(to_vec3("position", position), to_spot_cone(frame, spot_size, blend, falloff));
-}
-
-std::optional<py::tuple> position_in(const Light& light, const ReceiverGrid& grid)
-{
-    const LightSource source = light.source();
-    if (source.is_far)
-        return std::nullopt;
-    const Vec3 position = grid.to_plane(source.position - grid.origin);
-    return py::make_tuple(position.x, position.y, position.z);
-}
-
-std::unique_ptr<SunDiskLight> make_sun_disk(const Numbers& direction, double angle, const std::string& disk)
-{
-    const auto kind = named<SunDisk>("disk", disk, {{"even", SunDisk::even}, {"flat", SunDisk::flat}});
-    return std::make_unique<SunDiskLight>(to_vec3("direction", direction), angle, kind);
-}
-
-SphereModel to_model(const std::string& name)
-{
-    return named<SphereModel>("model", name, {{"sphere", SphereModel::sphere}, {"disk", SphereModel::disk}});
-}
-
-std::unique_ptr<SphereLight> make_sphere(const Numbers& position, double radius, const std::string& model)
-{
-    return std::make_unique<SphereLight>(to_vec3("position", position), radius, to_model(model));
-}
-
-std::unique_ptr<SphereSpotLight> make_sphere_spot(const Numbers& position, const Numbers& frame, double spot_size,
-                                                  double blend, const std::string& falloff, double radius,
-                                                  const std::string& model)
-{
-    return std::make_unique<SphereSpotLight>(to_vec3("position", position),
-                                             to_spot_cone(frame, spot_size, blend, falloff), radius, to_model(model));
+    const auto kind =
+        named<SpotFalloff>("falloff", falloff, {{"scaled", SpotFalloff::scaled}, {"legacy", SpotFalloff::legacy}});
+    const SpotCone cone(to_axes("frame", frame), spot_size, blend, kind);
+    return std::make_unique<SpotLight>(to_vec3("position", position), cone, radius, to_shape(shape));
 }
 
 std::unique_ptr<AreaLight> make_area(const Numbers& position, const Numbers& frame, double size_x, double size_y,
@@ -88,7 +55,7 @@ std::unique_ptr<EnvironmentLight> make_environment(const py::array& radiance, co
     const View2D<const Vec3f> pixels{static_cast<const Vec3f*>(radiance.data()),
                                      static_cast<std::size_t>(radiance.shape(0)),
                                      static_cast<std::size_t>(radiance.shape(1)), radiance.shape(1)};
-    // Its rows are those of the matrix.
+    // `to_axes` makes columns of the matrix's rows.
     return std::make_unique<EnvironmentLight>(pixels, glm::transpose(to_axes("to_world", to_world)));
 }
 
@@ -99,17 +66,27 @@ std::unique_ptr<MeshLight> make_mesh_light(const py::array& vertices, const py::
                                        to_rows<Vec3f, float>("radiance", radiance, "contiguous float32 (M, 3)"));
 }
 
-py::tuple irradiance(const ExtendedLight& light, const Numbers& point, const Numbers& normal)
+py::object position_in(const Light& light, const ReceiverGrid& grid)
 {
-    const Vec3 light_there = light.irradiance(to_vec3("point", point), to_vec3("normal", normal));
-    return py::make_tuple(light_there.x, light_there.y, light_there.z);
+    const std::optional<LightSource> source = light.source();
+    if (!source || source->is_far)
+        return py::none();
+    const Vec3 position = grid.to_plane(source->position - grid.origin);
+    return py::make_tuple(position.x, position.y, position.z);
 }
 
-py::tuple sample(const ExtendedLight& light, const Numbers& point, const Numbers& normal, const py::array& square)
+py::tuple irradiance(const Light& light, const Numbers& point, const Numbers& normal)
+{
+    const Vec3 arriving = light.irradiance(to_vec3("point", point), to_vec3("normal", normal));
+    return py::make_tuple(arriving.x, arriving.y, arriving.z);
+}
+
+py::tuple sample(const Light& light, const Numbers& point, const Numbers& normal, const py::array& square)
 {
     const auto places = to_rows<Vec2, double>("square", square, "contiguous float64 (N, 2)");
+    const std::vector<Vec3> points(places.size(), to_vec3("point", point));
     std::vector<LightRay> rays(places.size());
-    light.sample(to_vec3("point", point), to_vec3("normal", normal), places, rays.data());
+    light.sample(points, to_vec3("normal", normal), places, rays.data());
     const auto count = static_cast<py::ssize_t>(rays.size());
     Array<double> travel({count, py::ssize_t{3}});
     Array<double> distance(count);
@@ -129,12 +106,15 @@ py::tuple sample(const ExtendedLight& light, const Numbers& point, const Numbers
 
 void bind_lights(py::module_& m)
 {
-    py::class_<Light>(m, "Light",
-                      R"(A light of strength 1 without colour; its kinds are SunLight, PointLight, SpotLight.
+    py::class_<Light>(m, "Light", R"(A light of strength 1 without color, with or without a size.
 
-Each raises ValueError for an argument that is out of range, with a message that names it.
+Its kinds are SunLight, PointLight, SpotLight, AreaLight, EnvironmentLight and MeshLight. Each raises ValueError for an
+argument that is out of range, with a message that names it.
 )")
-        .def("position_in", &position_in, py::arg("grid"), R"(Where all of the light comes from.
+        .def_property_readonly("is_delta", &Light::is_delta,
+                               "bool: True if the light has no size, so that one ray reaches each point.")
+        .def_property_readonly("is_colored", &Light::is_colored, "bool: True if its rays differ in color.")
+        .def("position_in", &position_in, py::arg("grid"), R"(Position of a lamp without a size.
 
 Parameters
 ----------
@@ -143,60 +123,16 @@ grid : ReceiverGrid
 Returns
 -------
 tuple of 3 floats or None
-    Metres along the grid's x_axis, y_axis and normal from the outer corner of texel (0, 0); None: a light infinitely
-    far away.
-)");
-
-    py::class_<SunLight, Light>(m, "SunLight", R"(Parallel light of 1 W/m^2 at normal incidence.
-
-Parameters
-----------
-direction : 3 floats
-    Of travel in the world, any length but 0.
+    Metres along the grid's x_axis, y_axis and normal from the outer corner of texel (0, 0); None for a sun, and for a
+    light with a size.
 )")
-        .def(py::init(&make_sun), py::arg("direction"));
-
-    py::class_<PointLight, Light>(m, "PointLight", R"(A point lamp of 1 W.
-
-Parameters
-----------
-position : 3 floats
-    In the world, metres.
-)")
-        .def(py::init(&make_point), py::arg("position"));
-
-    py::class_<SpotLight, Light>(m, "SpotLight", R"(A spot lamp of 1 W over the whole sphere, as Blender counts it.
-
-Parameters
-----------
-position : 3 floats
-    In the world, metres.
-frame : (3, 3) floats
-    Rows: the lamp's x, y and z axes in the world with their scale (the columns of its 3 x 3 world matrix). It shines
-    along -z.
-spot_size : float
-    Full angle of the cone in radians, 0 < spot_size <= pi.
-blend : float
-    Soft part of the cone, 0 to 1.
-falloff : str
-    "scaled": as Cycles in Blender 4.2, 4.5 and 5.0, where the lamp's scale shapes the cone. "legacy": as in 3.4, where
-    it does not, and light falls off with the cosine to the axis besides.
-)")
-        .def(py::init(&make_spot), py::arg("position"), py::arg("frame"), py::arg("spot_size"), py::arg("blend"),
-             py::arg("falloff") = "scaled");
-
-    py::class_<ExtendedLight>(m, "ExtendedLight", R"(A light of a size; its kinds are SunDiskLight, SphereLight,
-SphereSpotLight, AreaLight, EnvironmentLight and MeshLight. Each raises ValueError for an argument that is out of range,
-with a message that names it.
-)")
-        .def_property_readonly("is_colored", &ExtendedLight::is_colored, "bool: whether its rays differ in colour.")
         .def("irradiance", &irradiance, py::arg("point"), py::arg("normal"),
-             R"(What reaches a point with nothing in between.
+             R"(Irradiance at a point where nothing blocks the light.
 
 Parameters
 ----------
 point : 3 floats
-    In the world, metres.
+    World position, metres.
 normal : 3 floats
     Unit vector out of the lit side of the plane there.
 
@@ -206,86 +142,95 @@ tuple of 3 floats
     W/m^2 in each channel.
 )")
         .def("sample", &sample, py::arg("point"), py::arg("normal"), py::arg("square"),
-             R"(Rays from a point towards the light.
+             R"(Rays from a point toward the light.
 
 Parameters
 ----------
 point, normal
-    Those of `irradiance`.
+    As for `irradiance`.
 square : ndarray, float64, shape (N, 2), C-contiguous
-    Places in the unit square; even ones give the density of rays that `flux` stands for.
+    Places in the unit square, evenly spread for the density of rays that `flux` assumes.
 
 Returns
 -------
 travel : ndarray, float64, shape (N, 3)
     Unit vectors along which the light travels, world.
 distance : ndarray, float64, shape (N,)
-    To the light, metres.
+    Distance to the light, metres.
 flux : ndarray, float32, shape (N, 3)
-    W/m^2 on a square metre that faces the ray, over the density of rays: the mean of flux times cosine to the normal is
-    the irradiance.
+    W/m^2 on a surface that faces the ray, over the density of rays: the mean of flux times cosine to the normal is the
+    irradiance.
 )");
 
-    py::class_<SunDiskLight, ExtendedLight>(m, "SunDiskLight", R"(Light of 1 W/m^2 from a disk infinitely far away.
+    py::class_<SunLight, Light>(m, "SunLight", R"(A sun of 1 W/m^2 at normal incidence.
 
 Parameters
 ----------
 direction : 3 floats
-    Of travel in the world from the disk's centre, any length but 0.
+    World direction of travel from the disk's center, any length but 0.
 angle : float
     Full angle of the disk in radians, 0 to pi.
 disk : str
     "even": of even radiance, and 1 W/m^2 at normal incidence, as Cycles in Blender 4.5. "flat": each part of a flat
     disk gives the same flux, as in 3.4; E at normal incidence is smaller, by 1.7 % for an angle of 30 degrees.
 )")
-        .def(py::init(&make_sun_disk), py::arg("direction"), py::arg("angle"), py::arg("disk") = "even");
+        .def(py::init(&make_sun), py::arg("direction"), py::arg("angle") = 0.0, py::arg("disk") = "even");
 
-    py::class_<SphereLight, ExtendedLight>(m, "SphereLight", R"(A point lamp of 1 W with a radius.
+    py::class_<PointLight, Light>(m, "PointLight", R"(A point lamp of 1 W.
 
 Parameters
 ----------
 position : 3 floats
-    Of its centre in the world, metres.
+    World position of its center, metres.
 radius : float
-    In metres, 0 or more.
-model : str
+    Metres, 0 or more.
+shape : str
     "sphere"; or "disk", which faces each point that it lights.
 )")
-        .def(py::init(&make_sphere), py::arg("position"), py::arg("radius"), py::arg("model"));
+        .def(py::init(&make_point), py::arg("position"), py::arg("radius") = 0.0, py::arg("shape") = "sphere");
 
-    py::class_<SphereSpotLight, ExtendedLight>(m, "SphereSpotLight", R"(A spot lamp of 1 W with a radius.
-
-Parameters
-----------
-position, frame, spot_size, blend, falloff
-    Those of `SpotLight`.
-radius, model
-    Those of `SphereLight`.
-)")
-        .def(py::init(&make_sphere_spot), py::arg("position"), py::arg("frame"), py::arg("spot_size"), py::arg("blend"),
-             py::arg("falloff"), py::arg("radius"), py::arg("model"));
-
-    py::class_<AreaLight, ExtendedLight>(m, "AreaLight",
-                                         R"(An area lamp of 1 W as Blender counts it: of the radiance 1 W / (4 area).
+    py::class_<SpotLight, Light>(m, "SpotLight", R"(A spot lamp of 1 W over the whole sphere, as in Blender.
 
 Parameters
 ----------
 position : 3 floats
-    Of its centre in the world, metres.
+    World position of its center, metres.
+frame : (3, 3) floats
+    Rows: the lamp's x, y and z axes in the world with their scale (the columns of its 3 x 3 world matrix). It shines
+    along -z.
+spot_size : float
+    Full angle of the cone in radians, 0 < spot_size <= pi.
+blend : float
+    Soft part of the cone, 0 to 1.
+falloff : str
+    "scaled": as Cycles in Blender 4.2, 4.5 and 5.0, where the lamp's scale shapes the cone. "legacy": as in 3.4, where
+    the scale does not count, and light also falls off with the cosine to the axis.
+radius, shape
+    As for `PointLight`.
+)")
+        .def(py::init(&make_spot), py::arg("position"), py::arg("frame"), py::arg("spot_size"), py::arg("blend"),
+             py::arg("falloff") = "scaled", py::arg("radius") = 0.0, py::arg("shape") = "sphere");
+
+    py::class_<AreaLight, Light>(m, "AreaLight", R"(An area lamp of 1 W, whose radiance is 1 W / (4 area).
+
+Parameters
+----------
+position : 3 floats
+    World position of its center, metres.
 frame : (3, 3) floats
     Rows: the lamp's x, y and z axes in the world with their scale (the columns of its 3 x 3 world matrix). It shines
     along -z.
 size_x, size_y : float
-    Whole lengths along its own axes, 0 or more; without an area it is dark.
+    Whole lengths along its own axes, 0 or more; a lamp without an area is dark.
 is_round : bool
-    An ellipse instead of a rectangle.
+    True for an ellipse, False for a rectangle.
 spread : float
-    Full angle that light leaves in, radians, 0 to pi.
+    Full angle in which light leaves, radians, 0 to pi.
 )")
         .def(py::init(&make_area), py::arg("position"), py::arg("frame"), py::arg("size_x"), py::arg("size_y"),
              py::arg("is_round") = false, py::arg("spread") = pi);
 
-    py::class_<EnvironmentLight, ExtendedLight>(m, "EnvironmentLight", R"(Light from all directions.
+    py::class_<EnvironmentLight, Light>(m, "EnvironmentLight", R"(Light from all directions.
 
 Parameters
 ----------
@@ -297,7 +242,7 @@ to_world : (3, 3) floats
 )")
         .def(py::init(&make_environment), py::arg("radiance"), py::arg("to_world"));
 
-    py::class_<MeshLight, ExtendedLight>(m, "MeshLight", R"(Triangles that glow on both sides.
+    py::class_<MeshLight, Light>(m, "MeshLight", R"(Triangles that glow on both sides.
 
 Parameters
 ----------
@@ -306,7 +251,7 @@ vertices : ndarray, float64, shape (N, 3), C-contiguous
 triangles : ndarray, uint32, shape (M, 3), C-contiguous
     Vertex indices. Copied.
 radiance : ndarray, float32, shape (M, 3), C-contiguous
-    Of each triangle, W/(m^2 sr), 0 or more. Copied.
+    Radiance of each triangle, W/(m^2 sr), 0 or more. Copied.
 )")
         .def(py::init(&make_mesh_light), py::arg("vertices"), py::arg("triangles"), py::arg("radiance"));
 }

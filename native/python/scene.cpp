@@ -1,9 +1,8 @@
-// Python names of native/scene but lights and occluders: ReceiverGrid, gather_beams, coverage.
+// Python names of receivers in native/scene: ReceiverGrid, coverage.
+#include <algorithm>
 #include <memory>
-#include <utility>
 
 #include "python/vectors.h"
-#include "scene/beams.h"
 #include "scene/coverage.h"
 
 namespace beamspread {
@@ -25,36 +24,6 @@ std::unique_ptr<ReceiverGrid> make_grid(const Numbers& origin, const Numbers& x_
                             .height = static_cast<std::size_t>(height)};
     grid.check();
     return std::make_unique<ReceiverGrid>(grid);
-}
-
-// Directions of all texels, or the one of a light infinitely far away.
-py::tuple gather_beams(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, int samples,
-                       int threads, const py::object& callback, double clearance, bool find_shadows, bool directions)
-{
-    BeamArrays beams;
-    Array<float> irradiance;
-    if (occluders && occluders->is_colored()) {
-        irradiance = new_vectors(grid);
-        beams.colored = vectors_of(irradiance);
-    } else {
-        irradiance = Array<float>({grid.height, grid.width});
-        beams.irradiance = {irradiance.mutable_data(), grid.height, grid.width, irradiance.shape(1)};
-    }
-    py::object direction = py::none();
-    if (light.source().is_far) {
-        const Vec3 travel = unblocked_direction(grid, light, grid.origin);
-        direction = Array<double>(3, &travel.x);
-    } else if (directions) {
-        Array<float> field = new_vectors(grid);
-        beams.direction = vectors_of(field);
-        direction = std::move(field);
-    }
-    Progress progress(progress_callback(callback));
-    {
-        const py::gil_scoped_release released;
-        compute_beams(grid, light, occluders, {samples, threads, clearance, find_shadows}, beams, progress);
-    }
-    return py::make_tuple(irradiance, direction);
 }
 
 Array<float> coverage(const py::array& corners, const py::array& corner_counts, py::ssize_t width, py::ssize_t height,
@@ -103,46 +72,6 @@ ValueError
              py::arg("pitch_x"), py::arg("pitch_y"), py::arg("width"), py::arg("height"));
 
     bind_lights(m);
-    m.def("gather_beams", &gather_beams, py::arg("grid"), py::arg("light"), py::arg("occluders") = py::none(),
-          py::arg("samples") = 4, py::arg("threads") = 0, py::arg("progress") = py::none(), py::arg("clearance") = 0.0,
-          py::arg("find_shadows") = true, py::arg("directions") = true,
-          R"(Irradiance of a plane by a light of strength 1, and where it comes from.
-
-Parameters
-----------
-grid : ReceiverGrid
-light : Light
-occluders : Occluders, optional
-    What casts shadows; None: nothing does.
-samples : int
-    samples x samples points in each texel, each with its own visibility; 1 to 64.
-threads : int
-    0: all. The result is the same, bit for bit, for any number.
-progress : callable, optional
-    progress(fraction) returns False to stop.
-clearance : float
-    How far off the plane shadow rays start, in metres, besides what rounding needs: as far as the receiver's own faces,
-    where they are among the occluders, depart from the plane.
-find_shadows : bool
-    False: rays are traced from every texel, also where none can be blocked or one triangle blocks them all. The result
-    is the same; for measurements.
-
-Returns
--------
-irradiance : ndarray, float32, shape (height, width), or (height, width, 3) past coloured occluders
-    W/m^2: cosine and visible part included, 0 if the light is behind the plane or in it. Row 0 is the lowest row.
-direction : ndarray, float32, shape (height, width, 3), or float64, shape (3,) of a light infinitely far away
-    Unit vectors of travel in the plane frame (x_axis, y_axis, normal), z < 0. Where no light arrives: that of the
-    unblocked light, or (0, 0, -1) if the light is behind the plane or in it.
-
-Raises
-------
-ValueError
-    An argument is out of range; the message names it.
-Cancelled
-    `progress` returned False.
-)");
-
     m.def("coverage", &coverage, py::arg("corners"), py::arg("corner_counts"), py::arg("width"), py::arg("height"),
           py::arg("threads") = 0, R"(The exact part of each texel of a grid that polygons cover.
 

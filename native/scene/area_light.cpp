@@ -9,19 +9,20 @@
 #include "base/constants.h"
 #include "base/error.h"
 #include "scene/checks.h"
-#include "scene/polygon.h"
+#include "scene/spherical_shapes.h"
 
 namespace beamspread {
 
 namespace {
 
-// A lamp whose squared size is less than this part of its squared distance is sampled evenly over its area: that costs
-// half and its shadows are as noisy, within 1 % also with half of it and twice.
+// Squared size over squared distance of a lamp below which rays are spread evenly over its area instead of its solid
+// angle. Higher values save time and add noise.
 constexpr double small = 0.05;
 
 constexpr std::array<Vec2, 4> rectangle = {Vec2(-0.5, -0.5), Vec2(0.5, -0.5), Vec2(0.5, 0.5), Vec2(-0.5, 0.5)};
 
-// Weights over [0, 1], dense at both ends, where the outline is seen along its edge: four points of Gauss in each third.
+// Nodes and weights over [0, 1], four Gauss points in each third. They are dense at both ends, where the outline is seen
+// along its edge.
 struct Node {
     double at;
     double weight;
@@ -45,12 +46,12 @@ struct Range {
     double last;
 };
 
-// The border of a lamp whose sides are 1 long, seen from a place in its plane.
+// The border of a lamp with sides of length 1, seen from a place in its plane.
 struct Outline {
     Vec2 from;
     bool is_round;
 
-    // Along from + t direction, t >= 0; empty ones end before they begin.
+    // The t >= 0 for which from + t direction lies on the lamp; an empty range ends before it begins.
     Range span(const Vec2& direction) const
     {
         if (is_round) {
@@ -68,7 +69,7 @@ struct Outline {
         return range;
     }
 
-    // Pieces of the azimuths in which it is seen, on each of which it is smooth; the sides have these lengths.
+    // Ranges of the azimuths in which the lamp is seen; the border is smooth within each. The sides have these lengths.
     std::vector<Range> azimuths(const Vec2& lengths) const
     {
         std::vector<Range> pieces;
@@ -79,7 +80,7 @@ struct Outline {
                 pieces.push_back({0.5 * pi * i, 0.5 * pi * (i + 1)});
             return pieces;
         }
-        // Around the direction to the centre, so that what lies ahead has no jump.
+        // Azimuths count from the direction to the center, so that they don't jump by 2 pi over the lamp.
         const Vec2 ahead = from == Vec2(0.0) ? Vec2(1.0, 0.0) : -from * lengths;
         const double middle = std::atan2(ahead.y, ahead.x);
         const auto azimuth = [&](const Vec2& to) {
@@ -165,50 +166,45 @@ double AreaLight::through_grid(double cos_angle) const
     return std::max((m_tan_spread - tangent) / (m_tan_spread - m_half_spread), 0.0);
 }
 
-void AreaLight::sample(const Vec3& point, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const
+void AreaLight::sample(std::span<const Vec3> points, const Vec3& normal, std::span<const Vec2> square,
+                       LightRay* rays) const
+{
+    for (std::size_t i = 0; i < points.size(); ++i)
+        rays[i] = ray_from(points[i], normal, square[i]);
+}
+
+LightRay AreaLight::ray_from(const Vec3& point, const Vec3& normal, const Vec2& at) const
 {
     const double to_plane = depth(point);
     Part part;
-    if (!lit_part(point, to_plane, part)) {
-        std::fill_n(rays, square.size(), LightRay{.travel = -normal, .distance = 1.0, .flux = Vec3f(0.0f)});
-        return;
-    }
+    if (!lit_part(point, to_plane, part))
+        return {.travel = -normal, .distance = 1.0, .flux = Vec3f(0.0f)};
     if (m_half_spread == 0.0) {
-        // The grid's limit: all light that leaves does so along the axis.
+        // The limit of a dense grid: all light leaves along the axis.
         const double flux = is_on(part.low) ? pi * m_radiance : 0.0;
-        std::fill_n(rays, square.size(),
-                    LightRay{.travel = m_axis, .distance = to_plane, .flux = Vec3f(static_cast<float>(flux))});
-        return;
+        return {.travel = m_axis, .distance = to_plane, .flux = Vec3f(static_cast<float>(flux))};
     }
     const Vec2 size = part.high - part.low;
     const Vec3 corner = m_position - point + part.low.x * m_side_x + part.low.y * m_side_y;
     const Vec3 side_x = size.x * m_side_x;
     const Vec3 side_y = size.y * m_side_y;
-    const double area = size.x * size.y * glm::length(m_side_x) * glm::length(m_side_y);
     const Vec3 middle = corner + 0.5 * (side_x + side_y);
-    if (glm::dot(side_x, side_x) + glm::dot(side_y, side_y) < small * glm::dot(middle, middle)) {
-        const bool is_whole = size.x == 1.0 && size.y == 1.0;
-        for (const Vec2& at : square) {
-            Vec2 place;
-            double of_area = area;
-            if (m_is_round && is_whole) {
-                const double radius = 0.5 * std::sqrt(at.x);
-                place = {radius * std::cos(2.0 * pi * at.y), radius * std::sin(2.0 * pi * at.y)};
-                of_area = m_area;
-            } else {
-                place = part.low + at * size;
-            }
-            const Vec3 way = m_position - point + place.x * m_side_x + place.y * m_side_y;
-            const double squared = glm::dot(way, way);
-            *rays++ = ray(way, place, of_area * to_plane / (squared * std::sqrt(squared)));
-        }
-        return;
-    }
-    const SphericalRectangle seen(corner, side_x, side_y);
-    for (const Vec2& at : square) {
+    if (glm::dot(side_x, side_x) + glm::dot(side_y, side_y) >= small * glm::dot(middle, middle)) {
+        const SphericalRectangle seen(corner, side_x, side_y);
         const Vec3 way = seen.point(at);
-        *rays++ = ray(way, foot(point + way), seen.solid_angle());
+        return ray(way, foot(point + way), seen.solid_angle());
     }
+    const bool is_whole = size.x == 1.0 && size.y == 1.0;
+    Vec2 place = part.low + at * size;
+    double area = size.x * size.y * glm::length(m_side_x) * glm::length(m_side_y);
+    if (m_is_round && is_whole) {
+        const double radius = 0.5 * std::sqrt(at.x);
+        place = {radius * std::cos(2.0 * pi * at.y), radius * std::sin(2.0 * pi * at.y)};
+        area = m_area;
+    }
+    const Vec3 way = m_position - point + place.x * m_side_x + place.y * m_side_y;
+    const double squared = glm::dot(way, way);
+    return ray(way, place, area * to_plane / (squared * std::sqrt(squared)));
 }
 
 LightRay AreaLight::ray(const Vec3& way, const Vec2& place, double solid_angle) const
@@ -257,8 +253,8 @@ double AreaLight::up_to(double along, double across, double tangent) const
 
 double AreaLight::seen(const Vec3& point, const Vec3& normal, double depth) const
 {
-    // By the angle a to the lamp's axis and the azimuth phi around the foot of the point on the lamp: the lamp is convex,
-    // so that for each azimuth it spans one range of angles, and the integral over that is known.
+    // Coordinates are the angle a to the lamp's axis and the azimuth phi around the foot of the point on the lamp. The
+    // lamp is convex: it spans one range of angles for each azimuth, and the integral over that range is known.
     const Vec2 lengths(glm::length(m_side_x), glm::length(m_side_y));
     const double along = -glm::dot(normal, m_axis);  // cos(theta) = along cos(a) + across(phi) sin(a)
     const double across_x = glm::dot(normal, m_side_x) / lengths.x;
@@ -274,7 +270,7 @@ double AreaLight::seen(const Vec3& point, const Vec3& normal, double depth) cons
             auto [near, far] = outline.span(direction / lengths);
             const double across = across_x * direction.x + across_y * direction.y;
             far = std::min(far, reach);
-            // The horizon: where along depth + across rho changes its sign.
+            // The horizon: along depth + across rho changes its sign.
             if (across != 0.0) {
                 const double horizon = -along * depth / across;
                 (across > 0.0 ? near : far) = across > 0.0 ? std::max(near, horizon) : std::min(far, horizon);

@@ -1,10 +1,10 @@
-// The world: radiance from all directions, infinitely far away.
+// The world: radiance from all directions, infinitely far away, as an equirectangular image.
 #pragma once
 
 #include <vector>
 
 #include "base/view.h"
-#include "scene/extended_light.h"
+#include "scene/light.h"
 
 namespace beamspread {
 
@@ -21,15 +21,17 @@ struct EnvironmentMap {
     const Vec3f& of_cell(std::size_t x, std::size_t y) const { return radiance[y / cells_y * width + x / cells_x]; }
 };
 
-class EnvironmentLight final : public ExtendedLight {
+class EnvironmentLight final : public Light {
 public:
     // `radiance` >= 0 in W/(m^2 sr); `to_world` turns directions of the image into the world. Throws InvalidArgument.
     EnvironmentLight(const View2D<const Vec3f>& radiance, const Mat3& to_world);
 
-    // By `facing`, which is what to sample: it chooses directions by radiance times cosine.
-    void sample(const Vec3& point, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const override;
+    // Both prepare the light with `facing` at each call; callers with many points sample that, which chooses directions
+    // by radiance times cosine.
+    void sample(std::span<const Vec3> points, const Vec3& normal, std::span<const Vec2> square,
+                LightRay* rays) const override;
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
-    std::unique_ptr<const ExtendedLight> facing(const Vec3& normal) const override;
+    std::unique_ptr<const Light> facing(const Vec3& normal) const override;
     bool is_colored() const override { return m_is_colored; }
 
 private:

@@ -1,29 +1,34 @@
-// Lights without size.
+// Interface of all lights: lamps with and without a size, the world, glowing meshes.
 //
-// Lights are in Cycles' units and follow Cycles' formulas, measured in Blender 3.4.1, 4.2, 4.5 and 5.0
-// (tests/blender/test_cycles_irradiance.py): a white diffuse plane baked with DIFFUSE / DIRECT shows E / pi. They have
-// strength 1, W/m^2 or W, and no colour: light is linear in both.
+// Lights use Cycles' units and formulas, measured in Blender 3.4.1, 4.2, 4.5 and 5.0
+// (tests/blender/test_cycles_irradiance.py): a white diffuse plane baked with DIFFUSE / DIRECT shows E / pi. Lamps have
+// strength 1 and no color, because light is linear in both. A lamp without a size is a lamp of size 0.
 #pragma once
 
+#include <limits>
+#include <memory>
+#include <optional>
 #include <span>
 
 #include "base/vec.h"
-#include "scene/spot_cone.h"
 
 namespace beamspread {
 
-// Light at one point of the scene.
-struct Arrival {
-    Vec3 travel;  // unit vector along which it travels
-    double flux;  // on a square metre that faces it, W/m^2
-    double distance;  // to the lamp, metres; may be infinite
+// One ray from a point toward a light.
+struct LightRay {
+    Vec3 travel;  // unit vector along which the light travels, world
+    double distance;  // to the light, metres; may be infinite
+    // W/m^2 on a surface that faces the ray, over the density of rays: the mean of flux cos(theta) over evenly spread
+    // places of the unit square is the irradiance. 0 if the ray misses the light.
+    Vec3f flux;
 };
 
-// Where all light of a lamp comes from.
+// The point or direction that all light of a lamp comes from.
 struct LightSource {
-    Vec3 position{};  // of the lamp; of a light infinitely far away the unit vector towards it
-    bool is_far = false;  // then light is the same everywhere
-    bool is_smooth = false;  // but for the falloff with distance and cosine, light is even in all directions
+    Vec3 position{};  // world; for a light infinitely far away the unit vector toward it
+    bool is_far = false;  // true if the light is infinitely far away
+    // True if only the distance and the cosine make irradiance change from point to point.
+    bool is_smooth = false;
 };
 
 class Light {
@@ -33,47 +38,30 @@ public:
     Light& operator=(const Light&) = delete;
     virtual ~Light() = default;
 
-    // Writes what arrives at each of the points; in the lamp itself, at distance 0, that need not be numbers. Many
-    // points at once: a call for each would cost a point lamp a quarter more time.
-    virtual void arrive(std::span<const Vec3> points, Arrival* arrivals) const = 0;
-    virtual LightSource source() const = 0;
-};
+    // True if one ray reaches each point, because the light has no size; such a light is white and has a source().
+    virtual bool is_delta() const { return false; }
 
-// Parallel light: E = S cos(theta), S the strength in W/m^2.
-class SunLight final : public Light {
-public:
-    // `direction` of travel, any length but 0; throws InvalidArgument.
-    explicit SunLight(const Vec3& direction);
-    void arrive(std::span<const Vec3> points, Arrival* arrivals) const override;
-    LightSource source() const override { return {.position = -m_travel, .is_far = true}; }
+    // Writes a ray for each point of a surface with that normal, and for the place of the unit square of the same
+    // index. A delta light ignores `square`, which may be empty. A ray from a point inside a delta light may hold NaN.
+    virtual void sample(std::span<const Vec3> points, const Vec3& normal, std::span<const Vec2> square,
+                        LightRay* rays) const = 0;
 
-private:
-    Vec3 m_travel;
-};
+    // Irradiance of a surface with that normal where nothing blocks the light, W/m^2.
+    virtual Vec3 irradiance(const Vec3& point, const Vec3& normal) const = 0;
 
-// Light from one point into all directions: E = P cos(theta) / (4 pi r^2), P the power in W, whatever the lamp's scale.
-class PointLight final : public Light {
-public:
-    // Throws InvalidArgument.
-    explicit PointLight(const Vec3& position);
-    void arrive(std::span<const Vec3> points, Arrival* arrivals) const override;
-    LightSource source() const override { return {.position = m_position, .is_smooth = true}; }
+    // A lower bound of the distance to the light, metres. Irradiance hardly changes within a small part of it; infinite:
+    // irradiance is the same at all points.
+    virtual double distance_from(const Vec3& /*point*/) const { return std::numeric_limits<double>::infinity(); }
 
-private:
-    Vec3 m_position;
-};
+    // True if rays of the light differ in color; otherwise all channels of a ray's flux are equal.
+    virtual bool is_colored() const { return false; }
 
-// A point light behind a cone: E = P cos(theta) f / (4 pi r^2), the power P that of the whole sphere, whatever the cone.
-class SpotLight final : public Light {
-public:
-    // Throws InvalidArgument.
-    SpotLight(const Vec3& position, const SpotCone& cone) : m_point(position), m_cone(cone) {}
-    void arrive(std::span<const Vec3> points, Arrival* arrivals) const override;
-    LightSource source() const override { return {.position = m_point.source().position}; }
+    // The same light prepared for surfaces with that normal; null if preparation does not pay.
+    virtual std::unique_ptr<const Light> facing(const Vec3& /*normal*/) const { return nullptr; }
 
-private:
-    PointLight m_point;
-    SpotCone m_cone;
+    // The one point or direction that stands for the light inside a medium; none if its rays differ too much. Delta
+    // lights and narrow suns have one.
+    virtual std::optional<LightSource> source() const { return std::nullopt; }
 };
 
 }  // namespace beamspread

@@ -6,17 +6,17 @@
 
 #include "base/error.h"
 #include "scene/checks.h"
-#include "scene/polygon.h"
+#include "scene/spherical_shapes.h"
 
 namespace beamspread {
 
 namespace {
 
-// Of the way to a face, which may be among what blocks light; rays are traced in single precision. A face that blocks
-// takes up to 1.4 % of its own light at 1 - 1e-7, and nothing from 1 - 2.5e-7 on.
+// Fraction of the way to a face that rays are traced, in single precision, so that a face which also blocks light does
+// not block its own. From 1 - 2.5e-7 up faces begin to.
 constexpr double short_of_face = 1.0 - 1e-5;
 
-// Squared distance over squared size from which on a face is as good as a point: right to 2e-3, and in inverse proportion.
+// Squared distance over squared size above which a face counts as a point. The error is 2e-3, in inverse proportion.
 constexpr double sizes_to_small = 20.0 * 20.0;
 
 }  // namespace
@@ -61,14 +61,16 @@ double MeshLight::distance_from(const Vec3& point) const
     return glm::distance(point, glm::clamp(point, m_low, m_high));
 }
 
-void MeshLight::sample(const Vec3& point, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const
+void MeshLight::sample(std::span<const Vec3> points, const Vec3& normal, std::span<const Vec2> square,
+                       LightRay* rays) const
 {
     if (m_faces.empty()) {
-        std::fill_n(rays, square.size(), LightRay{.travel = -normal, .distance = 1.0, .flux = Vec3f(0.0f)});
+        std::fill_n(rays, points.size(), LightRay{.travel = -normal, .distance = 1.0, .flux = Vec3f(0.0f)});
         return;
     }
     const double total = m_cumulated.back();
-    for (const Vec2& place : square) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const Vec2& place = square[i];
         const double wanted = place.x * total;
         const auto above = std::upper_bound(m_cumulated.begin() + 1, m_cumulated.end() - 1, wanted);
         const auto index = static_cast<std::size_t>(above - m_cumulated.begin()) - 1;
@@ -76,12 +78,12 @@ void MeshLight::sample(const Vec3& point, const Vec3& normal, std::span<const Ve
         const Face& face = m_faces[index];
         const double root = std::sqrt(std::clamp((wanted - m_cumulated[index]) / power, 0.0, 1.0));
         const auto& [a, b, c] = face.corners;
-        const Vec3 way = a + root * ((b - a) + place.y * (c - b)) - point;
+        const Vec3 way = a + root * ((b - a) + place.y * (c - b)) - points[i];
         const double squared = glm::dot(way, way);
         const double distance = std::sqrt(squared);
-        // Area times cosine at the light, over the chance of the face.
+        // Area times cosine at the light, over the probability of the face.
         const double projected = 0.5 * std::abs(glm::dot(face.normal, way)) / distance * total / power;
-        *rays++ = {.travel = -way / distance,
+        rays[i] = {.travel = -way / distance,
                    .distance = distance * short_of_face,
                    .flux = Vec3f(face.radiance * (projected / squared))};
     }

@@ -1,19 +1,20 @@
-// Glowing triangles, both sides of them.
+// A mesh of triangles that glow on both sides, each of its own radiance.
 #pragma once
 
 #include <array>
 #include <vector>
 
-#include "scene/extended_light.h"
+#include "scene/light.h"
 #include "scene/occluder_mesh.h"
 
 namespace beamspread {
 
-class MeshLight final : public ExtendedLight {
+class MeshLight final : public Light {
 public:
     // `vertices` in world metres; `radiance` >= 0 of each triangle, W/(m^2 sr). Copied. Throws InvalidArgument.
     MeshLight(std::span<const Vec3> vertices, std::span<const Triangle> triangles, std::span<const Vec3f> radiance);
-    void sample(const Vec3& point, const Vec3& normal, std::span<const Vec2> square, LightRay* rays) const override;
+    void sample(std::span<const Vec3> points, const Vec3& normal, std::span<const Vec2> square,
+                LightRay* rays) const override;
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
     double distance_from(const Vec3& point) const override;
     bool is_colored() const override { return m_is_colored; }
@@ -21,14 +22,14 @@ public:
 private:
     struct Face {
         std::array<Vec3, 3> corners;
-        Vec3 normal;  // its length is twice the area
-        double squared_size;  // of the longest edge
+        Vec3 normal;          // its length is twice the area
+        double squared_size;  // squared length of the longest edge
         Vec3 radiance;
     };
 
-    Vec3 m_low{0.0}, m_high{0.0};  // its bounds
+    Vec3 m_low{0.0}, m_high{0.0};  // bounds of the glowing faces
     std::vector<Face> m_faces;
-    std::vector<double> m_cumulated;  // power of the faces in the mean of the channels, one more than faces
+    std::vector<double> m_cumulated;  // sums of the faces' power, the mean of the channels; one more than faces
     bool m_is_colored = false;
 };
 

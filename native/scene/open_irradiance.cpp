@@ -34,7 +34,7 @@ std::array<double, 4> spline_weights(double t)
 
 }  // namespace
 
-OpenIrradiance::OpenIrradiance(const ReceiverGrid& grid, const ExtendedLight& light)
+OpenIrradiance::OpenIrradiance(const ReceiverGrid& grid, const Light& light)
     : m_grid(grid), m_light(light), m_pitch(std::max(grid.pitch_x, grid.pitch_y))
 {
     if (std::isinf(light.distance_from(grid.origin))) {

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "scene/extended_light.h"
+#include "scene/light.h"
 #include "scene/receiver.h"
 
 namespace beamspread {
@@ -13,7 +13,7 @@ namespace beamspread {
 class OpenIrradiance {
 public:
     // Both must outlive it.
-    OpenIrradiance(const ReceiverGrid& grid, const ExtendedLight& light);
+    OpenIrradiance(const ReceiverGrid& grid, const Light& light);
 
     // The mean over texel (x, y), W/m^2 in each channel.
     Vec3 at(std::size_t x, std::size_t y) const;
@@ -23,7 +23,7 @@ private:
     Vec3 between_nodes(std::size_t x, std::size_t y) const;
 
     const ReceiverGrid& m_grid;
-    const ExtendedLight& m_light;
+    const Light& m_light;
     double m_pitch;
     Vec3 m_everywhere{0.0};  // of a light infinitely far away
     std::size_t m_columns = 0;

@@ -2,90 +2,85 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <cstdint>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include "base/error.h"
 #include "base/sobol.h"
 #include "base/threads.h"
-#include "base/vec.h"
-#include "scene/beams.h"
 #include "scene/checks.h"
+#include "scene/delta_gather.h"
 #include "scene/open_irradiance.h"
-#include "scene/ray_start.h"
+#include "scene/shadow_ray.h"
 
 namespace beamspread {
 
 namespace {
 
-// Texels of a row, and rays of each, that are kept at once: 400 kB, for the processor's cache.
+// Texels of a row, and rays of each, that are gathered at once. More need more of the processor's cache, 400 kB here.
 constexpr std::size_t texels_at_once = 64;
 constexpr std::size_t max_rays_at_once = 256;
 
-// What the rays of a texel met.
-enum Met : std::uint8_t { nothing = 0, light = 1, obstacle = 2, both = light | obstacle };
-
-// How often rays are moved on where none finds the light: with half as many, 6 of 416 texels that a narrow lamp just
-// reaches stay dark, 1e-5 of its light, with twice as many none as with these. And how far: a lattice of four dimensions (Roberts 2018, "The
-// unreasonable effectiveness of quasirandom sequences").
+// Number of times that the rays of a texel are moved on if none finds the light. More find narrower lights.
 constexpr int max_trials = 64;
+
+// Steps by which they are moved on: a lattice of four dimensions (Roberts 2018, "The unreasonable effectiveness of
+// quasirandom sequences").
 constexpr Vec2 step_on_light(0.8566748838545029, 0.7338918566271259);
 constexpr Vec2 step_in_texel(0.6287067210378086, 0.5385972572236101);
 
-// One light's rays on one grid.
-class RayGatherer {
+// Obstacles and light that the rays of a texel met.
+enum Met : std::uint8_t { nothing = 0, light = 1, obstacle = 2, both = light | obstacle };
+
+// Rays of one light with a size, from the texels of one grid.
+class SizedGatherer {
 public:
-    RayGatherer(const ReceiverGrid& grid, const ExtendedLight& light, const Occluders* occluders,
-                const RaySettings& settings)
+    SizedGatherer(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, const RaySettings& settings)
         : m_grid(grid),
           m_prepared(light.facing(grid.normal)),
           m_light(m_prepared ? *m_prepared : light),
           m_open(grid, m_light),
-          m_is_far(std::isinf(m_light.distance_from(grid.origin))),
           m_occluders(occluders),
-          m_rays(static_cast<std::size_t>(settings.rays)),
-          m_even_rays(occluders ? std::min(static_cast<std::size_t>(settings.even_rays), m_rays) : 0),
-          m_sobol(m_rays, settings.seed),
+          m_with_travel(settings.with_travel),
+          m_ray_count(static_cast<std::size_t>(settings.rays)),
+          m_even_rays(occluders ? std::min(static_cast<std::size_t>(settings.even_rays), m_ray_count) : 0),
+          m_sobol(m_ray_count, settings.seed),
           m_even_sobol(std::max<std::size_t>(m_even_rays, 1), settings.seed),
-          m_start(ray_start(grid, occluders, settings.clearance)),
-          m_position_rounding(std::numeric_limits<double>::epsilon() * grid.reach(Vec3(0.0)))
+          m_rays(grid, occluders, settings.clearance)
     {
-        if (takes_a_look())
+        if (has_first_pass())
             m_met.resize(grid.width * grid.height);
     }
 
-    bool takes_a_look() const { return m_even_rays > 0 && m_even_rays < m_rays; }
+    bool has_first_pass() const { return m_even_rays > 0 && m_even_rays < m_ray_count; }
 
-    // Has a look at a row, for itself and for its neighbours.
-    void look_at_row(std::size_t y)
+    // Traces few rays from a row, to find where it and its neighbors need more.
+    void trace_first(std::size_t y)
     {
-        Rays& rays = m_rows.local();
+        Work& work = m_work.local();
         for (std::size_t x = 0; x < m_grid.width; x += texels_at_once) {
             const Span span{y, x, std::min(texels_at_once, m_grid.width - x)};
-            rays.start(m_even_rays, span);
+            work.start(m_even_rays, span);
             for (std::size_t i = 0; i < span.width; ++i)
-                gather_texel(i, {m_even_sobol, 0, m_even_rays, m_even_rays, true}, rays);
-            trace(rays);
-            std::copy(rays.met.begin(), rays.met.end(), met_in(y) + static_cast<std::ptrdiff_t>(x));
+                gather_texel(i, {m_even_sobol, 0, m_even_rays, m_even_rays, true}, work);
+            trace(work);
+            std::copy(work.met.begin(), work.met.end(), met_in(y) + static_cast<std::ptrdiff_t>(x));
         }
     }
 
     void gather_row(std::size_t y, RaySink& sink)
     {
-        Rays& rays = m_rows.local();
-        rays.met_around.assign(m_grid.width, Met::both);
-        if (takes_a_look())
-            look_around(y, rays.met_around);
+        Work& work = m_work.local();
+        work.met_around.assign(m_grid.width, Met::both);
+        if (has_first_pass())
+            find_met_around(y, work.met_around);
         for (std::size_t x = 0; x < m_grid.width; x += texels_at_once) {
             const Span span{y, x, std::min(texels_at_once, m_grid.width - x)};
-            const auto begin = rays.met_around.begin() + static_cast<std::ptrdiff_t>(x);
+            const auto begin = work.met_around.begin() + static_cast<std::ptrdiff_t>(x);
             const auto end = begin + static_cast<std::ptrdiff_t>(span.width);
-            const std::size_t most = std::find(begin, end, Met::both) == end ? m_even_rays : m_rays;
-            for (std::size_t first = 0; first < most; first += max_rays_at_once)
-                gather_some(span, first, std::min(most - first, max_rays_at_once), rays, sink);
+            const std::size_t ray_count = std::find(begin, end, Met::both) == end ? m_even_rays : m_ray_count;
+            for (std::size_t first = 0; first < ray_count; first += max_rays_at_once)
+                gather_span(span, first, std::min(ray_count - first, max_rays_at_once), work, sink);
         }
     }
 
@@ -97,23 +92,23 @@ private:
         std::size_t width;
     };
 
-    // Of a span; the last six of one texel.
-    struct Rays {
+    // Working memory of a thread: first the rays of a span, then those of one texel.
+    struct Work {
         Span span{};
         std::vector<Vec3f> travel, irradiance;  // [ray * width + texel]
-        std::vector<std::uint8_t> met;  // [texel]
-        std::vector<std::uint8_t> met_around;  // [texel of the row] by its own rays and those around it
-        // A packet that is being filled, and what its rays carry.
+        std::vector<std::uint8_t> met;          // [texel]
+        std::vector<std::uint8_t> met_around;   // [texel of the row] by its rays and those of its neighbors
+        // A packet of rays that is being filled, and the index of each in `irradiance`.
         std::array<ShadowRay, Occluders::packet_size> packet;
         std::array<std::size_t, Occluders::packet_size> carried;
         std::size_t waiting = 0;
         std::vector<Vec2> on_light, in_texel, unsorted;
         std::vector<Vec3> points, weights;
-        std::vector<LightRay> found;
+        std::vector<LightRay> rays;
 
-        void start(std::size_t count, const Span& of)
+        void start(std::size_t count, const Span& new_span)
         {
-            span = of;
+            span = new_span;
             travel.assign(count * span.width, Vec3f(0.0f, 0.0f, -1.0f));
             irradiance.assign(count * span.width, Vec3f(0.0f));
             met.assign(span.width, Met::nothing);
@@ -126,10 +121,10 @@ private:
             in_texel.resize(count);
             points.resize(count);
             weights.resize(count);
-            found.resize(count);
+            rays.resize(count);
         }
 
-        // Brings together rays towards the same part of the light: a packet of such meets the same triangles.
+        // Sorts rays by their part of the light along a Morton curve: a packet of neighbors meets the same triangles.
         void sort()
         {
             constexpr std::size_t side = 8;
@@ -137,7 +132,7 @@ private:
             const auto part = [&](std::size_t i) {
                 const auto x = static_cast<std::size_t>(on_light[i].x * side);
                 const auto y = static_cast<std::size_t>(on_light[i].y * side);
-                return static_cast<std::size_t>(spread[x] + 2 * spread[y]);  // along a Morton curve
+                return static_cast<std::size_t>(spread[x] + 2 * spread[y]);
             };
             if (on_light.size() < 2 * Occluders::packet_size)
                 return;
@@ -159,7 +154,7 @@ private:
         }
     };
 
-    // Some of a texel's rays.
+    // Rays [first, first + count) of the `all` rays of a texel.
     struct Part {
         const GridSobol& sobol;
         std::size_t first;
@@ -173,167 +168,162 @@ private:
         return m_met.begin() + static_cast<std::ptrdiff_t>(y * m_grid.width);
     }
 
-    // What was met by rays of the texels in a row and of their neighbours.
-    void look_around(std::size_t y, std::vector<std::uint8_t>& around)
+    // Finds for each texel of a row the obstacles and light that the first pass met in it and its neighbors.
+    void find_met_around(std::size_t y, std::vector<std::uint8_t>& around)
     {
         std::fill(around.begin(), around.end(), Met::nothing);
-        for (std::size_t row = y - std::min<std::size_t>(y, 1); row < std::min(y + 2, m_grid.height); ++row) {
+        for (std::size_t row = y > 0 ? y - 1 : 0; row <= std::min(y + 1, m_grid.height - 1); ++row) {
             const auto met = met_in(row);
             for (std::size_t x = 0; x < m_grid.width; ++x)
-                for (std::size_t beside = x - std::min<std::size_t>(x, 1); beside < std::min(x + 2, m_grid.width);
-                     ++beside)
+                for (std::size_t beside = x > 0 ? x - 1 : 0; beside <= std::min(x + 1, m_grid.width - 1); ++beside)
                     around[x] |= met[static_cast<std::ptrdiff_t>(beside)];
         }
     }
 
-    void gather_some(const Span& span, std::size_t first, std::size_t count, Rays& rays, RaySink& sink) const
+    void gather_span(const Span& span, std::size_t first, std::size_t count, Work& work, RaySink& sink) const
     {
-        rays.start(count, span);
+        work.start(count, span);
         for (std::size_t i = 0; i < span.width; ++i) {
-            const std::uint8_t around = rays.met_around[span.x + i];
+            const std::uint8_t around = work.met_around[span.x + i];
             if (around == Met::both)
-                gather_texel(i, {m_sobol, first, count, m_rays, m_occluders != nullptr}, rays);
+                gather_texel(i, {m_sobol, first, count, m_ray_count, m_occluders != nullptr}, work);
             else if (around == Met::light && first < m_even_rays)
-                gather_texel(i, {m_even_sobol, first, std::min(count, m_even_rays - first), m_even_rays, false}, rays);
+                gather_texel(i, {m_even_sobol, first, std::min(count, m_even_rays - first), m_even_rays, false}, work);
         }
-        trace(rays);
+        trace(work);
         for (std::size_t i = 0; i < count; ++i) {
             const std::size_t begin = i * span.width;
-            sink.add({.ray = first + i,
-                      .y = span.y,
-                      .x = span.x,
-                      .width = span.width,
-                      .travel = &rays.travel[begin],
-                      .irradiance = &rays.irradiance[begin]});
+            sink.add({.sample = span.y * m_grid.width + span.x,
+                      .count = span.width,
+                      .ray = first + i,
+                      .travel = m_with_travel ? &work.travel[begin] : nullptr,
+                      .irradiance = &work.irradiance[begin]});
         }
     }
 
-    // Of a texel of the span.
-    void gather_texel(std::size_t texel, const Part& part, Rays& rays) const
+    void gather_texel(std::size_t texel, const Part& part, Work& work) const
     {
         const std::size_t count = part.count;
-        const std::size_t x = rays.span.x + texel;
-        const std::size_t y = rays.span.y;
+        const std::size_t x = work.span.x + texel;
+        const std::size_t y = work.span.y;
+        // The share of the texel's open irradiance that this part of its rays carries.
         const Vec3 open = m_open.at(x, y) * (static_cast<double>(count) / static_cast<double>(part.all));
         if (open == Vec3(0.0))
             return;
-        rays.resize(count);
-        part.sobol.points(x, y, part.first, count, rays.on_light.data(), rays.in_texel.data());
+        work.resize(count);
+        part.sobol.points(x, y, part.first, count, work.on_light.data(), work.in_texel.data());
         if (part.is_traced)
-            rays.sort();
-        Vec3 sum = sample(x, y, rays);
-        // Where all miss, although there is light, others are tried.
+            work.sort();
+        Vec3 sum = sample(x, y, work);
         for (int i = 0; i < max_trials && sum == Vec3(0.0); ++i) {
             for (std::size_t k = 0; k < count; ++k) {
-                rays.on_light[k] = glm::fract(rays.on_light[k] + step_on_light);
-                rays.in_texel[k] = glm::fract(rays.in_texel[k] + step_in_texel);
+                work.on_light[k] = glm::fract(work.on_light[k] + step_on_light);
+                work.in_texel[k] = glm::fract(work.in_texel[k] + step_in_texel);
             }
-            sum = sample(x, y, rays);
+            sum = sample(x, y, work);
         }
-        // The sum of what comes unhindered is known: what is hindered takes its part of it.
-        // A channel in which all rays happen to be dark goes along with the mean of the channels.
+        // Open rays are scaled to the open irradiance, which is known; blocked rays then take their part of it. A channel
+        // in which all rays happen to be dark follows the mean of the channels.
         const auto lit = [is_dark = glm::equal(sum, Vec3(0.0))](const Vec3& weight) {
             return glm::mix(weight, Vec3((weight.x + weight.y + weight.z) / 3.0), is_dark);
         };
         const Vec3 scale = open / lit(sum);
         for (std::size_t i = 0; i < count; ++i) {
-            if (rays.weights[i] == Vec3(0.0))
+            if (work.weights[i] == Vec3(0.0))
                 continue;
-            const LightRay& found = rays.found[i];
-            const std::size_t index = i * rays.span.width + texel;
-            rays.travel[index] = Vec3f(glm::normalize(m_grid.to_plane(found.travel)));
-            rays.irradiance[index] = Vec3f(scale * lit(rays.weights[i]));
+            const LightRay& ray = work.rays[i];
+            const std::size_t index = i * work.span.width + texel;
+            if (m_with_travel)
+                work.travel[index] = Vec3f(glm::normalize(m_grid.to_plane(ray.travel)));
+            work.irradiance[index] = Vec3f(scale * lit(work.weights[i]));
             if (!part.is_traced)
                 continue;
-            rays.packet[rays.waiting] = shadow_ray(m_grid, m_start, rays.points[i], found.travel, found.distance);
-            rays.carried[rays.waiting] = index;
-            if (++rays.waiting == Occluders::packet_size)
-                trace(rays);
+            work.packet[work.waiting] = m_rays.shadow_ray(work.points[i], ray);
+            work.carried[work.waiting] = index;
+            if (++work.waiting == Occluders::packet_size)
+                trace(work);
         }
     }
 
-    // The rays of a texel at their places, and what they carry unhindered; returns the sum of that.
-    Vec3 sample(std::size_t x, std::size_t y, Rays& rays) const
+    // Finds the rays of a texel at their places and the irradiance that each brings unblocked; returns the sum.
+    Vec3 sample(std::size_t x, std::size_t y, Work& work) const
     {
-        const std::size_t count = rays.on_light.size();
-        for (std::size_t i = 0; i < count; ++i)
-            rays.points[i] =
-                m_grid.point(static_cast<double>(x) + rays.in_texel[i].x, static_cast<double>(y) + rays.in_texel[i].y);
-        if (m_is_far)
-            m_light.sample(rays.points.front(), m_grid.normal, rays.on_light, rays.found.data());
-        else
-            for (std::size_t i = 0; i < count; ++i)
-                m_light.sample(rays.points[i], m_grid.normal, {&rays.on_light[i], 1}, &rays.found[i]);
+        for (std::size_t i = 0; i < work.points.size(); ++i)
+            work.points[i] =
+                m_grid.point(static_cast<double>(x) + work.in_texel[i].x, static_cast<double>(y) + work.in_texel[i].y);
+        m_light.sample(work.points, m_grid.normal, work.on_light, work.rays.data());
         Vec3 sum(0.0);
-        for (std::size_t i = 0; i < count; ++i) {
-            const LightRay& found = rays.found[i];
-            const double cos_theta = -glm::dot(found.travel, m_grid.normal);
-            const bool counts = cos_theta > min_cos_theta && found.distance > m_position_rounding;
-            rays.weights[i] = counts ? Vec3(found.flux) * cos_theta : Vec3(0.0);
-            sum += rays.weights[i];
+        for (std::size_t i = 0; i < work.points.size(); ++i) {
+            work.weights[i] = Vec3(work.rays[i].flux) * m_rays.arriving_cosine(work.rays[i]);
+            sum += work.weights[i];
         }
         return sum;
     }
 
-    void trace(Rays& rays) const
+    void trace(Work& work) const
     {
         std::array<Vec3f, Occluders::packet_size> transmittance;
-        if (rays.waiting > 0)
-            // Those of a texel to a sky go all ways: traced as if they went the same, they take half as long again.
-            m_occluders->transmit(std::span(rays.packet).first(rays.waiting), transmittance.data(), false);
-        for (std::size_t i = 0; i < rays.waiting; ++i) {
-            const std::size_t index = rays.carried[i];
-            rays.irradiance[index] *= transmittance[i];
-            std::uint8_t& met = rays.met[index % rays.span.width];
-            met |= transmittance[i] == Vec3f(1.0f)   ? Met::light
-                   : transmittance[i] == Vec3f(0.0f) ? Met::obstacle
-                                                     : Met::both;
+        if (work.waiting > 0)
+            // Rays of a texel to the sky diverge: tracing them as coherent takes half as long again.
+            m_occluders->transmit(std::span(work.packet).first(work.waiting), transmittance.data(), false);
+        for (std::size_t i = 0; i < work.waiting; ++i) {
+            const std::size_t index = work.carried[i];
+            work.irradiance[index] *= transmittance[i];
+            work.met[index % work.span.width] |= transmittance[i] == Vec3f(1.0f)   ? Met::light
+                                                 : transmittance[i] == Vec3f(0.0f) ? Met::obstacle
+                                                                                   : Met::both;
         }
-        rays.waiting = 0;
+        work.waiting = 0;
     }
 
     const ReceiverGrid& m_grid;
-    std::unique_ptr<const ExtendedLight> m_prepared;
-    const ExtendedLight& m_light;
+    std::unique_ptr<const Light> m_prepared;
+    const Light& m_light;
     OpenIrradiance m_open;
-    bool m_is_far;
     const Occluders* m_occluders;
-    std::size_t m_rays;
+    bool m_with_travel;
+    std::size_t m_ray_count;
     std::size_t m_even_rays;
     GridSobol m_sobol;
     GridSobol m_even_sobol;
-    RayStart m_start;
-    double m_position_rounding;
-    std::vector<std::uint8_t> m_met;  // [texel] by the rays of a look
-    PerThread<Rays> m_rows;
+    ReceiverRays m_rays;
+    std::vector<std::uint8_t> m_met;  // [texel] in the first pass
+    PerThread<Work> m_work;
 };
+
+void gather_sized_rays(const ReceiverGrid& grid, const Light& light, const Occluders* occluders,
+                       const RaySettings& settings, RaySink& sink, Progress& progress)
+{
+    SizedGatherer gatherer(grid, light, occluders, settings);
+    progress.set_total(static_cast<double>(grid.height) * (gatherer.has_first_pass() ? 2.0 : 1.0));
+    if (gatherer.has_first_pass())
+        parallel_for(grid.height, [&](std::size_t y) {
+            gatherer.trace_first(y);
+            progress.advance(1.0);
+        });
+    parallel_for(grid.height, [&](std::size_t y) {
+        gatherer.gather_row(y, sink);
+        progress.advance(1.0);
+    });
+}
 
 }  // namespace
 
-void gather_rays(const ReceiverGrid& grid, const ExtendedLight& light, const Occluders* occluders,
-                 const RaySettings& settings, RaySink& sink, Progress& progress)
+void gather_rays(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, const RaySettings& settings,
+                 RaySink& sink, Progress& progress)
 {
     grid.check();
+    if (settings.samples < 1 || settings.samples > max_samples)
+        reject("samples", settings.samples, "1 to " + std::to_string(max_samples));
     if (settings.rays < 1 || settings.rays > max_rays)
         reject("rays", settings.rays, "1 to " + std::to_string(max_rays));
     if (settings.even_rays < 0)
         reject("even_rays", settings.even_rays, "0 or more");
     detail::check_length("clearance", settings.clearance);
-
-    const auto gather = [&] {
-        RayGatherer gatherer(grid, light, occluders, settings);
-        progress.set_total(static_cast<double>(grid.height) * (gatherer.takes_a_look() ? 2.0 : 1.0));
-        if (gatherer.takes_a_look())
-            parallel_for(grid.height, [&](std::size_t y) {
-                gatherer.look_at_row(y);
-                progress.advance(1.0);
-            });
-        parallel_for(grid.height, [&](std::size_t y) {
-            gatherer.gather_row(y, sink);
-            progress.advance(1.0);
-        });
-    };
-    with_threads(settings.threads, gather);
+    with_threads(settings.threads, [&] {
+        const auto gather = light.is_delta() ? gather_delta_rays : gather_sized_rays;
+        gather(grid, light, occluders, settings, sink, progress);
+    });
     progress.finish();
 }
 

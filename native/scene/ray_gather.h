@@ -1,48 +1,69 @@
-// Lights of a size and occluders to rays: what arrives at each texel, direction by direction.
+// The one tracer: lights and occluders to rays that arrive at the samples of a receiver.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "base/progress.h"
-#include "scene/extended_light.h"
+#include "scene/light.h"
 #include "scene/occluders.h"
 #include "scene/receiver.h"
 
 namespace beamspread {
 
-// One ray at each texel of a part of a row.
-struct RayRow {
-    std::size_t ray = 0;  // of those of a texel
-    std::size_t y = 0;
-    std::size_t x = 0;
-    std::size_t width = 0;
-    const Vec3f* travel = nullptr;      // [texel] unit vectors of the plane frame, z <= -min_cos_theta
-    const Vec3f* irradiance = nullptr;  // [texel] W/m^2 in each channel, cosine and visibility included
+// One ray at each of some samples that follow each other. A sample is a point of a receiver with a normal; the texels of
+// a grid are the samples y * width + x.
+struct RayRun {
+    std::size_t sample = 0;  // the first one
+    std::size_t count = 0;   // samples; in a grid all of one row
+    std::size_t ray = 0;     // index among the rays of a sample
+    // [count] unit vectors in the tangent frame of the sample, with z <= -min_cos_theta (shadow_ray.h); null without
+    // `with_travel`.
+    const Vec3f* travel = nullptr;
+    const Vec3f* irradiance = nullptr;  // [count] W/m^2 in each channel, cosine and visibility included
 };
 
-// Takes the rays of a grid. Called from several threads at once, for one row by one of them.
+// Takes the rays of a receiver. Several threads call `add` at once, each for a row of samples of its own.
 class RaySink {
 public:
     virtual ~RaySink() = default;
-    virtual void add(const RayRow& row) = 0;
+    virtual void add(const RayRun& run) = 0;
 };
 
+// Largest numbers in RaySettings.
+inline constexpr int max_samples = 64;
 inline constexpr int max_rays = 4096;
 
 struct RaySettings {
-    int rays = 16;  // from each texel
-    int threads = 0;  // 0: all
-    double clearance = 0.0;  // see BeamSettings
-    std::uint32_t seed = 0;
-    // First, a look by so many rays: where they, and those of the texels around, all met light or all an obstacle, they
-    // are enough. 0: no look.
+    // Delta lights: the ray of a texel is the mean over samples x samples points in it, each with its own visibility and
+    // falloff.
+    int samples = 4;
+    // Lights of a size: rays from each texel.
+    int rays = 16;
+    // Lights of a size: rays of a first pass. They are enough in texels that, with their neighbors, see only light or only
+    // obstacles. 0: no first pass.
     int even_rays = 0;
+    std::uint32_t seed = 0;
+    // Height above the plane where shadow rays start, metres, besides what rounding needs: the largest distance of the
+    // receiver's own faces to the plane, where they are among the occluders.
+    double clearance = 0.0;
+    int threads = 0;  // 0: all
+    bool with_travel = true;
+    // False traces rays from every texel; the result is the same.
+    bool find_shadows = true;
 };
 
-// At most `rays` rays from each texel; their sum is the light of the texel. Low-discrepancy over the texel and
-// over the light, from a seed: the same for any number of threads. Where nothing is in the way the sum is that of many
-// more rays, without noise. `occluders` may be null. Throws InvalidArgument, Cancelled.
-void gather_rays(const ReceiverGrid& grid, const ExtendedLight& light, const Occluders* occluders,
-                 const RaySettings& settings, RaySink& sink, Progress& progress);
+// Direction of travel in the plane frame of a delta light at `point` where nothing blocks it: a unit vector with
+// z <= -min_cos_theta; (0, 0, -1) if light comes from behind or travels within the plane.
+Vec3 unblocked_direction(const ReceiverGrid& grid, const Light& light, const Vec3& point);
+
+// Hands all rays of a light to the sink; the rays of a texel add up to its light. The result is the same for any number
+// of threads. `occluders` may be null. Throws InvalidArgument, Cancelled.
+//
+// A delta light gives one ray per texel, which travels in the mean direction weighed by irradiance; in the dark in
+// `unblocked_direction` at the texel's center. A light of a size gives up to `rays` rays, of low discrepancy over the
+// texel and over the light, from a seed. Where nothing blocks it, they add up without noise to the sum of many more rays.
+void gather_rays(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, const RaySettings& settings,
+                 RaySink& sink, Progress& progress);
 
 }  // namespace beamspread

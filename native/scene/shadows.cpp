@@ -12,18 +12,19 @@ namespace beamspread {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-// A vertex nearly as high as the lamp throws its shadow too far to be worth finding: here, a million heights away, where the
-// lamp's irradiance is 1e-18 of that below it.
+
+// Height of the lamp above a vertex, relative to its height above the plane, below which the vertex counts as a shadow
+// without an end: the shadow lies a million heights away, where irradiance is 1e-18 of the largest.
 constexpr double min_relative_weight = 1e-6;
 
-// Texels: the rounding of what is computed here, far above that of double precision at the largest texture's side,
-// 65536 * 2^-53 = 7e-12.
+// Bound of the rounding of the computation here, texels: far above 65536 * 2^-53 = 7e-12, double precision at the largest
+// texture's side.
 constexpr double own_rounding = 1e-6;
 
-// As long as it takes to find the shadows of so many facets it takes to trace all rays of a million texels.
-constexpr std::size_t most_facets = std::size_t{1} << 21;
+// Number of facets above which tracing all rays of a million texels is faster than finding the shadows.
+constexpr std::size_t max_facets = std::size_t{1} << 21;
 
-// The sides of a box in triangles: numbers of corners as of Hull.
+// Sides of a box as triangles of Hull's corners.
 constexpr std::array<std::array<unsigned, 3>, 12> box_facets = {{{0, 1, 3},
                                                                  {0, 3, 2},
                                                                  {4, 6, 7},
@@ -51,8 +52,8 @@ struct Interval {
 // A triangle's shadow in texels.
 struct Shadow {
     std::array<Vec2, 3> corners;
-    Vec2 reach{};           // how far rounding moves it at most
-    bool is_whole = false;  // whether all of an opaque triangle is between where rays start and where they end
+    Vec2 reach{};           // largest move by rounding
+    bool is_whole = false;  // true if an opaque triangle lies wholly between the starts and the ends of rays
 
     Interval rows() const
     {
@@ -62,7 +63,7 @@ struct Shadow {
         return {rows.low - reach.y, rows.high + reach.y};
     }
 
-    // Where a horizontal line cuts it; empty where it does not.
+    // The part of a horizontal line inside the shadow; may be empty.
     Interval cut(double y) const
     {
         Interval cut;
@@ -94,7 +95,7 @@ public:
         std::array<double, 3> corners;
         double lowest;
         double highest;
-        double rounding;  // of a ray and of the triangle
+        double rounding;  // bound of the rounding of a ray and of the triangle
     };
 
     Heights heights(const std::array<Vec3, 3>& triangle, double rounding) const
@@ -105,7 +106,7 @@ public:
         return {all, lowest, highest, std::max(m_start.rounding, rounding)};
     }
 
-    // Whether the triangle lies behind where rays start, or beyond the lamp where they end.
+    // True if the triangle lies below the starts of rays, or beyond the lamp.
     bool is_off_the_way(const Heights& heights) const
     {
         const double lowest_start = m_start.clearance + 0.5 * m_start.rounding;
@@ -113,7 +114,7 @@ public:
                (m_is_near > 0.0 && heights.lowest >= m_source_height + heights.rounding);
     }
 
-    // Whether the shadow has an end, not too far away.
+    // True if the shadow has an end, not too far away.
     bool has_shadow(const Heights& heights) const
     {
         return m_source_height > 2.0 * m_start.height() &&
@@ -138,8 +139,8 @@ private:
         // direction s p = v - (h_v / h_s) s.
         const Vec3 point = (m_source_height * (vertex - m_grid.origin) - height * m_source) / weight(height);
         corner = {glm::dot(point, m_grid.x_axis) / m_grid.pitch_x, glm::dot(point, m_grid.y_axis) / m_grid.pitch_y};
-        // A step of 1 at the vertex or at the ray's start moves the shadow by up to this: 1 / cos for a sun, for a lamp
-        // magnified besides.
+        // A step of 1 at the vertex or at the ray's start moves the shadow by up to this factor: 1 / cos for a sun,
+        // larger for a lamp.
         const double magnification = glm::length(m_source - m_is_near * point) / weight(height);
         const double step = 2.0 * (m_start.clearance + rounding) * magnification;
         reach = glm::max(reach, Vec2(step / m_grid.pitch_x, step / m_grid.pitch_y) + own_rounding);
@@ -162,7 +163,7 @@ std::size_t clamped(double texel, std::size_t count)
 
 void shade_row(const Shadow& shadow, std::size_t row, std::size_t width, Shade* texels)
 {
-    // All rays that may start in the row, rounding included.
+    // Bounds of all rays that may start in the row, rounding included.
     const double bottom = static_cast<double>(row) - shadow.reach.y;
     const double top = static_cast<double>(row) + 1.0 + shadow.reach.y;
     const Interval low = shadow.cut(bottom);
@@ -176,7 +177,7 @@ void shade_row(const Shadow& shadow, std::size_t row, std::size_t width, Shade* 
     for (std::size_t x = clamped(std::floor(touched.low - shadow.reach.x), width); x < end; ++x)
         texels[x] = std::max(texels[x], Shade::unknown);
 
-    // A triangle is convex: a texel lies in it if its corners do.
+    // A triangle is convex: a texel lies in it if the texel's corners do.
     if (!shadow.is_whole)
         return;
     const std::size_t full_begin = clamped(std::ceil(std::max(low.low, high.low) + shadow.reach.x), width);
@@ -196,23 +197,23 @@ Shadows::Shadows(const ReceiverGrid& grid, const LightSource& source, const Occl
     const Projection projection(grid, source, start);
     if (!projection.is_lit())
         return;
-    if (facet_count() > most_facets) {
+    if (facet_count() > max_facets) {
         m_is_unknown = true;
         return;
     }
     m_leaves = std::bit_ceil(bands());
     m_nodes.resize(2 * m_leaves);
     for (std::size_t i = 0; i < facet_count(); ++i) {
-        const Facet one = facet(i);
-        const Projection::Heights heights = projection.heights(one.corners, one.rounding);
+        const Facet item = facet(i);
+        const Projection::Heights heights = projection.heights(item.corners, item.rounding);
         if (projection.is_off_the_way(heights))
             continue;
-        // Among them are sides of a box that holds the lamp, which rays that end there need not cross.
+        // A box that holds the lamp has such sides; rays that end in the box need not cross them.
         if (!projection.has_shadow(heights)) {
             m_is_unknown = true;
             continue;
         }
-        const Interval rows = projection.shadow(one.corners, one.is_opaque, heights).rows();
+        const Interval rows = projection.shadow(item.corners, item.is_opaque, heights).rows();
         if (rows.high < 0.0 || rows.low > static_cast<double>(grid.height))
             continue;
         std::size_t first = m_leaves + clamped(rows.low, grid.height - 1) / rows_per_band;
@@ -254,9 +255,9 @@ void Shadows::shade_band(std::size_t band, std::vector<Shade>& texels) const
     const Projection projection(m_grid, m_source, m_start);
     for (std::size_t node = m_leaves + band; node > 0; node /= 2) {
         for (const std::uint32_t i : m_nodes[node]) {
-            const Facet one = facet(i);
-            const Projection::Heights heights = projection.heights(one.corners, one.rounding);
-            const Shadow shadow = projection.shadow(one.corners, one.is_opaque, heights);
+            const Facet item = facet(i);
+            const Projection::Heights heights = projection.heights(item.corners, item.rounding);
+            const Shadow shadow = projection.shadow(item.corners, item.is_opaque, heights);
             const Interval rows = shadow.rows();
             const std::size_t first = std::max(begin, clamped(std::floor(rows.low), m_grid.height));
             const std::size_t last = std::min(end, clamped(std::ceil(rows.high), m_grid.height));

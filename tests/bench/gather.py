@@ -59,8 +59,8 @@ def seconds(grid, light, occluders, find_shadows):
 
 
 EXTENDED = {
-    "sun of .1": native.SunDiskLight((0.3, 0.2, -1), 0.1),
-    "sphere": native.SphereLight((0.3, 0.2, 1.5), 0.2, "sphere"),
+    "sun of .1": native.SunLight((0.3, 0.2, -1), 0.1),
+    "sphere": native.PointLight((0.3, 0.2, 1.5), 0.2, "sphere"),
     "area": native.AreaLight((0.3, 0.2, 1.5), np.eye(3), 0.6, 0.4),
     "disk": native.AreaLight((0.3, 0.2, 1.5), np.eye(3), 0.6, 0.6, True),
     "spread": native.AreaLight((0.3, 0.2, 1.5), np.eye(3), 0.6, 0.4, False, 1.0),

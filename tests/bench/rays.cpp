@@ -72,7 +72,7 @@ Shapes standing_balls()
 
 class Count final : public RaySink {
 public:
-    void add(const RayRow& row) override { m_rays += row.width; }
+    void add(const RayRun& run) override { m_rays += run.count; }
     std::size_t rays() const { return m_rays; }
 
 private:
@@ -112,18 +112,20 @@ struct Tracer {
 };
 
 // Towards a light from a floor of texels, row by row; rays of a texel one after the other.
-std::vector<RTCRay> rays_to(const ExtendedLight& light, const ReceiverGrid& grid)
+std::vector<RTCRay> rays_to(const Light& light, const ReceiverGrid& grid)
 {
     Random random(2, 0, 0);
     std::vector<RTCRay> result;
     std::vector<Vec2> square(rays);
+    std::vector<Vec3> points(rays);
     std::vector<LightRay> found(rays);
     for (std::size_t y = 0; y < side; ++y) {
         for (std::size_t x = 0; x < side; ++x) {
             for (Vec2& place : square)
                 place = {random.uniform(), random.uniform()};
             const Vec3 point = grid.point(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5);
-            light.sample(point, grid.normal, square, found.data());
+            std::ranges::fill(points, point);
+            light.sample(points, grid.normal, square, found.data());
             for (const LightRay& ray : found) {
                 RTCRay one{};
                 one.org_x = static_cast<float>(point.x);
@@ -176,14 +178,14 @@ double in_packets(const Tracer& tracer, const std::vector<RTCRay>& work)
     });
 }
 
-void compare(const char* name, const ExtendedLight& light, const Shapes& shapes, const Tracer& tracer)
+void compare(const char* name, const Light& light, const Shapes& shapes, const Tracer& tracer)
 {
     const ReceiverGrid grid{{-2.0, -2.0, 0.0}, {1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}, 4.0 / side, 4.0 /
     side, side, side};
     const OccluderMesh mesh{.vertices = shapes.vertices, .triangles = shapes.triangles};
     const Occluders occluders({&mesh, 1}, {}, {});
-    const std::unique_ptr<const ExtendedLight> facing = light.facing(grid.normal);
-    const ExtendedLight& prepared = facing ? *facing : light;
+    const std::unique_ptr<const Light> facing = light.facing(grid.normal);
+    const Light& prepared = facing ? *facing : light;
     RaySettings settings;
     settings.rays = rays;
     Count count;

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from beamspread.blender.read.geometry import read_polygons
 from beamspread.core.native import native
-from beamspread.core.scene.lights import AreaLight, SphereLight, SphereSpotLight, SunDiskLight
+from beamspread.core.scene.lights import AreaLight, PointLight, SpotLight, SunLight
 from beamspread.core.scene.receiver import build_receiver
 from beamspread.core.scene.uv_map import fit_uv_maps
 from cycles_truth import PLANES, TEXELS, add_receiver, cycles_irradiance, frame_of
@@ -45,17 +45,17 @@ def core_light(lamp):
     position, frame = tuple(axes[:3, 3]), tuple(map(tuple, axes[:3, :3].T))
     if data.type == "SUN":
         travel = -axes[:3, 2] / np.linalg.norm(axes[:3, 2])
-        return SunDiskLight(*common, tuple(travel), data.angle, "flat" if IS_OLD else "even")
+        return SunLight(*common, tuple(travel), data.angle, "flat" if IS_OLD else "even")
     if data.type == "AREA":
         is_square = data.shape in ("SQUARE", "DISK")
         size = data.size, data.size if is_square else data.size_y
         common = lamp.name, data.energy * AREA_FACTOR, COLOR, True
         return AreaLight(*common, position, frame, *size, data.shape in ("DISK", "ELLIPSE"), data.spread)
-    model = "disk" if getattr(data, "use_soft_falloff", True) else "sphere"
+    shape = "disk" if getattr(data, "use_soft_falloff", True) else "sphere"
     if data.type == "POINT":
-        return SphereLight(*common, position, data.shadow_soft_size, model)
+        return PointLight(*common, position, data.shadow_soft_size, shape)
     cone = frame, data.spot_size, data.spot_blend, "legacy" if IS_OLD else "scaled"
-    return SphereSpotLight(*common, position, *cone, data.shadow_soft_size, model)
+    return SpotLight(*common, position, *cone, data.shadow_soft_size, shape)
 
 
 def our_irradiance(plane, light, occluders=None, texels=TEXELS):

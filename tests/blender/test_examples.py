@@ -16,7 +16,7 @@ KINDS = {
     "marble_floor": ["MeshLight", "PointLight", "SunLight", "SunLight"],
     "low_sun": ["SunLight", "SunLight"],
     "soapstone": ["WorldLight"],
-    "stage": ["AreaLight"] + ["SphereSpotLight"] * 4,
+    "stage": ["AreaLight"] + ["SpotLight"] * 4,
     "shop_window": ["AreaLight"] * 2 + ["MeshLight"] * 9,
 }
 

@@ -19,14 +19,14 @@ TRIANGLES = np.arange(12, dtype=np.uint32).reshape(4, 3)
 GLOW = rng.random((4, 3)).astype(np.float32)
 
 LIGHTS = {
-    "sun": native.SunDiskLight((0.2, 0.1, -1), 0.8),
-    "flat sun": native.SunDiskLight((0.2, 0.1, -1), 0.8, "flat"),
-    "sphere": native.SphereLight((0.3, 0.2, 0.7), 0.5, "sphere"),
-    "sphere around": native.SphereLight((0.3, 0.2, 0.3), 0.9, "sphere"),
-    "disk": native.SphereLight((0.3, 0.2, 0.7), 0.5, "disk"),
-    "spot": native.SphereSpotLight((0.3, 0.2, 0.9), TILTED, 1.6, 0.6, "scaled", 0.3, "sphere"),
-    "spot around": native.SphereSpotLight((0.3, 0.2, 0.3), TILTED, 1.6, 0.6, "scaled", 0.9, "sphere"),
-    "old spot": native.SphereSpotLight((0.3, 0.2, 0.9), TILTED, 1.6, 0.6, "legacy", 0.3, "disk"),
+    "sun": native.SunLight((0.2, 0.1, -1), 0.8),
+    "flat sun": native.SunLight((0.2, 0.1, -1), 0.8, "flat"),
+    "sphere": native.PointLight((0.3, 0.2, 0.7), 0.5, "sphere"),
+    "sphere around": native.PointLight((0.3, 0.2, 0.3), 0.9, "sphere"),
+    "disk": native.PointLight((0.3, 0.2, 0.7), 0.5, "disk"),
+    "spot": native.SpotLight((0.3, 0.2, 0.9), TILTED, 1.6, 0.6, "scaled", 0.3, "sphere"),
+    "spot around": native.SpotLight((0.3, 0.2, 0.3), TILTED, 1.6, 0.6, "scaled", 0.9, "sphere"),
+    "old spot": native.SpotLight((0.3, 0.2, 0.9), TILTED, 1.6, 0.6, "legacy", 0.3, "disk"),
     "area": native.AreaLight((0.2, 0.1, 0.4), TILTED, 1.5, 0.8),
     "far area": native.AreaLight((3.0, 0.9, 6.0), TILTED, 1.5, 0.8),
     "ellipse": native.AreaLight((0.2, 0.1, 0.4), TILTED, 1.5, 0.8, True),
@@ -143,9 +143,9 @@ def test_sphere_is_a_point_at_its_centre(radius):
     """Where all of it is above the plane; the disk that faces the point is weaker by d^2 / (d^2 + r^2)."""
     position = np.array([0.6, 0.0, 1.0])
     distance, cosine = np.linalg.norm(position), position[2] / np.linalg.norm(position)
-    sphere = native.SphereLight(position, radius, "sphere").irradiance((0, 0, 0), UP)[0]
+    sphere = native.PointLight(position, radius, "sphere").irradiance((0, 0, 0), UP)[0]
     assert sphere == pytest.approx(cosine / (4 * PI * distance**2), rel=1e-12)
-    disk = native.SphereLight(position, radius, "disk").irradiance((0, 0, 0), UP)[0]
+    disk = native.PointLight(position, radius, "disk").irradiance((0, 0, 0), UP)[0]
     if radius < 0.9:
         assert disk == pytest.approx(cosine / (4 * PI * (distance**2 + radius**2)), rel=1e-12)
 
@@ -153,7 +153,7 @@ def test_sphere_is_a_point_at_its_centre(radius):
 @pytest.mark.parametrize("height", [0.3, 0.0, -0.2])
 def test_half_sunk_sphere(height):
     """Against the integral over the visible cone, by 16 million points."""
-    light = native.SphereLight((0.9, 0, height), 0.5, "sphere")
+    light = native.PointLight((0.9, 0, height), 0.5, "sphere")
     distance = math.hypot(0.9, height)
     half, axis = math.asin(0.5 / distance), math.atan2(0.9, height)
     steps = (np.arange(4000) + 0.5) / 4000
@@ -165,7 +165,7 @@ def test_half_sunk_sphere(height):
 
 def test_sun_of_no_angle_is_a_direction():
     for disk in ("even", "flat"):
-        light = native.SunDiskLight((0.6, 0, -0.8), 0.0, disk)
+        light = native.SunLight((0.6, 0, -0.8), 0.0, disk)
         assert light.irradiance(POINT, UP)[0] == pytest.approx(0.8, rel=1e-12)
         travel, _, flux = light.sample(POINT, UP, lattice(4))
         np.testing.assert_allclose(travel, np.tile((0.6, 0, -0.8), (4, 1)), atol=1e-12)
@@ -175,10 +175,10 @@ def test_sun_of_no_angle_is_a_direction():
 def test_flat_sun_is_weaker_by_its_mean_cosine():
     """2 (sqrt(1 + R^2) - 1) / R^2, R the tangent of half the angle."""
     tangent = math.tan(0.5)
-    light = native.SunDiskLight((0, 0, -1), 1.0, "flat")
+    light = native.SunLight((0, 0, -1), 1.0, "flat")
     wanted = 2 * (math.sqrt(1 + tangent**2) - 1) / tangent**2
     assert light.irradiance(POINT, UP)[0] == pytest.approx(wanted, rel=1e-5)
-    assert native.SunDiskLight((0, 0, -1), 1.0, "even").irradiance(POINT, UP)[0] == pytest.approx(1, rel=1e-12)
+    assert native.SunLight((0, 0, -1), 1.0, "even").irradiance(POINT, UP)[0] == pytest.approx(1, rel=1e-12)
 
 
 def environment_radiance(image, to_world):
@@ -253,8 +253,8 @@ def test_dark_and_missing():
         native.MeshLight(CORNERS, TRIANGLES, np.zeros((4, 3), np.float32)),
         native.MeshLight(np.zeros((0, 3)), np.zeros((0, 3), np.uint32), np.zeros((0, 3), np.float32)),
         native.EnvironmentLight(np.zeros((2, 4, 3), np.float32), FRAME),
-        native.SunDiskLight((0, 0, 1), 0.5),
-        native.SphereLight((0, 0, -1), 0.5, "sphere"),
+        native.SunLight((0, 0, 1), 0.5),
+        native.PointLight((0, 0, -1), 0.5, "sphere"),
     ):
         assert light.irradiance((0, 0, 0), UP) == (0, 0, 0)
         travel, _, flux = light.sample((0, 0, 0), UP, lattice(16))
@@ -281,14 +281,14 @@ def test_spread_keeps_the_power():
 
 
 BAD = {
-    "angle": lambda: native.SunDiskLight((0, 0, -1), -0.1),
-    "direction": lambda: native.SunDiskLight((0, 0, 0), 0.1),
-    "disk": lambda: native.SunDiskLight((0, 0, -1), 0.1, "round"),
-    "radius": lambda: native.SphereLight((0, 0, 1), -1.0, "sphere"),
-    "position": lambda: native.SphereLight((0, math.nan, 1), 1.0, "sphere"),
-    "model": lambda: native.SphereLight((0, 0, 1), 1.0, "ball"),
-    "spot_size": lambda: native.SphereSpotLight((0, 0, 1), FRAME, 0.0, 0.5, "scaled", 1.0, "sphere"),
-    "falloff": lambda: native.SphereSpotLight((0, 0, 1), FRAME, 1.0, 0.5, "soft", 1.0, "sphere"),
+    "angle": lambda: native.SunLight((0, 0, -1), -0.1),
+    "direction": lambda: native.SunLight((0, 0, 0), 0.1),
+    "disk": lambda: native.SunLight((0, 0, -1), 0.1, "round"),
+    "radius": lambda: native.PointLight((0, 0, 1), -1.0, "sphere"),
+    "position": lambda: native.PointLight((0, math.nan, 1), 1.0, "sphere"),
+    "shape": lambda: native.PointLight((0, 0, 1), 1.0, "ball"),
+    "spot_size": lambda: native.SpotLight((0, 0, 1), FRAME, 0.0, 0.5, "scaled", 1.0, "sphere"),
+    "falloff": lambda: native.SpotLight((0, 0, 1), FRAME, 1.0, 0.5, "soft", 1.0, "sphere"),
     "size_x": lambda: native.AreaLight((0, 0, 1), FRAME, math.inf, 1.0),
     "size_y": lambda: native.AreaLight((0, 0, 1), FRAME, 1.0, -1.0),
     "spread": lambda: native.AreaLight((0, 0, 1), FRAME, 1.0, 1.0, False, 3.2),

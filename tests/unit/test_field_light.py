@@ -15,7 +15,7 @@ from beamspread.core.native import native
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight, LampFieldLight, WorldLight
-from beamspread.core.scene.lights.field import spline_weights
+from beamspread.core.scene.lights.field_light import spline_weights
 from beamspread.core.scene.reach import Reach
 from beamspread.core.scene.receiver import Chart, Receiver
 

@@ -15,15 +15,7 @@ from beamspread.core.bake.luminance import TOLERANCE, bake
 from beamspread.core.material.material import Material
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
-from beamspread.core.scene.lights import (
-    WIDEST_SUN,
-    AreaLight,
-    PointLight,
-    SpotLight,
-    SunDiskLight,
-    SunLight,
-    WorldLight,
-)
+from beamspread.core.scene.lights import WIDEST_SUN, AreaLight, PointLight, SpotLight, SunLight, WorldLight
 from beamspread.core.scene.occluders import Mesh
 
 SETTINGS = BakeSettings(quality="preview", samples=1, margin=0)
@@ -197,7 +189,7 @@ def test_light_of_many_colors_and_directions_has_the_power_of_its_parts():
 def test_a_narrow_sun_counts_as_one_direction():
     """The widest sun that does, at 75 degrees, against its rays: that leaves out what grows with the angle's square."""
     angle = math.radians(75)
-    sun = SunDiskLight("Sun", 1.0, (1.0, 1.0, 1.0), True, (math.sin(angle), 0.0, -math.cos(angle)), WIDEST_SUN)
+    sun = SunLight("Sun", 1.0, (1.0, 1.0, 1.0), True, (math.sin(angle), 0.0, -math.cos(angle)), WIDEST_SUN)
     one = bake(grid(48), Illumination([sun], WALL), MATERIAL, 0.0, SETTINGS)
     rays = bake(grid(48), Illumination([replace(sun, angle=1.0001 * sun.angle)], WALL), MATERIAL, 0.0, SETTINGS)
     difference = np.abs(one - rays) / rays.mean(axis=(0, 1))

@@ -13,9 +13,9 @@ SQUARE = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], float)
 TWO = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
 IMAGE = np.random.default_rng(5).random((16, 32, 3)).astype(np.float32)
 LIGHTS = {
-    "sun": native.SunDiskLight((0.3, 0.2, -1), 0.2),
-    "sphere": native.SphereLight((0.3, 0.2, 1.0), 0.2, "sphere"),
-    "spot": native.SphereSpotLight((0.3, 0.2, 1.0), FRAME, 1.2, 0.5, "scaled", 0.2, "disk"),
+    "sun": native.SunLight((0.3, 0.2, -1), 0.2),
+    "sphere": native.PointLight((0.3, 0.2, 1.0), 0.2, "sphere"),
+    "spot": native.SpotLight((0.3, 0.2, 1.0), FRAME, 1.2, 0.5, "scaled", 0.2, "disk"),
     "area": native.AreaLight((0.3, 0.2, 1.0), FRAME, 0.6, 0.4),
     "narrow": native.AreaLight((0.0, 0.0, 1.0), FRAME, 0.6, 0.4, True, 0.6),
     "environment": native.EnvironmentLight(IMAGE, FRAME),
@@ -90,7 +90,7 @@ def test_half_covered_sun_is_half_as_bright():
     """A wall's edge under the middle of a sun's disk: the visible part of the disk, by the segment of a circle."""
     angle, height, texels = 0.5, 1.0, 200
     grid = make_grid(texels, 1.0)
-    light = native.SunDiskLight((0, 0, -1), angle)
+    light = native.SunLight((0, 0, -1), angle)
     got = native.gather_rays(grid, light, wall(0.0, height), rays=256)[0][..., 0]
     x = (np.arange(texels) + 0.5) / texels - 0.5
     # Cosine-weighted light of the cone is even over the projected disk, whose radius is sin(angle / 2); the edge is
@@ -165,9 +165,9 @@ def test_a_glowing_mesh_does_not_shade_itself():
 
 def test_a_lamp_in_the_plane_and_behind():
     grid = make_grid()
-    behind = native.SphereLight((0, 0, -0.5), 0.4, "sphere")
+    behind = native.PointLight((0, 0, -0.5), 0.4, "sphere")
     assert native.gather_rays(grid, behind, card())[0].max() == 0
-    half = native.SphereLight((0, 0, 0), 0.4, "sphere")
+    half = native.PointLight((0, 0, 0), 0.4, "sphere")
     irradiance, _ = native.gather_rays(grid, half, rays=64)
     assert np.isfinite(irradiance).all()
     # Inside of it light comes from everywhere.

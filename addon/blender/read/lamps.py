@@ -11,10 +11,7 @@ from ...core.scene.lights import (
     AreaLight,
     Light,
     PointLight,
-    SphereLight,
-    SphereSpotLight,
     SpotLight,
-    SunDiskLight,
     SunLight,
 )
 from .. import compat
@@ -33,24 +30,16 @@ def _position(axes: np.ndarray) -> tuple:
 def _sun(data, axes: np.ndarray, common: tuple) -> Light:
     with np.errstate(invalid="ignore"):  # a scale of zero; see Light.fault
         travel = -axes[:3, 2] / np.linalg.norm(axes[:3, 2])
-    direction = tuple(travel.tolist())
-    if data.angle == 0:
-        return SunLight(*common, direction)
-    return SunDiskLight(*common, direction, data.angle, compat.sun_disk())
+    return SunLight(*common, tuple(travel.tolist()), data.angle, compat.sun_disk())
 
 
 def _point(data, axes: np.ndarray, common: tuple) -> Light:
-    if data.shadow_soft_size > 0:
-        return SphereLight(*common, _position(axes), data.shadow_soft_size, compat.round_lamp_model(data))
-    return PointLight(*common, _position(axes))
+    return PointLight(*common, _position(axes), data.shadow_soft_size, compat.round_lamp_shape(data))
 
 
 def _spot(data, axes: np.ndarray, common: tuple) -> Light:
     cone = _frame(axes), data.spot_size, data.spot_blend, compat.spot_falloff()
-    if data.shadow_soft_size > 0:
-        ball = data.shadow_soft_size, compat.round_lamp_model(data)
-        return SphereSpotLight(*common, _position(axes), *cone, *ball)
-    return SpotLight(*common, _position(axes), *cone)
+    return SpotLight(*common, _position(axes), *cone, data.shadow_soft_size, compat.round_lamp_shape(data))
 
 
 def _area(data, axes: np.ndarray, common: tuple) -> Light:
@@ -74,7 +63,7 @@ def is_portal(data) -> bool:
 
 def fault(light: Light) -> str:
     """The sentence that says why a light can't be baked; a spot's cone depends on the lamp's scale."""
-    if isinstance(light, SpotLight | SphereSpotLight) and np.linalg.matrix_rank(light.frame) < 3:
+    if isinstance(light, SpotLight) and np.linalg.matrix_rank(light.frame) < 3:
         return f"The scale of '{light.name}' is 0."
     return light.fault()
 

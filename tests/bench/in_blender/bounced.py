@@ -15,7 +15,7 @@ import beamspread
 import bpy
 import numpy as np
 from beamspread.core.scene.lights import STRATA, WEIGHTS
-from beamspread.core.scene.lights.field import spline_weights
+from beamspread.core.scene.lights.field_light import spline_weights
 
 sys.path.insert(0, str(Path(beamspread.__file__).with_name("blender") / "cycles"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blender"))

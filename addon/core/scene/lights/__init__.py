@@ -1,15 +1,9 @@
-"""The kinds of light that can be baked; strengths follow Cycles (see each class).
+"""The kinds of light that can be baked; strengths follow Cycles (see each class)."""
 
-A new kind is one class here, which extends the way in which it arrives (light.py), and its reader in blender/read/.
-"""
-
-from .area import AreaLight
-from .field import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight, LampFieldLight
-from .light import ExtendedLight, Light, TracedLight
-from .mesh import MeshLight
-from .point_like import PointLight, SpotLight, SunLight
-from .round import WIDEST_SUN, SphereLight, SphereSpotLight, SunDiskLight
-from .world import WorldLight
+from .field_light import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight, LampFieldLight
+from .glowing import MeshLight, WorldLight
+from .lamp_kinds import WIDEST_SUN, AreaLight, PointLight, SpotLight, SunLight
+from .light_base import Light, TracedLight
 
 __all__ = [
     "DIRECTIONS",
@@ -17,17 +11,13 @@ __all__ = [
     "WEIGHTS",
     "WIDEST_SUN",
     "AreaLight",
-    "ExtendedLight",
     "Field",
     "FieldLight",
     "LampFieldLight",
     "Light",
     "MeshLight",
     "PointLight",
-    "SphereLight",
-    "SphereSpotLight",
     "SpotLight",
-    "SunDiskLight",
     "SunLight",
     "TracedLight",
     "WorldLight",

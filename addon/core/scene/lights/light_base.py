@@ -1,7 +1,6 @@
-"""What all kinds of light have, and the ways in which they arrive at a grid.
+"""Properties that all kinds of light share, and the ways in which light arrives at a grid.
 
-There are three: from one direction at each texel (a `Light` that has `gather`), by rays (an `ExtendedLight`), or in
-parts that are known already (a `Light` without `has_one_direction` that has `parts` and `totals`).
+A light of one direction per texel has `gather`; other lights have `parts` and `totals`.
 """
 
 from __future__ import annotations
@@ -20,14 +19,15 @@ from ..reach import Reach
 
 @dataclass(frozen=True)
 class Light(ABC):
-    """What all kinds have.
+    """A light of a scene.
 
     Attributes
     ----------
-    strength : of the whole light, in the unit that its kind says.
+    strength : total strength, in the unit that its kind names.
     color : linear RGB factor.
-    blockers : names of the objects that alone cast its shadows; None: all.
-    receivers : names of the objects that it alone lights; None: all.
+    cast_shadow : True if objects block it.
+    blockers : names of the only objects that cast its shadows; None: all do.
+    receivers : names of the only objects that it lights; None: all.
     """
 
     name: str
@@ -37,19 +37,25 @@ class Light(ABC):
     blockers: frozenset[str] | None = field(default=None, kw_only=True)
     receivers: frozenset[str] | None = field(default=None, kw_only=True)
 
-    # Whether all of it travels along one direction, which then may have a kernel of its own; whether it takes rays.
-    is_parallel, has_size = False, False
+    # True if all light travels along one direction, which may have a kernel of its own.
+    is_parallel = False
 
-    # Whether it reaches each texel from one direction only, as far as a medium can tell.
+    # True if several rays reach a point.
+    has_size = False
+
+    # True if one direction per texel stands for the light inside a medium.
     has_one_direction = True
 
     @property
     def is_colored(self) -> bool:
-        """Whether parts of it differ in color, whatever they shine through."""
+        """True if parts of it differ in color."""
         return False
 
     def position_in(self, _grid: Grid) -> tuple[float, float, float] | None:
-        """Where all of it comes from, metres from the outer corner of texel (0, 0) in the plane's frame, if it does."""
+        """The point that all light comes from, or None.
+
+        In the plane's frame, metres from the outer corner of texel (0, 0).
+        """
         return None
 
     def gather(self, grid: Grid, caster, **options) -> tuple[np.ndarray, np.ndarray | None]:
@@ -118,7 +124,7 @@ class Light(ABC):
 
     @abstractmethod
     def is_behind(self, grid: Grid) -> bool:
-        """Whether none of it can reach the lit side of the grid's plane, whatever stands in between."""
+        """True if none of it can reach the lit side of the grid's plane."""
 
     def rgb(self) -> np.ndarray:
         return np.asarray(self.color, np.float32) * np.float32(self.strength)
@@ -136,13 +142,21 @@ class Light(ABC):
             return f"The position or direction of '{self.name}' is not a number."
         return ""
 
+    def _radiance_fault(self, *radiance: np.ndarray) -> str:
+        """The sentence that says why these values are no radiance; "" if they are."""
+        if all(np.isfinite(values).all() and (values >= 0).all() for values in radiance):
+            return ""
+        return f"The radiance of '{self.name}' has negative values, or values that are not numbers."
+
 
 class TracedLight(Light):
-    """A light without size that native code knows."""
+    """A light whose rays native code traces."""
+
+    has_size, has_one_direction = True, False
 
     @abstractmethod
     def native(self):
-        """The native light, white and of strength 1."""
+        """The native `Light`, of strength 1 and without `color`."""
 
     def gather(self, grid, caster, **options):
         return native.gather_beams(grid.native(), self.native(), caster, **options)
@@ -150,20 +164,12 @@ class TracedLight(Light):
     def position_in(self, grid):
         return self.native().position_in(grid.native())
 
-
-class ExtendedLight(Light):
-    """A light of a size: it reaches a point from many directions, by rays."""
-
-    has_size, has_one_direction = True, False
-
-    @abstractmethod
-    def native(self):
-        """The native extended light, of strength 1 and without `color`."""
-
     def parts(self, reach):
         return native.ray_layers(*self._traced(reach), **reach.ray_options())
 
     def totals(self, reach):
+        if not self.has_size:
+            return super().totals(reach)
         irradiance, flow = native.gather_rays(*self._traced(reach), **reach.even_ray_options())
         return reach.received(irradiance), reach.covered(flow)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...progress import ask
 from ..grid import Grid, Vector
-from .light import Light
+from .light_base import Light
 
 # Rings of the hemisphere from the zenith down, by the squared sine of the angle where they end, and their sectors. The
 # rings are narrow near the horizon, where media differ most with the angle: the reflectance of even light is right to
@@ -107,9 +107,7 @@ class _ComputedLight(Light):
         return field is None or not field.radiance.any()
 
     def fault(self):
-        if not all(np.isfinite(field.radiance).all() and (field.radiance >= 0).all() for field in self.fields):
-            return f"The radiance of '{self.name}' has negative values, or values that are not numbers."
-        return super().fault()
+        return self._radiance_fault(*(field.radiance for field in self.fields)) or super().fault()
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,152 @@
+"""Lamps: sun, point, spot and area. A lamp without a size is a lamp of size 0."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...native import native
+from ..grid import Vector
+from .light_base import TracedLight
+
+# Widest sun, radians, that counts as parallel light but for its shadows. The error of the luminance grows with the
+# square of the angle: 6e-4 at 80 degrees of incidence, 5e-3 at 85.
+WIDEST_SUN = math.radians(2.0)
+
+
+@dataclass(frozen=True)
+class SunLight(TracedLight):
+    """Light from a disk infinitely far away; `strength` is the irradiance at normal incidence, W/m^2.
+
+    Attributes
+    ----------
+    direction : unit vector of travel from the disk's center, world.
+    angle : full angle of the disk, radians, 0..pi.
+    disk : "even"; or "flat" as in Blender 3.4, see native `SunLight`.
+    """
+
+    direction: Vector
+    angle: float = 0.0
+    disk: str = "even"
+
+    def native(self):
+        return native.SunLight(self.direction, self.angle, self.disk)
+
+    @property
+    def has_size(self):
+        return self.angle > 0
+
+    @property
+    def is_parallel(self):
+        return self.angle <= WIDEST_SUN
+
+    has_one_direction = is_parallel
+
+    def beams(self, reach, directions=True):
+        if not self.has_size:
+            return super().beams(reach, directions)
+        irradiance, _ = self.totals(reach)
+        is_colored = reach.is_colored or reach.grid.color_in is not None
+        return irradiance if is_colored else irradiance[..., 0], reach.in_plane(self.direction)
+
+    def is_behind(self, grid):
+        return bool(np.dot(self.direction, grid.normal) >= math.sin(min(0.5 * self.angle, 0.5 * math.pi)))
+
+
+@dataclass(frozen=True)
+class PointLight(TracedLight):
+    """Light of a ball into all directions; `strength` is Cycles' watts.
+
+    Attributes
+    ----------
+    position : world position of its center.
+    radius : scene units, 0 or more.
+    shape : "sphere"; or "disk", which faces each point that it lights, as Cycles has it before Blender 4.0 and for
+        lamps of a soft falloff.
+    """
+
+    position: Vector
+    radius: float = 0.0
+    shape: str = "sphere"
+
+    def native(self):
+        return native.PointLight(self.position, self.radius, self.shape)
+
+    @property
+    def has_size(self):
+        return self.radius > 0
+
+    @property
+    def has_one_direction(self):
+        return not self.has_size
+
+    def is_behind(self, grid):
+        return grid.height_of(self.position) <= -self.radius
+
+
+@dataclass(frozen=True)
+class SpotLight(TracedLight):
+    """A point light behind a cone; `strength` is Cycles' watts, of the whole ball.
+
+    Attributes
+    ----------
+    position, radius, shape : as for `PointLight`.
+    frame : rows are the lamp's x, y and z axes (light travels along -z), object scale included.
+    spot_size : full cone angle, radians.
+    blend : soft part of the cone, 0..1.
+    falloff : "scaled", or "legacy" for Cycles before Blender 3.5, where the lamp's scale does not shape the cone.
+    """
+
+    position: Vector
+    frame: tuple[Vector, Vector, Vector]
+    spot_size: float
+    blend: float
+    falloff: str = "scaled"
+    radius: float = 0.0
+    shape: str = "sphere"
+
+    def native(self):
+        cone = self.frame, self.spot_size, self.blend, self.falloff
+        return native.SpotLight(self.position, *cone, self.radius, self.shape)
+
+    has_size, has_one_direction, is_behind = PointLight.has_size, PointLight.has_one_direction, PointLight.is_behind
+
+
+@dataclass(frozen=True)
+class AreaLight(TracedLight):
+    """A rectangle or ellipse that shines from its front, of the radiance `strength` / (4 area).
+
+    That is Cycles' watts in Blender 3.4; in 4.2 and 4.5 a watt gives strength / (pi area), 4 / pi of it.
+
+    Attributes
+    ----------
+    position : world position of its center.
+    frame : rows are the lamp's x, y and z axes (light travels along -z), object scale included.
+    size_x, size_y : whole lengths along the lamp's own axes.
+    is_round : True for an ellipse, False for a rectangle.
+    spread : full angle in which light leaves, radians, 0..pi.
+    """
+
+    position: Vector
+    frame: tuple[Vector, Vector, Vector]
+    size_x: float
+    size_y: float
+    is_round: bool
+    spread: float
+
+    def native(self):
+        size = self.size_x, self.size_y, self.is_round
+        return native.AreaLight(self.position, self.frame, *size, self.spread)
+
+    def is_behind(self, grid):
+        half_x = 0.5 * self.size_x * np.dot(self.frame[0], grid.normal)
+        half_y = 0.5 * self.size_y * np.dot(self.frame[1], grid.normal)
+        reach = np.hypot(half_x, half_y) if self.is_round else abs(half_x) + abs(half_y)
+        if grid.height_of(self.position) + reach <= 0:
+            return True
+        x, y = np.array([(0, 0), (1, 0), (0, 1), (1, 1)]).T[..., None]
+        right = x * grid.width * grid.pitch_x * np.array(grid.x_axis)
+        corners = grid.origin + right + y * grid.height * grid.pitch_y * np.array(grid.y_axis)
+        return bool(((corners - self.position) @ np.array(self.frame[2]) >= 0).all())

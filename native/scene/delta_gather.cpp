@@ -1,0 +1,250 @@
+#include "scene/delta_gather.h"
+
+#include <algorithm>
+#include <array>
+#include <numbers>
+#include <span>
+#include <vector>
+
+#include "base/threads.h"
+#include "scene/shadow_ray.h"
+#include "scene/shadows.h"
+
+namespace beamspread {
+
+namespace {
+
+// Distance to a point lamp, in texels, above which two Gauss points along each axis give the mean of a texel, to 2e-6.
+// Higher values are slower and more exact.
+constexpr double texels_to_smooth_lamp = 16.0;
+
+// Points of a texel relative to its corner in the world, n x n: one in each cell of an n x n grid and one in each of n^2
+// columns and n^2 rows, so that a shadow's border along the texels is resolved as finely as an oblique one (Chiu,
+// Shirley, Wang 1994, "Multi-jittered sampling", without the jitter).
+std::vector<Vec3> sub_texel_points(const ReceiverGrid& grid, int samples)
+{
+    std::vector<Vec3> points;
+    for (int j = 0; j < samples; ++j) {
+        for (int i = 0; i < samples; ++i)
+            points.push_back(grid.step((i + (j + 0.5) / samples) / samples, (j + (i + 0.5) / samples) / samples));
+    }
+    return points;
+}
+
+std::vector<Vec3> gauss_points(const ReceiverGrid& grid)
+{
+    const double offset = 0.5 / std::numbers::sqrt3;
+    std::vector<Vec3> points;
+    for (const double y : {0.5 - offset, 0.5 + offset})
+        for (const double x : {0.5 - offset, 0.5 + offset})
+            points.push_back(grid.step(x, y));
+    return points;
+}
+
+// Casts rays only from texels that `Shadows` can't decide.
+class DeltaGatherer {
+public:
+    DeltaGatherer(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, const RaySettings& settings)
+        : m_grid(grid),
+          m_light(light),
+          m_source(*light.source()),
+          m_occluders(occluders),
+          m_with_travel(settings.with_travel),
+          m_points(sub_texel_points(grid, settings.samples)),
+          m_smooth_points(gauss_points(grid)),
+          m_smooth_from(texels_to_smooth_lamp * std::max(grid.pitch_x, grid.pitch_y)),
+          m_rays(grid, occluders, settings.clearance),
+          m_shadows(grid, m_source, occluders, m_rays.start(), settings.find_shadows),
+          m_open_texel(gather_texel(0.0, 0.0, m_points, nullptr)),
+          m_open_travel(unblocked_direction(grid, light, grid.point(0.5, 0.5)))
+    {
+    }
+
+    std::size_t bands() const { return m_shadows.bands(); }
+
+    // Hands the rays of a band of rows to the sink; returns their number.
+    std::size_t gather_band(std::size_t band, RaySink& sink)
+    {
+        Work& work = m_work.local();
+        m_shadows.shade_band(band, work.shades);
+        work.irradiance.resize(m_grid.width);
+        work.travel.assign(m_grid.width, m_open_travel);
+        const std::size_t rows = work.shades.size() / m_grid.width;
+        for (std::size_t i = 0; i < rows; ++i)
+            gather_row(band * Shadows::rows_per_band + i, &work.shades[i * m_grid.width], work, sink);
+        return rows;
+    }
+
+private:
+    struct Texel {
+        Vec3 irradiance{0.0};
+        Vec3 flow{0.0};          // sum over the points of mean irradiance times direction of travel
+        bool is_shaded = false;  // true if any point is
+    };
+
+    // Working memory of a thread.
+    struct Work {
+        std::vector<Shade> shades;  // of a band
+        std::vector<Vec3f> travel, irradiance;
+    };
+
+    void gather_row(std::size_t y, const Shade* shades, Work& work, RaySink& sink) const
+    {
+        const bool travel_varies = m_with_travel && !m_source.is_far;
+        for (std::size_t x = 0; x < m_grid.width; ++x) {
+            const Texel found = texel(static_cast<double>(x), static_cast<double>(y), shades[x]);
+            work.irradiance[x] = Vec3f(found.irradiance);
+            if (travel_varies)
+                work.travel[x] = mean_direction(found.flow, static_cast<double>(x), static_cast<double>(y));
+        }
+        sink.add({.sample = y * m_grid.width,
+                  .count = m_grid.width,
+                  .ray = 0,
+                  .travel = m_with_travel ? work.travel.data() : nullptr,
+                  .irradiance = work.irradiance.data()});
+    }
+
+    Texel texel(double x, double y, Shade shade) const
+    {
+        if (shade == Shade::full)
+            return {};
+        if (shade == Shade::unknown) {
+            const Texel traced = gather_texel(x, y, m_points, m_occluders);
+            return traced.is_shaded || !is_smooth(x, y) ? traced : gather_texel(x, y, m_smooth_points, nullptr);
+        }
+        if (m_source.is_far)
+            return m_open_texel;
+        return gather_texel(x, y, is_smooth(x, y) ? m_smooth_points : m_points, nullptr);
+    }
+
+    // True if open light is so even within a texel that few points give its mean.
+    bool is_smooth(double x, double y) const
+    {
+        const Vec3 away = m_source.position - m_grid.point(x, y);
+        return m_source.is_smooth && m_points.size() > m_smooth_points.size() &&
+               glm::dot(away, away) > m_smooth_from * m_smooth_from;
+    }
+
+    Texel gather_texel(double x, double y, std::span<const Vec3> steps, const Occluders* occluders) const
+    {
+        const Vec3 corner = m_grid.point(x, y);
+        Texel sum;
+        for (std::size_t first = 0; first < steps.size(); first += Occluders::packet_size) {
+            const auto packet = steps.subspan(first, std::min(steps.size() - first, Occluders::packet_size));
+            if (occluders)
+                add_traced(corner, packet, *occluders, sum);
+            else
+                add_open(corner, packet, sum);
+        }
+        sum.irradiance /= static_cast<double>(steps.size());
+        return sum;
+    }
+
+    using Points = std::array<Vec3, Occluders::packet_size>;
+    using Rays = std::array<LightRay, Occluders::packet_size>;
+
+    void sample(const Vec3& corner, std::span<const Vec3> steps, Points& points, Rays& rays) const
+    {
+        for (std::size_t i = 0; i < steps.size(); ++i)
+            points[i] = corner + steps[i];
+        m_light.sample(std::span(points).first(steps.size()), m_grid.normal, {}, rays.data());
+    }
+
+    // Irradiance of a ray, the same in all channels: the light is white.
+    double irradiance(const LightRay& ray) const
+    {
+        return static_cast<double>(ray.flux.x) * m_rays.arriving_cosine(ray);
+    }
+
+    // Adds the light of points where nothing blocks it.
+    void add_open(const Vec3& corner, std::span<const Vec3> steps, Texel& sum) const
+    {
+        Points points;
+        Rays rays;
+        sample(corner, steps, points, rays);
+        double white = sum.irradiance.x;
+        Vec3 flow = sum.flow;
+        for (std::size_t i = 0; i < steps.size(); ++i) {
+            const double arriving = irradiance(rays[i]);
+            if (!(arriving > 0.0))
+                continue;
+            white += arriving;
+            flow += arriving * rays[i].travel;
+        }
+        sum.irradiance = Vec3(white);
+        sum.flow = flow;
+    }
+
+    // Adds the light of points that gets past the occluders.
+    void add_traced(const Vec3& corner, std::span<const Vec3> steps, const Occluders& occluders, Texel& sum) const
+    {
+        Points points;
+        Rays rays;
+        sample(corner, steps, points, rays);
+        std::array<double, Occluders::packet_size> arriving;
+        std::array<ShadowRay, Occluders::packet_size> shadow_rays;
+        std::size_t count = 0;
+        for (std::size_t i = 0; i < steps.size(); ++i) {
+            arriving[count] = irradiance(rays[i]);
+            if (!(arriving[count] > 0.0))
+                continue;
+            shadow_rays[count] = m_rays.shadow_ray(points[i], rays[i]);
+            rays[count].travel = rays[i].travel;
+            ++count;
+        }
+        sum.is_shaded |= count < steps.size();
+        std::array<Vec3f, Occluders::packet_size> transmittance;
+        occluders.transmit(std::span(shadow_rays).first(count), transmittance.data());
+        for (std::size_t i = 0; i < count; ++i) {
+            if (transmittance[i] != Vec3f(1.0f))
+                sum.is_shaded = true;
+            if (transmittance[i] == Vec3f(0.0f))
+                continue;
+            const Vec3 passed = arriving[i] * Vec3(transmittance[i]);
+            sum.irradiance += passed;
+            sum.flow += (occluders.is_colored() ? (passed.x + passed.y + passed.z) / 3.0 : passed.x) * rays[i].travel;
+        }
+    }
+
+    Vec3f mean_direction(const Vec3& flow, double x, double y) const
+    {
+        const bool is_lit = glm::dot(flow, flow) > 0.0;
+        return Vec3f(is_lit ? glm::normalize(m_grid.to_plane(flow))
+                            : unblocked_direction(m_grid, m_light, m_grid.point(x + 0.5, y + 0.5)));
+    }
+
+    const ReceiverGrid& m_grid;
+    const Light& m_light;
+    LightSource m_source;
+    const Occluders* m_occluders;
+    bool m_with_travel;
+    std::vector<Vec3> m_points;
+    std::vector<Vec3> m_smooth_points;
+    double m_smooth_from;  // distance to a lamp, metres
+    ReceiverRays m_rays;
+    Shadows m_shadows;
+    Texel m_open_texel;  // texel (0, 0) where nothing blocks the light
+    Vec3f m_open_travel;
+    PerThread<Work> m_work;
+};
+
+}  // namespace
+
+Vec3 unblocked_direction(const ReceiverGrid& grid, const Light& light, const Vec3& point)
+{
+    LightRay ray;
+    light.sample({&point, 1}, grid.normal, {}, &ray);
+    const Vec3 direction = glm::normalize(grid.to_plane(ray.travel));
+    return -direction.z > min_cos_theta ? direction : Vec3(0.0, 0.0, -1.0);
+}
+
+void gather_delta_rays(const ReceiverGrid& grid, const Light& light, const Occluders* occluders,
+                       const RaySettings& settings, RaySink& sink, Progress& progress)
+{
+    progress.set_total(static_cast<double>(grid.height));
+    DeltaGatherer gatherer(grid, light, occluders, settings);
+    parallel_for(gatherer.bands(),
+                 [&](std::size_t band) { progress.advance(static_cast<double>(gatherer.gather_band(band, sink))); });
+}
+
+}  // namespace beamspread
