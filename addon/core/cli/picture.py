@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from matplotlib.colors import LogNorm
@@ -13,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator
 
+from ..whole_file import whole_file
 from .totals import describe
 
 # Perceptually even, also in print and for colour-blind readers.
@@ -73,14 +72,9 @@ def read_maps(library, angle_deg: float, albedos: Sequence[float], size: int, pi
 
 
 def save(figure: Figure, path: str) -> None:
-    """Write a picture whole or not at all."""
-    target = Path(path)
-    part = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
-    try:
-        figure.savefig(part, dpi=DPI)
-        part.replace(target)
-    finally:
-        part.unlink(missing_ok=True)
+    """Write a picture completely or not at all."""
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, dpi=DPI)
 
 
 def draw(maps: Maps, totals: Sequence[tuple[str, ...]], notes: Sequence[str]) -> Figure:
