@@ -1,4 +1,4 @@
-"""A batch that is stopped, resumed, or asked for a part of the scene: what it keeps and how it calls that."""
+"""A batch that is stopped, resumed, or limited to some objects: its files and their names."""
 
 import json
 import os
@@ -22,7 +22,7 @@ SIGNALS = {signal.SIGINT: 130, signal.SIGTERM: 143}
 
 def cycles_of(process):
     """Numbers of the Blenders that it has started for Cycles and that still run."""
-    found = set()
+    numbers = set()
     for entry in Path("/proc").glob("[0-9]*/stat"):
         try:
             number, _, rest = entry.read_text().partition(" (")
@@ -31,17 +31,17 @@ def cycles_of(process):
             continue
         state, parent = rest.rpartition(") ")[2].split()[:2]
         if int(parent) == process.pid and state != "Z" and "child.py" in command:
-            found.add(int(number))
-    return found
+            numbers.add(int(number))
+    return numbers
 
 
 def wait_for(answer, process, seconds=60):
     deadline = time.monotonic() + seconds
-    while not (found := answer()):
+    while not (result := answer()):
         assert process.poll() is None, "it has ended"
         assert time.monotonic() < deadline, "waited in vain"
         time.sleep(0.05)
-    return found
+    return result
 
 
 def start(scene, *arguments):
@@ -75,7 +75,7 @@ def test_a_signal_ends_a_batch_soon_and_leaves_a_report(tmp_path, number):
     finally:
         process.kill()
     bakes = json.loads(report.read_text())["bakes"]
-    assert [(one["object"], one["status"], one["path"]) for one in bakes] == [
+    assert [(record["object"], record["status"], record["path"]) for record in bakes] == [
         ("First", "cancelled", ""),
         ("Second", "cancelled", ""),
     ]
@@ -102,7 +102,7 @@ def test_cycles_ends_as_well(tmp_path, number):
     finally:
         process.kill()
     assert not Path(f"/proc/{child}").exists()
-    assert [one["status"] for one in json.loads(report.read_text())["bakes"]] == ["cancelled"]
+    assert [record["status"] for record in json.loads(report.read_text())["bakes"]] == ["cancelled"]
 
 
 def run(*arguments):
@@ -117,15 +117,15 @@ def test_a_files_name_depends_on_the_scene_alone(tmp_path, chosen):
         add_plane(name, matrix=matrix, material=bpy.data.materials.get("M") or add_material("M"))
     add_sun(0)
     bpy.context.scene.beamspread.resolution = 16
-    names = {name: Path(one.path).name for name, one in run("--output", tmp_path / "all").items()}
+    names = {name: Path(record.path).name for name, record in run("--output", tmp_path / "all").items()}
     assert len(set(names.values())) == 3
     assert names["Plain"] == "Plain_M.exr"
     assert "A_b_M.exr" in names.values()
     some = run("--output", tmp_path / "some", "--object", *chosen)
-    assert {name: Path(one.path).name for name, one in some.items()} == {name: names[name] for name in chosen}
+    assert {name: Path(record.path).name for name, record in some.items()} == {name: names[name] for name in chosen}
 
 
-def test_resume_bakes_what_is_missing_damaged_or_older(tmp_path):
+def test_resume_bakes_missing_damaged_and_older_files(tmp_path):
     names = ("Kept", "Missing", "Damaged", "Old", "Failed")
     for number, name in enumerate(names):
         add_plane(name, matrix=Matrix.Translation((5 * number, 0, 0)), material=add_material(name))
@@ -153,7 +153,7 @@ def test_resume_bakes_what_is_missing_damaged_or_older(tmp_path):
         assert native.read_exr(records[name].path)[0].any()
     # Another size, or another pass, is another bake.
     for more in (["--resolution", "16"], ["--pass", "irradiance"], ["--format", "PNG"]):
-        assert {one.status for one in run(*arguments, "--resume", *more).values()} == {"written"}
+        assert {record.status for record in run(*arguments, "--resume", *more).values()} == {"written"}
 
 
 def test_resume_takes_an_images_own_file_only_by_its_report(tmp_path):
@@ -164,6 +164,6 @@ def test_resume_takes_an_images_own_file_only_by_its_report(tmp_path):
     os.utime(save_scene(tmp_path), (time.time() - 100,) * 2)
     report = tmp_path / "report.json"
     first = bake_all(batch_options.parse(["--resume", "--report", str(report)]))
-    assert [one.status for one in first.bakes] == ["written"]
+    assert [record.status for record in first.bakes] == ["written"]
     first.save(str(report))
-    assert [one.status for one in run("--resume", "--report", report).values()] == ["skipped"]
+    assert [record.status for record in run("--resume", "--report", report).values()] == ["skipped"]

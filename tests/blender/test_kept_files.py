@@ -1,4 +1,4 @@
-"""Files are whole or as they were: on a full disk, and where the process is killed while it writes."""
+"""Files are complete or unchanged on a full disk, and if the process is killed while it writes."""
 
 import resource
 import signal
@@ -24,7 +24,7 @@ NOISE = np.random.default_rng(0).random((SIDE, SIDE, 3), np.float32)
 
 @contextmanager
 def full_after(size):
-    """No file of this process may become larger than `size` bytes."""
+    """Limit files of this process to `size` bytes."""
     before, limit = signal.signal(signal.SIGXFSZ, signal.SIG_IGN), resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, limit[1]))
     try:
@@ -51,18 +51,18 @@ FILE_FORMATS = {"PNG": ".png", "JPEG": ".jpg", "TARGA": ".tga", "TARGA_RAW": ".t
 
 
 @pytest.mark.parametrize("file_format", FILE_FORMATS)
-def test_an_images_file_keeps_its_format_and_is_whole_or_old(tmp_path, file_format):
+def test_the_file_of_an_image_keeps_its_format_and_is_whole_or_old(tmp_path, file_format):
     path = tmp_path / f"target{FILE_FORMATS[file_format]}"
     image = saved_image(path, file_format, is_float=file_format in ("OPEN_EXR", "HDR"))
     before, shown = path.read_bytes(), pixels(image)
     bound = 0.2 if file_format == "JPEG" else 0.02
     whole = path.with_stem("whole")
-    other = saved_image(whole, file_format, is_float=image.is_float)
-    files.fill_image(other, NOISE * 0.5)
+    sample = saved_image(whole, file_format, is_float=image.is_float)
+    files.fill_image(sample, NOISE * 0.5)
     size = whole.stat().st_size
-    bpy.data.images.remove(other)
+    bpy.data.images.remove(sample)
     whole.unlink()
-    # In the last part of the file, in the middle, and before anything of the picture.
+    # The disk is full near the end of the file, in its middle, and in its header.
     for limit in (int(0.93 * size), size // 2, 50):
         with full_after(limit), pytest.raises(ImageError, match=f"target{path.suffix} cannot be written and stays"):
             files.fill_image(image, NOISE * 0.5)
@@ -73,8 +73,8 @@ def test_an_images_file_keeps_its_format_and_is_whole_or_old(tmp_path, file_form
     assert list(tmp_path.iterdir()) == [path]
     assert len(bpy.data.images) == 1
     expected = NOISE * 0.5 if image.is_float else files.to_srgb(NOISE * 0.5)
-    for one in (image, bpy.data.images.load(str(path), check_existing=False)):
-        assert np.abs(pixels(one) - expected).mean() < bound
+    for written in (image, bpy.data.images.load(str(path), check_existing=False)):
+        assert np.abs(pixels(written) - expected).mean() < bound
     assert image.file_format == file_format.removesuffix("_RAW") or file_format == "TARGA_RAW"
 
 
@@ -93,7 +93,7 @@ def test_an_output_is_whole_or_old(tmp_path, file_format, part):
     assert [*tmp_path.rglob("*.*")] == [path]
 
 
-def test_a_bake_on_a_full_disk_has_failed_and_the_image_shows_what_it_did(tmp_path):
+def test_a_bake_on_a_full_disk_fails_and_the_image_stays(tmp_path):
     bpy.context.scene.beamspread.resolution = 128
     image = saved_image(tmp_path / "own.bmp", "BMP", 128)  # large, however smooth
     plane = add_plane(material=add_material(image=image))
@@ -103,7 +103,7 @@ def test_a_bake_on_a_full_disk_has_failed_and_the_image_shows_what_it_did(tmp_pa
     with full_after(20000):
         assert "own.bmp cannot be written" in messages_of(bpy.ops.beamspread.bake)
         report = bake_all(batch_options.parse(["--output", str(tmp_path / "out")]))
-    assert [one.status for one in report.bakes] == ["failed"]
+    assert [record.status for record in report.bakes] == ["failed"]
     assert "cannot be written" in report.bakes[0].message
     assert not [*(tmp_path / "out").iterdir()]
     assert np.array_equal(pixels(image), before)
@@ -143,7 +143,7 @@ def test_a_report_is_whole_or_old(tmp_path):
 
 
 @pytest.mark.parametrize("file_format", ["PNG", "OPEN_EXR"])
-def test_killed_while_it_writes_the_old_file_is_whole(tmp_path, file_format):
+def test_a_process_that_is_killed_while_it_writes_leaves_the_old_file(tmp_path, file_format):
     side = 1024  # takes a while to write
     path = tmp_path / f"own{FILE_FORMATS[file_format]}"
     saved_image(path, file_format, side, is_float=file_format == "OPEN_EXR")
@@ -154,7 +154,7 @@ def test_killed_while_it_writes_the_old_file_is_whole(tmp_path, file_format):
         before = path.read_bytes()
         child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
-            # Whatever there is beside the image, or what became of itself, has begun to be written.
+            # Kill the process when a file of the folder is written in part.
             deadline = time.monotonic() + 60
             while not begun(path, len(before)):
                 assert child.poll() is None
@@ -172,9 +172,9 @@ def test_killed_while_it_writes_the_old_file_is_whole(tmp_path, file_format):
 
 
 def begun(path, whole):
-    """Whether a file of the folder is being written: there is more than its header, and not all of it."""
+    """True if a file of the folder is written in part: more than its header and less than half."""
     try:
-        return any(1000 < one.stat().st_size < whole // 2 for one in path.parent.iterdir())
+        return any(1000 < file.stat().st_size < whole // 2 for file in path.parent.iterdir())
     except FileNotFoundError:  # renamed just now
         return False
 

@@ -1,4 +1,4 @@
-"""An image belongs to one result, or to charts side by side; where new images are kept; undo."""
+"""Images belong to one target, or to targets with charts side by side; storage of new images; undo."""
 
 from types import SimpleNamespace
 
@@ -30,7 +30,7 @@ def settings():
 
 
 def duplicate(obj, own_material, turned=0.8):
-    """Shift+D, turned so that it is lit otherwise, and maybe Make Single User > Materials."""
+    """Duplicate as Shift+D does, and turn the copy. With `own_material`, its material becomes single-user."""
     copy = obj.copy()
     copy.data = obj.data.copy()
     copy.matrix_world = Matrix.Translation((9, 0, 0)) @ Matrix.Rotation(turned, 4, "X")
@@ -41,11 +41,11 @@ def duplicate(obj, own_material, turned=0.8):
 
 
 def warnings_of(obj):
-    """What the last bake said of the object."""
+    """Messages of the last bake about the object."""
     return [line for line in state.lines() if f"'{obj.name}" in line]
 
 
-def test_a_copy_with_a_material_of_its_own_gets_an_image_of_its_own():
+def test_a_copy_with_its_own_material_gets_its_own_image():
     plane = add_plane(material=add_material())
     add_sun(0)
     (before,) = bake(plane)
@@ -57,7 +57,7 @@ def test_a_copy_with_a_material_of_its_own_gets_an_image_of_its_own():
     assert not np.allclose(other, before)
     (sentence,) = warnings_of(copy)
     assert sentence.startswith(f"The image '{image_of(plane).name}' belongs to 'Plane / Medium': ")
-    # From here on each has its own, in whatever order, and in one run.
+    # From now on each target has its own image, in any order and in one run.
     assert np.array_equal(bake(plane)[0], before)
     assert np.array_equal(bake(copy)[0], other)
     assert [*map(np.ndarray.tolist, bake(copy, plane))] == [other.tolist(), before.tolist()]
@@ -65,7 +65,7 @@ def test_a_copy_with_a_material_of_its_own_gets_an_image_of_its_own():
     assert not warnings_of(copy)
 
 
-def test_copies_that_are_baked_in_one_run_part_as_well():
+def test_copies_that_are_baked_in_one_run_get_an_image_each():
     image = bpy.data.images.new("Own", 16, 16, float_buffer=True)
     plane = add_plane(material=add_material(image=image))
     copy = duplicate(plane, own_material=True)
@@ -109,7 +109,7 @@ def test_a_removed_owners_image_is_free(removed):
     assert [*facts_of(image).bakes] == [Target("Plane.001", "Medium")]
 
 
-def test_a_shared_material_is_refused_before_the_bake_and_says_what_to_do():
+def test_a_shared_material_is_refused_before_the_bake_with_a_remedy():
     plane = add_plane(material=add_material())
     add_sun(0)
     (before,) = bake(plane)
@@ -179,7 +179,7 @@ def test_new_images_are_float_files_beside_a_saved_scene(tmp_path, settings):
     assert (image.filepath, image.packed_file) == ("//textures/A_b_M.exr", None)
     assert native.read_exr(str(path))[0] == pytest.approx(shown)
     assert shown.max() > 1
-    # Undone and baked again, it is the same file; what another has made is not touched.
+    # After undo, the next bake writes the same file. A file of another program stays.
     node_of(plane.data.materials[0]).image = None
     bpy.data.images.remove(image)
     bake(plane)
@@ -194,7 +194,7 @@ def test_new_images_are_float_files_beside_a_saved_scene(tmp_path, settings):
 
 
 def test_a_node_whose_image_was_cleared_gets_its_file_again(tmp_path):
-    """And not where something shows the image, or it was painted on."""
+    """A file whose image is in use, or was painted on, stays."""
     plane = add_plane(material=add_material())
     sun = add_sun(0)
     save_scene(tmp_path)
@@ -235,7 +235,7 @@ def test_folder_name_and_storage_are_settings(tmp_path, settings):
     assert any("packed into the .blend file instead" in line for line in state.lines())
 
 
-def test_an_exr_file_that_was_read_as_srgb_is_read_as_what_it_is(tmp_path):
+def test_an_exr_file_that_was_read_as_srgb_is_read_as_linear(tmp_path):
     path = tmp_path / "own.exr"
     native.write_exr(str(path), np.ones((16, 16, 3), np.float32), ["R", "G", "B"])
     image = bpy.data.images.load(str(path))
@@ -265,7 +265,7 @@ def test_half_floats_stay_half_where_the_values_fit(tmp_path):
     assert path.stat().st_size > 1.5 * size
 
 
-def test_what_clips_is_said_and_make_float_mends_it(tmp_path):
+def test_an_image_that_clips_gives_a_warning_and_make_float_mends_it(tmp_path):
     image = bpy.data.images.new("Bytes", 16, 16)
     plane = add_plane(material=add_material(image=image))
     sun = add_sun(0)
@@ -345,8 +345,8 @@ def test_a_png_has_the_view_transform_where_that_is_asked_for(tmp_path, settings
     assert np.abs(pixels(filmic) - shown[True]).max() > 0.03
 
 
-def test_nothing_is_stored_where_the_part_is_anothers():
-    """As where the charts were moved while the bake ran."""
+def test_a_part_of_another_target_is_not_overwritten():
+    """Such as after UVs were moved during the bake."""
     plane = add_plane(material=add_material())
     add_sun(0)
     (before,) = bake(plane)
@@ -361,7 +361,7 @@ def test_nothing_is_stored_where_the_part_is_anothers():
     assert np.array_equal(pixels(image_of(plane)), before)
 
 
-def test_undo_leaves_what_was_painted_on_an_older_bake(tmp_path):
+def test_undo_keeps_strokes_on_an_older_bake(tmp_path):
     plane = add_plane(material=add_material())
     add_sun(0)
     bake(plane)
@@ -378,8 +378,8 @@ def test_undo_leaves_what_was_painted_on_an_older_bake(tmp_path):
     assert bpy.data.images[name].pixels[0] == 9
 
 
-def test_a_result_is_kept_where_the_image_was_resized_meanwhile():
-    """As undo does."""
+def test_an_image_that_was_resized_during_the_bake_is_filled():
+    """Undo can do that."""
     plane = add_plane(material=add_material(image=bpy.data.images.new("Own", 16, 16, float_buffer=True)))
     add_sun(0)
     (one,) = prepare_scene(bpy.context, find_targets([plane]), for_bake())
@@ -396,8 +396,8 @@ def for_bake():
 
 
 @pytest.mark.parametrize("has_file", [False, True])
-def test_undo_in_background_shows_what_is_packed(has_file, tmp_path):
-    """Also where a packed image has a file, which is none of this."""
+def test_undo_in_background_shows_the_packed_pixels(has_file, tmp_path):
+    """The file of a packed image stays as it is."""
     image = None
     if has_file:
         native.write_exr(str(tmp_path / "a.exr"), np.zeros((16, 16, 3), np.float32), ["R", "G", "B"])

@@ -1,4 +1,4 @@
-"""What comes from another .blend file: refused where its result could not be kept, and else nothing of it is lost."""
+"""Data of other .blend files: bakes that could not be stored are refused, all others are stored."""
 
 import bpy
 from beamspread.blender.images.facts import facts_of

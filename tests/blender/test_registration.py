@@ -7,10 +7,12 @@ from beamspread.blender.jobs.run import operator
 
 
 def handlers():
-    """What of ours Blender calls."""
+    """Our functions that Blender calls."""
     lists = {name: getattr(bpy.app.handlers, name) for name in dir(bpy.app.handlers) if name != "persistent"}
-    found = [(name, one) for name, functions in lists.items() if isinstance(functions, list) for one in functions]
-    return [(name, one.__name__) for name, one in found if one.__module__.startswith("beamspread")]
+    entries = [
+        (name, function) for name, functions in lists.items() if isinstance(functions, list) for function in functions
+    ]
+    return [(name, function.__name__) for name, function in entries if function.__module__.startswith("beamspread")]
 
 
 def registered():
@@ -18,7 +20,7 @@ def registered():
     return names, handlers(), hasattr(bpy.types.Scene, "beamspread")
 
 
-def test_what_fails_half_way_leaves_nothing():
+def test_a_registration_that_fails_half_way_leaves_nothing():
     before = registered()
     assert before[1]
     blender.unregister()
@@ -26,11 +28,11 @@ def test_what_fails_half_way_leaves_nothing():
     assert nothing == ([], [], False)
     register, seen = bpy.utils.register_class, []
 
-    def refuse(one):
-        seen.append(one.__name__)
-        if one is operator.BEAMSPREAD_OT_cancel:
+    def refuse(cls):
+        seen.append(cls.__name__)
+        if cls is operator.BEAMSPREAD_OT_cancel:
             raise RuntimeError("no")
-        register(one)
+        register(cls)
 
     try:
         bpy.utils.register_class = refuse

@@ -42,7 +42,7 @@ def row_at(frame):
     return row
 
 
-def test_it_says_of_the_frame_what_has_changed_since(plane, tmp_path):
+def test_the_row_names_changes_since_the_frame_that_is_shown(plane, tmp_path):
     bpy.ops.beamspread.show_frames()
     shown = "Shows the frames 3 to 5 of a batch"
     for frame in (3, 4, 5):
@@ -60,12 +60,12 @@ def test_it_says_of_the_frame_what_has_changed_since(plane, tmp_path):
     assert not row.is_stale  # for a bake of this image
     assert batch_run.bake_all(batch_options.parse(["--frames", "3-3"])).all_written()
     assert row_at(3).status == Status.BAKED
-    # As older ones, and those in PNG.
+    # Older files and PNG files have no record.
     write_exr(tmp_path / "beamspread" / "Plane_Medium_0003.exr", np.ones((32, 32, 3), np.float32), {ATTRIBUTE: ""})
     assert [*map(str, row_at(3).messages)] == [f"{shown}. Changes since then are not known."]
 
 
-def test_it_follows_the_frame(plane, tmp_path):
+def test_the_node_follows_the_frame(plane, tmp_path):
     node = node_of(plane.data.materials[0])
     own = node.image
     assert bpy.ops.beamspread.show_frames() == {"FINISHED"}
@@ -106,7 +106,7 @@ def render_brightness(plane, frame, folder):
     return native.read_exr(scene.render.filepath)[0][..., :3].mean()
 
 
-def test_it_is_not_baked_into_and_a_batch_writes_its_frames_again(plane, tmp_path):
+def test_a_sequence_is_not_baked_into_and_a_batch_writes_its_frames_again(plane, tmp_path):
     bpy.ops.beamspread.show_frames()
     before = {path: path.read_bytes() for path in (tmp_path / "beamspread").iterdir()}
     select(plane)
@@ -120,7 +120,7 @@ def test_it_is_not_baked_into_and_a_batch_writes_its_frames_again(plane, tmp_pat
     assert all(path.read_bytes() != content for path, content in before.items())
 
 
-def test_gaps_and_no_frames_are_said(plane, tmp_path, capfd):
+def test_gaps_and_missing_frames_are_reported(plane, tmp_path, capfd):
     (tmp_path / "beamspread" / "Plane_Medium_0004.exr").unlink()
     bpy.ops.beamspread.show_frames()
     assert "1 of the frames 3 to 5 of 'Plane / Medium' are missing" in capfd.readouterr().out
