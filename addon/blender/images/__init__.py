@@ -1,1 +1,1 @@
-"""Where bakes are kept."""
+"""Images of bakes: their files, facts about them, and storing results in them."""

@@ -250,7 +250,7 @@ def _check_written(path: Path, size: tuple[int, int]) -> None:
 
 @contextmanager
 def _whole_image(path: Path) -> Iterator[Path]:
-    """As `whole_file`; raises ImageError that names the file if it can't be written."""
+    """Like `whole_file`, but an ImageError names the file that can't be written."""
     try:
         with whole_file(path) as temporary:
             yield temporary

@@ -12,7 +12,7 @@ from ..node.find import find_node
 from ..registration import all_or_nothing, classes
 from . import files, icons, previews
 from .facts import facts_of, set_facts
-from .new_image import keep_new
+from .new_image import store_new
 
 
 def image_in(context):
@@ -24,12 +24,12 @@ def image_in(context):
 
 
 def wanted_size(image, resolution: int) -> tuple[int, int]:
-    """Of an image of the same shape with `resolution` texels along its longer side."""
+    """Size of an image of the same shape with `resolution` texels along its longer side."""
     return tuple(max(1, round(resolution * side / max(image.size))) for side in image.size)
 
 
 class ImageOperator:
-    """Works on the image of the active material's node."""
+    """Operator on the image of the active material's node."""
 
     bl_options = {"REGISTER", "UNDO"}
 
@@ -42,7 +42,7 @@ class ImageOperator:
 
 
 class BEAMSPREAD_OT_make_float(ImageOperator, bpy.types.Operator):
-    """Put a float image with the same pixels in place of this one, which holds no values above 1. Its file stays"""
+    """Replace this image, which clips values above 1, by a float image with the same pixels. Its file stays"""
 
     bl_idname = "beamspread.make_float"
     bl_label = "Make Float"
@@ -55,22 +55,22 @@ class BEAMSPREAD_OT_make_float(ImageOperator, bpy.types.Operator):
         previews.give_back()
         image = image_in(context)
         name, bakes = image.name, facts_of(image).bakes
-        said = Bake(Target(""))
-        _path, new = keep_new(name, files.linear_pixels(image), said, image.colorspace_settings.is_data)
+        bake = Bake(Target(""))
+        _path, new = store_new(name, files.linear_pixels(image), bake, image.colorspace_settings.is_data)
         image.user_remap(new)
         image.name, new.name = f"{name} (8 bit)", name
         set_facts(new, replace(facts_of(new), bakes=bakes))
         for material in bpy.data.materials:
             node = find_node(material)
             if node is not None and node.image == new:
-                node.image = new  # shows it
-        for message in said.messages:
+                node.image = new  # the inner tree shows it
+        for message in bake.messages:
             self.report({message.level.value}, str(message))
         return {"FINISHED"}
 
 
 class BEAMSPREAD_OT_resize_image(ImageOperator, bpy.types.Operator):
-    """Scale the image to the scene's resolution, until the next bake fills and keeps it"""
+    """Scale the image to the scene's resolution. The next bake fills it"""
 
     bl_idname = "beamspread.resize_image"
     bl_label = "Resize Image"
@@ -83,7 +83,7 @@ class BEAMSPREAD_OT_resize_image(ImageOperator, bpy.types.Operator):
         previews.give_back()
         image = image_in(context)
         icons.scale(image, *wanted_size(image, context.scene.beamspread.resolution))
-        image.update_tag()  # of itself, Blender tells nobody of a new size
+        image.update_tag()  # Blender sends no update for a new size
         return {"FINISHED"}
 
 

@@ -1,4 +1,4 @@
-"""Images that bakes make: float, in a file beside the scene, or packed into it."""
+"""New images for bakes: float, in a file beside the scene or packed into it."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from . import files, icons, undo
 
 
 def name_for(target: Target) -> str:
-    """What the scene's settings call an image made for the target."""
+    """Name of a new image for the target, by the scene's settings."""
     pattern = bpy.context.scene.beamspread.image_name or "{object}_{material}"
     return pattern.replace("{object}", target.object_name).replace("{material}", target.material_name)
 
 
-def keep_new(name: str, texture: np.ndarray, bake: Bake, is_data: bool = False) -> tuple[str, bpy.types.Image]:
-    """A new image of linear RGB (height, width, 3), kept as the scene's settings say; its file's path, "" if packed.
+def store_new(name: str, texture: np.ndarray, bake: Bake, is_data: bool = False) -> tuple[str, bpy.types.Image]:
+    """Store linear RGB (height, width, 3) in a new image; the path of its file, "" if it is packed, and the image.
 
-    Where the file can't be written, the image is packed and the bake is warned.
+    If the file can't be written, the image is packed and the bake gets a warning.
     """
     if uses_files():
         try:
@@ -40,15 +40,15 @@ def keep_new(name: str, texture: np.ndarray, bake: Bake, is_data: bool = False) 
 
 
 def uses_files() -> bool:
-    """Whether new images go to files: the folder may lie beside a scene that was never saved, and so be nowhere."""
+    """True if new images go to files. A folder beside a scene that was never saved does not exist."""
     settings = bpy.context.scene.beamspread
     return settings.image_storage == "FILES" and bool(bpy.data.filepath or not settings.image_dir.startswith("//"))
 
 
 def _in_file(name: str, texture: np.ndarray, is_data: bool) -> tuple[str, bpy.types.Image]:
-    path, made_for = _place(name)
+    path, made_for = _new_file(name)
     files.write_file(path, texture, "EXR", {files.MADE_FOR: made_for})
-    for unused in [one for one in bpy.data.images if files.file_of(one) == path]:
+    for unused in [image for image in bpy.data.images if files.file_of(image) == path]:
         icons.remove(unused)
     image = bpy.data.images.load(str(path))
     image.name = _free_name(name)
@@ -58,46 +58,49 @@ def _in_file(name: str, texture: np.ndarray, is_data: bool) -> tuple[str, bpy.ty
     return str(path), image
 
 
-def part_from_others(image) -> tuple[Message, ...]:
-    """Give the image a file of its own where it shows that of another .blend file, as after Save As; a warning then.
+def separate_from_other_scene(image) -> tuple[Message, ...]:
+    """Give the image its own file if its file belongs to another .blend file, as after Save As; a warning then.
 
-    ImageError where that can't be written.
+    Raises
+    ------
+    ImageError
+        The file can't be written.
     """
     path = files.file_of(image)
-    other = _scene_of(path) if path is not None and bpy.data.filepath else None
-    if other is None or other == Path(bpy.data.filepath).resolve() or not other.exists():
-        return ()  # renamed or moved, else
-    own, made_for = _place(image.name)
+    owner = _scene_of(path) if path is not None and bpy.data.filepath else None
+    if owner is None or owner == Path(bpy.data.filepath).resolve() or not owner.exists():
+        return ()  # a missing owner was renamed or moved: it is this scene
+    new_path, made_for = _new_file(image.name)
     try:
-        own.parent.mkdir(parents=True, exist_ok=True)
-        with whole_file(own) as temporary:
+        new_path.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(new_path) as temporary:
             shutil.copyfile(path, temporary)
     except OSError as error:
-        raise ImageError(f"The file {own} cannot be written: {error.strerror}.") from error
+        raise ImageError(f"The file {new_path} cannot be written: {error.strerror}.") from error
     size = tuple(image.size)
-    _point_to(image, own)
-    files.write_exr(own, files.linear_pixels(image), {files.MADE_FOR: made_for})
+    _point_to(image, new_path)
+    files.write_exr(new_path, files.linear_pixels(image), {files.MADE_FOR: made_for})
     icons.reload(image)
     if tuple(image.size) != size:
         icons.scale(image, *size)
-    text = f"'{path.name}' belongs to '{other.name}': the image '{image.name}' now has the file '{own.name}'."
+    text = f"'{path.name}' belongs to '{owner.name}': the image '{image.name}' now has the file '{new_path.name}'."
     return (warning(image.name, text),)
 
 
 def _scene_of(path: Path) -> Path | None:
-    """The .blend file for which a file was made, from where it lies."""
+    """The .blend file that the image file belongs to, or None."""
     scene, separator, _name = files.made_for(path).partition(": ")
     return (path.parent / scene).resolve() if separator else None
 
 
-def _place(name: str) -> tuple[Path, str]:
-    """A file for a new image in the scene's folder, and what it is to say of itself."""
+def _new_file(name: str) -> tuple[Path, str]:
+    """Path of a file for a new image in the scene's folder, and the file's `MADE_FOR` attribute."""
     folder = Path(bpy.path.abspath(bpy.context.scene.beamspread.image_dir)).absolute()
     scene = bpy.data.filepath
     if scene:
         try:
             scene = Path(os.path.relpath(scene, folder)).as_posix()
-        except ValueError:  # on another drive
+        except ValueError:  # the folder is on another drive
             scene = Path(scene).as_posix()
     made_for = f"{scene}: {name}"
     return _free_path(folder, stem([name]), made_for), made_for
@@ -108,18 +111,18 @@ def _point_to(image, path: Path) -> None:
 
 
 def _free_path(folder: Path, plain: str, made_for: str) -> Path:
-    """A file that neither an image of this scene nor anything else has; one made before for the same is free.
+    """First path that is neither in use by an image nor the path of another scene's or program's file.
 
-    So is that of an image that nothing shows any more, as when a node's image was cleared.
+    A file with the same `made_for` is free, and so is the file of an unused image, as of a node that was cleared.
     """
     taken = {files.file_of(image) for image in bpy.data.images if image.users or image.is_dirty}
     stems = itertools.chain([plain], (f"{plain}_{number}" for number in itertools.count(2)))
-    paths = (folder / f"{one}.exr" for one in stems)
+    paths = (folder / f"{name}.exr" for name in stems)
     free = (path for path in paths if path not in taken)
     return next(path for path in free if not path.exists() or files.made_for(path) == made_for)
 
 
 def _free_name(name: str) -> str:
-    """As Blender names new images; where one is renamed to what another is called, 3.4 renames the other."""
+    """First free name, numbered as by Blender. If a name is taken, Blender 3.4 would rename the image that has it."""
     numbered = (f"{name}.{number:03d}" for number in itertools.count(1))
-    return next(one for one in itertools.chain([name], numbered) if one not in bpy.data.images)
+    return next(free for free in itertools.chain([name], numbered) if free not in bpy.data.images)

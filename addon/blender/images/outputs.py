@@ -1,4 +1,4 @@
-"""Where a batch writes: its folder, else the file of the node's image, else the scene's folder."""
+"""Files of a batch: in its folder, else the file of the node's image, else in the scene's folder."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .results import Results
 
 
 class Outputs:
-    """The files of a run. Their names depend on the scene alone, whatever of it is baked."""
+    """The files of a run. Their names depend on the scene, not on the objects that are baked."""
 
     def __init__(self, scene, options: BatchOptions) -> None:
         self._options, self._settings, self._results = options, scene.beamspread, Results()
@@ -30,12 +30,12 @@ class Outputs:
         self._stems = file_stems(_names(target, layer) for target in targets for layer in LAYERS)
 
     def write(self, bake: Bake, frame: int, attributes: dict[str, str]) -> str:
-        """Write all layers, with what EXR files of frames are to say of themselves; the path of the first."""
+        """Write all layers; EXR files of frames get the attributes. The path of the first layer."""
         paths = [self._write_layer(bake, frame, layer, texture, attributes) for layer, texture in bake.layers.items()]
         return paths[0]
 
     def path(self, target: Target, layer: str, frame: int) -> Path:
-        """The file of a layer in a folder of outputs; ImageError where it can't have one."""
+        """Path of a layer's file in the folder of outputs; raises ImageError if it can't have one."""
         options = self._options
         file_format, folder = options.format or self._settings.format, options.output or self._settings.output_dir
         if folder.startswith("//") and not bpy.data.filepath:
@@ -47,7 +47,7 @@ class Outputs:
         return Path(bpy.path.abspath(folder)).absolute() / name
 
     def own_image(self, target: Target, layer: str):
-        """The node's image, if it has a file that this layer of one frame can go to; else None."""
+        """The node's image, if a single frame's layer can be written to its file; else None."""
         options = self._options
         if options.output is not None or options.frames is not None or layer != COMBINED:
             return None
@@ -66,8 +66,8 @@ class Outputs:
             text = f"The image '{image.name}' belongs to another object: '{bake.target}' has a file of its own."
             bake.warn(image.name, text)
         path = self.path(bake.target, layer, frame)
-        said = attributes if self._options.frames else None
-        files.write_file(path, texture, _format_of(path), said, view_of=self._view_of)
+        frame_attributes = attributes if self._options.frames else None
+        files.write_file(path, texture, _format_of(path), frame_attributes, view_of=self._view_of)
         if path.suffix == files.EXTENSIONS["PNG"] and texture.max() > 1 and self._view_of is None:
             bake.warn(path.name, f"'{path.name}' clips values above 1.", "EXR keeps them.")
         return str(path)

@@ -1,4 +1,4 @@
-"""Puts finished bakes into the images of their nodes and shows them in the materials."""
+"""Stores finished bakes in the images of their nodes, and shows them in the materials."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..node.node import link_result
 from ..read.geometry import read_polygons
 from . import files, icons, previews
 from .facts import note_bake, owners_of, users_of
-from .new_image import keep_new, name_for, part_from_others
+from .new_image import name_for, separate_from_other_scene, store_new
 
 OVERLAP_TOLERANCE = 0.01
 """Fraction of a receiver's texels that may lie in another's charts: rounding at a common border is less."""
@@ -29,14 +29,14 @@ Parts = tuple[tuple[int, int, np.ndarray], ...]
 
 
 class Results:
-    """The images filled in one run; objects that share an image each fill their own part of it."""
+    """Images that one run fills. Objects that share an image fill a part of it each."""
 
     def __init__(self) -> None:
-        self._planned: dict[str, list[Target]] = {}  # by the name of the image, in the order of the run
-        self._parts: dict[tuple, Parts] = {}  # by target and size
+        self._planned: dict[str, list[Target]] = {}  # targets by the name of their image, in the order of the run
+        self._parts: dict[tuple, Parts] = {}  # charts by target and size of the image
 
     def admit(self, bake: Bake) -> Bake:
-        """The bake, if its result can be kept; else one that says why not, before it has run for hours."""
+        """The bake if its result can be stored, else a failed bake with the reason."""
         if bake.job is None:
             return bake
         try:
@@ -46,7 +46,7 @@ class Results:
         return bake
 
     def _plan(self, image, bake: Bake) -> None:
-        """Reserve the bake's part of an image; BakeError if another has it and there can't be two images."""
+        """Reserve the bake's part of an image; raises BakeError if it belongs to another target of the material."""
         if image is not None:
             files.check_image(image)
             self._check_room(image, bake)
@@ -55,10 +55,15 @@ class Results:
             self._parts[bake.target, receiver.width, receiver.height] = parts_of(receiver)
 
     def store(self, bake: Bake) -> str:
-        """Fill the image of the target's node, or a new one, and link it back; other layers have images beside it.
+        """Fill the image of the target's node, or a new one, and show it; other layers get images of their own.
 
-        The path of the first layer's file, "" where it is packed; BakeError if it can't be kept. Where the node's
-        image holds the result of another target, this one gets an image of its own.
+        If the node's image holds the result of another target, the target gets a new image. Returns the path of the
+        first layer's file, "" if it is packed.
+
+        Raises
+        ------
+        BakeError
+            The result can't be stored.
         """
         node, paths = _node(bake.target, bake.layers), []
         for layer, texture in bake.layers.items():
@@ -71,9 +76,9 @@ class Results:
         return paths[0]
 
     def fill(self, image, bake: Bake, texture: np.ndarray, shown=None) -> str | None:
-        """Fill the bake's part of an image, and leave that of others; None if theirs is the same.
+        """Fill the bake's part of an image; the path of its file, None if the part belongs to another target.
 
-        `shown` is the image of the node, whose owners count, where that is another.
+        `shown` is the image whose owners count: the node's, if `image` is beside it.
         """
         receiver, others = bake.job.receiver, self._others(shown or image, bake)
         if others:
@@ -82,14 +87,14 @@ class Results:
                 return None
             covered = receiver.coverage.copy()
             for part in parts:
-                there = within(covered, *part)
-                np.maximum(there, part[2], out=there)
+                chart = within(covered, *part)
+                np.maximum(chart, part[2], out=chart)
             merged = np.where(receiver.inside()[..., None], texture, files.linear_pixels(image))
             texture = extend_margin(merged, covered, bake.job.settings.margin)
         return files.fill_image(image, texture)
 
     def fill_shown(self, image, bake: Bake, texture: np.ndarray) -> str | None:
-        """Fill the bake's part of its node's image, and note whose it is; None if it is another's."""
+        """Fill the bake's part of its node's image and record its owner; None if the part belongs to another."""
         size = texture.shape[1::-1]
         if tuple(image.size) != size and 0 not in image.size:
             icons.scale(image, *size)
@@ -110,7 +115,7 @@ class Results:
             image = None
         if image is None:
             return self._new(bake, texture)
-        bake.messages.add(*part_from_others(image))
+        bake.messages.add(*separate_from_other_scene(image))
         path = self.fill_shown(image, bake, texture)
         if path is not None:
             return path, image
@@ -121,17 +126,17 @@ class Results:
         return path, new
 
     def _new(self, bake: Bake, texture: np.ndarray) -> tuple[str, bpy.types.Image]:
-        path, image = keep_new(name_for(bake.target), texture, bake)
+        path, image = store_new(name_for(bake.target), texture, bake)
         note_bake(image, bake.target)
         return path, image
 
     def _store_beside(self, node, bake: Bake, layer: str, texture: np.ndarray) -> str:
-        """Fill the image of a layer that no node shows, named after the one that is shown."""
+        """Fill the image of a layer that no node shows; its name begins with that of the node's image."""
         names = [f"{node.image.name} {layer}"] if node.image else []
         for name in [*names, f"{name_for(bake.target)} {layer}"]:
             image, size = bpy.data.images.get(name), texture.shape[1::-1]
             if image is None:
-                return keep_new(name, texture, bake, is_data=True)[0]
+                return store_new(name, texture, bake, is_data=True)[0]
             if tuple(image.size) != size and 0 not in image.size:
                 icons.scale(image, *size)
             path = self.fill(image, bake, texture, node.image)
@@ -140,7 +145,7 @@ class Results:
         raise BakeError(f"Another object is baked to the same part of the image '{name}'.")
 
     def _others(self, image, bake: Bake) -> list[Target]:
-        """Those whose results the image holds, or will by the end of this run because they came first."""
+        """Other targets whose results the image holds, or that come first in this run."""
         target = bake.target
         planned = self._planned.get(image.name, [])
         first = planned[: planned.index(target)] if target in planned else planned
@@ -149,23 +154,25 @@ class Results:
         others.pop(target, None)
         if target.object_name in bpy.data.objects:
             return list(others)
-        # Renamed during the bake: it isn't another, and others with its material have other parts.
+        # The target was renamed during the bake: a target of the same material and charts is the target itself.
         return [
-            one for one in others if one.material_name != target.material_name or not self._covers(one, image, bake)
+            other
+            for other in others
+            if other.material_name != target.material_name or not self._covers(other, image, bake)
         ]
 
     def _covers(self, other: Target, image, bake: Bake) -> bool:
         return overlaps(bake.job.receiver, self._parts_of(other, image))
 
     def _parts_of(self, target: Target, image) -> Parts:
-        """Where the target's charts lie in the image."""
+        """The target's charts in the image."""
         key = target, *image.size
         if key not in self._parts:
             self._parts[key] = read_parts(*key)
         return self._parts[key]
 
     def _check_room(self, image, bake: Bake) -> None:
-        """Raise BakeError if the image is another's who has the same material, and so can't have two images."""
+        """Raise BakeError if the part belongs to a target of the same material, which can't have two images."""
         receiver, target = bake.job.receiver, bake.target
         if receiver.coverage.shape != tuple(image.size)[::-1]:
             return
@@ -179,7 +186,7 @@ class Results:
 
 
 def _node(target: Target, layers: Collection[str]):
-    """The target's node; BakeError where it is gone, or can't be changed and would be."""
+    """The target's node; raises BakeError if it is gone, or if it must be changed and can't be."""
     material = bpy.data.materials.get(target.material_name)
     node = find_node(material)
     if node is None:
@@ -190,7 +197,7 @@ def _node(target: Target, layers: Collection[str]):
 
 
 def check_editable(material) -> None:
-    """Raise BakeError if what is changed in the material is lost when the file is closed."""
+    """Raise BakeError if changes of the material are lost when the file is closed."""
     if material.library is not None or material.override_library is not None:
         raise BakeError(
             f"The material '{material.name}' belongs to another .blend file, so this one can't keep its image: make it "
