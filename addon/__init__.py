@@ -6,11 +6,11 @@ Outside Blender this package is the Python interface of the native module; insid
 import sys
 
 if "bl_info" in globals():
-    # Read anew: an update was installed, and the former one's parts are still there. A native module can't be
-    # exchanged: core/native.py sees whether it is the right one.
+    # An update was installed over the running add-on, whose modules are still loaded: load them again. A native module
+    # can't be replaced; core/native.py checks its version.
     for _name in [name for name in sys.modules if name.startswith(f"{__name__}.") and not name.endswith("._native")]:
         del sys.modules[_name]
-        globals().pop(_name[len(__name__) + 1 :], None)  # `from . import blender` would find the former one here
+        globals().pop(_name[len(__name__) + 1 :], None)  # otherwise `from . import blender` finds the old module
 
 from .core.native import native, problem
 
@@ -25,7 +25,7 @@ bl_info = {
 }
 
 if problem:
-    # Inside Blender an add-on that vanishes with a traceback helps nobody: it registers and its panel says this.
+    # Inside Blender the add-on registers all the same, and its panel shows the message.
     if "bpy" not in sys.modules:
         raise ImportError(problem)
     __all__ = ["register", "unregister"]

@@ -1,16 +1,16 @@
-"""Blender's half of the add-on: reads scenes into core's plain data, and shows what comes of it.
+"""Blender's half of the add-on: reads scenes into plain data of core, runs bakes, and shows their results.
 
 Each part imports only core and those above it (tests/unit/test_layers.py reads this list):
 
     compat        all differences between Blender versions
-    registration  what parts add to Blender, all of it or nothing
+    registration  classes and handlers of a part, added completely or not at all
     popup         popups with important messages
-    preferences   what holds for all files of a user
+    preferences   settings of the user for all files
     settings      scene.beamspread
-    read          geometry, lights and what a render would show
-    node          the shader node, and where a scene has it
-    cycles        what Cycles finds in a process of its own: bounced light, the world's radiance
-    images        images of the scene, whole files, whose result an image holds
+    read          geometry, lights, visibility in a render
+    node          the shader node, and finding it in a scene
+    cycles        light and colors that Cycles finds in a process of its own
+    images        images of the scene: their files, facts about their bakes, storing results
     jobs          how targets are baked (run), how each stands (state), and what changed since (out_of_date)
     live          images that follow the scene while it is worked on
     ui            panels
