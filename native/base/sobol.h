@@ -11,13 +11,13 @@
 namespace beamspread {
 
 // The first four dimensions of Sobol's sequence, with the direction numbers of Joe and Kuo 2008 ("Constructing Sobol
-// sequences with better two-dimensional projections", doi:10.1137/070709359) and Owen scrambling by a hash (Burley 2020,
-// "Practical hash-based Owen scrambling", JCGT 9(4)).
+// sequences with better two-dimensional projections", doi:10.1137/070709359) and Owen scrambling by a hash (Burley
+// 2020, "Practical hash-based Owen scrambling", JCGT 9(4)).
 //
-// Each cell of the grid has one block of the sequence. Blocks follow a Morton curve with shuffled quarters (Ahmed, Wonka
-// 2020, "Screen-space blue-noise diffusion of Monte Carlo sampling error via hierarchical ordering of pixels",
-// doi:10.1145/3414685.3417881). The points of a cell are well spread, and so are the points of a neighbourhood of cells:
-// errors average out between neighbours.
+// Each cell of the grid has one block of the sequence. Blocks follow a Morton curve with shuffled quarters (Ahmed,
+// Wonka 2020, "Screen-space blue-noise diffusion of Monte Carlo sampling error via hierarchical ordering of pixels",
+// doi:10.1145/3414685.3417881). The points of a cell are well spread, and so are the points of a neighbourhood of
+// cells: errors average out between neighbours.
 class GridSobol {
 public:
     static constexpr std::size_t dimensions = 4;

@@ -20,8 +20,8 @@ std::size_t thread_count();
 // Calls body(0) .. body(count - 1). An exception in a body stops the loop and is rethrown here.
 void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body);
 
-// Calls make(i) in parallel and the returned functions one at a time, in the order of i: sums are the same, bit for bit,
-// for any number of threads. Only a few results exist at once.
+// Calls make(i) in parallel and the returned functions one at a time, in the order of i: sums are the same, bit for
+// bit, for any number of threads. Only a few results exist at once.
 void parallel_ordered(std::size_t count, const std::function<std::function<void()>(std::size_t)>& make);
 
 // Array that starts at a cache line, so that no SIMD load straddles two lines.

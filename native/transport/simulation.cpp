@@ -17,15 +17,16 @@ namespace beamspread {
 
 namespace {
 
-// Half takes 1.03 times the CPU time, an eighth 1.17 times, twice .92 times for half as many threads; of 800,000 photons.
-constexpr std::uint64_t enough_photons_per_job = 200'000;
+// Photons in one thread's job up to which its batches are joined. More: fewer idle lanes at a job's end, fewer jobs for
+// threads to share.
+constexpr std::uint64_t max_photons_per_job = 200'000;
 
-// Consecutive ones, see transport/tally/tally_statistics.h.
+// Consecutive batches in a group (transport/tally/tally_statistics.h).
 constexpr std::size_t batches_per_group = batch_count / group_count;
 
 SideTallies empty_tallies(const Medium& medium, double theta_inside)
 {
-    const PolePlaces poles = pole_places(medium, theta_inside);
+    const PolePositions poles = pole_positions(medium, theta_inside);
     SideTallies tallies;
     for (std::size_t side = 0; side < side_count; ++side) {
         tallies[side].poles = poles[side];
@@ -37,13 +38,13 @@ SideTallies empty_tallies(const Medium& medium, double theta_inside)
     return tallies;
 }
 
-// Sums of batches, and what is kept of each.
+// Sums of groups of batches, and the total of each batch.
 struct AngleSums {
     std::array<SideTallies, group_count> groups;
     std::array<std::vector<double>, side_count> batch_totals;
 };
 
-// The sum of every `step`-th group from the first one.
+// Sum of every `step`-th group, from group `first` on.
 Tally sum_of(const AngleSums& sums, std::size_t side, std::size_t first, std::size_t step)
 {
     Tally sum = sums.groups[first][side];
@@ -52,14 +53,14 @@ Tally sum_of(const AngleSums& sums, std::size_t side, std::size_t first, std::si
     return sum;
 }
 
-// The nearest number that half precision holds; of numbers up to 1.
+// Nearest number in half precision, for numbers up to 1.
 float rounded_to_half(double x)
 {
     constexpr int digits = 11;
-    constexpr int least_exponent = -13;  // of the fraction that frexp gives; below, digits are lost
+    constexpr int min_exponent = -13;  // of frexp's fraction; smaller numbers lose digits
     int exponent = 0;
     std::frexp(x, &exponent);
-    const double unit = std::ldexp(1.0, std::max(exponent, least_exponent) - digits);
+    const double unit = std::ldexp(1.0, std::max(exponent, min_exponent) - digits);
     return static_cast<float>(std::round(x / unit) * unit);
 }
 
@@ -77,7 +78,7 @@ void normalize_rings(const Tally& tally, double photons, SideResult& out)
     }
 }
 
-// Up to the last that anything was counted in, at least one.
+// Number of radius bins up to the last one with light, at least one.
 std::size_t used_radii(const std::vector<float>& power)
 {
     std::size_t used = 1;
@@ -98,9 +99,9 @@ AngleResult normalized(double angle_deg, const AngleSums& sums, double photons)
         Tally tally = sum_of(sums, side, 0, 2);
         const Tally other = sum_of(sums, side, 1, 2);
         out.harmonics.assign(row_count, 1);
-        if (angle_deg > 0.0) {  // at 0 there is rotational symmetry: what the other harmonics hold is noise
-            const auto worth = harmonics_worth_keeping(tally, other);
-            out.harmonics.assign(worth.begin(), worth.end());
+        if (angle_deg > 0.0) {  // at 0 degrees, symmetry makes all harmonics m > 0 noise
+            const auto counts = significant_harmonics(tally, other);
+            out.harmonics.assign(counts.begin(), counts.end());
         }
         tally.merge(other);
         normalize_rings(tally, photons, out);
@@ -126,7 +127,7 @@ AngleResult normalized(double angle_deg, const AngleSums& sums, double photons)
     return result;
 }
 
-// What one thread walked: consecutive batches.
+// Sums of one thread's job: consecutive batches.
 struct JobSums {
     std::vector<SideTallies> groups;
     std::vector<SideWeights> batches;
@@ -147,7 +148,7 @@ void merge(std::size_t first_batch, JobSums job, AngleSums& sums)
     }
 }
 
-// The first batches take one more each where the photons do not divide evenly.
+// Photons of each batch. The first batches take one more where the photons do not divide evenly.
 std::vector<std::uint64_t> batch_sizes(std::uint64_t photons)
 {
     std::vector<std::uint64_t> sizes(batch_count, photons / batch_count);
@@ -156,12 +157,12 @@ std::vector<std::uint64_t> batch_sizes(std::uint64_t photons)
     return sizes;
 }
 
-// Batches that one thread walks together: the last walks of a job leave most lanes of a packet idle, so that a job
-// should not be short.
+// Number of batches that one thread walks together. The last walks of a job leave most lanes idle, hence jobs should be
+// long.
 std::size_t batches_per_job(std::uint64_t photons)
 {
     std::size_t batches = batch_count;
-    while (batches > 1 && photons / batch_count * batches > enough_photons_per_job)
+    while (batches > 1 && photons / batch_count * batches > max_photons_per_job)
         batches /= 2;
     return batches;
 }

@@ -13,21 +13,21 @@
 
 namespace beamspread {
 
-// Photons are walked in this many independent batches per angle: their scatter is the statistical error,
-// known to 1 / sqrt(2 (32 - 1)), 13 %; with half as many to 18 %, with twice to 9 %.
+// Number n of independent batches of photons per angle. Their scatter gives the statistical error of totals, known to
+// 1 / sqrt(2 (n - 1)), 13 %; more batches: better known, larger files.
 inline constexpr std::size_t batch_count = 32;
 
 // One side of one angle, normalized to one unit of power that entered the medium.
 struct SideResult {
-    std::vector<float> power;         // [row][radius bin]; empty: nothing leaves here
-    std::size_t radii = 0;            // radius bins up to the last that is not empty, at least 1
-    std::vector<std::size_t> harmonics;  // [row]: how many are kept, at least 1, see transport/tally/tally_statistics.h
-    std::vector<float>
-        ratios;  // means of cos(m phi) weighted by power, m > 0: [row][harmonic][radius bin], as half holds them
+    std::vector<float> power;            // [row][radius bin]; empty if no light leaves here
+    std::size_t radii = 0;               // number of radius bins up to the last non-empty one, at least 1
+    std::vector<std::size_t> harmonics;  // [row]: number of stored harmonics, at least 1: `significant_harmonics`
+    // Means of cos(m phi) weighted by power, m > 0, rounded to half precision: [row][harmonic][radius bin].
+    std::vector<float> ratios;
     std::vector<float> mean_order;  // [order bin]
     std::vector<float> order_variance;  // [order bin]
     std::vector<float> batch_totals;  // [batch][order bin], power
-    std::vector<float> deviations;  // of groups of batches, see transport/tally/tally_statistics.h
+    std::vector<float> deviations;  // of groups of batches: `relative_deviations`
 };
 
 struct AngleResult {
@@ -35,7 +35,7 @@ struct AngleResult {
     std::array<SideResult, side_count> sides;
 };
 
-// `photons` per angle. The result depends on seed, photons and kernel (a name of walk_kernels(), or empty: the
+// Walks `photons` per angle. The result depends on seed, photons and kernel (a name from walk_kernels(); empty: the
 // fastest), never on threads. Throws InvalidArgument, Cancelled.
 std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> angles_deg, std::uint64_t photons,
                                   std::uint64_t seed, int threads, std::string_view kernel_name, Progress& progress);

@@ -73,7 +73,7 @@ def test_arrays_broadcast_and_numbers_give_numbers():
         (lambda: AngularSpace((0, 0), (0, 0), 0), "'height' is 0"),
         (lambda: AngularSpace((0, 0), (0, 0), -1), "'height' is -1"),
         (lambda: AngularSpace((0, 0), (0, 0), math.inf), "'height' is inf"),
-        (lambda: space().to_angular(1e16, 0), "'u, v' is 1e\\+16; allowed: places within 1e15 heights"),
+        (lambda: space().to_angular(1e16, 0), "'u, v' is 1e\\+16; allowed: points within 1e15 heights"),
         (lambda: space().to_angular(0, math.inf), "'u, v' is inf"),
         (lambda: space().to_angular(math.nan, 0), "'u, v' is nan"),
         (lambda: space().to_angular(1j, 0), "'u' is complex128"),

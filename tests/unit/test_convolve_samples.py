@@ -105,7 +105,7 @@ def test_three_samples_are_samples(samples):
     ("changes", "message"),
     [
         ({"direction": travel(70, 0)}, "'angle' is 70; allowed: 0 <= angle <= 60"),
-        ({"albedo": 0.95}, "'albedo' is 0.95; allowed: 0.8 <= albedo <= 0.9, what the samples span"),
+        ({"albedo": 0.95}, "'albedo' is 0.95; allowed: 0.8 <= albedo <= 0.9, the span of the samples"),
         ({"interpolation": "best"}, "'method' is 'best'"),
         ({"ldf": []}, "'ldf' is"),
         ({"ldf": "samples"}, "'ldf' is 'samples'"),

@@ -81,7 +81,7 @@ SAMPLES = random_samples()
     [
         (lambda: interpolate([], 0, 0.5), "'samples' is empty"),
         (lambda: interpolate([None], 0, 0.5), "'samples' is with None"),
-        (lambda: interpolate(SAMPLES, 31, 0.6), "'angle' is 31; allowed: 0 <= angle <= 30, what the samples span"),
+        (lambda: interpolate(SAMPLES, 31, 0.6), "'angle' is 31; allowed: 0 <= angle <= 30, the span of the samples"),
         (lambda: interpolate(SAMPLES, -1, 0.6), "'angle' is -1"),
         (lambda: interpolate(SAMPLES, math.nan, 0.6), "'angle' is nan"),
         (lambda: interpolate(SAMPLES, 10, 0.95), "'albedo' is 0.95; allowed: 0.5 <= albedo <= 0.9"),

@@ -16,7 +16,8 @@ namespace {
 // Row-major, as AngleSpline stores it.
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// Second derivatives of the cardinal splines, which are 1 at one point and 0 at the others: [point][spline].
+// Second derivatives of the cardinal splines, which are 1 at one point and 0 at the others (de Boor 2001, "A Practical
+// Guide to Splines", Ch. IV): [point][spline].
 Matrix cardinal_second_derivatives(const std::vector<double>& x)
 {
     const auto n = static_cast<Eigen::Index>(x.size());
@@ -31,7 +32,7 @@ Matrix cardinal_second_derivatives(const std::vector<double>& x)
         a.row(i).segment(i - 1, 3) << h0, 2.0 * (h0 + h1), h1;
         b.row(i).segment(i - 1, 3) << 6.0 / h0, -6.0 / h0 - 6.0 / h1, 6.0 / h1;
     }
-    // Not-a-knot: the third derivative does not jump at the second point and at the last but one.
+    // Not-a-knot: the third derivative is continuous at the second and the second last point.
     const auto end_condition = [&](Eigen::Index row, Eigen::Index i) {
         a.row(row).segment(i - 1, 3) << step(i), -(step(i - 1) + step(i)), step(i - 1);
     };
@@ -40,9 +41,9 @@ Matrix cardinal_second_derivatives(const std::vector<double>& x)
     return a.partialPivLu().solve(b);
 }
 
-// Closer nodes would only amplify the simulation's noise: at this distance 1e-3 of it are a slope of 1 per radian, which is
-// about that of the LDFs.
-constexpr double closest_deg = 0.06;
+// Smallest distance of nodes in degrees. Closer nodes amplify noise: at this distance noise of 1e-3 is a slope of 1 per
+// radian, about that of the LDFs.
+constexpr double min_spacing_deg = 0.06;
 
 }  // namespace
 
@@ -63,7 +64,7 @@ std::vector<double> AngleSpline::weights(double x, Parity parity) const
     const std::size_t n = m_points.size();
     std::vector<double> point_weight(n, 0.0);
     if (n <= 4) {
-        // Lagrange's polynomial is the spline of so few points.
+        // The spline of up to four points is Lagrange's polynomial.
         for (std::size_t i = 0; i < n; ++i) {
             point_weight[i] = 1.0;
             for (std::size_t k = 0; k < n; ++k)
@@ -93,7 +94,7 @@ std::vector<double> AngleSpline::weights(double x, Parity parity) const
             const double mirrored = point_weight[count - 1 - j];
             result[j] = parity == Parity::even ? here + mirrored : here - mirrored;
         } else {
-            // An odd function is zero at zero, whatever noise its sample there carries.
+            // An odd function is zero at zero; the sample there is noise.
             result[j] = parity == Parity::even ? here : 0.0;
         }
     }
@@ -103,12 +104,12 @@ std::vector<double> AngleSpline::weights(double x, Parity parity) const
 AngleNodes::AngleNodes(std::vector<double> angles_deg) : m_angles_deg(std::move(angles_deg))
 {
     for (std::size_t j = 1; j < count(); ++j)
-        if (!(m_angles_deg[j] - m_angles_deg[j - 1] > closest_deg))
+        if (!(m_angles_deg[j] - m_angles_deg[j - 1] > min_spacing_deg))
             reject("angles", m_angles_deg[j], "distinct angles, more than 0.06 degrees apart");
     std::vector<double> nodes;
     for (const double angle : m_angles_deg)
-        // A node's mirror image is a node as well: one that is as close as that stands for both, at 0.
-        nodes.push_back(angle < 0.5 * closest_deg ? 0.0 : angle * radians_per_degree);
+        // Snap to 0 a node that is too close to its own mirror image.
+        nodes.push_back(angle < 0.5 * min_spacing_deg ? 0.0 : angle * radians_per_degree);
     m_spline = AngleSpline(std::move(nodes));
 }
 

@@ -9,17 +9,16 @@
 
 namespace beamspread {
 
-// Cubic spline (not-a-knot) through nodes x >= 0 and their mirror images -x: a beam from the other
-// side gives the mirrored distribution, so a harmonic of even m is an even function of the angle and
-// one of odd m an odd function. The interpolant is linear in the values, which keeps every total
-// consistent with the distribution that it is the total of.
+// Cubic spline (not-a-knot) through nodes x >= 0 and their mirror images -x. A beam from the other side gives the
+// mirrored distribution: harmonics of even m are even functions of the angle, those of odd m odd functions. The
+// interpolant is linear in the values, hence totals agree with the distributions.
 class AngleSpline {
 public:
     enum class Parity { even, odd };
 
     AngleSpline() = default;
 
-    // Ascending nodes, radians.
+    // Nodes in radians, ascending.
     explicit AngleSpline(std::vector<double> nodes);
 
     // Weight of each node's value in the interpolated value at x.
@@ -28,25 +27,26 @@ public:
 private:
     std::vector<double> m_nodes;
     std::vector<double> m_points;             // nodes and their mirror images, ascending
-    std::vector<double> m_second_derivative;  // [point][value]: of the cardinal splines
+    std::vector<double> m_second_derivative;  // of the cardinal splines, [point][value]
 };
 
-// Splines over the angle outside the medium, where both the refracted angle and the Fresnel factor of light that comes
-// back from a slab's other boundary are smooth; inside, the latter rises infinitely fast toward grazing.
+// Angles of incidence with known values, and splines between them. The variable is the angle outside the medium, in
+// which the refracted angle and the Fresnel factor of light from a slab's other boundary are smooth. As a function of
+// the angle inside, that factor has an infinite slope at grazing.
 class AngleNodes {
 public:
     AngleNodes() = default;
 
-    // Degrees, ascending. Throws InvalidArgument.
+    // Angles in degrees, ascending. Throws InvalidArgument.
     explicit AngleNodes(std::vector<double> angles_deg);
 
     const std::vector<double>& angles_deg() const { return m_angles_deg; }
     std::size_t count() const { return m_angles_deg.size(); }
 
-    // The nearest angle between the first and the last.
+    // The angle, clamped to the first and last node.
     double clamped(double angle_deg) const;
 
-    // Nodes around an angle.
+    // The two nodes around an angle.
     std::array<std::size_t, 2> neighbours(double angle_deg) const;
 
     // Weights of the nodes at the clamped angle, times a factor.
@@ -57,7 +57,7 @@ private:
     AngleSpline m_spline;
 };
 
-// The same angles, and one in the middle of each two.
+// The angles, and the middle of each two neighbours.
 std::vector<double> with_middles(const std::vector<double>& angles_deg);
 
 }  // namespace beamspread

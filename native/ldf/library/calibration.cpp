@@ -23,40 +23,40 @@ using Eigen::VectorXd;
 constexpr auto bins = static_cast<Eigen::Index>(order_bin_count);
 constexpr auto batches = static_cast<Eigen::Index>(batch_count);
 
-// Totals are made equal at every other of the compared albedos, and led to what is known of them at an albedo of 1.
+// Number of observed totals: at every other compared albedo, and at an albedo of 1, where bounds are known.
 constexpr std::size_t compared_count = compared_albedos.size();
 constexpr Eigen::Index albedos = (compared_count + 1) / 2 + 1;
 
-// Nothing is absorbed here; the exact solution needs an albedo below 1, and this one's differs by less than its error.
+// Albedo that stands for 1 in the exact solution, which needs an albedo below 1. The difference is below its error.
 constexpr double next_to_one = 1.0 - 1e-12;
 
-// At this albedo light has decayed to 1/e where walks are given up.
-constexpr double deepest = 1.0 - 1.0 / max_order;
+// Albedo at which light has decayed to 1/e at the last scattering order of a walk.
+constexpr double last_order_albedo = 1.0 - 1.0 / max_order;
 
-// Fewer leave so many orders empty that totals can be 10 % off; measured over twelve media, 100 are within 3 %.
-constexpr std::uint64_t fewest_photons = 100;
+// Photons per angle below which too many orders are empty for calibration.
+constexpr std::uint64_t min_photons = 100;
 
-// Of Newton's method below. The last is in squares of tolerances. Twelve media of 1 to 10,000 photons took at most 400
-// rounds; to stop before the end may leave totals far from exact. Damping a thousand times as strong, and an end a thousand
-// times as early, change no total in the third digit of its error (five media of 100 to 10,000 photons).
+// Newton's method below: rounds before giving up, smallest damping above 0 (over the largest curvature), and the
+// squared Newton decrement (in squared tolerances) at which it ends. A larger end value: fewer rounds, less exact
+// totals.
 constexpr int max_rounds = 10'000;
-constexpr double least_damping = 1e-9;
+constexpr double min_damping = 1e-9;
 constexpr double settled = 1e-6;
 
-// Part of the light that enters. Simulations know nothing of less, and no picture shows it; a hundred times as much is as
-// good to 2 % of the errors of totals.
+// Absolute tolerance of totals, as a fraction of the light that enters. Larger: less exact totals where hardly any
+// light leaves.
 constexpr double negligible_power = 1e-9;
 
-// Totals of the angles and of the middles between them, alternating: [angle][albedo], the compared albedos and then
-// `deepest` and `next_to_one`.
+// Exact totals, [angle][albedo], of simulated angles and the middles between them, alternating; of the compared
+// albedos, then `last_order_albedo` and `next_to_one`.
 struct Exact {
     std::vector<double> angles_deg;
     ExactTotals totals;
 
     double total(std::size_t angle, std::size_t albedo, Side side) const
     {
-        const std::size_t place = angle * (compared_count + 2) + albedo;
-        return side == Side::reflected ? totals.reflectance[place] : totals.transmittance[place];
+        const std::size_t index = angle * (compared_count + 2) + albedo;
+        return side == Side::reflected ? totals.reflectance[index] : totals.transmittance[index];
     }
 };
 
@@ -64,7 +64,7 @@ Exact solve_exactly(const LdfLibrary& library, int threads)
 {
     Exact exact{with_middles(library.angles_deg()), {}};
     std::vector<double> solved(compared_albedos.begin(), compared_albedos.end());
-    solved.insert(solved.end(), {deepest, next_to_one});
+    solved.insert(solved.end(), {last_order_albedo, next_to_one});
     exact.totals = exact_totals(library.medium(), exact.angles_deg, solved, threads);
     return exact;
 }
@@ -75,8 +75,8 @@ MatrixXd batch_powers(const SideResult& side)
     return Eigen::Map<const Eigen::MatrixXf>(side.batch_totals.data(), bins, batches).cast<double>();
 }
 
-// Relative variance of the mean power of each bin. Deep orders are reached by ever fewer photons, a handful at last,
-// which says little of their own variance: none is taken for better known than a bin before it.
+// Relative variance of the mean power of each bin. A handful of photons reach the last orders and say little of their
+// variance: no bin counts as better known than a bin before it.
 VectorXd relative_variances(const MatrixXd& powers, const VectorXd& mean)
 {
     const VectorXd variance = (powers.colwise() - mean).rowwise().squaredNorm() / (batches * (batches - 1));
@@ -90,18 +90,17 @@ VectorXd relative_variances(const MatrixXd& powers, const VectorXd& mean)
     return relative;
 }
 
-// Linear totals of unknown powers, observed to within a tolerance.
+// Observed totals, linear in the powers of the bins, with tolerances.
 struct Observation {
     MatrixXd weights;    // [albedo][bin]
     VectorXd totals;     // [albedo]
     VectorXd tolerance;  // [albedo]
 };
 
-// The likeliest scale of each bin's power, around 1 with this relative variance, given the totals; none is negative: a
-// quadratic programme with bounds. Its dual has a variable per total, is convex, smooth and piecewise
-// quadratic: solved by Newton's method, damped where bins meet or leave 0 (Levenberg, Marquardt 1963,
-// doi:10.1137/0111030) by the Hessian for all bins free, than which the dual is nowhere more curved: so damped a step
-// always goes down.
+// Most likely non-negative scale of each bin's power, around 1 with this relative variance, given the totals. This is a
+// quadratic programme with bounds. Its dual has one variable per total and is convex, smooth and piecewise quadratic.
+// Newton's method solves it, damped (Marquardt 1963, doi:10.1137/0111030) by the Hessian with all bins free, which
+// bounds the curvature of the dual: fully damped steps always descend.
 VectorXd likeliest_scale(const VectorXd& power, const VectorXd& relative, const Observation& observed)
 {
     const MatrixXd of_scale = observed.tolerance.cwiseInverse().asDiagonal() * observed.weights * power.asDiagonal();
@@ -140,10 +139,10 @@ VectorXd likeliest_scale(const VectorXd& power, const VectorXd& relative, const 
         if (!(gradient.dot(curvature.ldlt().solve(gradient)) > settled))
             break;
         const double here = dual(pull);
-        damping = damping > least_damping ? 0.1 * damping : 0.0;
+        damping = damping > min_damping ? 0.1 * damping : 0.0;
         VectorXd step = damped_step();
         while (damping < 1.0 && !(dual(pull + step) < here + 1e-4 * gradient.dot(step))) {
-            damping = std::max(10.0 * damping, least_damping);
+            damping = std::max(10.0 * damping, min_damping);
             step = damped_step();
         }
         pull += step;
@@ -152,7 +151,7 @@ VectorXd likeliest_scale(const VectorXd& power, const VectorXd& relative, const 
     return scale;
 }
 
-// Scales the powers of a side, with their distributions, to what was observed of their totals.
+// Scales the powers of a side's bins, and so their distributions, to the observed totals.
 void calibrate(SideResult& side, const Observation& observed)
 {
     MatrixXd powers = batch_powers(side);
@@ -165,7 +164,8 @@ void calibrate(SideResult& side, const Observation& observed)
         std::transform(power, power + radius_bin_count, power,
                        [factor](float x) { return static_cast<float>(factor * static_cast<double>(x)); });
     }
-    // Had a batch been the whole simulation, it would have been led to the same totals; the mean of all stays.
+    // Scale each batch as if it were the whole simulation, to the same totals (Kalman update of its deviation). The
+    // mean of all batches stays.
     powers = scale.asDiagonal() * powers;
     const VectorXd variance = relative.cwiseProduct((scale.cwiseProduct(before)).cwiseAbs2());
     const MatrixXd spread = variance.asDiagonal() * observed.weights.transpose();
@@ -181,9 +181,9 @@ void calibrate(SideResult& side, const Observation& observed)
 LdfLibrary calibrated(const LdfLibrary& library, int threads)
 {
     const Medium& medium = library.medium();
-    if (library.photons() < fewest_photons)
+    if (library.photons() < min_photons)
         reject("photons", static_cast<double>(library.photons()),
-               "at least " + std::to_string(fewest_photons) + " per angle, or totals can't be made right");
+               "at least " + std::to_string(min_photons) + " per angle, or totals can't be made right");
     const Exact exact = solve_exactly(library, threads);
     const double relative_error = exact_totals_error(medium);
     std::vector<AngleResult> results = library.results();
@@ -205,13 +205,13 @@ LdfLibrary calibrated(const LdfLibrary& library, int threads)
             for (std::size_t k = 0; k < compared_count; k += 2)
                 observe(static_cast<Eigen::Index>(k / 2), compared_albedos[k], exact.total(2 * j, k, side) / entering,
                         0.0);
-            // The power of all orders lies below that of an albedo of 1 by what leaves later than any walk, and above
-            // that at `deepest`: a half-space, of which n^-1/2 is left inside after n orders, leaves .56 of the
-            // difference. Half of the way to either bound is the tolerance. Without this the last orders, of which a
-            // few photons tell, might return more than arrives.
-            const double most = exact.total(2 * j, compared_count + 1, side) / entering;
-            const double least = exact.total(2 * j, compared_count, side) / entering;
-            observe(albedos - 1, 1.0, 0.5 * (most + least), 0.25 * (most - least));
+            // Observe the power of all orders: below the total at an albedo of 1, which includes light that leaves
+            // later than any walk, and above that at `last_order_albedo` (a half-space, with n^-1/2 of the light inside
+            // after n orders, is at .56 of the difference). The tolerance is half the distance to either bound. Without
+            // this observation the last orders, which few photons reach, might return more light than arrives.
+            const double upper = exact.total(2 * j, compared_count + 1, side) / entering;
+            const double lower = exact.total(2 * j, compared_count, side) / entering;
+            observe(albedos - 1, 1.0, 0.5 * (upper + lower), 0.25 * (upper - lower));
             calibrate(result, observed);
         }
     }
@@ -221,10 +221,10 @@ LdfLibrary calibrated(const LdfLibrary& library, int threads)
     for (std::size_t angle = 0; angle < exact.angles_deg.size(); ++angle)
         for (const Side side : {Side::reflected, Side::transmitted}) {
             Residuals& node = residuals[angle / 2][static_cast<std::size_t>(side)];
-            auto& left = angle % 2 == 0 ? node.here : node.halfway;
-            for (std::size_t k = 0; k < left.size(); ++k)
+            auto& errors = angle % 2 == 0 ? node.here : node.halfway;
+            for (std::size_t k = 0; k < errors.size(); ++k)
                 if (const double total = exact.total(angle, k, side); total > 0.0)
-                    left[k] = static_cast<float>(
+                    errors[k] = static_cast<float>(
                         std::abs(result.total(exact.angles_deg[angle], compared_albedos[k], side) / total - 1.0));
         }
     return LdfLibrary(medium, library.photons(), library.seed(), std::move(results), std::move(residuals));

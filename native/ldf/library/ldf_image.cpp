@@ -12,18 +12,18 @@ namespace beamspread {
 
 namespace {
 
-// Where the light of a disk loses .1 % of a texel to rounding: it is a difference of integrals over what is far larger.
-constexpr double smallest_pitch_of_disk = 1e-4;
-constexpr double largest_disk = 1e6;
-constexpr double largest_disk_texels = 1e4;
+// Limits of images of disks, beyond which differences of large integrals lose .1 % of a texel to rounding.
+constexpr double min_disk_pitch = 1e-4;         // mean free paths
+constexpr double max_disk_diameter = 1e6;       // mean free paths
+constexpr double max_disk_diameter_texels = 1e4;
 
-// A disk so much smaller than a texel is a point: what it spreads over a texel's border is lost in rounding.
+// True if a disk is too small to spread a texel's light by more than rounding.
 bool is_point(double beam_diameter, double pitch)
 {
     return beam_diameter < 1e-5 * pitch;
 }
 
-// Adds a delta function at (u, 0), shared by the texels whose border it lies on.
+// Adds a delta function at (u, 0). Texels share it if it lies on their border.
 void add_delta(std::vector<double>& texels, std::size_t size, double pitch, const BallisticExit& delta)
 {
     const double half = 0.5 * static_cast<double>(size);
@@ -51,13 +51,13 @@ void check_grid(std::size_t size, double pitch, double beam_diameter)
         reject("beam_diameter", beam_diameter, "beam_diameter >= 0 mean free paths");
     if (is_point(beam_diameter, pitch))
         return;
-    if (pitch < smallest_pitch_of_disk)
+    if (pitch < min_disk_pitch)
         reject("pitch", pitch, "pitch >= 1e-4 mean free paths for a beam with a diameter");
-    if (beam_diameter > std::min(largest_disk, largest_disk_texels * pitch))
+    if (beam_diameter > std::min(max_disk_diameter, max_disk_diameter_texels * pitch))
         reject("beam_diameter", beam_diameter, "up to 1e6 mean free paths and 1e4 texels");
 }
 
-// Adds what a disk of light around (u, 0) leaves in each texel.
+// Adds an even disk of light around (u, 0).
 void add_disk(std::vector<double>& texels, std::size_t size, double pitch, const BallisticExit& centre, double radius)
 {
     const double corner = -0.5 * static_cast<double>(size) * pitch;
@@ -74,7 +74,7 @@ void add_disk(std::vector<double>& texels, std::size_t size, double pitch, const
     }
 }
 
-// Power of the scattered light in each texel.
+// Power of scattered light in each texel.
 std::vector<double> texel_power(const std::vector<RadialProfile>& profiles, std::size_t size, double pitch,
                                 double beam_diameter)
 {
@@ -117,7 +117,7 @@ std::vector<float> ldf_image_standard_error(const LdfLibrary& library, double an
                                             std::size_t size, double pitch, Side side, double beam_diameter)
 {
     check_grid(size, pitch, beam_diameter);
-    // Mean and sum of squared differences from it, one group after the other (Welford 1962,
+    // Compute mean and sum of squared differences in one pass over the groups (Welford 1962,
     // doi:10.1080/00401706.1962.10490022).
     std::vector<double> mean(size * size, 0.0);
     std::vector<double> squares(size * size, 0.0);

@@ -17,24 +17,21 @@ namespace beamspread {
 
 namespace {
 
-// Beyond the last simulated angle, if that is at least this close to grazing, its distribution is
-// used with the exact Fresnel factor. Totals at 89.7 degrees are then off by less than 1e-3
-// with an ior of 1.4, and with 1 too small by 3 to 17 % (albedos of .99 and .6, g .8), from 86 degrees on by 5 to 30 %.
+// Angle in degrees from which the last simulated distribution, with the exact Fresnel factor, serves all larger angles.
+// Larger: smaller errors near grazing, but libraries must reach this angle.
 constexpr double grazing_deg = 88.0;
 
-// Below this exponent a bin's weight is zero to any purpose, and the expansion in its variance no longer holds. With
-// -30 and -120 no texel changes by 1e-12 of the brightest.
+// Exponent below which a bin's weight is zero; the expansion in its variance no longer holds there.
 constexpr double negligible_log_weight = -60.0;
 
-// Harmonics at the end of the row that move less than this part of a profile's power only cost time: the worst of 64 x 64
-// texels is off by 1e-6 of the brightest. Half and a tenth give the same, twice 3e-5, ten times 2e-4.
+// Fraction of a profile's power that its dropped trailing harmonics may move. Larger: less time, larger errors.
 constexpr double negligible_harmonics = 1e-4;
 
-// Sums over the rows of a pole, [harmonic][radius bin].
+// Sums over the rows of a pole, weighted for an albedo, [harmonic][radius bin].
 std::vector<double> contract_orders(const SideResult& side, double albedo, std::size_t pole)
 {
     const std::array<double, order_bin_count> weights = order_weights(side, albedo);
-    std::vector<double> sums(most_harmonics(side.harmonics, pole) * radius_bin_count, 0.0);
+    std::vector<double> sums(max_harmonics(side.harmonics, pole) * radius_bin_count, 0.0);
     const float* ratios = side.ratios.data();
     for (std::size_t row = 0; row < end_row(pole); ++row) {
         const std::size_t harmonics = side.harmonics[row];
@@ -46,7 +43,7 @@ std::vector<double> contract_orders(const SideResult& side, double albedo, std::
                 sums[k] += power[k];
             }
             for (std::size_t m = 1; m < harmonics; ++m) {
-                const double weight = harmonics == harmonic_count ? fading_harmonics()[m] : 1.0;
+                const double weight = harmonics == harmonic_count ? harmonic_taper()[m] : 1.0;
                 for (std::size_t k = 0; k < radius_bin_count; ++k)
                     sums[m * radius_bin_count + k] +=
                         weight * power[k] * static_cast<double>(ratios[(m - 1) * radius_bin_count + k]);
@@ -57,17 +54,17 @@ std::vector<double> contract_orders(const SideResult& side, double albedo, std::
     return sums;
 }
 
-// Relative deviations [harmonic][radius bin] of the powers of the rings, and of harmonics in parts of those.
+// Adds a group's deviations, [harmonic][radius bin], which are relative to the rings' powers.
 void deviate(std::vector<double>& sums, const std::vector<double>& deviations)
 {
     const bool fades = deviations.size() == harmonic_count * radius_bin_count;
-    for (std::size_t i = sums.size(); i-- > 0;) {  // the powers, which come first, last
-        const double weight = fades ? fading_harmonics()[i / radius_bin_count] : 1.0;
+    for (std::size_t i = sums.size(); i-- > 0;) {  // backward: the powers at the front change last
+        const double weight = fades ? harmonic_taper()[i / radius_bin_count] : 1.0;
         sums[i] += weight * sums[i % radius_bin_count] * deviations[i];
     }
 }
 
-std::size_t poles_of(const Medium& medium)
+std::size_t used_poles(const Medium& medium)
 {
     return mirrored_orders(medium) == 0 ? 1 : pole_count;
 }
@@ -108,20 +105,20 @@ LdfLibrary::LdfLibrary(const Medium& medium, std::uint64_t photons, std::uint64_
     for (const AngleResult& result : m_results)
         angles.push_back(result.angle_deg);
     m_simulated = AngleNodes(std::move(angles));
-    // Around one pole the images of a beam have to move from node to node.
-    m_nodes = poles_of(medium) > 1 ? AngleNodes(with_middles(angles_deg())) : m_simulated;
+    // Mirror images move from node to node, hence profiles around one pole need closer nodes.
+    m_nodes = used_poles(medium) > 1 ? AngleNodes(with_middles(angles_deg())) : m_simulated;
 }
 
 void LdfLibrary::check_angle(double angle_deg) const
 {
     if (!(angle_deg >= 0.0 && angle_deg < 90.0))
         reject("angle", angle_deg, "0 <= angle < 90 degrees");
-    constexpr double rounding = 1e-4;  // degrees: single-precision directions
+    constexpr double rounding = 1e-4;  // degrees; error of directions in single precision
     const double first = m_results.front().angle_deg;
     const double last = m_results.back().angle_deg;
     if (angle_deg < first - rounding || (angle_deg > last + rounding && last < grazing_deg)) {
         std::ostringstream span;
-        span << first << " <= angle <= " << last << " degrees, what this library was simulated for";
+        span << first << " <= angle <= " << last << " degrees, the angles that this library was simulated for";
         reject("angle", angle_deg, span.str());
     }
 }
@@ -190,7 +187,7 @@ double LdfLibrary::standard_error(double angle_deg, double albedo, Side side) co
     return std::sqrt(variance);
 }
 
-// The largest of those at the compared angles and albedos around.
+// Largest remaining error at the compared angles and albedos around.
 double LdfLibrary::residual(double angle_deg, double albedo, Side side) const
 {
     const double angle = m_simulated.clamped(angle_deg);
@@ -210,9 +207,8 @@ double LdfLibrary::residual(double angle_deg, double albedo, Side side) const
 
 double LdfLibrary::diffuse_reflectance(double albedo) const
 {
-    // 2 integral of R(mu) mu dmu by midpoints: in mu, because R may grow linearly with it at grazing. 128 differ by
-    // 1.6e-5 in twice the time, 32 by 6e-5 in half.
-    constexpr int points = 64;
+    // Compute 2 integral of R(mu) mu dmu by the midpoint rule in mu, as R may be linear in mu at grazing.
+    constexpr int points = 64;  // more: smaller errors, more time
     double sum = 0.0;
     for (int i = 0; i < points; ++i) {
         const double mu = (i + 0.5) / points;
@@ -225,7 +221,7 @@ std::vector<LdfLibrary::PoleProfiles> LdfLibrary::simulated_profiles(double albe
                                                                      std::optional<std::size_t> group) const
 {
     check_albedo(albedo);
-    std::vector<PoleProfiles> poles(poles_of(m_medium));
+    std::vector<PoleProfiles> poles(used_poles(m_medium));
     for (std::size_t pole = 0; pole < poles.size(); ++pole)
         for (const AngleResult& result : m_results) {
             RadialProfile& profile = poles[pole].emplace_back();
@@ -248,7 +244,7 @@ RadialProfile LdfLibrary::interpolated(double angle_deg, Side side, std::size_t 
     for (std::size_t j = 0; j < nodes.size(); ++j)
         sum.add(nodes[j], weights.even[j], weights.odd[j]);
     const double theta = refracted_angle(m_simulated.clamped(angle_deg) * radians_per_degree, m_medium.ior);
-    sum.set_centre(pole_places(m_medium, theta)[static_cast<std::size_t>(side)][pole]);
+    sum.set_centre(pole_positions(m_medium, theta)[static_cast<std::size_t>(side)][pole]);
     sum.keep_harmonics(weights.harmonics(nodes));
     sum.drop_negligible(negligible_harmonics);
     return sum;
@@ -302,7 +298,7 @@ LdfLibrary simulate_library(const Medium& medium, const std::vector<double>& ang
 {
     std::vector<double> sorted = angles_deg;
     std::sort(sorted.begin(), sorted.end());
-    const AngleNodes checked(sorted);  // before the work, though the library checks again
+    const AngleNodes checked(sorted);  // rejects bad angles before the simulation
     auto results = simulate(medium, sorted, photons, seed, threads, kernel, progress);
     return LdfLibrary(medium, photons, seed, std::move(results));
 }

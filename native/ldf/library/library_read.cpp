@@ -152,7 +152,7 @@ private:
     std::vector<float> scatter(ExrPart& part, const std::vector<std::size_t>& harmonics, std::size_t radii) const
     {
         if (part.height != static_cast<int>(group_count) ||
-            part.pixels.size() != group_count * scatter_count(harmonics, radii))
+            part.pixels.size() != group_count * deviation_count(harmonics, radii))
             fail_size(part.name);
         return std::move(part.pixels);
     }

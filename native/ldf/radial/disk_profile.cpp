@@ -11,19 +11,14 @@ namespace beamspread {
 
 namespace {
 
-// The constants of this file were measured by images of twelve disks of .0002 to 300 mean free paths against ones made with
-// rings of 1.02 and four times as many points: as they are, no texel is off by more than
-// 2.2e-4 of the brightest, and of those of disks wider than .01 by 7e-6.
-
-// So many radii away the disk is a point: g changes by less than 1e-4 where it matters, while the border integral would be a
-// small difference of large numbers. Ten times as far changes nothing, a tenth of it is off by 1.3e-5.
+// Distance from which a disk counts as a point, over its radius. Larger: the border integral becomes a small difference
+// of large numbers; smaller: g is less even over the disk.
 constexpr double far_in_radii = 1000.0;
 
-// c_m at r, from the slope of C_m across a thousandth of r: half of it changes texels by 1e-7 of the brightest, twice by
-// 3e-7.
+// c_m at r, by a central difference of C_m.
 Harmonics point_value(const RadialFunction& point, double r)
 {
-    constexpr double step = 5e-4;
+    constexpr double step = 5e-4;  // over r; larger: less rounding, more truncation error
     const Harmonics inner = point.remaining(r * (1.0 - step));
     const Harmonics outer = point.remaining(r * (1.0 + step));
     Harmonics value{};
@@ -32,21 +27,19 @@ Harmonics point_value(const RadialFunction& point, double r)
     return value;
 }
 
-// Mean over a disk at distance s from the pole of c_m(r) cos(m phi).
+// Mean of c_m(r) cos(m phi) over a disk whose centre is at distance s from the pole.
 Harmonics disk_mean(const RadialFunction& point, double radius, double s)
 {
     if (s > far_in_radii * radius)
         return point_value(point, s);
     Harmonics sum{};
-    // Any constant may be added to C_m around a closed border, unless the pole is inside; there C_m itself is needed.
+    // Near the pole integrate C_m itself; elsewhere C_m - C_m(infinity), as constants cancel around a closed border.
     const bool near = s < 2.0 * radius;
-    // tau: angle at the disk's centre from the point nearest to the pole. With tau = a sinh(x) the steps are short
-    // there.
-    // At the edge itself any width from 1e-6 to 1e-2 gives the same to 1e-8.
+    // Substitute tau = a sinh(x), with tau the angle at the disk's centre from the point nearest to the pole: steps are
+    // short near that point. The bound on `a` serves points on the disk's edge.
     const double a = std::max(1e-4, std::abs(radius - s) / std::sqrt(std::max(s, 1e-12 * radius) * radius));
     const double last = std::asinh(pi / a);
-    // As along the borders of texels: half a period of the shortest harmonic at most. Where harmonics are few, 16 panels: 8
-    // give the same to 1e-8, a single one is off by 9e-4.
+    // Choose the number of panels: at most half a period of the shortest harmonic each, and at least 16.
     const double step = 3.2 / static_cast<double>(point.harmonics());
     const int panels = std::max(16, static_cast<int>(std::ceil(last / step)));
     const double half = 0.5 * last / panels;
@@ -59,7 +52,7 @@ Harmonics disk_mean(const RadialFunction& point, double radius, double s)
             const double r = std::sqrt(r2);
             if (r == 0.0)
                 continue;
-            // d phi / d tau, times d tau / dx; twice for both halves of the border.
+            // Compute the weight d phi / d tau * d tau / dx, twice for both halves of the border.
             const double phi_slope = radius * (radius - s + 2.0 * s * sine * sine) / r2;
             const double weight = 2.0 * gauss_weight[q] * half * a * std::cosh(x) * phi_slope;
             const double cos_phi = (s - radius * std::cos(tau)) / r;
@@ -79,8 +72,8 @@ Harmonics disk_mean(const RadialFunction& point, double radius, double s)
     return sum;
 }
 
-// Radii between which the disk's means are smooth: where its border touches the borders of the profile's radius bins,
-// and denser toward the edge, where the singularity at the pole shows.
+// Radii between which the disk's means are smooth: its border touches a border of the profile's radius bins there. They
+// are denser toward the disk's edge, where the singularity at the pole shows.
 std::vector<double> breakpoints(double radius, double support)
 {
     std::vector<double> radii{0.0, radius, radius + support};
@@ -89,8 +82,7 @@ std::vector<double> breakpoints(double radius, double support)
             if (r > 0.0 && r < radius + support)
                 radii.push_back(r);
     };
-    // Of 2, the worst texel is off by 8e-4, of 4 by 1e-2; with bins' edges alone, which end at 2^-10, by 1e-1.
-    constexpr double ratio = 1.2;
+    constexpr double ratio = 1.2;  // of neighbouring radii's distances to the edge; larger: less exact, less time
     const double finest = std::max(1e-6 * radius, std::min(1e-3 * radius, 1e-3));
     const int steps = static_cast<int>(std::ceil(std::log(std::max(1.0, support / finest)) / std::log(ratio)));
     for (int i = 0; i < steps; ++i)
@@ -101,7 +93,7 @@ std::vector<double> breakpoints(double radius, double support)
             radii.push_back(radial_edge(k));
     }
     std::sort(radii.begin(), radii.end());
-    // Closer radii, which come from sums of the same numbers, would make rings of nothing.
+    // Remove radii that differ by rounding alone.
     constexpr double rounding = 1e-9;
     radii.erase(
         std::unique(radii.begin(), radii.end(), [&](double a, double b) { return b - a < rounding * (radius + b); }),
@@ -109,14 +101,14 @@ std::vector<double> breakpoints(double radius, double support)
     return radii;
 }
 
-// Integral from 0 to x of the half chord sqrt(radius^2 - x^2).
+// Integral of the half chord sqrt(radius^2 - x^2) from 0 to x.
 double chord_integral(double radius, double x)
 {
     const double inside = std::clamp(x, -radius, radius);
     return 0.5 * (inside * std::sqrt(radius * radius - inside * inside) + radius * radius * std::asin(inside / radius));
 }
 
-// Area of the disk between x0 and x1, below y, less that of its lower half.
+// Area of the disk between x0 and x1 and below y, minus the area of its lower half there.
 double area_below(double radius, double x0, double x1, double y)
 {
     const double sign = y < 0.0 ? -1.0 : 1.0;
@@ -125,7 +117,7 @@ double area_below(double radius, double x0, double x1, double y)
     };
     if (std::abs(y) >= radius)
         return sign * chords(x0, x1);
-    // Where the chord ends above |y| the line cuts it.
+    // Between -cut and cut, chords reach beyond |y|.
     const double cut = std::sqrt(radius * radius - y * y);
     const double from = std::clamp(x0, -cut, cut);
     const double to = std::clamp(x1, -cut, cut);
@@ -142,7 +134,7 @@ DiskProfile::DiskProfile(const RadialFunction& point, double radius)
       m_remaining(m_radii.size(), Harmonics{}),
       m_slope(m_radii.size(), Harmonics{})
 {
-    std::vector<Harmonics> power(m_radii.size(), Harmonics{});  // of the ring inside each radius
+    std::vector<Harmonics> power(m_radii.size(), Harmonics{});  // of the ring that ends at each radius
     parallel_for(m_radii.size() - 1, [&](std::size_t k) {
         const double r = m_radii[k];
         const double half = 0.5 * (m_radii[k + 1] - r);
@@ -160,7 +152,7 @@ DiskProfile::DiskProfile(const RadialFunction& point, double radius)
         for (std::size_t m = 0; m < m_harmonics; ++m)
             m_remaining[k][m] = m_remaining[k + 1][m] + power[k + 1][m];
 
-    // The rings are summed by quadrature, the total is known.
+    // Scale the sums, which are made by quadrature, to the known total.
     const double total = point.cumulative(point.support())[0];
     if (m_remaining[0][0] == 0.0)
         return;
@@ -180,7 +172,7 @@ Harmonics DiskProfile::remaining(double r) const
     const auto k = static_cast<std::size_t>(above - m_radii.begin());
     const double h = m_radii[k] - m_radii[k - 1];
     const double t = (r - m_radii[k - 1]) / h;
-    // Cubic Hermite polynomials.
+    // Evaluate the cubic Hermite polynomials.
     const double v1 = t * t * (3.0 - 2.0 * t);
     const double s0 = t * (1.0 - t) * (1.0 - t) * h;
     const double s1 = t * t * (t - 1.0) * h;

@@ -1,4 +1,4 @@
-// An LDF of a beam that lights a disk instead of a point.
+// LDF of a beam that lights a disk instead of a point.
 #pragma once
 
 #include <vector>
@@ -7,12 +7,12 @@
 
 namespace beamspread {
 
-// The convolution of an LDF with an evenly lit disk of total weight 1. A disk is the same from everywhere, so the
-// result has the same harmonics: their radial functions are the means of g cos(m phi) over disks, here by Green's
-// theorem as integrals of C_m(r) cos(m phi) d phi around their borders.
+// Convolution of an LDF with an evenly lit disk of total weight 1. A disk is symmetric, hence the result has the same
+// harmonics; their radial functions are the means of g cos(m phi) over disks, by Green's theorem integrals of
+// C_m(r) cos(m phi) d phi around the disks' borders.
 class DiskProfile final : public RadialFunction {
 public:
-    // radius > 0. The total stays the same.
+    // radius > 0. Keeps the total.
     DiskProfile(const RadialFunction& point, double radius);
 
     std::size_t harmonics() const override { return m_harmonics; }
@@ -29,7 +29,7 @@ private:
     std::vector<Harmonics> m_slope;  // dC_m/dr
 };
 
-// Area that a disk of this radius around the origin shares with the rectangle [x0, x1] x [y0, y1].
+// Area of the intersection of a disk of this radius around the origin with the rectangle [x0, x1] x [y0, y1].
 double disk_overlap(double radius, double x0, double x1, double y0, double y1);
 
 }  // namespace beamspread

@@ -1,4 +1,4 @@
-// What solvers ask of the LDFs of one medium, wherever they come from.
+// Interface of the LDFs of one medium, for solvers.
 #pragma once
 
 #include <algorithm>
@@ -16,19 +16,19 @@ class LdfSource {
 public:
     virtual ~LdfSource() = default;
 
-    // The scattered part of the LDF, per unit power incident. Throws InvalidArgument.
+    // The scattered part of the LDF, per unit incident power. Throws InvalidArgument.
     virtual RadialProfile profile(double angle_deg, double albedo, Side side) const = 0;
 
-    // Angles at which profiles are known; `profile` is the sum of `node_profiles` with the weights that `angle_weights`
-    // gives, of the harmonics that AngleWeights::harmonics leaves. For solvers that meet many angles at once.
+    // Profiles at the angles of all nodes, for solvers that need many angles at once. `profile` is their sum weighted
+    // by `angle_weights`, cut to AngleWeights::harmonics.
     virtual std::vector<RadialProfile> node_profiles(double albedo, Side side) const = 0;
 
     struct AngleWeights {
-        std::vector<double> even;  // per node, for the harmonics of even m
+        std::vector<double> even;  // [node], for the harmonics of even m
         std::vector<double> odd;
         std::array<std::size_t, 2> neighbours;  // nodes around the angle
 
-        // A spline rings around what begins at the next node but one: what neither neighbour has is not there.
+        // Number of harmonics that a neighbour has. Splines ring: nodes farther away would add others.
         std::size_t harmonics(const std::vector<RadialProfile>& nodes) const
         {
             return std::max(nodes[neighbours[0]].harmonics(), nodes[neighbours[1]].harmonics());
@@ -36,10 +36,10 @@ public:
     };
     virtual AngleWeights angle_weights(double angle_deg) const = 0;
 
-    // The unscattered light, per unit power incident; none where it is part of the profiles.
+    // The unscattered light, per unit incident power; empty if the profiles include it.
     virtual std::vector<BallisticExit> ballistic(double /*angle_deg*/, Side /*side*/) const { return {}; }
 
-    // Throws InvalidArgument for an angle that the source does not reach to.
+    // Throws InvalidArgument for an angle outside the source's range.
     virtual void check_angle(double angle_deg) const = 0;
 
 protected:

@@ -1,5 +1,5 @@
-// Radii between which a profile is a cubic: the edges of the radius bins (transport/tally/bins.h), and finer ones where a
-// profile may have taken in peaks around another place.
+// Radii between which a profile is a cubic: the edges of the radius bins (transport/tally/bins.h), and finer edges for
+// profiles that include peaks of other poles.
 #pragma once
 
 #include <bit>
@@ -11,28 +11,26 @@
 
 namespace beamspread {
 
-// 2^fine_bits edges per octave between these powers of two, mean free paths. Lamps .1 to 1.8 mean free paths above slabs of
-// .3 to 4 with an ior above 1, against 2^7 from -7 on: the worst texel is off by 5e-3 of the brightest; with 2^5 from -1 on
-// by 2.3e-2. With 2^5 from -5 on slabs' images differ as much, 2e-3 to 9e-3, in 1.08 times the time. Up to 2^4 mean free
-// paths changes nothing.
+// Range of the fine edges, as powers of two in mean free paths, and their density, 2^fine_bits per octave. A wider
+// range or more edges: smaller errors around mirror images in slabs, more time.
 inline constexpr int min_fine_exponent = -5;
 inline constexpr int max_fine_exponent = 2;
 inline constexpr int fine_bits = 4;
 inline constexpr double fine_end = 1 << max_fine_exponent;
 
-// The first of the finer edges, their number, and of how many edges of bins they take the place.
+// Index of the first fine edge, number of fine edges, and number of bin edges that they replace.
 inline constexpr std::size_t first_fine_edge = 4 * std::size_t{min_fine_exponent - min_radius_exponent} + 1;
 inline constexpr std::size_t fine_edge_count = std::size_t{max_fine_exponent - min_fine_exponent} << fine_bits;
 inline constexpr std::size_t replaced_edge_count = 4 * std::size_t{max_fine_exponent - min_fine_exponent};
 inline constexpr std::size_t edge_count = radius_bin_count + fine_edge_count - replaced_edge_count;
 
-// Edges of the bins alone, which do for light that is seen around one place, or all.
+// The edges of the bins, enough for light around one pole; or all edges.
 enum class RadialDetail { bins, all };
 
 // Radius of an edge, mean free paths, ascending.
 double radial_edge(std::size_t edge);
 
-// The first edge beyond a radius, or the last of all.
+// Index of the first edge beyond a radius, at most the last.
 inline std::size_t edge_beyond(float radius)
 {
     constexpr int bias = 127;
@@ -46,15 +44,17 @@ inline std::size_t edge_beyond(float radius)
     return first_fine_edge + step - (static_cast<std::uint32_t>(bias + min_fine_exponent) << fine_bits);
 }
 
-// Where profiles of this detail are compared, and their integrals divided, mean free paths, ascending: all their edges, and
-// of bins between the two ends this many steps, without which the worst texel of bench/terms.py uses .90 of what a tolerance
-// of .001 allows, with them .57.
+// Range of radii (mean free paths) in which bins are divided for comparing profiles, and the number of parts. A wider
+// range or more parts: smaller errors, more time.
 inline constexpr double divided_begin = 0.5;
 inline constexpr double divided_end = 4.0;
 inline constexpr int bin_steps = 8;
+
+// Radii (mean free paths, ascending) at which profiles are compared and their integrals divided: the edges of this
+// detail, and `bin_steps` points per bin between `divided_begin` and `divided_end`.
 std::vector<double> profile_radii(RadialDetail detail);
 
-// Whether an edge is one of the bins'.
+// True if an edge is the edge of a bin.
 bool is_bin_edge(std::size_t edge);
 
 }  // namespace beamspread

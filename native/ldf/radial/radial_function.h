@@ -1,4 +1,4 @@
-// What an LDF has to know of itself to be integrated over texels.
+// Interface of a radial function that can be integrated over texels.
 #pragma once
 
 #include <array>
@@ -11,12 +11,11 @@ namespace beamspread {
 
 using Harmonics = std::array<double, harmonic_count>;
 
-// Weights of the harmonics of light so sharp that it needs more than are counted. Cut off, they would ring around rings
-// with a peak, below zero beside it; fading out they do not, and texels finer than the last ones resolve are nearer to the
-// truth.
-inline const Harmonics& fading_harmonics()
+// Weights that taper the highest harmonics (von Hann window) of light that needs more than `harmonic_count`. A sharp
+// cut would ring and make values negative beside a peak.
+inline const Harmonics& harmonic_taper()
 {
-    static const Harmonics fading = [] {
+    static const Harmonics taper = [] {
         constexpr std::size_t half = harmonic_count / 2;
         Harmonics weights;
         weights.fill(1.0);
@@ -24,28 +23,28 @@ inline const Harmonics& fading_harmonics()
             weights[m] = 0.5 + 0.5 * std::cos(pi * static_cast<double>(m - half) / half);
         return weights;
     }();
-    return fading;
+    return taper;
 }
 
-// g(r, phi) = sum over m of c_m(r) cos(m phi), as C_m(r) = integral of c_m(s) s ds from 0 to r. Lengths in mean free
-// paths.
+// The function g(r, phi) = sum over m of c_m(r) cos(m phi), as C_m(r) = integral of c_m(s) s ds from 0 to r. Lengths
+// are in mean free paths.
 class RadialFunction {
 public:
     virtual ~RadialFunction() = default;
 
-    // Leading harmonics in use: c_m is zero from this m on.
+    // Number of harmonics: c_m is zero from this m on.
     virtual std::size_t harmonics() const = 0;
 
     // C_m(r) for every m.
     virtual Harmonics cumulative(double r) const = 0;
 
-    // C_m(infinity) - C_m(r), which stays accurate where next to nothing is left outside r.
+    // C_m(infinity) - C_m(r), accurate even if hardly any light is left outside r.
     virtual Harmonics remaining(double r) const = 0;
 
-    // From this radius on the cumulative functions are constant.
+    // Radius beyond which g is zero.
     virtual double support() const = 0;
 
-    // Radius where c_m may change abruptly; 0: nowhere but at the pole.
+    // Radius of an abrupt change of c_m besides the pole; 0 if there is none.
     virtual double edge() const { return 0.0; }
 
 protected:

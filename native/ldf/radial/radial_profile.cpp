@@ -9,14 +9,13 @@ namespace beamspread {
 
 namespace {
 
-// Weights of the values at five neighbouring knots, from `first` on, in the derivative at one of them: that of the
-// polynomial through them.
+// Weights of the values at five neighbouring knots, from `first`, in the derivative of their polynomial at one of them.
 struct Stencil {
     std::size_t first = 0;
     std::array<double, 5> weight{};
 };
 
-// The edges that the cubics meet at.
+// Edges at which the cubics meet.
 struct Knots {
     std::vector<std::size_t> edge;
     std::vector<Stencil> stencil;
@@ -63,8 +62,8 @@ const Knots& knots(RadialDetail detail)
     return table[static_cast<std::size_t>(detail)];
 }
 
-// The cubic Hermite polynomials, or their derivatives, at t in [0, 1] of a bin of width h: factors of values and
-// slopes at its edges.
+// Factors of the values (v) and slopes (s) at a bin's edges in its cubic Hermite polynomial, or in the derivative, at t
+// in [0, 1] of the bin's width h.
 struct Cubic {
     double v0, v1, s0, s1;
 };
@@ -92,9 +91,9 @@ RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments,
     m_centre = centre;
     const std::vector<std::size_t>& knot = knots(detail).edge;
     m_harmonics = bin_moments.size() / knot.size();
-    // integral of cos^2(m phi) over the circle: 2 pi for m = 0, pi above.
+    // 1 / integral of cos^2(m phi) over the circle, which is 2 pi for m = 0 and pi above.
     const auto norm = [](std::size_t m) { return m == 0 ? inv_pi / 2.0 : inv_pi; };
-    // From outside in, so that what remains far out is not the difference of large sums.
+    // Sum from outside in: the small remainders far out must not be differences of large sums.
     Harmonics sum{};
     for (std::size_t i = knot.size(); i-- > 0;) {
         m_remaining[knot[i]] = sum;
@@ -106,8 +105,8 @@ RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments,
     for (std::size_t i = 0; i + 1 < knot.size(); ++i) {
         const std::size_t k = knot[i];
         m_slope[k] = slope_at(i, detail);
-        // A monotone C_0 keeps the azimuthal mean of g positive: slopes at most three times those of the
-        // chords beside them (Fritsch, Carlson 1980, doi:10.1137/0717021).
+        // Limit the slopes to three times those of the adjacent chords, which makes C_0 monotone and the azimuthal mean
+        // of g positive (Fritsch, Carlson 1980, doi:10.1137/0717021).
         const auto chord = [&](std::size_t end) {
             return end == 0 ? (m_total[0] - m_remaining[0][0]) / radial_edge(0)
                             : (m_remaining[knot[end - 1]][0] - m_remaining[knot[end]][0]) /
@@ -121,7 +120,7 @@ RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments,
     update_support();
 }
 
-// Edges between two knots lie on the knots' cubic.
+// Evaluates the cubic between two knots at the edges between them.
 void RadialProfile::subdivide(std::size_t first, std::size_t last)
 {
     const double start = radial_edge(first);
@@ -139,8 +138,8 @@ void RadialProfile::subdivide(std::size_t first, std::size_t last)
     }
 }
 
-// Far out g falls exponentially, by several times within a bin: the logarithm of what remains of m = 0 and
-// the ratios of the other harmonics to it are what a polynomial follows well.
+// Slopes of C_m at knot i. Far out g falls exponentially, by several times within a bin. A polynomial follows the
+// logarithm of the remaining power of m = 0 well, and the other harmonics' ratios to it.
 Harmonics RadialProfile::slope_at(std::size_t i, RadialDetail detail) const
 {
     const Knots& of = knots(detail);
@@ -148,7 +147,7 @@ Harmonics RadialProfile::slope_at(std::size_t i, RadialDetail detail) const
     Harmonics slope{};
     for (std::size_t j = 0; j < 5; ++j)
         if (m_remaining[of.edge[stencil.first + j]][0] <= 0.0)
-            return slope;  // next to where the counts end, or in the noise that is left of others
+            return slope;  // beside the last bin with light, or noise of subtracted profiles
     const Harmonics& here = m_remaining[of.edge[i]];
     for (std::size_t j = 0; j < 5; ++j) {
         const Harmonics& there = m_remaining[of.edge[stencil.first + j]];
@@ -230,7 +229,7 @@ Harmonics RadialProfile::remaining(double r) const
         return out;
     const std::size_t k = edge_beyond(static_cast<float>(r));
     if (k == 0) {
-        // Single scattering makes g grow like 1/r toward the point of entry.
+        // Inside the first edge C_m is linear: single scattering makes g grow like 1 / r toward the point of entry.
         const double t = std::min(1.0, r / radial_edge(0));
         for (std::size_t m = 0; m < m_harmonics; ++m)
             out[m] = m_total[m] + t * (m_remaining[0][m] - m_total[m]);

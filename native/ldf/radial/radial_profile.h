@@ -9,37 +9,37 @@
 
 namespace beamspread {
 
-// g(r, phi) = sum over m of c_m(r) cos(m phi) around (centre, 0), lengths in mean free paths, kept
-// as C_m(r) = integral of c_m(s) s ds from 0 to r: a piecewise cubic through its values at the edges of the
-// radius bins, whose power therefore is exactly what was counted.
+// g(r, phi) = sum over m of c_m(r) cos(m phi) around (centre, 0), lengths in mean free paths. C_m(r) = integral of
+// c_m(s) s ds from 0 to r is a piecewise cubic through its values at the edges of the radius bins, which keeps the
+// power of each bin exactly.
 class RadialProfile final : public RadialFunction {
 public:
     RadialProfile();
 
-    // From sums of weight * cos(m phi) between the edges of this detail, [harmonic][radius], for as many harmonics as there
-    // are. The cubics meet at these edges.
+    // Makes a profile from sums of weight * cos(m phi) between the edges of this detail, [harmonic][radius]. The cubics
+    // meet at these edges.
     RadialProfile(double centre, std::span<const double> bin_moments, RadialDetail detail);
 
-    // Adds `weight` times another profile, harmonics of even and odd m apart. The centre stays.
+    // Adds a weighted profile, with separate weights for harmonics of even and odd m. Keeps the centre.
     void add(const RadialProfile& other, double even_weight, double odd_weight);
 
-    // The same with a weight for each harmonic.
+    // Adds a profile with a weight for each harmonic. Keeps the centre.
     void add(const RadialProfile& other, const Harmonics& weights);
 
-    // Drops those from this m on.
+    // Drops the harmonics from this m on.
     void keep_harmonics(std::size_t count);
 
-    // Leading harmonics of which none can be dropped without moving more than this power outside r.
+    // Number of leading harmonics that must stay: dropping the others moves at most this power outside r.
     std::size_t harmonics_beyond(double r, double power) const;
 
-    // Drops the trailing harmonics that together move no more than this fraction of the power.
+    // Drops the trailing harmonics that together move at most this fraction of the power.
     void drop_negligible(double fraction);
 
     std::size_t harmonics() const override { return m_harmonics; }
     Harmonics cumulative(double r) const override;
     Harmonics remaining(double r) const override;
 
-    // c_m(r) itself, r > 0.
+    // c_m(r), r > 0.
     Harmonics density(double r) const;
 
     // Total power: 2 pi C_0(infinity).
@@ -47,13 +47,13 @@ public:
 
     double support() const override { return m_support; }
 
-    // The least edge that all but this fraction of the power stays within.
+    // Smallest edge that encloses all but this fraction of the power.
     double reach(double fraction) const;
 
     double centre() const { return m_centre; }
     void set_centre(double centre) { m_centre = centre; }
 
-    // Whether it follows the finer edges.
+    // The edges that the profile follows.
     RadialDetail detail() const { return m_detail; }
 
 private:
@@ -70,8 +70,8 @@ private:
     Harmonics m_total{};
 };
 
-// The same distribution around (centre, 0), as far as harmonics and finer edges there tell: a peak at the old pole is
-// blurred as fading harmonics do.
+// The same distribution around the pole (centre, 0), as exactly as the fine edges and tapered harmonics there resolve
+// it: a peak at the old pole is blurred.
 RadialProfile recentred(const RadialProfile& profile, double centre);
 
 }  // namespace beamspread

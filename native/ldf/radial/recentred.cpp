@@ -11,19 +11,17 @@ namespace beamspread {
 
 namespace {
 
-// Rings around the old pole that cells are cut from, and the size of cells relative to the distance of the poles: below
-// what the finer edges and the last harmonics around the new pole tell apart. A lamp over slabs of .3 to 4 mean free paths,
-// against 32 rings and cells a quarter as large: the worst texel is off by 3e-4 of the brightest, with 8 rings by 2.5e-3, with
-// 4 by 1e-2, in the same time. Half and twice of the others change nothing.
+// The light is divided into rings around the old pole, and these into cells, which the fine edges and the harmonics
+// around the new pole do not resolve. More rings or cells, or smaller cells: smaller errors, more time.
 constexpr int rings_per_octave = 16;
-constexpr double cell_size = 0.01;
-constexpr double least_cells = 16.0;  // of half a ring
-constexpr double most_cells = 256.0;
+constexpr double cell_size = 0.01;  // over the distance of the poles
+constexpr double min_cells = 16.0;  // in half a ring
+constexpr double max_cells = 256.0;
 
-// Sums of weight * cos(m phi) around the new pole, [between edges][harmonic].
+// Sums of weight * cos(m phi) around the new pole, [edge][harmonic]: inside each edge and outside the one before.
 class Moments {
 public:
-    // Light evenly between two radii, at cos(phi).
+    // Adds light that is even between two radii, at one cos(phi).
     void add(double r0, double r1, double cos_phi, double weight)
     {
         std::array<double, harmonic_count> harmonics;
@@ -47,7 +45,7 @@ public:
         std::vector<double> sums;
         for (std::size_t m = 0; m < harmonic_count; ++m)
             for (const auto& between : m_sums)
-                sums.push_back(fading_harmonics()[m] * between[m]);
+                sums.push_back(harmonic_taper()[m] * between[m]);
         return RadialProfile(centre, sums, RadialDetail::all);
     }
 
@@ -55,9 +53,9 @@ private:
     std::vector<std::array<double, harmonic_count>> m_sums{edge_count, std::array<double, harmonic_count>{}};
 };
 
-// A place on a ring around the old pole, seen from the new one.
-struct Place {
-    Place(double shift, double rho, double psi)
+// The point (rho, psi) around the old pole, in coordinates around the new one.
+struct RingPoint {
+    RingPoint(double shift, double rho, double psi)
         : x(shift + rho * std::cos(psi)), y(rho * std::sin(psi)), r(std::hypot(x, y))
     {
     }
@@ -72,7 +70,7 @@ void add_ring(const RadialProfile& profile, double shift, double inner, double o
 {
     const Harmonics from = profile.remaining(inner);
     const Harmonics to = profile.remaining(outer);
-    // Power between the azimuths 0 and psi, and as much on the other side.
+    // Compute the power between the azimuths -psi and psi.
     const auto power_to = [&](double psi) {
         const double twice_cosine = 2.0 * std::cos(psi);
         double previous = 0.0;
@@ -86,19 +84,19 @@ void add_ring(const RadialProfile& profile, double shift, double inner, double o
         }
         return 2.0 * sum;
     };
-    const double wanted = std::ceil(pi * outer / (cell_size * std::abs(shift)));
-    const auto cells = static_cast<int>(std::clamp(wanted, least_cells, most_cells));
-    double before = 0.0;
+    const double cells_of_size = std::ceil(pi * outer / (cell_size * std::abs(shift)));
+    const auto cells = static_cast<int>(std::clamp(cells_of_size, min_cells, max_cells));
+    double power_before = 0.0;
     for (int i = 0; i < cells; ++i) {
         const double psi0 = pi * i / cells;
         const double psi1 = pi * (i + 1) / cells;
-        const double up_to_here = power_to(psi1);
-        const std::array corners = {Place(shift, inner, psi0).r, Place(shift, inner, psi1).r,
-                                    Place(shift, outer, psi0).r, Place(shift, outer, psi1).r};
+        const double power = power_to(psi1);
+        const std::array corners = {RingPoint(shift, inner, psi0).r, RingPoint(shift, inner, psi1).r,
+                                    RingPoint(shift, outer, psi0).r, RingPoint(shift, outer, psi1).r};
         const auto [nearest, farthest] = std::minmax_element(corners.begin(), corners.end());
-        const Place middle(shift, 0.5 * (inner + outer), 0.5 * (psi0 + psi1));
-        moments.add(*nearest, *farthest, middle.cos_phi(), up_to_here - before);
-        before = up_to_here;
+        const RingPoint middle(shift, 0.5 * (inner + outer), 0.5 * (psi0 + psi1));
+        moments.add(*nearest, *farthest, middle.cos_phi(), power - power_before);
+        power_before = power;
     }
 }
 

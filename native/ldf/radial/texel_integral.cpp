@@ -12,9 +12,9 @@ namespace beamspread {
 
 namespace {
 
-// Longest step of asinh(s / distance) along a border: a fifth of the radius, about the width of most
-// radius bins, and half a period of the shortest harmonic, which the rule integrates to 1e-5.
-double longest_step(const RadialFunction& profile)
+// Largest step of asinh(s / distance) along a border: a fifth of the radius, about the width of a radius bin, and half
+// a period of the shortest harmonic, which the Gauss rule integrates to 1e-5.
+double max_border_step(const RadialFunction& profile)
 {
     return std::min(0.2, 3.2 / static_cast<double>(profile.harmonics()));
 }
@@ -51,10 +51,10 @@ struct BorderIntegral {
 enum class Radial { remaining, cumulative };
 
 // Integral over a straight border of F_m(r) (cos, sin)(m phi) d phi. The border runs from s0 to s1 along a unit vector
-// at `distance` (>= 0) from the pole, which lies on its left (sense 1) or right (-1); place(s) gives (x, y).
-template <class Place>
+// at `distance` (>= 0) from the pole, which lies on its left (sense 1) or right (-1); point(s) gives (x, y).
+template <class Point>
 BorderIntegral integrate_piece(const RadialFunction& profile, Radial radial, double distance, double s0, double s1,
-                               double sense, const Place& place)
+                               double sense, const Point& point)
 {
     BorderIntegral sum(profile.harmonics());
     if (distance == 0.0)
@@ -64,10 +64,10 @@ BorderIntegral integrate_piece(const RadialFunction& profile, Radial radial, dou
         return sum;
     const auto add = [&](double s, double r2, double weight) {
         const double r = std::sqrt(r2);
-        const auto [x, y] = place(s);
+        const auto [x, y] = point(s);
         sum.add(radial == Radial::remaining ? profile.remaining(r) : profile.cumulative(r), x / r, y / r, weight);
     };
-    const double max_step = longest_step(profile);
+    const double max_step = max_border_step(profile);
     if (std::abs(s1 - s0) < max_step * nearest) {
         const double half = 0.5 * (s1 - s0);
         for (std::size_t q = 0; q < gauss_node.size(); ++q) {
@@ -77,8 +77,8 @@ BorderIntegral integrate_piece(const RadialFunction& profile, Radial radial, dou
         }
         return sum;
     }
-    // With s = distance sinh(t), r = distance cosh(t) and d phi = dt / cosh(t): as smooth near the foot
-    // of the perpendicular as far from it.
+    // Substitute s = distance sinh(t), r = distance cosh(t), d phi = dt / cosh(t): the integrand is as smooth near the
+    // foot of the perpendicular as far from it.
     const double t0 = std::asinh(s0 / distance);
     const double t1 = std::asinh(s1 / distance);
     const int steps = static_cast<int>(std::ceil(std::abs(t1 - t0) / max_step));
@@ -93,32 +93,32 @@ BorderIntegral integrate_piece(const RadialFunction& profile, Radial radial, dou
     return sum;
 }
 
-// The same, cut where the border crosses the radius at which the profile may change abruptly.
-template <class Place>
+// Integral over a border, divided where it crosses the profile's edge.
+template <class Point>
 BorderIntegral integrate_border(const RadialFunction& profile, Radial radial, double distance, double s0, double s1,
-                                double sense, const Place& place)
+                                double sense, const Point& point)
 {
     if (!(distance < profile.edge()))
-        return integrate_piece(profile, radial, distance, s0, s1, sense, place);
+        return integrate_piece(profile, radial, distance, s0, s1, sense, point);
     const double chord = std::sqrt(profile.edge() * profile.edge() - distance * distance);
     BorderIntegral sum(profile.harmonics());
     double from = s0;
     for (const double to : {std::clamp(-chord, s0, s1), std::clamp(chord, s0, s1), s1}) {
         if (to > from)
-            sum.add(integrate_piece(profile, radial, distance, from, to, sense, place), 1.0);
+            sum.add(integrate_piece(profile, radial, distance, from, to, sense, point), 1.0);
         from = to;
     }
     return sum;
 }
 
-// Along +x at height y, from x0 to x1.
+// Integral over the border along +x at height y, from x0 to x1.
 BorderIntegral horizontal(const RadialFunction& profile, Radial radial, double y, double x0, double x1)
 {
     return integrate_border(profile, radial, std::abs(y), x0, x1, y > 0.0 ? -1.0 : 1.0,
                             [y](double s) { return std::pair(s, y); });
 }
 
-// Along +y at x, from y0 to y1.
+// Integral over the border along +y at x, from y0 to y1.
 BorderIntegral vertical(const RadialFunction& profile, Radial radial, double x, double y0, double y1)
 {
     return integrate_border(profile, radial, std::abs(x), y0, y1, x > 0.0 ? 1.0 : -1.0,
@@ -137,7 +137,7 @@ TexelIntegrals integrate_texels(const RadialFunction& profile, const TexelGrid& 
 {
     const std::size_t texels = grid.width * grid.height;
     TexelIntegrals out(profile.harmonics(), texels);
-    // A border that misses the pole only by rounding goes through it.
+    // Snap borders to the pole that miss it by rounding alone.
     const double rounding = 1e-9 * std::min(grid.pitch_x, grid.pitch_y);
     const auto snapped = [rounding](double x) { return std::abs(x) < rounding ? 0.0 : x; };
     const auto x_at = [&](std::size_t j) { return snapped(grid.x0 + static_cast<double>(j) * grid.pitch_x); };
@@ -151,7 +151,7 @@ TexelIntegrals integrate_texels(const RadialFunction& profile, const TexelGrid& 
         }
     };
 
-    constexpr std::size_t rows_per_block = 16;  // 8 and 32 take as long, within 5 %
+    constexpr std::size_t rows_per_block = 16;  // texel rows per work item; more: fewer borders twice, less to share
     const std::size_t blocks = (grid.height + rows_per_block - 1) / rows_per_block;
     parallel_for(blocks, [&](std::size_t block) {
         const std::size_t first = block * rows_per_block;
@@ -173,7 +173,7 @@ TexelIntegrals integrate_texels(const RadialFunction& profile, const TexelGrid& 
                 const double x1 = x_at(j + 1);
                 const BorderIntegral right = vertical(profile, Radial::remaining, x1, y0, y1);
                 if (x0 <= 0.0 && x1 >= 0.0 && y0 <= 0.0 && y1 >= 0.0) {
-                    // The pole is inside or on the border: what remains outside r does not vanish there.
+                    // The pole is inside the texel or on its border, where the remaining power does not vanish.
                     BorderIntegral sum = horizontal(profile, Radial::cumulative, y0, x0, x1);
                     sum.add(vertical(profile, Radial::cumulative, x1, y0, y1), 1.0);
                     sum.add(horizontal(profile, Radial::cumulative, y1, x0, x1), -1.0);

@@ -19,8 +19,7 @@ struct TexelGrid {
     std::size_t height = 0;
 };
 
-// Integrals over each texel of c_m(r) cos(m phi) and c_m(r) sin(m phi), [m][i][j], for the harmonics that the profile
-// uses.
+// Integrals over each texel of c_m(r) cos(m phi) and c_m(r) sin(m phi), [m][i][j], for the profile's harmonics.
 struct TexelIntegrals {
     std::size_t harmonics = 0;
     std::vector<double> cosine;
@@ -33,14 +32,13 @@ struct TexelIntegrals {
     }
 };
 
-// Throws InvalidArgument for a pitch whose texels double and single precision can't resolve: below 1e-6 mean free paths
-// differences between the borders of a texel lose more than 1e-5 of it, and beyond 1e18 exitance per texel is no normal
-// float.
+// Throws InvalidArgument for a pitch (mean free paths) outside [1e-6, 1e18]. Below, differences between a texel's
+// borders lose more than 1e-5 to rounding; above, a texel's exitance is no normal float.
 void check_pitch(double pitch);
 
-// By Green's theorem the integral over a texel is that of C_m(r) cos(m phi) d phi around its border.
-// Every border is shared by two texels, so the sum over texels telescopes: no energy is lost or
-// doubled for any ratio of mean free path and pitch.
+// Computes the integrals by Green's theorem: the integral of g over a texel is that of C_m(r) cos(m phi) d phi around
+// its border. Two texels share each border, hence the sum over texels telescopes and conserves energy for any ratio of
+// mean free path and pitch.
 TexelIntegrals integrate_texels(const RadialFunction& profile, const TexelGrid& grid);
 
 }  // namespace beamspread

@@ -1,24 +1,23 @@
 // The adaptive method: geometric means in angular space, with weights and heights of Q from the distributions.
 //
-// 1. Means of logarithms. LDFs fall off exponentially, and by powers of the albedo: between samples their logarithm is
-//    what changes evenly. Of noisy images the logarithm is taken from their envelope S; the result is
+// 1. Logarithms. LDFs fall off exponentially and with powers of the albedo, hence their logarithms change evenly
+//    between samples. For noisy images the logarithm is that of their envelope S; the result is
 //        S* sum of w_k image_k / S_k,   log S* = sum of W_k log S_k,
-//    with linear weights w_k, less where image_k is noisier than the others: so texels without light, noise and the
-//    mean over noise stay what they are.
-// 2. Angle. A beam from the other side gives the mirrored LDF, so log g is the sum of a part even in u, which is even
-//    in the angle, and of one odd in u, odd in the angle. With s = tan(theta / 2), interpolating both through the
-//    samples and their mirror images gives  even: linear in s^2;  odd: s times linear in s^2. Why s: reflection goes
-//    like 1 / (mu + mu') in the cosines of incidence and exit (Chandrasekhar 1960, Ch. III), toward the normal
-//    1 / (1 + mu) = (1 + s^2) / 2.
-// 3. Albedo. Every path scatters once, hence log(g / albedo). For a pencil beam that is linear in what light decays
-//    with, the diffusion exponent kappa = sqrt(3 (1 - albedo) (1 - g albedo)): exactly so far out, and near O next to
-//    nothing changes. Deep inside a wide beam exitance goes like the reflectance R: there log(g / albedo) is linear in
-//    log(R / albedo) by van de Hulst's approximation. Near the border of the beam one goes over into the other within
-//    `interior_depth`. Q's height stays out of it: not a unit of length changes but an exponent.
-// 4. Anisotropy. What is far out scales with the transport mean free path (similarity: Wyman, Patterson, Wilson 1989,
-//    doi:10.1364/AO.28.005243): Q stands above O at a height of the root
-//    mean square radius of each sample, that of the result is their geometric mean, and g height^2 is blended, which
-//    keeps the power. log g is linear in log(1 - g). Along the other axes one height does for all, and cancels out.
+//    with linear weights w_k that are reduced for noisy images. This keeps dark texels, noise, and the mean over noise.
+// 2. Angle. A beam from the other side gives the mirrored LDF: log g is the sum of a part that is even in u and in the
+//    angle, and one that is odd in both. In s = tan(theta / 2), the polynomials through the samples and their mirror
+//    images are linear in s^2 for the even part, and s times linear in s^2 for the odd part. The variable s is natural:
+//    reflection is proportional to 1 / (mu + mu') in the cosines of incidence and exit (Chandrasekhar 1960, Ch. III),
+//    toward the normal 1 / (1 + mu) = (1 + s^2) / 2.
+// 3. Albedo. Every path scatters at least once, hence log(g / albedo). For a pencil beam it is linear in the diffusion
+//    exponent kappa = sqrt(3 (1 - albedo) (1 - g albedo)): exactly far out, and near O it hardly changes. Deep inside a
+//    wide beam exitance is proportional to the reflectance R, and log(g / albedo) is linear in log(R / albedo) by van
+//    de Hulst's approximation. Near the beam's border the weights change from one to the other within
+//    `interior_depth`. Q's height plays no part: the albedo changes an exponent and not a unit of length.
+// 4. Anisotropy. Far out, lengths scale with the transport mean free path (similarity: Wyman, Patterson, Wilson 1989,
+//    doi:10.1364/AO.28.005243). The height of Q above O is therefore the root mean square radius of each sample, and
+//    their geometric mean for the result; g height^2 is blended, which keeps the power. log g is linear in log(1 - g).
+//    Along the other axes all samples have one height, which cancels.
 #include "ldf/samples/interpolate.h"
 
 #include <algorithm>
@@ -34,8 +33,8 @@ namespace beamspread {
 
 namespace {
 
-// Where samples don't say their anisotropy: that of most translucent materials.
-constexpr double usual_g = 0.8;
+// Anisotropy of samples without g: a common value of translucent materials.
+constexpr double default_g = 0.8;
 
 double half_angle_tangent(double angle_deg)
 {
@@ -47,34 +46,32 @@ double diffusion_exponent(double albedo, double g)
     return std::sqrt(3.0 * (1.0 - albedo) * (1.0 - g * albedo));
 }
 
-// Place of f(x) between its values at the ends of a bracket.
+// Weight of the upper end of a bracket, linear in f(x).
 template <class Function>
-double place_between(const Bracket& axis, double x, const Function& f)
+double weight_between(const Bracket& axis, double x, const Function& f)
 {
     return axis.lower == axis.upper ? 0.0 : (f(x) - f(axis.lower)) / (f(axis.upper) - f(axis.lower));
 }
 
-// Logarithm of a half-space's reflectance over the albedo (van de Hulst 1980, Sec. 11.1.3: spherical albedo).
+// Logarithm of a half-space's reflectance over the albedo: spherical albedo (van de Hulst 1980, Sec. 11.1.3).
 double log_reflectance_per_scattering(double albedo, double g)
 {
     const double s = std::sqrt((1.0 - albedo) / (1.0 - g * albedo));
     return std::log((1.0 - s) * (1.0 - 0.139 * s) / ((1.0 + 1.17 * s) * albedo));
 }
 
-// Mean free paths: measured at the centres of disks of 0.01 to 200 mean free paths for g of .5, .8 and .9. Half and twice as
-// much move errors of interpolation of 3.7 % to 3.6 and 3.8 %, for albedos far apart.
+// Distance in mean free paths from the beam's border at which its interior counts as wide. Larger: a wider transition.
 constexpr double interior_depth = 6.0;
 
-// Relative variance of noise that does not yet make a sample count for less: a tenth, squared, at which
-// logarithms are off by .5 % (envelope.cpp).
+// Relative variance of noise below which all samples count alike: that of `max_noise` in envelope.cpp. Larger: noisy
+// samples count more.
 constexpr double tolerated_variance = 0.01;
 
-// How far the inside of the beam decides what leaves at a distance r from O: the share of the beam in what falls off
-// exponentially around there, 0 far from any light, 1 deep inside.
+// Fraction of a beam of this radius in an exponential neighbourhood of a point at distance r from O: 0 far from any
+// light, 1 deep inside.
 double interior(double r, double radius)
 {
-    // Against 128, the worst texel differs by 2e-5 of the peak, with 32 by 5e-5; in .6 and .35 of the time.
-    constexpr int directions = 64;
+    constexpr int directions = 64;  // more: smaller errors, more time
     double sum = 0.0;
     for (int i = 0; i < directions; ++i) {
         const double phi = (i + 0.5) * pi / directions;  // from the direction away from O
@@ -90,14 +87,14 @@ double interior(double r, double radius)
     return sum / directions;
 }
 
-// For each texel the weight of the samples of the upper albedo.
+// Weight of the samples of the upper albedo, for each texel.
 std::vector<double> albedo_weights(const Bracket& axis, double albedo, double g, const LdfSample& like)
 {
-    // A black sample says nothing of the shape: then g / albedo is the other one's.
+    // A black sample has no shape: take g / albedo of the other one.
     if (axis.lower == 0.0 && axis.upper > 0.0)
         return std::vector<double>(like.image.size(), 1.0);
-    const double outside = place_between(axis, albedo, [g](double a) { return diffusion_exponent(a, g); });
-    const double inside = place_between(axis, albedo, [g](double a) { return log_reflectance_per_scattering(a, g); });
+    const double outside = weight_between(axis, albedo, [g](double a) { return diffusion_exponent(a, g); });
+    const double inside = weight_between(axis, albedo, [g](double a) { return log_reflectance_per_scattering(a, g); });
     std::vector<double> weights;
     weights.reserve(like.image.size());
     for (std::size_t y = 0; y < like.height; ++y)
@@ -108,22 +105,22 @@ std::vector<double> albedo_weights(const Bracket& axis, double albedo, double g,
     return weights;
 }
 
-// Weights of the samples at the lower and upper angle in the parts even and odd in u.
-struct AngleWeights {
+// Weights of the samples at the lower and upper angle, in the parts even and odd in u.
+struct ParityWeights {
     std::array<double, 2> even;
     std::array<double, 2> odd;
 };
 
-AngleWeights angle_weights(const Bracket& axis, double angle_deg)
+ParityWeights angle_weights(const Bracket& axis, double angle_deg)
 {
     const double s = half_angle_tangent(angle_deg);
     const double w =
-        place_between(axis, angle_deg, [](double angle) { return std::pow(half_angle_tangent(angle), 2); });
+        weight_between(axis, angle_deg, [](double angle) { return std::pow(half_angle_tangent(angle), 2); });
     const double lower = half_angle_tangent(axis.lower);
     const double upper = half_angle_tangent(axis.upper);
     if (upper == 0.0)
         return {{1.0, 0.0}, {0.0, 0.0}};
-    // At normal incidence what is odd is noise: then odd / s is that of the upper sample.
+    // At normal incidence the odd part is noise: take odd / s of the upper sample.
     if (lower == 0.0)
         return {{1.0 - w, w}, {0.0, s / upper}};
     return {{1.0 - w, w}, {(1.0 - w) * s / lower, w * s / upper}};
@@ -143,16 +140,16 @@ double rms_radius(const LdfSample& sample)
     return power > 0.0 ? std::sqrt(moment / power) : sample.pitch;
 }
 
-// The sample as it looks with Q at `height` instead of `own_height`: g height^2 stays at its place of angular space.
-LdfSample at_height(const LdfSample& sample, double own_height, double height)
+// The sample scaled from height `from_height` of Q to `to_height`: g height^2 stays the same in each direction.
+LdfSample at_height(const LdfSample& sample, double from_height, double to_height)
 {
     LdfSample result = sample;
-    if (own_height == height)
+    if (from_height == to_height)
         return result;
     const Vec2 origin(0.0, 0.0);
-    const AngularSpace from(origin, origin, own_height);
-    const AngularSpace to(origin, origin, height);
-    const double scale = (own_height / height) * (own_height / height);
+    const AngularSpace from(origin, origin, from_height);
+    const AngularSpace to(origin, origin, to_height);
+    const double scale = (from_height / to_height) * (from_height / to_height);
     for (std::size_t y = 0; y < result.height; ++y)
         for (std::size_t x = 0; x < result.width; ++x)
             result.image[y * result.width + x] = static_cast<float>(
@@ -160,15 +157,15 @@ LdfSample at_height(const LdfSample& sample, double own_height, double height)
     return result;
 }
 
-// log S* and the sum of w_k image_k / S_k, with that of w_k.
+// Sums over the samples k at each texel.
 struct Blend {
-    std::vector<double> logarithm;
-    std::vector<double> ratio;
-    // By a factor of e beyond what the samples have: it meets garbage alone, half and twice as much change nothing.
+    // Allowed extrapolation of log S* beyond the samples' range. Larger: noise far from light may be amplified.
     static constexpr double slack = 1.0;
 
-    std::vector<double> weight;
-    std::vector<double> lowest;  // log S_k there and at the mirrored place
+    std::vector<double> logarithm;  // log S*
+    std::vector<double> ratio;  // sum of w_k image_k / S_k
+    std::vector<double> weight;  // sum of w_k
+    std::vector<double> lowest;  // range of log S_k here and at the mirrored texel
     std::vector<double> highest;
 
     explicit Blend(std::size_t texels)
@@ -182,12 +179,13 @@ struct Blend {
 
     double mean(std::size_t texel) const
     {
-        // The odd part extrapolates, which must not blow up the noise that is in it.
+        // Clamp the extrapolation of the odd part, which would amplify its noise.
         return std::exp(std::clamp(logarithm[texel], lowest[texel] - slack, highest[texel] + slack)) * ratio[texel] /
                weight[texel];
     }
 
-    // W_k for the parts even and odd in u is `even` and `odd` times the texel's weight of the sample's albedo.
+    // Adds a sample with w_k = `linear` and W_k = `even` and `odd`, for the parts even and odd in u, times the texel's
+    // weight of the sample's albedo.
     void add(const LdfSample& sample, double linear, double even, double odd, const std::vector<double>& by_albedo,
              bool upper_albedo)
     {
@@ -204,7 +202,7 @@ struct Blend {
                     lowest[row + x] = std::min({lowest[row + x], here, mirrored});
                     highest[row + x] = std::max({highest[row + x], here, mirrored});
                 }
-                // Undershoots are small, but not beside an envelope that is smaller still.
+                // Clamp undershoots, which may be large beside the envelope.
                 const double exitance = std::max(0.0, static_cast<double>(sample.image[row + x]));
                 const double w = linear / (tolerated_variance + variance[row + x]);
                 ratio[row + x] += w * exitance / smooth[row + x];
@@ -219,10 +217,10 @@ struct Blend {
 std::vector<float> adaptive_image(const SampleCell& cell, double angle_deg, double albedo, std::optional<double> g)
 {
     const LdfSample& first = *cell.corners[0][0][0];
-    const double medium_g = g.value_or(first.g.value_or(usual_g));
-    const AngleWeights by_angle = angle_weights(cell.angle, angle_deg);
+    const double medium_g = g.value_or(first.g.value_or(default_g));
+    const ParityWeights by_angle = angle_weights(cell.angle, angle_deg);
     const std::vector<double> by_albedo = albedo_weights(cell.albedo, albedo, medium_g, first);
-    const double by_g = place_between(cell.g, medium_g, [](double x) { return std::log(1.0 - x); });
+    const double by_g = weight_between(cell.g, medium_g, [](double x) { return std::log(1.0 - x); });
     const std::array<double, 2> g_weights{1.0 - by_g, by_g};
 
     Blend blend(first.image.size());

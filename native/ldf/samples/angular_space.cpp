@@ -13,25 +13,24 @@ namespace beamspread {
 
 namespace {
 
-// In heights. Farther out psi is pi/2 in double precision, which is no place any more.
-constexpr double farthest = 1e15;
+// Largest distance from H, in heights. Farther out psi rounds to pi/2.
+constexpr double max_distance = 1e15;
 
-// Measured on 36 disks of .5 to 15 mean free paths at 30 to 60 degrees, 96 x 96 texels with the noise of 1e4, 1e5 and 1e6
-// photons per square mean free path: the point is off by .33, .08 and .11 diameters (root mean square).
-//
-// Of the peak: a fifth of what its top spans. Half: .34, .16, .11; twice: .20, .11, .07.
-constexpr double allowed_noise = 0.01;
-// .9: .34, .07, .06; .975: .32, .10, .07
+// Root mean square of the noise that smoothing leaves, over the peak. Larger: less smoothing, a noisier point.
+constexpr double max_noise = 0.01;
+
+// Value of texels that belong to the top, over the peak. Larger: a smaller top, more noise, less bias.
 constexpr double top_fraction = 0.95;
-// Texels across the top. Half: .32, .08, .08; twice: .34, .08, .11.
-constexpr double resolved = 4.0;
+
+// Texels across the top from which it counts as resolved. Larger: more peaks beside O count as a pencil beam's.
+constexpr double min_top_width = 4.0;
 
 struct Parts {
     std::vector<double> even;
     std::vector<double> odd;
 };
 
-// Even and odd in v.
+// Parts of the image that are even and odd in v.
 Parts split(const LdfSample& sample)
 {
     Parts parts{std::vector<double>(sample.image.size()), std::vector<double>(sample.image.size())};
@@ -70,31 +69,31 @@ std::size_t brightest_texel(const std::vector<double>& values)
 std::vector<double> denoised(const LdfSample& sample)
 {
     const Parts parts = split(sample);
-    const double coarsest = static_cast<double>(std::min(sample.width, sample.height)) / 8.0;
+    const double max_sigma = static_cast<double>(std::min(sample.width, sample.height)) / 8.0;
     std::vector<double> values = parts.even;
     for (double sigma = 1.0;; sigma *= 2.0) {
         const std::size_t peak = brightest_texel(values);
         const auto reach = static_cast<std::size_t>(std::max(8.0, 2.0 * sigma));
         const std::vector<double> noise =
             sigma > 1.0 ? blur(parts.odd, sample.width, sample.height, 0.5 * sigma) : parts.odd;
-        if (rms_around(noise, sample, peak, reach) <= allowed_noise * values[peak] || sigma > coarsest)
+        if (rms_around(noise, sample, peak, reach) <= max_noise * values[peak] || sigma > max_sigma)
             return values;
         values = blur(parts.even, sample.width, sample.height, sigma);
     }
 }
 
-// Texels connected with the brightest one that are nearly as bright.
+// Texels of the peak's top: those connected with the brightest one that reach `top_fraction` of it.
 std::vector<std::size_t> top_of(const std::vector<double>& values, const LdfSample& sample)
 {
     std::vector<std::size_t> top{brightest_texel(values)};
-    const double least = top_fraction * values[top.front()];
+    const double threshold = top_fraction * values[top.front()];
     std::vector<bool> seen(values.size(), false);
     seen[top.front()] = true;
     for (std::size_t k = 0; k < top.size(); ++k) {
         const std::size_t x = top[k] % sample.width;
         const std::size_t y = top[k] / sample.width;
         const auto visit = [&](bool exists, std::size_t texel) {
-            if (exists && !seen[texel] && values[texel] >= least) {
+            if (exists && !seen[texel] && values[texel] >= threshold) {
                 seen[texel] = true;
                 top.push_back(texel);
             }
@@ -107,8 +106,8 @@ std::vector<std::size_t> top_of(const std::vector<double>& values, const LdfSamp
     return top;
 }
 
-// Least squares for value = a + b u + c (u^2 + v^2): u of the vertex, or the middle of the top where that isn't convex.
-// Lengths in texels from `middle`, which keeps the sums well conditioned.
+// u of the vertex of value = a + b u + c (u^2 + v^2), fitted by least squares; `middle` if the fit has no maximum.
+// Lengths are in texels; the sums are around `middle`, which keeps them well conditioned.
 double vertex(const std::vector<double>& values, const std::vector<std::size_t>& top, const LdfSample& sample,
               double middle)
 {
@@ -119,7 +118,7 @@ double vertex(const std::vector<double>& values, const std::vector<std::size_t>&
         const glm::dvec4 terms(1.0, u, u * u + v * v, values[texel]);
         sums += glm::outerProduct(terms, terms);
     }
-    // The normal equations without their constant term.
+    // Compute the normal equations without the constant term.
     const auto moment = [&](int i, int j) { return sums[i][j] - sums[0][i] * sums[0][j] / sums[0][0]; };
     const double uu = moment(1, 1);
     const double uq = moment(1, 2);
@@ -149,14 +148,14 @@ AngularSpace::AngularSpace(const Vec2& origin, const Vec2& brightest, double hei
         reject("height", height, "height > 0");
 }
 
-AngularCoordinates AngularSpace::to_angular(const Vec2& place) const
+AngularCoordinates AngularSpace::to_angular(const Vec2& point) const
 {
-    const Vec2 offset = place - m_brightest;
-    if (const double distance = std::hypot(offset.x, offset.y); !(distance <= farthest * m_height))
-        reject("u, v", distance, "places within 1e15 heights of the brightest point");
+    const Vec2 offset = point - m_brightest;
+    if (const double distance = std::hypot(offset.x, offset.y); !(distance <= max_distance * m_height))
+        reject("u, v", distance, "points within 1e15 heights of the brightest point");
     const double phi = std::atan2(offset.y, offset.x);
     const double positive = phi < 0.0 ? phi + 2.0 * pi : phi;
-    // A negative angle next to 0 is rounded to 2 pi.
+    // Rounding can turn a negative angle next to 0 into 2 pi.
     return {positive < 2.0 * pi ? positive : 0.0, std::atan2(std::hypot(offset.x, offset.y), m_height)};
 }
 
@@ -184,7 +183,7 @@ Vec2 brightest_point(const LdfSample& sample)
         last = std::max(last, u);
     }
     const double middle = 0.5 * (first + last);
-    if (last - first + 1.0 < resolved)
+    if (last - first + 1.0 < min_top_width)
         return Vec2(std::abs(middle) <= 1.0 ? 0.0 : middle * sample.pitch, 0.0);
     return Vec2(std::clamp(vertex(values, top, sample, middle), first, last) * sample.pitch, 0.0);
 }

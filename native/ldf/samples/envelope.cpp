@@ -18,7 +18,7 @@ std::vector<double> gaussian(double sigma)
     return weights;
 }
 
-// Along `count` values, `stride` apart; what lies outside has no weight.
+// Blurs `count` values that are `stride` apart. Values outside have no weight.
 void blur_line(const double* from, double* to, std::size_t count, std::size_t stride,
                const std::vector<double>& weights)
 {
@@ -35,31 +35,27 @@ void blur_line(const double* from, double* to, std::size_t count, std::size_t st
     }
 }
 
-// Measured by the errors of `adaptive`, summed over 96 x 96 texels with the noise of 1e4, 1e5 and 1e6 photons per square
-// mean free path, between angles 40 to 60 degrees apart and albedos of .6 and .9 to .95: .88, .33 and .11.
-//
-// Bias of the logarithm: half of its square. Half: .90, .35, .11; twice: .85, .32, .10.
-constexpr double allowed_noise = 0.1;
+// Relative noise that averages may have. The bias of the logarithm is half of its square. Larger: less blur, more bias.
+constexpr double max_noise = 0.1;
 
-// Of the radial means, for which texels far apart are joined. Half: 1.25 with the fewest photons, else the same; twice: .87.
-constexpr double allowed_ring_noise = 0.3;
+// Relative noise of the means over rings. Larger: narrower rings, noisier means.
+constexpr double max_ring_noise = 0.3;
 
-// The noise itself is estimated over some neighbours. Half: the same; twice: .85 with the fewest photons, else the same, in
-// 1.14 times the time.
+// Standard deviation, in texels, of the blur that estimates the noise. Larger: a more reliable estimate, more time.
 constexpr double noise_sigma = 3.0;
 
-// Relative variance where too little light was seen to tell: 1e3 to 1e9 give the same within .1 %.
-constexpr double unknown = 1e6;
+// Relative variance of texels with too little light for an estimate.
+constexpr double unknown_variance = 1e6;
 
-// Black to any purpose; logarithms stay finite.
+// Smallest exitance, which keeps logarithms finite.
 constexpr double black = 1e-300;
 
-bool is_clear(double mean, double variance, double allowed = allowed_noise)
+bool is_clear(double mean, double variance, double allowed = max_noise)
 {
     return mean > black && variance <= allowed * allowed * mean * mean;
 }
 
-// Variance of each texel's noise.
+// Estimate of the noise's variance in each texel, from its mirror image in v.
 std::vector<double> noise_of(const LdfSample& sample)
 {
     std::vector<double> variance(sample.image.size());
@@ -75,7 +71,7 @@ std::vector<double> noise_of(const LdfSample& sample)
 
 struct Ring {
     double count = 0.0;
-    double radius = 0.0;  // sums over its texels, then means
+    double radius = 0.0;  // radius, value and variance: sums over the texels, then means
     double value = 0.0;
     double variance = 0.0;
 
@@ -93,7 +89,7 @@ Ring mean_of(const Ring& sums)
     return {1.0, sums.radius / sums.count, sums.value / sums.count, 0.0};
 }
 
-// Rings around O of a texel's width, joined where they are too noisy alone; radii and means ascending from O.
+// Rings around O, a texel wide or joined until their noise is small enough; ascending from O.
 std::vector<Ring> rings_of(const LdfSample& sample, const std::vector<double>& variance)
 {
     std::vector<Ring> narrow(sample.width + sample.height);
@@ -108,7 +104,7 @@ std::vector<Ring> rings_of(const LdfSample& sample, const std::vector<double>& v
     Ring joined;
     for (const Ring& ring : narrow) {
         joined.add(ring);
-        if (is_clear(joined.value, joined.variance, allowed_ring_noise)) {
+        if (is_clear(joined.value, joined.variance, max_ring_noise)) {
             rings.push_back(mean_of(joined));
             joined = Ring();
         }
@@ -116,8 +112,8 @@ std::vector<Ring> rings_of(const LdfSample& sample, const std::vector<double>& v
     return rings;
 }
 
-// Mean over rings around O at every texel: exponential between the rings, and beyond the last one, where it declines at
-// least as fast as on the whole.
+// Mean over rings around O, at every texel: exponential between the rings, and beyond the last one, where it declines
+// at least as fast as from the first to the last.
 std::vector<double> ring_means(const LdfSample& sample, const std::vector<double>& variance)
 {
     const std::vector<Ring> rings = rings_of(sample, variance);
@@ -167,7 +163,7 @@ std::vector<double> blur(const std::vector<double>& values, std::size_t width, s
 Envelope envelope(const LdfSample& sample)
 {
     const std::vector<double> image(sample.image.begin(), sample.image.end());
-    Envelope result{image, std::vector<double>(image.size(), unknown)};
+    Envelope result{image, std::vector<double>(image.size(), unknown_variance)};
     const std::vector<double> variance = noise_of(sample);
     std::vector<double> noise = blur(variance, sample.width, sample.height, noise_sigma);
     std::vector<std::size_t> open;  // texels that are not clear yet
@@ -181,13 +177,13 @@ Envelope envelope(const LdfSample& sample)
         return result;
 
     const std::vector<double> means = ring_means(sample, variance);
-    const double coarsest = static_cast<double>(std::min(sample.width, sample.height)) / 8.0;
+    const double max_sigma = static_cast<double>(std::min(sample.width, sample.height)) / 8.0;
     double sigma = 1.0;
-    while (sigma <= coarsest && !open.empty()) {
+    while (sigma <= max_sigma && !open.empty()) {
         const std::vector<double> blurred = blur(image, sample.width, sample.height, sigma);
         const std::vector<double> blurred_means = blur(means, sample.width, sample.height, sigma);
         noise = blur(variance, sample.width, sample.height, std::max(noise_sigma, sigma));
-        const double texels = 4.0 * pi * sigma * sigma;  // that count in an average
+        const double texels = 4.0 * pi * sigma * sigma;  // effective number in an average
         std::erase_if(open, [&](std::size_t i) {
             const bool clear = is_clear(blurred[i], noise[i] / texels);
             if (clear) {

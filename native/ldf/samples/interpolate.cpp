@@ -10,7 +10,7 @@ namespace beamspread {
 
 namespace {
 
-// The paper's height: 100 units over a window of 150.
+// Default height of Q over the image's width, as in Manabe et al. 2012: 100 units over a window of 150.
 constexpr double height_per_width = 2.0 / 3.0;
 
 struct WeightedSample {
@@ -68,7 +68,7 @@ LdfSample interpolate(const std::vector<const LdfSample*>& samples, double angle
                       std::optional<double> g, Interpolation method, std::optional<double> height)
 {
     if (height && method != Interpolation::angular)
-        reject("height", *height, "None, but for method 'angular'");
+        reject("height", *height, "None, except for method 'angular'");
     if (height && !(*height > 0.0 && std::isfinite(*height)))
         reject("height", *height, "height > 0 mean free paths");
     const SampleGrid grid(samples);

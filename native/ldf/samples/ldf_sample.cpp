@@ -12,8 +12,8 @@ namespace beamspread {
 
 namespace {
 
-// Of the brightest texel: filters that sharpen undershoot steps by 9 % (Gibbs); more is no rounding of an exitance.
-constexpr double allowed_undershoot = 0.1;
+// Largest undershoot over the brightest texel. Sharpening filters undershoot steps by 9 % (Gibbs).
+constexpr double max_undershoot = 0.1;
 
 void check_image(const LdfSample& sample)
 {
@@ -29,7 +29,7 @@ void check_image(const LdfSample& sample)
         darkest = std::min(darkest, value);
         brightest = std::max(brightest, value);
     }
-    if (darkest < -allowed_undershoot * brightest)
+    if (darkest < -max_undershoot * brightest)
         reject("image", "with a texel of " + std::to_string(darkest),
                "exitance >= 0, or undershoots of up to 10 % of the brightest texel");
 }
@@ -43,9 +43,9 @@ struct Neighbours {
 Neighbours neighbours(double x, double pitch, std::size_t count)
 {
     const auto last = static_cast<double>(count - 1);
-    const double place = std::clamp(x / pitch + 0.5 * last, 0.0, last);
-    const auto lower = static_cast<std::size_t>(place);
-    return {lower, std::min(lower + 1, count - 1), place - std::floor(place)};
+    const double position = std::clamp(x / pitch + 0.5 * last, 0.0, last);
+    const auto lower = static_cast<std::size_t>(position);
+    return {lower, std::min(lower + 1, count - 1), position - std::floor(position)};
 }
 
 }  // namespace
@@ -55,10 +55,10 @@ double LdfSample::power() const
     return std::accumulate(image.begin(), image.end(), 0.0) * pitch * pitch;
 }
 
-double exitance_at(const LdfSample& sample, const Vec2& place)
+double exitance_at(const LdfSample& sample, const Vec2& point)
 {
-    const Neighbours x = neighbours(place.x, sample.pitch, sample.width);
-    const Neighbours y = neighbours(place.y, sample.pitch, sample.height);
+    const Neighbours x = neighbours(point.x, sample.pitch, sample.width);
+    const Neighbours y = neighbours(point.y, sample.pitch, sample.height);
     const auto along_u = [&](std::size_t row) {
         return (1.0 - x.weight) * static_cast<double>(sample.at(row, x.lower)) +
                x.weight * static_cast<double>(sample.at(row, x.upper));

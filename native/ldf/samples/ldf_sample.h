@@ -1,4 +1,4 @@
-// One LDF as an image: from a library, from our files or another simulator's.
+// One LDF as an image, from a library or from the file of another simulator.
 #pragma once
 
 #include <cstddef>
@@ -12,16 +12,16 @@ namespace beamspread {
 
 inline constexpr std::size_t max_sample_side = 16384;
 
-// Lengths in mean free paths. The beam travels toward +u; O, where its axis enters, is the centre of the image.
+// Lengths are in mean free paths. The beam travels toward +u; O, where its axis enters, is the centre of the image.
 struct LdfSample {
     std::size_t width = 0;
     std::size_t height = 0;
     std::vector<float> image;  // mean exitance of each texel per unit incident power, 1/mfp^2; rows v upward, columns u
     double pitch = 1.0;  // side of a texel
     double angle_deg = 0.0;  // of incidence
-    double albedo = 0.0;
+    double albedo = 0.0;  // of single scattering
     double beam_diameter = 0.0;  // of the disk that the beam lights on the surface; 0: a pencil beam
-    std::optional<double> g;  // anisotropy of the medium, where known
+    std::optional<double> g;  // anisotropy of the medium, if known
 
     float at(std::size_t y, std::size_t x) const { return image[y * width + x]; }
 
@@ -33,15 +33,15 @@ struct LdfSample {
     double power() const;
 };
 
-// Exitance between the centres of texels, bilinear; outside of them the value at the border: an LDF does not end with its
+// Exitance at a point (u, v): bilinear between the centres of texels, constant outside, as an LDF does not end with its
 // image.
-double exitance_at(const LdfSample& sample, const Vec2& place);
+double exitance_at(const LdfSample& sample, const Vec2& point);
 
-// Throws InvalidArgument. Exitance is finite and not negative, but for undershoots of up to 10 % of the brightest
-// texel: few harmonics (ldf_image.h) and denoised simulations have them. Its integral lies in [0, 1.05].
+// Throws InvalidArgument unless the exitance is finite and not negative. Undershoots of up to 10 % of the brightest
+// texel are allowed: truncated harmonics (ldf_image.h) and denoised simulations have them.
 void validate(const LdfSample& sample);
 
-// One-part OpenEXR file; see sample_file.cpp for the layout. Throw IoError.
+// Write and read a one-part OpenEXR file; sample_file.cpp describes the layout. Throw IoError.
 void save_sample(const LdfSample& sample, const std::filesystem::path& path);
 LdfSample load_sample(const std::filesystem::path& path);
 

@@ -11,7 +11,7 @@ namespace beamspread {
 
 namespace {
 
-// Values that differ only by the rounding of a file's single precision are the same.
+// True if two values differ at most by the rounding of a file's single precision.
 bool same(double a, double b)
 {
     return std::abs(a - b) <= 1e-6 * std::max({1.0, std::abs(a), std::abs(b)});
@@ -28,7 +28,7 @@ std::vector<double> axis(const std::vector<const LdfSample*>& samples, const Val
     return values;
 }
 
-std::string place(double angle_deg, double albedo, std::optional<double> g)
+std::string description(double angle_deg, double albedo, std::optional<double> g)
 {
     std::ostringstream text;
     text << "angle " << angle_deg << ", albedo " << albedo;
@@ -57,7 +57,7 @@ Bracket bracket(const std::string& name, const std::vector<double>& values, doub
 {
     if (!(x >= values.front() || same(x, values.front())) || !(x <= values.back() || same(x, values.back()))) {
         std::ostringstream span;
-        span << values.front() << " <= " << name << " <= " << values.back() << ", what the samples span";
+        span << values.front() << " <= " << name << " <= " << values.back() << ", the span of the samples";
         reject(name, x, span.str());
     }
     for (const double value : values)
@@ -88,7 +88,7 @@ SampleGrid::SampleGrid(std::vector<const LdfSample*> samples) : m_samples(std::m
         for (const double albedo : m_albedos)
             for (const std::optional<double> g : gs)
                 if (!find(angle, albedo, g))
-                    reject("samples", "without one at " + place(angle, albedo, g),
+                    reject("samples", "without one at " + description(angle, albedo, g),
                            "a regular grid: each angle with each albedo, and each g where there are several");
     if (m_samples.size() != m_angles.size() * m_albedos.size() * gs.size())
         reject("samples", "with two of the same angle, albedo and g", "one sample per corner of the grid");
@@ -96,10 +96,10 @@ SampleGrid::SampleGrid(std::vector<const LdfSample*> samples) : m_samples(std::m
 
 const LdfSample* SampleGrid::find(double angle_deg, double albedo, std::optional<double> g) const
 {
-    const auto found = std::find_if(m_samples.begin(), m_samples.end(), [&](const LdfSample* s) {
+    const auto match = std::find_if(m_samples.begin(), m_samples.end(), [&](const LdfSample* s) {
         return same(s->angle_deg, angle_deg) && same(s->albedo, albedo) && (!g || same(*s->g, *g));
     });
-    return found == m_samples.end() ? nullptr : *found;
+    return match == m_samples.end() ? nullptr : *match;
 }
 
 SampleCell SampleGrid::cell(double angle_deg, double albedo, std::optional<double> g) const
@@ -108,10 +108,10 @@ SampleCell SampleGrid::cell(double angle_deg, double albedo, std::optional<doubl
     cell.angle = bracket("angle", m_angles, angle_deg);
     cell.albedo = bracket("albedo", m_albedos, albedo);
     if (m_gs.empty() && g)
-        reject("g", *g, "None: the samples don't say theirs");
+        reject("g", *g, "None, as the samples have no g");
     if (m_gs.size() > 1 && !g) {
         std::ostringstream span;
-        span << m_gs.front() << " <= g <= " << m_gs.back() << ", what the samples span";
+        span << m_gs.front() << " <= g <= " << m_gs.back() << ", the span of the samples";
         reject("g", "None", span.str());
     }
     if (!m_gs.empty())

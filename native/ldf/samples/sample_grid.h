@@ -9,32 +9,32 @@
 
 namespace beamspread {
 
-// The two values of an axis around the one that is asked for, and its place between them.
+// The two values of an axis around a requested one.
 struct Bracket {
     double lower = 0.0;
-    double upper = 0.0;  // equal: the axis has that one value here
-    double weight = 0.0;  // of the upper one, linear
+    double upper = 0.0;   // equal to `lower` if the axis has the requested value
+    double weight = 0.0;  // linear weight of the upper value
 
     double weight_of(std::size_t i) const { return i ? weight : 1.0 - weight; }
 };
 
-// The cell of the grid that holds what is asked for.
+// The cell of the grid around a requested angle, albedo and g.
 struct SampleCell {
     Bracket angle;   // degrees
     Bracket albedo;
-    Bracket g;  // both unknown where the samples don't say
-    // [angle][albedo][g], 0: lower, 1: upper; the same sample twice where an axis has one value.
+    Bracket g;  // zeros if the samples' g is unknown
+    // [angle][albedo][g], 0: lower, 1: upper; the same sample twice if `lower` equals `upper`.
     std::array<std::array<std::array<const LdfSample*, 2>, 2>, 2> corners{};
 };
 
 class SampleGrid {
 public:
-    // In any order, one per corner of the grid, all with the same texels and beam; pointers stay with the caller.
-    // Throws InvalidArgument.
+    // Takes one sample per corner of the grid, in any order, all with the same texels and beam diameter. The caller
+    // owns the samples. Throws InvalidArgument.
     explicit SampleGrid(std::vector<const LdfSample*> samples);
 
-    // Throws InvalidArgument, naming the span, for what lies outside of it. Without g, that of the samples, if it is
-    // one.
+    // The cell around a request; without g, all samples must have the same. Throws InvalidArgument, naming the samples'
+    // span, for requests outside.
     SampleCell cell(double angle_deg, double albedo, std::optional<double> g) const;
 
     const LdfSample& first() const { return *m_samples.front(); }
@@ -45,7 +45,7 @@ private:
     std::vector<const LdfSample*> m_samples;
     std::vector<double> m_angles;  // ascending
     std::vector<double> m_albedos;
-    std::vector<double> m_gs;  // empty: unknown
+    std::vector<double> m_gs;  // empty if unknown
 };
 
 }  // namespace beamspread

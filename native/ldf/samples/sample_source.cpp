@@ -14,23 +14,20 @@ namespace beamspread {
 
 namespace {
 
-// Between directions for which the samples are interpolated once; in between, their moments are. For a lamp over samples at
-// 0, 30 and 60 degrees the sum is off by 4e-5 and the worst texel by 9e-4 of the brightest; 2.5 degrees: 9e-6, 2e-4 and 1.4
-// times as long; 10: 2e-4, 1.4e-3.
-constexpr double largest_step_deg = 5.0;
+// Largest step in degrees between nodes, at which samples are interpolated; between nodes their moments are. Larger:
+// less time, larger errors.
+constexpr double max_step_deg = 5.0;
 
-// Directions come in single precision.
+// Rounding error of directions in single precision, degrees.
 constexpr double rounding_deg = 1e-4;
 
-// Points along each side of a texel that rings are summed over: the worst texel is off by 5e-4 of the brightest, with 2 points
-// by 2e-3, with 8, which take 1.2 times as long, by 3e-4.
+// Points along each side of a texel in sums over rings. More: smaller errors, more time.
 constexpr double points_per_texel = 4.0;
 
-// An image of texels resolves no more, and seldom as much: against 33 the worst texel differs by 1e-3 of the brightest and the
-// sum by 8e-5; 9 differ by 2.5e-3 and 1.4e-4.
+// Number of harmonics of a sample's profile. More: smaller errors, more time; an image of texels hardly resolves more.
 constexpr std::size_t sample_harmonics = 17;
 
-// Exitance of the texel at a place, 0 outside of the image; the mean of v and -v.
+// Exitance of the texel at (u, v), averaged with that at (u, -v); 0 outside the image.
 double even_exitance(const LdfSample& sample, double u, double v)
 {
     const double x = std::floor(u / sample.pitch + 0.5 * static_cast<double>(sample.width));
@@ -83,21 +80,20 @@ std::vector<double> node_angles(const std::vector<LdfSample>& samples)
     std::vector<double> angles{sampled.front()};
     for (const double angle : sampled) {
         const double from = angles.back();
-        const int steps = static_cast<int>(std::ceil((angle - from - rounding_deg) / largest_step_deg));
+        const int steps = static_cast<int>(std::ceil((angle - from - rounding_deg) / max_step_deg));
         for (int i = 1; i <= steps; ++i)
             angles.push_back(from + (angle - from) * i / steps);
     }
     return angles;
 }
 
-// No medium returns more than arrives. A simulation knows a total to within .5 / sqrt(photons) (binomial), of which
-// this leaves three for a thousand photons.
-constexpr double most_power = 1.05;
+// Largest power of a sample. No medium returns more light than arrives; three standard errors of a simulation of a
+// thousand photons, .5 / sqrt(photons) each (binomial), are allowed.
+constexpr double max_power = 1.05;
 
-// Any image may be interpolated, but none returns more light than comes in.
 void check_power(const LdfSample& sample)
 {
-    if (const double power = sample.power(); !(power >= 0.0 && power <= most_power))
+    if (const double power = sample.power(); !(power >= 0.0 && power <= max_power))
         reject("ldf", "a sample of power " + std::to_string(power),
                "0 to 1.05, of which .05 are noise: the integral of exitance per unit incident power");
 }
@@ -112,7 +108,7 @@ RadialProfile sample_profile(const LdfSample& sample)
     double power = 0.0;
     double inner = 0.0;
     for (std::size_t k = 0; k < radius_bin_count && inner < farthest; ++k) {
-        // What lies beyond the last bin is counted in it.
+        // The last bin includes the rest of the image.
         const double outer = k + 1 < radius_bin_count ? std::min(radius_bin_edge(k), farthest) : farthest;
         const auto ring = ring_moments(sample, inner, outer);
         for (std::size_t m = 0; m < harmonics; ++m)
@@ -133,8 +129,8 @@ SampleSource::SampleSource(std::vector<LdfSample> samples, Interpolation method)
         check_power(sample);
         m_pointers.push_back(&sample);
     }
-    const SampleGrid checked(m_pointers);
-    checked.cell(m_samples.front().angle_deg, m_samples.front().albedo, std::nullopt);  // of one g
+    const SampleGrid grid(m_pointers);
+    grid.cell(m_samples.front().angle_deg, m_samples.front().albedo, std::nullopt);  // rejects samples of several g
     m_angles = node_angles(m_samples);
 }
 
@@ -143,7 +139,7 @@ void SampleSource::check_angle(double angle_deg) const
     if (angle_deg >= m_angles.front() - rounding_deg && angle_deg <= m_angles.back() + rounding_deg)
         return;
     std::ostringstream span;
-    span << m_angles.front() << " <= angle <= " << m_angles.back() << " degrees, what the samples span";
+    span << m_angles.front() << " <= angle <= " << m_angles.back() << " degrees, the span of the samples";
     reject("angle", angle_deg, span.str());
 }
 
@@ -152,13 +148,13 @@ RadialProfile SampleSource::at_node(double angle_deg, double albedo) const
     const std::pair key(angle_deg, albedo);
     {
         const std::scoped_lock lock(m_mutex);
-        if (const auto found = m_known.find(key); found != m_known.end())
-            return found->second;
+        if (const auto cached = m_cache.find(key); cached != m_cache.end())
+            return cached->second;
     }
-    RadialProfile made =
+    RadialProfile profile =
         sample_profile(interpolate(m_pointers, angle_deg, albedo, std::nullopt, m_method, std::nullopt));
     const std::scoped_lock lock(m_mutex);
-    return m_known.emplace(key, std::move(made)).first->second;
+    return m_cache.emplace(key, std::move(profile)).first->second;
 }
 
 RadialProfile SampleSource::profile(double angle_deg, double albedo, Side) const

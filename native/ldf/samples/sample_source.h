@@ -1,4 +1,4 @@
-// Samples in place of a library.
+// LDFs for solvers from samples instead of a library.
 #pragma once
 
 #include <map>
@@ -11,18 +11,17 @@
 
 namespace beamspread {
 
-// The image as radial functions around O, one per azimuthal harmonic: rings of the image, its texels evenly bright. The
-// power is that of the image. What is odd in v is left out, and at normal incidence what is not round: an LDF has
-// neither.
+// The image as radial functions around O, one per azimuthal harmonic, integrated over rings with constant texels. Keeps
+// the power. Drops the part odd in v, and at normal incidence all harmonics m > 0: an LDF has neither.
 RadialProfile sample_profile(const LdfSample& sample);
 
-// LDFs interpolated from samples of one medium, between angles at most 5 degrees apart; in between linearly.
+// LDFs interpolated from samples of one medium at nodes at most 5 degrees apart, and linearly between the nodes.
 class SampleSource final : public LdfSource {
 public:
-    // Samples as for `interpolate`, of one g. Throws InvalidArgument.
+    // Takes samples as `interpolate` does, all of the same g. Throws InvalidArgument.
     SampleSource(std::vector<LdfSample> samples, Interpolation method);
 
-    // Samples have one side.
+    // Ignores the side: samples have one.
     RadialProfile profile(double angle_deg, double albedo, Side side) const override;
     std::vector<RadialProfile> node_profiles(double albedo, Side side) const override;
     AngleWeights angle_weights(double angle_deg) const override;
@@ -32,13 +31,13 @@ private:
     RadialProfile at_node(double angle_deg, double albedo) const;
 
     std::vector<LdfSample> m_samples;
-    std::vector<const LdfSample*> m_pointers;  // to them
+    std::vector<const LdfSample*> m_pointers;  // to m_samples
     Interpolation m_method;
     std::vector<double> m_angles;  // ascending
 
-    // Channels of the same albedo and the steps of a solver ask for the same again.
+    // Cache of profiles by angle and albedo: channels of the same albedo and the steps of a solver repeat requests.
     mutable std::mutex m_mutex;
-    mutable std::map<std::pair<double, double>, RadialProfile> m_known;  // by angle and albedo
+    mutable std::map<std::pair<double, double>, RadialProfile> m_cache;
 };
 
 }  // namespace beamspread

@@ -1,9 +1,9 @@
-// Radiance averaged over the azimuth, on a quadrature of cosines inside the medium (van de Hulst 1980,
-// doi:10.1016/B978-0-12-710701-1.X5001-0; Prahl, van Gemert, Welch 1993, doi:10.1364/AO.32.000559).
+// Adding-doubling on radiance averaged over the azimuth, with a quadrature of cosines inside the medium (van de Hulst
+// 1980, doi:10.1016/B978-0-12-710701-1.X5001-0; Prahl, van Gemert, Welch 1993, doi:10.1364/AO.32.000559).
 //
-// By reciprocity the totals of a beam are the radiance that the medium returns toward it under uniform diffuse
-// light. That asks for one vector of incident light and, beside the quadrature's own nodes, for rows of the matrices at
-// the angles of the beams: directions that light leaves by, but that feed nothing else.
+// By reciprocity, the totals of a beam equal the radiance that the medium returns toward it under uniform diffuse
+// light. One vector of incident light therefore serves all beams; each beam adds a row to the matrices, a direction
+// that light leaves by and that does not feed back into the others.
 #include "transport/exact/adding_doubling.h"
 
 #include <algorithm>
@@ -24,21 +24,17 @@ using Eigen::ArrayXd;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Legendre coefficients of the phase function, g^l, are kept until they have fallen to this, but at least and at most
-// so many. `exact_totals_error` says what the others leave. Against 1e-5, 100 and 400, over g of -.5 to .95: a g of .9 is
-// off by 1e-4, and by 3e-4 where next to nothing comes back; half 5e-5 in 1.2 times the time, twice 6e-4 in .75 times. A g
-// of .8 is off by 1.5e-5; with at least 20 by 2e-4 in .75 times, with at least 80 by 2e-9 in 1.5 times. Beyond .966 the
-// most decide: with 96 a g of .95 is off by 2e-4, as is by 7e-5.
+// Legendre coefficient g^l of the phase function at which the series ends, within bounds on its length. A smaller
+// coefficient or longer series: smaller errors (`exact_totals_error`), more time.
 constexpr double negligible_coefficient = 1.4e-3;
 constexpr int min_coefficients = 40;
 constexpr int max_coefficients = 192;
 
-// Thickness of the first layer over the smallest cosine. Its error is a twelfth of the square; half and twice
-// change no total by 1e-9, in the same time within 15 %.
+// Thickness of the first layer over the smallest cosine. Its relative error is a twelfth of the square.
 constexpr double first_layer = 0.02;
 
-// A half-space is reached when less than this gets from any direction of the quadrature to another: the other side's
-// effect on R grows as the square. A hundred times as much leaves 9e-5, a thousand times 3e-3, in .95 of the time.
+// Largest transmission between two directions of the quadrature at which a layer counts as a half-space; the effect on
+// its reflectance is the square. Larger: larger errors, hardly less time.
 constexpr double opaque = 1e-6;
 
 int coefficient_count(double g)
@@ -60,11 +56,11 @@ MatrixXd legendre(int count, const ArrayXd& x)
     return p;
 }
 
-// Light of one direction per column, scattered into the directions of the rows: without albedo, the column's quadrature
-// weight included.
+// Phase matrices from the directions of the columns to those of the rows, without albedo, with the column's quadrature
+// weight.
 struct Scattering {
-    MatrixXd forward;  // both up or both down
-    MatrixXd backward;  // from down to up and from up to down
+    MatrixXd forward;   // up to up, and down to down
+    MatrixXd backward;  // down to up, and up to down
 };
 
 // The problem apart from the albedo.
@@ -84,11 +80,11 @@ struct Quadrature {
     ArrayXd weight;
 };
 
-// A polynomial of high degree swings like the cosine of degree * angle, and Gauss's rule of n nodes is exact for
-// products of degree 2 n: this many nodes more than that needs for what is no polynomial. Measured: 8 more change no
-// total by 1e-5.
+// Nodes beyond those that polynomials need, for the radiance, which is not one. More: smaller errors, more time.
 constexpr int spare_nodes = 10;
 
+// A polynomial of high degree oscillates like the cosine of degree * angle, and n Gauss nodes integrate products of
+// degree 2 n exactly.
 int node_count(int degree, double angle)
 {
     return static_cast<int>(std::ceil(degree * angle / pi)) + spare_nodes;
@@ -106,9 +102,9 @@ Quadrature gauss_legendre(int count)
     return {0.5 * (solver.eigenvalues().array() + 1.0), solver.eigenvectors().row(0).transpose().array().square()};
 }
 
-// For radiance inside a medium of this refractive index, resolving Legendre polynomials up to `degree`: Gauss's rule,
-// in two pieces where there is a critical angle. Beyond it the variable is the cosine outside, in which what leaves is
-// smooth.
+// Quadrature of radiance inside a medium of this refractive index that resolves Legendre polynomials up to `degree`.
+// Gauss rules on both sides of the critical angle; inside the cone that leaves, the variable is the cosine outside, in
+// which the leaving radiance is smooth.
 Quadrature directions_inside(double ior, int degree)
 {
     if (ior == 1.0)
@@ -138,8 +134,8 @@ Angular angular_problem(const Medium& medium, std::span<const double> angles_deg
     a.reflectance = a.cosine.unaryExpr(from_inside);
     a.beam_reflectance = a.beam_cosine.unaryExpr(from_inside);
 
-    // Delta-M (Wiscombe 1977, doi:10.1175/1520-0469(1977)034<1408:TDMRYA>2.0.CO;2): what a forward peak has beyond the
-    // last coefficient goes straight on.
+    // Compute the fraction `peak` of scattered light that counts as unscattered, by the delta-M method (Wiscombe 1977,
+    // doi:10.1175/1520-0469(1977)034<1408:TDMRYA>2.0.CO;2): the forward peak beyond the last coefficient.
     a.peak = medium.g > 0.0 ? std::pow(medium.g, count) : 0.0;
     const MatrixXd p = legendre(count, a.cosine);
     const MatrixXd p_beams = legendre(count, a.beam_cosine);
@@ -155,24 +151,24 @@ Angular angular_problem(const Medium& medium, std::span<const double> angles_deg
     };
     a.among = {kernel(p, even), kernel(p, odd)};
     a.to_beams = {kernel(p_beams, even), kernel(p_beams, odd)};
-    // What the quadrature misses of the phase function's integral is taken for unscattered too, so that no energy is
-    // lost (Grant, Hunt 1969, doi:10.1098/rspa.1969.0187).
+    // Renormalize the phase function: its quadrature error counts as unscattered too, which conserves energy (Grant,
+    // Hunt 1969, doi:10.1098/rspa.1969.0187).
     const VectorXd lost =
         VectorXd::Ones(a.cosine.size()) - a.among.forward.rowwise().sum() - a.among.backward.rowwise().sum();
     a.among.forward.diagonal() += lost;
     return a;
 }
 
-// A homogeneous layer without boundaries: radiance that leaves for radiance that arrives.
+// Response of a homogeneous layer without boundaries: leaving radiance per arriving radiance.
 struct Layer {
-    ArrayXd depth, beam_depth;  // optical, along each direction
-    ArrayXd direct, beam_direct;  // unscattered, straight through: exp(-depth)
-    MatrixXd reflected, beam_reflected;  // from the quadrature's directions to them and to the beams
+    ArrayXd depth, beam_depth;           // optical depth along each direction
+    ArrayXd direct, beam_direct;         // unscattered transmission: exp(-depth)
+    MatrixXd reflected, beam_reflected;  // from the quadrature's directions to themselves and to the beams
     MatrixXd scattered, beam_scattered;  // the same on the far side
 };
 
-// The diamond scheme, which conserves energy exactly: radiance inside is the mean of the two sides (Wiscombe 1976,
-// doi:10.1016/0022-4073(76)90056-X).
+// Thin layer by diamond initialization, which conserves energy exactly: radiance inside is the mean of the two sides
+// (Wiscombe 1976, doi:10.1016/0022-4073(76)90056-X).
 Layer thin_layer(const Angular& a, double albedo, double thickness)
 {
     const Eigen::Index n = a.cosine.size();
@@ -191,7 +187,7 @@ Layer thin_layer(const Angular& a, double albedo, double thickness)
     layer.direct = (1.0 - m) / (1.0 + m);
     layer.reflected = 2.0 * g * x;
     layer.scattered = (2.0 / (1.0 + m)).matrix().asDiagonal() * (forward + x * backward) * g;
-    // The beams' rows follow from the mean radiance within the layer.
+    // Compute the beams' rows from the mean radiance within the layer.
     MatrixXd down = 0.5 * (identity + layer.scattered);
     down.diagonal() += 0.5 * layer.direct.matrix();
     const MatrixXd up = 0.5 * layer.reflected;
@@ -203,15 +199,15 @@ Layer thin_layer(const Angular& a, double albedo, double thickness)
     return layer;
 }
 
-// Two of the same on top of each other (van de Hulst 1980, section 4.3). Unscattered light is kept apart all along:
-// differences from it would lose the digits of thin layers.
+// Doubles a layer (van de Hulst 1980, Sec. 4.3). Unscattered light stays separate: differences from it would lose the
+// digits of thin layers.
 Layer doubled(const Layer& layer)
 {
     const auto direct = layer.direct.matrix().asDiagonal();
     const auto beam_direct = layer.beam_direct.matrix().asDiagonal();
     const MatrixXd& r = layer.reflected;
     const MatrixXd& t = layer.scattered;
-    // Radiance between the two: down is direct + down, up is up.
+    // Compute the scattered radiance between the two layers, down and up.
     const MatrixXd twice = r * r;
     MatrixXd between = -twice;
     between.diagonal().array() += 1.0;
@@ -220,7 +216,7 @@ Layer doubled(const Layer& layer)
     const MatrixXd beam_up = layer.beam_reflected * down + layer.beam_reflected * direct;
     const MatrixXd beam_down = layer.beam_scattered + layer.beam_reflected * up;
     Layer both;
-    // Near grazing a beam's first layer is so thin that squares of what it lets through would lose its depth.
+    // Double the depth and not the transmission: the square of a thin layer's transmission would lose its digits.
     both.depth = 2.0 * layer.depth;
     both.beam_depth = 2.0 * layer.beam_depth;
     both.direct = (-both.depth).exp();
@@ -234,12 +230,12 @@ Layer doubled(const Layer& layer)
 
 Layer layer_of(const Medium& medium, const Angular& a, double albedo)
 {
-    // Scattering into the peak does not count, so the layer is thinner and darker.
+    // Compute the delta-M depth and albedo, without the light that scatters into the peak.
     const double depth = medium.thickness * (1.0 - albedo * a.peak);
     const double scaled_albedo = albedo * (1.0 - a.peak) / (1.0 - albedo * a.peak);
     const double thin = first_layer * std::min(a.cosine.minCoeff(), a.beam_cosine.minCoeff());
     const bool ends = !medium.is_half_space();
-    // Without an end, more than any albedo below 1 needs in double precision.
+    // A half-space ends at `opaque`; 100 doublings exceed the need of any albedo below 1.
     const int doublings = ends ? std::max(0, static_cast<int>(std::ceil(std::log2(depth / thin)))) : 100;
     Layer layer = thin_layer(a, scaled_albedo, ends ? std::ldexp(depth, -doublings) : thin);
     for (int i = 0; i < doublings; ++i) {
@@ -251,11 +247,12 @@ Layer layer_of(const Medium& medium, const Angular& a, double albedo)
     return layer;
 }
 
-// Radiance outside toward the beams, divided by that of the diffuse light: what leaves on both sides when light
-// arrives on both (sign = 1), or when it arrives with the opposite sign below (sign = -1).
+// Radiance outside toward the beams, divided by the incident diffuse radiance, when light arrives on both sides: with
+// the same sign (sign = 1) or the opposite sign on the far side (sign = -1). The half sum of both cases is the
+// reflectance, the half difference the transmittance.
 ArrayXd returned(const Angular& a, const Layer& layer, double sign)
 {
-    // On the way in radiance grows by the square of the refractive index, and shrinks by it on the way out.
+    // Radiance grows by ior^2 on the way in and shrinks by it on the way out, hence neither factor appears.
     MatrixXd through = layer.reflected + sign * layer.scattered;
     through.diagonal() += sign * layer.direct.matrix();
     const VectorXd entering = (1.0 - a.reflectance).matrix();
@@ -299,9 +296,9 @@ ExactTotals exact_totals(const Medium& medium, std::span<const double> angles_de
             const ArrayXd opposite = returned(angular, layer, -1.0);
             for (std::size_t j = 0; j < angles_deg.size(); ++j) {
                 const auto beam = static_cast<Eigen::Index>(j);
-                const std::size_t place = j * albedos.size() + k;
-                totals.reflectance[place] = 0.5 * (same(beam) + opposite(beam));
-                totals.transmittance[place] = medium.is_half_space() ? 0.0 : 0.5 * (same(beam) - opposite(beam));
+                const std::size_t index = j * albedos.size() + k;
+                totals.reflectance[index] = 0.5 * (same(beam) + opposite(beam));
+                totals.transmittance[index] = medium.is_half_space() ? 0.0 : 0.5 * (same(beam) - opposite(beam));
             }
         });
     });

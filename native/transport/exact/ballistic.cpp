@@ -8,10 +8,10 @@ namespace beamspread {
 
 namespace {
 
-// Beer's law along the slanted path, and Fresnel's reflectance at its end.
+// One crossing of the slab: Beer-Lambert transmission along the slanted path and Fresnel reflectance at its end.
 struct Pass {
-    double transmission;  // of one crossing
-    double reflectance;   // at either boundary, from inside
+    double transmission;  // fraction that reaches the end
+    double reflectance;   // from inside, the same at both boundaries
 };
 
 Pass single_pass(const Medium& medium, double theta_inside)

@@ -1,4 +1,4 @@
-// What leaves one side of the medium, by scattering order, radius and azimuthal harmonic.
+// Tally of the light that leaves one side of the medium, by scattering order, radius and azimuthal harmonic.
 #pragma once
 
 #include <algorithm>
@@ -14,8 +14,8 @@
 
 namespace beamspread {
 
-// The most harmonics that any row around a pole has, given those of all rows.
-inline std::size_t most_harmonics(std::span<const std::size_t> harmonics, std::size_t pole)
+// Largest number of harmonics in the rows of a pole; `harmonics` has the number of each row.
+inline std::size_t max_harmonics(std::span<const std::size_t> harmonics, std::size_t pole)
 {
     const auto rows = harmonics.subspan(first_row(pole), end_row(pole) - first_row(pole));
     return *std::max_element(rows.begin(), rows.end());
@@ -24,14 +24,14 @@ inline std::size_t most_harmonics(std::span<const std::size_t> harmonics, std::s
 // One number for each bin.
 using OrderWeights = std::array<double, order_bin_count>;
 
-// Sums over photons of weight * cos(m phi), with (r, phi) the place of exit around a pole and
-// phi = 0 along the beam's direction of travel. Conservative walk: albedo a scales order n by a^n.
+// Sums over photons of weight * cos(m phi), with (r, phi) the point of exit around a pole and phi = 0 along the beam's
+// direction of travel. The walk absorbs nothing: an albedo a scales the sums of order n by a^n.
 struct Tally {
     std::array<double, pole_count> poles{};  // u, mean free paths
     std::uint32_t mirrored_orders = 0;       // see transport/tally/poles.h
-    // [row][radius bin][harmonic], see `ring`; empty: nothing leaves this side
+    // [row][radius bin][harmonic], see `ring`; empty if no light leaves this side
     std::vector<double, HugePageAllocator<double>> moments;
-    OrderWeights weight{};         // [order bin], around whatever pole
+    OrderWeights weight{};         // sum of weight, [order bin], around all poles
     OrderWeights weight_order{};   // sum of weight * order
     OrderWeights weight_order2{};  // sum of weight * order^2
 
@@ -56,7 +56,7 @@ struct Tally {
         const std::size_t bin = order_bin(order);
         const std::size_t harmonics = harmonics_of(bin);
         double* sums = ring(first_row(pole) + bin, radius_bin(static_cast<float>(r)));
-        // cos(m phi) by the recurrence of the Chebyshev polynomials.
+        // Add cos(m phi) by the recurrence of the Chebyshev polynomials.
         double previous = w;
         double current = w * cos_phi;
         sums[0] += previous;

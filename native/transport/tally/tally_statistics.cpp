@@ -9,9 +9,8 @@ namespace beamspread {
 
 namespace {
 
-// Root mean square of what is left out, relative to the mean around a ring: less than that is not missed, be there
-// ever so little noise. Of two million photons none and twice keep the same but for 5e-8 of the brightest texel; 1e-2 leave
-// 3e-4 and files 2 % smaller, 3e-2 1.4e-3 and 17 %.
+// Root mean square of the omitted harmonics, relative to the mean around a ring, below which they are dropped without
+// regard to noise. Larger: smaller files, larger errors.
 constexpr double negligible = 3e-3;
 
 // Sums of cos(m phi) over an octave of radii and some rows.
@@ -20,8 +19,8 @@ struct Octave {
     std::array<double, harmonic_count> other{};
 };
 
-// What texels take together is judged together: were each ring to tell signal from noise by itself, the little that
-// many rings agree on would be lost.
+// Sums rows and radii that texels see together. A ring alone cannot separate signal from noise: weak harmonics that
+// many rings share would be lost.
 std::vector<Octave> octaves(const Tally& half, const Tally& other, std::size_t first, std::size_t last)
 {
     std::vector<Octave> sums(1);
@@ -37,9 +36,9 @@ std::vector<Octave> octaves(const Tally& half, const Tally& other, std::size_t f
     return sums;
 }
 
-std::size_t worth_keeping(const std::vector<Octave>& octaves, std::size_t count)
+std::size_t significant_count(const std::vector<Octave>& octaves, std::size_t count)
 {
-    // Mean squares around the rings, relative to the rings' mean and weighted by their power.
+    // Compute mean squares around the rings, relative to the rings' mean and weighted by their power.
     std::array<double, harmonic_count> signal{};
     std::array<double, harmonic_count> noise{};
     double power = 0.0;
@@ -56,7 +55,7 @@ std::size_t worth_keeping(const std::vector<Octave>& octaves, std::size_t count)
             noise[m] += 2.0 * (a - b) * (a - b) / ring;
         }
     }
-    // Keeping a harmonic takes its signal from the error and brings in its noise.
+    // Maximize the gain: a harmonic removes its signal from the error and adds its noise.
     std::size_t best = 1;
     double gain = 0.0;
     double best_gain = 0.0;
@@ -73,9 +72,9 @@ std::size_t worth_keeping(const std::vector<Octave>& octaves, std::size_t count)
     return best;
 }
 
-// Albedos at which the groups are kept. A group's deviation from the mean, relative to the power of the ring, changes
-// slowly with the albedo: it is interpolated in log(1 - albedo). Around mirror images light has scattered so few times that
-// it hardly changes any more from the second one on.
+// Albedos at which deviations are stored, around the first pole and around mirror images. A group's relative deviation
+// changes slowly with log(1 - albedo), in which it is interpolated, and hardly at all around mirror images, where light
+// has scattered few times.
 constexpr std::array<double, 4> first_albedos = {0.6, 0.95, 0.995, 0.9995};
 constexpr std::array<double, 2> image_albedos = {0.6, 0.995};
 
@@ -84,7 +83,7 @@ std::span<const double> albedos_of(std::size_t pole)
     return pole == 0 ? std::span<const double>(first_albedos) : std::span<const double>(image_albedos);
 }
 
-// To what half precision holds exactly.
+// Rounds to five binary digits, which half precision holds exactly.
 float rounded_to_five_bits(double x)
 {
     if (std::abs(x) < 0x1p-14)
@@ -94,20 +93,20 @@ float rounded_to_five_bits(double x)
     return static_cast<float>(std::ldexp(std::round(mantissa * 32.0) / 32.0, exponent));
 }
 
-// Of the poles before this one.
+// Number of a group's deviations before this pole's.
 std::size_t count_before(std::span<const std::size_t> harmonics, std::size_t radii, std::size_t pole)
 {
     std::size_t count = 0;
     for (std::size_t before = 0; before < pole; ++before)
-        count += albedos_of(before).size() * most_harmonics(harmonics, before) * radii;
+        count += albedos_of(before).size() * max_harmonics(harmonics, before) * radii;
     return count;
 }
 
-// Sums over the orders at an albedo, [harmonic][radius bin].
+// Sums over the scattering orders, weighted for an albedo, [harmonic][radius bin].
 std::vector<double> contracted(const Tally& tally, double albedo, std::span<const std::size_t> harmonics,
                                std::size_t radii, std::size_t pole)
 {
-    std::vector<double> sums(most_harmonics(harmonics, pole) * radii, 0.0);
+    std::vector<double> sums(max_harmonics(harmonics, pole) * radii, 0.0);
     for (std::size_t row = first_row(pole); row < end_row(pole); ++row) {
         const std::size_t b = order_bin_of(row);
         if (b == 0 || tally.weight[b] == 0.0)
@@ -122,7 +121,7 @@ std::vector<double> contracted(const Tally& tally, double albedo, std::span<cons
     return sums;
 }
 
-// Appends those of each group, [harmonic][radius bin].
+// Appends the deviations of each group at an albedo, [harmonic][radius bin].
 void add_deviations(std::vector<std::vector<float>>& by_group, std::span<const Tally* const> groups, double albedo,
                     std::span<const std::size_t> harmonics, std::size_t radii, std::size_t pole)
 {
@@ -143,13 +142,13 @@ void add_deviations(std::vector<std::vector<float>>& by_group, std::span<const T
 
 }  // namespace
 
-std::array<std::size_t, row_count> harmonics_worth_keeping(const Tally& half, const Tally& other)
+std::array<std::size_t, row_count> significant_harmonics(const Tally& half, const Tally& other)
 {
     std::array<std::size_t, row_count> counts{};
     for (std::size_t first = 0; first < row_count;) {
         const bool is_octave = first >= exact_orders && first < order_bin_count;
         const std::size_t last = first + (is_octave ? 4 : 1);
-        const std::size_t count = worth_keeping(octaves(half, other, first, last), harmonics_of(first));
+        const std::size_t count = significant_count(octaves(half, other, first, last), harmonics_of(first));
         std::fill(counts.begin() + static_cast<std::ptrdiff_t>(first),
                   counts.begin() + static_cast<std::ptrdiff_t>(last), count);
         first = last;
@@ -157,7 +156,7 @@ std::array<std::size_t, row_count> harmonics_worth_keeping(const Tally& half, co
     return counts;
 }
 
-std::size_t scatter_count(std::span<const std::size_t> harmonics, std::size_t radii)
+std::size_t deviation_count(std::span<const std::size_t> harmonics, std::size_t radii)
 {
     return count_before(harmonics, radii, pole_count);
 }
@@ -179,16 +178,18 @@ std::vector<double> deviations_at(std::span<const float> deviations, std::span<c
                                   std::size_t radii, std::size_t group, std::size_t pole, double albedo)
 {
     const std::span<const double> albedos = albedos_of(pole);
-    const auto place = [](double a) { return std::log1p(-a); };
-    const double x = std::clamp(place(albedo), place(albedos.back()), place(albedos.front()));
+    const auto log_absorption = [](double a) { return std::log1p(-a); };
+    const double x =
+        std::clamp(log_absorption(albedo), log_absorption(albedos.back()), log_absorption(albedos.front()));
     std::size_t high = 1;
-    while (high + 1 < albedos.size() && x < place(albedos[high]))
+    while (high + 1 < albedos.size() && x < log_absorption(albedos[high]))
         ++high;
-    const double t = (x - place(albedos[high - 1])) / (place(albedos[high]) - place(albedos[high - 1]));
+    const double low_end = log_absorption(albedos[high - 1]);
+    const double t = (x - low_end) / (log_absorption(albedos[high]) - low_end);
 
-    const std::size_t rings = most_harmonics(harmonics, pole);
+    const std::size_t rings = max_harmonics(harmonics, pole);
     const float* kept =
-        deviations.data() + group * scatter_count(harmonics, radii) + count_before(harmonics, radii, pole);
+        deviations.data() + group * deviation_count(harmonics, radii) + count_before(harmonics, radii, pole);
     std::vector<double> result(rings * radius_bin_count, 0.0);
     for (const auto& [albedo_index, weight] : {std::pair(high - 1, 1.0 - t), std::pair(high, t)})
         for (std::size_t m = 0; m < rings; ++m)

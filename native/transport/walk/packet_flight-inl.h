@@ -1,4 +1,4 @@
-// Photons of the vectorized walk, their flights, and what happens at the ends of these. Compiled once per target, like
+// Photons of the vectorized walk: flights, scattering, and reflection at the boundary. Compiled once per target, like
 // packet_math-inl.h.
 #if defined(BEAMSPREAD_TRANSPORT_PACKET_FLIGHT_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BEAMSPREAD_TRANSPORT_PACKET_FLIGHT_INL_H
@@ -37,9 +37,9 @@ public:
     {
     }
 
-    // With t = 1 + g (2 u - 1) its inverted distribution gives
+    // Inverts the distribution. With t = 1 + g (2 u - 1),
     //   1 - cos = 2 (1 - g)^2 (1 - u) (1 + g u) / t^2,   1 + cos = 2 (1 + g)^2 u (1 - g (1 - u)) / t^2,
-    // which lose no digits for any g, and the density is t^3 / (4 pi (1 - g^2)^2).
+    // which lose no digits for any g; the density is t^3 / (4 pi (1 - g^2)^2).
     HWY_INLINE Deflection sample(Floats u) const
     {
         const Floats one = broadcast(1.0);
@@ -57,7 +57,7 @@ public:
         return {cos_theta, sin_theta, pdf};
     }
 
-    // Per steradian.
+    // Density per steradian.
     HWY_INLINE Floats pdf(Floats cos_theta) const
     {
         const Floats denominator = hn::NegMulAdd(hn::Set(floats, m_twice_g), cos_theta, hn::Set(floats, m_one_plus_g2));
@@ -105,7 +105,7 @@ private:
     float m_ior2;
 };
 
-// A medium in single precision: what a flight needs of it is converted once, not at each.
+// A medium's coefficients in single precision, converted once for all flights.
 struct PacketMedium {
     explicit PacketMedium(const Medium& medium)
         : phase(medium.g),
@@ -121,20 +121,20 @@ struct PacketMedium {
     bool is_half_space;
 };
 
-// One in each lane.
+// One photon in each lane.
 struct Photons {
     Vectors x;  // mean free paths; z points into the medium
     Vectors w;
     Floats weight;
     Words order;
     Words next_roulette;  // order
-    Words batch;          // and reflections, shifted into place, see transport/walk/packet_tally-inl.h
+    Words batch;          // and reflections, as bits of an exit's tag: see transport/walk/packet_tally-inl.h
 };
 
-// Photons that wait for their next flights, without gaps.
+// Photons that wait for their next flights, stored without gaps.
 class PhotonPool {
 public:
-    static constexpr std::size_t capacity = 512;  // 256 and 1024 take as long, within 10 %
+    static constexpr std::size_t capacity = 512;  // photons; larger: fewer idle lanes, more cache
 
     std::size_t count() const { return m_count; }
     void clear() { m_count = 0; }
@@ -181,12 +181,13 @@ HWY_INLINE Flight fly(const PacketMedium& medium, const Photons& photons, Packet
     const Floats length = minus_log(random.uniform());
     const Floats depth =
         hn::IfNegativeThenElse(photons.w.z, photons.x.z, hn::Sub(hn::Set(floats, medium.thickness), photons.x.z));
-    // From below: a flight along the surface has a finite end that it never reaches.
+    // The bound gives flights along the surface a finite end, which they never reach.
     const Floats cosine = hn::Max(hn::Abs(photons.w.z), broadcast(1e-30));
     return {length, depth, cosine, hn::Ge(hn::Mul(length, cosine), depth)};
 }
 
-// The end of the flights that hit no boundary.
+// Moves and deflects the photons whose flights end inside the medium. Lanes that hit a boundary get garbage, which
+// `reflect` replaces.
 HWY_INLINE void scatter(Photons& photons, const Flight& flight, const Deflection& deflection, PacketRandom& random)
 {
     const auto scatters = hn::RebindMask(words, hn::Not(flight.hits));
@@ -197,7 +198,7 @@ HWY_INLINE void scatter(Photons& photons, const Flight& flight, const Deflection
     photons.order = hn::Add(photons.order, hn::IfThenElseZero(scatters, hn::Set(words, 1u)));
 }
 
-// Inner reflection of some photons, given where they came from.
+// Reflects the chosen photons internally; `from` holds them before their flight.
 HWY_INLINE void reflect(Photons& photons, FloatMask mask, const Photons& from, Floats to_boundary, float thickness)
 {
     const auto choose = [mask](Floats value, Floats& to) { to = hn::IfThenElse(mask, value, to); };
@@ -205,7 +206,7 @@ HWY_INLINE void reflect(Photons& photons, FloatMask mask, const Photons& from, F
     choose(hn::MulAdd(to_boundary, from.w.x, from.x.x), photons.x.x);
     choose(hn::MulAdd(to_boundary, from.w.y, from.x.y), photons.x.y);
     choose(hn::IfThenElse(up, hn::Zero(floats), hn::Set(floats, thickness)), photons.x.z);
-    // See transport/tally/poles.h.
+    // Count the reflection as `reflections_after` does (transport/tally/poles.h).
     const Words meets = hn::IfThenElse(hn::RebindMask(words, up), hn::Set(words, far_reflection_bits << 1),
                                        hn::Set(words, far_reflection_bits));
     const Words next = hn::Or(hn::Add(photons.batch, photons.batch), hn::Set(words, reflection_bit(0)));

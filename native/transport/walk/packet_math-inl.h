@@ -1,5 +1,5 @@
-// Random numbers and directions for as many photons as a vector has lanes. Compiled once per target: no include guard
-// of the usual kind (Highway's documentation, "foreach_target").
+// Random numbers and directions for one photon per vector lane. Compiled once per target, hence the toggled include
+// guard (Highway's documentation, "foreach_target").
 #if defined(BEAMSPREAD_TRANSPORT_PACKET_MATH_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BEAMSPREAD_TRANSPORT_PACKET_MATH_INL_H
 #undef BEAMSPREAD_TRANSPORT_PACKET_MATH_INL_H
@@ -42,20 +42,20 @@ HWY_INLINE FloatMask float_mask(hn::Mask<WordTag> mask)
     return hn::RebindMask(floats, mask);
 }
 
-// Of numbers below 2^31.
+// a > b for numbers below 2^31.
 HWY_INLINE FloatMask greater(Words a, Words b)
 {
     const hn::RebindToSigned<FloatTag> integers;
     return hn::RebindMask(floats, hn::Gt(hn::BitCast(integers, a), hn::BitCast(integers, b)));
 }
 
-// How to move the lanes of a mask to the front.
+// Order that moves the lanes of a mask to the front.
 #if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_SSE4
-// There is no instruction for it. hn::Compress looks the order up for each vector anew, in a table of a kilobyte that
-// GCC copies onto the stack first: with AVX2 that was two thirds of the whole walk.
+// These targets lack a compress instruction. hn::Compress looks up the order for each vector anew, in a table of a
+// kilobyte that GCC first copies onto the stack: two thirds of the walk's time with AVX2.
 using LaneOrder = Words;
 
-// [mask][lane]: where its value comes from.
+// [mask][lane]: lane that the value comes from.
 constexpr auto lane_orders = [] {
     std::array<std::array<std::uint8_t, lane_count>, std::size_t{1} << lane_count> from{};
     for (std::size_t mask = 0; mask < from.size(); ++mask)
@@ -97,11 +97,11 @@ class Compression {
 public:
     HWY_INLINE explicit Compression(FloatMask mask) : m_order(lane_order(mask)), m_count(hn::CountTrue(floats, mask)) {}
 
-    // How many lanes are chosen.
+    // Number of chosen lanes.
     HWY_INLINE std::size_t count() const { return m_count; }
 
-    // Stores all lanes, so that there has to be room for them: hn::CompressStore writes no more than those chosen,
-    // which takes some processors (Zen 4) hundreds of cycles.
+    // Stores a whole vector, which `to` must have room for: hn::CompressStore, which writes the chosen lanes alone,
+    // takes hundreds of cycles on some processors (Zen 4).
     template <class D>
     HWY_INLINE void store(D tag, hn::Vec<D> values, hn::TFromD<D>* to) const
     {
@@ -137,7 +137,7 @@ public:
     {
     }
 
-    // The state goes on where this object leaves it.
+    // Writes the state back, for the next object to continue.
     HWY_INLINE void store() const
     {
         hn::Store(m_0, words, m_state.word[0]);
@@ -159,11 +159,11 @@ public:
         return result;
     }
 
-    // Uniform in (0, 1): the midpoints of 2^23 cells. The longest flight is 16.6 mean free paths, which
-    // shortens the mean by 1e-6.
+    // Uniform in (0, 1): the midpoints of 2^23 cells. They bound flights to 16.6 mean free paths, which shortens the
+    // mean by 1e-6.
     HWY_INLINE Floats uniform()
     {
-        // In [1, 2) the bits of a number are equally spaced; the difference is exact.
+        // Floats in [1, 2) are equally spaced, hence the difference is exact.
         const Words one_to_two = hn::Or(hn::ShiftRight<9>(bits()), hn::Set(words, 0x3f800000u));
         return hn::Sub(hn::BitCast(floats, one_to_two), hn::Set(floats, 1.0f - 0x1p-24f));
     }
@@ -181,8 +181,8 @@ struct SinCos {
     Floats cosine;
 };
 
-// Sine and cosine of a uniform angle: of one in [-pi/4, pi/4) by their Taylor series, whose remainders are below
-// 2e-9 and 3e-8 there, rotated by a random multiple of pi/2.
+// Sine and cosine of a uniform angle: Taylor series of an angle in [-pi/4, pi/4), with remainders below 2e-9 and 3e-8,
+// then a rotation by a random multiple of pi/2.
 HWY_INLINE SinCos random_azimuth(PacketRandom& random)
 {
     const hn::RebindToSigned<FloatTag> integers;
@@ -201,7 +201,7 @@ HWY_INLINE SinCos random_azimuth(PacketRandom& random)
     cosine = hn::MulAdd(cosine, x2, broadcast(-0.5));
     cosine = hn::MulAdd(cosine, x2, broadcast(1.0));
 
-    // Bit 8 exchanges them, bit 7 rotates by pi.
+    // Rotate: bit 8 exchanges sine and cosine, bit 7 adds pi.
     const FloatMask exchanged = float_mask(hn::TestBit(bits, hn::Set(words, 1u << 8)));
     const Words sign_bit = hn::And(hn::ShiftLeft<24>(bits), hn::Set(words, 1u << 31));
     const Floats sign = hn::BitCast(floats, sign_bit);
@@ -239,14 +239,14 @@ HWY_INLINE Vectors deflect(const Vectors& w, Floats cos_theta, Floats sin_theta,
             hn::NegMulAdd(signed_x, a, hn::NegMulAdd(w.y, b, hn::Mul(w.z, cos_theta)))};
 }
 
-// One step of Newton's method brings a length that has strayed from 1 by rounding back.
+// Restores the length 1 after rounding, by one step of Newton's method.
 HWY_INLINE Vectors renormalized(const Vectors& w)
 {
     const Floats scale = hn::NegMulAdd(broadcast(0.5), dot(w, w), broadcast(1.5));
     return {hn::Mul(w.x, scale), hn::Mul(w.y, scale), hn::Mul(w.z, scale)};
 }
 
-// -log of a normal number, by the method of FreeBSD's logf as in hn::Log, less what that does for subnormal ones.
+// -log of a normal number, by the method of FreeBSD's logf as in hn::Log, which also handles subnormal numbers.
 HWY_INLINE Floats minus_log(Floats x)
 {
     const hn::RebindToSigned<FloatTag> integers;
@@ -264,7 +264,7 @@ HWY_INLINE Floats minus_log(Floats x)
     const Floats odd = hn::MulAdd(hn::Set(floats, 0.28498786688f), s4, hn::Set(floats, 0.66666662693f));
     const Floats even = hn::MulAdd(hn::Set(floats, 0.24279078841f), s4, hn::Set(floats, 0.40000972152f));
     const Floats series = hn::MulAdd(odd, s2, hn::Mul(even, s4));
-    // log 2 in two parts, the first of which has few digits.
+    // log 2 in two parts; the first has few digits, so that its product with the exponent is exact.
     const Floats low = hn::Mul(exponent, hn::Set(floats, 9.0580006145e-6f));
     const Floats rest = hn::Sub(hn::MulSub(s, hn::Sub(f, series), low), f);
     return hn::NegMulAdd(exponent, hn::Set(floats, 0.69313812256f), rest);

@@ -1,4 +1,4 @@
-// Exits of many photons at a time on their way into the tallies. Compiled once per target, like packet_math-inl.h.
+// Adds the exits of the vectorized walk to the tallies. Compiled once per target, like packet_math-inl.h.
 #if defined(BEAMSPREAD_TRANSPORT_PACKET_TALLY_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BEAMSPREAD_TRANSPORT_PACKET_TALLY_INL_H
 #undef BEAMSPREAD_TRANSPORT_PACKET_TALLY_INL_H
@@ -19,32 +19,32 @@ HWY_BEFORE_NAMESPACE();
 namespace beamspread {
 namespace HWY_NAMESPACE {
 
-// Order, side, batch and reflections (transport/tally/poles.h) of an exit in one word. Reflections are as many bits,
-// set from `reflections_shift` on.
+// An exit's tag: order, side, batch and reflections (transport/tally/poles.h) in one word. n reflections are n bits set
+// from `reflections_shift` on.
 constexpr int side_shift = 20;
 constexpr int batch_shift = 21;
 constexpr int reflections_shift = 28;
 constexpr std::uint32_t order_bits = max_order - 1;
 constexpr std::uint32_t batch_bits = (1u << reflections_shift) - (1u << batch_shift);
 static_assert(max_order <= 1u << side_shift);
-static_assert(most_reflections <= 32 - reflections_shift);
+static_assert(max_reflections <= 32 - reflections_shift);
 
-// The bit of reflection number i, from 0 on, and those of all reflections at the far boundary.
+// Bit of reflection i (from 0), and the bits of all reflections at the far boundary.
 constexpr std::uint32_t reflection_bit(std::uint32_t i)
 {
     return 1u << (static_cast<std::uint32_t>(reflections_shift) + i);
 }
 constexpr std::uint32_t far_reflection_bits = [] {
     std::uint32_t bits = 0;
-    for (std::uint32_t i = 0; i < most_reflections; i += 2)
+    for (std::uint32_t i = 0; i < max_reflections; i += 2)
         bits |= reflection_bit(i);
     return bits;
 }();
 
-// Harmonics are added in blocks of this many.
+// Harmonics in a block, which are added together.
 constexpr std::size_t block = 8;
 
-// [m][k]: of c^k in T_m(c), the Chebyshev polynomial, which is cos(m phi) for c = cos(phi).
+// [m][k]: coefficient of c^k in the Chebyshev polynomial T_m(c), which is cos(m phi) for c = cos(phi).
 constexpr auto chebyshev_coefficients = [] {
     std::array<std::array<double, block>, block> c{};
     c[0][0] = c[1][1] = 1.0;
@@ -54,10 +54,9 @@ constexpr auto chebyshev_coefficients = [] {
     return c;
 }();
 
-// Collects exits, and adds them to the tallies when there are enough to fill vectors. Until `finish` the moments
-// hold T_8j(c) c^k, c = cos(phi), in the place of cos((8 j + k) phi): a step from one block to the next is one
-// operation. Powers alone would lose twelve digits on the way back to the sixty-third harmonic, within a block of eight
-// it is three.
+// Collects exits and adds them to the tallies when they fill vectors. Until `finish`, the moment of harmonic 8 j + k
+// holds T_8j(c) c^k, c = cos(phi): a step to the next block is one operation. Conversion to harmonics loses three
+// digits within a block; powers of c alone would lose twelve at harmonic 63.
 class PacketTally {
 public:
     explicit PacketTally(const WalkJob& job) : m_job(job)
@@ -66,13 +65,13 @@ public:
             m_tallies.push_back(&job.tallies[batch / job.batches_per_tally]);
     }
 
-    HWY_INLINE void add(FloatMask mask, Floats x, Floats y, Floats weight, Words what)
+    HWY_INLINE void add(FloatMask mask, Floats x, Floats y, Floats weight, Words tag)
     {
         const Compression chosen(mask);
         chosen.store(floats, x, m_x.data() + m_count);
         chosen.store(floats, y, m_y.data() + m_count);
         chosen.store(floats, weight, m_weight.data() + m_count);
-        chosen.store(words, what, m_what.data() + m_count);
+        chosen.store(words, tag, m_tag.data() + m_count);
         m_count += chosen.count();
         if (m_count > capacity)
             flush();
@@ -88,7 +87,7 @@ public:
 
 private:
     static constexpr std::size_t capacity = 256;
-    static constexpr std::size_t exits_ahead = 8;  // that memory is asked for: 4 and 16 take as long, within 10 %
+    static constexpr std::size_t exits_ahead = 8;  // distance of prefetches, in exits
     template <class T>
     using Queue = std::array<T, capacity + 2 * lane_count>;
 
@@ -103,7 +102,7 @@ private:
         }
     }
 
-    // From sums of T_8j c^k to sums of T_8j+k = 2 T_8j T_k - T_8j-k.
+    // Converts sums of T_8j c^k to sums of T_8j+k = 2 T_8j T_k - T_8j-k.
     static void blocks_to_harmonics(double* sums, std::size_t count)
     {
         for (std::size_t first = 0; first < count; first += block) {
@@ -120,10 +119,10 @@ private:
 
     HWY_NOINLINE void flush()
     {
-        // What lies behind the last exit only has to be finite.
+        // Fill the last vector's unused lanes with finite values.
         for (std::size_t i = 0; i < lane_count; ++i) {
             m_x[m_count + i] = m_y[m_count + i] = 0.0f;
-            m_what[m_count + i] = 0;
+            m_tag[m_count + i] = 0;
         }
         for (std::size_t i = 0; i < m_count; i += lane_count)
             find_bins(i);
@@ -137,26 +136,26 @@ private:
         m_count = 0;
     }
 
-    // The bins of transport/bins.h, read off the bits of a float.
+    // Computes the bins of transport/tally/bins.h and cos(phi) of one vector of exits.
     HWY_INLINE void find_bins(std::size_t from)
     {
         constexpr int bias = 127;
         const hn::RebindToSigned<FloatTag> integers;
-        const Words what = hn::LoadU(words, m_what.data() + from);
+        const Words tag = hn::LoadU(words, m_tag.data() + from);
         const Tally& near = m_job.tallies[0][0];
         const Tally& far = m_job.tallies[0][1];
-        const auto order = hn::BitCast(integers, hn::And(what, hn::Set(words, order_bits)));
+        const auto order = hn::BitCast(integers, hn::And(tag, hn::Set(words, order_bits)));
         const auto mirrored = hn::Lt(order, hn::Set(integers, static_cast<int>(near.mirrored_orders)));
-        const FloatMask transmitted = float_mask(hn::TestBit(what, hn::Set(words, 1u << side_shift)));
+        const FloatMask transmitted = float_mask(hn::TestBit(tag, hn::Set(words, 1u << side_shift)));
         Floats u = hn::IfThenElse(transmitted, broadcast(far.poles[0]), broadcast(near.poles[0]));
         auto rows_before = hn::Zero(integers);
         for (std::size_t pole = 1; pole < pole_count; ++pole) {
-            // Light on the near side had an odd number, see pole_of.
+            // Pole p of the near side needs 2 p - 1 reflections, of the far side 2 p: see pole_of.
             const auto reflection = static_cast<std::uint32_t>(2 * (pole - 1));
             const Words bit =
                 hn::IfThenElse(hn::RebindMask(words, transmitted), hn::Set(words, reflection_bit(reflection + 1)),
                                hn::Set(words, reflection_bit(reflection)));
-            const auto here = hn::And(mirrored, hn::RebindMask(integers, hn::TestBit(what, bit)));
+            const auto here = hn::And(mirrored, hn::RebindMask(integers, hn::TestBit(tag, bit)));
             u = hn::IfThenElse(hn::RebindMask(floats, here),
                                hn::IfThenElse(transmitted, broadcast(far.poles[pole]), broadcast(near.poles[pole])), u);
             rows_before = hn::IfThenElse(here, hn::Set(integers, static_cast<int>(first_row(pole))), rows_before);
@@ -180,19 +179,19 @@ private:
         hn::StoreU(row, integers, m_row.data() + from);
     }
 
-    static HWY_INLINE std::size_t batch_of(std::uint32_t what) { return (what & batch_bits) >> batch_shift; }
+    static HWY_INLINE std::size_t batch_of(std::uint32_t tag) { return (tag & batch_bits) >> batch_shift; }
 
-    HWY_INLINE Tally& tally_of(std::uint32_t what) const
+    HWY_INLINE Tally& tally_of(std::uint32_t tag) const
     {
-        return (*m_tallies[batch_of(what)])[(what >> side_shift) & 1u];
+        return (*m_tallies[batch_of(tag)])[(tag >> side_shift) & 1u];
     }
 
     HWY_INLINE double* find_ring(std::size_t i) const
     {
-        return tally_of(m_what[i]).ring(static_cast<std::size_t>(m_row[i]), static_cast<std::size_t>(m_radius_bin[i]));
+        return tally_of(m_tag[i]).ring(static_cast<std::size_t>(m_row[i]), static_cast<std::size_t>(m_radius_bin[i]));
     }
 
-    // The processor cannot foresee which ring is next, and would wait for memory at each.
+    // Prefetches a ring, which the processor cannot predict.
     HWY_INLINE void fetch_ring(std::size_t i) const
     {
         const double* ring = m_ring[i];
@@ -203,15 +202,15 @@ private:
 
     HWY_INLINE void add_one(std::size_t i)
     {
-        const std::uint32_t what = m_what[i];
-        const std::size_t batch = batch_of(what);
-        const std::size_t side = (what >> side_shift) & 1u;
+        const std::uint32_t tag = m_tag[i];
+        const std::size_t batch = batch_of(tag);
+        const std::size_t side = (tag >> side_shift) & 1u;
         const auto row = static_cast<std::size_t>(m_row[i]);
         const std::size_t bin = order_bin_of(row);
-        Tally& tally = tally_of(what);
+        Tally& tally = tally_of(tag);
         add_blocks(m_ring[i], harmonics_of(row), m_x[i], m_weight[i]);
         const auto w = static_cast<double>(m_weight[i]);
-        const double n = static_cast<double>(what & order_bits);
+        const double n = static_cast<double>(tag & order_bits);
         m_job.weights[batch][side][bin] += w;
         tally.weight[bin] += w;
         tally.weight_order[bin] += w * n;
@@ -221,7 +220,7 @@ private:
     using DoubleTag = hn::CappedTag<double, 8>;
     using Doubles = hn::Vec<DoubleTag>;
 
-    // The values of the lanes whose number has this bit, times a factor; the others as they are.
+    // Multiplies the lanes whose index has this bit by a factor.
     static HWY_INLINE Doubles times_where(std::uint64_t bit, Doubles values, double factor)
     {
         const DoubleTag doubles;
@@ -261,12 +260,12 @@ private:
     }
 
     const WalkJob& m_job;
-    std::vector<SideTallies*> m_tallies;  // of each batch: a division for each exit would take time
+    std::vector<SideTallies*> m_tallies;  // [batch]; saves a division per exit
     std::size_t m_count = 0;
-    Queue<float> m_x{};  // then cos(phi)
+    Queue<float> m_x{};  // replaced by cos(phi) in find_bins
     Queue<float> m_y{};
     Queue<float> m_weight{};
-    Queue<std::uint32_t> m_what{};
+    Queue<std::uint32_t> m_tag{};
     Queue<std::int32_t> m_row{};
     Queue<std::int32_t> m_radius_bin{};
     Queue<double*> m_ring{};

@@ -16,7 +16,7 @@ Vec3 scatter(const Vec3& w, double g, Random& random)
 {
     const double cos_theta = henyey_greenstein_sample(g, random.uniform());
     const double sin_theta = std::sqrt(std::max(0.0, 1.0 - cos_theta * cos_theta));
-    // A uniform azimuth, as (a, b) / sqrt(s) of a point in the unit disk.
+    // Sample a uniform azimuth as (a, b) / sqrt(s), with (a, b) uniform in the unit disk.
     double a, b, s;
     do {
         a = 2.0 * random.uniform() - 1.0;
@@ -25,11 +25,11 @@ Vec3 scatter(const Vec3& w, double g, Random& random)
     } while (s >= 1.0 || s == 0.0);
     const double scale = sin_theta / std::sqrt(s);
     const Vec3 out = Frame(w).to_world({a * scale, b * scale, cos_theta});
-    // One step of Newton's method keeps the length at 1 over a million scatterings.
+    // Renormalize by one step of Newton's method, which keeps the length at 1 over a million scatterings.
     return out * (1.5 - 0.5 * glm::dot(out, out));
 }
 
-// A direction of length 1 around the z axis, at a uniform azimuth.
+// Unit vector at this angle from the z axis and a uniform azimuth.
 Vec3 around_z(double cos_theta, Random& random)
 {
     const double phi = 2.0 * pi * random.uniform();
@@ -64,7 +64,7 @@ public:
     }
 
 private:
-    // One flight, with its expected exit, and the scattering or reflection at its end; false: the photon left.
+    // Makes one flight, tallies its expected exit, and scatters or reflects at its end. False if the photon left.
     bool step_early()
     {
         const double to_boundary = distance_to_boundary(m_w);
@@ -81,7 +81,7 @@ private:
         return true;
     }
 
-    // The same, tallying the exit that happens; false: the photon left or was given up.
+    // Makes one flight and tallies an actual exit. False if the photon left or lost the roulette.
     bool step_late()
     {
         const double to_boundary = distance_to_boundary(m_w);
@@ -89,7 +89,7 @@ private:
         if (flight >= to_boundary) {
             if (reflect(to_boundary))
                 return true;
-            // Fresnel's transmittance is in the decision, and not in the tally.
+            // The random decision above accounts for Fresnel's transmittance; the tally must not.
             tally(m_w, to_boundary, 1.0);
             return false;
         }
@@ -97,7 +97,7 @@ private:
         return m_order < m_next_roulette || survive_roulette();
     }
 
-    // Far from the boundary the flight itself decides whether its exit is tallied: it comes this close with the
+    // Far from the boundary the flight's length decides at random whether its exit is tallied: it comes this close with
     // probability exp(-to_boundary) / rare_exit.
     void tally_expected(double flight, double to_boundary)
     {
@@ -112,7 +112,7 @@ private:
         ++m_order;
     }
 
-    // Fresnel's decision at the boundary; false: the photon leaves.
+    // Reflects with the probability of Fresnel's reflectance. False if the photon leaves.
     bool reflect(double to_boundary)
     {
         if (m_random.uniform() >= fresnel(std::abs(m_w.z), 1.0 / m_medium.ior))
@@ -134,15 +134,15 @@ private:
         return true;
     }
 
-    // In units of free paths; infinite where nothing can leave.
+    // Distance in mean free paths; infinite toward the far side of a half-space.
     double distance_to_boundary(const Vec3& w) const
     {
         const double depth = w.z < 0.0 ? m_x.z : m_medium.thickness - m_x.z;
-        // |w.z| from below: a flight along the surface has a finite end that it never reaches.
+        // The bound on |w.z| gives flights along the surface a finite end, which they never reach.
         return depth / std::max(std::abs(w.z), 1e-300);
     }
 
-    // Adds an exit along w that happens with the given probability, instead of waiting for it.
+    // Tallies the expected value of an exit along w that happens with this probability.
     void tally_exit(const Vec3& w, double to_boundary, double probability)
     {
         const double reflectance = fresnel(std::abs(w.z), 1.0 / m_medium.ior);
@@ -157,15 +157,15 @@ private:
                                                       pole_of(m_reflections, side), m_weight * probability);
     }
 
-    // Density per steradian of the connections below: proportional to the cosine, inside the cone that
-    // internal reflection lets out.
+    // Density per steradian of sampled connections: proportional to the cosine, inside the cone that can leave.
     double connection_pdf(const Vec3& w) const
     {
         return w.z * w.z > 1.0 - m_plan.exit_cone ? std::abs(w.z) * inv_pi / m_plan.exit_cone : 0.0;
     }
 
-    // An exit of low order is sampled in two ways, by the phase function (the walk itself) and by a direction chosen
-    // among those that leave, weighted by the balance heuristic (Veach, Guibas 1995, doi:10.1145/218380.218498).
+    // Exits of low order have two sampling strategies: the phase function (the walk itself) and a connection, a
+    // direction chosen inside the cone that can leave. The balance heuristic weights them (Veach, Guibas 1995,
+    // doi:10.1145/218380.218498).
     void tally_connections(const Vec3& before)
     {
         const double phase = henyey_greenstein_pdf(glm::dot(before, m_w), m_medium.g);
@@ -176,7 +176,7 @@ private:
             connect(before, 1.0);
     }
 
-    // From deep inside an exit is rare: as many fewer are sampled as exp(-depth) is below rare_exit.
+    // Samples one connection. From deep inside, where exp(-depth) is below rare_exit, only that fraction is sampled.
     void connect(const Vec3& before, double side)
     {
         const double depth = side < 0.0 ? m_x.z : m_medium.thickness - m_x.z;
@@ -203,7 +203,7 @@ private:
     Vec3 m_x{0.0};  // mean free paths; z points into the medium
     Vec3 m_w;
     double m_weight = 1.0;
-    double m_exit_weight = 1.0;  // of the exit along the walk, among the ways to sample it
+    double m_exit_weight = 1.0;  // balance heuristic of the exit along the walk
     std::uint32_t m_order = 0;
     std::uint32_t m_reflections = 0;  // see transport/tally/poles.h
     std::uint32_t m_next_roulette;

@@ -1,6 +1,6 @@
-// The photon walk of walk.cpp for many photons at a time, one in each lane of a vector. As many as a vector holds start
-// together and make their early flights, whose exits are tallied at their expected values; those that are left join a
-// pool, from which vectors are filled for the flights that follow. The oldest instruction set runs the scalar walk.
+// The photon walk of walk.cpp with one photon in each vector lane. The photons of a vector start together and make
+// their early flights, which tally expected exits. Survivors join a pool, which fills the vectors for later flights.
+// The oldest instruction set runs the scalar walk.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "transport/walk/walk_packets.cpp"
@@ -21,7 +21,7 @@ HWY_BEFORE_NAMESPACE();
 namespace beamspread {
 namespace HWY_NAMESPACE {
 
-// Flights of the photons in the pool between two looks at which of them are left: 2 and 8 take as long, within 10 %.
+// Flights between two compactions of the pool. More: fewer compactions, more idle lanes.
 constexpr int flights_per_sweep = 4;
 
 class PacketWalk {
@@ -50,7 +50,7 @@ public:
     }
 
 private:
-    // Whether a batch has photons left to start.
+    // Moves to the next batch with photons left to start. True if there is one.
     bool next_batch()
     {
         while (m_batch < m_job.photons.size() && m_started == m_job.photons[m_batch]) {
@@ -60,7 +60,7 @@ private:
         return m_batch < m_job.photons.size();
     }
 
-    // As many photons of the batch as a vector holds.
+    // Starts one vector of the batch's photons.
     HWY_INLINE FloatMask start(Photons& photons)
     {
         const std::uint64_t left = m_job.photons[m_batch] - m_started;
@@ -81,13 +81,13 @@ private:
         return hn::FirstN(floats, count);
     }
 
-    // From the entry to the scattering after `last_expected_order`.
+    // Walks one vector from the entry to the scattering after `last_expected_order`.
     HWY_NOINLINE void walk_early()
     {
         Photons photons;
         FloatMask active = start(photons);
         PacketRandom random(m_random);
-        Floats exit_weight = broadcast(1.0);  // of the exit along the walk, among the ways to sample it
+        Floats exit_weight = broadcast(1.0);  // balance heuristic of the exit along the walk
         while (!hn::AllFalse(floats, active)) {
             const Photons from = photons;
             const Flight flight = fly(m_medium, from, random);
@@ -125,7 +125,7 @@ private:
         random.store();
     }
 
-    // Some more flights of all photons in the pool.
+    // Makes `flights_per_sweep` flights of all photons in the pool.
     HWY_NOINLINE void walk_late()
     {
         PacketRandom random(m_random);
@@ -142,7 +142,7 @@ private:
         random.store();
     }
 
-    // One flight, and the scattering or reflection at its end; returns who goes on.
+    // Makes one flight, then scatters or reflects at its end. Returns the photons that continue.
     HWY_INLINE FloatMask step(Photons& photons, FloatMask active, PacketRandom& random)
     {
         const Photons from = photons;
@@ -153,7 +153,7 @@ private:
             const FloatMask is_reflected =
                 hn::And(hits, hn::Lt(random.uniform(), m_medium.boundary.reflectance(flight.cosine)));
             reflect(photons, is_reflected, from, to_boundary, m_medium.thickness);
-            // Fresnel's transmittance is in the decision, and not in the tally.
+            // The random decision above accounts for Fresnel's transmittance; the tally must not.
             const FloatMask leaves = hn::AndNot(is_reflected, hits);
             tally(leaves, from, from.w, to_boundary, from.weight);
             active = hn::AndNot(leaves, active);
@@ -164,7 +164,7 @@ private:
         return active;
     }
 
-    // Returns who survives.
+    // Returns the survivors.
     HWY_INLINE FloatMask play_roulette(Photons& photons, FloatMask at_risk, PacketRandom& random) const
     {
         const FloatMask late = greater(photons.order, hn::Set(words, last_common_order));
@@ -185,14 +185,14 @@ private:
                     hn::Or(hn::Or(from.order, from.batch), side));
     }
 
-    // Far from the boundary the flight itself decides whether its exit is tallied: it comes this close with the
+    // Far from the boundary the flight's length decides at random whether its exit is tallied: it comes this close with
     // probability exp(-to_boundary) / rare_exit.
     static HWY_INLINE FloatMask comes_close(const Flight& flight)
     {
         return hn::Ge(hn::Mul(hn::Add(flight.length, broadcast(rare_exit_distance)), flight.cosine), flight.depth);
     }
 
-    // The exits along flights that begin here, instead of waiting for one.
+    // Tallies the expected exits of flights that begin at `from`.
     HWY_INLINE void tally_expected(FloatMask close, const Photons& from, Floats to_boundary, Floats reflectance,
                                    Floats exit_weight)
     {
@@ -205,15 +205,14 @@ private:
               hn::Mul(hn::Mul(from.weight, transmittance), hn::Mul(escape, exit_weight)));
     }
 
-    // Density per steradian of the connections below: proportional to the cosine, inside the cone that
-    // internal reflection lets out.
+    // Density per steradian of sampled connections: proportional to the cosine, inside the cone that can leave.
     HWY_INLINE Floats connection_pdf(Floats wz) const
     {
         const FloatMask inside = hn::Gt(hn::Mul(wz, wz), broadcast(1.0 - m_plan.exit_cone));
         return hn::IfThenElseZero(inside, hn::Mul(hn::Abs(wz), broadcast(inv_pi / m_plan.exit_cone)));
     }
 
-    // An exit after a scattering, sampled by a direction that leaves: see Walk::connect.
+    // Samples one connection per photon: see Walk::connect.
     HWY_INLINE void connect(FloatMask mask, const Photons& at, const Vectors& before, double side, PacketRandom& random)
     {
         const Floats depth = side < 0.0 ? at.x.z : hn::Sub(hn::Set(floats, m_medium.thickness), at.x.z);
@@ -245,7 +244,7 @@ private:
     RandomState m_random{};
     std::size_t m_batch = 0;
     std::uint64_t m_started = 0;  // photons of the batch
-    std::uint64_t m_unreported = 0;  // photons
+    std::uint64_t m_unreported = 0;  // started photons
 };
 
 void walk_packets(const WalkJob& job)
