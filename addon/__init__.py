@@ -33,8 +33,7 @@ else:
     from .core.bake.convolve import adaptive_beams, convolve, convolve_lights, luminance
     from .core.ldf.albedo import albedo_from_color
     from .core.ldf.library import library
-    from .core.material.material import Material
-    from .core.material.presets import presets
+    from .core.material import Material, presets
 
     AngularSpace = native.AngularSpace
     Cancelled = native.Cancelled

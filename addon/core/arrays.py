@@ -1,4 +1,4 @@
-"""Array arguments: converted only where nothing is lost on the way."""
+"""Array arguments, converted without loss."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ def float_array(name: str, values, dtype=np.float32, allowed="real numbers, none
     Raises
     ------
     ValueError
-        Names the argument that is no array of real numbers: a ragged one, text, complex numbers, masked values.
+        The argument is no array of real numbers (ragged, text, complex or masked). Names the argument.
     """
     if np.ma.is_masked(values):
         raise ValueError(f"argument {name!r} is an array with masked values; allowed: {allowed}")

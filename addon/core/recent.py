@@ -1,10 +1,10 @@
-"""What was used last, kept."""
+"""Least-recently-used cache."""
 
 
-def keep_recent(kept: dict, key, value, most: int):
-    """Put the value last, drop the first where there are more than `most`; returns the value."""
-    kept.pop(key, None)
-    kept[key] = value
-    while len(kept) > most:
-        del kept[next(iter(kept))]
+def keep_recent(cache: dict, key, value, capacity: int):
+    """Make the value the most recent entry, drop the oldest beyond `capacity`, and return the value."""
+    cache.pop(key, None)
+    cache[key] = value
+    while len(cache) > capacity:
+        del cache[next(iter(cache))]
     return value

@@ -21,7 +21,7 @@ from beamspread.core.bake.surface import Surface
 from beamspread.core.live.media import Media
 from beamspread.core.live.picture import Studio, for_live
 from beamspread.core.live.subject import Subject
-from beamspread.core.material.material import Material
+from beamspread.core.material import Material
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import PointLight, SunLight
 from beamspread.core.scene.occluders import Mesh

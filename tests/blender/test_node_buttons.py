@@ -12,7 +12,7 @@ from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.node import draw, principled
 from beamspread.blender.node.buttons import BEAMSPREAD_OT_from_principled
-from beamspread.core.material.principled import ior_of_reflectance, transport_length
+from beamspread.core.material import ior_of_reflectance, transport_length
 from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
 
 IS_BEFORE_4 = bpy.app.version < (4, 0, 0)

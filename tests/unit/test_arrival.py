@@ -10,7 +10,7 @@ from beamspread.core.bake.bake_settings import COMBINED, DIRECTION, IRRADIANCE, 
 from beamspread.core.bake.job import BakeJob
 from beamspread.core.bake.runner import Bake
 from beamspread.core.bake.surface import Surface
-from beamspread.core.material.material import Material
+from beamspread.core.material import Material
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination, Mesh
 from beamspread.core.scene.lights import PointLight, SunLight

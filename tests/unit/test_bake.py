@@ -15,7 +15,7 @@ from beamspread.core.bake.luminance import bake
 from beamspread.core.bake.runner import Bake
 from beamspread.core.bake.surface import Surface
 from beamspread.core.errors import MaterialError
-from beamspread.core.material.material import Material
+from beamspread.core.material import Material
 from beamspread.core.messages import warning
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination

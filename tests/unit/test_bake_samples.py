@@ -10,7 +10,7 @@ from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.luminance import bake
 from beamspread.core.errors import BakeError
 from beamspread.core.ldf.samples import load_source
-from beamspread.core.material.material import Material
+from beamspread.core.material import Material
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import SunLight

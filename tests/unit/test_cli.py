@@ -10,8 +10,8 @@ import time
 import numpy as np
 import pytest
 from beamspread import LdfLibrary, Medium, presets, simulate
-from beamspread.core.cli import picture
-from beamspread.core.cli.totals import totals_table
+from beamspread.core.cli import plot
+from beamspread.core.cli.terminal import totals_table
 from PIL import Image
 
 COMMAND = [sys.executable, "-m", "beamspread"]
@@ -250,17 +250,17 @@ def test_ctrl_c_leaves_at_once_and_nothing_behind(tmp_path):
 def test_any_number_of_maps_can_be_drawn(slab_file, tmp_path, count):
     library = LdfLibrary.load(slab_file)
     albedos = [0.0, 0.2, 0.5, 0.9, 0.99, 0.999][-count:]
-    maps = picture.read_maps(library, 20, albedos, 31, 0.3, "transmitted")
-    figure = picture.draw(maps, totals_table(library, 20, albedos), ["note"])
+    maps = plot.read_maps(library, 20, albedos, 31, 0.3, "transmitted")
+    figure = plot.draw(maps, totals_table(library, 20, albedos), ["note"])
     boxes = [ax.get_position() for ax in figure.axes]
     assert len(boxes) == count + 3
     assert all(0 <= edge <= 1 for box in boxes for edge in box.extents)
-    picture.save(figure, str(tmp_path / "map.png"))
+    plot.save(figure, str(tmp_path / "map.png"))
 
 
 def test_a_map_without_light_can_be_drawn(tmp_path):
     """Albedo 0 in a half-space: nothing comes back, and there is no logarithm of it."""
     library = simulate(Medium(), [0], 100)
-    maps = picture.read_maps(library, 0, [0.0], 11, 1.0, "reflected")
-    picture.save(picture.draw(maps, totals_table(library, 0, [0.0]), []), str(tmp_path / "map.png"))
+    maps = plot.read_maps(library, 0, [0.0], 11, 1.0, "reflected")
+    plot.save(plot.draw(maps, totals_table(library, 0, [0.0]), []), str(tmp_path / "map.png"))
     assert (tmp_path / "map.png").stat().st_size > 1000

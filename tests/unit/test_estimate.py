@@ -16,7 +16,7 @@ from beamspread.core.bake.job import BakeJob
 from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.surface import Surface
 from beamspread.core.errors import BakeError
-from beamspread.core.material.material import Material
+from beamspread.core.material import Material
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import PointLight, SunLight, WorldLight
 from beamspread.core.scene.receiver import build_receiver

@@ -10,7 +10,7 @@ from beamspread.core.bake.job import BakeJob
 from beamspread.core.bake.luminance import bake
 from beamspread.core.bake.surface import Surface
 from beamspread.core.ldf.library import library
-from beamspread.core.material.material import Material
+from beamspread.core.material import Material
 from beamspread.core.native import native
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination

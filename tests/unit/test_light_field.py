@@ -12,7 +12,7 @@ import pytest
 from beamspread.core.bake import luminance
 from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.luminance import TOLERANCE, bake
-from beamspread.core.material.material import Material
+from beamspread.core.material import Material
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import WIDEST_SUN, AreaLight, PointLight, SpotLight, SunLight, WorldLight

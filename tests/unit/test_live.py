@@ -16,7 +16,7 @@ from beamspread.core.live.pace import BUDGET_SECONDS, FIRST_SIDE, SIDES, Pace
 from beamspread.core.live.painter import Painter
 from beamspread.core.live.picture import FramedReceiver, Studio, for_live
 from beamspread.core.live.subject import Subject
-from beamspread.core.material.material import Material
+from beamspread.core.material import Material
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import AreaLight, PointLight, SunLight
 from beamspread.core.scene.receiver import Receiver, build_receiver

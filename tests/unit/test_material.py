@@ -8,8 +8,8 @@ import pytest
 from beamspread import Material, presets
 from beamspread.core.bake.surface import Surface
 from beamspread.core.errors import MaterialError
-from beamspread.core.ldf.albedo import HIGHEST_ALBEDO, albedo_from_color, albedo_from_reflectance
-from beamspread.core.material.material import check_thickness
+from beamspread.core.ldf.albedo import MAX_ALBEDO, albedo_from_color, albedo_from_reflectance
+from beamspread.core.material import check_thickness
 
 GOOD = {"albedo": (0.9, 0.5, 0.0), "mean_free_path": (1e-3, 2e-3, 3e-3)}
 
@@ -120,7 +120,7 @@ def test_albedo_from_reflectance_inverts():
 
 
 def test_a_color_that_a_medium_cannot_reflect_becomes_its_extreme():
-    assert albedo_from_reflectance(0.95, lambda albedo: 0.2 + 0.7 * albedo) == HIGHEST_ALBEDO
+    assert albedo_from_reflectance(0.95, lambda albedo: 0.2 + 0.7 * albedo) == MAX_ALBEDO
     assert albedo_from_reflectance(0.1, lambda albedo: 0.2 + 0.7 * albedo) == 0
 
 
@@ -138,14 +138,14 @@ def noisy(request, monkeypatch):
 
 def test_color_to_albedo_and_back(noisy):
     medium, simulated = noisy
-    darkest, brightest = simulated.diffuse_reflectance(0.0), simulated.diffuse_reflectance(HIGHEST_ALBEDO)
+    darkest, brightest = simulated.diffuse_reflectance(0.0), simulated.diffuse_reflectance(MAX_ALBEDO)
     colors = np.linspace(0, 1, 13)
     albedos = np.array([albedo_from_color(color, medium)[0] for color in colors])
     assert (np.diff(albedos) >= 0).all()
     assert (np.diff(albedos)[(colors[1:] < brightest) & (colors[:-1] > darkest)] > 0).all()
     back = [simulated.diffuse_reflectance(albedo) for albedo in albedos]
     assert back == pytest.approx(np.clip(colors, darkest, brightest), abs=1e-9)
-    assert 0.9999 < albedos[-1] <= HIGHEST_ALBEDO
+    assert 0.9999 < albedos[-1] <= MAX_ALBEDO
 
 
 def test_diffuse_reflectance_is_the_mean_over_the_hemisphere(noisy):

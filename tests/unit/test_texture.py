@@ -8,7 +8,7 @@ import pytest
 from beamspread.core.bake.arrival import arrive
 from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.luminance import bake
-from beamspread.core.material.material import Material
+from beamspread.core.material import Material
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import AreaLight, PointLight, SunLight

@@ -7,8 +7,7 @@ from bpy.app.handlers import persistent
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty, StringProperty
 
 from ...core.bake.surface import Surface
-from ...core.material.material import Material
-from ...core.material.presets import presets
+from ...core.material import Material, presets
 from ...core.messages import Message
 from .. import compat
 from ..registration import all_or_nothing, handlers

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...core.material.principled import (
+from ...core.material import (
     FIXED_RADIUS,
     MEAN_FREE_PATH,
     ior_of_reflectance,

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import float_array
 from ..ldf.library import library
-from ..material.material import Material
+from ..material import Material
 from ..native import native
 from ..progress import Progress, stages
 

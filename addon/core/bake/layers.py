@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..material.material import Material
+from ..material import Material
 from ..progress import Progress
 from ..scene.grid import Grid
 from .arrival import arrive, mean_direction

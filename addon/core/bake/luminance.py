@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import BakeError
 from ..ldf.library import library
 from ..ldf.samples import load_source
-from ..material.material import Material, check_thickness
+from ..material import Material, check_thickness
 from ..native import native
 from ..progress import Progress, stages
 from ..scene.grid import Grid

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..ldf.albedo import albedo_from_color
-from ..material.material import RGB, Material, check_base_color, check_thickness
+from ..material import RGB, Material, check_base_color, check_thickness
 from ..native import native
 from ..progress import Progress, stages
 

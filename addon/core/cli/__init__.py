@@ -1,1 +1,1 @@
-"""The command line: options, commands, pictures; needs no Blender, and matplotlib only to draw."""
+"""The command line `python3 -m beamspread`. Needs no Blender; the plots need matplotlib."""

@@ -1,4 +1,4 @@
-"""The commands: each takes its options, prints its result, and raises what goes wrong."""
+"""The commands. Each takes its options, prints its result, and raises errors."""
 
 from __future__ import annotations
 
@@ -8,43 +8,42 @@ from pathlib import Path
 
 from ..ldf.albedo import albedo_from_color
 from ..ldf.library import angles_for, library, photons_for
-from ..material.presets import presets
+from ..material import presets
 from ..native import native
-from .bar import ProgressBar
-from .options import MOST_MAPS
-from .totals import describe, specular, text_table, totals_table
+from .options import MAX_MAPS
+from .terminal import ProgressBar, describe, specular, text_table, totals_table
 
-PICTURES = (".png", ".pdf", ".svg")
+PLOT_ENDINGS = (".png", ".pdf", ".svg")
 
 
 class CommandError(Exception):
-    """Something that keeps a command from its result, in one sentence."""
+    """A reason why a command cannot produce its result."""
 
 
 def ldf(options) -> None:
     """Print the totals of an LDF and draw its maps."""
-    if len(options.albedo) > MOST_MAPS:
-        raise ValueError(f"--albedo has {len(options.albedo)} values; allowed: 1 to {MOST_MAPS}")
+    if len(options.albedo) > MAX_MAPS:
+        raise ValueError(f"--albedo has {len(options.albedo)} values; allowed: 1 to {MAX_MAPS}")
     if options.library and (options.g, options.ior, options.thickness) != (None, None, None):
         raise ValueError("--library has a medium of its own: leave out --g, --ior and --thickness")
-    saved = native.LdfLibrary.load(options.library) if options.library else None
-    medium = saved.medium if saved else _medium(options)
+    loaded = native.LdfLibrary.load(options.library) if options.library else None
+    medium = loaded.medium if loaded else _medium(options)
     if options.side == "transmitted" and math.isinf(medium.thickness):
         raise ValueError("--side is transmitted; a half-space has no far side: give --thickness")
     if options.output:
-        # Before the simulation: who waited for it should get the picture.
-        _check_target(options.output, PICTURES)
-        picture = _picture_module()
-    source = saved or _simulated(medium, options.quality)
+        # Check before the simulation, which takes long.
+        _check_target(options.output, PLOT_ENDINGS)
+        plot = _plot_module()
+    source = loaded or _simulated(medium, options.quality)
     rows = totals_table(source, options.angle, options.albedo)
-    lost = f"{100 * specular(medium, options.angle):.1f} % is reflected before it enters"
-    photons = f"{source.photons} photons per angle"
-    print(f"{describe(medium)}; beam at {options.angle:g} degrees, of which {lost}; {photons}")
+    specular_note = f"{100 * specular(medium, options.angle):.1f} % is reflected before it enters"
+    photons_note = f"{source.photons} photons per angle"
+    print(f"{describe(medium)}; beam at {options.angle:g} degrees, of which {specular_note}; {photons_note}")
     print(text_table(rows), flush=True)
     if options.output:
-        pitch = options.pitch or picture.default_pitch(medium, options.size)
-        maps = picture.read_maps(source, options.angle, options.albedo, options.size, pitch, options.side)
-        picture.save(picture.draw(maps, rows, [lost, photons]), options.output)
+        pitch = options.pitch or plot.default_pitch(medium, options.size)
+        maps = plot.read_maps(source, options.angle, options.albedo, options.size, pitch, options.side)
+        plot.save(plot.draw(maps, rows, [specular_note, photons_note]), options.output)
 
 
 def simulate(options) -> None:
@@ -55,8 +54,8 @@ def simulate(options) -> None:
     photons = options.photons or photons_for(medium, options.quality)
     start = time.monotonic()
     with ProgressBar("simulating") as progress:
-        plain = native.simulate(medium, angles, photons, seed=options.seed, threads=options.threads, progress=progress)
-        result = plain.calibrated(options.threads)
+        raw = native.simulate(medium, angles, photons, seed=options.seed, threads=options.threads, progress=progress)
+        result = raw.calibrated(options.threads)
     seconds = time.monotonic() - start
     result.save(options.output)
     size = Path(options.output).stat().st_size / 1e6
@@ -93,8 +92,8 @@ def albedo(options) -> None:
     color = options.color if len(options.color) == 3 else options.color * 3
     values = albedo_from_color(color, medium, quality=options.quality)
     rows = [("channel", "color", "albedo", "reflects")]
-    for channel, wanted, value in zip(("red", "green", "blue"), color, values):
-        rows.append((channel, f"{wanted:g}", f"{value:.6f}", f"{source.diffuse_reflectance(value):.4f}"))
+    for channel, target, value in zip(("red", "green", "blue"), color, values):
+        rows.append((channel, f"{target:g}", f"{value:.6f}", f"{source.diffuse_reflectance(value):.4f}"))
     print(f"{describe(medium)}, under uniform diffuse light")
     print(text_table(rows))
 
@@ -122,12 +121,12 @@ def _check_target(path: str, endings: tuple[str, ...]) -> None:
         raise CommandError(f"{path} is a folder; name a file")
 
 
-def _picture_module():
+def _plot_module():
     try:
-        from . import picture
+        from . import plot
     except ImportError as error:
         raise CommandError(
             "drawing needs matplotlib, which this Python does not have "
             f"(apt install python3-matplotlib, or pip install matplotlib): {error}"
         ) from error
-    return picture
+    return plot

@@ -1,4 +1,4 @@
-"""Runs one command and turns whatever happens into an exit code and at most one sentence."""
+"""Runs one command; turns errors into an exit code and a message of one line."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         COMMANDS[options.command](options)
         sys.stdout.flush()
     except (KeyboardInterrupt, native.Cancelled):
-        return _complain(options, "cancelled", INTERRUPTED)
+        return _fail(options, "cancelled", INTERRUPTED)
     except BrokenPipeError:
-        # Whoever reads has had enough, as `head` does; Python would complain once more when it closes the stream.
+        # The reader has closed the pipe, as `head` does. Python would report that again when it closes stdout.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
     except (CommandError, OSError) as error:
-        return _complain(options, str(error), FAILED)
+        return _fail(options, str(error), FAILED)
     except MemoryError:
-        return _complain(options, "there is not enough memory", FAILED)
+        return _fail(options, "there is not enough memory", FAILED)
     except ValueError as error:
-        return _complain(options, str(error), WRONG_USE)
+        return _fail(options, str(error), WRONG_USE)
     return DONE
 
 
-def _complain(options, sentence: str, code: int) -> int:
-    print(f"{PROGRAM} {options.command}: {sentence}", file=sys.stderr)
+def _fail(options, message: str, code: int) -> int:
+    print(f"{PROGRAM} {options.command}: {message}", file=sys.stderr)
     return code

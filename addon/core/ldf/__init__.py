@@ -1,1 +1,1 @@
-"""Luminance distribution functions: simulated, cached, shipped or an artist's own."""
+"""Luminance distribution functions: simulated, cached, shipped, or from an artist's samples."""

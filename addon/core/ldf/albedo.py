@@ -1,4 +1,4 @@
-"""The albedo that transport needs, from the colour that an artist picks."""
+"""Single-scattering albedo of a medium with a given colour."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import float_array
-from ..material.material import RGB
+from ..material import RGB
 from ..native import native
 from ..progress import Progress
 from .library import library
 
-HIGHEST_ALBEDO = 0.99999
-"""What a colour too bright for its medium becomes: simulations follow light for enough scatterings up to here."""
+MAX_ALBEDO = 0.99999
+"""Albedo of colours that are too bright for their medium. Simulations follow light for enough scatterings up to it."""
 
 
 def albedo_from_color(
@@ -22,15 +22,14 @@ def albedo_from_color(
 ) -> RGB:
     """Single-scattering albedo whose reflectance under uniform diffuse light is `color`.
 
-    It grows with the colour, from 0 for black. No medium reflects everything: some light is reflected before it
-    enters, some leaves a slab on the other side. A colour brighter than the medium can be becomes `HIGHEST_ALBEDO`
-    (0.99999), its brightest.
+    The albedo grows with the colour, from 0 for black. Colours brighter than the medium can be get `MAX_ALBEDO`
+    (0.99999): some light is reflected before it enters, and some leaves a slab on the other side.
 
     Parameters
     ----------
     color : float or three, linear RGB in [0, 1]; one number stands for grey.
     medium : Medium.
-    quality : of the LDF used, "final" or "preview".
+    quality : quality of the LDF, "final" or "preview".
 
     Returns
     -------
@@ -39,7 +38,7 @@ def albedo_from_color(
     Raises
     ------
     ValueError
-        A colour outside [0, 1] or that is not a number, or something else than one or three; unknown quality.
+        The colour is not one or three numbers in [0, 1], or the quality is unknown.
     Cancelled
         `progress` returned False.
     """
@@ -58,22 +57,23 @@ def _channels(color: ArrayLike) -> list[float]:
 
 
 def albedo_from_reflectance(value: float, reflectance: Callable[[float], float]) -> float:
-    """Single-scattering albedo whose reflectance is `value`, or the nearest of 0 and `HIGHEST_ALBEDO`.
+    """Single-scattering albedo whose reflectance is `value`; at most `MAX_ALBEDO`, at least 0.
 
     Parameters
     ----------
-    reflectance : of an albedo; grows with it, e.g. `LdfLibrary.diffuse_reflectance`.
+    reflectance : increasing function of the albedo, e.g. `LdfLibrary.diffuse_reflectance`.
     """
-    # Over sqrt(1 - albedo) the reflectance of a medium is almost a straight line where it is bright (van de Hulst's
-    # similarity parameter), which a secant follows well.
-    dark, bright = 1.0, (1 - HIGHEST_ALBEDO) ** 0.5
-    below, above = reflectance(0.0) - value, reflectance(HIGHEST_ALBEDO) - value
+    # Search in sqrt(1 - albedo), van de Hulst's similarity parameter: the reflectance of bright media is almost linear
+    # in it, and a secant converges fast.
+    dark, bright = 1.0, (1 - MAX_ALBEDO) ** 0.5
+    below, above = reflectance(0.0) - value, reflectance(MAX_ALBEDO) - value
     if below >= 0:
         return 0.0
     if above <= 0:
-        return HIGHEST_ALBEDO
-    # Regula falsi; an end that stays twice counts half the next time (Illinois), or it would stay for ever.
-    kept = 0
+        return MAX_ALBEDO
+    # Illinois variant of regula falsi: an end that stays twice counts half (Dowell, Jarratt 1971,
+    # doi:10.1007/BF01934364).
+    unchanged_end = 0
     while abs(dark - bright) > 1e-12:
         middle = dark + (bright - dark) * below / (below - above)
         error = reflectance(1 - middle**2) - value
@@ -81,8 +81,8 @@ def albedo_from_reflectance(value: float, reflectance: Callable[[float], float])
             return 1 - middle**2
         if error < 0:
             dark, below = middle, error
-            above, kept = (above / 2 if kept == 1 else above), 1
+            above, unchanged_end = (above / 2 if unchanged_end == 1 else above), 1
         else:
             bright, above = middle, error
-            below, kept = (below / 2 if kept == -1 else below), -1
+            below, unchanged_end = (below / 2 if unchanged_end == -1 else below), -1
     return 1 - dark**2

@@ -1,4 +1,4 @@
-"""LDF libraries of any medium: from the cache, or simulated now and cached."""
+"""LDF libraries of any medium: shipped, cached, or simulated and then cached."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from ..progress import Progress, say
 from ..recent import keep_recent
 
 PHOTONS = {"preview": 80_000, "final": 4_000_000}
-"""Photons per angle for a medium with g .8 and ior 1; see `photons_for`."""
+"""Photons per angle for a medium with g .8 and ior 1. More: less noise, more time; see `photons_for`."""
 
 SIMULATING = "Simulating the medium, once"
-"""What takes so long, for whoever watches the progress."""
+"""Message of the progress bar during a simulation."""
 
 _MAX_PHOTONS = 4_000_000
+"""Largest number of photons per angle. More: less noise in media of little scattering, more time."""
 
 _FILE_VERSION = 10
-"""Raised when the simulation changes, so that older cached files are made again."""
+"""Version of the simulation. Increment it when the simulation changes, so that cached files are made again."""
 
 SHIPPED_FOLDER = Path(__file__).resolve().parents[2] / "library"
 """Libraries that came with the package, made by ``tools/make_library.py``."""
@@ -30,17 +31,17 @@ SHIPPED_FOLDER = Path(__file__).resolve().parents[2] / "library"
 def angles_for(medium: native.Medium) -> Sequence[float]:
     """Angles of incidence to simulate, degrees.
 
-    Refraction lets the light inside change slowly with the angle outside; without it, the more a phase function peaks
-    forward, the more suddenly light leaves again near grazing. With these angles interpolation moves no total from 0 to
-    85 degrees by more than .15 % (.8 % from 75 degrees on), whatever the albedo, for g -.5 to .95 and
-    thicknesses from .5, up to 1e-6 of the incident power.
+    With refraction the light inside changes slowly with the angle outside. Without it, light leaves the more suddenly
+    near grazing the more the phase function peaks forward. Interpolation between these angles changes totals by at most
+    .15 % below 75 degrees and .8 % up to 85 degrees (besides 1e-6 of the incident power), for g -.5 to .95, thicknesses
+    from .5 and all albedos.
     """
     if medium.ior < 1.02 and medium.thickness <= max(4.0, 0.5 / (1.0 - medium.g)):
-        # The place where the beam leaves the far side runs away toward grazing.
+        # The beam's exit on the far side moves to infinity toward grazing.
         return (0.0, 10.0, 20.0, 30.0, 39.0, 47.0, 54.0, 60.0, 65.0, 69.0, 72.5, 75.3, 77.6, 79.5, 81.1, 82.5, 83.4,
                 84.1, 84.6, 85.0, 86.2, 88.5)  # fmt: skip
     if medium.ior > 1.0 and medium.thickness < 2.0:
-        # What comes back from the far side surrounds the beam's mirror image, which moves with the angle.
+        # Light from the far side surrounds the beam's mirror image, which moves with the angle.
         return (*map(float, range(0, 73, 6)), 76.0, 80.0, 84.0, 88.0)
     if medium.ior >= 1.2:
         return (0.0, 12.0, 24.0, 36.0, 47.0, 57.0, 66.0, 73.0, 79.0, 84.0, 88.0)
@@ -53,12 +54,12 @@ _chosen = {"folder": ""}
 
 
 def choose_cache_folder(folder: str | Path) -> None:
-    """Keep libraries in a folder of the user's from now on; empty: where `cache_folder` has it otherwise."""
+    """Set the folder of cached libraries; empty: the default of `cache_folder`."""
     _chosen["folder"] = str(folder)
 
 
 def cache_folder() -> Path:
-    """Folder of cached libraries: ``$BEAMSPREAD_CACHE``, the one chosen, or the user's cache folder."""
+    """Folder of cached libraries: ``$BEAMSPREAD_CACHE``, else the chosen one, else the user's cache folder."""
     if folder := os.environ.get("BEAMSPREAD_CACHE") or _chosen["folder"]:
         return Path(folder)
     if sys.platform == "win32":
@@ -73,8 +74,8 @@ def cache_folder() -> Path:
 def photons_for(medium: native.Medium, quality: str) -> int:
     """Photons per angle that take about the same time in every medium.
 
-    The number of scatterings before light leaves grows like 1 / (1 - g), in a slab no further than with its thickness,
-    and internal reflection keeps light in longer.
+    The number of scatterings before light leaves grows like 1 / (1 - g), in a slab at most like its thickness, and with
+    internal reflection like ior^2.
     """
     scatterings = min(1.0 / (1.0 - medium.g), 1.0 + medium.thickness)
     return round(min(5.0 * PHOTONS[quality] / scatterings / medium.ior**2, _MAX_PHOTONS))
@@ -90,7 +91,7 @@ def make(
 
 
 def file_name(medium: native.Medium, quality: str) -> str:
-    """Name of the file that holds the library of a medium."""
+    """Name of the file of a medium's shipped library."""
     return f"g{medium.g:g}_ior{medium.ior:g}_thickness{medium.thickness:g}_{quality}.exr"
 
 
@@ -104,25 +105,25 @@ def _cache_path(medium: native.Medium, quality: str) -> Path:
 
 
 def _load(path: Path, medium: native.Medium) -> native.LdfLibrary | None:
-    """The library in a file; None where there is no such file, or where it is damaged or another medium's."""
+    """The library in a file; None if the file is missing, damaged or of another medium."""
     try:
-        found = native.LdfLibrary.load(path)
+        loaded = native.LdfLibrary.load(path)
     except OSError:
         return None
-    whole = found.is_calibrated and tuple(found.angles) == angles_for(medium)
-    return found if whole and found.medium == medium else None
+    complete = loaded.is_calibrated and tuple(loaded.angles) == angles_for(medium)
+    return loaded if complete and loaded.medium == medium else None
 
 
 def _load_shipped(medium: native.Medium, quality: str) -> native.LdfLibrary | None:
     """A shipped library of at least this quality, or None."""
     for name in (quality, "final"):
-        if found := _load(SHIPPED_FOLDER / file_name(medium, name), medium):
-            return found
+        if shipped := _load(SHIPPED_FOLDER / file_name(medium, name), medium):
+            return shipped
     return None
 
 
 def _store(result: native.LdfLibrary, path: Path) -> None:
-    """Caching is a convenience: a full or read-only disk must not cost the bake."""
+    """Save a library to the cache; a full or read-only disk must not fail the bake."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         result.save(path)
@@ -131,7 +132,7 @@ def _store(result: native.LdfLibrary, path: Path) -> None:
 
 
 def cached_files() -> list[Path]:
-    """The files of the cache, which hold libraries only: whatever else lies in the folder is not ours."""
+    """Files of cached libraries. Other files in the folder belong to others."""
     try:
         return sorted(path for path in cache_folder().glob("g*_ior*_thickness*_*.exr") if path.is_file())
     except OSError:
@@ -139,57 +140,58 @@ def cached_files() -> list[Path]:
 
 
 def clear_cache() -> int:
-    """Remove the libraries from the cache, and forget those in memory; the bytes freed."""
+    """Remove all libraries from the cache folder and from memory. Returns the freed bytes."""
     freed = 0
     for path in cached_files():
         try:
             size = path.stat().st_size
             path.unlink()
             freed += size
-        except OSError:  # another process has it, or it is gone
+        except OSError:  # in use by another process, or removed by it
             continue
     _loaded.clear()
     return freed
 
 
 def is_known(medium: native.Medium, quality: str) -> bool:
-    """Whether `library` need not simulate, as far as names of files tell: a damaged file is made again."""
+    """True if `library` need not simulate. Checks names of files alone; damaged files are simulated again."""
     path = _cache_path(medium, quality)
     shipped = (SHIPPED_FOLDER / file_name(medium, name) for name in (quality, "final"))
-    return path in _loaded or path.is_file() or any(one.is_file() for one in shipped)
+    return path in _loaded or path.is_file() or any(file.is_file() for file in shipped)
 
 
 _loaded: dict[Path, native.LdfLibrary] = {}
-"""The libraries used last, by path, oldest first."""
+"""Cache of recently used libraries by path, oldest first."""
 
-_LOADED_LIMIT = 8
+_MAX_LOADED = 8
+"""Capacity of `_loaded`. Larger: fewer files read again, more memory."""
 
 
 def library(
     medium: native.Medium, quality: str = "final", progress: Progress | None = None, threads: int = 0
 ) -> native.LdfLibrary:
-    """LDF library of a medium for every angle of incidence and albedo.
+    """Load the LDF library of a medium, for every angle of incidence and albedo, or simulate it (up to minutes).
 
     Parameters
     ----------
     medium : Medium
     quality : {"final", "preview"}
-        Totals are exact either way, as `LdfLibrary.calibrated` has it; what differs is the noise of the maps, see
-        `LdfLibrary.image_standard_error`.
+        Amount of noise in the maps, see `LdfLibrary.image_standard_error`. Totals are exact with either, see
+        `LdfLibrary.calibrated`.
     progress : callable, optional
-        Called with the finished fraction while a simulation runs; only the answer False (or NumPy's) stops.
+        Called with the finished fraction while a simulation runs. It stops the simulation by returning False.
     threads : int
-        0: all. The result does not depend on it.
+        Number of threads; 0: all. The result does not depend on it.
 
     Returns
     -------
     LdfLibrary
-        One that came with the package, else from the cache folder, else simulated now and cached.
+        The shipped library, else the cached one, else one that is simulated and cached.
 
     Raises
     ------
     ValueError
-        Names the argument that is no Medium, quality or function.
+        An argument is no Medium, quality or function. Names the argument.
     Cancelled
         `progress` returned False.
     """
@@ -197,21 +199,21 @@ def library(
         raise ValueError(f"argument 'medium' is {medium!r}; allowed: a Medium")
     if quality not in PHOTONS:
         raise ValueError(f"argument 'quality' is {quality!r}; allowed: 'final', 'preview'")
-    if known := _at_hand(medium, quality):
-        return known
+    if available := _available_library(medium, quality):
+        return available
     say(progress, SIMULATING + (" (preview)" if quality == "preview" else ""))
-    made = make(medium, quality, progress, threads=threads)
+    simulated = make(medium, quality, progress, threads=threads)
     path = _cache_path(medium, quality)
-    _store(made, path)
-    return keep_recent(_loaded, path, made, _LOADED_LIMIT)
+    _store(simulated, path)
+    return keep_recent(_loaded, path, simulated, _MAX_LOADED)
 
 
 def known_library(medium: native.Medium) -> native.LdfLibrary | None:
-    """The best library of a medium that came with the package or is cached; None where one would be simulated."""
+    """The best shipped or cached library of a medium; None if it must be simulated."""
     return _at_hand(medium, "final") or _at_hand(medium, "preview")
 
 
 def _at_hand(medium: native.Medium, quality: str) -> native.LdfLibrary | None:
     path = _cache_path(medium, quality)
-    found = _loaded.get(path) or _load_shipped(medium, quality) or _load(path, medium)
-    return found and keep_recent(_loaded, path, found, _LOADED_LIMIT)
+    available = _loaded.get(path) or _load_shipped(medium, quality) or _load(path, medium)
+    return available and keep_recent(_loaded, path, available, _MAX_LOADED)

@@ -1,4 +1,4 @@
-"""LDF samples of an artist's own: a folder of EXR files in place of a simulated library."""
+"""Folders of LDF samples, EXR files that replace a simulated library."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ from ..native import native
 
 
 def load_source(folder: str, method: str):
-    """What `convolve` takes for the samples of a folder: one per ``.exr`` file, in the order of their names.
+    """LDF source, for `convolve`, of the samples in a folder: one per ``.exr`` file, sorted by name.
 
-    The folder's files are read again only when they have changed.
+    Files are read again only after a change.
 
     Raises
     ------
     BakeError
-        The folder is missing or holds no EXR file, or one of them is no sample; the samples don't form a grid, or are
-        of several media. Says which.
+        The folder is missing or has no EXR file, a file is no sample, or the samples don't form a grid of one medium.
     """
     path = Path(folder)
     if not folder or not path.is_dir():
@@ -37,5 +36,5 @@ def load_source(folder: str, method: str):
 
 @lru_cache(maxsize=1)
 def _load(files: tuple[tuple[Path, int, int], ...], method: str):
-    """The samples in files, which come with their times and sizes."""
+    """Source of the samples in files; times and sizes are part of the cache's key."""
     return native.SampleSource([native.LdfSample.load(file) for file, _, _ in files], method)

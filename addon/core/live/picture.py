@@ -15,7 +15,7 @@ from ..bake.margin import WHOLE, extend_margin
 from ..bake.surface import channel_media
 from ..ldf.albedo import albedo_from_reflectance
 from ..ldf.samples import load_source
-from ..material.material import Material
+from ..material import Material
 from ..progress import Progress
 from ..recent import keep_recent
 from ..scene.grid import Grid

@@ -12,7 +12,7 @@ import numpy as np
 from ....core.bake.job import BakeJob, needs_medium
 from ....core.bake.surface import Surface
 from ....core.errors import BakeError, NotSupportedError, text_of
-from ....core.material.material import RGB
+from ....core.material import RGB
 from ....core.messages import Message, warning
 from ....core.progress import Progress
 from ....core.scene.receiver import Receiver

@@ -1,4 +1,4 @@
-"""The picture of an LDF: false-colour maps with contours, a cut along u with its error band, and the totals."""
+"""Plot of an LDF: false-color maps with contours, a cut along u with its error band, and the totals."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator
 
 from ..whole_file import whole_file
-from .totals import describe
+from .terminal import describe
 
-# Perceptually even, also in print and for colour-blind readers.
+# Perceptually uniform, in print and for color-blind readers too.
 COLORS = "magma"
 UNIT = r"$1/\mathrm{mfp}^2$"
-# Maps show at most this many decades below their brightest texel: farther down there is little but noise.
-MOST_DECADES = 6
-# In standard errors: 95 % of normally distributed values.
+# Decades of a map below its brightest texel. More: more noise shows.
+MAX_DECADES = 6
+# Half width of the error band, in standard errors: 95 % of normally distributed values.
 BAND = 2.0
-# The layout, in inches.
+# Layout, in inches.
 MAP, GAP, MARGIN, BAR_MARGIN, TOP, AXIS_LABELS = 3.0, 0.45, 0.8, 1.05, 0.75, 0.85
 CUT_WIDTH, CUT_HEIGHT, TABLE_WIDTH = 5.3, 2.5, 3.3
 DPI = 150
@@ -29,7 +29,7 @@ DPI = 150
 
 @dataclass(frozen=True, eq=False)
 class Maps:
-    """What to draw: per albedo the image and its standard error, float32 (size, size), 1/mfp^2, rows along v.
+    """Image and standard error of each albedo, float32 (size, size), 1/mfp^2, rows along v.
 
     `pitch` is the side of a texel in mean free paths, `title` names medium, beam and side.
     """
@@ -43,7 +43,7 @@ class Maps:
 
     @property
     def half_width(self) -> float:
-        """From O to the border, mean free paths."""
+        """Distance from O to the border, mean free paths."""
         return self.images[0].shape[0] * self.pitch / 2
 
     @property
@@ -59,7 +59,7 @@ def default_pitch(medium, size: int) -> float:
 
 
 def read_maps(library, angle_deg: float, albedos: Sequence[float], size: int, pitch: float, side: str) -> Maps:
-    """Evaluate the library."""
+    """Evaluate a library's images and standard errors."""
     travelling = ", travelling towards +u" if angle_deg else ""
     return Maps(
         title=f"LDF, {side} light: {describe(library.medium)}; beam at {angle_deg:g}°{travelling}",
@@ -72,13 +72,13 @@ def read_maps(library, angle_deg: float, albedos: Sequence[float], size: int, pi
 
 
 def save(figure: Figure, path: str) -> None:
-    """Write a picture completely or not at all."""
+    """Write the plot. If that fails, an existing file stays."""
     with whole_file(path) as temporary:
         figure.savefig(temporary, dpi=DPI)
 
 
 def draw(maps: Maps, totals: Sequence[tuple[str, ...]], notes: Sequence[str]) -> Figure:
-    """The whole picture.
+    """Draw the plot.
 
     Parameters
     ----------
@@ -93,43 +93,43 @@ def draw(maps: Maps, totals: Sequence[tuple[str, ...]], notes: Sequence[str]) ->
     figure = Figure(figsize=(width, height))
     figure.text(0.5, 1 - 0.2 / height, maps.title, fontsize=12, ha="center", va="center")
 
-    def place(left: float, top: float, across: float, down: float):
-        """Axes at a distance from the upper left corner, all in inches."""
+    def add_axes(left: float, top: float, across: float, down: float):
+        """Add axes; positions from the upper left corner and sizes in inches."""
         return figure.add_axes((left / width, 1 - (top + down) / height, across / width, down / height))
 
     first = MARGIN + (width - MARGIN - BAR_MARGIN - block) / 2
     norm = _shared_norm(maps.images)
     for number in range(len(maps.albedos)):
         line, column = divmod(number, columns)
-        ax = place(first + column * (MAP + GAP), TOP + line * (MAP + AXIS_LABELS), MAP, MAP)
-        shown = _draw_map(ax, maps, number, norm)
+        ax = add_axes(first + column * (MAP + GAP), TOP + line * (MAP + AXIS_LABELS), MAP, MAP)
+        map_image = _draw_map(ax, maps, number, norm)
         ax.set_xlabel("u (mean free paths)")
         if column == 0:
             ax.set_ylabel("v (mean free paths)")
-    bar = place(first + block + 0.15, TOP, 0.15, lines * (MAP + AXIS_LABELS) - AXIS_LABELS)
-    figure.colorbar(shown, cax=bar, label=f"exitance per unit power ({UNIT})", extend="min")
+    bar = add_axes(first + block + 0.15, TOP, 0.15, lines * (MAP + AXIS_LABELS) - AXIS_LABELS)
+    figure.colorbar(map_image, cax=bar, label=f"exitance per unit power ({UNIT})", extend="min")
     below = TOP + lines * (MAP + AXIS_LABELS)
-    _draw_cut(place(MARGIN, below, CUT_WIDTH, CUT_HEIGHT), maps, norm)
+    _draw_cut(add_axes(MARGIN, below, CUT_WIDTH, CUT_HEIGHT), maps, norm)
     rest = width - MARGIN - CUT_WIDTH - GAP - 0.1
-    _draw_table(place(MARGIN + CUT_WIDTH + GAP, below + 0.4, rest, CUT_HEIGHT - 0.4), totals, notes)
+    _draw_table(add_axes(MARGIN + CUT_WIDTH + GAP, below + 0.4, rest, CUT_HEIGHT - 0.4), totals, notes)
     return figure
 
 
 def _shared_norm(images: Sequence[np.ndarray]) -> LogNorm:
-    """Colours from the faintest hundredth of the texels, but not below noise, to the brightest texel."""
+    """Color scale from the first percentile of the texels, at most `MAX_DECADES` down, to the brightest texel."""
     brightest = max(float(image.max()) for image in images)
     if not brightest > 0:
-        # Nothing leaves this side: an empty map.
+        # No light leaves this side.
         return LogNorm(1e-6, 1.0)
     faintest = min(float(np.percentile(image[image > 0], 1)) for image in images if (image > 0).any())
-    lowest = np.clip(faintest, brightest * 10.0**-MOST_DECADES, brightest / 10)
+    lowest = np.clip(faintest, brightest * 10.0**-MAX_DECADES, brightest / 10)
     return LogNorm(float(lowest), brightest)
 
 
 def _draw_map(ax, maps: Maps, number: int, norm: LogNorm):
     image, edge = maps.images[number], maps.half_width
-    # Zeros have no logarithm: they get the colour of the lowest value.
-    shown = ax.imshow(
+    # Zeros, which have no logarithm, get the color of the lowest value.
+    map_image = ax.imshow(
         np.maximum(image, norm.vmin), norm=norm, cmap=COLORS, extent=(-edge, edge, -edge, edge), origin="lower"
     )
     decades = [level for level in LogLocator().tick_values(norm.vmin, norm.vmax) if norm.vmin < level < image.max()]
@@ -144,11 +144,11 @@ def _draw_map(ax, maps: Maps, number: int, norm: LogNorm):
         arrow = {"arrowstyle": "-|>", "color": "white", "linewidth": 1.2, "shrinkB": 5}
         ax.annotate("", (0, 0), (-0.45 * edge, 0), arrowprops=arrow)
     ax.set_title(f"albedo {maps.albedos[number]:g}", fontsize=10)
-    return shown
+    return map_image
 
 
 def _draw_cut(ax, maps: Maps, norm: LogNorm) -> None:
-    """Values and errors along v = 0: the middle row, or the mean of the two beside it."""
+    """Draw values and errors along v = 0: the middle row, or the mean of the two middle rows."""
     size = maps.images[0].shape[0]
     middle = slice((size - 1) // 2, size // 2 + 1)
     for number, (albedo, image, error) in enumerate(zip(maps.albedos, maps.images, maps.errors)):
