@@ -210,10 +210,10 @@ def library(
 
 def known_library(medium: native.Medium) -> native.LdfLibrary | None:
     """The best shipped or cached library of a medium; None if it must be simulated."""
-    return _at_hand(medium, "final") or _at_hand(medium, "preview")
+    return _available_library(medium, "final") or _available_library(medium, "preview")
 
 
-def _at_hand(medium: native.Medium, quality: str) -> native.LdfLibrary | None:
+def _available_library(medium: native.Medium, quality: str) -> native.LdfLibrary | None:
     path = _cache_path(medium, quality)
     available = _loaded.get(path) or _load_shipped(medium, quality) or _load(path, medium)
     return available and keep_recent(_loaded, path, available, _MAX_LOADED)
