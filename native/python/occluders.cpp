@@ -1,4 +1,4 @@
-// Python names of what shades: Transmittance, OccluderMesh, Occluders.
+// Python names of occluders in native/scene: Transmittance, OccluderMesh, Occluders.
 #include <memory>
 #include <optional>
 #include <vector>
@@ -10,7 +10,7 @@ namespace beamspread {
 
 namespace {
 
-// Keeps the arrays that an OccluderMesh views.
+// An OccluderMesh and the arrays that it views.
 struct HeldMesh {
     py::array vertices, triangles;
     std::optional<py::array> placements, materials, uvs;
@@ -48,17 +48,17 @@ std::unique_ptr<HeldMesh> make_mesh(const py::array& vertices, const py::array& 
 }
 
 std::unique_ptr<Occluders> make_occluders(const std::vector<const HeldMesh*>& held, const Numbers& origin,
-                                          std::optional<int> most_crossings, std::size_t most_copied)
+                                          std::optional<int> max_crossings, std::size_t max_copied)
 {
     std::vector<OccluderMesh> meshes;
-    for (const HeldMesh* one : held)
-        meshes.push_back(one->mesh);
-    OccluderSettings settings{.most_copied = most_copied};
-    if (most_crossings)
-        settings.most_crossings = *most_crossings;
-    const Vec3 centre = to_vec3("origin", origin);
+    for (const HeldMesh* item : held)
+        meshes.push_back(item->mesh);
+    OccluderSettings settings{.max_copied = max_copied};
+    if (max_crossings)
+        settings.max_crossings = *max_crossings;
+    const Vec3 center = to_vec3("origin", origin);
     const py::gil_scoped_release released;
-    return std::make_unique<Occluders>(meshes, centre, settings);
+    return std::make_unique<Occluders>(meshes, center, settings);
 }
 
 Extension to_extension(const std::string& name)
@@ -92,8 +92,8 @@ std::shared_ptr<Transmittance> make_image(const py::array& texels, const std::st
 
 void bind_occluders(py::module_& m)
 {
-    py::class_<Transmittance, std::shared_ptr<Transmittance>>(
-        m, "Transmittance", R"(What a surface lets through of the light that crosses it.
+    py::class_<Transmittance, std::shared_ptr<Transmittance>>(m, "Transmittance",
+                                                              R"(The part of crossing light that a surface lets through.
 
 Parameters
 ----------
@@ -103,42 +103,42 @@ color : 3 floats
         .def(py::init(&make_color), py::arg("color"))
         .def_static("from_image", &make_image, py::arg("texels"), py::arg("extension") = "repeat",
                     py::arg("is_smooth") = true, py::arg("outside") = py::make_tuple(1.0, 1.0, 1.0),
-                    R"(From an image that is looked up by the triangles' UVs.
+                    R"(A transmittance by an image, at the triangles' UVs.
 
 Parameters
 ----------
 texels : ndarray, float32, shape (H, W, 1) or (H, W, 3), C-contiguous
-    0 to 1; row 0 at v = 0. Kept in 16 bits.
+    0 to 1; row 0 at v = 0. Stored in 16 bits.
 extension : str
-    Beyond the border: 'repeat', 'extend', 'clip', 'mirror'.
+    Extension beyond the border: 'repeat', 'extend', 'clip', 'mirror'.
 is_smooth : bool
-    Bilinear, else that of the nearest texel.
+    True for bilinear interpolation, False for the nearest texel.
 outside : 3 floats
-    Beyond the border of a clipped image.
+    Color of a clipped image beyond its border.
 
 Raises
 ------
 ValueError
     Wrong dtype or shape, a value outside 0 to 1.
 )")
-        .def_property_readonly("is_opaque", &Transmittance::is_opaque, "bool: nothing gets through anywhere.")
-        .def_property_readonly("is_clear", &Transmittance::is_clear, "bool: everything gets through everywhere.")
-        .def_property_readonly("is_colored", &Transmittance::is_colored, "bool: channels differ somewhere.");
+        .def_property_readonly("is_opaque", &Transmittance::is_opaque, "bool: True if no light gets through anywhere.")
+        .def_property_readonly("is_clear", &Transmittance::is_clear, "bool: True if all light gets through everywhere.")
+        .def_property_readonly("is_colored", &Transmittance::is_colored, "bool: True if channels differ somewhere.");
 
-    py::class_<HeldMesh>(m, "OccluderMesh", R"(A mesh, the places where it stands, and what its triangles let through.
+    py::class_<HeldMesh>(m, "OccluderMesh", R"(A mesh, its instances, and the light that its triangles let through.
 
 Parameters
 ----------
 vertices : ndarray, float64, shape (N, 3), C-contiguous
-    Metres in the mesh's frame. As all arrays, it must not change before occluders are made of it.
+    Metres in the mesh's frame. No array may change before occluders are made of the mesh.
 triangles : ndarray, uint32, shape (M, 3), C-contiguous
     Vertex indices.
 placements : ndarray, float64, shape (K, 12), C-contiguous, optional
-    Rows of 3 x 4 matrices from the mesh's frame to the world; None: it stands there as it is.
+    Rows of 3 x 4 matrices from the mesh's frame to the world; None: the mesh is in the world.
 transmittances : list of Transmittance
-    By material.
+    Transmittance of each material.
 materials : ndarray, uint32, shape (M, 1), C-contiguous, optional
-    Of each triangle the index of its material; None: all are opaque.
+    Index of each triangle's material; None: all are opaque.
 uvs : ndarray, float32, shape (M, 6), C-contiguous, optional
     (u, v) of each triangle's corners; None: all are (0, 0).
 
@@ -150,19 +150,18 @@ ValueError
         .def(py::init(&make_mesh), py::arg("vertices"), py::arg("triangles"), py::arg("placements") = py::none(),
              py::arg("transmittances") = py::list(), py::arg("materials") = py::none(), py::arg("uvs") = py::none());
 
-    py::class_<Occluders>(m, "Occluders", R"(Triangles of meshes that block light, or a part of it, on both sides.
+    py::class_<Occluders>(m, "Occluders", R"(Triangles of meshes that block light, or a part of it, from both sides.
 
 Parameters
 ----------
 meshes : list of OccluderMesh
-    None at all is allowed: nothing is blocked.
+    May be empty: nothing is blocked.
 origin : 3 floats
     World position near the receivers, metres: rays are traced in single precision relative to it.
-most_crossings : int, optional
-    A ray that has crossed so many see-through triangles ends at the next.
-most_copied : int
-    Where there are more triangles than this, counting those of each placement, the placements of a mesh share its
-    triangles.
+max_crossings : int, optional
+    Number of see-through triangles that a ray crosses; it ends at the next. None: no limit.
+max_copied : int
+    Number of triangles, with those of each placement, above which the placements of a mesh share its triangles.
 
 Raises
 ------
@@ -170,18 +169,18 @@ ValueError
     A number that is not finite, an index that is out of range.
 )")
         .def(py::init(&make_occluders), py::arg("meshes"), py::arg("origin") = py::make_tuple(0.0, 0.0, 0.0),
-             py::arg("most_crossings") = py::none(), py::arg("most_copied") = OccluderSettings{}.most_copied)
+             py::arg("max_crossings") = py::none(), py::arg("max_copied") = OccluderSettings{}.max_copied)
         .def_property_readonly("triangle_count", &Occluders::triangle_count,
-                               "int: number of triangles, those of each placement counted.")
+                               "int: number of triangles, with those of each placement.")
         .def_property_readonly(
             "instance_count", [](const Occluders& self) { return self.hulls().size(); },
-            "int: placements that share their mesh's triangles.")
-        .def_property_readonly("is_opaque", &Occluders::is_opaque, "bool: all triangles block all light.")
+            "int: number of placements that share their mesh's triangles.")
+        .def_property_readonly("is_opaque", &Occluders::is_opaque, "bool: True if all triangles block all light.")
         .def_property_readonly("is_colored", &Occluders::is_colored,
-                               "bool: some let more of one channel through than of another.");
+                               "bool: True if some let one channel through more than another.");
 
     m.def("embree_version", &embree_version,
-          "The version of Embree in use, 31305 for 3.13.5: not that of the host process.");
+          "Version of Embree in this module, 31305 for 3.13.5; the host may have another.");
 }
 
 }  // namespace beamspread

@@ -13,7 +13,7 @@ std::unique_ptr<ReceiverGrid> make_grid(const Numbers& origin, const Numbers& x_
                                         const Numbers& normal, double pitch_x, double pitch_y, py::ssize_t width,
                                         py::ssize_t height)
 {
-    // Negative sizes become huge ones, which the check refuses.
+    // Negative sizes become huge ones, which the check rejects.
     const ReceiverGrid grid{.origin = to_vec3("origin", origin),
                             .x_axis = to_vec3("x_axis", x_axis),
                             .y_axis = to_vec3("y_axis", y_axis),
@@ -56,8 +56,8 @@ Parameters
 origin : 3 floats
     World position, in metres, of the outer corner of texel (0, 0).
 x_axis, y_axis, normal : 3 floats each
-    Unit vectors at right angles in the world: along a row of texels, from row to row, and out of the lit side. They may
-    be left-handed (a mirrored texture).
+    Unit vectors at right angles in the world: along a row of texels, from row to row, and out of the lit side. A
+    mirrored texture makes them left-handed.
 pitch_x, pitch_y : float
     Size of a texel in metres.
 width, height : int
@@ -81,9 +81,9 @@ corners : ndarray, float64, shape (N, 2), C-contiguous
     The corners of all polygons, one after the other, in texels: texel (row y, column x) spans [x, x+1] x [y, y+1].
     Polygons may be concave, have either orientation and reach beyond the grid.
 corner_counts : ndarray, uint32, shape (P,), C-contiguous
-    How many corners each polygon has: 3 or more; all 3 for triangles.
+    Number of corners of each polygon, 3 or more.
 width, height : int
-    Of the grid in texels.
+    Size of the grid, texels.
 threads : int
     0: all.
 

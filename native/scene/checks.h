@@ -1,4 +1,4 @@
-// Helpers for the checks of arguments in this folder.
+// Checks of arguments in this folder.
 #pragma once
 
 #include <cmath>
@@ -11,7 +11,7 @@
 
 namespace beamspread::detail {
 
-// Hosts that keep angles in single precision round pi up.
+// Largest angle, radians: hosts with angles in single precision round pi up.
 inline constexpr double max_angle = static_cast<double>(static_cast<float>(pi));
 
 inline bool is_finite(const Vec3& v)
@@ -26,7 +26,7 @@ inline std::string to_text(const Vec3& v)
     return text.str();
 }
 
-// As all that follow: throws InvalidArgument.
+// All functions below throw InvalidArgument.
 inline void check_finite(const char* name, const Vec3& v, const char* allowed = "finite coordinates in metres")
 {
     if (!is_finite(v))

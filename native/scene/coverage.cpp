@@ -12,13 +12,13 @@ namespace beamspread {
 
 namespace {
 
-// Rows that are worked on together; also the unit of work of a thread.
+// Rows that one thread fills at a time.
 constexpr std::size_t rows_per_band = 64;
 
-// Heights and areas are counted in whole multiples of this many per texel: the heights of edges that meet add up
-// exactly, so nothing is left in texels that no edge passes through. The positions where an edge enters a texel are
-// rounded by at most 5 * 2^-53 of the largest coordinate, 0.04 of a multiple in a grid of 65536 texels: what enters a
-// texel by rounding alone counts as 0. A texel's part is off by less than one multiple for each edge through it.
+// Units of height and area per texel, counted in whole numbers: heights of edges that meet add up exactly, so that no
+// remainder is left in texels that no edge passes through. The position where an edge enters a texel is rounded by at most
+// 5 * 2^-53 of the largest coordinate, 0.04 units in a grid of 65536 texels, so that rounding alone counts as 0. A texel's
+// coverage is off by less than one unit for each edge through it.
 constexpr double per_texel = 0x1p30;
 
 std::int64_t counted(double part)
@@ -26,9 +26,9 @@ std::int64_t counted(double part)
     return std::llrint(part * per_texel);
 }
 
-// Signed area by Green's theorem: each edge adds, to every texel right of it, the height by which it crosses the
-// texel's row. Stored as differences along the row, so that an edge touches only the texels that it passes through and
-// one running sum at the end gives the covered part.
+// Signed area by Green's theorem: each edge adds, to every texel right of it, the height by which it crosses the texel's
+// row. Differences along the row are stored, so that an edge changes only the texels that it passes through, and one
+// running sum at the end gives the covered part.
 class Band {
 public:
     Band(std::size_t first_row, std::size_t rows, std::size_t width)
@@ -40,7 +40,7 @@ public:
     {
     }
 
-    // An edge in texels of the grid.
+    // Adds an edge, in texels of the grid.
     void add_edge(Vec2 from, Vec2 to, int sign)
     {
         from.y -= m_bottom;
@@ -74,18 +74,18 @@ public:
     }
 
 private:
-    // A piece of an edge within one row, from x0 to x1 while it rises by `height`, cut at the borders of texels.
+    // Adds a piece of an edge within one row, which rises by `height` from x0 to x1, texel by texel.
     void add_in_row(std::size_t row, double x0, double x1, std::int64_t height)
     {
         if (x0 > x1)
-            std::swap(x0, x1);  // only where it passes counts, not which way it leans
+            std::swap(x0, x1);  // the piece counts the same either way
         std::int64_t* difference = &m_difference[row * m_stride];
-        // How high it has risen at x.
+        // Height of the edge at x.
         const auto height_at = [&](double x) {
             return x < x1 ? std::llrint(static_cast<double>(height) * ((x - x0) / (x1 - x0))) : height;
         };
 
-        // Left of the grid: all of the row is to its right. Right of it: nothing is.
+        // Left of the grid, the whole row lies right of the edge; right of the grid, none of it.
         std::int64_t risen = 0;
         if (x0 < 0.0) {
             risen = height_at(0.0);
@@ -97,14 +97,14 @@ private:
         double x = std::max(x0, 0.0);
         do {
             const double next = std::min(std::floor(x) + 1.0, end);
-            const std::int64_t there = height_at(next);
-            add_in_texel(difference, x, next, there - risen);
-            risen = there;
+            const std::int64_t next_height = height_at(next);
+            add_in_texel(difference, x, next, next_height - risen);
+            risen = next_height;
             x = next;
         } while (x < end);
     }
 
-    // Of the texel itself the part right of the edge is covered, of all further ones the whole.
+    // Covers the part of the texel right of the edge, and all further texels wholly.
     static void add_in_texel(std::int64_t* difference, double x0, double x1, std::int64_t height)
     {
         const double left = std::floor(x0);
@@ -123,7 +123,7 @@ private:
 
 struct Polygon {
     std::span<const Vec2> corners;
-    int sign;  // makes its covered area positive
+    int sign;  // makes the covered area positive
     double bottom;
     double top;
 };
@@ -151,11 +151,11 @@ std::vector<Polygon> split(std::span<const Vec2> corners, std::span<const std::u
     for (const std::uint32_t count : corner_counts) {
         if (count < 3 || count > corners.size() - first)
             reject("corner_counts", std::to_string(count), "3 or more, their sum the number of corners");
-        const std::span<const Vec2> own = corners.subspan(first, count);
+        const std::span<const Vec2> outline = corners.subspan(first, count);
         const auto [low, high] =
-            std::minmax_element(own.begin(), own.end(), [](const Vec2& a, const Vec2& b) { return a.y < b.y; });
-        // An edge that rises has the inside on its left where corners run anticlockwise, and on its right it counts.
-        polygons.push_back({own, signed_area(own) > 0.0 ? -1 : 1, low->y, high->y});
+            std::minmax_element(outline.begin(), outline.end(), [](const Vec2& a, const Vec2& b) { return a.y < b.y; });
+        // A rising edge has the inside on its left if corners run anticlockwise, and counts on its right.
+        polygons.push_back({outline, signed_area(outline) > 0.0 ? -1 : 1, low->y, high->y});
         first += count;
     }
     if (first != corners.size())

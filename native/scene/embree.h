@@ -18,7 +18,7 @@ using Device = std::unique_ptr<std::remove_pointer_t<RTCDevice>, Release>;
 using Scene = std::unique_ptr<std::remove_pointer_t<RTCScene>, Release>;
 using Geometry = std::unique_ptr<std::remove_pointer_t<RTCGeometry>, Release>;
 
-// Throws std::runtime_error with the device's pending error, if it has one.
+// Throws std::runtime_error if the device has a pending error.
 void check(RTCDevice device);
 
 }  // namespace beamspread::embree

@@ -7,7 +7,6 @@
 
 #include "scene/checks.h"
 #include "scene/embree.h"
-#include "scene/passage.h"
 #include "scene/triangle_set.h"
 
 namespace beamspread {
@@ -24,20 +23,19 @@ void check(RTCDevice device)
 
 namespace {
 
-// Instances of smaller meshes cost more than copies: one takes about 400 bytes, a triangle about 110.
-constexpr std::size_t least_instanced = 16;
+// Number of triangles of a mesh below which it is copied: an instance takes about 400 bytes, a triangle about 110.
+constexpr std::size_t min_instanced = 16;
 
-// Rounding of a ray in an instance's frame grows with the condition of its matrix: beyond, instances are copied. At
-// 100 rays start 16 * 2^-23 * 100 = 2e-4 of the scene's size off the receiver, and closer contact is lost; it is in
-// proportion.
-constexpr double most_condition = 100.0;
+// Condition of an instance's matrix above which it is copied: rounding of a ray in its frame is in proportion. At 100 rays
+// start 16 * 2^-23 * 100 = 2e-4 of the scene's size off the receiver, and closer contact is lost.
+constexpr double max_condition = 100.0;
 
 double frobenius(const Mat3& matrix)
 {
     return std::sqrt(glm::dot(matrix[0], matrix[0]) + glm::dot(matrix[1], matrix[1]) + glm::dot(matrix[2], matrix[2]));
 }
 
-// 1 for a rotation with even scale, infinite or not a number for a singular matrix.
+// Condition of a matrix: 1 for a rotation with even scale, infinite or NaN for a singular matrix.
 double condition(const Mat3& matrix)
 {
     return frobenius(matrix) * frobenius(glm::inverse(matrix)) / 3.0;
@@ -45,15 +43,15 @@ double condition(const Mat3& matrix)
 
 bool is_shareable(const OccluderMesh& mesh)
 {
-    return mesh.placements.size() > 1 && mesh.triangles.size() >= least_instanced;
+    return mesh.placements.size() > 1 && mesh.triangles.size() >= min_instanced;
 }
 
 bool is_regular(const Placement& placement)
 {
-    return condition(placement.linear) <= most_condition;
+    return condition(placement.linear) <= max_condition;
 }
 
-// What `add` needs to know of meshes in advance.
+// An empty set with memory for these meshes.
 std::unique_ptr<TriangleSet> set_for(std::span<const OccluderMesh> meshes)
 {
     std::size_t opaque = 0;
@@ -76,12 +74,12 @@ std::unique_ptr<TriangleSet> set_for(std::span<const OccluderMesh> meshes)
 embree::Scene new_scene(RTCDevice device)
 {
     embree::Scene scene(rtcNewScene(device));
-    // Robust: no light leaks through the shared edges of triangles.
+    // Robust traversal lets no light through the shared edges of triangles.
     rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
     return scene;
 }
 
-// Middle and half the size of a mesh in its own frame.
+// The middle of a mesh and half its size, in its own frame.
 struct Extent {
     Vec3 middle;
     Vec3 half;
@@ -115,14 +113,14 @@ void attach_instance(RTCDevice device, RTCScene top, RTCScene part, const Mat3& 
 
 struct Occluders::Hierarchy {
     std::vector<std::shared_ptr<const Transmittance>> transmittances;
-    std::vector<std::unique_ptr<TriangleSet>> sets;  // the first: in no instance
+    std::vector<std::unique_ptr<TriangleSet>> sets;  // the first holds triangles outside of instances
     embree::Device device;
-    std::vector<embree::Scene> parts;  // of instanced meshes
+    std::vector<embree::Scene> parts;  // one for each instanced mesh
     embree::Scene top;
 };
 
 Occluders::Occluders(std::span<const OccluderMesh> meshes, const Vec3& origin, const OccluderSettings& settings)
-    : m_most_crossings(settings.most_crossings), m_origin(origin)
+    : m_max_crossings(settings.max_crossings), m_origin(origin)
 {
     detail::check_finite("origin", origin);
     for (const OccluderMesh& mesh : meshes) {
@@ -130,15 +128,15 @@ Occluders::Occluders(std::span<const OccluderMesh> meshes, const Vec3& origin, c
         m_triangle_count += mesh.placements.size() * mesh.triangles.size();
     }
     if (m_triangle_count > 0)
-        build(meshes, settings.most_copied);
+        build(meshes, settings.max_copied);
 }
 
 Occluders::~Occluders() = default;
 
-void Occluders::build(std::span<const OccluderMesh> meshes, std::size_t most_copied)
+void Occluders::build(std::span<const OccluderMesh> meshes, std::size_t max_copied)
 {
     m_hierarchy = std::make_unique<Hierarchy>();
-    // The user's own .embree3 files must not change what is baked.
+    // The user's own .embree3 files must not change results.
     m_hierarchy->device.reset(rtcNewDevice("ignore_config_files=1"));
     RTCDevice device = m_hierarchy->device.get();
     if (!device)
@@ -146,7 +144,7 @@ void Occluders::build(std::span<const OccluderMesh> meshes, std::size_t most_cop
     m_hierarchy->top = new_scene(device);
 
     std::vector<OccluderMesh> copied(meshes.begin(), meshes.end());
-    if (m_triangle_count > most_copied) {
+    if (m_triangle_count > max_copied) {
         for (OccluderMesh& mesh : copied)
             if (is_shareable(mesh))
                 std::erase_if(mesh.placements, is_regular);
@@ -250,10 +248,10 @@ std::uint32_t Occluders::trace(std::span<const ShadowRay> rays, Passage* passage
     }
     PassageContext context;
     context.passages = passages;
-    context.most_crossings = m_most_crossings;
+    context.max_crossings = m_max_crossings;
     rtcInitIntersectContext(&context);
-    // Rays that Embree takes for coherent it may test against one triangle several times, which only filters notice, and
-    // in instances without end.
+    // Embree may test coherent rays against one triangle several times, which filters would count, and without end in
+    // instances.
     const bool is_plain = !passages && m_hulls.empty();
     context.flags =
         is_plain && is_coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;

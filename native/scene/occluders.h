@@ -15,8 +15,8 @@ namespace beamspread {
 
 class Passage;
 
-// Towards a light: what lies in (0, distance) from `origin` along the unit vector `direction` shades `origin`. The
-// distance may be infinite; nothing lies within one that is not > 0.
+// A ray toward a light: triangles at (0, distance) from `origin` along the unit vector `direction` shade `origin`. The
+// distance may be infinite; a ray whose distance is not > 0 meets nothing.
 struct ShadowRay {
     Vec3 origin;
     Vec3 direction;
@@ -27,9 +27,9 @@ struct ShadowRay {
 struct Hull {
     Vec3 centre;
     Mat3 half_axes;  // columns
-    double reach;    // what the rounding of the instance's triangles scales with
+    double reach;    // metres; the rounding of the instance's triangles is in proportion
 
-    // Bit i of `corner`: on which side along the i-th axis.
+    // Bit i of `corner` chooses the side along the i-th axis.
     Vec3 corner(unsigned corner) const
     {
         const auto side = [corner](unsigned axis) { return corner >> axis & 1u ? 1.0 : -1.0; };
@@ -38,10 +38,11 @@ struct Hull {
 };
 
 struct OccluderSettings {
-    // A ray that has crossed so many see-through triangles ends at the next.
-    int most_crossings = std::numeric_limits<int>::max();
-    // Where copies of meshes have more triangles than this together, those of one mesh share its triangles.
-    std::size_t most_copied = std::size_t{1} << 20;
+    // Number of see-through triangles that a ray crosses; it ends at the next.
+    int max_crossings = std::numeric_limits<int>::max();
+    // Number of triangles, with those of copies, above which the placements of a mesh share its triangles. More take
+    // memory and trace faster.
+    std::size_t max_copied = std::size_t{1} << 20;
 };
 
 // An immutable set of triangles with a bounding volume hierarchy; both sides of a triangle block. Its queries may run
@@ -50,30 +51,31 @@ struct OccluderSettings {
 // relative to its own middle, and rays are turned into its frame.
 class Occluders {
 public:
-    // Meshes are copied. None at all is allowed. Throws InvalidArgument.
+    // Copies the meshes; there may be none. Throws InvalidArgument.
     Occluders(std::span<const OccluderMesh> meshes, const Vec3& origin, const OccluderSettings& settings);
     ~Occluders();
     Occluders(const Occluders&) = delete;
     Occluders& operator=(const Occluders&) = delete;
 
-    // Rays that are traced together: neighbours take the same way through the hierarchy, and share it.
+    // Number of rays that are traced together: neighbors share their way through the hierarchy.
     static constexpr std::size_t packet_size = 16;
 
-    // What at most `packet_size` rays let through in each channel, 0 to 1. Whether they go much the same way only decides
-    // how they are traced.
+    // Finds the part of light, 0 to 1 in each channel, that reaches the origins of at most `packet_size` rays.
+    // `is_coherent` says that they run much the same way; it only changes the speed.
     void transmit(std::span<const ShadowRay> rays, Vec3f* transmittance, bool is_coherent = true) const;
 
-    // Whether all triangles block all light; else whether some let one channel through more than another.
+    // True if all triangles block all light.
     bool is_opaque() const { return m_is_opaque; }
+    // True if some triangles let one channel through more than another.
     bool is_colored() const { return m_is_colored; }
 
-    // Those of all instances.
+    // Number of triangles; those of each instance count.
     std::size_t triangle_count() const { return m_triangle_count; }
 
-    // Triangles that are no instance's; opaque ones come first.
+    // Number of triangles outside of instances; opaque ones come first.
     std::size_t own_count() const;
     std::size_t own_opaque_count() const;
-    // Its corners in the world, rounded as rays meet them.
+    // World corners of such a triangle, rounded as rays meet them.
     std::array<Vec3, 3> triangle(std::size_t index) const;
 
     std::span<const Hull> hulls() const { return m_hulls; }
@@ -82,21 +84,21 @@ public:
 
 private:
     struct Hierarchy;
-    // Bit i: whether nothing of the i-th ray gets through.
+    // Returns bits: bit i is set if nothing of the i-th ray gets through.
     std::uint32_t trace(std::span<const ShadowRay> rays, Passage* passages, bool is_coherent = true) const;
-    void build(std::span<const OccluderMesh> meshes, std::size_t most_copied);
+    void build(std::span<const OccluderMesh> meshes, std::size_t max_copied);
     void add_instances(const OccluderMesh& mesh);
 
     std::unique_ptr<Hierarchy> m_hierarchy;  // null without triangles
     std::vector<Hull> m_hulls;
     std::size_t m_triangle_count = 0;
-    int m_most_crossings;
+    int m_max_crossings;
     bool m_is_opaque = true;
     bool m_is_colored = false;
     Vec3 m_origin;
 };
 
-// 10000 major + 100 minor + patch of the Embree that is called, which a host's own could have taken the place of.
+// Version of the Embree that is called, 10000 major + 100 minor + patch: a host's own could take the place of ours.
 int embree_version();
 
 }  // namespace beamspread

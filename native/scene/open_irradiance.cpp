@@ -11,20 +11,18 @@ namespace beamspread {
 
 namespace {
 
-// As the distance below is in steps, half takes a spot an eighth of the time and is off by 2e-3 of the brightest, other
-// lights by 4e-5 in the same time; twice takes a spot 1.5 times as long.
+// Texels between nodes. More are faster and less exact.
 constexpr std::size_t texels_per_node = 8;
 
-// From so many steps between nodes away on, cubics between them know the light of a point to 1e-3, and better of a larger
-// one. Lights of a size: 5e-5 of the brightest; from half as many on 3e-4, a spot's border 2e-2; from twice as many
-// 1e-6, a spot takes 1.6 times as long.
+// Distance to the light, in steps between nodes, above which irradiance is interpolated. Higher values are slower and more
+// exact: here 1e-3 for a point, 5e-5 of the brightest for larger lights.
 constexpr double steps_to_smooth_light = 12.0;
 
-// From so many texels away on a texel's centre knows its mean to 6e-4 of the light of a point; from half as many 2.6e-3,
-// from twice 1.6e-4.
+// Distance to the light, in texels, above which a texel's center gives its mean, to 6e-4 for a point. Higher values are
+// slower and more exact.
 constexpr double texels_to_even_light = 24.0;
 
-// Of four neighbours, at t in [0, 1] between the second and the third (Catmull and Rom 1974, "A class of local
+// Weights of four neighbors at t in [0, 1] between the second and the third (Catmull and Rom 1974, "A class of local
 // interpolating splines").
 std::array<double, 4> spline_weights(double t)
 {
@@ -44,10 +42,10 @@ OpenIrradiance::OpenIrradiance(const ReceiverGrid& grid, const Light& light)
     m_columns = grid.width / texels_per_node + 4;
     m_nodes.resize(m_columns * (grid.height / texels_per_node + 4));
     parallel_for(m_nodes.size(), [&](std::size_t i) {
-        const auto place = [](std::size_t node) {
+        const auto texel_of = [](std::size_t node) {
             return (static_cast<double>(node) - 1.0) * static_cast<double>(texels_per_node);
         };
-        m_nodes[i] = in_texel(place(i % m_columns), place(i / m_columns));
+        m_nodes[i] = in_texel(texel_of(i % m_columns), texel_of(i / m_columns));
     });
 }
 

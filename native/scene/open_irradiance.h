@@ -1,4 +1,4 @@
-// What arrives at the texels of a grid from a light of a size with nothing in between.
+// Irradiance at the texels of a grid by a light of a size that nothing blocks.
 #pragma once
 
 #include <vector>
@@ -8,14 +8,14 @@
 
 namespace beamspread {
 
-// Near the light it is asked at each texel; farther away, where irradiance is smooth, at nodes some texels apart, as a mesh
-// of many faces takes its time.
+// Near the light irradiance is computed at each texel; farther away, where it is smooth, at nodes some texels apart, because a
+// mesh of many faces takes time.
 class OpenIrradiance {
 public:
-    // Both must outlive it.
+    // The arguments must outlive the object.
     OpenIrradiance(const ReceiverGrid& grid, const Light& light);
 
-    // The mean over texel (x, y), W/m^2 in each channel.
+    // Mean irradiance of texel (x, y), W/m^2 in each channel.
     Vec3 at(std::size_t x, std::size_t y) const;
 
 private:
@@ -25,9 +25,10 @@ private:
     const ReceiverGrid& m_grid;
     const Light& m_light;
     double m_pitch;
-    Vec3 m_everywhere{0.0};  // of a light infinitely far away
+    Vec3 m_everywhere{0.0};  // irradiance by a light infinitely far away
     std::size_t m_columns = 0;
-    std::vector<Vec3> m_nodes;  // of every `texels_per_node`-th texel, one before the first on; empty: none
+    std::vector<Vec3>
+        m_nodes;  // irradiance of every `texels_per_node`-th texel, from one before the first; may be empty
 };
 
 }  // namespace beamspread

@@ -11,10 +11,10 @@ namespace beamspread {
 
 namespace {
 
-// Axes come from object matrices in single precision; a larger error would change lengths visibly.
+// Largest error of a unit vector: axes come from object matrices in single precision.
 constexpr double axis_tolerance = 1e-4;
 
-// The largest texture side that Blender's own images allow.
+// Texels along a side, as Blender's own images allow.
 constexpr std::size_t max_side = 1u << 16;
 
 void check_unit(const std::string& name, const Vec3& axis)
@@ -43,13 +43,13 @@ void check_side(const std::string& name, std::size_t side)
 
 }  // namespace
 
-double ReceiverGrid::reach(const Vec3& centre) const
+double ReceiverGrid::reach(const Vec3& center) const
 {
     const double w = static_cast<double>(width);
     const double h = static_cast<double>(height);
     double largest = 0.0;
     for (const Vec3& corner : {point(0, 0), point(w, 0), point(0, h), point(w, h)}) {
-        const Vec3 offset = glm::abs(corner - centre);
+        const Vec3 offset = glm::abs(corner - center);
         largest = std::max({largest, offset.x, offset.y, offset.z});
     }
     return largest;

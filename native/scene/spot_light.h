@@ -34,7 +34,7 @@ private:
     SpotFalloff m_falloff;
 };
 
-// Nothing falls off inside the ball of a lamp with a radius, but light from the half-space away from its center counts
+// Light inside the ball of a lamp with a radius does not fall off, but light from the half-space away from its center counts
 // half, as in Cycles from Blender 4.0 on: its random rays find a spot only toward its center, while the chance of rays
 // sent to the spot is computed as if both kinds found all of it (kernel/light/spot.h). Measured in 4.5: right to 3e-3.
 // Beside other lights Cycles sends fewer rays to the spot, and is darker there than this.

@@ -1,6 +1,7 @@
 #include "scene/triangle_set.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "base/error.h"
@@ -10,16 +11,67 @@ namespace beamspread {
 
 namespace {
 
-// Embree's hits are undefined beyond this: products of coordinates overflow single precision.
+// Units of optical depth that halve light. Fine units keep the depth of few crossings exact in single precision.
+constexpr double units_per_half = 1099511627776.0;  // 2^40
+
+// Depth at which light counts as blocked: single precision can't tell 1 - 2^-24 from 1.
+constexpr auto max_depth = static_cast<std::int64_t>(24.0 * units_per_half);
+
+// Relative difference of two distances below which they are the same: far above the rounding of single precision.
+constexpr float same_distance = 1e-5f;
+
+std::int64_t depth_of(float transmittance)
+{
+    if (!(transmittance > 0.0f))
+        return max_depth;
+    const double depth = -std::log2(static_cast<double>(transmittance)) * units_per_half;
+    return std::llround(std::clamp(depth, 0.0, static_cast<double>(max_depth)));
+}
+
+// Largest coordinate: products of larger ones overflow in Embree.
 constexpr double max_coordinate = 1e18;
 
-// Embree's robust test takes a ray for a hit up to a unit in the last place outside of an edge.
+// Barycentric coordinate below which a hit is at an edge: Embree's robust test accepts rays up to a unit in the last place
+// outside.
 constexpr float edge_width = 16.0f * std::numeric_limits<float>::epsilon();
 
-// Embree loads 16 bytes at a time: beyond the last one, as many must be readable.
+// Elements that must be readable after the last one, because Embree loads 16 bytes at a time.
 constexpr std::size_t padding = 1;
 
 }  // namespace
+
+bool Passage::cross(const Vec3f& transmittance, float distance, bool at_edge)
+{
+    const Depth depth = {depth_of(transmittance.x), depth_of(transmittance.y), depth_of(transmittance.z)};
+    Depth* counted = at_edge ? edge_at(distance) : nullptr;
+    m_crossings += counted ? 0 : 1;
+    bool is_dark = true;
+    for (std::size_t i = 0; i < depth.size(); ++i) {
+        m_depth[i] += counted ? std::max<std::int64_t>(depth[i] - (*counted)[i], 0) : depth[i];
+        if (counted)
+            (*counted)[i] = std::max((*counted)[i], depth[i]);
+        is_dark &= m_depth[i] >= max_depth;
+    }
+    if (at_edge && !counted)
+        m_edges.push_back({distance, depth});
+    return !is_dark;
+}
+
+Passage::Depth* Passage::edge_at(float distance)
+{
+    const auto edge = std::ranges::find_if(m_edges, [distance](const Edge& known) {
+        return std::abs(known.distance - distance) <= same_distance * distance;
+    });
+    return edge == m_edges.end() ? nullptr : &edge->depth;
+}
+
+Vec3f Passage::transmittance() const
+{
+    const auto left = [](std::int64_t depth) {
+        return depth >= max_depth ? 0.0f : static_cast<float>(std::exp2(static_cast<double>(-depth) / units_per_half));
+    };
+    return {left(m_depth[0]), left(m_depth[1]), left(m_depth[2])};
+}
 
 TriangleSet::TriangleSet(std::size_t opaque, std::size_t see_through, std::size_t vertices, bool has_uvs)
 {
@@ -35,11 +87,11 @@ void TriangleSet::add(const OccluderMesh& mesh, const Placement& placement, cons
 {
     const auto first = static_cast<std::uint32_t>(m_vertices.size());
     for (const Vec3& vertex : mesh.vertices) {
-        const Vec3 place = placement(vertex) - origin;
-        const Vec3 size = glm::abs(place);
+        const Vec3 position = placement(vertex) - origin;
+        const Vec3 size = glm::abs(position);
         if (!(size.x < max_coordinate && size.y < max_coordinate && size.z < max_coordinate))
             reject("vertices", detail::to_text(vertex), "finite coordinates within 1e18 m of the origin");
-        m_vertices.emplace_back(place);
+        m_vertices.emplace_back(position);
     }
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
         const auto [a, b, c] = mesh.triangles[i];
@@ -99,7 +151,7 @@ Vec3f TriangleSet::transmittance(std::uint32_t see_through, const Vec2f& barycen
     return m_transmittances[see_through]->at(uv);
 }
 
-// A hit that is left valid blocks its ray.
+// A hit that stays valid blocks its ray.
 void TriangleSet::filter(const RTCFilterFunctionNArguments* hits)
 {
     const auto* const set = static_cast<const TriangleSet*>(hits->geometryUserPtr);
@@ -112,7 +164,7 @@ void TriangleSet::filter(const RTCFilterFunctionNArguments* hits)
         Passage& passage = context->passages[RTCRayN_id(hits->ray, hits->N, i)];
         const bool is_left = passage.cross(set->transmittance(RTCHitN_primID(hits->hit, hits->N, i), barycentric),
                                            RTCRayN_tfar(hits->ray, hits->N, i), least <= edge_width);
-        if (is_left && passage.crossings() <= context->most_crossings)
+        if (is_left && passage.crossings() <= context->max_crossings)
             hits->valid[i] = 0;
     }
 }

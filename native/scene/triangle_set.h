@@ -1,4 +1,4 @@
-// Triangles in one frame as Embree keeps them: opaque ones, and those that let light through.
+// Triangles in one frame in Embree's form, opaque and see-through ones, and light that crosses see-through triangles.
 #pragma once
 
 #include <array>
@@ -7,31 +7,56 @@
 
 #include "scene/embree.h"
 #include "scene/occluder_mesh.h"
-#include "scene/passage.h"
 
 namespace beamspread {
 
-// What Embree hands on to the filter of see-through triangles; the rays' ids are indices of passages.
+// The part of a ray's light that is left after crossing see-through triangles. Optical depths are added in fixed point, so
+// that crossings in any order have the same sum.
+class Passage {
+public:
+    // Counts a crossing; returns false once nothing is left. Two triangles that share an edge both report a ray that meets
+    // the edge: crossings `at_edge` at the same distance count once, by the darkest of them.
+    bool cross(const Vec3f& transmittance, float distance, bool at_edge);
+
+    int crossings() const { return m_crossings; }
+    Vec3f transmittance() const;
+
+private:
+    using Depth = std::array<std::int64_t, 3>;
+
+    struct Edge {
+        float distance;
+        Depth depth;
+    };
+
+    Depth* edge_at(float distance);
+
+    Depth m_depth{};
+    int m_crossings = 0;
+    std::vector<Edge> m_edges;
+};
+
+// Context that Embree passes to the filter of see-through triangles; ids of rays are indices of passages.
 struct PassageContext : RTCIntersectContext {
     Passage* passages;
-    int most_crossings;
+    int max_crossings;
 };
 
 class TriangleSet {
 public:
-    // Room for so many triangles and vertices.
+    // Reserves memory for so many triangles and vertices.
     TriangleSet(std::size_t opaque, std::size_t see_through, std::size_t vertices, bool has_uvs);
     TriangleSet(const TriangleSet&) = delete;
     TriangleSet& operator=(const TriangleSet&) = delete;
 
-    // Adds a mesh, relative to `origin`. What lets all light through is left out. Throws InvalidArgument.
+    // Adds a mesh, relative to `origin`, without triangles that let all light through. Throws InvalidArgument.
     void add(const OccluderMesh& mesh, const Placement& placement, const Vec3& origin);
 
-    // Makes them geometries of the scene, which looks at this set for as long as it lives.
+    // Makes the triangles geometries of the scene. The set must outlive the scene.
     void attach(RTCDevice device, RTCScene scene);
 
     std::size_t size() const { return m_opaque.size() + m_see_through.size(); }
-    // Opaque ones come first.
+    // Opaque triangles come first.
     std::size_t opaque_count() const { return m_opaque.size(); }
     std::array<Vec3f, 3> corners(std::size_t index) const;
 
@@ -43,8 +68,8 @@ private:
     std::vector<Vec3f> m_vertices;
     std::vector<Triangle> m_opaque;
     std::vector<Triangle> m_see_through;
-    std::vector<const Transmittance*> m_transmittances;  // of the see-through ones, as are the next
-    std::vector<std::array<Vec2f, 3>> m_uvs;             // empty if no image is looked up
+    std::vector<const Transmittance*> m_transmittances;  // of see-through triangles
+    std::vector<std::array<Vec2f, 3>> m_uvs;             // of see-through triangles; empty without images
 };
 
 }  // namespace beamspread

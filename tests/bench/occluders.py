@@ -65,10 +65,10 @@ CASES = {
 
 
 def run(name, part):
-    mesh, most_copied = CASES[name](part)
+    mesh, max_copied = CASES[name](part)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     start = time.perf_counter()
-    occluders = native.Occluders([mesh], most_copied=most_copied)
+    occluders = native.Occluders([mesh], max_copied=max_copied)
     times = [time.perf_counter() - start]
     grid = native.ReceiverGrid((-1, -1, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 1 / 256, 1 / 256, 512, 512)
     for light in LIGHTS:

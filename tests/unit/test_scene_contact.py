@@ -68,7 +68,7 @@ def light_past(*meshes, sun, turn, shift, is_instanced=False):
     if is_instanced:
         step = 2**13 * 2.0 ** math.ceil(math.log2(TEXEL))
         origin = step * np.round(grid.centre / step)
-        caster = native.Occluders([one.mesh.native(one.placements) for one in occluders], origin, most_copied=0)
+        caster = native.Occluders([one.mesh.native(one.placements) for one in occluders], origin, max_copied=0)
     return light.gather(grid, caster, samples=4)[0] / light.gather(grid, None, samples=4)[0]
 
 

@@ -77,7 +77,7 @@ def test_instances_shade_as_copies_do(seed, stretch, kind, far, is_sun):
     off[:, :, 3] -= off[:, :, :3] @ (5, 3, -4)
     mesh = native.OccluderMesh(vertices + (5, 3, -4), triangles, off.reshape(-1, 12), transmittances, materials, uvs)
     copied = native.Occluders([mesh], shift)
-    shared = native.Occluders([mesh], shift, most_copied=0)
+    shared = native.Occluders([mesh], shift, max_copied=0)
     assert (copied.instance_count, shared.instance_count) == (0, 12)
     assert copied.triangle_count == shared.triangle_count == 12 * len(triangles)
     assert copied.is_opaque == shared.is_opaque == (kind == "opaque")
@@ -107,7 +107,7 @@ def test_boxes_of_instances_hide_no_shadow(seed, far, lamp, kind, size):
     places = placements(rng, 3, 3.0, shift).reshape(-1, 3, 4)
     places[..., :3] *= size
     mesh = native.OccluderMesh(vertices, triangles, places.reshape(-1, 12), transmittances, materials, uvs)
-    occluders = native.Occluders([mesh], shift, most_copied=0)
+    occluders = native.Occluders([mesh], shift, max_copied=0)
     assert occluders.instance_count == 3
     light = native.SunLight((0.5, 0.3, -0.4)) if lamp is None else native.PointLight(shift + lamp)
     found, traced = (native.gather_beams(floor(shift), light, occluders, find_shadows=find) for find in (True, False))
@@ -138,7 +138,7 @@ def test_an_instanced_receiver_does_not_shadow_itself(seed, far, angle, stretch,
     mesh = native.OccluderMesh(vertices, triangles, np.reshape(places, (2, 12)))
     # As the add-on does: an origin near the receiver, not at it.
     middle = centre + linear @ (*rng.uniform(-0.5, 0.5, 2), 0) * (size > 1)
-    occluders = native.Occluders([mesh], np.round(middle / 8) * 8, most_copied=0)
+    occluders = native.Occluders([mesh], np.round(middle / 8) * 8, max_copied=0)
     assert occluders.instance_count == 2
     half = np.array([0.9, 0.9 / stretch])
     grid = native.ReceiverGrid(middle - half @ axes[:2], *axes, half[0] / 8, half[1] / 8, 16, 16)
@@ -158,7 +158,7 @@ def test_flat_and_small_ones_are_copied():
         native.OccluderMesh(vertices, triangles, flat.reshape(-1, 12)),
         native.OccluderMesh(vertices, triangles[:15].copy(), placements(np.random.default_rng(1), 9, 1.0)),
     ]
-    occluders = native.Occluders(meshes, most_copied=0)
+    occluders = native.Occluders(meshes, max_copied=0)
     assert occluders.instance_count == 0
     lit, _ = native.gather_beams(floor(), native.SunLight((0, 0, -1)), native.Occluders(meshes[:1]))
     # A disk of radius 1 around x = -.5, a polygon of 24 corners, and two of a quarter: one in it, one in part.
@@ -203,7 +203,7 @@ def test_every_number_of_threads_gives_the_same_bits():
 
     def lit(threads):
         mesh = native.OccluderMesh(vertices, triangles, places, transmittances, materials, uvs)
-        occluders = native.Occluders([mesh], most_copied=0)
+        occluders = native.Occluders([mesh], max_copied=0)
         return native.gather_beams(floor(), lamp, occluders, threads=threads)[0]
 
     one, *more = [lit(threads) for threads in (1, 2, 7, 0)]

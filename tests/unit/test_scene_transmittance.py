@@ -33,8 +33,8 @@ def image(texels, **options):
     return native.Transmittance.from_image(texels if texels.ndim == 3 else texels[..., None], **options)
 
 
-def light_past(meshes, light=DOWN, samples=4, most_crossings=None, on=None, **options):
-    occluders = native.Occluders(meshes, most_crossings=most_crossings)
+def light_past(meshes, light=DOWN, samples=4, max_crossings=None, on=None, **options):
+    occluders = native.Occluders(meshes, max_crossings=max_crossings)
     return native.gather_beams(on or grid(), light, occluders, samples, **options)[0]
 
 
@@ -200,8 +200,8 @@ def test_the_order_of_triangles_does_not_change_a_bit():
 
 def test_a_ray_ends_after_so_many_crossings():
     cards = [card(native.Transmittance((0.9,) * 3), 1 + 0.1 * i) for i in range(5)]
-    np.testing.assert_allclose(light_past(cards, most_crossings=5), 0.9**5, rtol=1e-6)
-    assert not light_past(cards, most_crossings=4).any()
+    np.testing.assert_allclose(light_past(cards, max_crossings=5), 0.9**5, rtol=1e-6)
+    assert not light_past(cards, max_crossings=4).any()
 
 
 def test_what_occluders_say_of_themselves():

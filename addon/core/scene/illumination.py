@@ -34,16 +34,16 @@ class Illumination:
         lights: Sequence[Light],
         occluders: Sequence[Occluder] | Mesh | None = None,
         messages: Iterable[Message] = (),
-        most_crossings: int | None = None,
+        max_crossings: int | None = None,
         by_cycles: Mapping[str, Message] | None = None,
         receivers: Mapping[str, Collection[str]] | None = None,
     ) -> None:
-        """`most_crossings`: light that crossed so many see-through surfaces ends at the next; None: it never does."""
+        """`max_crossings`: light that crossed so many see-through surfaces ends at the next; None: it never does."""
         self.lights = tuple(lights)
         self.by_cycles, self.receivers = dict(by_cycles or {}), dict(receivers or {})
         self._messages = tuple(messages)
         self._occluders = (Occluder("", occluders),) if isinstance(occluders, Mesh) else tuple(occluders or ())
-        self._most_crossings = most_crossings
+        self._max_crossings = max_crossings
         # By origin and names of the blockers, all of the same origin.
         self._casters: dict = {}
 
@@ -124,5 +124,5 @@ class Illumination:
         chosen = None if blockers is None or names <= blockers else frozenset(names & blockers)
         if (origin, chosen) not in self._casters:
             occluders = [one for one in self._occluders if chosen is None or one.name in chosen]
-            self._casters[origin, chosen] = build(occluders, origin, self._most_crossings)
+            self._casters[origin, chosen] = build(occluders, origin, self._max_crossings)
         return self._casters[origin, chosen]

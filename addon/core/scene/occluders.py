@@ -1,4 +1,4 @@
-"""What throws shadows: meshes, where they stand, and what they let through."""
+"""Meshes that cast shadows, their instances, and the light that they let through."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from .grid import Vector
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles in a frame of their own, or in the world.
+    """Triangles in the mesh's own frame, or in the world.
 
     Attributes
     ----------
     vertices : float64 (N, 3).
     triangles : uint32 (M, 3).
-    transmittances : native `Transmittance`s, by material.
-    materials : uint32 (M,), indices of these; None: all triangles are opaque.
-    uvs : float32 (M, 3, 2), where the corners lie in their material's image; None: there is none.
+    transmittances : a native `Transmittance` for each material.
+    materials : uint32 (M,), the material of each triangle; None: all are opaque.
+    uvs : float32 (M, 3, 2), UVs of each triangle's corners in its material's image; None: no material has one.
     """
 
     vertices: np.ndarray
@@ -34,12 +34,12 @@ class Mesh:
 
     @cached_property
     def content(self) -> int:
-        """A number that tells meshes apart, but for what their materials let through."""
+        """A digest of the mesh without its transmittances."""
         arrays = (self.vertices, self.triangles, self.materials, self.uvs)
-        return zlib.crc32(b"".join(np.ascontiguousarray(one).tobytes() for one in arrays if one is not None))
+        return zlib.crc32(b"".join(np.ascontiguousarray(array).tobytes() for array in arrays if array is not None))
 
     def native(self, placements: np.ndarray | None):
-        """The native `OccluderMesh`, in the world as it is or once for each of (K, 3, 4) matrices."""
+        """The native `OccluderMesh`; `placements` are matrices (K, 3, 4), None for a mesh in the world."""
         return native.OccluderMesh(
             np.ascontiguousarray(self.vertices, float),
             np.ascontiguousarray(self.triangles, np.uint32),
@@ -56,9 +56,9 @@ class Occluder:
 
     Attributes
     ----------
-    name : of the object, by which lights know what they are blocked by.
-    mesh : may be shared by several occluders.
-    placements : float64 (K, 3, 4), from the mesh's frame to the world; None: the mesh is in the world.
+    name : name of the object, for lights that only some objects block.
+    mesh : its mesh, which several occluders may share.
+    placements : float64 (K, 3, 4), matrices from the mesh's frame to the world; None: the mesh is in the world.
     """
 
     name: str
@@ -66,7 +66,7 @@ class Occluder:
     placements: np.ndarray | None = None
 
 
-def build(occluders: Sequence[Occluder], origin: Vector, most_crossings: int | None):
+def build(occluders: Sequence[Occluder], origin: Vector, max_crossings: int | None):
     """The native `Occluders`, or None without triangles."""
     by_mesh: dict[int, list[Occluder]] = {}
     for occluder in occluders:
@@ -74,6 +74,6 @@ def build(occluders: Sequence[Occluder], origin: Vector, most_crossings: int | N
             by_mesh.setdefault(id(occluder.mesh), []).append(occluder)
     meshes = []
     for same in by_mesh.values():
-        matrices = [np.eye(4)[None, :3] if one.placements is None else one.placements for one in same]
+        matrices = [np.eye(4)[None, :3] if item.placements is None else item.placements for item in same]
         meshes.append(same[0].mesh.native(np.concatenate(matrices)))
-    return native.Occluders(meshes, origin, most_crossings) if meshes else None
+    return native.Occluders(meshes, origin, max_crossings) if meshes else None
