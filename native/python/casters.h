@@ -1,4 +1,4 @@
-// pybind11 behind one header, with what every binding file shares.
+// pybind11 behind one header, and conversions that the binding files share.
 #pragma once
 
 #include <pybind11/functional.h>
@@ -19,21 +19,20 @@ namespace beamspread {
 
 namespace py = pybind11;
 
-// Of functions that run without the interpreter.
+// Marks functions that run without the interpreter's lock.
 using ReleaseGil = py::call_guard<py::gil_scoped_release>;
 
-// C-contiguous arrays of exactly this type; another type raises TypeError instead of being copied silently.
+// C-contiguous arrays of exactly this type. Other types raise TypeError and are not converted.
 template <class T>
 using Array = py::array_t<T, py::array::c_style>;
 
-// A callback for Progress that calls `progress(fraction)` with the GIL held and lets Ctrl-C through; with None nothing
-// is reported. Only an answer of False or of NumPy's False_ stops: a callback without a return statement, or one that
-// returns what a method happened to, does not mean to. `progress` must outlive the callback; throws InvalidArgument
-// unless it can be called.
+// Callback for Progress that calls `progress(fraction)` with the GIL held and lets Ctrl-C through. It stops for False
+// and NumPy's False_ alone, so that callbacks without a meaningful return value do not stop by accident. `progress`
+// must outlive the callback. Throws InvalidArgument unless `progress` is callable or None.
 Progress::Callback progress_callback(const py::object& progress);
 
-// Values of an array argument as C-contiguous doubles or floats. Throws InvalidArgument for what would lose something
-// on the way: masks, imaginary parts, and what is no number.
+// Values of an array argument as C-contiguous doubles or floats. Throws InvalidArgument for masked or complex arrays
+// and for arrays of other objects.
 template <class T>
 Array<T> real_array(const std::string& name, const py::object& values);
 
@@ -45,7 +44,7 @@ inline std::size_t side(const py::array& array, py::ssize_t axis)
     return static_cast<std::size_t>(array.shape(axis));
 }
 
-// What a name stands for; throws InvalidArgument for one that is not known.
+// Value of a name; throws InvalidArgument for an unknown name.
 template <class T>
 T named(const std::string& argument, const std::string& name, std::initializer_list<std::pair<const char*, T>> known)
 {
@@ -58,10 +57,10 @@ T named(const std::string& argument, const std::string& name, std::initializer_l
     reject(argument, "'" + name + "'", allowed);
 }
 
-// "reflected" or "transmitted"; throws InvalidArgument.
+// Side named "reflected" or "transmitted"; throws InvalidArgument.
 Side side_from_name(const std::string& name);
 
-// Texels along a side of an LDF's image; throws InvalidArgument for a negative number.
+// Texels along a side of an LDF's image; throws InvalidArgument for numbers below 1.
 std::size_t image_side(std::ptrdiff_t size);
 
 void bind_medium(py::module_& m);

@@ -9,16 +9,16 @@ namespace beamspread {
 
 namespace {
 
-// `make`: ldf_image, or its standard error.
+// Image of a library by `make`: ldf_image or ldf_image_standard_error.
 template <auto make>
 Array<float> image(const LdfLibrary& library, double angle, double albedo, std::ptrdiff_t size, double pitch,
                    const std::string& side, double beam_diameter)
 {
-    const Side which = side_from_name(side);
+    const Side image_of = side_from_name(side);
     std::vector<float> texels;
     {
         const py::gil_scoped_release release;
-        texels = make(library, angle, albedo, image_side(size), pitch, which, beam_diameter);
+        texels = make(library, angle, albedo, image_side(size), pitch, image_of, beam_diameter);
     }
     Array<float> result({size, size});
     std::copy(texels.begin(), texels.end(), result.mutable_data());
@@ -29,24 +29,25 @@ Array<float> image(const LdfLibrary& library, double angle, double albedo, std::
 
 void bind_ldf(py::module_& m)
 {
-    const py::class_<LdfSource, std::shared_ptr<LdfSource>> source(m, "LdfSource", "What `convolve` takes LDFs from.");
+    const py::class_<LdfSource, std::shared_ptr<LdfSource>> source(m, "LdfSource",
+                                                                   "LDFs of one medium, for `convolve`.");
     py::class_<LdfLibrary, LdfSource, std::shared_ptr<LdfLibrary>> library(
         m, "LdfLibrary",
         R"(Luminance distribution functions of one medium.
 
-Made by `simulate`, `library` or `LdfLibrary.load`. Angles are in degrees from the surface normal,
-within the simulated ones (a library that reaches 88 degrees serves up to 90); albedos in [0, 1).
+Made by `simulate`, `library` or `LdfLibrary.load`. Angles are in degrees from the surface normal, within the simulated
+ones (a library that reaches 88 degrees serves up to 90); albedos are in [0, 1).
 )");
     library
         .def_static("load", &load_library, py::arg("path"), ReleaseGil(),
-                    "Read a library from an OpenEXR file; OSError if it is missing, damaged or something else.")
+                    "Read a library from an OpenEXR file; OSError if it is missing, damaged or no library.")
         .def("save", &save_library, py::arg("path"), ReleaseGil(),
              "Write a multi-part OpenEXR file; an existing file is replaced only by a complete one.")
         .def_property_readonly("medium", &LdfLibrary::medium)
         .def_property_readonly("angles", &LdfLibrary::angles_deg, "Simulated angles, degrees, ascending.")
         .def_property_readonly("photons", &LdfLibrary::photons, "Photons per angle.")
         .def_property_readonly("seed", &LdfLibrary::seed)
-        .def_property_readonly("is_calibrated", &LdfLibrary::is_calibrated, "Whether `calibrated` made it.");
+        .def_property_readonly("is_calibrated", &LdfLibrary::is_calibrated, "True if `calibrated` made it.");
     library
         .def(
             "reflectance",
@@ -70,23 +71,22 @@ within the simulated ones (a library that reaches 88 degrees serves up to 90); a
             py::arg("angle"), py::arg("albedo"), py::arg("side") = "reflected",
             R"(Standard error of `reflectance` or `transmittance`.
 
-From the scatter of 32 independent batches; it does not know what interpolation between far angles misses. That of a
-calibrated library does: the error halfway between simulated angles is known from `exact_totals`.
+It follows from the scatter of 32 independent batches, without the error of interpolation between angles. For a
+calibrated library it includes that error, which `exact_totals` gives halfway between simulated angles.
 )")
         .def("calibrated", &calibrated, py::arg("threads") = 0, ReleaseGil(),
              R"(A copy whose totals are those of `exact_totals`.
 
-The light of each scattering order, with the distribution it was simulated with, is scaled: by as little as makes the
-totals right at 16 albedos from .01 to .99999, least squares weighted by statistical variance. Albedos in between, and
-the totals of every map, follow. `standard_error` then includes what `exact_totals` and the interpolation between angles
-leave; `image_standard_error` stays that of the simulation, an upper bound. Measured over twelve media: totals of 100
-photons are within 3 % of the incident power, of 1000 within .5 %; for albedos beyond .99999 they may be 1.5 % too
-large.
+The light of each scattering order is scaled, by the smallest change (least squares weighted by statistical variance)
+that makes the totals exact at 16 albedos from .01 to .99999; other albedos, and the totals of all maps, follow.
+`standard_error` then includes the errors of `exact_totals` and of interpolation between angles. `image_standard_error`
+stays that of the simulation, an upper bound. Totals of twelve media are within 3 % of the incident power with 100
+photons and within .5 % with 1000; for albedos above .99999 they may be 1.5 % too large.
 
 Parameters
 ----------
 threads : int
-    0: all. The result does not depend on it.
+    Number of threads; 0: all. The result does not depend on it.
 
 Returns
 -------
@@ -112,31 +112,31 @@ pitch : float
     Side of a texel, mean free paths, 1e-6 to 1e18; at least 1e-4 for a beam with a diameter.
 side : {"reflected", "transmitted"}
 beam_diameter : float
-    Of the disk around O that the beam evenly lights on the surface, mean free paths, up to 1e6 and 1e4 texels; 0: a
-    pencil beam.
+    Diameter of the disk around O that the beam lights evenly on the surface, mean free paths, up to 1e6 and 1e4 texels;
+    0: a pencil beam.
 
 Returns
 -------
 float32, shape (size, size)
-    1/mfp^2; rows v, columns u, O at the centre, +u (the beam's direction of travel) to the right.
-    The few texels where azimuthal harmonics undershoot may be slightly negative.
+    1/mfp^2; rows v, columns u, O at the centre, +u (the beam's direction of travel) to the right. Few texels may be
+    slightly negative, where azimuthal harmonics undershoot.
 
 Raises
 ------
 ValueError
-    Names the argument, its value and what is allowed.
+    An argument is outside its range. Names argument, value and range.
 )")
         .def("image_standard_error", &image<ldf_image_standard_error>, py::arg("angle"), py::arg("albedo"),
              py::arg("size"), py::arg("pitch"), py::arg("side") = "reflected", py::arg("beam_diameter") = 0.0,
              R"(Statistical standard error of every texel of `image`.
 
-From the scatter between eight groups of the simulation's photons, hence with a relative error of about a quarter of its
-own (less between simulated angles, where several simulations add up). Parameters, units and errors as for `image`.
+It follows from the scatter between eight groups of the simulation's photons and has a relative error of about a quarter
+(less between simulated angles, where several simulations add up). Parameters, units and errors are those of `image`.
 
 Returns
 -------
 float32, shape (size, size)
-    1/mfp^2; 0 where no photon came near.
+    1/mfp^2; 0 for texels that no photon came near.
 )")
         .def("__repr__", [](const LdfLibrary& self) {
             return py::str("<LdfLibrary {} angles={} photons={}>")

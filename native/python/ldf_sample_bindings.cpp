@@ -15,7 +15,7 @@ namespace beamspread {
 
 namespace {
 
-// Any real array: samples come from files and other programs, and are small.
+// Sample from a real array of any type. Samples are small and come from files and other programs.
 LdfSample sample_of(const py::object& image, double pitch, double angle, double albedo, double beam_diameter,
                     std::optional<double> g)
 {
@@ -31,16 +31,16 @@ LdfSample sample_of(const py::object& image, double pitch, double angle, double 
 LdfSample from_library(const LdfLibrary& library, double angle, double albedo, std::ptrdiff_t size, double pitch,
                        double beam_diameter, const std::string& side)
 {
-    const Side which = side_from_name(side);
+    const Side image_of = side_from_name(side);
     const std::size_t texels = image_side(size);
     const py::gil_scoped_release release;
-    std::vector<float> image = ldf_image(library, angle, albedo, texels, pitch, which, beam_diameter);
+    std::vector<float> image = ldf_image(library, angle, albedo, texels, pitch, image_of, beam_diameter);
     LdfSample sample{texels, texels, std::move(image), pitch, angle, albedo, beam_diameter, library.medium().g};
     validate(sample);
     return sample;
 }
 
-// A view that nobody can write through: what `validate` saw holds for the sample's life.
+// Read-only view: the image stays as `validate` checked it.
 Array<float> image_of(const py::object& self)
 {
     const auto& sample = self.cast<const LdfSample&>();
@@ -49,13 +49,13 @@ Array<float> image_of(const py::object& self)
     return view;
 }
 
-// An argument and its name.
+// An argument with its name.
 struct Named {
     const char* name;
     const py::object& values;
 };
 
-// Applies a map of two numbers to two, elementwise to arrays that broadcast; numbers give numbers.
+// Applies a map of two numbers to two, elementwise to arrays after broadcasting; numbers give numbers.
 template <class Map>
 py::tuple apply(const Named& first, const Named& second, const Map& map)
 {
@@ -85,9 +85,9 @@ py::tuple to_angular(const AngularSpace& space, const py::object& u, const py::o
 py::tuple to_planar(const AngularSpace& space, const py::object& phi, const py::object& psi)
 {
     return apply({"phi", phi}, {"psi", psi}, [&](double azimuth, double zenith, double& u, double& v) {
-        const Vec2 place = space.to_planar({azimuth, zenith});
-        u = place.x;
-        v = place.y;
+        const Vec2 point = space.to_planar({azimuth, zenith});
+        u = point.x;
+        v = point.y;
     });
 }
 
@@ -108,9 +108,9 @@ LdfSample interpolate_samples(const std::vector<std::shared_ptr<LdfSample>>& sam
             reject("samples", "with None", "LdfSamples");
         pointers.push_back(sample.get());
     }
-    const Interpolation which = method_from_name(method);
+    const Interpolation interpolation = method_from_name(method);
     const py::gil_scoped_release release;
-    return interpolate(pointers, angle, albedo, g, which, height);
+    return interpolate(pointers, angle, albedo, g, interpolation, height);
 }
 
 std::shared_ptr<SampleSource> sample_source(const std::vector<std::shared_ptr<LdfSample>>& samples,
@@ -125,9 +125,9 @@ std::shared_ptr<SampleSource> sample_source(const std::vector<std::shared_ptr<Ld
     return std::make_shared<SampleSource>(std::move(copies), method_from_name(method));
 }
 
-py::tuple pair(const Vec2& place)
+py::tuple pair(const Vec2& point)
 {
-    return py::make_tuple(place.x, place.y);
+    return py::make_tuple(point.x, point.y);
 }
 
 }  // namespace
@@ -141,24 +141,24 @@ Parameters
 image : array_like, float32, shape (N, M)
     Mean exitance of each texel per unit incident power, 1/mfp^2 (the paper's luminance, times pi); rows v upward,
     columns u; O, where the beam's axis enters, at the centre; the beam travels toward +u, to the right.
-    Undershoots of up to 10 % of the brightest texel are taken for noise, other negative values are refused; so is a
-    power, the integral, that is negative or larger than 1.05: no medium returns more than arrives, and 5 % is what a
-    simulation of a thousand photons may be off.
+    Undershoots of up to 10 % of the brightest texel count as noise; other negative values are rejected. `convolve` also
+    rejects a power (the integral) that is negative or above 1.05: no medium returns more light than arrives, and 5 % is
+    the error of a simulation of a thousand photons.
 pitch : float
     Side of a texel, mean free paths, 1e-6 to 1e18.
 angle : float
-    Of incidence, degrees from the surface normal, [0, 90).
+    Angle of incidence, degrees from the surface normal, [0, 90).
 albedo : float
-    [0, 1).
+    Single-scattering albedo, [0, 1).
 beam_diameter : float
-    Of the evenly lit disk on the surface, mean free paths; 0: a pencil beam.
+    Diameter of the evenly lit disk on the surface, mean free paths; 0: a pencil beam.
 g : float, optional
     Anisotropy of the medium.
 
 Raises
 ------
 ValueError
-    Names the argument, its value and what is allowed.
+    An argument is outside its range. Names argument, value and range.
 )");
     sample.def(py::init(&sample_of), py::arg("image"), py::arg("pitch"), py::arg("angle"), py::arg("albedo"),
                py::arg("beam_diameter") = 0.0, py::arg("g") = py::none());
@@ -166,16 +166,16 @@ ValueError
                       py::arg("size"), py::arg("pitch"), py::arg("beam_diameter") = 0.0, py::arg("side") = "reflected",
                       "The sample whose image is `library.image(angle, albedo, size, pitch, side, beam_diameter)`.");
     sample.def_static("load", &load_sample, py::arg("path"), ReleaseGil(),
-                      R"(Read a sample from an OpenEXR file, ours or another program's.
+                      R"(Read a sample from an OpenEXR file of `save` or of another program.
 
-The file has one part with the channel Y (or one channel alone) and the attributes, numbers of type float, double or
-int, ``pitch`` (mean free paths), ``angle`` (degrees), ``albedo``, and where known ``beamDiameter`` (mean free paths)
-and ``g``. Its first line is that of the largest v.
+The file has one part with the channel Y (or a single channel) and the attributes ``pitch`` (mean free paths), ``angle``
+(degrees), ``albedo`` and, if known, ``beamDiameter`` (mean free paths) and ``g``, of type float, double or int. Its
+first line has the largest v.
 
 Raises
 ------
 OSError
-    The file is missing or damaged; or it lacks, or has a wrong, attribute, channel or value, which the message names.
+    The file is missing or damaged, or an attribute, channel or value is missing or wrong. The message names it.
 )");
     sample.def("save", &save_sample, py::arg("path"), ReleaseGil(),
                "Write an OpenEXR file that `load` reads; an existing file is replaced only by a complete one.");
@@ -190,14 +190,14 @@ OSError
         .def_property_readonly(
             "brightest",
             [](const LdfSample& self) {
-                const Vec2 place = brightest_point(self);
-                return py::make_tuple(place.x, place.y);
+                const Vec2 point = brightest_point(self);
+                return py::make_tuple(point.x, point.y);
             },
             R"(H, the brightest point, (u, v) in mean free paths.
 
-On v = 0, as an LDF is even in v. The image is smoothed as little as brings its noise, the part odd in v, below 1 % of
-the peak; H is the vertex of a paraboloid fitted to what is within 5 % of the peak. A peak next to O that the texels
-don't resolve, such as a pencil beam's, is at O.)")
+H lies on v = 0, as an LDF is even in v. The image is smoothed until its noise, the part odd in v, is below 1 % of the
+peak. H is the vertex of a paraboloid fitted to the texels within 5 % of the peak. A peak beside O that the texels do
+not resolve, as a pencil beam's, is at O.)")
         .def("__repr__", [](const LdfSample& self) {
             return py::str("<LdfSample {}x{} pitch={} angle={} albedo={} beam_diameter={} g={}>")
                 .format(self.height, self.width, self.pitch, self.angle_deg, self.albedo, self.beam_diameter, self.g);
@@ -208,25 +208,25 @@ void bind_interpolation(py::module_& m)
 {
     py::class_<AngularSpace> space(m, "AngularSpace", R"(The angular space of Manabe et al. 2012 (Sec. 3.2, Fig. 3).
 
-Places P of the plane as seen from the reference point Q at `height` above the brightest point H: psi in [0, pi/2)
-is the angle at Q between the normal and the direction to P, phi in [0, 2 pi) the azimuth of P around H from the
-beam's direction of travel, +u: ``P = H + height tan(psi) (cos phi, sin phi)``. The paper's text takes for phi the angle
-at P between the directions to O and H, which is 0 everywhere at normal incidence; its Fig. 4 shows the azimuth. The
-maps therefore depend on H and the height alone.
+Directions to points P of the plane from the reference point Q, at `height` above the brightest point H. psi in
+[0, pi/2) is the angle at Q between the normal and the direction to P; phi in [0, 2 pi) is the azimuth of P around H
+from the beam's direction of travel, +u: ``P = H + height tan(psi) (cos phi, sin phi)``. The paper's text defines phi as
+the angle at P between the directions to O and H, which is 0 everywhere at normal incidence; its Fig. 4 shows the
+azimuth. The maps therefore depend on H and the height alone.
 
 Parameters
 ----------
 origin : (float, float)
-    O, where the beam enters, (u, v) in any unit of length.
+    Point of entry O, (u, v) in any unit of length.
 brightest : (float, float)
-    H, in the same unit.
+    Brightest point H, in the same unit.
 height : float
-    Of Q, in the same unit; > 0.
+    Height of Q, in the same unit; > 0.
 
 Raises
 ------
 ValueError
-    Names the argument, its value and what is allowed.
+    An argument is outside its range. Names argument, value and range.
 )");
     space
         .def(py::init([](std::array<double, 2> origin, std::array<double, 2> brightest, double height) {
@@ -234,7 +234,7 @@ ValueError
              }),
              py::arg("origin"), py::arg("brightest"), py::arg("height"))
         .def("to_angular", &to_angular, py::arg("u"), py::arg("v"),
-             "(phi, psi) of places (u, v), elementwise for arrays; phi is 0 at H.")
+             "(phi, psi) of points (u, v), elementwise for arrays; phi is 0 at H.")
         .def("to_planar", &to_planar, py::arg("phi"), py::arg("psi"),
              "(u, v) of directions, elementwise for arrays; any phi, psi in [0, pi/2).")
         .def_property_readonly("origin", [](const AngularSpace& self) { return pair(self.origin()); })
@@ -252,35 +252,35 @@ ValueError
 Parameters
 ----------
 samples : sequence of LdfSample
-    On a regular grid of angles and albedos, and of g where that differs, in any order; alike in texels and beam. Only
-    the cell of the grid around what is asked for counts.
+    Samples on a regular grid of angles, albedos and, if it differs, g, in any order, with the same texels and beam
+    diameter. The cell of the grid around the request determines the result.
 angle, albedo : float
-    Within the samples' span.
+    Requested angle (degrees) and albedo, within the samples' span.
 g : float, optional
-    Anisotropy; needed where the samples span more than one.
+    Anisotropy; required if the samples span more than one.
 method : {"angular", "adaptive", "planar"}
-    ``angular`` is the paper's (Eq. 3, 4): exitance is blended with linear weights at the same place of angular space, H
-    and Q are blended with the same weights. ``planar`` blends at the same (u, v). ``adaptive`` blends logarithms, with
-    weights that follow how LDFs change with angle and albedo: nearer to the truth, by far where albedos differ.
+    ``angular`` is the paper's method (Eq. 3, 4): exitance is blended with linear weights at the same direction of
+    angular space, H and Q with the same weights. ``planar`` blends at the same (u, v). ``adaptive`` blends logarithms
+    with weights that follow the dependence of LDFs on angle and albedo: more exact, by far if albedos differ.
 height : float, optional
-    Of Q above H for ``angular``, mean free paths; default: two thirds of the images' width, the paper's 100 units over
-    a window of 150. The result doesn't depend on it but for rounding: with the same height for all samples it cancels
-    out.
+    Height of Q above H for ``angular``, mean free paths; default: two thirds of the images' width, as the paper's 100
+    units over a window of 150. It cancels, as all samples have the same height: the result depends on it by rounding
+    alone.
 
 Returns
 -------
 LdfSample
-    Where a sample is asked for, its own image.
+    The interpolated sample; a sample's own image at its angle, albedo and g.
 
 Raises
 ------
 ValueError
-    Names the argument, its value and what is allowed: outside of the samples, their span.
+    An argument is outside its range or the samples' span. Names argument, value and range.
 )");
 
     py::class_<SampleSource, LdfSource, std::shared_ptr<SampleSource>>(
         m, "SampleSource",
-        "LdfSamples of one medium as `convolve` takes them, interpolated by a method of `interpolate`.")
+        "LDFs for `convolve` from LdfSamples of one medium, interpolated by a method of `interpolate`.")
         .def(py::init(&sample_source), py::arg("samples"), py::arg("method") = "angular");
 }
 

@@ -1,10 +1,10 @@
-// The extension module beamspread._native: exceptions and one function per folder.
+// The extension module beamspread._native: exceptions, and one binding function per topic.
 #include "base/error.h"
 #include "python/casters.h"
 
 namespace beamspread {
 
-// Errors of the engine become Python's at this one boundary.
+// Translates errors of the engine to Python's.
 static void translate(std::exception_ptr pointer)
 {
     try {
@@ -26,10 +26,10 @@ PYBIND11_MODULE(_native, m)
     m.attr("__version__") = BEAMSPREAD_VERSION;
     py::register_exception<Cancelled>(m, "Cancelled").doc() = "A progress callback returned False.";
     py::register_exception<MemoryLimit>(m, "MemoryLimit", PyExc_MemoryError).doc() =
-        "More memory would be taken than allowed.";
+        "The job needs more memory than allowed.";
     py::register_local_exception_translator(&translate);
     bind_medium(m);
-    // Types before the functions that name them in their signatures.
+    // Bind types before the functions that have them in their signatures.
     bind_ldf(m);
     bind_ldf_sample(m);
     bind_interpolation(m);

@@ -47,7 +47,7 @@ thickness : float
 Raises
 ------
 ValueError
-    Names the argument, its value and what is allowed.
+    An argument is outside its range. Names argument, value and range.
 )")
         .def(py::init([](double g, double ior, double thickness) {
                  const Medium medium{g, ior, thickness};
@@ -58,7 +58,7 @@ ValueError
         .def_readonly("g", &Medium::g)
         .def_readonly("ior", &Medium::ior)
         .def_readonly("thickness", &Medium::thickness)
-        // With anything else Python goes on to compare identities, as for its own types.
+        // For other types Python compares identities, as for its own types.
         .def(
             "__eq__", [](const Medium& a, const Medium& b) { return a == b; }, py::is_operator())
         .def("__hash__", [](const Medium& a) { return py::hash(py::make_tuple(a.g, a.ior, a.thickness)); })
@@ -70,7 +70,7 @@ ValueError
             [](const Medium& a) { return py::make_tuple(a.g, a.ior, a.thickness); },
             [](const py::tuple& t) { return Medium{t[0].cast<double>(), t[1].cast<double>(), t[2].cast<double>()}; }));
     m.def("fresnel", py::vectorize(&fresnel), py::arg("cos_theta_i"), py::arg("eta"),
-          "Reflectance of unpolarized light; eta is the index behind the boundary over the one before it.");
+          "Reflectance of unpolarized light; eta is the index behind the boundary over the index before it.");
     m.def("henyey_greenstein_pdf", py::vectorize(&henyey_greenstein_pdf), py::arg("cos_theta"), py::arg("g"),
           "Density per steradian of a deflection.");
     m.def("henyey_greenstein_sample", py::vectorize(&henyey_greenstein_sample), py::arg("g"), py::arg("u"),
@@ -90,9 +90,9 @@ void bind_transport(py::module_& m)
         },
         py::arg("medium"), py::arg("angles"), py::arg("photons"), py::arg("seed") = 1, py::arg("threads") = 0,
         py::arg("progress") = py::none(), py::arg("kernel") = "",
-        R"(Simulate the light that beams spread inside a medium, by Monte Carlo.
+        R"(Simulate light inside a medium by Monte Carlo.
 
-One simulation serves every albedo, because what leaves is tallied by scattering order.
+One simulation serves every albedo, because light that leaves is tallied by scattering order.
 
 Parameters
 ----------
@@ -100,15 +100,15 @@ medium : Medium
 angles : sequence of float
     Angles of incidence, degrees from the surface normal, 0 <= angle < 90, distinct.
 photons : int
-    Per angle, at least 1.
+    Photons per angle, at least 1.
 seed : int
-    The result depends on it, and not on the number of threads.
+    Seed of the random numbers. The result depends on it, and not on the number of threads.
 threads : int
-    0: all.
+    Number of threads; 0: all.
 progress : callable, optional
-    Called with the finished fraction. The answer False (or NumPy's) stops, any other goes on; an error passes through.
+    Called with the finished fraction. Returning False (or NumPy's) stops the simulation; exceptions pass through.
 kernel : str
-    One of `walk_kernels()`; empty: the fastest. They agree up to the simulation's noise.
+    One of `walk_kernels()`; empty: the fastest. Kernels agree up to the simulation's noise.
 
 Returns
 -------
@@ -117,7 +117,7 @@ LdfLibrary
 Raises
 ------
 ValueError
-    Names the argument, its value and what is allowed.
+    An argument is outside its range. Names argument, value and range.
 Cancelled
     `progress` returned False.
 )");
@@ -131,15 +131,15 @@ Cancelled
         },
         R"(Names of the implementations of the photon walk that this processor can run, fastest first.
 
-The last, `scalar`, walks one photon at a time in double precision and is the truth for the others, which
-walk as many as a vector has lanes, in single precision.
+The last, `scalar`, walks one photon at a time in double precision. It is the reference for the others, which walk one
+photon per vector lane in single precision.
 )");
     m.def("exact_totals", &exact, py::arg("medium"), py::arg("angles"), py::arg("albedos"), py::arg("threads") = 0,
           R"(Reflectance and transmittance of a medium without noise, by discrete ordinates and doubling of layers.
 
-The plane-parallel problem alone, as van de Hulst 1980 and Prahl, van Gemert, Welch 1993 (Appl. Opt. 32, 559) solve it:
-it knows nothing of where light leaves, and so checks simulations and calibrates libraries. Twice as many
-directions change the results by less than 1e-4 of each for -.95 <= g <= .95 and angles up to 88 degrees.
+Solves the plane-parallel problem (van de Hulst 1980; Prahl, van Gemert, Welch 1993, doi:10.1364/AO.32.000559), without
+the positions at which light leaves. Checks simulations and calibrates libraries. Twice as many directions change the
+results by less than 1e-4 of each for -.95 <= g <= .95 and angles up to 88 degrees.
 
 Parameters
 ----------
@@ -149,17 +149,17 @@ angles : sequence of float
 albedos : sequence of float
     Single-scattering albedos, 0 <= albedo < 1.
 threads : int
-    0: all. The result does not depend on it.
+    Number of threads; 0: all. The result does not depend on it.
 
 Returns
 -------
 reflectance, transmittance : float64, shape (angles, albedos)
-    Power per unit incident power: what `LdfLibrary.reflectance` and `LdfLibrary.transmittance` estimate.
+    Power per unit incident power, as `LdfLibrary.reflectance` and `LdfLibrary.transmittance`.
 
 Raises
 ------
 ValueError
-    Names the argument, its value and what is allowed.
+    An argument is outside its range. Names argument, value and range.
 )");
 }
 

@@ -1,4 +1,4 @@
-// Small vectors from Python's sequences of numbers.
+// Vectors, and rows of arrays as vectors, from Python's sequences of numbers.
 #pragma once
 
 #include <array>
@@ -13,10 +13,10 @@
 
 namespace beamspread {
 
-// Few numbers of any type, copied.
+// Short sequence of numbers of any type, copied.
 using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-// A big array of `Number`s whose rows are seen as `Row`s: its type is never converted silently. Throws InvalidArgument.
+// View of an array's rows as `Row`s. The array must consist of `Number`s and is not converted. Throws InvalidArgument.
 template <class Row, class Number>
 std::span<const Row> to_rows(const std::string& name, const py::array& array, const std::string& allowed)
 {
@@ -50,7 +50,7 @@ inline View2D<Vec3f> vectors_of(Array<float>& array)
     return {reinterpret_cast<Vec3f*>(array.mutable_data()), side(array, 0), side(array, 1), array.shape(1)};
 }
 
-// Throws InvalidArgument.
+// Three numbers as a vector; throws InvalidArgument.
 inline Vec3 to_vec3(const std::string& name, const Numbers& numbers)
 {
     if (numbers.ndim() != 1 || numbers.size() != 3)
@@ -58,7 +58,7 @@ inline Vec3 to_vec3(const std::string& name, const Numbers& numbers)
     return {numbers.at(0), numbers.at(1), numbers.at(2)};
 }
 
-// Rows of the array become columns of the matrix: both are the axes of something. Throws InvalidArgument.
+// Matrix whose columns are the rows of the array, the axes of a frame. Throws InvalidArgument.
 inline Mat3 to_axes(const std::string& name, const Numbers& numbers)
 {
     if (numbers.ndim() != 2 || numbers.shape(0) != 3 || numbers.shape(1) != 3)

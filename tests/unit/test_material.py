@@ -52,7 +52,7 @@ def test_regular_milk_has_the_coefficients_of_narasimhans_table():
         ("gatorade", [0.0024574, 0.003007, 0.0037325]),
     ],
 )
-def test_reduced_scattering_agrees_with_others_who_used_the_same_table(name, reduced):
+def test_reduced_scattering_agrees_with_other_users_of_the_table(name, reduced):
     """The values of pbrt's table of media, per mm; the columns for sigma_s and g must belong together."""
     material = presets()[name]
     assert coefficients(material)[0] * (1 - np.array(material.anisotropy_rgb)) == pytest.approx(reduced, rel=1e-4)

@@ -83,7 +83,7 @@ class TestTextured:
         colors[:, SIZE // 2 :] = 1
         return colors
 
-    def test_the_mean_is_over_what_is_covered(self, grid):
+    def test_the_mean_is_over_covered_texels(self, grid):
         assert mean_color(self.receiver(grid), [self.colors()]) == pytest.approx((0.4, 0.4, 0.0))
 
     @pytest.mark.parametrize("blur", [0.0, 0.5, 0.8, 1.0])

@@ -1,6 +1,6 @@
-"""A rectangular grid of texels on a plane, which light arrives on and is solved on.
+"""Rectangular grid of texels on a plane, on which light arrives and is solved.
 
-All positions are world positions in scene units. Rows of every array run up the plane: row 0 is the bottom (v = 0), as
+Positions are world positions in scene units. Rows of all arrays run up the plane: row 0 is the bottom (v = 0), as
 Blender stores images.
 """
 
@@ -17,7 +17,7 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """The grid; its frame is the plane's: x along columns, y up the rows, z outward.
+    """The grid. Its frame is the plane's: x along columns, y up the rows, z outward.
 
     Attributes
     ----------
@@ -27,10 +27,10 @@ class Grid:
     normal : unit vector, outward.
     pitch_x, pitch_y : texel size along the axes, scene units.
     width, height : number of texels.
-    coverage : float32 (height, width), part of each texel inside the mesh, 0..1.
-    clearance : how far the mesh departs from the plane at most, scene units: shadow rays start above that.
-    color_in, color_out : float32 (height, width, 3), factors of light on its way in and of light that leaves, by the
-        texture of the surface; None without one.
+    coverage : float32 (height, width), fraction of each texel inside the mesh, 0..1.
+    clearance : largest distance of the mesh from the plane, scene units; shadow rays start above it.
+    color_in, color_out : float32 (height, width, 3), factors of entering and leaving light by the surface's texture;
+        None without a texture.
     """
 
     origin: Vector
@@ -48,7 +48,7 @@ class Grid:
 
     @property
     def centre(self) -> np.ndarray:
-        """World position."""
+        """World position of the grid's centre."""
         across = 0.5 * self.width * self.pitch_x * np.array(self.x_axis)
         return self.origin + across + 0.5 * self.height * self.pitch_y * np.array(self.y_axis)
 
@@ -59,7 +59,7 @@ class Grid:
         return np.array(self.origin) + columns + rows
 
     def height_of(self, point: Vector) -> float:
-        """How far a world point lies outward of the plane; negative behind it."""
+        """Distance of a world point from the plane, outward; negative behind it."""
         return float(np.dot(np.subtract(point, self.origin), self.normal))
 
     def native(self):

@@ -1,7 +1,7 @@
-"""From flat, UV-mapped sets of polygons to the texel grids that light is gathered on.
+"""Receivers: texel grids of flat, UV-mapped polygons, and their positions in a texture.
 
-When the axes p_u and p_v of a chart's UV map are orthogonal, its grid consists of the texels themselves; otherwise it
-is a rectangular grid of the same density, and `Chart.write` resamples it bilinearly.
+If the axes p_u and p_v of a chart's UV map are orthogonal, the chart's grid consists of the texture's texels. Otherwise
+it is a rectangular grid of the same density, and `Chart.write` resamples it bilinearly.
 """
 
 from __future__ import annotations
@@ -17,26 +17,26 @@ from .grid import Grid
 from .sampling import bilinear
 from .uv_map import UvMap
 
-# Texels that a chart enters by less than this fraction are left out of the grid (rounding of float32 UVs).
+# Overlap with a chart, in texels, below which texels at its border are not part of the grid: rounding of float32 UVs.
 EDGE_TOLERANCE = 1e-3
 
 
 def in_chart(coverage: np.ndarray) -> np.ndarray:
-    """Which texels belong to a chart, of the part of each that lies inside: those that it touches at all."""
+    """True for texels that belong to a chart: those with any coverage."""
     return coverage > 0
 
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """A flat part of a receiver: a grid on its plane and its place in the texture.
+    """Flat part of a receiver: a grid on its plane, and the texels that it fills in a texture.
 
     Attributes
     ----------
-    grid : where light arrives.
-    coverage : float32 (rows, columns), part of each texel inside the chart, of the texture's part from `offset` on.
+    grid : the grid on which light arrives.
+    coverage : float32 (rows, columns), fraction inside the chart of each texel of the texture's part around the chart.
     offset : (column, row) of that part's first texel in the texture.
     texel_to_grid : (2, 3), maps (column, row, 1) of a texel's centre to grid coordinates, both in texels with centres
-        at half-integers; None when the grid is that part of the texture itself.
+        at half-integers; None if the grid consists of the part's texels.
     """
 
     grid: Grid
@@ -45,9 +45,9 @@ class Chart:
     texel_to_grid: np.ndarray | None = None
 
     def uvs(self, width: int, height: int, at: tuple[float, float] = (0.5, 0.5)) -> np.ndarray:
-        """Float64 (grid height, grid width, 2): where places of the grid lie in a texture of that size, 0..1.
+        """UVs of the grid's texels in a texture of this size, float64 (grid height, grid width, 2), 0..1.
 
-        `at`: columns and rows from each texel's corner, its centre by default.
+        `at` is the sample position: columns and rows from each texel's corner, its centre by default.
         """
         columns, rows = np.meshgrid(np.arange(self.grid.width) + at[0], np.arange(self.grid.height) + at[1])
         if self.texel_to_grid is None:
@@ -57,20 +57,20 @@ class Chart:
             columns, rows = np.moveaxis((np.stack([columns, rows], -1) - shift) @ np.linalg.inv(matrix).T, -1, 0)
         return np.stack([columns / width, rows / height], axis=-1)
 
-    def grid_places(self, uvs: np.ndarray, receiver: Receiver) -> tuple[np.ndarray, np.ndarray]:
-        """Columns and rows of its grid, flat, centres at half-integers; of UVs (..., 2) of the receiver's texture."""
+    def grid_positions(self, uvs: np.ndarray, receiver: Receiver) -> tuple[np.ndarray, np.ndarray]:
+        """Grid columns and rows (flat, texel centres at half-integers) of UVs (..., 2) in the receiver's texture."""
         texels = uvs.reshape(-1, 2) * [receiver.width, receiver.height]
         if self.texel_to_grid is None:
             return tuple((texels - self.offset).T)
         return tuple(self.texel_to_grid @ np.column_stack([texels, np.ones(len(texels))]).T)
 
     def part_of(self, texture: np.ndarray) -> np.ndarray:
-        """The part of the texture around the chart, a view."""
+        """View of the texture's part around the chart."""
         (column, row), (rows, columns) = self.offset, self.coverage.shape
         return texture[row : row + rows, column : column + columns]
 
     def write(self, texture: np.ndarray, values: np.ndarray) -> None:
-        """Put grid values (grid height, grid width, C) where the chart lies in the texture (height, width, C)."""
+        """Write grid values (grid height, grid width, C) to the chart's texels of a texture (height, width, C)."""
         part, inside = self.part_of(texture), in_chart(self.coverage)
         if self.texel_to_grid is None:
             np.copyto(part, values, where=inside[..., None])
@@ -81,7 +81,7 @@ class Chart:
         part[rows, columns] = bilinear(values, x, y)
 
     def read(self, texture: np.ndarray) -> np.ndarray:
-        """Values of its grid (grid height, grid width, C) from a texture (height, width, C)."""
+        """Values (grid height, grid width, C) on the grid, from a texture (height, width, C)."""
         if self.texel_to_grid is None:
             return self.part_of(texture)
         height, width = texture.shape[:2]
@@ -91,12 +91,12 @@ class Chart:
 
 @dataclass(frozen=True, eq=False)
 class Receiver:
-    """What one bake fills of a texture.
+    """The texels of a texture that one bake fills.
 
     Attributes
     ----------
-    coverage : float32 (height, width), part of each texel of the texture inside the charts.
-    charts : flat parts, today always one.
+    coverage : float32 (height, width), fraction of each texel inside the charts.
+    charts : flat parts; one at present.
     """
 
     coverage: np.ndarray
@@ -115,7 +115,7 @@ class Receiver:
         return in_chart(self.coverage)
 
     def to_texture(self, values: Sequence[np.ndarray]) -> np.ndarray:
-        """Float32 (height, width, C) from grid values (grid height, grid width, C) of each chart, 0 outside of them."""
+        """Texture, float32 (height, width, C), with the charts' grid values (grid height, grid width, C); 0 outside."""
         texture = np.zeros((self.height, self.width, values[0].shape[2]), np.float32)
         for chart, on_grid in zip(self.charts, values):
             chart.write(texture, on_grid)
@@ -123,14 +123,20 @@ class Receiver:
 
 
 def texture_size(maps: Sequence[UvMap], resolution: int) -> tuple[int, int]:
-    """Width and height of a texture with `resolution` texels along the longer side, nearly square where finest."""
-    lengths = np.max([(np.linalg.norm(one.p_u), np.linalg.norm(one.p_v)) for one in maps], axis=0).tolist()
+    """Width and height of a texture with `resolution` texels along the longer side; texels are nearly square."""
+    lengths = np.max([(np.linalg.norm(uv_map.p_u), np.linalg.norm(uv_map.p_v)) for uv_map in maps], axis=0).tolist()
     return tuple(max(1, round(resolution * length / max(lengths))) for length in lengths)
 
 
 def build_receiver(maps: Sequence[UvMap], width: int, height: int) -> Receiver:
-    """Lay the grids of a texture of `width` x `height` texels over flat parts; ReceiverError where that has none."""
-    charts = tuple(_chart(one, width, height) for one in maps)
+    """Make the charts of flat parts for a texture of `width` x `height` texels.
+
+    Raises
+    ------
+    ReceiverError
+        The parts cover no texel.
+    """
+    charts = tuple(_chart(uv_map, width, height) for uv_map in maps)
     coverage = charts[0].coverage
     if len(charts) > 1 or coverage.shape != (height, width):
         coverage = np.zeros((height, width), np.float32)
@@ -152,19 +158,19 @@ def _chart(uv_map: UvMap, width: int, height: int) -> Chart:
     first = np.clip(np.floor(texels.min(axis=0) + EDGE_TOLERANCE), 0, [width - 1, height - 1]).astype(int)
     last = np.clip(np.ceil(texels.max(axis=0) - EDGE_TOLERANCE), first + 1, [width, height]).astype(int)
     coverage = _coverage(polygons.split(texels), width, height)
-    own = np.ascontiguousarray(coverage[first[1] : last[1], first[0] : last[0]])
+    chart_coverage = np.ascontiguousarray(coverage[first[1] : last[1], first[0] : last[0]])
     offset = int(first[0]), int(first[1])
     if uv_map.is_orthogonal():
         origin = uv_map.p_0 + first[0] / width * p_u + first[1] / height * p_v
-        return Chart(_grid(origin, frame, uv_map, pitch, own), own, offset)
-    # A rectangle around the polygons with its rows along the texture's.
+        return Chart(_grid(origin, frame, uv_map, pitch, chart_coverage), chart_coverage, offset)
+    # Compute the rectangle around the polygons whose rows are parallel to the texture's.
     points = polygons.corners @ frame.T / pitch
     corner = points.min(axis=0)
     columns, rows = np.maximum(np.ceil(points.max(axis=0) - corner - EDGE_TOLERANCE), 1).astype(int).tolist()
     origin = (corner * pitch) @ frame + (polygons.corners.mean(axis=0) @ uv_map.normal) * uv_map.normal
     grid = _grid(origin, frame, uv_map, pitch, _coverage(polygons.split(points - corner), columns, rows))
     slopes = [(frame @ p_u) / pitch / width, (frame @ p_v) / pitch / height]
-    return Chart(grid, own, offset, np.column_stack([*slopes, frame @ uv_map.p_0 / pitch - corner]))
+    return Chart(grid, chart_coverage, offset, np.column_stack([*slopes, frame @ uv_map.p_0 / pitch - corner]))
 
 
 def _grid(origin: np.ndarray, frame: np.ndarray, uv_map: UvMap, pitch: np.ndarray, coverage: np.ndarray) -> Grid:
@@ -174,7 +180,7 @@ def _grid(origin: np.ndarray, frame: np.ndarray, uv_map: UvMap, pitch: np.ndarra
 
 
 def _coverage(faces: list[np.ndarray], width: int, height: int) -> np.ndarray:
-    """Part of each texel inside the faces; `faces` hold (x, y) in texels."""
+    """Fraction of each texel inside the faces; `faces` have (x, y) in texels."""
     corners = np.ascontiguousarray(np.concatenate(faces), np.float64)
     counts = np.array([len(face) for face in faces], np.uint32)
     return native.coverage(corners, counts, width, height)

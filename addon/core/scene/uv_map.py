@@ -1,4 +1,4 @@
-"""The plane of a flat set of polygons, and its UV map, which must be affine: P = p_0 + u p_u + v p_v."""
+"""Plane and affine UV map, P = p_0 + u p_u + v p_v, of a flat set of polygons."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 
 from ..errors import ReceiverError
 
-# Allowed departure from a plane and from an affine map, over the receiver's diagonal: a tenth of a texel at 1024.
+# Largest distance from a plane and from an affine map, over the receiver's diagonal: a tenth of a texel at 1024.
 FLATNESS_TOLERANCE = 1e-4
-# UVs this little outside 0..1 are rounding of float32 coordinates.
+# Largest distance of UVs from 0..1: rounding of float32 coordinates.
 UV_TOLERANCE = 1e-4
 
 
@@ -32,13 +32,13 @@ class Polygons:
     normals: np.ndarray
 
     def split(self, points: np.ndarray) -> list[np.ndarray]:
-        """Cut a per-corner array into one array per face."""
+        """Split a per-corner array into one array per face."""
         return [points[begin:end] for begin, end in zip(self.starts[:-1], self.starts[1:])]
 
 
 @dataclass(frozen=True, eq=False)
 class UvMap:
-    """P(u, v) = p_0 + u p_u + v p_v on the plane with the outward unit `normal`; corners depart by `deviation`."""
+    """P(u, v) = p_0 + u p_u + v p_v on a plane with an outward unit `normal`; corners are within `deviation` of it."""
 
     polygons: Polygons
     p_0: np.ndarray
@@ -48,19 +48,19 @@ class UvMap:
     deviation: float
 
     def is_orthogonal(self) -> bool:
-        """Whether texels are rectangles."""
+        """True if texels are rectangles."""
         cosine = self.p_u @ self.p_v / (np.linalg.norm(self.p_u) * np.linalg.norm(self.p_v))
         return abs(cosine) < FLATNESS_TOLERANCE
 
 
 def fit_uv_maps(polygons: Polygons) -> list[UvMap]:
-    """The flat parts of a mesh, each of which becomes a chart: today all polygons have to be one.
+    """UV maps of the flat parts of a mesh, one per chart. At present all polygons must be one part.
 
     Raises
     ------
     ReceiverError
-        No faces, no area, not flat, faces of both orientations, or UVs that are missing, outside 0..1, degenerate or
-        not affine: plane and map are verified on every corner.
+        The mesh has no faces or no area, is not flat, has faces of both orientations, or has UVs that are missing,
+        outside 0..1, degenerate or not affine. Every corner is checked.
     """
     corners, uvs = polygons.corners, polygons.uvs
     if len(polygons.starts) < 2:
@@ -121,7 +121,7 @@ def _fit_affine(polygons: Polygons, normal: np.ndarray, size: float) -> UvMap:
             "The UV map bends, cuts or scales faces differently: unwrap the flat surface in one piece "
             "(UV > Project from View in Edit Mode)."
         )
-    # Directions in the plane exactly, so that the grid's axes are orthogonal to the normal.
+    # Project the directions into the plane: the grid's axes must be orthogonal to the normal.
     p_u, p_v = slopes - np.outer(slopes @ normal, normal)
     if np.linalg.norm(np.cross(p_u, p_v)) < 1e-9 * np.linalg.norm(p_u) * np.linalg.norm(p_v):
         raise ReceiverError("The UV map has no area: unwrap the mesh again.")
