@@ -71,3 +71,20 @@ def lit_texels(kind, size, rng):
         part = {"none": np.s_[:], "half": np.s_[:, : size // 2], "stripes": np.s_[:, ::8], "corner": np.s_[:33, :33]}
         lit[part[kind]] = 1
     return lit
+
+
+def gather_beams(grid, light, occluders=None, samples=4, **options):
+    """Irradiance and mean direction of travel of a light without a size, on a native `ReceiverGrid`.
+
+    Irradiance is (H, W), or (H, W, 3) past colored occluders. Directions are float64 unit vectors (H, W, 3), and
+    (0, 0, -1) in the dark.
+    """
+    from beamspread.core.native import native
+
+    irradiance, flow = native.gather_rays(grid, light, occluders, samples=samples, **options)
+    if occluders is None or not occluders.is_colored:
+        irradiance = np.ascontiguousarray(irradiance[..., 0])
+    flow = flow.astype(float)
+    length = np.linalg.norm(flow, axis=-1, keepdims=True)
+    direction = np.where(length > 0, flow / np.maximum(length, np.finfo(float).tiny), (0, 0, -1))
+    return irradiance, direction

@@ -53,7 +53,7 @@ def seconds(grid, light, occluders, find_shadows):
     times = []
     for _ in range(3):
         start = time.process_time()
-        native.gather_beams(grid, light, occluders, find_shadows=find_shadows)
+        native.gather_rays(grid, light, occluders, find_shadows=find_shadows)
         times.append(time.process_time() - start)
     return min(times)
 

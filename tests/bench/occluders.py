@@ -73,7 +73,7 @@ def run(name, part):
     grid = native.ReceiverGrid((-1, -1, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 1 / 256, 1 / 256, 512, 512)
     for light in LIGHTS:
         start = time.perf_counter()
-        native.gather_beams(grid, light, occluders, find_shadows=False)
+        native.gather_rays(grid, light, occluders, find_shadows=False)
         times.append(time.perf_counter() - start)
     grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 2**20
     print(f"{name:28}{occluders.triangle_count:12d}" + "".join(f"{one:9.2f}" for one in times) + f"{grown:10.2f}")

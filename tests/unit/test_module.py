@@ -43,7 +43,7 @@ for solver in ("fft", "direct", "adaptive"):
     convolve(np.ones((8, 8), np.float32), (0.0, 0.0, -1.0), library, 0.5, 1.0, 1.0, solver=solver)
 occluders = native.Occluders([native.OccluderMesh(np.eye(3), np.array([[0, 1, 2]], np.uint32))])
 grid = native.ReceiverGrid((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), pitch_x=1, pitch_y=1, width=4, height=4)
-native.gather_beams(grid, native.SunLight((0, 0, -1)), occluders)
+native.gather_rays(grid, native.SunLight((0, 0, -1)), occluders)
 """
 
 
@@ -64,8 +64,8 @@ image = ldf.image(30, 0.9, 33, 0.5)
 print(image.strides, f"{image.sum(dtype=float):.9g}", bs.exact_totals(bs.Medium(), [0, 45], [0.5, 0.9])[0].tolist())
 grid = native.ReceiverGrid((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), pitch_x=1, pitch_y=1, width=4, height=3)
 for light in (native.SunLight((0.6, 0, -0.8)), native.PointLight((1, 1, 2))):
-    arriving, directions = native.gather_beams(grid, light)
-    print(arriving.strides, arriving.tolist(), directions.strides, directions.tolist())
+    arriving, flow = native.gather_rays(grid, light)
+    print(arriving.strides, arriving.tolist(), flow.strides, flow.tolist())
 """
 
 

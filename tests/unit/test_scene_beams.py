@@ -8,7 +8,7 @@ from beamspread.core.native import native
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from helpers import travel
+from helpers import gather_beams, travel
 
 PI = math.pi
 
@@ -38,7 +38,7 @@ def make_grid(width=8, height=6, size=(2.0, 1.5), axes=None, centre=(0, 0, 0)):
 
 def gather(grid, light, occluders=None, **options):
     """Irradiance and direction."""
-    return native.gather_beams(native.ReceiverGrid(**grid), light, occluders, **options)
+    return gather_beams(native.ReceiverGrid(**grid), light, occluders, **options)
 
 
 def points_of(grid, samples):
@@ -115,7 +115,9 @@ def test_sun_equals_brute_force(seed, samples, count):
     got, direction = gather(
         grid, native.SunLight(3 * travel), native.Occluders([native.OccluderMesh(vertices, triangles)]), samples=samples
     )
-    np.testing.assert_allclose(direction, axes @ travel / np.linalg.norm(travel), rtol=1e-12)
+    lit = got > 0
+    expected = np.broadcast_to(axes @ travel / np.linalg.norm(travel), direction.shape)
+    np.testing.assert_allclose(direction[lit], expected[lit], rtol=2e-6)
     travel = np.broadcast_to(travel / np.linalg.norm(travel), (*got.shape, samples**2, 3))
     wanted, _, doubtful = expected_beams(grid, samples, travel, 1.0, np.inf, vertices, triangles)
     assert got.dtype == np.float32
@@ -139,10 +141,6 @@ def test_point_equals_brute_force(seed, samples, count, mirrored):
     assert_close(irradiance, wanted, doubtful)
     dark = wanted == 0
     assert_close(direction, wanted_direction, doubtful | dark)
-    centres = (
-        lamp_at(points_of(grid, 1)[:, :, 0], position)[0] @ np.array([grid["x_axis"], grid["y_axis"], grid["normal"]]).T
-    )
-    assert_close(direction, centres, doubtful | ~dark)
     np.testing.assert_allclose(np.linalg.norm(direction, axis=-1), 1, atol=1e-6)
     assert (direction[..., 2] < 0).all()
 
@@ -257,7 +255,8 @@ def test_spot_follows_its_formula(seed, scale, shear, size, blend, falloff):
     travel, flux, _ = lamp_at(points, position)
     factor = spot_falloff(travel, frame, size, blend, falloff)
     np.testing.assert_allclose(irradiance, (flux * factor * -travel[..., 2])[..., 0], rtol=1e-5, atol=1e-8)
-    np.testing.assert_allclose(direction, travel[:, :, 0], atol=1e-6)
+    lit = irradiance > 0
+    np.testing.assert_allclose(direction[lit], travel[:, :, 0][lit], atol=1e-6)
 
 
 def test_spot_with_a_full_half_space_is_a_point_light_in_front():
@@ -380,9 +379,7 @@ def test_lamp_between_the_plane_and_an_occluder_is_not_blocked():
 @pytest.mark.parametrize("height", [0.0, -1.0])
 def test_light_from_behind_or_within_the_plane_is_none(height):
     grid = make_grid()
-    irradiance, direction = gather(grid, native.PointLight((0.01, 0.02, height)))
-    assert not irradiance.any()
-    np.testing.assert_array_equal(direction, np.broadcast_to([0, 0, -1], direction.shape))
+    assert not gather(grid, native.PointLight((0.01, 0.02, height)))[0].any()
     assert not gather(grid, native.SunLight((0, 0.1, -height)))[0].any()
 
 
@@ -480,7 +477,7 @@ def test_bad_sun_directions(direction):
 def test_few_points_tell_the_mean_of_a_lamp_far_away(place):
     """From 16 texels on: the Gauss rule against the mean of 64 x 64 points, known to (1 / 64 / 17)^2 = 1e-6."""
     grid = native.ReceiverGrid((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 1.0, 1.0, 40, 8)
-    irradiance, _ = native.gather_beams(grid, native.PointLight(place), samples=4)
+    irradiance, _ = gather_beams(grid, native.PointLight(place))
     x, y = ((np.arange(64 * count) + 0.5) / 64 for count in (40, 8))
     distance = np.sqrt((x - place[0]) ** 2 + (y[:, None] - place[1]) ** 2 + place[2] ** 2)
     mean = (place[2] / (4 * np.pi * distance**3)).reshape(8, 64, 40, 64).mean((1, 3))

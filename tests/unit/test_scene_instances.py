@@ -13,7 +13,7 @@ from beamspread.core.scene.occluders import Mesh, Occluder
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from helpers import travel
+from helpers import gather_beams, travel
 
 
 def sphere(steps=12):
@@ -82,7 +82,7 @@ def test_instances_shade_as_copies_do(seed, stretch, kind, far, is_sun):
     assert copied.triangle_count == shared.triangle_count == 12 * len(triangles)
     assert copied.is_opaque == shared.is_opaque == (kind == "opaque")
     light = native.SunLight((0.3, 0.2, -1)) if is_sun else native.PointLight(shift + (0.2, 0.1, 1.5))
-    one, other = (native.gather_beams(floor(shift), light, occluders)[0] for occluders in (copied, shared))
+    one, other = (gather_beams(floor(shift), light, occluders)[0] for occluders in (copied, shared))
     assert (one < 0.9 * one.max()).mean() > 0.01
     differs = np.abs(one - other) > 1e-6 * one.max()
     assert differs.mean() < 2e-3
@@ -110,7 +110,7 @@ def test_boxes_of_instances_hide_no_shadow(seed, far, lamp, kind, size):
     occluders = native.Occluders([mesh], shift, max_copied=0)
     assert occluders.instance_count == 3
     light = native.SunLight((0.5, 0.3, -0.4)) if lamp is None else native.PointLight(shift + lamp)
-    found, traced = (native.gather_beams(floor(shift), light, occluders, find_shadows=find) for find in (True, False))
+    found, traced = (gather_beams(floor(shift), light, occluders, find_shadows=find) for find in (True, False))
     np.testing.assert_array_equal(found[0], traced[0])
     np.testing.assert_array_equal(found[1], traced[1])
 
@@ -143,7 +143,7 @@ def test_an_instanced_receiver_does_not_shadow_itself(seed, far, angle, stretch,
     half = np.array([0.9, 0.9 / stretch])
     grid = native.ReceiverGrid(middle - half @ axes[:2], *axes, half[0] / 8, half[1] / 8, 16, 16)
     local = travel(angle, seed % 360)
-    lit, _ = native.gather_beams(grid, native.SunLight(local @ axes), occluders)
+    lit, _ = gather_beams(grid, native.SunLight(local @ axes), occluders)
     np.testing.assert_allclose(lit, -local[2], rtol=1e-6)
 
 
@@ -160,7 +160,7 @@ def test_flat_and_small_ones_are_copied():
     ]
     occluders = native.Occluders(meshes, max_copied=0)
     assert occluders.instance_count == 0
-    lit, _ = native.gather_beams(floor(), native.SunLight((0, 0, -1)), native.Occluders(meshes[:1]))
+    lit, _ = gather_beams(floor(), native.SunLight((0, 0, -1)), native.Occluders(meshes[:1]))
     # A disk of radius 1 around x = -.5, a polygon of 24 corners, and two of a quarter: one in it, one in part.
     x, y = np.meshgrid(*[(np.arange(96) + 0.5) / 48 - 1] * 2)
     distance = np.min([np.hypot(x + 0.5, y), 4 * np.hypot(x, y), 4 * np.hypot(x - 0.5, y)], axis=0)
@@ -204,7 +204,7 @@ def test_every_number_of_threads_gives_the_same_bits():
     def lit(threads):
         mesh = native.OccluderMesh(vertices, triangles, places, transmittances, materials, uvs)
         occluders = native.Occluders([mesh], max_copied=0)
-        return native.gather_beams(floor(), lamp, occluders, threads=threads)[0]
+        return gather_beams(floor(), lamp, occluders, threads=threads)[0]
 
     one, *more = [lit(threads) for threads in (1, 2, 7, 0)]
     for other in more:

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from beamspread.core.native import native
 
+from helpers import gather_beams
+
 GRID = native.ReceiverGrid((-1, -1, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 0.5, 0.5, 4, 4)
 SQUARE = np.array([[-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], float)
 FACES = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
@@ -14,7 +16,7 @@ DOWN = native.SunLight((0, 0, -1))
 
 def light_past(occluders, light=DOWN, grid=GRID, samples=4):
     """Irradiance."""
-    return native.gather_beams(grid, light, occluders, samples)[0]
+    return gather_beams(grid, light, occluders, samples)[0]
 
 
 def test_no_triangles_block_nothing():

@@ -8,6 +8,8 @@ from beamspread.core.native import native
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from helpers import gather_beams
+
 DOWN = native.SunLight((0, 0, -1))
 SQUARE = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
 FACES = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
@@ -35,7 +37,7 @@ def image(texels, **options):
 
 def light_past(meshes, light=DOWN, samples=4, max_crossings=None, on=None, **options):
     occluders = native.Occluders(meshes, max_crossings=max_crossings)
-    return native.gather_beams(on or grid(), light, occluders, samples, **options)[0]
+    return gather_beams(on or grid(), light, occluders, samples, **options)[0]
 
 
 def test_grey_cards_multiply_and_stay_scalar():
@@ -62,8 +64,8 @@ def test_the_direction_is_weighed_by_what_arrives():
     half = SQUARE * (0.5, 1, 0) - (0.5, 0, -1e-3)
     one = native.OccluderMesh(half, FACES, None, [native.Transmittance((0.25,) * 3)], np.zeros((2, 1), np.uint32))
     wide = grid(1, 1)
-    plain = native.gather_beams(wide, lamp, None, 8)
-    dimmed = native.gather_beams(wide, lamp, native.Occluders([one]), 8)
+    plain = gather_beams(wide, lamp, None, 8)
+    dimmed = gather_beams(wide, lamp, native.Occluders([one]), 8)
     # Half of the rays, mirror images of the others, at a quarter.
     np.testing.assert_allclose(dimmed[0], plain[0] * 0.625, rtol=1e-6)
     j, i = np.divmod(np.arange(64), 8)  # see beams.cpp
@@ -175,7 +177,7 @@ def test_finding_shadows_and_threads_change_nothing(seed, count, colored, far):
     place = native.ReceiverGrid(shift - (1, 1, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 1 / 40, 1 / 40, 80, 80)
     for light in (native.SunLight((0.3, 0.2, -1)), native.PointLight(shift + (0.2, 0.1, 1.4))):
         first, *others = [
-            native.gather_beams(place, light, occluders, find_shadows=find, threads=threads)
+            gather_beams(place, light, occluders, find_shadows=find, threads=threads)
             for find, threads in ((True, 1), (False, 1), (True, 0), (True, 3))
         ]
         for other in others:
