@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Bakes every example in Blender, renders each with Cycles from what was baked, and plots the cut through the shadow
-# border of `obstacle`. Sets up and builds first what is missing. The pictures end up in build/examples.
+# Bakes every example in Blender, renders each with Cycles from its bake, and plots the cut through the shadow
+# border of `obstacle`. Sets up and builds first. The pictures end up in build/examples.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 root=$(dirname "$here")
@@ -11,7 +11,7 @@ logs=$pictures/logs
 package=$root/build/stage/beamspread
 mkdir -p "$logs"
 
-# step NAME COMMAND...: what it prints goes to a log, which is shown if it fails.
+# step NAME COMMAND...: its output goes to a log, which is shown after a failure.
 step() {
     local name=$1 log=$logs/${1// /_}.log begin=$SECONDS
     shift
@@ -34,7 +34,7 @@ bake() { # SCENE [batch options]
         --python "$here/render_examples.py" -- "$pictures/baked/$scene.json" "$pictures"
 }
 
-# Light bounces in these too, but what they are compared with, or their darkness, is without.
+# Scenes without indirect light: their references, or their dark parts, have none.
 bake laser_beams --no-indirect
 bake obstacle --no-indirect --frames 1-2
 bake marble_floor --no-indirect

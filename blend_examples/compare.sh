@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
-# Makes pictures in blend_examples/pictures: low_sun by Beamspread and by Cycles' own subsurface scattering; the scenes with
-# lights of a size by Beamspread and as surfaces that light does not enter; stage also as a volume that Cycles traces paths
-# through. Bakes the examples first. On two cores Cycles takes ten minutes for low_sun, five for the volume, half a minute for
-# each of the others.
+# Makes pictures in blend_examples/pictures: low_sun by Beamspread and by Cycles' own subsurface scattering; the scenes
+# with area lights by Beamspread and as diffuse surfaces; stage also as a volume with Cycles' paths. Bakes the examples
+# first. On two cores Cycles takes ten minutes for low_sun, five for the volume, half a minute for each of the others.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 root=$(dirname "$here")

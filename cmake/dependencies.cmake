@@ -1,5 +1,4 @@
-# Makes the static libraries of cmake/dependencies, unless this compiler has made them before, and lets find_package
-# find those alone.
+# Builds the static libraries of cmake/dependencies once per compiler, and lets find_package find no others.
 set(BEAMSPREAD_DEPENDENCIES_DIR "${CMAKE_SOURCE_DIR}/build/deps" CACHE PATH "Folder that keeps the dependencies")
 include(${CMAKE_CURRENT_LIST_DIR}/dependencies/archives.cmake)
 
@@ -9,10 +8,10 @@ foreach(file CMakeLists.txt patch_embree.cmake)
   string(APPEND recipe "${text}")
 endforeach()
 get_property(archives GLOBAL PROPERTY beamspread_archives)
-string(SHA256 key "${recipe} ${archives} ${CMAKE_CXX_COMPILER_ID} ${CMAKE_CXX_COMPILER_VERSION} ${CMAKE_SYSTEM_PROCESSOR}")
-string(SUBSTRING ${key} 0 12 key)
+string(SHA256 key "${recipe} ${archives} ${CMAKE_CXX_COMPILER_ID} ${CMAKE_CXX_COMPILER_VERSION}
+${CMAKE_SYSTEM_PROCESSOR}") string(SUBSTRING ${key} 0 12 key)
 set(BEAMSPREAD_DEPENDENCIES ${BEAMSPREAD_DEPENDENCIES_DIR}/${key})
-# Builds in several folders may want them at the same time.
+# Several folders may build at the same time.
 file(LOCK ${BEAMSPREAD_DEPENDENCIES_DIR}/lock GUARD FILE)
 if(NOT EXISTS ${BEAMSPREAD_DEPENDENCIES}/.complete)
   message(STATUS "Building the dependencies in ${BEAMSPREAD_DEPENDENCIES} (some minutes, once)")
@@ -20,9 +19,11 @@ if(NOT EXISTS ${BEAMSPREAD_DEPENDENCIES}/.complete)
   file(REMOVE_RECURSE ${BEAMSPREAD_DEPENDENCIES})
   execute_process(COMMAND ${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR}/dependencies -B ${build} -G Ninja
                           -DCMAKE_INSTALL_PREFIX=${BEAMSPREAD_DEPENDENCIES} -DCMAKE_C_COMPILER=${CMAKE_C_COMPILER}
-                          -DCMAKE_CXX_COMPILER=${CMAKE_CXX_COMPILER} -DCMAKE_C_COMPILER_LAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER}
-                          -DCMAKE_CXX_COMPILER_LAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER} -DPython_EXECUTABLE=${Python_EXECUTABLE}
-                          -DBEAMSPREAD_ARCHIVES_DIR=${BEAMSPREAD_ARCHIVES_DIR} OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+                          -DCMAKE_CXX_COMPILER=${CMAKE_CXX_COMPILER}
+                          -DCMAKE_C_COMPILER_LAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER}
+                          -DCMAKE_CXX_COMPILER_LAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER}
+                          -DPython_EXECUTABLE=${Python_EXECUTABLE} -DBEAMSPREAD_ARCHIVES_DIR=${BEAMSPREAD_ARCHIVES_DIR}
+                          OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
   execute_process(COMMAND ${CMAKE_COMMAND} --build ${build} COMMAND_ERROR_IS_FATAL ANY)
   file(REMOVE_RECURSE ${build})
   file(TOUCH ${BEAMSPREAD_DEPENDENCIES}/.complete)

@@ -1,24 +1,23 @@
 # DUCC's FFT (BSD-3 part of its PyPI source package), compiled for several instruction sets into one static library.
 set(ducc_src ${BEAMSPREAD_DEPENDENCIES}/include)
 
-# What templates and inline functions become for a newer processor must not be what the linker keeps for the rest of the
-# program; that everything is static and hidden doesn't help, as it is one program. So each is linked into one object
-# file, where the groups that linkers merge by name are dissolved (--force-group-allocation) and every symbol but the one
-# that it is found by is local, which unique ones could not be. Only Linux's linker does that: elsewhere there is the
-# baseline alone.
+# The linker merges templates and inline functions of one name, so code for a newer processor could end up in the rest
+# of the program, even though all of it is static and hidden. Each variant is therefore linked into one object file:
+# --force-group-allocation dissolves the groups that linkers merge, and all symbols but its entry become local (unique
+# symbols could not). Only Linux's linker does that; other systems have the baseline alone.
 set(ducc_objects)
 function(ducc_instruction_set name)
   add_library(ducc_${name} OBJECT ${CMAKE_SOURCE_DIR}/native/fft/instruction_sets/fft.cpp ${ducc_src}/ducc0/infra/mav.cc
               ${ducc_src}/ducc0/infra/string_utils.cc ${ducc_src}/ducc0/infra/threading.cc)
   target_include_directories(ducc_${name} PRIVATE ${CMAKE_SOURCE_DIR}/native)
-  # Threads are ours (base/threads.h): a guest in another process brings no pool of its own. DUCC's own switch for
-  # that, DUCC0_NO_LOWLEVEL_THREADING, would also take the locks off the plans that our threads share.
+  # base/threads.h provides threads: a guest in another process brings no pool. DUCC's switch
+  # DUCC0_NO_LOWLEVEL_THREADING would also remove the locks of the plans that our threads share.
   target_include_directories(ducc_${name} SYSTEM PRIVATE ${ducc_src} ${CMAKE_SOURCE_DIR}/cmake/ducc)
   target_compile_definitions(ducc_${name} PRIVATE DUCC0_CUSTOM_LOWLEVEL_THREADING
                              BEAMSPREAD_FFT_INSTRUCTION_SET=beamspread_fft_${name})
   target_compile_options(ducc_${name} PRIVATE -w -O3 -fno-gnu-unique ${ARGN})
   if(BEAMSPREAD_SANITIZE)
-    # Minutes to compile otherwise, and not what a sanitizer is here to check.
+    # A sanitizer would take minutes to compile DUCC, which is not under test.
     target_compile_options(ducc_${name} PRIVATE -fno-sanitize=all)
   endif()
   if(NOT linux)

@@ -1,12 +1,12 @@
-# The module, once per Python; all link the same libraries. The one of the Python that builds goes into the stage.
-# Those of other Pythons whose headers are there are made by the target `modules`, for the package, where they lie
-# beside it, each named by the tag that its Python looks for. (Python's stable interface would make one file of them,
-# but binding libraries know it from Python 3.12 on, and most Blenders have an older one.)
+# The module, once per Python; all link the same libraries. The module of the Python that builds goes into the stage.
+# The target `modules` makes those of other Pythons with headers at hand, for the package; the tag in a file's name
+# tells its Python. (Python's stable interface would need one file, but binding libraries know it from Python 3.12 on,
+# and most Blenders are older.)
 option(BEAMSPREAD_FETCH_PYTHON_HEADERS "Fetch headers of further Pythons (tools/python_headers.sh)" OFF)
 if(BEAMSPREAD_FETCH_PYTHON_HEADERS)
   execute_process(COMMAND ${CMAKE_SOURCE_DIR}/tools/python_headers.sh ${BEAMSPREAD_DEPENDENCIES_DIR}/python)
 endif()
-# Or given: a list of folders with headers.
+# A list of folders with headers; given on the command line, or found.
 if(NOT DEFINED BEAMSPREAD_OTHER_PYTHONS)
   file(GLOB BEAMSPREAD_OTHER_PYTHONS ${BEAMSPREAD_DEPENDENCIES_DIR}/python/usr/include/python3.*)
 endif()
@@ -20,7 +20,7 @@ function(python_module target tag folder)
   target_compile_definitions(${target} PRIVATE BEAMSPREAD_VERSION="${PROJECT_VERSION}")
   set_target_properties(${target} PROPERTIES PREFIX "" OUTPUT_NAME _native SUFFIX .${tag}
                         LIBRARY_OUTPUT_DIRECTORY ${folder})
-  # Most of its compilation is reading headers. (clang-tidy wants to see each file by itself: the preset `dev`.)
+  # Reading headers takes most of the compilation. (The preset `dev` compiles each file by itself, for clang-tidy.)
   if(NOT DEFINED CMAKE_UNITY_BUILD)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
   endif()

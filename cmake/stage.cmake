@@ -1,5 +1,5 @@
-# Mirrors the Python package FROM into TO beside the native module, with the pages of DOCS that its help buttons open, and
-# removes what these no longer have.
+# Mirrors the Python package FROM into TO beside the native module, with the pages of DOCS for its help buttons, and
+# removes files that have gone.
 cmake_minimum_required(VERSION 3.25)
 file(GLOB_RECURSE sources RELATIVE ${FROM} ${FROM}/*)
 list(FILTER sources EXCLUDE REGEX "__pycache__|\\.pyc$")

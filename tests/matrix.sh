@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # One zip in every Blender: tests/matrix.sh [NAME...]
-# In each: install as users do, upgrade, bake the examples and compare them with Blender 3.4.1's, a node's life, disable and
-# remove; no error in the log, nothing left behind. Without names all of:
+# In each: install as artists do, upgrade, bake the examples and compare them with Blender 3.4.1's, a node's life,
+# disable and remove; no error in the log, nothing left behind. Without names all of:
 #
 #     3.4       Debian 12's Blender 3.4.1
 #     4.2 4.5 5.0   official, Python 3.11, as modules
@@ -9,15 +9,15 @@
 #     debian13  Debian 13's own Blender, in the same chroot
 #     sid       Debian unstable's own, in a chroot
 #
-# Fetches what is missing into build/matrix: tests/matrix/set_up.sh. Chroots need root. ZIP=path tests that zip instead of
-# the one that this builds.
+# tests/matrix/set_up.sh fetches missing Blenders into build/matrix. Chroots need root. ZIP=path tests that zip instead
+# of a new one.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 root=$PWD
 matrix=$root/build/matrix
 python=$root/build/venv/bin/python
 all=(3.4 4.2 4.5 5.0 5.2 debian13 sid)
-# Harmless in a chroot and in a machine without a screen or a sound card.
+# Messages that are harmless in a chroot, and without a screen or a sound card.
 harmless='Could not get a list of mounted file-systems|ALSA|Unable to open a display|XDG_RUNTIME_DIR|dconf|Fontconfig'
 
 if [ $# -gt 0 ]; then names=("$@"); else names=("${all[@]}"); fi
@@ -39,8 +39,8 @@ if [[ " ${names[*]} " == *" 3.4 "* ]] || [ "$(cat "$matrix/work/3.4/key" 2>/dev/
     names=(3.4 "${rest[@]}")
 fi
 
-# in_blender NAME ARGUMENTS...: the Blender (or Python) of a row, with nothing of this environment. A plain PATH: Debian's
-# Blender takes its Python from the first python3 there.
+# in_blender NAME ARGUMENTS...: the Blender (or Python) of a row, with nothing of this environment. A plain PATH:
+# Debian's Blender takes its Python from the first python3 there.
 in_blender() {
     local name=$1
     shift
@@ -54,14 +54,14 @@ in_blender() {
     esac
 }
 
-# in_chroot SUITE FOLDER COMMAND...: the folder is its /beamspread. What is mounted goes with the command.
+# in_chroot SUITE FOLDER COMMAND...: the folder is its /beamspread. Mounts go with the command.
 in_chroot() {
     mkdir -p "$matrix/$1/beamspread"
     unshare -m bash -ec 'mount -t proc proc "$1/proc"; mount --bind "$2" "$1/beamspread"; exec chroot "$1" "${@:3}"' - \
         "$matrix/$1" "${@:2}"
 }
 
-# Names as seen inside.
+# Names inside the chroot.
 inside() { case "$1" in 5.2 | debian13 | sid) echo /beamspread ;; *) echo "$matrix/work/$1" ;; esac; }
 
 is_module() { case "$1" in 4.2 | 4.5 | 5.0 | 5.2) true ;; *) false ;; esac; }

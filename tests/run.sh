@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Sets up, builds and tests: tests/run.sh
-# What takes long and seldom finds what the rest doesn't is left out, and said at the end; tests/run.sh --all leaves out
-# nothing. With other arguments, which go to pytest, only the tests that they choose, and nothing else:
-#     tests/run.sh -k convolve        tests/run.sh tests/blender/test_batch.py -x
+# Leaves out long tests that seldom find a fault of their own, and lists them at the end; tests/run.sh --all runs all.
+# Other arguments go to pytest and choose the tests: tests/run.sh -k convolve        tests/run.sh
+# tests/blender/test_batch.py -x
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PYTHONPATH=$PWD/build/stage
@@ -11,7 +11,7 @@ summary=$(mktemp)
 trap 'rm -f "$summary"' EXIT
 started=$SECONDS
 
-# step NAME COMMAND...: runs it, whatever came of the steps before, and remembers how it ended.
+# step NAME COMMAND...: runs it even after failures, and remembers its result.
 step() {
     local name=$1 begin=$SECONDS outcome=ok
     shift
@@ -33,10 +33,11 @@ finish() {
 # (ThreadSanitizer takes every hand-over between threads for a race, as it can't see into TBB.)
 sanitized() {
     local runtime
-    # It has to come first; libstdc++ with it, because its functions for exceptions are looked up when the process starts.
+    # The sanitizer has to be loaded first, and libstdc++ with it, because the process looks up its functions for
+    # exceptions at the start.
     runtime="$(c++ -print-file-name=libasan.so) $(c++ -print-file-name=libstdc++.so.6)"
     tools/build.sh asan || return
-    # Leaks: Python keeps much until it exits.
+    # No leak detection: Python keeps much memory until it exits.
     env LD_PRELOAD="$runtime" PYTHONPATH="$PWD/build/asan/stage" PYTHONMALLOC=malloc \
         ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 "$python" tests/smoke.py
 }
@@ -50,7 +51,7 @@ in_bpy() {
     PYTHONPATH=$PWD/build/bpy-4.5 "$python" tests/blender/run.py -- "$@"
 }
 
-# Where the zip is tried: the oldest Blender, an official LTS and the newest, or all.
+# Blenders that try the zip: the oldest, an official LTS and the newest, or all.
 choose_matrix() {
     matrix=(3.4 4.5)
     [ $all = 0 ] || matrix+=(4.2 5.0)
@@ -62,8 +63,7 @@ choose_matrix() {
     fi
 }
 
-# Most comparisons with Cycles, and Live, which take minutes. Those of lamps stay, whose meaning changed between the versions,
-# but for their places.
+# Most comparisons with Cycles, and Live, take minutes. Those of lamps stay, because lamps changed between the versions.
 long_in_bpy=(test_cycles_extended_lights test_cycles_irradiance test_indirect test_light_is_not_lost test_live
              test_live_and_bakes test_live_and_painters test_live_in_cycles test_panorama test_passes test_read_emitters
              test_read_world test_reflectance test_shown_in_cycles test_transparency)
@@ -84,14 +84,14 @@ step set-up tools/setup.sh --tests
 [ "$(failures)" = 0 ] || finish
 if [ $# = 0 ]; then
     choose_matrix
-    # Fetching leaves a core to the build. What fails here is tried again, and said, when it is needed.
+    # Fetching leaves a core to the build. A failure here is repeated, and reported, when the Blender is needed.
     tests/matrix/set_up.sh "${matrix[@]}" &
 fi
 step build tools/build.sh release
 [ "$(failures)" = 0 ] || finish
 
 if [ $# -gt 0 ]; then
-    # Paths choose the side; without any, both look for what the other arguments choose.
+    # Paths choose the side; without a path, both sides look for the tests that the other arguments choose.
     venv=() blender=() others=()
     for argument in "$@"; do
         case "$argument" in
@@ -100,7 +100,7 @@ if [ $# -gt 0 ]; then
             *) others+=("$argument") ;;
         esac
     done
-    # 5: nothing there was chosen, which is fine as long as the other side had something.
+    # 5: no test was chosen, which is fine if the other side had one.
     none=0
     tolerant() {
         local code=0
@@ -122,8 +122,8 @@ if [ $all = 1 ]; then
 fi
 
 step "the zip" cmake --build build/release --target package
-# Two by two: most of a test's time in a Blender goes by on one core. What those beside print comes when they are done; some
-# of Blender's go there, so that both take about as long.
+# Two runs at a time, because tests in a Blender use one core most of the time. The output of the second run comes at
+# its end; it gets some of Blender's tests, so that both take about as long.
 moved=(tests/blender/test_read_world.py tests/blender/test_cycles_irradiance.py)
 beside=$(mktemp)
 {

@@ -18,8 +18,8 @@ for archive in build/deps/archives/*; do
     grep -qF "$archive" "$out/sdist.list" || { echo "$sdist lacks $archive"; exit 1; }
 done
 
-# What is built here comes from the source package alone: an address that leads nowhere stands for the network. The
-# dependencies that this machine has built already are taken, where BEAMSPREAD_WHEEL_FROM_NOTHING isn't set.
+# The build uses the source package alone: the proxy's address leads nowhere. It takes the dependencies that this
+# machine has built before, unless BEAMSPREAD_WHEEL_FROM_NOTHING is set.
 mkdir "$out/source"
 tar -xzf "$sdist" -C "$out/source" --strip-components 1
 dependencies=$PWD/build/deps
@@ -30,7 +30,7 @@ env http_proxy=http://127.0.0.1:9 https_proxy=http://127.0.0.1:9 no_proxy= PIP_N
     { tail -60 "$out/wheel.log"; exit 1; }
 wheel=$(ls "$out"/beamspread-*.whl)
 "$out/tools/bin/auditwheel" show "$wheel"
-# auditwheel sees that nothing has to be bundled, and names the oldest glibc that the wheel runs with.
+# auditwheel checks that no library must be bundled, and names the oldest glibc of the wheel.
 PATH=$PWD/$out/tools/bin:$PATH "$out/tools/bin/auditwheel" repair --wheel-dir "$out/repaired" "$wheel"
 wheel=$(ls "$out"/repaired/*.whl)
 case "$wheel" in *manylinux_2_3[0-5]_* | *manylinux_2_2[0-9]_*) ;; *) echo "$wheel needs a newer glibc than 2.35"; exit 1 ;; esac

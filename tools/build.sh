@@ -1,15 +1,15 @@
 #!/usr/bin/env bash
-# Builds what changed and stages the importable package: tools/build.sh [PRESET], presets as in CMakePresets.json.
+# Builds changed files and stages the importable package: tools/build.sh [PRESET], presets as in CMakePresets.json.
 # `release` (the default) stages into build/stage, the others into build/PRESET/stage.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 preset=${1:-release}
 
 tools/setup.sh
-# Objects are the same wherever the clone lies.
+# ccache then finds objects of clones in other folders.
 export CCACHE_BASEDIR=$PWD CCACHE_NOHASHDIR=1
 
-# ninja re-runs cmake by itself when a CMake file changes, but doesn't know of the presets, the folder and the compiler,
+# ninja re-runs cmake after a change of a CMake file, but not after a change of the presets, the folder or the compiler,
 # and would keep the libraries that it once found.
 key=$( (pwd; c++ --version; cat CMakePresets.json cmake/dependencies/*) | sha256sum | cut -d' ' -f1)
 stamp=build/$preset/.configured

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Brings a bare Debian 12 (git, a compiler, python3) to where this repository builds, bakes and, with --tests, is tested.
-# Whatever is there already is left alone; when nothing is missing this takes a fraction of a second.
+# Prepares a bare Debian 12 (git, a compiler, python3) for building, baking and, with --tests, testing. Leaves alone all
+# that is installed; takes a fraction of a second if nothing is missing.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -13,8 +13,8 @@ for argument in "$@"; do
 done
 
 packages=(g++ cmake ninja-build ccache python3 python3-dev python3-venv python3-numpy blender)
-# The X libraries are what the official bpy wheel links to; it never opens a window here. Debian's Blender opens one, for
-# tests/blender/test_window.py, on a screen in memory.
+# The official bpy wheel links to the X libraries but opens no window. Debian's Blender opens one on a screen in memory,
+# for tests/blender/test_window.py.
 test_packages=(binutils libegl1 libgl1 libgomp1 libsm6 libx11-6 libxfixes3 libxi6 libxkbcommon0 libxrender1 libxxf86vm1
                xvfb xauth libgl1-mesa-dri)
 debian_python=/usr/bin/python3
@@ -69,7 +69,8 @@ make_venv() {
     "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps "${arguments[@]}" >&2
 }
 
-# fetch_into FOLDER REQUIREMENTS WHAT: packages beside the venv, fetched once per version and kept whatever else changes.
+# fetch_into FOLDER REQUIREMENTS WHAT: packages beside the venv, fetched once per version and kept whatever else
+# changes.
 fetch_into() {
     local folder=$1 requirements=$2
     [ ! -f "$folder/.complete" ] || ! cmp -s "$folder/.complete" "$requirements" || return 0

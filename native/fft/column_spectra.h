@@ -1,4 +1,4 @@
-// Rows of a plane transformed along x, kept column by column for the transforms along y.
+// Rows of a plane after the transform along x, stored by columns for the transform along y.
 #pragma once
 
 #include <cstddef>
@@ -9,11 +9,11 @@
 
 namespace beamspread {
 
-// As many planes as are transformed together: one block of memory, because whole huge pages for each of hundreds of small
-// ones would be many times what they hold.
+// Planes that are transformed together share one block of memory: huge pages for each of hundreds of small planes would
+// take many times their size.
 class ColumnSpectra {
 public:
-    // Not cleared.
+    // The memory is not cleared.
     ColumnSpectra(std::size_t count, std::size_t columns, std::size_t rows)
         : m_count(count),
           m_columns(columns),

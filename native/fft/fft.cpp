@@ -18,7 +18,7 @@ struct Named {
     const FftInstructionSet* instructions;
 };
 
-// Fastest first.
+// Variants that this processor can run, fastest first.
 const std::vector<Named>& runnable_sets()
 {
     static const std::vector<Named> sets = [] {

@@ -13,7 +13,7 @@ namespace beamspread {
 using ExrAttribute = std::variant<std::string, double, int, std::vector<float>>;
 
 struct ExrPart {
-    std::string name;  // may be empty where the file has one part only
+    std::string name;  // may be empty if the file has one part only
     int width = 0;
     int height = 0;
     std::vector<std::string> channels;  // in this order, although the format sorts them by name
@@ -26,8 +26,8 @@ struct ExrPart {
 inline constexpr int max_exr_side = 1 << 17;
 inline constexpr long long max_exr_values = 1LL << 30;
 
-// The last bits of a simulated or baked number are noise, which packs badly: ZIP takes ten times as long to write a
-// baked RGB texture as no compression, and saves two fifths of it.
+// Noise in the last bits of baked numbers packs badly: ZIP saves two fifths of a baked RGB texture and takes ten times
+// as long to write.
 enum class ExrCompression { none, zip };
 
 // Writes the parts to a file beside `path` and renames it over `path` when it is whole.
@@ -35,13 +35,13 @@ enum class ExrCompression { none, zip };
 void write_exr_parts(const std::string& path, std::span<const ExrPart> parts,
                      ExrCompression compression = ExrCompression::zip);
 
-// The same for one part whose pixels are the host's: `pixels` in place of its own, from the file's last line to its
+// The same for one part with pixels of the host: `pixels` replaces its own and goes from the file's last line to its
 // first.
 void write_exr_bottom_up(const std::string& path, const ExrPart& part, std::span<const float> pixels,
                          ExrCompression compression = ExrCompression::zip);
 
 // Reads every part of a flat file, scan lines or tiles, half, float or unsigned channels. Throws IoError, naming the
-// path, where the file is missing, damaged, too large, deep, or has subsampled channels.
+// path, if the file is missing, damaged, too large, deep, or has subsampled channels.
 std::vector<ExrPart> read_exr_parts(const std::string& path);
 
 // The same parts without their pixels: reads only the start of the file.

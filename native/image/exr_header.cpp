@@ -19,7 +19,7 @@ namespace beamspread::detail {
 
 namespace {
 
-// The attributes that OpenEXR itself gives a meaning and a type.
+// Attributes with a meaning and a type in OpenEXR itself.
 constexpr std::array<std::string_view, 17> structural_attributes{"channels",
                                                                  "chromaticities",
                                                                  "chunkCount",
@@ -50,7 +50,7 @@ std::pair<std::string, std::pair<std::size_t, std::string>> conventional_rank(co
     return {layer, {rank, channel}};
 }
 
-// RFC 3629: no surrogates, nothing longer than it need be.
+// RFC 3629: no surrogates and no overlong forms.
 bool is_utf8(std::string_view text)
 {
     constexpr std::array<std::uint32_t, 3> smallest{0x80, 0x800, 0x10000};
@@ -128,7 +128,8 @@ std::vector<std::string> get_channels(const Imf::Header& header)
     for (auto entry = header.channels().begin(); entry != header.channels().end(); ++entry)
         channels.emplace_back(entry.name());
 
-    // Another program may have kept the attribute and changed the channels: it counts only if it names the same ones.
+    // Another program may have copied the attribute and changed the channels: the order counts only for the same
+    // channels.
     const auto* order = header.findTypedAttribute<Imf::StringVectorAttribute>(channel_order_attribute);
     if (order && order->value().size() == channels.size() &&
         std::is_permutation(channels.begin(), channels.end(), order->value().begin()))

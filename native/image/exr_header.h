@@ -10,10 +10,10 @@
 
 namespace beamspread::detail {
 
-// The attribute that keeps the order of the channels: the format itself stores them sorted by name.
+// Attribute with the order of the channels, because the format sorts them by name.
 inline constexpr const char* channel_order_attribute = "channelOrder";
 
-// Attributes that describe the image itself; they are neither set from nor shown in ExrPart::attributes.
+// True for attributes that describe the image itself. ExrPart::attributes never has them.
 bool is_structural_attribute(const std::string& name);
 
 void set_attributes(Imf::Header& header, const std::map<std::string, ExrAttribute>& attributes);

@@ -89,7 +89,7 @@ void write_pixels(Imf::OutputPart output, const ExrPart& part, Imf::PixelType ty
     const std::size_t pixel_bytes = part.channels.size() * sizeof(T);
     const std::size_t values = part.channels.size() * static_cast<std::size_t>(part.width);
     const T* first_line = pixels.data() + (goes_up ? pixels.size() - values : 0);
-    // OpenEXR only adds strides to addresses: one that wraps around goes back, as Blender's own files are written.
+    // OpenEXR only adds strides to addresses: a stride that wraps around goes back. Blender writes its files this way.
     const std::size_t line_bytes = (goes_up ? 0 - values : values) * sizeof(T);
     Imf::FrameBuffer buffer;
     for (std::size_t c = 0; c < part.channels.size(); ++c)

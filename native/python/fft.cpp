@@ -7,7 +7,7 @@ namespace beamspread {
 
 namespace {
 
-// How many lines there are, and of how many values.
+// Number of lines, and of values in each.
 std::pair<std::size_t, std::size_t> lines_of(const std::string& name, const py::array& array)
 {
     if (array.ndim() != 2 || array.shape(0) == 0 || array.shape(1) == 0)
@@ -61,15 +61,15 @@ Array<Complex> complex_lines(const Array<Complex>& values, bool forward, const s
 void bind_fft(py::module_& m)
 {
     m.def("fft_instruction_sets", &fft_instruction_sets,
-          R"(What the transforms were compiled for and this processor has, fastest first; the solver uses the first.
+          R"(Instruction sets of the transforms that this processor can run, fastest first; the solver uses the first.
 
-Of "avx512", "avx2" and "baseline". Where a function takes an `instruction_set`, an empty one stands for the fastest.
+A subset of "avx512", "avx2" and "baseline". An empty `instruction_set` of the functions below means the fastest.
 )");
     m.def("fast_size", &fast_even_size, py::arg("min_size"), "The smallest even size of fast transforms.");
     m.def("real_transform", &real_transform, py::arg("values"), py::arg("threads") = 0, py::arg("instruction_set") = "",
           R"(Fourier transform of real values, float32 (H, W) with W even; complex64 (H, W / 2 + 1).
 
-One of these is what tests/bench/fft.py counts the solver's time in.
+tests/bench/fft.py counts the solver's time in these.
 )");
     m.def("real_lines", &real_lines, py::arg("values"), py::arg("instruction_set") = "",
           "Transforms of lines of real values: float32 (N, size) to complex64 (N, size // 2 + 1).");

@@ -32,7 +32,7 @@ void multiply_rows(float* __restrict product, const float* factors, const float*
                    std::size_t count, std::size_t width)
 {
     using Values = float __attribute__((vector_size(values_per_block * sizeof(float))));
-    // As many as keep an adder busy and fit into registers; what is read of the rows serves all.
+    // Columns per pass: enough to keep an adder busy, few enough for registers. Each row is read once per pass.
     constexpr std::size_t at_once = 4;
     for (std::size_t first = 0; first < columns; first += at_once) {
         std::array<const float*, at_once> factor;
@@ -126,7 +126,7 @@ using Block = float __attribute__((vector_size(harmonics_per_block * sizeof(floa
 
 void multiple_angles(float* cosine, float cos_angle, float sin_angle, float factor, std::size_t count)
 {
-    // The angle times i bit by bit of i: few steps, each for all of a block at once.
+    // Angles i times the angle, bit by bit of i: few steps, each for a whole block.
     constexpr std::array<Block, 3> bits = {Block{0, 1, 0, 1, 0, 1, 0, 1}, Block{0, 0, 1, 1, 0, 0, 1, 1},
                                            Block{0, 0, 0, 0, 1, 1, 1, 1}};
     Block cos_m = Block{} + factor;

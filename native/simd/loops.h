@@ -13,7 +13,7 @@ void add_scaled(float* sum, const float* values, float factor, std::size_t count
 
 void add_scaled(double* sum, const double* values, double factor, std::size_t count);
 
-// Values of a block: `multiply_rows` has no remainders.
+// Values in a block: `multiply_rows` has no remainders.
 inline constexpr std::size_t values_per_block = 16;
 
 // product[c * width + i] = sum over k of factors[c * count + k] * rows[k * width + i]; k below count, c below columns,
@@ -62,8 +62,8 @@ void multiple_angles(float* cosine, float cos_angle, float sin_angle, float fact
 void add_harmonics(float* sum, const float* values, const float* by_harmonic, float factor, const std::size_t* first,
                    std::size_t blocks);
 
-// Azimuths beta and tan(theta / 2) of directions of travel of any length, stored (x, y, z) after (x, y, z). Texels without
-// irradiance may have any direction.
+// Azimuths beta and tan(theta / 2) of directions of travel of any length, stored (x, y, z) after (x, y, z). Texels
+// without irradiance may have any direction.
 void find_angles(const float* directions, const float* irradiance, float* cos_beta, float* sin_beta,
                  float* half_tangent, std::size_t count);
 

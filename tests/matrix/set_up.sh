@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Brings the Blenders of tests/matrix.sh into build/matrix: tests/matrix/set_up.sh NAME...
-# What is there already is left alone. Chroots hold what Blender needs and nothing else: no compiler, no -dev package, nothing
+# Leaves existing ones alone. Chroots hold only the packages that Blender needs: no compiler, no -dev package, nothing
 # of ours. They need root; nothing stays mounted.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 folder=$PWD/build/matrix
 mirror=${DEBIAN_MIRROR:-http://deb.debian.org/debian}
-# What the official bpy wheels link to.
+# Libraries that the official bpy wheels link to.
 libraries=(libx11-6 libxrender1 libxxf86vm1 libxfixes3 libxi6 libxkbcommon0 libsm6 libgl1 libegl1 libgomp1)
 
 say() { echo "matrix: $*" >&2; }
@@ -36,7 +36,7 @@ venv_of_tests() {
     touch "$place/.complete"
 }
 
-# chroot_of SUITE PACKAGE...: a Debian with these packages and what they depend on.
+# chroot_of SUITE PACKAGE...: a Debian with these packages and their dependencies.
 chroot_of() {
     local suite=$1 place=$folder/$1 missing
     shift
@@ -61,7 +61,7 @@ chroot_of() {
     # Services have nothing to start here.
     printf '#!/bin/sh\nexit 101\n' >"$place/usr/sbin/policy-rc.d"
     chmod +x "$place/usr/sbin/policy-rc.d"
-    # In a mount namespace of its own, so that no mount outlives this.
+    # A separate mount namespace: no mount outlives this command.
     unshare -m bash -ec 'mount -t proc proc "$1/proc"
         chroot "$1" apt-get -o Acquire::Check-Valid-Until=false -q update
         DEBIAN_FRONTEND=noninteractive chroot "$1" apt-get -q install -y --no-install-recommends ${*:2}

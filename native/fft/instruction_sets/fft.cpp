@@ -1,5 +1,5 @@
-// Compiled once per instruction set, BEAMSPREAD_FFT_INSTRUCTION_SET naming the function that it is found by. DUCC's templates
-// are instantiated here, and only those that are used.
+// Compiled once per instruction set; BEAMSPREAD_FFT_INSTRUCTION_SET names the function that returns the variant. Only
+// the templates of DUCC in use are instantiated here.
 #include "fft/instruction_sets/fft.h"
 
 #include "ducc0/fft/fftnd_impl.h"
@@ -34,9 +34,8 @@ void complex_columns(Complex* columns, std::size_t count, std::size_t size, std:
     ducc0::c2c(data, data, {0}, true, 1.0f, 1);
 }
 
-// Of lines that are half as long as those of the plane. Long lines of real values are transformed as complex ones of half
-// their length, which has fast factors up to 11, short ones have them up to 5. From 60
-// to 500 the others' planes take 1.13 to 1.19 times as long, from 500 to 2000 .90 to .95 times.
+// A fast size for lines of half the plane's length. DUCC transforms long lines of real values as complex ones of half
+// the length, with fast factors up to 11, and short lines directly, with fast factors up to 5.
 std::size_t good_size(std::size_t size)
 {
     constexpr std::size_t long_line = 500;

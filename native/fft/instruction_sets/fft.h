@@ -1,4 +1,4 @@
-// The transforms of fft/fft.h as compiled for one instruction set.
+// The transforms of fft/fft.h for one instruction set.
 #pragma once
 
 #include <complex>
@@ -12,14 +12,14 @@ struct FftInstructionSet {
     void (*real_to_half)(const float*, std::complex<float>*, std::size_t count, std::size_t size);
     void (*half_to_real)(const std::complex<float>*, float*, std::size_t count, std::size_t size);
     void (*complex_in_place)(std::complex<float>*, std::size_t count, std::size_t size, bool forward);
-    // Forward, of `count` columns that lie side by side in rows `stride` apart.
+    // Forward transform of `count` columns that lie side by side in rows `stride` apart.
     void (*complex_columns)(std::complex<float>*, std::size_t count, std::size_t size, std::size_t stride);
     std::size_t (*good_size)(std::size_t);
 };
 
 }  // namespace beamspread
 
-// One per instruction set: each is its own object file, of which only this symbol can be seen (cmake/ducc.cmake).
+// One object file per instruction set, which exports this symbol alone (cmake/ducc.cmake).
 extern "C" {
 const beamspread::FftInstructionSet* beamspread_fft_baseline();
 const beamspread::FftInstructionSet* beamspread_fft_avx2();

@@ -25,7 +25,7 @@ public:
     }
     void add(const std::vector<float>& values)
     {
-        // Two at a time, and all finite as long as no exponent is all ones.
+        // Hash two values at a time. A value is finite unless all bits of its exponent are ones.
         std::size_t i = 0;
         for (; i + 1 < values.size(); i += 2)
             add(bits(values[i]) | bits(values[i + 1]) << 32);

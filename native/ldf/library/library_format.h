@@ -1,19 +1,20 @@
-// What readers and writers of library files agree on.
+// Layout of library files, shared by reader and writer.
 //
 // Every part carries the attributes beamspreadLdf (format version), g, ior, thickness (mean free
 // paths, inf: half-space), photons, seed, angle (degrees) and a checksum of itself. For the
-// j-th angle and each side, radius bins up to the last that is not empty, rows as in transport/bins.h, there are
+// j-th angle and each side there are these parts, with radius bins up to the last that is not empty and rows as in
+// transport/tally/bins.h:
 //   "<side>.<j>"         columns: radius bins, lines: rows up to the last that is not empty: power that leaves
-//                        per unit power that entered; attribute harmonics: how many each row has; of a calibrated
-//                        library also residuals and residualsHalfway (ldf/library/ldf_library.h);
+//                        per unit power that entered; attribute harmonics: their number in each row; calibrated
+//                        libraries also have residuals and residualsHalfway (ldf/library/ldf_library.h);
 //   "<side>.<j>.ratios"  means of cos(m phi) over each ring, weighted by power, m = 1 and on: [row][m][radius
-//                        bin], in lines of a fixed length, filled up with zeros, half precision; left out where no row
+//                        bin], in lines of a fixed length, filled up with zeros, half precision; left out if no row
 //                        has any;
 //   "<side>.<j>.orders"  columns: order bins; line 0 and 1: mean and variance of the order; then one
 //                        line per batch: power that leaves;
 //   "<side>.<j>.scatter" columns: [pole][albedo][harmonic][radius bin], lines: groups of batches: their deviations
 //                        (transport/tally/tally_statistics.h), half precision.
-// One channel each: OpenEXR takes longer to sort channels into pixels than to read.
+// Each part has one channel, because sorting channels into pixels takes OpenEXR longer than reading.
 #pragma once
 
 #include <cstddef>
@@ -25,24 +26,24 @@
 
 namespace beamspread::library_format {
 
-// Values in a line of ratios, which come in rows of many lengths: part of the layout, like the version.
+// Values in a line of ratios, whose rows have many lengths. Part of the layout.
 inline constexpr std::size_t ratio_columns = 2048;
 
-// Goes up when the layout changes.
+// Version of the layout; a change makes files of earlier versions unreadable.
 inline constexpr int version = 8;
 
 std::string part_name(std::size_t side, std::size_t angle);
 
-// Lines that hold so many values.
+// Number of lines for this number of values.
 inline std::size_t ratio_lines(std::size_t values)
 {
     return (values + ratio_columns - 1) / ratio_columns;
 }
 
-// Lines of another length: what is too long is cut off, what is missing filled up with zeros.
+// The values in lines of another length, cut off or filled up with zeros.
 std::vector<float> with_columns(const std::vector<float>& values, std::size_t from_columns, std::size_t columns);
 
-// Of everything but itself, and whether all values are finite.
+// Sum over all of a part but its own checksum; `is_finite` is true if all values are finite.
 struct Checksum {
     std::string text;
     bool is_finite;

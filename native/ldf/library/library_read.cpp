@@ -110,7 +110,7 @@ private:
 
     [[noreturn]] void fail_size(const std::string& name) const { fail("has a part '" + name + "' of another size"); }
 
-    // A part of lines of radius bins, the missing bins empty.
+    // Values of a part in lines of radius bins. Bins that the part lacks are zero.
     std::vector<float> power(const ExrPart& part) const
     {
         if (part.width > static_cast<int>(radius_bin_count) || part.height > static_cast<int>(row_count))
@@ -148,7 +148,7 @@ private:
         return format::with_columns(part.pixels, radii, radius_bin_count);
     }
 
-    // Most of a file: what was read is kept, not copied.
+    // The largest part of a file: its pixels are moved, not copied.
     std::vector<float> scatter(ExrPart& part, const std::vector<std::size_t>& harmonics, std::size_t radii) const
     {
         if (part.height != static_cast<int>(group_count) ||

@@ -12,7 +12,7 @@ namespace format = library_format;
 
 namespace {
 
-// Up to the last that is not empty; at least one.
+// Number of rows up to the last one with power; at least one.
 std::size_t used_rows(const std::vector<float>& power)
 {
     std::size_t used = 1;

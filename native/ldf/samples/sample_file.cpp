@@ -95,7 +95,7 @@ private:
         fail(m_path, "has an attribute '" + name + "' that is no number");
     }
 
-    // Of an attribute that `check_attributes` saw.
+    // Value of an attribute that `check_attributes` has found.
     double needed(const std::string& name) const { return number(name).value_or(0.0); }
 
     std::vector<float> channel() const
