@@ -1,6 +1,6 @@
-"""Bakes without a window: `blender -b scene.blend --python batch.py -- [options]`, `--help` lists them.
+"""Bakes without a window: `blender -b scene.blend --python batch.py -- [options]`; `--help` lists the options.
 
-Works with the add-on installed or not, and as `python batch.py scene.blend [options]` where `import bpy` works.
+The add-on need not be installed. `python batch.py scene.blend [options]` works if `import bpy` does.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ PACKAGE_FOLDER = Path(__file__).resolve().parent
 
 
 def load_package() -> str:
-    """Name of the package that this run uses: the add-on if it is on, else the one around this file.
+    """Name of the package that this run uses: the add-on if it is enabled, else the package of this file.
 
     Two copies in one process would register the same classes and native types twice.
     """
@@ -37,7 +37,7 @@ def load_package() -> str:
 
 
 def run(arguments: list[str]) -> int:
-    """Parse, open the scene, bake, report; the exit code."""
+    """Parse the arguments, open the scene, bake and report; the exit code."""
     import bpy
 
     from . import blender
@@ -62,14 +62,14 @@ def run(arguments: list[str]) -> int:
                 return stop.exit_code
         return 0 if is_saved and report.all_written() and (options.allow_dark or not report.dark()) else 1
     finally:
-        # Classes left registered can keep newer versions from exiting, and so can nodes of a class that is gone.
+        # Registered classes, and nodes of unregistered ones, can keep newer versions from exiting.
         if registers:
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
             blender.unregister()
 
 
 def _save(report, path: str | None) -> bool:
-    """Write the report if one is wanted; whether that went well."""
+    """Write the report if there is a path; True unless that fails."""
     if path is None:
         return True
     try:
@@ -81,7 +81,7 @@ def _save(report, path: str | None) -> bool:
 
 
 def _open(path: str | None) -> str:
-    """Open a .blend file if one is named; one sentence if it cannot be."""
+    """Open a .blend file if there is a path; a message if it cannot be opened."""
     import bpy
 
     if path is None:
@@ -99,8 +99,8 @@ def main() -> int:
     """Run as a script; the exit code."""
     import bpy
 
-    # `python batch.py` makes this folder the first place to look for any module, such as one named "settings".
-    sys.path[:] = [place for place in sys.path if Path(place or ".").resolve() != PACKAGE_FOLDER]
+    # `python batch.py` puts this folder first in the search path, where it would hide other modules of the same names.
+    sys.path[:] = [folder for folder in sys.path if Path(folder or ".").resolve() != PACKAGE_FOLDER]
     try:
         package = load_package()
         inside_blender = bool(bpy.app.binary_path)

@@ -60,7 +60,7 @@ def incomplete(tmp_path):
 
 
 def baked_scene(path):
-    """A file with a baked, packed image; what its node holds."""
+    """Save a file with a baked, packed image; the pixels of the image."""
     material = add_material(ior=1.3, linked=True)
     plane = add_plane(material=material)
     add_sun(0)
@@ -83,7 +83,7 @@ def test_the_add_on_registers_with_a_message_and_loses_nothing(spoilt):
     assert "Traceback" not in output
     (message,) = [line for line in output.splitlines() if line.startswith("MESSAGE")]
     assert message.startswith("MESSAGE Error: beamspread has no working native module for Python")
-    # In the log as well, for those who don't see the panel.
+    # The log has the message, too.
     (logged,) = [line for line in done.stderr.splitlines() if line.startswith("Beamspread: ")]
     for text in (message, logged):
         assert cause in text
@@ -95,7 +95,7 @@ def test_the_add_on_registers_with_a_message_and_loses_nothing(spoilt):
     assert seen["linked"]
     assert (seen["shown"], seen["size"]) == (seen["image"], [16, 16])
     assert max(seen["pixels"][:3]) > 0
-    # And with the module again, all is as it was.
+    # With the module, everything is as before.
     bpy.ops.wm.open_mainfile(filepath=str(scene))
     node = node_of(bpy.data.materials["Medium"])
     assert (node.ior, node.anisotropy) == (pytest.approx(1.3), pytest.approx(0.7))

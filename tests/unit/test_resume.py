@@ -4,7 +4,7 @@ import os
 
 import pytest
 from beamspread.core.batch.report import BakeRecord, Report
-from beamspread.core.batch.resume import Earlier
+from beamspread.core.batch.resume import PreviousReport
 
 SAVED = 1000.0
 
@@ -21,11 +21,15 @@ def wanted(folder, seconds=1.0, **changes):
 def earlier(folder, *records):
     report = folder / "report.json"
     Report([*records]).save(str(report))
-    return Earlier(str(report), SAVED)
+    return PreviousReport(str(report), SAVED)
 
 
 def test_without_a_report_the_newer_file_counts(tmp_path):
-    for before in (Earlier(None, SAVED), Earlier(str(tmp_path / "missing.json"), SAVED), earlier(tmp_path)):
+    for before in (
+        PreviousReport(None, SAVED),
+        PreviousReport(str(tmp_path / "missing.json"), SAVED),
+        earlier(tmp_path),
+    ):
         assert before.skipped(wanted(tmp_path)).status == "skipped"
         assert before.skipped(wanted(tmp_path, seconds=-1)) is None
         assert before.skipped(wanted(tmp_path, path=str(tmp_path / "missing.exr"))) is None
@@ -35,7 +39,7 @@ def test_without_a_report_the_newer_file_counts(tmp_path):
 @pytest.mark.parametrize("text", ["", "{}", "[]", '{"bakes": 3}', '{"bakes": ["a", {}]}'])
 def test_a_damaged_report_is_none(tmp_path, text):
     (tmp_path / "report.json").write_text(text)
-    assert Earlier(str(tmp_path / "report.json"), SAVED).skipped(wanted(tmp_path)).status == "skipped"
+    assert PreviousReport(str(tmp_path / "report.json"), SAVED).skipped(wanted(tmp_path)).status == "skipped"
 
 
 def test_a_report_must_agree(tmp_path):

@@ -77,7 +77,7 @@ def fill_image(image, texture: np.ndarray) -> str:
     if path.suffix.lower() == ".exr":
         write_exr(path, texture)
         if not image.colorspace_settings.is_data:
-            image.colorspace_settings.name = scene_linear()  # the new file is linear, whatever the old one was
+            image.colorspace_settings.name = scene_linear()  # the new file is linear
     else:
         _write_like(image, encoded, path)
     icons.reload(image)
@@ -138,7 +138,7 @@ def clips(image) -> bool:
 
 
 def is_read_only(path: Path) -> bool:
-    """True if a file or folder is write-protected, also for an administrator, who could write to it anyway."""
+    """True if a file or folder is write-protected, although an administrator could write to it."""
     return not os.access(path, os.W_OK) or not path.stat().st_mode & 0o222
 
 

@@ -61,7 +61,7 @@ def luminance(
     Raises
     ------
     ValueError
-        Names the argument or the material's property, its value and what is allowed.
+        Names the argument or the material's property, its value and the allowed values.
     Cancelled
         `progress` returned False.
 
@@ -148,7 +148,7 @@ def convolve(
     Raises
     ------
     ValueError
-        Names the argument, its value and what is allowed.
+        Names the argument, its value and the allowed values.
     Cancelled
         `progress` returned False.
     """
@@ -252,7 +252,7 @@ def adaptive_beams(
     Raises
     ------
     ValueError
-        Names the argument, its value and what is allowed.
+        Names the argument, its value and the allowed values.
     """
     light = float_array("irradiance", irradiance)
     if light.ndim != 2:

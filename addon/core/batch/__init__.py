@@ -1,1 +1,1 @@
-"""Many bakes without a window."""
+"""Options, report and file names of many bakes without a window."""

@@ -15,7 +15,7 @@ PASSES = tuple(OUTPUTS)
 
 @dataclass(frozen=True)
 class BatchOptions:
-    """What a batch run is asked to do; None leaves a choice to the scene's settings."""
+    """Options of a batch run; None leaves the choice to the scene's settings."""
 
     scene: str | None
     objects: tuple[str, ...]
@@ -33,14 +33,14 @@ class BatchOptions:
 
 
 def arguments_for_script(argv: Sequence[str], inside_blender: bool) -> list[str]:
-    """The batch's own arguments: those after `--` inside Blender's program, all but the first under Python."""
+    """Arguments for the batch: those after `--` in Blender's program, all but the first one in Python."""
     if "--" in argv:
         return list(argv[argv.index("--") + 1 :])
     return [] if inside_blender else list(argv[1:])
 
 
 def parse(arguments: Sequence[str]) -> BatchOptions:
-    """Read the command line; a mistake ends the program with exit code 2 and one line that says why."""
+    """Parse the command line; a mistake ends the program with exit code 2 and a line that names it."""
     parser = _parser()
     values = parser.parse_args(list(arguments))
     values.objects = tuple(dict.fromkeys(name for group in values.objects for name in group))
@@ -48,7 +48,7 @@ def parse(arguments: Sequence[str]) -> BatchOptions:
 
 
 class _Help(argparse.HelpFormatter):
-    """Help of a fixed width: to ask for the terminal's, argparse would import much, also where no help is wanted."""
+    """Help of a fixed width. To ask for the terminal's width, argparse imports many modules in every run."""
 
     def __init__(self, prog: str) -> None:
         super().__init__(prog, width=100)
@@ -58,7 +58,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="beamspread batch",
         description="Bake the light inside translucent surfaces of a scene into image files.",
-        epilog="Exit code 0 only if every bake asked for was written and light reached it; 2 for a mistake in these.",
+        epilog="Exit code 0 only if every requested bake was written and light reached it; 2 for a wrong argument.",
         allow_abbrev=False,
         formatter_class=_Help,
     )
@@ -80,7 +80,7 @@ def _parser() -> argparse.ArgumentParser:
         dest="pass_name",
         type=str.upper,
         choices=PASSES,
-        help="what leaves the surface, what arrives on it, or the way that travels (default: the scene's setting)",
+        help="light that leaves the surface, arrives on it, or its direction (default: the scene's setting)",
     )
     parser.add_argument(
         "--indirect",
@@ -89,10 +89,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--output", metavar="DIR", help="folder for the images (default: the scene's setting)")
     parser.add_argument("--format", type=str.upper, choices=FORMATS)
-    parser.add_argument("--report", metavar="FILE.json", help="write what became of each bake")
-    parser.add_argument("--allow-dark", action="store_true", help="exit code 0 also where no light arrives")
-    parser.add_argument("--verbose", action="store_true", help="print what is read, and how long each stage takes")
-    parser.add_argument("--resume", action="store_true", help="leave out what an earlier run has written")
+    parser.add_argument("--report", metavar="FILE.json", help="write the result of each bake")
+    parser.add_argument("--allow-dark", action="store_true", help="exit code 0 even if no light arrives")
+    parser.add_argument("--verbose", action="store_true", help="print lights, triangles and the time of each stage")
+    parser.add_argument("--resume", action="store_true", help="skip bakes that an earlier run has written")
     return parser
 
 

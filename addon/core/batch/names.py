@@ -1,4 +1,4 @@
-"""Names of files that every file system takes, each for one thing of the scene alone."""
+"""File names that every file system accepts, one for each target and layer."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from collections import defaultdict
 from collections.abc import Iterable
 
 HASH_LETTERS = 6
+"""Letters that tell equal file names apart."""
 
 
 def file_stems(things: Iterable[tuple[str, ...]]) -> dict[tuple[str, ...], str]:
-    """A file name without its ending for each of these, which are tuples of names; no two names differ by case alone.
+    """File name without its extension for each tuple of names. No two file names differ only by case.
 
-    What is given decides, not its order: of several that would be called the same, the one that was changed least
-    keeps that name, and the others get letters of their own.
+    The result does not depend on the order. If several would get the same file name, the tuple that changed least
+    keeps it, and the others get additional letters.
     """
     groups = defaultdict(list)
     for names in dict.fromkeys(things):
@@ -28,7 +29,7 @@ def file_stems(things: Iterable[tuple[str, ...]]) -> dict[tuple[str, ...], str]:
 
 
 def stem(names: Iterable[str]) -> str:
-    """The names, of letters that every file system takes."""
+    """The names, joined, in letters that every file system accepts."""
     return "_".join(re.sub(r"[^\w.-]+", "_", name).strip("._") or "unnamed" for name in names)
 
 

@@ -1,4 +1,4 @@
-"""What became of each bake, and the JSON report of a batch."""
+"""The result of each bake, and the JSON report of a batch."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ class BakeRecord:
 
     Attributes
     ----------
-    path : the file written.
+    path : the file that was written.
     seconds : wall-clock time.
-    output : what was asked for, LUMINANCE, IRRADIANCE or DIRECTION.
-    lights : how many were baked.
-    left_out : sentences that name light which is missing.
-    indirect : whether light that other objects return was asked for.
-    dark : whether no light arrived; the file is written all the same.
+    output : the requested pass, LUMINANCE, IRRADIANCE or DIRECTION.
+    lights : number of lights that were baked.
+    left_out : messages about light that is missing.
+    indirect : True if light that other objects return was requested.
+    dark : True if no light arrived; the file is written all the same.
     """
 
     object: str
@@ -41,7 +41,7 @@ class BakeRecord:
 
     @classmethod
     def of(cls, bake: Bake, frame: int) -> BakeRecord:
-        """What became of a bake."""
+        """The record of a bake at a frame."""
         job, subject = bake.job, (bake.target.object_name, bake.target.material_name, frame, bake.path)
         outcome = round(bake.seconds, 3), bake.status, " ".join(map(str, bake.messages))
         if job is None:
@@ -65,15 +65,15 @@ class Report:
     bakes: list[BakeRecord] = field(default_factory=list)
 
     def all_written(self) -> bool:
-        """Whether there was something to bake and every bake was written, be it by an earlier run."""
+        """True if there were bakes and all were written, by this run or an earlier one."""
         return bool(self.bakes) and all(bake.status in (WRITTEN, SKIPPED) for bake in self.bakes)
 
     def dark(self) -> list[BakeRecord]:
-        """Those that no light reached."""
+        """Bakes that no light reached."""
         return [bake for bake in self.bakes if bake.dark]
 
     def save(self, path: str) -> None:
-        """Write {"bakes": [...]} as JSON, whole or not at all."""
+        """Write {"bakes": [...]} as JSON, completely or not at all."""
         import json
 
         target = Path(path)

@@ -1,4 +1,4 @@
-"""What an earlier run has written, so that `--resume` need not bake it again."""
+"""Bakes that an earlier run has written, which `--resume` skips."""
 
 from __future__ import annotations
 
@@ -12,33 +12,32 @@ from .report import BakeRecord
 KEPT = "An earlier run wrote it, after the scene was last saved."
 
 
-class Earlier:
-    """The records of the report that an earlier run left, if it left one; none where that is damaged.
+class PreviousReport:
+    """Records in the report of an earlier run; none if there is no report or it is damaged.
 
     Parameters
     ----------
     report : path of the report, or None.
-    since : when the scene was saved, as files' times are; what is older shows another scene.
+    since : time when the scene was saved, as files have it. Older files belong to another state of the scene.
     """
 
     def __init__(self, report: str | None, since: float) -> None:
         self._since = since
         self._records: dict[tuple, BakeRecord] = {}
-        known = {one.name for one in fields(BakeRecord)}
+        known = {field.name for field in fields(BakeRecord)}
         for entry in _entries(report):
             record = BakeRecord(**{key: value for key, value in entry.items() if key in known})
             self._records[record.object, record.material, record.frame] = record
 
     def skipped(self, wanted: BakeRecord, needs_record: bool = False) -> BakeRecord | None:
-        """The record of a bake that need not be made again, or None.
+        """The record of a bake that can be skipped, or None.
 
-        The file of `wanted` must be newer than the scene; where the report has the bake, it must say that it was
-        written to that file, with the same size, output and indirect light. That the file is whole is for the caller
-        to see.
+        The file of `wanted` must be newer than the scene. If the report has the bake, the bake must have been written
+        to that file, with the same size, output and indirect light. The caller checks that the file is complete.
 
         Parameters
         ----------
-        needs_record : whether the report must have it, as where the file may be the artist's own.
+        needs_record : True if the report must have the bake, because the file may be the artist's.
         """
         path = Path(wanted.path)
         if not path.is_file() or path.stat().st_mtime <= self._since:

@@ -1,4 +1,4 @@
-"""Ctrl-C, and the end that a system asks for, while a batch runs."""
+"""Stopping a batch by Ctrl-C or SIGTERM."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class Stop:
-    """Whether a batch was asked to stop; true from then on."""
+    """True once a signal has asked the batch to stop."""
 
     def __init__(self) -> None:
         self._signal = 0
@@ -19,24 +19,24 @@ class Stop:
         return bool(self._signal)
 
     def ask(self, signal_number: int, _frame: object = None) -> None:
-        """Handler of signals; the next one of the kind ends the process at once."""
+        """Handle a signal. A second signal of the same kind ends the process at once."""
         self._signal = signal_number
         signal.signal(signal_number, signal.SIG_DFL)
 
     @property
     def exit_code(self) -> int:
-        """As shells count them: 130 for Ctrl-C, 143 for SIGTERM."""
+        """Exit code as in shells: 130 for Ctrl-C, 143 for SIGTERM."""
         return 128 + self._signal
 
 
 @contextmanager
 def listening() -> Iterator[Stop]:
-    """Have signals ask to stop, until the block ends."""
+    """Let signals ask the batch to stop, until the block ends."""
     stop = Stop()
     before = {number: signal.signal(number, stop.ask) for number in SIGNALS}
     try:
         yield stop
     finally:
         for number, handler in before.items():
-            # None where it is not one of Python's: Blender's own ends a render, of which there is none.
+            # None stands for a handler of Blender's own, which ends renders; there is none here.
             signal.signal(number, signal.SIG_DFL if handler is None else handler)

@@ -14,7 +14,7 @@ from ....core.bake.runner import CANCELLED, SKIPPED, WRITTEN, Bake
 from ....core.batch.batch_options import BatchOptions
 from ....core.batch.inventory import Inventory
 from ....core.batch.report import BakeRecord, Report
-from ....core.batch.resume import Earlier
+from ....core.batch.resume import PreviousReport
 from ....core.batch.stop import Stop
 from ....core.errors import BakeError
 from ....core.progress import timed
@@ -70,7 +70,7 @@ class _Batch:
         self._options, self._stop, self._scene = options, stop, bpy.context.scene
         self._settings = self._scene.beamspread.for_bake(options.solver, options.pass_name, options.indirect)
         self._outputs = Outputs(self._scene, options)
-        self._earlier = Earlier(options.report, _saved()) if options.resume else None
+        self._earlier = PreviousReport(options.report, _saved()) if options.resume else None
 
     def run(self) -> Iterator[BakeRecord]:
         """Bake frame by frame."""
