@@ -1,1 +1,1 @@
-"""What Cycles finds for a bake, in a process of its own on a copy of the scene, which stays as it is."""
+"""Light, colors and images by Cycles, computed in another process on a copy of the scene."""

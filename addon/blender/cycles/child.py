@@ -1,7 +1,7 @@
-"""What runs in the child process, in Blender or with it as a module: child.py -- FILE.blend REQUEST.json
+"""Program of the child process, in Blender or with Blender as a module: child.py -- FILE.blend REQUEST.json
 
-It computes on a copy of the scene that nobody else sees, so that it may change everything. One task per process; what
-it returns, arrays by name, is written to the file that the request names.
+Each process does one task, and may change the copy of the scene, which no other process sees. The arrays that the task
+returns, by name, are written to the file that the request names.
 """
 
 import json
@@ -29,7 +29,7 @@ TASKS = {
 
 
 def restore_images(file: Path) -> None:
-    """Give images the pixels that they had in memory alone."""
+    """Restore pixels that images had in memory only."""
     with np.load(file) as pixels:
         for name in pixels.files:
             old, values = bpy.data.images.get(name), pixels[name]
@@ -46,7 +46,7 @@ def restore_images(file: Path) -> None:
 
 
 def main() -> None:
-    """Do the task, and leave without the tidying up at which some versions hang."""
+    """Do the task of the request."""
     blend, request_file = map(Path, sys.argv[sys.argv.index("--") + 1 :])
     request = json.loads(request_file.read_text())
     if not bpy.app.binary_path:
@@ -60,7 +60,7 @@ def main() -> None:
         window.view_layer = scene.view_layers[request["view_layer"]]
 
     def progress(fraction: float) -> None:
-        # Without a parent that listens this fails, which ends the process.
+        # The process ends here if its parent is gone: writing fails.
         sys.stdout.write(f"\n{request['mark']} {fraction:.4f}\n")
         sys.stdout.flush()
 
@@ -72,11 +72,11 @@ def main() -> None:
 if __name__ == "__main__":
     try:
         main()
-    except BaseException:  # noqa: BLE001 - whatever it is, the parent shows it
+    except BaseException:  # noqa: BLE001 - the parent shows every error
         traceback.print_exc()
         code = 1
     else:
         code = 0
     sys.stdout.flush()
     sys.stderr.flush()
-    os._exit(code)
+    os._exit(code)  # some versions hang while they clean up

@@ -1,7 +1,7 @@
-"""Takes the noise out of small maps of light, by Open Image Denoise where this Blender has it.
+"""Removes noise from small maps of light with Open Image Denoise, if this Blender has it (Debian's has not).
 
-Part of the child process (child.py). The compositor's node is the one way to it from Python; it works in a scene of its
-own. Debian's Blender is built without.
+Part of the child process (child.py). Python reaches the denoiser only through a node of the compositor, in a scene of
+its own.
 """
 
 import tempfile
@@ -11,12 +11,12 @@ import bpy
 import compat
 import numpy as np
 
-# Around each map goes its mirror image, so many nodes wide: neither the borders nor other maps show within it.
+# Width in nodes of the mirror image around each map, which keeps borders and other maps from influencing it.
 MARGIN = 16
 
 
 class Denoiser:
-    """Maps go in and come back as often as wanted."""
+    """Denoises maps, any number of times."""
 
     def __init__(self) -> None:
         self._scene = bpy.data.scenes.new("Beamspread denoiser")
@@ -31,21 +31,21 @@ class Denoiser:
         tree.links.new(output.inputs[0], denoise.outputs["Image"])
 
     def __call__(self, maps: list) -> list:
-        """Of float32 (rows, columns, 3) each; every map keeps its mean in each channel, and what is dark stays dark."""
-        means = [one.mean(axis=(0, 1)) for one in maps]
+        """Denoised maps, float32 (rows, columns, 3). Each keeps its mean in each channel, and dark nodes stay dark."""
+        means = [values.mean(axis=(0, 1)) for values in maps]
         scales = [max(float(mean.max()), 1e-30) for mean in means]
-        width = max(one.shape[1] for one in maps) + 2 * MARGIN
+        width = max(values.shape[1] for values in maps) + 2 * MARGIN
         blocks = []
-        for one, scale in zip(maps, scales):
-            across = width - MARGIN - one.shape[1]
-            blocks.append(np.pad(fill_dark(one) / scale, ((MARGIN, MARGIN), (MARGIN, across), (0, 0)), "symmetric"))
+        for values, scale in zip(maps, scales):
+            across = width - MARGIN - values.shape[1]
+            blocks.append(np.pad(fill_dark(values) / scale, ((MARGIN, MARGIN), (MARGIN, across), (0, 0)), "symmetric"))
         clean, row, results = self._run(np.concatenate(blocks)), MARGIN, []
-        for one, mean, scale in zip(maps, means, scales):
-            rows, columns = one.shape[:2]
+        for values, mean, scale in zip(maps, means, scales):
+            rows, columns = values.shape[:2]
             part = np.maximum(clean[row : row + rows, MARGIN : MARGIN + columns] * scale, 0)
-            part[~one.any(axis=2)] = 0
-            found = part.mean(axis=(0, 1))
-            results.append(part * np.divide(mean, found, out=np.zeros_like(mean), where=found > 0))
+            part[~values.any(axis=2)] = 0
+            new_mean = part.mean(axis=(0, 1))
+            results.append(part * np.divide(mean, new_mean, out=np.zeros_like(mean), where=new_mean > 0))
             row += rows + 2 * MARGIN
         return results
 
@@ -68,25 +68,25 @@ class Denoiser:
             clean.pixels.foreach_get(values)
         values = values.reshape(clean.size[1], clean.size[0], clean.channels)[..., :3]
         if values.shape != pixels.shape or not np.isfinite(values).all():
-            raise RuntimeError("the denoiser returned no picture")
-        for one in (image, clean):
-            bpy.data.images.remove(one)
+            raise RuntimeError("the denoiser returned no image")
+        for temporary in (image, clean):
+            bpy.data.images.remove(temporary)
         return values
 
 
 def fill_dark(values: np.ndarray) -> np.ndarray:
-    """Nodes without light, as those inside of things, get that of the nearest with some: else they would darken these.
+    """The map with light of the nearest lit node at dark nodes, which else would darken their neighbors.
 
-    Not a mean of those around: nodes that are half inside are dim, and would pass for noise between brighter ones.
+    Dark nodes are inside of objects. A mean of neighbors would include nodes that are half inside and dim.
     """
     result, lit = values.copy(), values.any(axis=2)
     rows, columns = lit.shape
     while lit.any() and not lit.all():
         padded, known, unknown = np.pad(result, ((1, 1), (1, 1), (0, 0))), np.pad(lit, 1), ~lit
         for down, right in ((0, 1), (1, 0), (1, 2), (2, 1), (0, 0), (0, 2), (2, 0), (2, 2)):
-            place = slice(down, down + rows), slice(right, right + columns)
-            new = unknown & known[place]
-            result[new] = padded[place][new]
+            window = slice(down, down + rows), slice(right, right + columns)
+            new = unknown & known[window]
+            result[new] = padded[window][new]
             unknown &= ~new
         lit = ~unknown
     return result

@@ -1,4 +1,4 @@
-"""What arrives at coarse grids on planes, by direction, path traced by Cycles with the artist's materials.
+"""Light that arrives at coarse grids on planes, by direction, path traced by Cycles with the artist's materials.
 
 Part of the child process (child.py).
 """
@@ -21,20 +21,20 @@ DENOISED = 2.0
 
 
 def fields(request, scene, progress) -> dict:
-    """The task `fields`: radiance_0, radiance_1, ... of the charts, float32 (K, rows, columns, 3), and noise.
+    """Task `fields`: radiance_0, radiance_1, ... of the charts, float32 (K, rows, columns, 3), and noise.
 
-    `light` is "INDIRECT" or "DIRECT", `only` names the objects whose light counts, none: all. With `by_lamps` a white
-    diffuse surface stands in place of the mirrors, for which Cycles looks for lamps however small; it has one stratum.
-    The mean `irradiance`, W/m^2, is that of the first two rounds; there are no others if it is less than the part
+    `light` is "INDIRECT" or "DIRECT". `only` names the objects whose light counts; none: all. With `by_lamps` a white
+    diffuse surface of one stratum replaces the mirrors, so that Cycles samples lamps of any size. The mean
+    `irradiance`, W/m^2, is that of the first two rounds. There are no more rounds if it is below the fraction
     `negligible` of `direct`.
 
-    Radiance is each stratum's mean by the cosine. The noise is that of the irradiance, the root of its mean square over
-    all nodes, as part of its mean. What bounces is smooth: a denoiser takes noise out of its irradiance, and strata
-    follow in proportion.
+    Radiance is the cosine-weighted mean of each stratum. The noise is the root mean square error of the irradiance over
+    all nodes, relative to its mean. Bounced light is smooth: a denoiser removes noise from its irradiance, and the
+    strata follow in proportion.
     """
     for name, color in request["reflectances"].items():
         material = bpy.data.materials.get(name)
-        if material is not None:  # the copy has those that the scene uses
+        if material is not None:  # the copy has only materials that the scene uses
             make_diffuse(material, color, request["textures"].get(name))
     set_up(scene, request["light"])
     if request["only"]:
@@ -42,18 +42,18 @@ def fields(request, scene, progress) -> dict:
     ghost, image = add_ghost(request["charts"], request["strata"], request["by_lamps"])
     scene.collection.objects.link(ghost)
     baker = Baker(scene, ghost, image, "DIFFUSE" if request["by_lamps"] else "GLOSSY", request["light"])
-    looks = [baker.bake(LOOK), baker.bake(LOOK)]
-    mean, samples, count = Mean(), 2 * LOOK, 2 * LOOK
-    for look in looks:
-        mean.add(look, LOOK)
-    looks = [np.nan_to_num(look) for look in looks]
-    found = np.pi * float(np.mean([mean_radiance(request, look) for look in looks]))
-    # The mean of both has noise / sqrt(2); it falls by the root of the samples.
-    noise = noise_of(request, *looks) / np.sqrt(2)
+    rounds = [baker.bake(FIRST_SAMPLES), baker.bake(FIRST_SAMPLES)]
+    mean, samples, count = Mean(), 2 * FIRST_SAMPLES, 2 * FIRST_SAMPLES
+    for pixels in rounds:
+        mean.add(pixels, FIRST_SAMPLES)
+    rounds = [np.nan_to_num(pixels) for pixels in rounds]
+    irradiance = np.pi * float(np.mean([mean_radiance(request, pixels) for pixels in rounds]))
+    # The mean of both rounds has noise / sqrt(2), which falls by the root of the samples.
+    noise = noise_of(request, *rounds) / np.sqrt(2)
     denoise = working_denoiser(request, mean) if request["light"] == "INDIRECT" else None
     gain = DENOISED if denoise else 1.0
-    allowed = gain * allowed_noise(request, found)
-    most = samples if found < request["negligible"] * request["direct"] else request["most_samples"]
+    allowed = gain * allowed_noise(request, irradiance)
+    most = samples if irradiance < request["negligible"] * request["direct"] else request["most_samples"]
     wanted = int(min(np.ceil(samples * (noise / allowed) ** 2), most))
     progress(samples / max(wanted, samples))
     while samples < wanted:
@@ -65,32 +65,32 @@ def fields(request, scene, progress) -> dict:
     if denoise:
         parts = with_irradiance(request, parts, denoise(irradiances(request, parts)))
     result = {f"radiance_{n}": part for n, part in enumerate(parts)}
-    result["noise"] = np.array(noise * np.sqrt(2 * LOOK / samples) / gain)
-    result["samples"], result["irradiance"] = np.array(samples), np.array(found)
+    result["noise"] = np.array(noise * np.sqrt(2 * FIRST_SAMPLES / samples) / gain)
+    result["samples"], result["irradiance"] = np.array(samples), np.array(irradiance)
     return result
 
 
 def working_denoiser(request, mean):
-    """None where there is none, or where it fails."""
+    """Denoiser of this Blender, None if it has none or it fails."""
     if not compat.has_denoiser():
         return None
     try:
         denoise = Denoiser()
         denoise(irradiances(request, split(request, np.maximum(mean.values(), 0))))
-    except Exception:  # noqa: BLE001 - more samples do instead, whatever it is
+    except Exception:  # noqa: BLE001 - more samples replace it
         traceback.print_exc()
         return None
     return denoise
 
 
 def irradiances(request, parts) -> list:
-    """Over pi, of each chart from its strata's radiance."""
+    """Irradiance over pi of each chart, from the radiance of its strata."""
     _, reach, _, part = np.transpose(request["strata"])
     return [np.tensordot(np.float32(reach * part), values, 1) for values in parts]
 
 
 def with_irradiance(request, parts, wanted) -> list:
-    """The strata, in each node and channel in proportion."""
+    """Strata scaled to the wanted irradiance, in each node and channel."""
     ratios = [
         np.divide(new, old, out=np.zeros_like(old), where=old > 0)
         for new, old in zip(wanted, irradiances(request, parts))
@@ -99,9 +99,9 @@ def with_irradiance(request, parts, wanted) -> list:
 
 
 def make_diffuse(material, color, texture) -> None:
-    """A plain diffuse surface, as bright as the medium under it, or as what its texture shows.
+    """Replace a material by a diffuse one with the color of its medium or of its texture.
 
-    `texture` names an input: the group nodes around a node, the node, the socket. None: there is none.
+    `texture` names an input: the group nodes around a node, the node, the socket. None: no texture.
     """
     tree = material.node_tree
     source = texture and linked_source(tree, *texture)
@@ -119,20 +119,19 @@ def make_diffuse(material, color, texture) -> None:
 
 
 def linked_source(tree, groups, node: str, socket: str):
-    """What the input of a node in nested groups is linked to, led out to the tree; None if it has no link."""
+    """Output that is linked to the input of a node in nested groups, led out to the tree; None without a link."""
     around = []
     for name in groups:
         around.append((tree, tree.nodes[name]))
         tree = tree.nodes[name].node_tree
-    # The add-on is not at work here: its node is one of an unknown kind.
-    links = (one for one in tree.links if one.to_node == tree.nodes[node] and one.to_socket.name == socket)
+    # The add-on is not registered here: its node is of an unknown type.
+    links = (link for link in tree.links if link.to_node == tree.nodes[node] and link.to_socket.name == socket)
     source = next((link.from_socket for link in links), None)
     for outer, group in reversed(around if source is not None else []):
         add_output(tree, socket)
-        for end in [one for one in tree.nodes if one.type == "GROUP_OUTPUT"]:
-            # The last one is empty, for what is to come.
-            tree.links.new([one for one in end.inputs if one.name == socket][-1], source)
-        source = [one for one in group.outputs if one.name == socket][-1]
+        for end in [inner for inner in tree.nodes if inner.type == "GROUP_OUTPUT"]:
+            tree.links.new([inner for inner in end.inputs if inner.name == socket][-1], source)
+        source = [output for output in group.outputs if output.name == socket][-1]
         tree = outer
     return source
 
@@ -144,7 +143,7 @@ def add_output(tree, name: str) -> None:
 
 
 def within_one(tree, source):
-    """The colour, from 0 to 1: what is brighter would reflect more than arrives."""
+    """Color clipped to 0..1: a brighter one would reflect more light than arrives."""
     for operation, limit in (("MINIMUM", 1.0), ("MAXIMUM", 0.0)):
         cut = tree.nodes.new("ShaderNodeVectorMath")
         cut.operation = operation
@@ -155,22 +154,25 @@ def within_one(tree, source):
 
 
 def shine_alone(scene, names) -> None:
-    """Switch off all light but that of these objects; whoever asks for it has seen to it that it is linked there."""
+    """Switch off all light but that of these objects, which the caller knows to be linked to the receiver."""
     scene.world = None
     for name in names:
         linking = compat.light_linking(bpy.data.objects[name])
         if linking is not None:
             linking.receiver_collection = None
-    own = {slot.material for name in names for slot in bpy.data.objects[name].material_slots}
-    for obj in bpy.data.objects:  # instances of collections show others than the scene's
+    shining = {slot.material for name in names for slot in bpy.data.objects[name].material_slots}
+    for obj in bpy.data.objects:  # collections instance objects that are not in the scene
         if obj.type == "LIGHT" and obj.name not in names:
             obj.hide_render = True
-    trees = [one.node_tree for one in bpy.data.materials if one.node_tree and one not in own]
+    trees = [material.node_tree for material in bpy.data.materials if material.node_tree and material not in shining]
     for tree in [*trees, *bpy.data.node_groups]:
-        used_by_own = any(
-            tree is getattr(node, "node_tree", None) for one in own if one for node in one.node_tree.nodes
+        is_used = any(
+            tree is getattr(node, "node_tree", None)
+            for material in shining
+            if material
+            for node in material.node_tree.nodes
         )
-        for node in () if used_by_own else tree.nodes:
+        for node in () if is_used else tree.nodes:
             for socket in node.inputs if node.type in {"EMISSION", "BSDF_PRINCIPLED"} else ():
                 if socket.name in {"Strength", "Emission Strength"}:
                     for link in list(socket.links):
@@ -179,7 +181,7 @@ def shine_alone(scene, names) -> None:
 
 
 def without_limits(scene) -> None:
-    """Cycles without clamps, exposure, or what stops early."""
+    """Set Cycles to use neither clamps and exposure nor anything that stops early."""
     scene.render.engine = "CYCLES"
     cycles = scene.cycles
     cycles.use_denoising = cycles.use_adaptive_sampling = cycles.use_auto_tile = False
@@ -189,21 +191,21 @@ def without_limits(scene) -> None:
 
 
 def set_up(scene, light) -> None:
-    """The artist's materials and bounces."""
+    """Set Cycles to the artist's materials and bounces, for mirrors instead of a diffuse surface."""
     without_limits(scene)
     cycles = scene.cycles
-    # The mirror stands for a diffuse surface: it uses up a glossy bounce in place of a diffuse one.
+    # The mirror replaces a diffuse surface: it takes a glossy bounce instead of a diffuse one.
     cycles.glossy_bounces += 1
     cycles.diffuse_bounces -= 1
     for obj in bpy.data.objects:
-        # What mirrors meet of a lamp behind something see-through would count as indirect.
+        # Mirrors would count lamps behind transparent surfaces as indirect light.
         obj.visible_glossy = obj.visible_diffuse and not (light == "INDIRECT" and obj.type == "LIGHT")
     if light == "INDIRECT" and scene.world is not None:
         scene.world.cycles_visibility.glossy = False
 
 
 class Mean:
-    """Of bakes of one image by their samples. A texel in ten thousand may come as no number: its other bakes count."""
+    """Mean of bakes of one image, weighted by samples. A texel in ten thousand may be NaN: its other bakes count."""
 
     def __init__(self) -> None:
         self._total, self._samples = 0.0, 0.0
@@ -217,13 +219,13 @@ class Mean:
 
 
 class Baker:
-    """Bakes the ghost again and again."""
+    """Bakes the ghost, any number of times."""
 
     def __init__(self, scene, ghost, image, kind, light="") -> None:
         self.scene, self.ghost, self.image, self.kind, self.light = scene, ghost, image, kind, light
         self.rounds = 0
         view_layer = bpy.context.view_layer
-        view_layer.update()  # before, the ghost can't be selected
+        view_layer.update()  # else the ghost can't be selected
         for obj in view_layer.objects:
             obj.select_set(obj == ghost)
         view_layer.objects.active = ghost
@@ -232,7 +234,7 @@ class Baker:
             self.options["view_from"] = "ABOVE_SURFACE"
 
     def bake(self, samples: int) -> np.ndarray:
-        """Float32 (height, width, 3) of the image; NaN where Cycles finds no number."""
+        """Pixels of the image, float32 (height, width, 3), NaN included."""
         self.rounds += 1
         draw_anew(self.ghost, self.rounds)
         self.scene.cycles.seed, self.scene.cycles.samples = self.rounds, samples
@@ -242,7 +244,7 @@ class Baker:
         return self.bake_passes({self.light})
 
     def bake_passes(self, passes: set) -> np.ndarray:
-        """As the scene is now."""
+        """Pixels of one bake with the current settings; infinity becomes NaN."""
         bpy.ops.object.bake(type=self.kind, pass_filter=passes, **self.options)
         values = np.empty(len(self.image.pixels), np.float32)
         self.image.pixels.foreach_get(values)
@@ -251,7 +253,7 @@ class Baker:
 
 
 def split(request, pixels) -> list:
-    """(K, rows, columns, 3) of each chart from the image."""
+    """Parts (K, rows, columns, 3) of the image, for each chart."""
     parts, row, count = [], 0, len(request["strata"])
     for chart in request["charts"]:
         columns, rows = chart["nodes"]
@@ -262,21 +264,23 @@ def split(request, pixels) -> list:
 
 
 def mean_radiance(request, pixels) -> np.ndarray:
-    """Of each node, by the cosine over the hemisphere."""
+    """Cosine-weighted mean radiance over the hemisphere, for each node."""
     _, reach, _, part = np.transpose(request["strata"])
     return np.concatenate(
         [np.tensordot(reach * part, values.mean(axis=3), 1).ravel() for values in split(request, pixels)]
     )
 
 
-def allowed_noise(request, found: float) -> float:
-    """Of the irradiance found, as part of it; where there is much light besides, more of it goes unseen."""
-    least, most = request["noise"]
-    return float(np.clip(request["noise_of_all"] * (1 + request["direct"] / found), least, most)) if found > 0 else most
+def allowed_noise(request, irradiance: float) -> float:
+    """Allowed noise of the irradiance, relative to it; it grows with the direct light beside it."""
+    low, high = request["noise"]
+    if irradiance <= 0:
+        return high
+    return float(np.clip(request["noise_of_all"] * (1 + request["direct"] / irradiance), low, high))
 
 
-def noise_of(request, one, other) -> float:
-    """Of the irradiance in `one`, from its difference to `other`."""
-    one, other = mean_radiance(request, one), mean_radiance(request, other)
-    total = (one + other).mean() / 2
-    return float(np.sqrt(((one - other) ** 2 / 2).mean()) / total) if total > 0 else 0.0
+def noise_of(request, first, second) -> float:
+    """Relative noise of the irradiance in one round, from the difference of two."""
+    first, second = mean_radiance(request, first), mean_radiance(request, second)
+    total = (first + second).mean() / 2
+    return float(np.sqrt(((first - second) ** 2 / 2).mean()) / total) if total > 0 else 0.0

@@ -1,4 +1,4 @@
-"""Mirrors that gather what arrives at a plane, direction by direction, when Cycles bakes them.
+"""Mirrors that gather the light that arrives at a plane, by direction, when Cycles bakes them.
 
 Part of the child process (child.py). A bake looks straight down on each of its points. A sharp mirror whose shading
 normal lies halfway between that view and a direction w shows the radiance that arrives from w. Here w is drawn at
@@ -13,18 +13,18 @@ import numpy as np
 
 STRATUM, AXES = "stratum", ("x_axis", "y_axis", "z_axis")
 
-# The node that keeps rounds apart: Cycles' first sample of each bake is at the middle of its texel, whatever the seed.
+# Node that differs from round to round: the first sample of each bake is at the middle of its texel for any seed.
 ROUND = "Round"
 
 
 def add_ghost(charts, strata, is_diffuse=False):
-    """The object, and its image; every chart's tiles fill rows of the image from `chart_rows` on.
+    """Ghost object and its image; the tiles of each chart fill some rows of the image.
 
     Parameters
     ----------
     charts : dicts with corner, x_axis, y_axis, normal, size (2), nodes (columns, rows).
-    is_diffuse : whether the mirrors are white diffuse surfaces.
-    strata : (K, 4): of r^2 and the azimuth / 2 pi, each where it begins and how far it reaches.
+    is_diffuse : True if white diffuse surfaces replace the mirrors.
+    strata : (K, 4): begin and length of r^2, begin and length of the azimuth / 2 pi.
     """
     width = max(chart["nodes"][0] for chart in charts) * len(strata)
     height = sum(chart["nodes"][1] for chart in charts)
@@ -64,14 +64,14 @@ def add_ghost(charts, strata, is_diffuse=False):
 
 
 def draw_anew(ghost, number: int) -> None:
-    """Other directions from the same places than in rounds of other numbers."""
+    """Draw directions that differ from those of rounds with other numbers."""
     node = ghost.data.materials[0].node_tree.nodes.get(ROUND)
     if node is not None:
         node.inputs[1].default_value = (0, 0, number)
 
 
 def _mirror(image):
-    """The material; what a ray sees follows from the attributes."""
+    """Material of the mirrors; attributes of the mesh decide the direction that a ray sees."""
     material = _new_material()
     tree = material.node_tree
     link = tree.links.new
@@ -105,7 +105,7 @@ def _mirror(image):
     stratum = attribute(STRATUM)
     part = tree.nodes.new("ShaderNodeSeparateXYZ")
     link(part.inputs[0], stratum.outputs["Color"])
-    # A place in the unit disk, which is the foot of a direction drawn by the cosine (Malley's method).
+    # A point in the unit disk, below a direction of cosine-weighted density (Malley's method).
     squared = math("MULTIPLY_ADD", random.outputs[0], part.outputs[1], part.outputs[0])
     turn = math("MULTIPLY_ADD", random.outputs[1], stratum.outputs["Alpha"], part.outputs[2])
     azimuth, radius = math("MULTIPLY", turn, 2 * np.pi), math("SQRT", squared)
@@ -139,7 +139,7 @@ def _new_material():
 
 
 def finish(tree, surface, image) -> None:
-    """White, at the output, and with the image that is baked into."""
+    """Link a white shader to the output, and add the image to bake to."""
     surface.inputs["Color"].default_value = (1, 1, 1, 1)
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     tree.links.new(output.inputs["Surface"], surface.outputs[0])

@@ -1,4 +1,4 @@
-"""The radiance of the world by direction, rendered by an equirectangular camera where nothing else is.
+"""Radiance of the world by direction, rendered by an equirectangular camera in an empty scene.
 
 Part of the child process (child.py).
 """
@@ -11,16 +11,17 @@ import bpy
 import compat
 import numpy as np
 
-# What Light Path nodes tell the light that a receiver gets: Cycles itself asks for it with all flags off where it
-# samples the world, and as a diffuse ray elsewhere.
+# Outputs of Light Path nodes for light on a receiver. Cycles sets no flag when it samples the world, and those of a
+# diffuse ray else.
 LIGHT_PATH = {"Is Diffuse Ray": 1.0, "Ray Depth": 1.0, "Diffuse Depth": 1.0}
 
-# Tiles whose radiance varies most are rendered again with more samples: suns of a few texels are there.
+# Side in texels of tiles, and the number of tiles with the largest range of radiance, as around a sun of few texels,
+# that are rendered again with more samples.
 TILE, TILES = 32, 12
 
 
 def panorama(request, scene, progress) -> dict:
-    """The task `world`; the request has width, height, samples and fine_samples."""
+    """Task `world`; the request has width, height, samples and fine_samples."""
     world = compat.original_world(bpy.context.view_layer, scene)
     size = request["width"], request["height"]
     if world is None or not lights_diffuse(world):
@@ -42,7 +43,7 @@ def panorama(request, scene, progress) -> dict:
 
 
 def lights_diffuse(world) -> bool:
-    """Whether the world's visibility lets it light diffuse surfaces."""
+    """True if the world is visible to diffuse surfaces."""
     visibility = getattr(world, "cycles_visibility", None)
     return bool(getattr(visibility, "diffuse", True))
 
@@ -59,7 +60,7 @@ def trees_of(world) -> list:
 
 
 def fix_light_path(tree) -> None:
-    """Let Light Path nodes answer as to a ray of a diffuse surface, whatever the camera's own ray is."""
+    """Replace Light Path nodes by their values for a ray of a diffuse surface, since camera rays render the world."""
     for node in [node for node in tree.nodes if node.bl_idname == "ShaderNodeLightPath"]:
         for socket in node.outputs:
             for target in [link.to_socket for link in socket.links]:
@@ -70,7 +71,7 @@ def fix_light_path(tree) -> None:
 
 
 def without_volume(world) -> None:
-    """A world's volume dims everything that far away; without it the background remains."""
+    """Remove the world's volume, which would hide the background."""
     for node in world.node_tree.nodes if world.node_tree else ():
         if node.bl_idname == "ShaderNodeOutputWorld":
             for link in list(node.inputs["Volume"].links):
@@ -78,11 +79,11 @@ def without_volume(world) -> None:
 
 
 def set_up(studio, width: int, height: int) -> None:
-    """Nothing but the world around a panoramic camera; linear EXR without view transform."""
+    """Set up a panoramic camera and linear EXR output."""
     data = bpy.data.cameras.new("Panorama")
     compat.set_panorama(data)
     camera = bpy.data.objects.new("Panorama", data)
-    # Upright, looking along +X: the camera's picture then is what an environment texture would have.
+    # Upright, along +X: the image then equals an environment texture.
     camera.rotation_euler = (math.pi / 2, 0.0, -math.pi / 2)
     studio.collection.objects.link(camera)
     studio.camera = camera
@@ -103,7 +104,7 @@ def set_up(studio, width: int, height: int) -> None:
 
 
 def render(studio, samples: int) -> np.ndarray:
-    """Float32 (height, width, 3), row 0 at the bottom; of a border, only what is in it."""
+    """Radiance, float32 (height, width, 3), row 0 at the bottom; with a render border, only the part in it."""
     studio.cycles.samples = samples
     with tempfile.TemporaryDirectory() as folder:
         studio.render.filepath = str(Path(folder) / "world.exr")
@@ -118,7 +119,7 @@ def render(studio, samples: int) -> np.ndarray:
 
 
 def uneven_tiles(radiance: np.ndarray) -> list:
-    """First row and column of the tiles where few samples may miss most of the light."""
+    """First row and column of the tiles in which few samples may miss most of the light."""
     height, width, _ = radiance.shape
     rows, columns = height // TILE, width // TILE
     if not rows or not columns:
@@ -127,7 +128,7 @@ def uneven_tiles(radiance: np.ndarray) -> list:
     weighted = radiance.mean(axis=2) * solid
     tiles = weighted[: rows * TILE, : columns * TILE].reshape(rows, TILE, columns, TILE)
     spread = np.ptp(tiles, axis=(1, 3))
-    # Where a texel's error may be a thousandth of all light.
+    # In these tiles the error of a texel may be a thousandth of all light.
     worst = [
         index for index in np.argsort(spread, axis=None)[::-1][:TILES] if spread.flat[index] > 1e-4 * weighted.sum()
     ]

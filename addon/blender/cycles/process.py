@@ -1,4 +1,4 @@
-"""Runs child.py on a copy of the scene; nothing here touches the host's data, so that it may run in any thread."""
+"""Runs child.py on a copy of the scene, in any thread: this file never touches the data of this Blender."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from .scene_copy import SceneCopy
 
 CHILD = Path(__file__).with_name("child.py")
 
-# Begins the lines by which the child says how far it is; Blender prints many others.
+# First word of the lines with the child's progress; Blender prints many other lines.
 MARK = "BEAMSPREAD-PROGRESS"
 
-# What Cycles prints of a picture that it renders.
+# Progress in the lines that Cycles prints while it renders.
 SAMPLES = re.compile(r"\bSample (\d+)/(\d+)")
 
 POLL_SECONDS = 0.1
 
-# Without a sign of life for this long a process hangs: loading a scene of gigabytes takes minutes.
+# Seconds without output after which the process counts as hung. Loading a scene of gigabytes takes minutes.
 SILENT_SECONDS = 1800.0
 
 LAST_LINES = 12
@@ -89,16 +89,16 @@ def _command(copy: SceneCopy, request: Path) -> list[str]:
 
 
 class _Pace:
-    """How far a process seems to be that seldom says so: by the time that it takes, of what it is reckoned to take.
+    """Progress of a process that reports it seldom: by the time that has passed, relative to an estimate.
 
-    By time alone it never arrives: once all of that is over, a quarter is left.
+    The estimate alone never completes it: when its time is over, a quarter is left.
     """
 
     def __init__(self, seconds: float) -> None:
         self._began, self._seconds, self._fraction = time.monotonic(), seconds, 0.0
 
     def fraction(self, told: float) -> float:
-        """Of the whole, from what it has `told`."""
+        """Finished fraction, at least the one that the process `told`."""
         if self._seconds:
             part = (time.monotonic() - self._began) / self._seconds
             told = max(told, part if part < 0.5 else 1 - 0.25 / part)
@@ -107,12 +107,12 @@ class _Pace:
 
 
 class _Child:
-    """A process, and what it says: how far it is by lines of its own, or by the samples that Cycles counts."""
+    """The child process, and its progress by its own lines or by the samples that Cycles counts."""
 
     def __init__(self, command: list[str], counts_samples: bool = False) -> None:
         self._counts_samples = counts_samples
         pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
-        # Windows would open a console for it.
+        # Windows would open a console.
         hidden = getattr(subprocess, "CREATE_NO_WINDOW", 0)
         self._process = subprocess.Popen(command, encoding="utf-8", errors="replace", creationflags=hidden, **pipes)
         self.fraction, self.has_answered, self.heard = 0.0, False, time.monotonic()
@@ -125,7 +125,7 @@ class _Child:
         return self._process.returncode
 
     def is_running(self, seconds: float) -> bool:
-        """Whether it still runs after this time at the most."""
+        """Wait for at most this time; True if the process still runs."""
         try:
             self._process.wait(seconds)
         except subprocess.TimeoutExpired:
@@ -133,7 +133,7 @@ class _Child:
         return False
 
     def end(self) -> None:
-        """Kill it if it still runs, and wait until it and all it said are through."""
+        """Kill the process if it still runs, and wait until all its output is read."""
         if self._process.poll() is None:
             self._process.kill()
         self._process.wait()
@@ -145,7 +145,7 @@ class _Child:
             self.heard = time.monotonic()
             if line.startswith(MARK):
                 self.fraction, self.has_answered = float(line.split()[1]), True
-            elif self._counts_samples and (found := SAMPLES.search(line)):
-                self.fraction = int(found[1]) / max(int(found[2]), 1)
+            elif self._counts_samples and (match := SAMPLES.search(line)):
+                self.fraction = int(match[1]) / max(int(match[2]), 1)
             elif line.strip():
                 self.last_lines.append(line.strip())
