@@ -45,6 +45,16 @@ class NotSupportedError(BakeError):
         super().__init__(f"The {kind} '{name}' is not supported{': ' if reason else ''}{reason}.")
 
 
+class MissingImageError(NotSupportedError):
+    """An image that no renderer can load; Cycles shows it in magenta."""
+
+    REMEDY = "Choose its file again, or use File > External Data > Find Missing Files."
+
+    def __init__(self, image: str = "", node: str = "") -> None:
+        text = f"The image '{image}' is missing." if image else f"The node '{node}' has no image."
+        BakeError.__init__(self, text, self.REMEDY if image else "Choose an image.")
+
+
 def message_of(error: Exception, subject: str = "") -> Message:
     """The message that tells the artist about an exception."""
     if isinstance(error, BakeError):

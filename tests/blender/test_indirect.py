@@ -13,7 +13,7 @@ import pytest
 import scenes
 from beamspread.blender.compat import has_denoiser
 from beamspread.blender.cycles import cycles_light, process
-from beamspread.blender.cycles.scene_copy import PREFIX, SceneCopy, remove_stale
+from beamspread.blender.cycles.scene_copy import PREFIX, SceneCopy, remove_leftovers
 from beamspread.blender.jobs.run.prepare import prepare_scene
 from beamspread.blender.node.find import find_node
 from beamspread.core.bake.runner import CANCELLED, FAILED
@@ -30,7 +30,7 @@ TEXELS, GREY = 32, 0.5
 def coarse(monkeypatch):
     """Few nodes, with noise of 2 % at each."""
     monkeypatch.setattr(cycles_light, "NODES", 32)
-    for name in ("LEAST_NOISE", "MOST_NOISE"):
+    for name in ("MIN_NOISE", "MAX_NOISE"):
         monkeypatch.setattr(cycles_light, name, 0.02)
     bpy.context.scene.beamspread.use_indirect = True
     bpy.context.scene.beamspread.margin = 0
@@ -406,7 +406,7 @@ def folders():
 
 def test_the_scene_stays_as_it_is(monkeypatch, tmp_path):
     floor = add_scene()
-    monkeypatch.setattr(cycles_light, "MOST_SAMPLES", 8)
+    monkeypatch.setattr(cycles_light, "MAX_SAMPLES", 8)
     dirty = bpy.data.images.new("In memory", 8, 8)
     dirty.pixels[0] = 0.5
     bpy.context.scene.frame_set(7)
@@ -439,9 +439,9 @@ def test_the_scene_stays_as_it_is(monkeypatch, tmp_path):
 
 def test_cancelling_kills_the_process(monkeypatch):
     floor = add_scene()
-    monkeypatch.setattr(cycles_light, "LEAST_NOISE", 1e-4)
-    monkeypatch.setattr(cycles_light, "MOST_NOISE", 1e-4)
-    monkeypatch.setattr(cycles_light, "MOST_SAMPLES", 10**4)
+    monkeypatch.setattr(cycles_light, "MIN_NOISE", 1e-4)
+    monkeypatch.setattr(cycles_light, "MAX_NOISE", 1e-4)
+    monkeypatch.setattr(cycles_light, "MAX_SAMPLES", 10**4)
     children = []
 
     class Popen(subprocess.Popen):
@@ -472,14 +472,14 @@ def test_cancelling_kills_the_process(monkeypatch):
 
 def test_folders_of_killed_processes_go(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    gone = subprocess.Popen(["true"])
-    gone.wait()
-    stale, ours = (tmp_path / f"{PREFIX}{number}-abc" for number in (gone.pid, os.getpid()))
-    stale.mkdir()
-    ours.mkdir()
-    remove_stale()
-    assert not stale.exists()
-    assert ours.exists()
+    leftover = tmp_path / f"{PREFIX}abc"
+    leftover.mkdir()
+    ours = SceneCopy(bpy.context.scene, bpy.context.view_layer)
+    for folder in (leftover, ours.folder):
+        os.utime(folder, (0, 0))
+    remove_leftovers()
+    assert not leftover.exists()
+    assert ours.folder.exists()
 
 
 def test_a_process_that_is_cancelled_at_once():

@@ -402,7 +402,7 @@ def test_light_is_linked_to_what_the_instancer_shows():
 def test_indirect_light_is_that_of_what_is_made_real(monkeypatch):
     """Of a bright wall of the collection and of a card of the scene, by the same random numbers."""
     monkeypatch.setattr(cycles_light, "NODES", 16)
-    for name in ("LEAST_NOISE", "MOST_NOISE"):
+    for name in ("MIN_NOISE", "MAX_NOISE"):
         monkeypatch.setattr(cycles_light, name, 0.02)
     holder, collection, matrix = nested()
     bpy.data.objects["Wall"].data.materials.append(scenes.diffuse_material((0.8, 0.1, 0.1)))

@@ -6,6 +6,8 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+from beamspread.blender.jobs.state import state
+from beamspread.blender.node.output import make_plain, plain_of
 from beamspread.blender.read.emitters import _pieces
 from beamspread.blender.read.lights import read_illumination
 from beamspread.core.scene.lights import MeshLight
@@ -240,6 +242,68 @@ def test_collections_that_cameras_do_not_see_light_all_the_same(flag):
 def test_the_beamspread_node_is_no_light():
     scenes.add_plane(material=scenes.add_material(linked=True))
     assert read().lights == ()
+
+
+def test_a_baked_image_is_no_light_by_any_way():
+    """By the node's Color as emission, and by the group of plain nodes in the node's place."""
+    image = bpy.data.images.new("Baked", 4, 4, float_buffer=True)
+    image.pixels.foreach_set(np.ones(64, np.float32))
+    material = scenes.add_material(image=image)
+    scenes.add_plane(material=material)
+    node, tree = scenes.node_of(material), material.node_tree
+    emission = tree.nodes.new("ShaderNodeEmission")
+    tree.links.new(emission.inputs["Color"], node.outputs["Color"])
+    tree.links.new(tree.get_output_node("CYCLES").inputs["Surface"], emission.outputs[0])
+    assert (read().lights, read().by_cycles) == ((), {})
+    make_plain(node)
+    assert (read().lights, read().by_cycles) == ((), {})
+    tree.links.new(tree.get_output_node("CYCLES").inputs["Surface"], plain_of(node).outputs["BSDF"])
+    assert (read().lights, read().by_cycles) == ((), {})
+
+
+def test_an_unused_beamspread_node_takes_no_light_away():
+    material, _ = glowing_material()
+    add_panel(material=material)
+    (before,) = read().lights
+    material.node_tree.nodes.new("BeamspreadNode")
+    (light,) = read().lights
+    assert np.array_equal(light.radiance, before.radiance)
+
+
+def test_emission_beside_a_beamspread_node_is_light():
+    material, emission = glowing_material()
+    add_panel(material=material)
+    (before,) = read().lights
+    tree = material.node_tree
+    node, total = tree.nodes.new("BeamspreadNode"), tree.nodes.new("ShaderNodeAddShader")
+    tree.links.new(total.inputs[0], emission.outputs[0])
+    tree.links.new(total.inputs[1], node.outputs["BSDF"])
+    tree.links.new(tree.get_output_node("CYCLES").inputs["Surface"], total.outputs[0])
+    (light,) = read().lights
+    assert np.array_equal(light.radiance, before.radiance)
+
+
+def test_a_bake_of_all_keeps_the_light_of_a_material_with_an_unused_node():
+    """A first bake puts the node at the material's output only if that takes no light from the scene."""
+    material, emission = glowing_material()
+    panel = add_panel(material=material)
+    panel.data.uv_layers.new(name="UVMap")
+    material.node_tree.nodes.new("BeamspreadNode")
+    bpy.context.scene.beamspread.resolution = 16
+    bpy.context.scene.beamspread.use_indirect = False
+    plane = scenes.add_plane(material=scenes.add_material())
+    scenes.select(plane)
+    assert bpy.ops.beamspread.bake(objects="SELECTED") == {"FINISHED"}
+    alone = scenes.pixels(scenes.image_of(plane)).copy()
+    assert alone.any()
+    state.forget()
+    bpy.ops.beamspread.bake(objects="ALL")
+    assert np.array_equal(scenes.pixels(scenes.image_of(plane)), alone)
+    output = material.node_tree.get_output_node("ALL")
+    assert output.inputs["Surface"].links[0].from_node == emission
+    assert any("shines by 'Emission'" in line for line in state.lines())
+    bpy.ops.beamspread.bake(objects="ALL")
+    assert np.array_equal(scenes.pixels(scenes.image_of(plane)), alone)
 
 
 def test_what_is_not_understood_is_named():

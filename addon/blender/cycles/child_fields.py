@@ -11,12 +11,11 @@ import numpy as np
 from child_denoise import Denoiser
 from child_ghost import add_ghost, draw_anew
 
-# Samples per node and stratum of the first two rounds, from which the noise follows. Later rounds take twice as many
-# as the one before, since each prepares the scene anew. Nothing depends on how long it takes, or each run would differ.
-LOOK = 4
+# Samples per node and stratum of each of the first two rounds, which measure the noise. Later rounds take twice as many
+# as the round before. The number of rounds does not depend on time, so that every run gives the same result.
+FIRST_SAMPLES = 4
 
-# How much noisier irradiance may be than it is wanted, where a denoiser follows. Measured in a room and beside a wall,
-# 64 x 64 nodes (tests/bench/bounced.py): errors of 7 and 5 % become 2.4 and 2.3 %, and 19, 14 and 10 % 8, 6 and 5 %.
+# Factor by which a denoiser reduces noise (docs/tuning.md); sampling stops that much earlier.
 DENOISED = 2.0
 
 
@@ -36,6 +35,8 @@ def fields(request, scene, progress) -> dict:
         material = bpy.data.materials.get(name)
         if material is not None:  # the copy has only materials that the scene uses
             make_diffuse(material, color, request["textures"].get(name))
+    if not request["with_world"]:
+        scene.world = None
     set_up(scene, request["light"])
     if request["only"]:
         shine_alone(scene, request["only"])

@@ -1,4 +1,4 @@
-"""The light of a scene that Cycles finds: what bounces, and what our own readers don't understand."""
+"""Light by Cycles: bounced light, and lights whose nodes only Cycles can evaluate."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ import numpy as np
 from ...core.bake.bake_settings import BakeSettings
 from ...core.bake.gather import Gatherer
 from ...core.bake.job import BakeJob
-from ...core.errors import MaterialError
-from ...core.messages import warning
+from ...core.errors import MaterialError, MissingImageError
+from ...core.messages import Message, warning
 from ...core.progress import Progress, stages
 from ...core.scene.illumination import Illumination
 from ...core.scene.lights import STRATA, Field, FieldLight, LampFieldLight, Light, WorldLight
@@ -23,39 +23,42 @@ from ...core.scene.receiver import Receiver
 from .. import compat
 from ..node.find import find_node_in_groups
 from ..node.tree import BASE_COLOR
+from ..read.image_nodes import missing_images
+from ..read.nodes import InputSocket, Links, surface_of
 from ..read.visibility import SOLID_TYPES, render_visible_names, renders
 from .process import run
 from .scene_copy import SceneCopy
 
-# Nodes along the longest side of a receiver; the nodes of all its charts fill so many squares of that side at most.
-NODES, MOST_SQUARES = 64, 2.0
+# Nodes along the longest side of a receiver; more resolve bounced light more finely and take longer.
+NODES = 64
+# Most squares of that side that the nodes of all charts fill.
+MAX_SQUARES = 2.0
 
-# Part of all irradiance that is noise of what bounces at a node, but of the bounced one at least and at most so much;
-# interpolation averages it to about half. Unless that takes more samples of each of its directions.
-NOISE_OF_ALL, LEAST_NOISE, MOST_NOISE = 0.01, 0.03, 0.1
-MOST_SAMPLES = 128
+# Allowed noise of bounced light at a node, relative to all irradiance; interpolation about halves it.
+NOISE_OF_ALL = 0.01
+# Limits of that noise, relative to the bounced irradiance.
+MIN_NOISE, MAX_NOISE = 0.03, 0.1
+# Most samples of each direction at a node.
+MAX_SAMPLES = 128
 
-# Less bounced light is none, beside what the lights would send without anything in their way: what leaks into a closed
-# box with sun and lamp outside, at a single node beside its edges, is 1.3e-7.
+# Fraction of the unoccluded direct light below which bounced light is ignored. Leaks into a closed box are 1.3e-7.
 NEGLIGIBLE = 1e-6
 NOTHING_BOUNCES = warning(
     "", "Indirect light is left out: it is less than a millionth of what the lights send without obstacles."
 )
 
-# Of light that comes directly, with its shadows, and is not understood by our readers.
+# Nodes along the longest side, and noise, of direct light whose nodes only Cycles can evaluate.
 DIRECT_NODES, DIRECT_NOISE = 256, 0.02
 
-# For estimates: what Blender takes to start, the paths that a node takes, with a denoiser after them, and how many a
-# processor traces.
+# Estimates: seconds until Blender has started, paths per node without and with a denoiser, paths per second of a core.
 START_SECONDS, PATHS_PER_NODE, PATHS_TO_DENOISE, PATHS_PER_SECOND = 3.0, 600, 256, 1.5e5
 
-# Of a node, how high above the receiver its light is gathered: nothing that stands there may be below.
+# Height above the receiver at which light is gathered, in nodes; objects below it cast no shadow.
 LIFT = 1e-3
 
-# Samples of each texel of the world's panorama, and of those in tiles around a sun: 16 and 256 give the same irradiance
-# to 1e-6.
+# Samples of each texel of the world's panorama, and of texels in tiles around a sun; more reduce noise.
 WORLD_SAMPLES, SUN_SAMPLES = 2, 256
-# Seconds that a panorama takes about, for the progress: a sky in Blender 3.4 on two cores.
+# Estimate of the seconds that a panorama takes.
 WORLD_SECONDS = 8.0
 
 WHITE = 1.0, (1.0, 1.0, 1.0)
@@ -63,39 +66,45 @@ UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class CopyForCycles:
-    """A copy of a scene, and what stands in it for the materials that are baked. Make it in the main thread."""
+    """A copy of a scene, with the colors that replace baked materials in it. Make it in the main thread."""
 
     def __init__(self, scene, view_layer) -> None:
         self.scene = SceneCopy(scene, view_layer)
-        places = {one.name: find_node_in_groups(one) for one in bpy.data.materials}
-        places = {name: place for name, place in places.items() if place is not None}
-        self.reflectances = {name: _reflectance(node.surface()) for name, (node, _) in places.items()}
-        # Where the texture is: the groups around a node, the node, its input.
+        nodes = {material.name: find_node_in_groups(material) for material in bpy.data.materials}
+        nodes = {name: node for name, node in nodes.items() if node is not None}
+        self.reflectances = {name: _reflectance(node.surface()) for name, (node, _) in nodes.items()}
+        # Names of the groups around a node, of the node, and of its input with a texture.
         self.textures = {
             name: ([group.name for group in groups], node.name, BASE_COLOR)
-            for name, (node, groups) in places.items()
-            if node.has_texture()
+            for name, (node, groups) in nodes.items()
+            if node.has_texture() and not missing_images(Links(), InputSocket(node.inputs[BASE_COLOR], groups))
         }
 
 
 class CyclesLight:
     """Completes the jobs of one scene, which share a copy of it.
 
-    Make it, and call `complete`, in the main thread, or with a copy that was made there.
+    Make it, and call `complete`, in the main thread, unless a copy that was made there is given.
     """
 
     def __init__(self, depsgraph, copy: CopyForCycles | None = None) -> None:
-        # By name: undo between two jobs brings other data-blocks.
+        # Names, since undo between two jobs replaces data-blocks.
         self._names = depsgraph.scene.name, depsgraph.view_layer.name
         world = compat.world_of(depsgraph)
         self._world = world.name if world else ""
         self._corners = _corners_of_solids(depsgraph)
-        self._lamps = {obj.name: _place(obj) for obj in bpy.data.scenes[self._names[0]].objects if obj.type == "LIGHT"}
+        self._lamps = {
+            obj.name: _position_of(obj) for obj in bpy.data.scenes[self._names[0]].objects if obj.type == "LIGHT"
+        }
         self._copy = copy
         self._panorama: WorldLight | None = None
+        self._lacks_world_images = world is not None and bool(_missing_images_of(world))
+        self._has_world = True
+        materials = (data for data in depsgraph.ids if isinstance(data, bpy.types.Material))
+        self._missing = [message for material in materials for message in _warnings_of(material)]
 
     def complete(self, job: BakeJob) -> BakeJob:
-        """The job, with what finds the light that it still lacks."""
+        """The job, with a step that adds the light that it lacks."""
         illumination, scene = job.illumination, bpy.data.scenes[self._names[0]]
         world = self._world if self._world in illumination.by_cycles else ""
         bounced = job.settings.indirect and bool(illumination.lights or illumination.by_cycles)
@@ -103,11 +112,15 @@ class CyclesLight:
         others = [name for name in illumination.by_cycles if name != world and name in scene.objects]
         if not (world or bounced or others):
             return job
+        # A world without its images is left out; Cycles would show it in magenta.
+        is_lit = bool(world) or any(light.name == self._world for light in illumination.lights)
+        self._has_world = is_lit or not self._lacks_world_images
         if self.copy() is None:
             text = "Blender's own Bake could not ask Cycles for light that only Cycles can evaluate."
             missing = warning("", text, "Use Bake Beamspread.")
             return replace(job, illumination=illumination.with_messages(missing))
         illumination = illumination.found({world, *others} - {""}).with_messages(*self._copy.scene.warnings)
+        illumination = illumination.with_messages(*self._missing) if bounced else illumination
         return replace(
             job,
             illumination=illumination,
@@ -116,7 +129,7 @@ class CyclesLight:
         )
 
     def copy(self) -> CopyForCycles | None:
-        """Of the scene; None where there is none yet, and where it can't be made: outside the main thread."""
+        """Copy of the scene; None if there is none and this is not the main thread."""
         if self._copy is None and threading.current_thread() is threading.main_thread():
             scene = bpy.data.scenes[self._names[0]]
             self._copy = CopyForCycles(scene, scene.view_layers[self._names[1]])
@@ -125,7 +138,7 @@ class CyclesLight:
     def _is_below_something(self, receiver: Receiver) -> bool:
         for grid in (chart.grid for chart in receiver.charts):
             heights = (self._corners - grid.origin) @ np.array(grid.normal)
-            # Its own corners lie in the plane but for rounding.
+            # The receiver's own corners lie in the plane up to rounding.
             size = max(grid.width * grid.pitch_x, grid.height * grid.pitch_y)
             if heights.max(initial=0) > grid.clearance + 1e-5 * size + 1e-6 * np.abs(grid.origin).max():
                 return True
@@ -134,7 +147,7 @@ class CyclesLight:
     def _complete(
         self, job: BakeJob, world: str, others: list[str], bounced: bool, progress: Progress | None
     ) -> BakeJob:
-        """The job with what Cycles adds to its lights. Runs in any thread."""
+        """The job with the light that Cycles adds. Runs in any thread."""
         weights = [float(bool(world) and self._panorama is None), 2.0 * bounced, *(1.0 for _ in others)]
         first, second, *each = stages(progress, weights)
         illumination, receiver = job.illumination, job.receiver
@@ -154,7 +167,7 @@ class CyclesLight:
         return replace(job, illumination=illumination.lit_by(found))
 
     def _direct(self, receiver: Receiver, name: str, progress: Progress | None) -> Light:
-        """What an object sends to the receiver."""
+        """Light of one object on the receiver."""
         lamp = self._lamps.get(name)
         doing = f"Finding the light of '{name}'"
         options = {"light": "DIRECT", "only": [name], "noise": (DIRECT_NOISE, DIRECT_NOISE)}
@@ -167,20 +180,21 @@ class CyclesLight:
     def _fields(
         self, receiver: Receiver, progress: Progress | None, doing: str, **options
     ) -> tuple[tuple[Field, ...], float]:
-        """Bounced light, or what the options ask for, and about its mean irradiance, W/m^2."""
+        """Bounced light, or light as the options ask for, and an estimate of its mean irradiance, W/m^2."""
         request = {
             "charts": charts_of(receiver, NODES),
             "strata": STRATA.tolist(),
             "light": "INDIRECT",
+            "with_world": self._has_world,
             "only": [],
             "by_lamps": False,
             "reflectances": self._copy.reflectances,
             "textures": self._copy.textures,
-            "noise": (LEAST_NOISE, MOST_NOISE),
+            "noise": (MIN_NOISE, MAX_NOISE),
             "noise_of_all": NOISE_OF_ALL,
             "direct": 0.0,
             "negligible": NEGLIGIBLE,
-            "most_samples": MOST_SAMPLES,
+            "most_samples": MAX_SAMPLES,
         }
         seconds = seconds_estimate(receiver.width, receiver.height)
         found = run(self._copy.scene, "fields", {**request, **options}, progress, doing, seconds)
@@ -190,7 +204,7 @@ class CyclesLight:
 
 
 def _irradiance_in_the_open(receiver: Receiver, lights: Sequence[Light]) -> float:
-    """The mean, W/m^2, of the lights without what stands in their way."""
+    """Mean irradiance, W/m^2, of the lights without occluders."""
     grids = [chart.grid for chart in receiver.charts]
     means = [sum(Gatherer(grid, Illumination(lights), BakeSettings()).survey()[2]) for grid in grids]
     areas = [grid.width * grid.pitch_x * grid.height * grid.pitch_y for grid in grids]
@@ -198,9 +212,9 @@ def _irradiance_in_the_open(receiver: Receiver, lights: Sequence[Light]) -> floa
 
 
 def charts_of(receiver: Receiver, nodes: int) -> list[dict]:
-    """The charts as child_fields.py takes them: rectangles a little above the receiver, in nodes."""
+    """Charts as child_fields.py takes them: rectangles of nodes slightly above the receiver."""
     sizes = [(c.grid.width * c.grid.pitch_x, c.grid.height * c.grid.pitch_y) for c in receiver.charts]
-    cell = max(*map(max, sizes), math.sqrt(sum(x * y for x, y in sizes) / MOST_SQUARES)) / nodes
+    cell = max(*map(max, sizes), math.sqrt(sum(x * y for x, y in sizes) / MAX_SQUARES)) / nodes
     charts = []
     for grid, size in zip((chart.grid for chart in receiver.charts), sizes):
         lift = grid.clearance + LIFT * cell + 1e-6 * float(np.abs(grid.origin).max())
@@ -218,10 +232,10 @@ def charts_of(receiver: Receiver, nodes: int) -> list[dict]:
 
 
 def seconds_estimate(width: int, height: int) -> float:
-    """About how long the search for bounced light takes on this machine, for a receiver of so many texels.
+    """Estimate of the seconds that bounced light takes on this machine, for a receiver of that many texels.
 
-    Measured in a white room, where light bounces longest; scenes of millions of triangles are besides prepared anew
-    some six times.
+    Measured in a white room, where light bounces longest. Scenes of millions of triangles take longer, since Cycles
+    prepares them some six times.
     """
     nodes = NODES * max(1, round(NODES * min(width, height) / max(width, height)))
     paths = nodes * (PATHS_TO_DENOISE if compat.has_denoiser() else PATHS_PER_NODE)
@@ -229,7 +243,7 @@ def seconds_estimate(width: int, height: int) -> float:
 
 
 def _corners_of_solids(depsgraph) -> np.ndarray:
-    """World positions (N, 3) of the corners of the boxes around all that renders."""
+    """World positions (N, 3) of the corners of the bounding boxes of all objects that render."""
     visible = render_visible_names(depsgraph.view_layer)
     corners = [np.zeros((0, 3))]
     for instance in depsgraph.object_instances:
@@ -239,8 +253,18 @@ def _corners_of_solids(depsgraph) -> np.ndarray:
     return np.concatenate(corners)
 
 
-def _place(lamp) -> tuple:
-    """Of a `LampFieldLight`."""
+def _missing_images_of(owner) -> list[MissingImageError]:
+    surface = surface_of(owner.node_tree) if compat.uses_nodes(owner) else None
+    return [] if surface is None else missing_images(Links(), surface)
+
+
+def _warnings_of(material) -> list[Message]:
+    text = f"Light that bounces from the material '{material.name}' is magenta, as Cycles shows it."
+    return [warning(material.name, f"{error.text} {text}", error.remedy) for error in _missing_images_of(material)]
+
+
+def _position_of(lamp) -> tuple:
+    """Position or direction of a lamp, and True if it is a direction; see `LampFieldLight`."""
     if lamp.data.type != "SUN":
         return tuple(lamp.matrix_world.translation), False
     return tuple(-lamp.matrix_world.col[2].to_3d().normalized()), True
@@ -249,7 +273,7 @@ def _place(lamp) -> tuple:
 def _reflectance(surface) -> list[float]:
     try:
         return surface.reflectance()
-    except MaterialError:  # of another object: it can't be baked, and says so when it is tried
+    except MaterialError:  # of another object, whose own bake reports it
         return [0.0, 0.0, 0.0]
 
 

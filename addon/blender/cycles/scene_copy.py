@@ -7,6 +7,7 @@ import shutil
 import tempfile
 import time
 import weakref
+from contextlib import suppress
 from pathlib import Path
 
 import bpy
@@ -15,29 +16,34 @@ import numpy as np
 from ...core.messages import Message, warning
 from ..read.visibility import with_instanced
 
+try:
+    import fcntl
+except ImportError:  # Windows: folders of killed processes stay
+    fcntl = None
+
 PREFIX = "beamspread-cycles-"
 FILE, IMAGES = "scene.blend", "images.npz"
 
-# Where a process can't be asked for by its number: after this long its folder is surely no longer in use.
-STALE_SECONDS = 7 * 24 * 3600
+# Age from which an unlocked folder counts as a leftover; a younger one may not be locked yet.
+MIN_AGE_SECONDS = 60.0
 
 
 class SceneCopy:
-    """The scene as it is now, in a folder of its own; nothing of the host's is touched, undo and paths included.
+    """The scene as it is now, in a folder of its own. The data of this Blender stay as they are.
 
-    Make it in the main thread (it reads `bpy.data`), and use it anywhere. The folder goes when nobody needs it any
-    more, at the latest when the process ends, or by `remove()`.
+    Make it in the main thread (it reads `bpy.data`), and use it in any thread. The folder is removed with the object,
+    when the process ends, or by `remove()`.
 
     Attributes
     ----------
-    request : what every process on it needs to know, as plain data: scene, view layer, whether drivers may run Python.
+    request : plain data for every process on it: scene, view layer, and whether drivers may run Python.
     warnings : messages about images whose unsaved pixels the copy lacks.
     """
 
     def __init__(self, scene, view_layer) -> None:
-        remove_stale()
-        self.folder = Path(tempfile.mkdtemp(prefix=f"{PREFIX}{os.getpid()}-"))
-        self.remove = weakref.finalize(self, shutil.rmtree, self.folder, ignore_errors=True)
+        remove_leftovers()
+        self.folder = Path(tempfile.mkdtemp(prefix=PREFIX))
+        self.remove = weakref.finalize(self, _remove, self.folder, _lock(self.folder))
         self.warnings: list[Message] = []
         self.binary = bpy.app.binary_path
         self.request = {
@@ -49,7 +55,7 @@ class SceneCopy:
             for obj in with_instanced(scene.objects):
                 if obj.mode == "EDIT":
                     obj.update_from_editmode()
-            # Unlike saving the file this runs no handlers of other add-ons, packs nothing and makes no preview.
+            # Unlike saving the file, this runs no handlers of other add-ons, packs nothing and makes no preview.
             bpy.data.libraries.write(str(self.file), {scene}, path_remap="ABSOLUTE", compress=False)
             self._keep_unsaved_images()
         except BaseException:
@@ -67,7 +73,7 @@ class SceneCopy:
         self.remove()
 
     def _keep_unsaved_images(self) -> None:
-        """Pixels that are in memory alone: a file has them only if they are packed."""
+        """Save pixels that are in memory only."""
         pixels = {}
         for image in bpy.data.images:
             if not image.is_dirty or image.library is not None or image.source not in {"GENERATED", "FILE"}:
@@ -83,24 +89,28 @@ class SceneCopy:
         np.savez(self.folder / IMAGES, **pixels)
 
 
-def remove_stale() -> None:
-    """Folders that killed processes left behind."""
+def remove_leftovers() -> None:
+    """Remove folders that no process has locked: those of processes that were killed."""
     for folder in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
-        number = folder.name.removeprefix(PREFIX).split("-")[0]
-        try:
-            if number.isdigit() and not _may_run(int(number), folder):
-                shutil.rmtree(folder, ignore_errors=True)
-        except OSError:  # another user's, or gone meanwhile
-            continue
+        with suppress(OSError):  # another user's, or removed meanwhile
+            if fcntl is not None and time.time() - folder.stat().st_mtime > MIN_AGE_SECONDS:
+                _remove(folder, _lock(folder))
 
 
-def _may_run(process: int, folder: Path) -> bool:
-    if os.name != "posix":  # there a signal of 0 is no question
-        return time.time() - folder.stat().st_mtime < STALE_SECONDS
+def _lock(folder: Path) -> int | None:
+    """Descriptor that holds a lock on a folder, None on systems without locks; OSError if another holds it."""
+    if fcntl is None:
+        return None
+    descriptor = os.open(folder, os.O_RDONLY)
     try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(descriptor)
+        raise
+    return descriptor
+
+
+def _remove(folder: Path, lock: int | None) -> None:
+    shutil.rmtree(folder, ignore_errors=True)
+    if lock is not None:
+        os.close(lock)

@@ -1,34 +1,38 @@
-"""What a material shows: the baked result, what it had before, or nodes that need no add-on."""
+"""The material's output: the baked result, the former shader, or nodes that need no add-on."""
 
 from __future__ import annotations
 
 import bpy
 
+from ...core.errors import NotSupportedError
 from ...core.messages import Message, note, warning
+from ..read.nodes import InputSocket
+from ..read.shading import ShadingPoints
 from .tree import NORMAL, ROUGHNESS
 
 PLAIN_LABEL = "Baked Light"
 
 
 def plain_of(node):
-    """The group that shows the bake in the node's place, or None."""
+    """Group of plain nodes that shows the bake in the node's place, or None."""
     plain = node.id_data.nodes.get(node.plain_node) if node.plain_node else None
     return plain if plain is not None and plain.bl_idname == "ShaderNodeGroup" else None
 
 
 def is_linked(node) -> bool:
-    """Whether anything uses the node's outputs, or those of the group in its place."""
-    return any(socket.is_linked for one in (node, plain_of(node)) if one is not None for socket in one.outputs)
+    """True if an output of the node, or of the group in its place, is linked."""
+    nodes = [node, *filter(None, [plain_of(node)])]
+    return any(socket.is_linked for shown in nodes for socket in shown.outputs)
 
 
 def former_output(node):
-    """The output that the material showed before the node's, or None."""
+    """Output that the material showed before the node's, or None."""
     former = node.id_data.nodes.get(node.former_node) if node.former_node else None
-    return former and next((one for one in former.outputs if one.identifier == node.former_socket), None)
+    return former and next((output for output in former.outputs if output.identifier == node.former_socket), None)
 
 
 def is_shown(node) -> bool:
-    """Whether the material shows the node's result at its output, and nothing else."""
+    """True if the material's output shows the node's result and nothing else."""
     surface = _surface(node.id_data)
     if surface is None or not surface.is_linked:
         return False
@@ -36,7 +40,7 @@ def is_shown(node) -> bool:
 
 
 def link_output(node) -> list[Message]:
-    """Put the node at its material's output, unless something uses it or the user has chosen.
+    """Put the node at its material's output, unless it is linked, the user has chosen, or the material shines.
 
     The former shader stays in the tree, and the node remembers it. A warning says that the bake is not shown, a note
     which shader it replaces.
@@ -58,13 +62,16 @@ def link_output(node) -> list[Message]:
     if former_output(node) is not None:
         text = f"'{name}' shows '{shader.name}' instead of the bake."
         return [warning(name, text, "Show Baked Result in its node changes that.")]
+    if _shines(surface):
+        text = f"'{name}' shines by '{shader.name}', so it does not show the bake."
+        return [warning(name, text, "Show Baked Result in its node changes that, and takes its light away.")]
     _remember(node, surface.links[0])
     _link(surface, node)
     return [note(name, f"'{name}' now shows the bake.", f"Show Former Shader brings '{shader.name}' back.")]
 
 
 def toggle(node) -> str:
-    """Swap the baked result with what the material showed before; the name of the node shown now, "" if none is."""
+    """Switch the baked result and the former shader; the name of the node shown now, "" if there is no other."""
     surface = _surface(node.id_data)
     if surface is None:
         return ""
@@ -81,9 +88,9 @@ def toggle(node) -> str:
 
 
 def make_plain(node):
-    """A group of ordinary nodes, linked wherever the node is, that every Blender shows without the add-on.
+    """Link a group of plain nodes, which needs no add-on, in the node's place.
 
-    It shares the node's inner tree: a bake changes both.
+    The group shares the node's inner tree: a bake changes both.
     """
     tree = node.id_data
     plain = plain_of(node)
@@ -108,13 +115,21 @@ def remove_plain(node) -> None:
     node.plain_node = ""
 
 
+def _shines(surface) -> bool:
+    """True if an input emits light, or may emit it by nodes that only Cycles can evaluate."""
+    try:
+        return bool(ShadingPoints().value(InputSocket(surface, ())).any())
+    except NotSupportedError:
+        return True
+
+
 def _surface(tree):
     output = None if _is_group(tree) else tree.get_output_node("ALL")
     return output and output.inputs["Surface"]
 
 
 def is_in_group(node) -> bool:
-    """Whether the node is in a node group, and not in the tree of a material itself."""
+    """True if the node is in a node group, and not in the tree of a material itself."""
     return _is_group(node.id_data)
 
 
@@ -123,7 +138,7 @@ def _is_group(tree) -> bool:
 
 
 def _owner_name(tree) -> str:
-    return next((one.name for one in bpy.data.materials if one.node_tree == tree), tree.name)
+    return next((material.name for material in bpy.data.materials if material.node_tree == tree), tree.name)
 
 
 def _link(surface, node) -> None:
@@ -135,7 +150,7 @@ def _remember(node, link) -> None:
 
 
 def _same_input(source, target, name: str) -> None:
-    """Value and link of an input for another node's."""
+    """Copy the value and the link of an input to another node."""
     if name not in source.inputs or name not in target.inputs:
         return
     target.inputs[name].default_value = source.inputs[name].default_value

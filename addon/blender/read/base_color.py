@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...core.errors import NotSupportedError
+from ...core.errors import MissingImageError, NotSupportedError
 from ...core.scene.receiver import Receiver
-from .image_nodes import MISSING, Images, Pixels
+from .image_nodes import Images, Pixels
 from .nodes import Evaluator, InputSocket, Links, Source, converted, shows_bake
 from .shading import ON_NO_PATH, ShadingPoints
 from .visibility import ObjectInstance
@@ -68,19 +68,19 @@ def read_base_color(
 
 
 def is_understood(wanted: InputSocket, obj) -> bool:
-    """True if `read_base_color` understands all nodes; reads no pixels."""
+    """True unless only Cycles can evaluate the nodes; reads no pixels."""
     nowhere = _outputs(np.zeros((1, 1, 2)), np.zeros((1, 1, 3)), np.eye(4))
     try:
         _OnChart(nowhere, Images(_Unread()), _uv_map(obj)).value(wanted)
-    except NotSupportedError:
-        return False
+    except NotSupportedError as error:
+        return isinstance(error, MissingImageError)
     return True
 
 
 class _Unread(Pixels):
     @staticmethod
     def _read(_image) -> np.ndarray:
-        return MISSING[None, None]
+        return np.ones((1, 1, 4), np.float32)
 
 
 def _uv_map(obj) -> str:

@@ -57,7 +57,8 @@ class EmissiveMesh:
         self._images = materials.images
         self._parts: list[tuple[np.ndarray, np.ndarray]] = []
         self._matrices: list[np.ndarray] = []
-        self.reason = ""
+        self.reason: NotSupportedError | None = None
+        self.surface: InputSocket | None = None  # of the material that `reason` is about
         radiance = {index: materials.read(slot.material) for index, slot in enumerate(obj.material_slots)}
         radiance = {index: light for index, light in radiance.items() if light is not None}
         if radiance:
@@ -101,7 +102,7 @@ class EmissiveMesh:
             try:
                 self._parts.append(self._textured(light, corners[chosen], None if uvs is None else uvs[chosen]))
             except NotSupportedError as error:
-                self.reason = str(error)
+                self.reason, self.surface = error, light
 
     def _textured(self, surface, corners: np.ndarray, uvs: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         cuts = int(np.clip(np.ceil(np.sqrt(TEXTURED_TRIANGLES / len(corners))), 1, MAX_CUTS))

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
+import bpy
 import numpy as np
 
-from ...core.errors import NotSupportedError
+from ...core.errors import MissingImageError, NotSupportedError
 from .node_math import rotation_matrix
-from .nodes import Links, Source
+from .nodes import InputSocket, Links, Source
 
-MISSING = np.array([1.0, 0.0, 1.0, 1.0], np.float32)  # Cycles' color for an image that it can't load
 EXTENSIONS = {"REPEAT": "repeat", "EXTEND": "extend", "CLIP": "clip", "MIRROR": "mirror"}
 
 # Largest width of an environment, texels; wider ones are averaged down. A texel is then a tenth of a degree.
@@ -92,10 +93,17 @@ class Pixels:
     def __init__(self) -> None:
         self._known: dict[str, np.ndarray] = {}
 
-    def __call__(self, image) -> np.ndarray:
-        """Float32 (H, W, 4)."""
+    def __call__(self, node) -> np.ndarray:
+        """Pixels of a node's image, float32 (H, W, 4).
+
+        Raises
+        ------
+        MissingImageError
+            The node has no image, or its file can't be read.
+        """
+        image = node.image
         if image is None:
-            return MISSING[None, None]
+            raise MissingImageError(node=node.name)
         if image.source not in ("FILE", "GENERATED", "VIEWER"):
             raise NotSupportedError("image", image.name, "it is a sequence, a movie or tiled")
         if image.name_full not in self._known:
@@ -106,7 +114,7 @@ class Pixels:
     def _read(image) -> np.ndarray:
         values = np.empty(len(image.pixels), np.float32)
         if not len(values):
-            return MISSING[None, None]
+            raise MissingImageError(image.name)
         image.pixels.foreach_get(values)
         values = values.reshape(image.size[1], image.size[0], -1)
         if values.shape[2] == 4:
@@ -148,7 +156,23 @@ class Images:
             space = image.colorspace_settings
             if not (space.is_data or space.name == "sRGB" or space.name in ("Linear", "Linear Rec.709")):
                 raise NotSupportedError("image", image.name, f"its color space is {space.name}")
-        return self._pixels(image)
+        return self._pixels(node)
+
+
+def missing_images(links: Links, wanted: InputSocket) -> list[MissingImageError]:
+    """Errors for images that an input depends on and that no renderer can load, each once; reads no pixels."""
+    nodes = dict.fromkeys(source.node for source in links.readers(wanted) if source.socket.is_output)
+    textures = [node for node in nodes if node.bl_idname in ("ShaderNodeTexImage", "ShaderNodeTexEnvironment")]
+    missing = {node.image.name if node.image else node.name: node for node in textures if _is_missing(node.image)}
+    return [MissingImageError(node.image.name if node.image else "", node.name) for node in missing.values()]
+
+
+def _is_missing(image) -> bool:
+    if image is None:
+        return True
+    if image.source not in ("FILE", "MOVIE") or image.packed_file is not None or image.has_data:
+        return False
+    return not Path(bpy.path.abspath(image.filepath, library=image.library)).exists()
 
 
 def shrunk(pixels: np.ndarray) -> np.ndarray:

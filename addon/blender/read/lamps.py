@@ -68,19 +68,19 @@ def fault(light: Light) -> str:
     return light.fault()
 
 
-def read_lamp(obj, matrix) -> tuple[Light | None, str]:
-    """The light, None if it is dark, and the reason why its nodes are ignored if only Cycles can evaluate them."""
+def read_lamp(obj, matrix) -> tuple[Light | None, NotSupportedError | None]:
+    """The light, None if it is dark, and the reason why its nodes are ignored, if so."""
     data, axes = obj.data, np.array(matrix, dtype=float)
-    color, reason = np.array(compat.light_color(data)), ""
+    color, reason = np.array(compat.light_color(data)), None
     if data.use_nodes and data.node_tree is not None:
         surface = surface_of(data.node_tree)
         try:
             color = color * (0 if surface is None else ShadingPoints().value(surface))
         except NotSupportedError as error:
-            reason = str(error)
+            reason = error
     strength = compat.light_strength(data) * _area_factor(data, axes)
     if strength == 0 or not color.any():
-        return None, ""
+        return None, None
     common = obj.name, strength, tuple(color.tolist()), compat.light_casts_shadow(data)
     return READERS[data.type](data, axes, common), reason
 

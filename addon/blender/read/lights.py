@@ -7,13 +7,16 @@ from dataclasses import replace
 
 import bpy
 
+from ...core.errors import MissingImageError, NotSupportedError
 from ...core.messages import Message, Messages, warning
 from ...core.scene.illumination import Illumination
 from ...core.scene.lights import Light
 from .. import compat
 from .emitters import EmissiveMesh
 from .geometry import GEOMETRY_TYPES, OccluderReader
+from .image_nodes import missing_images
 from .lamps import fault, is_portal, read_lamp
+from .nodes import InputSocket, Links, surface_of
 from .scene_cache import SceneCache
 from .visibility import left_out, left_out_of_world, render_visible_names, renders, with_instanced
 from .world_light import read_world
@@ -96,7 +99,8 @@ class _Lights:
         light, reason = read_lamp(obj, matrix)
         links = links_of(obj, self._names)
         if reason:
-            self._leave_to_cycles(obj.name, f"The light '{obj.name}' is baked without its nodes. {reason}", links)
+            text = f"The light '{obj.name}' is baked without its nodes."
+            self._warn_of(obj.name, text, reason, surface_of(obj.data.node_tree), links)
         if light is not None:
             self._add(light, links)
 
@@ -111,8 +115,8 @@ class _Lights:
             self._emissive[key] = mesh = meshes[key].without_instances()
             self._links[obj.name] = links_of(obj, self._names)
             if mesh.reason:
-                text = f"The emission of '{obj.name}' is left out. {mesh.reason}"
-                self._leave_to_cycles(obj.name, text, self._links[obj.name])
+                text = f"The emission of '{obj.name}' is left out."
+                self._warn_of(obj.name, text, mesh.reason, mesh.surface, self._links[obj.name])
         self._emissive[key].add_instance(instance.matrix_world)
 
     def add_world(self, view_layer, world) -> None:
@@ -121,12 +125,20 @@ class _Lights:
             self._cache.world = key, read_world(view_layer, world, self._cache.emission.images)
         light, reason = self._cache.world[1]
         if reason:
-            self.by_cycles[world.name] = warning(world.name, f"The world '{world.name}' is left out. {reason}")
+            text = f"The world '{world.name}' is left out."
+            self._warn_of(world.name, text, reason, surface_of(world.node_tree), {})
         if light is not None:
             self._add(light, {})
 
-    def _leave_to_cycles(self, name: str, text: str, links: dict) -> None:
-        self.by_cycles[name] = warning(name, text)
+    def _warn_of(self, name: str, text: str, reason: NotSupportedError, surface: InputSocket, links: dict) -> None:
+        """Add a warning, and leave the light to Cycles if Cycles can evaluate its nodes."""
+        message = warning(name, f"{text} {reason.text}", reason.remedy)
+        if isinstance(reason, MissingImageError):
+            self.warn(message)
+            return
+        self.by_cycles[name] = message
+        for error in missing_images(Links(), surface):
+            self.warn(warning(name, f"{error.text} Cycles shows it in magenta, as light of '{name}'.", error.remedy))
         if links.get("receivers") is not None:
             self.receivers[name] = links["receivers"]
 

@@ -112,7 +112,7 @@ class TexelEvaluator(Evaluator):
 
     def _texture(self, source: Source) -> np.ndarray:
         node = source.node
-        stored, evaluate = self._pixels(node.image), color_of
+        stored, evaluate = self._pixels(node), color_of
         if source.socket.name == "Alpha":
             stored, evaluate = stored[..., 3:], alpha_of
         if stored.shape[:2] != (1, 1):

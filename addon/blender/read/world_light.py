@@ -17,19 +17,19 @@ WIDTH, HEIGHT = 1440, 720
 ROWS = 64
 
 
-def read_world(view_layer, world, images: Images) -> tuple[WorldLight | None, str]:
-    """Light of a world, None if there is none or it is dark, and the reason why only Cycles knows it, if so."""
+def read_world(view_layer, world, images: Images) -> tuple[WorldLight | None, NotSupportedError | None]:
+    """Light of a world, None if there is none or it is dark, and the reason why it is left out, if so."""
     if world is None or not view_layer.use_sky or not world.cycles_visibility.diffuse:
-        return None, ""
+        return None, None
     if not compat.uses_nodes(world):
-        return _even(world.name, np.array(world.color)), ""
+        return _even(world.name, np.array(world.color)), None
     surface = surface_of(world.node_tree)
     if surface is None:
-        return None, ""
+        return None, None
     try:
-        return _panorama(world.name, surface, images), ""
+        return _panorama(world.name, surface, images), None
     except NotSupportedError as error:
-        return None, str(error)
+        return None, error
 
 
 def _even(name: str, color: np.ndarray) -> WorldLight | None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ....core.bake.job import BakeJob, needs_medium
 from ....core.bake.surface import Surface
-from ....core.errors import BakeError, NotSupportedError, text_of
+from ....core.errors import BakeError, MissingImageError, NotSupportedError, text_of
 from ....core.material import RGB
 from ....core.messages import Message, warning
 from ....core.progress import Progress
@@ -74,6 +74,9 @@ def read_texture(node, groups: tuple, placed: ObjectInstance, receiver: Receiver
     """
     try:
         colors = read_base_color(InputSocket(node.inputs[BASE_COLOR], groups), placed, receiver)
+    except MissingImageError as error:
+        text = f"The Base Color of '{placed.obj.name}' is left out: the node's own color is used. {error.text}"
+        return BaseColor(blur=node.texture_blur, warnings=(warning(placed.obj.name, text, error.remedy),))
     except NotSupportedError as error:
         return BaseColor(blur=node.texture_blur, unknown=str(error))
     return BaseColor.of(colors, receiver, node.texture_blur, placed.obj.name)

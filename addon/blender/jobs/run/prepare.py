@@ -47,9 +47,11 @@ def read_scene(context, targets: list[Target], settings: BakeSettings, resolutio
         there is none.
     """
     depsgraph = context.evaluated_depsgraph_get()
-    for material in {bpy.data.materials[target.material_name] for target in targets}:
+    places = {material: find_node_in_groups(material) for material in bpy.data.materials}
+    # Also materials of other objects: their nodes must be known not to shine.
+    for material, (_, around) in ((material, place) for material, place in places.items() if place is not None):
         evaluated = material.evaluated_get(depsgraph).node_tree
-        groups = [group.node_tree for group in find_node_in_groups(material)[1]]
+        groups = [group.node_tree for group in around]
         # No more than needs it is tagged: views, and the material's icons, would start again.
         for tree, copy in [(material.node_tree, evaluated), *((one, one.evaluated_get(depsgraph)) for one in groups)]:
             if not all(map(_is_current, tree.nodes, copy.nodes)):

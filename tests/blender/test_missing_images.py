@@ -1,0 +1,183 @@
+"""Images that no renderer can load: Cycles shows them in magenta; bakes leave them out and name image and owner."""
+
+import json
+import subprocess
+
+import bpy
+import pytest
+from beamspread.blender.jobs.state import state
+from beamspread.blender.read.lights import read_illumination
+from scenes import add_lamp, add_material, add_mesh, add_plane, add_sun, bake, batch_command, node_of, save_scene
+
+SIZE = 16
+
+
+@pytest.fixture(autouse=True)
+def scene():
+    bpy.context.scene.beamspread.resolution = SIZE
+    bpy.context.scene.beamspread.use_indirect = False
+    state.forget()
+
+
+def missing(name="studio.hdr"):
+    """An image whose file is gone."""
+    image = bpy.data.images.new(name, 4, 4)
+    image.source, image.filepath = "FILE", f"/nowhere/{name}"
+    return image
+
+
+def tree_of(owner):
+    if bpy.app.version < (5, 0, 0):
+        owner.use_nodes = True
+    return owner.node_tree
+
+
+def texture(tree, image, kind="ShaderNodeTexImage"):
+    node = tree.nodes.new(kind)
+    node.image = image
+    return node.outputs["Color"]
+
+
+def add_world(image):
+    world = bpy.context.scene.world = bpy.data.worlds.new("Sky")
+    tree = tree_of(world)
+    background = next(node for node in tree.nodes if node.type == "BACKGROUND")
+    tree.links.new(background.inputs["Color"], texture(tree, image, "ShaderNodeTexEnvironment"))
+    return tree, background
+
+
+def add_panel(image):
+    """A mesh that emits an image."""
+    material = bpy.data.materials.new("Screen")
+    tree = tree_of(material)
+    emission = tree.nodes.new("ShaderNodeEmission")
+    tree.links.new(emission.inputs["Color"], texture(tree, image))
+    tree.links.new(tree.get_output_node("CYCLES").inputs["Surface"], emission.outputs[0])
+    panel = add_mesh("Panel", [(0, 0, 1), (1, 0, 1), (0, 1, 1)], [(0, 1, 2)])
+    panel.data.materials.append(material)
+    return panel
+
+
+def read():
+    return read_illumination(bpy.context.evaluated_depsgraph_get())
+
+
+def texts(illumination):
+    return [str(message) for message in illumination.messages]
+
+
+def test_the_world_is_left_out():
+    add_world(missing())
+    illumination = read()
+    assert (illumination.lights, illumination.by_cycles) == ((), {})
+    (text,) = texts(illumination)
+    assert "The world 'Sky' is left out. The image 'studio.hdr' is missing." in text
+    assert "Find Missing Files" in text
+
+
+def test_a_node_without_an_image_is_named():
+    add_world(None)
+    (text,) = texts(read())
+    assert "The world 'Sky' is left out. The node 'Environment Texture' has no image." in text
+
+
+def test_a_missing_image_that_is_not_used_changes_nothing():
+    tree, background = add_world(missing())
+    plain = tree.nodes.new("ShaderNodeBackground")
+    mix = tree.nodes.new("ShaderNodeMixShader")
+    mix.inputs[0].default_value = 1.0
+    for socket, node in zip(mix.inputs[1:], (background, plain)):
+        tree.links.new(socket, node.outputs[0])
+    tree.links.new(tree.get_output_node("CYCLES").inputs["Surface"], mix.outputs[0])
+    illumination = read()
+    assert len(illumination.lights) == 1
+    assert texts(illumination) == []
+
+
+def test_a_world_that_cycles_evaluates_says_that_its_image_is_magenta():
+    tree, background = add_world(missing())
+    mix = tree.nodes.new("ShaderNodeMixRGB")
+    for socket, output in zip(mix.inputs[1:], (tree.nodes.new("ShaderNodeTexNoise").outputs[1], background.inputs[0])):
+        tree.links.new(socket, output.links[0].from_socket if output.is_linked else output)
+    tree.links.new(background.inputs["Color"], mix.outputs[0])
+    illumination = read()
+    assert list(illumination.by_cycles) == ["Sky"]
+    expected = "The image 'studio.hdr' is missing. Cycles shows it in magenta, as light of 'Sky'."
+    assert any(expected in text for text in texts(illumination))
+
+
+def test_emission_is_left_out():
+    add_panel(missing("ad.png"))
+    illumination = read()
+    assert (illumination.lights, illumination.by_cycles) == ((), {})
+    (text,) = texts(illumination)
+    assert "The emission of 'Panel' is left out. The image 'ad.png' is missing." in text
+
+
+def test_a_lamp_shines_as_without_nodes():
+    lamp = add_lamp((0, 0, 1))
+    tree = tree_of(lamp.data)
+    emission = next(node for node in tree.nodes if node.type == "EMISSION")
+    tree.links.new(emission.inputs["Color"], texture(tree, missing("gobo.png")))
+    illumination = read()
+    assert (len(illumination.lights), illumination.by_cycles) == (1, {})
+    (text,) = texts(illumination)
+    assert "The light 'Lamp' is baked without its nodes. The image 'gobo.png' is missing." in text
+
+
+def test_transparency_is_left_out():
+    wall = add_mesh("Leaf", [(0, 0, 1), (1, 0, 1), (0, 1, 1)], [(0, 1, 2)])
+    material = bpy.data.materials.new("Leaf")
+    tree = tree_of(material)
+    principled = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image = missing("leaf.png")
+    tree.links.new(principled.inputs["Alpha"], node.outputs["Alpha"])
+    wall.data.materials.append(material)
+    (text,) = texts(read())
+    assert "The material 'Leaf' casts opaque shadows." in text
+    assert "The image 'leaf.png' is missing." in text
+
+
+def test_the_base_color_is_the_nodes_own():
+    add_sun(30)
+    material = add_material(color_mode="BASE_COLOR", base_color=(0.5, 0.6, 0.4))
+    plane = add_plane(material=material)
+    plain = bake(plane)[0].copy()
+    link = texture(material.node_tree, missing("tiles.png"))
+    material.node_tree.links.new(node_of(material).inputs["Base Color"], link)
+    assert bake(plane)[0] == pytest.approx(plain, rel=1e-5)
+    (message,) = state.lines()
+    assert "The Base Color of 'Plane' is left out: the node's own color is used." in str(message)
+    assert "The image 'tiles.png' is missing." in str(message)
+
+
+def test_bounced_light_of_other_materials_is_said_to_be_magenta():
+    bpy.context.scene.beamspread.use_indirect = True
+    add_sun(30)
+    add_world(missing())
+    wall = add_mesh("Wall", [(0.2, -1, 0), (0.2, 1, 0), (0.2, 1, 1), (0.2, -1, 1)], [(0, 1, 2, 3)])
+    material = bpy.data.materials.new("Bricks")
+    tree = tree_of(material)
+    principled = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    tree.links.new(principled.inputs["Base Color"], texture(tree, missing("bricks.png")))
+    wall.data.materials.append(material)
+    plane = add_plane(material=add_material(albedo=(0.9, 0.9, 0.9)))
+    found = bake(plane)[0]
+    said = " ".join(map(str, state.lines()))
+    assert "The image 'bricks.png' is missing. Light that bounces from the material 'Bricks' is magenta" in said
+    assert "The world 'Sky' is left out." in said
+    # The world's magenta would be as bright as the sun; that of the wall is dim beside the sun.
+    assert found[..., 1].mean() > 0.5 * found[..., 0].mean()
+
+
+def test_report_and_console_name_image_and_world(tmp_path):
+    add_sun(30)
+    add_world(missing())
+    add_plane(material=add_material())
+    scene, report = save_scene(tmp_path), tmp_path / "report.json"
+    arguments = ("--output", tmp_path, "--report", report, "--no-indirect", "--resolution", SIZE)
+    result = subprocess.run(batch_command(scene, *arguments), capture_output=True, text=True, check=True)
+    words = "The world 'Sky' is left out. The image 'studio.hdr' is missing."
+    assert words in json.loads(report.read_text())["bakes"][0]["message"]
+    assert words in result.stdout + result.stderr
