@@ -3,10 +3,12 @@
 import contextlib
 
 import bpy
+import numpy as np
 from bpy.app.handlers import persistent
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty, StringProperty
 
 from ...core.bake.surface import Surface
+from ...core.errors import MaterialError
 from ...core.material import Material, presets
 from ...core.messages import Message
 from .. import compat
@@ -21,6 +23,7 @@ from .tree import (
     add_missing_inputs,
     is_inner_tree,
     make_inner_tree,
+    show_image,
     show_values,
 )
 
@@ -72,11 +75,21 @@ def _edited(node, _context) -> None:
     """Take the preset's name away, since a value differs from it."""
     if node.as_pointer() not in _nodes_being_filled and node.preset != CUSTOM_PRESET:
         node.preset = CUSTOM_PRESET
+    _color_edited(node, _context)
 
 
 def _ior_edited(node, context) -> None:
     _edited(node, context)
     _show(node, context)
+
+
+def _color_edited(node, _context) -> None:
+    """Show the color of the node if it has no image yet."""
+    if node.image is not None or BASE_COLOR not in node.inputs:
+        return
+    color = np.array((*node.visible_color(), 1.0), np.float32)
+    if not np.array_equal(node.inputs[BASE_COLOR].default_value, color):
+        node.inputs[BASE_COLOR].default_value = color
 
 
 def _show(node, _context) -> None:
@@ -97,6 +110,7 @@ def _show(node, _context) -> None:
             plain.node_tree = tree
     _upgrade(tree)
     show_values(tree, node.image, node.ior)
+    _color_edited(node, _context)
 
 
 def _is_shared(tree, plain=None) -> bool:
@@ -150,6 +164,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         default=(0.6, 0.6, 0.6),
         soft_min=0.0,
         soft_max=1.0,
+        update=_color_edited,
     )
     albedo: FloatVectorProperty(
         name="Scattering Albedo",
@@ -199,6 +214,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         soft_min=0.0,
         soft_max=10.0,
         precision=5,
+        update=_color_edited,
     )
     image: PointerProperty(
         name="Image",
@@ -239,6 +255,14 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         base_color = tuple(map(_decimal, self.base_color)) if self.color_mode == "BASE_COLOR" else None
         return Surface(material, _decimal(self.thickness), base_color)
 
+    def visible_color(self) -> list[float]:
+        """Color in white, uniform light, 0 to 1; the base color if the values are out of range."""
+        try:
+            color = self.surface().reflectance()
+        except (MaterialError, ImportError):  # the module may be missing
+            color = self.base_color
+        return [min(max(channel, 0.0), 1.0) for channel in color]
+
     def has_texture(self) -> bool:
         """True if the base color comes from a link, and not from the node's own base color or albedo."""
         return BASE_COLOR in self.inputs and self.inputs[BASE_COLOR].is_linked
@@ -263,11 +287,11 @@ def all_nodes():
 
 @persistent
 def show_own_images(*_arguments) -> None:
-    """Have trees show the images of their nodes: undo, and what Blender saves by itself, bring back Live's own."""
+    """Have trees show the images of their nodes: undo, and files saved by Blender itself, restore Live's images."""
     for node in all_nodes():
         tree = node.node_tree
-        if tree is not None and tree.library is None and IMAGE in tree.nodes and tree.nodes[IMAGE].image != node.image:
-            show_values(tree, node.image, node.ior)
+        if tree is not None and tree.library is None and IMAGE in tree.nodes:
+            show_image(tree, node.image)
 
 
 @persistent
@@ -275,6 +299,9 @@ def upgrade_nodes(*_arguments) -> None:
     """Give nodes of older files the inputs that they have today; links and values stay."""
     for tree in {node.node_tree for node in all_nodes()} - {None}:
         _upgrade(tree)
+    for node in all_nodes():
+        if node.id_data.library is None:
+            _color_edited(node, None)
 
 
 @persistent

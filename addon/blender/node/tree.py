@@ -3,12 +3,14 @@
 import bpy
 
 from .. import compat
+from ..read.nodes import INNER_TREE
 
-NAME = ".Beamspread"
+NAME = INNER_TREE
 BASE_COLOR, ROUGHNESS, NORMAL = "Base Color", "Roughness", "Normal"
 IMAGE, FRESNEL, COAT, GLOSSY = "Image", "Fresnel", "Coat", "Glossy"
 FACING = "Facing"
-INPUT, EMISSION, UNSEEN = "Input", "Emission", "Unseen"
+INPUT, EMISSION, UNSEEN, TOTAL, OUTPUT = "Input", "Emission", "Unseen", "Total", "Output"
+BAKED = "Is Baked"
 
 # Of the coat where no input has changed it; older trees have it in their Glossy node.
 ROUGHNESS_BEFORE = 0.1
@@ -17,7 +19,8 @@ ROUGHNESS_BEFORE = 0.1
 def make_inner_tree() -> bpy.types.ShaderNodeTree:
     """Image -> Color; image as emission, with a Fresnel-weighted glossy coat added -> BSDF.
 
-    The image already is what leaves the surface, so the coat adds to it and takes nothing away.
+    The image already holds the light that leaves the surface, so the coat adds to it and takes nothing away. Without an
+    image, the base color of a diffuse surface replaces the emission, and Color is black.
     """
     # The dot hides it in menus. A Blender without this add-on drops a tree that has no fake user when it saves.
     tree = bpy.data.node_groups.new(NAME, "ShaderNodeTree")
@@ -32,8 +35,8 @@ def make_inner_tree() -> bpy.types.ShaderNodeTree:
     glossy = _add(tree, "ShaderNodeBsdfGlossy", GLOSSY, (-200, -300))
     glossy.inputs["Roughness"].default_value = ROUGHNESS_BEFORE
     emission = _add(tree, "ShaderNodeEmission", EMISSION, (-200, 0))
-    total = _add(tree, "ShaderNodeAddShader", "Total", (0, -100))
-    output = _add(tree, "NodeGroupOutput", "Output", (200, 0))
+    total = _add(tree, "ShaderNodeAddShader", TOTAL, (0, -100))
+    output = _add(tree, "NodeGroupOutput", OUTPUT, (200, 0))
     link = tree.links.new
     link(output.inputs["Color"], image.outputs["Color"])
     link(emission.inputs["Color"], image.outputs["Color"])
@@ -59,6 +62,8 @@ def add_missing_inputs(tree) -> bool:
         _add_inputs(tree)
     if UNSEEN not in tree.nodes and {INPUT, IMAGE, EMISSION} <= set(tree.nodes.keys()):
         _use_base_color(tree)
+    if BAKED not in tree.nodes and {INPUT, IMAGE, EMISSION, TOTAL, OUTPUT} <= set(tree.nodes.keys()):
+        _show_unbaked(tree)
     return lacks_inputs
 
 
@@ -87,6 +92,26 @@ def _use_base_color(tree) -> None:
     link(tree.nodes[EMISSION].inputs["Color"], total.outputs[0])
 
 
+def _show_unbaked(tree) -> None:
+    """Switch between the bake and a diffuse surface of the base color; an image node without image is magenta."""
+    baked = _add(tree, "ShaderNodeValue", BAKED, (-600, 450))
+    diffuse = _add(tree, "ShaderNodeBsdfDiffuse", "Diffuse", (-400, 350))
+    surface = _add(tree, "ShaderNodeMixShader", "Surface", (-200, 200))
+    color = _add(tree, "ShaderNodeVectorMath", "Baked Color", (0, 100))
+    color.operation = "MULTIPLY"
+    link = tree.links.new
+    link(diffuse.inputs["Color"], tree.nodes[INPUT].outputs[BASE_COLOR])
+    link(diffuse.inputs["Normal"], tree.nodes[GLOSSY].inputs["Normal"].links[0].from_socket)
+    link(surface.inputs[0], baked.outputs[0])
+    link(surface.inputs[1], diffuse.outputs[0])
+    link(surface.inputs[2], tree.nodes[EMISSION].outputs[0])
+    link(tree.nodes[TOTAL].inputs[0], surface.outputs[0])
+    link(color.inputs[0], tree.nodes[IMAGE].outputs["Color"])
+    link(color.inputs[1], baked.outputs[0])
+    link(tree.nodes[OUTPUT].inputs["Color"], color.outputs[0])
+    show_image(tree, tree.nodes[IMAGE].image)
+
+
 def _normal_or_plain(tree, given):
     """The given normal, or the surface's own where nothing is linked: a group's input is the null vector then."""
     link = tree.links.new
@@ -110,10 +135,20 @@ def _normal_or_plain(tree, given):
 
 def show_values(tree, image, ior: float) -> None:
     """Bring an image and an index of refraction into the tree."""
-    tree.nodes[IMAGE].image = image
+    show_image(tree, image)
     tree.nodes[FRESNEL].inputs["IOR"].default_value = max(ior, 1.0)
     # Without a step in refraction there is no coat, whatever the renderer's Fresnel node says at grazing angles.
     tree.nodes[COAT].inputs[1].default_value = 1.0 if ior > 1 else 0.0
+
+
+def show_image(tree, image) -> None:
+    """Show an image in the tree, or the base color without one."""
+    if tree.nodes[IMAGE].image != image:
+        tree.nodes[IMAGE].image = image
+    baked = tree.nodes[BAKED].outputs[0] if BAKED in tree.nodes else None
+    is_baked = float(image is not None)
+    if baked is not None and baked.default_value != is_baked:
+        baked.default_value = is_baked
 
 
 def follow_frames(tree, first: int, last: int) -> None:
