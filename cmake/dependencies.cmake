@@ -8,8 +8,8 @@ foreach(file CMakeLists.txt patch_embree.cmake)
   string(APPEND recipe "${text}")
 endforeach()
 get_property(archives GLOBAL PROPERTY beamspread_archives)
-string(SHA256 key "${recipe} ${archives} ${CMAKE_CXX_COMPILER_ID} ${CMAKE_CXX_COMPILER_VERSION}
-${CMAKE_SYSTEM_PROCESSOR}") string(SUBSTRING ${key} 0 12 key)
+string(SHA256 key "${recipe} ${archives} ${CMAKE_CXX_COMPILER_ID} ${CMAKE_CXX_COMPILER_VERSION} ${CMAKE_SYSTEM_PROCESSOR}")
+string(SUBSTRING ${key} 0 12 key)
 set(BEAMSPREAD_DEPENDENCIES ${BEAMSPREAD_DEPENDENCIES_DIR}/${key})
 # Several folders may build at the same time.
 file(LOCK ${BEAMSPREAD_DEPENDENCIES_DIR}/lock GUARD FILE)
@@ -19,11 +19,9 @@ if(NOT EXISTS ${BEAMSPREAD_DEPENDENCIES}/.complete)
   file(REMOVE_RECURSE ${BEAMSPREAD_DEPENDENCIES})
   execute_process(COMMAND ${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR}/dependencies -B ${build} -G Ninja
                           -DCMAKE_INSTALL_PREFIX=${BEAMSPREAD_DEPENDENCIES} -DCMAKE_C_COMPILER=${CMAKE_C_COMPILER}
-                          -DCMAKE_CXX_COMPILER=${CMAKE_CXX_COMPILER}
-                          -DCMAKE_C_COMPILER_LAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER}
-                          -DCMAKE_CXX_COMPILER_LAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER}
-                          -DPython_EXECUTABLE=${Python_EXECUTABLE} -DBEAMSPREAD_ARCHIVES_DIR=${BEAMSPREAD_ARCHIVES_DIR}
-                          OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+                          -DCMAKE_CXX_COMPILER=${CMAKE_CXX_COMPILER} -DCMAKE_C_COMPILER_LAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER}
+                          -DCMAKE_CXX_COMPILER_LAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER} -DPython_EXECUTABLE=${Python_EXECUTABLE}
+                          -DBEAMSPREAD_ARCHIVES_DIR=${BEAMSPREAD_ARCHIVES_DIR} OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
   execute_process(COMMAND ${CMAKE_COMMAND} --build ${build} COMMAND_ERROR_IS_FATAL ANY)
   file(REMOVE_RECURSE ${build})
   file(TOUCH ${BEAMSPREAD_DEPENDENCIES}/.complete)

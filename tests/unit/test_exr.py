@@ -127,7 +127,7 @@ def test_a_text_is_told_by_the_header(tmp_path):
 
 
 def test_a_negative_attribute_size_ends_the_reading(tmp_path):
-    """These 18 bytes lead a reader that trusts the size back to the attribute's start, without end."""
+    """A reader that trusts the size returns to the start of the attribute without end: 18 bytes are enough."""
     path = tmp_path / "a.exr"
     path.write_bytes(struct.pack("<ii", MAGIC, 2) + b"a\0b\0" + struct.pack("<i", -8) + b"xx")
     assert not is_half(path)
