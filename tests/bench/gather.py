@@ -58,7 +58,7 @@ def seconds(grid, light, occluders, find_shadows):
     return min(times)
 
 
-EXTENDED = {
+SIZED = {
     "sun of .1": native.SunLight((0.3, 0.2, -1), 0.1),
     "sphere": native.PointLight((0.3, 0.2, 1.5), 0.2, "sphere"),
     "area": native.AreaLight((0.3, 0.2, 1.5), np.eye(3), 0.6, 0.4),
@@ -70,12 +70,12 @@ EXTENDED = {
 
 def print_ray_rates(grid, rays=16):
     """Million rays per second and core for lights with a size, without the time to build occluders."""
-    print(f"{'10^6 rays/CPU s':23}" + "".join(f"{name:>10}" for name in EXTENDED))
+    print(f"{'10^6 rays/CPU s':23}" + "".join(f"{name:>10}" for name in SIZED))
     for name, vertices in SCENES.items():
         triangles = None if vertices is None else np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)
         occluders = None if vertices is None else native.Occluders([native.OccluderMesh(vertices, triangles)])
         row = f"{name:23}"
-        for light in EXTENDED.values():
+        for light in SIZED.values():
             start = time.process_time()
             native.gather_rays(grid, light, occluders, rays=rays)
             row += f"{512 * 512 * rays / (time.process_time() - start) / 1e6:10.2f}"

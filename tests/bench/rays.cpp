@@ -118,26 +118,26 @@ std::vector<RTCRay> rays_to(const Light& light, const ReceiverGrid& grid)
     std::vector<RTCRay> result;
     std::vector<Vec2> square(rays);
     std::vector<Vec3> points(rays);
-    std::vector<LightRay> found(rays);
+    std::vector<LightRay> towards(rays);
     for (std::size_t y = 0; y < side; ++y) {
         for (std::size_t x = 0; x < side; ++x) {
             for (Vec2& place : square)
                 place = {random.uniform(), random.uniform()};
             const Vec3 point = grid.point(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5);
             std::ranges::fill(points, point);
-            light.sample(points, grid.normal, square, found.data());
-            for (const LightRay& ray : found) {
-                RTCRay one{};
-                one.org_x = static_cast<float>(point.x);
-                one.org_y = static_cast<float>(point.y);
-                one.org_z = 1e-5f;
-                one.dir_x = static_cast<float>(-ray.travel.x);
-                one.dir_y = static_cast<float>(-ray.travel.y);
-                one.dir_z = static_cast<float>(-ray.travel.z);
-                one.tnear = 0.0f;
-                one.tfar = static_cast<float>(ray.distance);
-                one.mask = ~0u;
-                result.push_back(one);
+            light.sample(points, grid.normal, square, towards.data());
+            for (const LightRay& ray : towards) {
+                RTCRay packed{};
+                packed.org_x = static_cast<float>(point.x);
+                packed.org_y = static_cast<float>(point.y);
+                packed.org_z = 1e-5f;
+                packed.dir_x = static_cast<float>(-ray.travel.x);
+                packed.dir_y = static_cast<float>(-ray.travel.y);
+                packed.dir_z = static_cast<float>(-ray.travel.z);
+                packed.tnear = 0.0f;
+                packed.tfar = static_cast<float>(ray.distance);
+                packed.mask = ~0u;
+                result.push_back(packed);
             }
         }
     }

@@ -130,7 +130,7 @@ def test_errors_of_neighbours_cancel(name):
 
 
 def test_light_and_transmission_are_of_each_channel():
-    """What a colored sky gives below a card is what it gives in each channel alone, within the noise of 1024 rays."""
+    """A colored sky gives the same light below a card as its channels alone, within the noise of 1024 rays."""
     grid, occluders = make_grid(8), card()
     whole = native.gather_rays(grid, LIGHTS["environment"], occluders, rays=1024)[0]
     for channel in range(3):
@@ -140,7 +140,7 @@ def test_light_and_transmission_are_of_each_channel():
     assert LIGHTS["environment"].is_colored
 
 
-def test_sky_below_a_card_is_what_it_leaves():
+def test_a_card_takes_its_form_factor_of_an_even_sky():
     """An even sky less the form factor of the card (Lambert), which the card as a lamp measures."""
     grid = make_grid(16)
     sky = native.EnvironmentLight(np.ones((1, 1, 3), np.float32), FRAME)
@@ -189,7 +189,7 @@ def test_bad_arguments_are_named(name, value):
         native.gather_rays(make_grid(), LIGHTS["sun"], **{name: value})
 
 
-def test_a_first_look_keeps_light_and_spares_rays():
+def test_a_first_pass_keeps_light_and_spares_rays():
     """Rays of all texels against those of shadows' borders alone: in the open both are exact, in all within noise."""
     light, grid, occluders = LIGHTS["sphere"], make_grid(96), card()
     whole, _ = native.gather_rays(grid, light, occluders, rays=256)
@@ -200,6 +200,6 @@ def test_a_first_look_keeps_light_and_spares_rays():
     is_open = np.isclose(whole, bare, rtol=1e-5)
     assert 0.5 < is_open.mean() < 0.95
     np.testing.assert_allclose(spared[0][is_open], bare[is_open], rtol=1e-4)
-    # In the penumbra a texel's noise is below 1e-2; what 72 rays of a texel and its neighbours miss is as little.
+    # A texel in the penumbra has noise below 1e-2; 72 rays of a texel and its neighbors miss as little light.
     assert spared[0].sum() == pytest.approx(whole.sum(), rel=5e-4)
     assert np.abs(spared[0] - whole).max() < 0.04 * bare.max()

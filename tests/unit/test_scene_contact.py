@@ -85,7 +85,7 @@ EVERY_TURN = pytest.mark.parametrize("turn", TURNS)
 @EVERY_TURN
 @pytest.mark.parametrize("bottom", [0.0, -0.2, 1e-9, -1e-9])
 def test_a_box_on_the_floor(bottom, turn, shift):
-    """Standing on it, sunk, or off by less than what rounding can tell: dark under the box and in its shadow, else lit.
+    """The box stands on the floor, is sunk, or off by less than rounding: only its bottom and its shadow are dark.
 
     The box covers texels 30 to 49, and its shadow reaches .4 m further, 16 texels: 30 to 65.
     """
@@ -126,7 +126,7 @@ def test_a_sphere_half_sunk(sun, is_instanced, turn, shift):
     lit = light_past((0.5 * vertices, triangles), sun=sun, turn=turn, shift=shift, is_instanced=is_instanced)
     x, y = middles()
     distance = np.hypot(x, y)
-    # The polygon's corners and a texel's own; a lamp 3 m up sees what lies beyond by .5 / sqrt(1 - (.5 / 3)^2) - .5.
+    # The polygon's corners and a texel's own; a lamp 3 m up sees .5 / sqrt(1 - (.5 / 3)^2) - .5 beyond.
     edge = 0.5 * math.cos(math.pi / 48) - 0.75 * TEXEL
     assert not lit[distance < edge].any()
     assert (lit[distance > 0.5 / math.sqrt(1 - (0.5 / 3) ** 2) + 0.06] == 1).all()

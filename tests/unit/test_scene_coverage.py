@@ -6,12 +6,12 @@ from beamspread.core.native import native
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-# Texels. An edge that enters a texel by less adds less than half of what coverage counts in, 2^-31: nothing.
+# Depth, in texels, below which an edge that enters a texel adds nothing: less than half of coverage's unit, 2^-31.
 ENTERED = 3e-10
 
 
 def area(polygon):
-    """Signed, by the shoelace formula."""
+    """Signed area by the shoelace formula."""
     x, y = np.asarray(polygon).T if len(polygon) else np.zeros((2, 0))
     return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 

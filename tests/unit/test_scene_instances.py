@@ -1,4 +1,4 @@
-"""Meshes that stand in many places: instances against copied triangles, at the scene's origin and far from it."""
+"""Instances against copied triangles, at the scene's origin and far from it."""
 
 import math
 import time
@@ -72,7 +72,7 @@ def test_instances_shade_as_copies_do(seed, stretch, kind, far, is_sun):
     transmittances, numbers = see_through(kind)
     materials = None if numbers is None else rng.choice(numbers, (len(triangles), 1)).astype(np.uint32)
     places = placements(rng, 12, stretch, shift)
-    # The mesh lies off its own origin: what counts is where its placement puts it.
+    # The mesh lies off its own origin; its placement compensates.
     off = places.reshape(-1, 3, 4).copy()
     off[:, :, 3] -= off[:, :, :3] @ (5, 3, -4)
     mesh = native.OccluderMesh(vertices + (5, 3, -4), triangles, off.reshape(-1, 12), transmittances, materials, uvs)
@@ -98,7 +98,7 @@ def test_instances_shade_as_copies_do(seed, stretch, kind, far, is_sun):
     size=st.sampled_from([0.3, 1.0, 6.0]),
 )
 def test_boxes_of_instances_hide_no_shadow(seed, far, lamp, kind, size):
-    """Also where the lamp or the whole receiver is within an instance's box."""
+    """The lamp or the whole receiver may lie within an instance's box."""
     rng = np.random.default_rng(seed)
     shift = far * np.array([0.6, -0.64, 0.48])
     vertices, triangles, uvs = sphere(6)
@@ -136,7 +136,7 @@ def test_an_instanced_receiver_does_not_shadow_itself(seed, far, angle, stretch,
     linear = axes.T * (size, size / stretch, 0.7 * size)
     places = [np.column_stack([linear, centre]), np.column_stack([linear, centre - 5 * size * axes[2]])]
     mesh = native.OccluderMesh(vertices, triangles, np.reshape(places, (2, 12)))
-    # As the add-on does: an origin near the receiver, not at it.
+    # The add-on has an origin near the receiver, too, not at it.
     middle = centre + linear @ (*rng.uniform(-0.5, 0.5, 2), 0) * (size > 1)
     occluders = native.Occluders([mesh], np.round(middle / 8) * 8, max_copied=0)
     assert occluders.instance_count == 2

@@ -1,4 +1,4 @@
-"""What occluders accept and refuse."""
+"""Occluders accept valid arguments and reject others."""
 
 import math
 

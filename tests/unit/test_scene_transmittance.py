@@ -58,7 +58,7 @@ def test_color_gives_three_channels():
     np.testing.assert_allclose(lit, np.broadcast_to(np.float32(red) * np.float32(blue), lit.shape), rtol=3e-7)
 
 
-def test_the_direction_is_weighed_by_what_arrives():
+def test_the_direction_is_weighed_by_irradiance():
     """A lamp past a card that dims one half: the mean direction of the texels below its border leans to the other."""
     lamp = native.PointLight((0.0, 0.0, 2.0))
     half = SQUARE * (0.5, 1, 0) - (0.5, 0, -1e-3)
@@ -66,7 +66,7 @@ def test_the_direction_is_weighed_by_what_arrives():
     wide = grid(1, 1)
     plain = gather_beams(wide, lamp, None, 8)
     dimmed = gather_beams(wide, lamp, native.Occluders([one]), 8)
-    # Half of the rays, mirror images of the others, at a quarter.
+    # The mirror images of the other rays keep a quarter of their light.
     np.testing.assert_allclose(dimmed[0], plain[0] * 0.625, rtol=1e-6)
     j, i = np.divmod(np.arange(64), 8)  # see beams.cpp
     x, y = (i + (j + 0.5) / 8) / 4 - 1, (j + (i + 0.5) / 8) / 4 - 1
@@ -115,7 +115,7 @@ def test_an_image_is_looked_up_bilinearly_by_uv(channels):
     texels = rng.random((5, 4, channels), np.float32)
     size = 32
     lit = light_past([card(image(texels), uvs=UVS)], samples=1, on=grid(size, size))
-    # As Cycles: texel (i, j) holds for u = (i + 1/2) / width; one ray from each texel's middle. Repeated.
+    # Texel (i, j) holds for u = (i + 1/2) / width, as in Cycles, and repeats; one ray starts at each texel's middle.
     place = (np.arange(size) + 0.5) / size
     x, y = place * 4 - 0.5, place * 5 - 0.5
     i, j = np.floor(x).astype(int), np.floor(y).astype(int)
@@ -206,18 +206,18 @@ def test_a_ray_ends_after_so_many_crossings():
     assert not light_past(cards, max_crossings=4).any()
 
 
-def test_what_occluders_say_of_themselves():
-    def said(*transmittances):
-        occluders = native.Occluders([card(one) for one in transmittances])
+def test_occluders_know_whether_they_are_opaque_and_colored():
+    def facts(*transmittances):
+        occluders = native.Occluders([card(transmittance) for transmittance in transmittances])
         return occluders.is_opaque, occluders.is_colored
 
     opaque, clear = native.Transmittance((0, 0, 0)), native.Transmittance((1, 1, 1))
     assert opaque.is_opaque
     assert clear.is_clear
-    assert said(opaque) == said(clear) == said(opaque, clear) == (True, False)
-    assert said(opaque, image(np.full((2, 2), 0.5))) == (False, False)
-    assert said(native.Transmittance((0.5, 0.5, 0.4))) == (False, True)
-    assert said(image(np.full((2, 2), 0.5), extension="clip", outside=(1, 0, 0))) == (False, True)
+    assert facts(opaque) == facts(clear) == facts(opaque, clear) == (True, False)
+    assert facts(opaque, image(np.full((2, 2), 0.5))) == (False, False)
+    assert facts(native.Transmittance((0.5, 0.5, 0.4))) == (False, True)
+    assert facts(image(np.full((2, 2), 0.5), extension="clip", outside=(1, 0, 0))) == (False, True)
     assert (light_past([card(clear)]) == 1).all()
 
 

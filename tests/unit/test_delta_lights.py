@@ -1,4 +1,4 @@
-"""Beams against an independent ray caster in numpy, and against what follows from geometry alone."""
+"""Lamps without a size against a ray caster in numpy, and against geometry."""
 
 import math
 
@@ -163,7 +163,7 @@ def test_texels_that_need_no_rays_are_as_if_traced(
     axes, centre, rng = rotation(seed), far * np.array([30.0, -20.0, 10.0]), np.random.default_rng(seed)
     origin = (0, 0, 0) if at_origin else centre
     grid = make_grid(width=150, height=110, axes=axes, centre=centre)
-    # Also through the plane, behind it, and beyond the lamp.
+    # Some triangles cut the plane, lie behind it, or beyond the lamp.
     middle = rng.uniform([-1.5, -1.2, -0.3], [1.5, 1.2, 1.5], (count, 1, 3))
     local = (middle + rng.normal(0, size, (count, 3, 3))).reshape(-1, 3)
     # Rounded by more than the grid's own triangles: its shadow's border is known less well.
@@ -222,7 +222,7 @@ def test_lamps_know_their_place_in_the_plane(seed, mirrored):
 
 
 def spot_falloff(travel, frame, size, blend, falloff):
-    """As Cycles of Blender 3.4 ("legacy") and 4.2 to 5.0 ("scaled")."""
+    """Falloff of Cycles in Blender 3.4 ("legacy") and in 4.2 to 5.0 ("scaled")."""
     frame = np.asarray(frame, float)
     if falloff == "legacy":
         cosine = -travel @ (frame[2] / np.linalg.norm(frame[2]))
@@ -342,7 +342,7 @@ def box(low, high):
 
 
 @pytest.mark.parametrize("bottom", [0.0, -0.1])
-def test_no_light_leaks_under_what_stands_on_the_plane(bottom):
+def test_no_light_leaks_under_a_box_on_the_plane(bottom):
     grid = make_grid(40, 40, (2, 2))
     occluders = native.Occluders([native.OccluderMesh(*box((-0.5, -0.5, bottom), (0.5, 0.5, 0.4)))])
     lit, _ = gather(grid, native.SunLight((1, 0, -0.5)), occluders, samples=4)

@@ -1,4 +1,4 @@
-"""Lights of a size against closed forms and brute force in numpy."""
+"""Each kind of light against closed forms and brute force in numpy."""
 
 import math
 
@@ -140,7 +140,7 @@ def test_disk_above_its_centre(height):
 
 @pytest.mark.parametrize("radius", [0.0, 0.2, 0.99])
 def test_sphere_is_a_point_at_its_centre(radius):
-    """Where all of it is above the plane; the disk that faces the point is weaker by d^2 / (d^2 + r^2)."""
+    """The whole ball is above the plane. The disk that faces the point is weaker by d^2 / (d^2 + r^2)."""
     position = np.array([0.6, 0.0, 1.0])
     distance, cosine = np.linalg.norm(position), position[2] / np.linalg.norm(position)
     sphere = native.PointLight(position, radius, "sphere").irradiance((0, 0, 0), UP)[0]
@@ -182,7 +182,7 @@ def test_flat_sun_is_weaker_by_its_mean_cosine():
 
 
 def environment_radiance(image, to_world):
-    """Of directions in the world, by the nearest pixel."""
+    """Radiance of world directions, by the nearest pixel."""
     height, width = image.shape[:2]
 
     def radiance(directions):
@@ -271,7 +271,7 @@ def test_parallel_light_of_an_area():
 
 
 def test_spread_keeps_the_power():
-    """What a lamp sends through a large plane in front of it: E over the plane adds up to 1 W times pi / 4."""
+    """Irradiance over a large plane in front of a lamp adds up to 1 W times pi / 4."""
     steps = 240
     for spread in (1.0, 0.4):
         light = native.AreaLight((0, 0, 1), FRAME, 0.6, 0.4, True, spread)
