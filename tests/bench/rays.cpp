@@ -192,12 +192,13 @@ void compare(const char* name, const Light& light, const Shapes& shapes, const T
     Progress progress;
     const double gathering = seconds_of([&] { gather_rays(grid, light, &occluders, settings, count, progress); });
     const std::vector<RTCRay> work = rays_to(prepared, grid);
-    const auto millions = [](std::size_t number, double seconds) { return 1e-6 * static_cast<double>(number) / seconds;
-    }; const double traced = millions(work.size(), gathering);
+    const auto millions = [](std::size_t number, double seconds) { return 1e-6 * static_cast<double>(number) / seconds; };
+    const double traced = millions(work.size(), gathering);
     const double single = millions(work.size(), alone(tracer, work));
     const double together = millions(work.size(), in_packets(tracer, work));
-    std::printf("%-10s gathered %.1f million rays per CPU second (%zu of %zu added); Embree alone %.1f, in packets %.1f:
-    %.0f %%\n", name, traced, count.rays(), work.size(), single, together, 100.0 * traced / std::max(single, together));
+    std::printf("%-10s gathered %.1f million rays per CPU second (%zu of %zu added); Embree alone %.1f, in packets %.1f: "
+                "%.0f %%\n",
+                name, traced, count.rays(), work.size(), single, together, 100.0 * traced / std::max(single, together));
 }
 
 }  // namespace
