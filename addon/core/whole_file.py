@@ -16,8 +16,8 @@ try:
 except ImportError:  # Windows: temporary files of killed processes stay
     fcntl = None
 
-_TEMPORARY = re.compile(r".+\.beamspread-[0-9a-f]{8}\.tmp(\.\w+)?")
-"""Names of temporary files. A running process holds a lock on each of its own."""
+_TEMPORARY = re.compile(r".+\.beamspread-[0-9a-f]{8}\.tmp(\..+)?")
+"""Names of temporary files, and of those that the native module writes beside them. Running processes lock theirs."""
 
 _SPARE_BYTES = 1 << 14
 """Room that a disk must have left after a file is written. Blender and other writers ignore errors of a full disk."""

@@ -73,6 +73,15 @@ def test_a_leftover_of_a_killed_process_is_removed_by_the_next_write(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["other.exr"]
 
 
+def test_a_leftover_of_the_native_module_is_removed(tmp_path):
+    leftover = killed(tmp_path / "light.exr")
+    nested = leftover.with_name(f"{leftover.name}.1234-0.tmp")
+    nested.write_text("half")
+    aged(nested)
+    write(tmp_path / "other.exr")
+    assert [path.name for path in tmp_path.iterdir()] == ["other.exr"]
+
+
 def test_temporary_files_in_use_and_foreign_files_stay(tmp_path):
     process, in_use = start_writer(tmp_path / "light.exr", "time.sleep(60)")
     try:

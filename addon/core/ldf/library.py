@@ -11,6 +11,7 @@ from pathlib import Path
 from ..native import native
 from ..progress import Progress, say
 from ..recent import keep_recent
+from ..whole_file import whole_file
 
 PHOTONS = {"preview": 80_000, "final": 4_000_000}
 """Photons per angle for a medium with g .8 and ior 1. More: less noise, more time; see `photons_for`."""
@@ -126,15 +127,17 @@ def _store(result: native.LdfLibrary, path: Path) -> None:
     """Save a library to the cache; a full or read-only disk must not fail the bake."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        result.save(path)
+        with whole_file(path) as temporary:
+            result.save(temporary)
     except OSError:
         pass
 
 
 def cached_files() -> list[Path]:
-    """Files of cached libraries. Other files in the folder belong to others."""
+    """Files of cached libraries. Other files in the folder belong to others, and temporary ones to `whole_file`."""
     try:
-        return sorted(path for path in cache_folder().glob("g*_ior*_thickness*_*.exr") if path.is_file())
+        paths = cache_folder().glob("g*_ior*_thickness*_*.exr")
+        return sorted(path for path in paths if path.is_file() and ".tmp." not in path.name)
     except OSError:
         return []
 
