@@ -180,8 +180,8 @@ double in_packets(const Tracer& tracer, const std::vector<RTCRay>& work)
 
 void compare(const char* name, const Light& light, const Shapes& shapes, const Tracer& tracer)
 {
-    const ReceiverGrid grid{{-2.0, -2.0, 0.0}, {1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}, 4.0 / side, 4.0 /
-    side, side, side};
+    const ReceiverGrid grid{{-2.0, -2.0, 0.0}, {1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}, 4.0 / side, 4.0 / side,
+                            side, side};
     const OccluderMesh mesh{.vertices = shapes.vertices, .triangles = shapes.triangles};
     const Occluders occluders({&mesh, 1}, {}, {});
     const std::unique_ptr<const Light> facing = light.facing(grid.normal);

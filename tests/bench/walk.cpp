@@ -220,9 +220,9 @@ int main()
     std::printf(
         "albedo %g, %g degrees; error: relative, of one photon; FOM: 1 / (variance x CPU time) over the plain walk's.\n"
         "`calibrated` is what library() returns: the fastest walk, totals corrected by adding-doubling, whose time is\n"
-        "counted and whose error, with interpolation's, stands for the total's; 200 000 photons, `final` those that
-        library()\n" "takes for slabs, 4 million, and a million for half-spaces, which take as long for each however
-        many there are\n", albedo, angle_deg);
+        "counted and whose error, with interpolation's, stands for the total's; 200 000 photons, `final` those that library()\n"
+        "takes for slabs, 4 million, and a million for half-spaces, which take as long for each however many there are\n",
+        albedo, angle_deg);
     for (const Medium& medium :
          {Medium{0.8, 1.0}, Medium{0.8, 1.4}, Medium{0.0, 1.0}, Medium{0.95, 1.3}, Medium{0.8, 1.0, 10.0},
           Medium{0.8, 1.4, 1.0}}) {
