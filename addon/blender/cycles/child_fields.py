@@ -35,7 +35,7 @@ def fields(request, scene, progress) -> dict:
         material = bpy.data.materials.get(name)
         if material is not None:  # the copy has only materials that the scene uses
             make_diffuse(material, color, request["textures"].get(name))
-    if not request["with_world"]:
+    if not request.get("with_world", True):
         scene.world = None
     set_up(scene, request["light"])
     if request["only"]:

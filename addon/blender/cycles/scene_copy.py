@@ -42,7 +42,7 @@ class SceneCopy:
 
     def __init__(self, scene, view_layer) -> None:
         remove_leftovers()
-        self.folder = Path(tempfile.mkdtemp(prefix=PREFIX))
+        self.folder = Path(tempfile.mkdtemp(prefix=f"{PREFIX}{os.getpid()}-"))
         self.remove = weakref.finalize(self, _remove, self.folder, _lock(self.folder))
         self.warnings: list[Message] = []
         self.binary = bpy.app.binary_path
