@@ -14,7 +14,7 @@ ALBEDO = (0.6, 0.9, 0.3)
 SLANTED = travel(55)
 PATHS = [0.01, 0.3, 1.0, 5.0, 40.0, 400.0]  # mean free paths in texels
 
-# What `tolerance` promises, for the sum over texels and for the worst one. Single-precision results are off by 1e-7.
+# Errors relative to `tolerance`, of the sum over texels and of the worst one. Single-precision results are off by 1e-7.
 ROUNDING = 1e-6
 
 

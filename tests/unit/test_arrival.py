@@ -1,4 +1,4 @@
-"""Irradiance and direction: what arrives, without a medium; and bakes that no light reaches."""
+"""Irradiance and direction of arriving light, without a medium; bakes that no light reaches."""
 
 import math
 from dataclasses import replace
@@ -82,7 +82,7 @@ def test_axes_are_those_of_the_texture():
 
 
 def test_the_border_of_the_mesh_is_as_bright_as_its_inside():
-    """A texel that lies inside by a third shows what arrives on that third, as renderers' bakes do."""
+    """A texel that lies inside by a third shows the light on that third, as renderers' bakes do."""
     whole, third = arriving(SUN, LAMP), arriving(SUN, LAMP, grid=plane(coverage=1 / 3))
     assert all(np.array_equal(one, other) for one, other in zip(whole, third))
 
@@ -95,7 +95,7 @@ def test_shadow_is_dark_and_has_no_direction():
     assert np.array_equal(free[0], arriving(SUN)[0])
 
 
-def test_both_passes_are_what_convolve_takes_to_the_luminance():
+def test_convolve_makes_the_luminance_of_both_passes():
     layers = job([LAMP], COMBINED, IRRADIANCE, DIRECTION).run()
     ldf = beamspread.library(beamspread.Medium(g=0.0, ior=1.0), quality="preview")
     medium = ldf, MATERIAL.albedo, MATERIAL.mean_free_path
@@ -110,7 +110,7 @@ def no_simulation(*_arguments, **_options):
 
 @pytest.fixture
 def without_media(monkeypatch):
-    """Whatever asks for a medium's LDF fails."""
+    """Loading an LDF fails."""
     monkeypatch.setattr("beamspread.core.bake.luminance.library", no_simulation)
     monkeypatch.setattr("beamspread.core.ldf.albedo.library", no_simulation)
 
@@ -118,7 +118,7 @@ def without_media(monkeypatch):
 COLORED = Surface(MATERIAL, base_color=(0.5, 0.4, 0.3))
 
 
-def test_what_arrives_needs_no_medium(without_media):
+def test_arriving_light_needs_no_medium(without_media):
     for layer in (IRRADIANCE, DIRECTION):
         assert replace(job([SUN], layer), surface=COLORED).run()[layer].any()
 
@@ -127,7 +127,7 @@ def test_what_arrives_needs_no_medium(without_media):
 @pytest.mark.parametrize(
     "lights", [(), (replace(SUN, direction=(0.0, 0.0, 1.0)),), (replace(LAMP, position=(0, 0, -1.0)),)]
 )
-def test_what_is_surely_dark_takes_no_simulation(lights, layer, without_media):
+def test_a_surely_dark_bake_takes_no_simulation(lights, layer, without_media):
     one = Bake(Target("Plane"), replace(job(lights, layer), surface=COLORED))
     one.run()
     assert one.error == ""
@@ -154,7 +154,7 @@ def test_a_bake_in_the_shadow_is_dark_and_says_so(layer):
     assert not lit.messages
 
 
-def test_what_absorbs_all_light_is_not_dark():
+def test_a_medium_that_absorbs_all_light_is_not_dark():
     one = Bake(Target("Plane"), job([SUN], material=replace(MATERIAL, albedo=(0.0, 0.0, 0.0))))
     one.run()
     assert not one.layers[COMBINED].any()
@@ -166,9 +166,7 @@ def test_light_behind_a_slab_is_named():
     rising = replace(SUN, name="Rising sun", direction=(0.0, 0.6, 0.8))
     assert job([above, SUN], thickness=0.1).messages() == []
     assert job([above, below, rising]).messages() == []  # endlessly thick
-    assert (
-        job([above, below], IRRADIANCE, thickness=0.1).messages() == []
-    )  # of what arrives in front, nothing is missing
+    assert job([above, below], IRRADIANCE, thickness=0.1).messages() == []  # all light that arrives in front counts
     (some,) = job([above, below, rising], thickness=0.1).messages()
     assert some.text.startswith("Light that shines through the slab 'Plane' from behind is not baked yet")
     assert some.text.endswith("that of 'Low lamp', 'Rising sun'.")

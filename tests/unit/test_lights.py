@@ -1,4 +1,4 @@
-"""Many lights, their colours, and what is known of their directions: all add up to the same moments."""
+"""Many lights, their colours and directions: all add up to the same moments."""
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ def test_many_lamps_of_any_colour_are_the_sum_of_each(ldf):
     assert_within(TOLERANCE, solve(lights, ldf), apart)
 
 
-def test_the_colour_counts_in_what_is_bright():
+def test_the_colour_counts_in_the_brightness():
     """Irradiance is that of a colour of 1: many weak lamps of much of it don't decide about the strong one's terms."""
     clear = library(Medium(0.8, 1.0))
     lights = [_native.PlaneLight(*lamp(60, 90, 4), [1.0, 1.0, 1.0])]
@@ -153,7 +153,7 @@ def test_the_scale_of_the_light_does_not_matter(ldf, solver, power):
         ("mean_free_path", "nan", {"mean_free_path": float("nan")}),
     ],
 )
-def test_what_no_solver_covers_is_named(ldf, argument, value, options):
+def test_unsupported_arguments_of_solvers_are_named(ldf, argument, value, options):
     given = {"irradiance": 1.0, "mean_free_path": 1.0, "pitch": 1.0} | options
     beams = np.full((8, 8), given.pop("irradiance"), np.float32)
     with pytest.raises(ValueError, match=f"'{argument}' is .*({value})"):

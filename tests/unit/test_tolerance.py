@@ -10,7 +10,7 @@ from helpers import lamp, lights_of, lit_texels, travel
 # Planes up to 192 x 192 texels keep all terms.
 SIZE = 200
 
-# Next to nothing in deep shadow is off by a fraction of the brightest texel, whatever the tolerance.
+# Deep shadow is off by a fraction of the brightest texel, for any tolerance.
 FLOOR = 1e-5
 
 MEDIA = {
@@ -26,7 +26,7 @@ def media():
 
 
 def assert_within(tolerance, result, expected, floor=FLOOR):
-    """Of every channel the sum of the errors, and each texel relative to the mean of those around."""
+    """Sum of the errors of each channel, and error of each texel relative to the mean around."""
     error = np.abs(result - expected)
     nearby = uniform_filter(expected, (17, 17, 0), mode="nearest")
     assert np.all(error.sum((0, 1)) <= tolerance * expected.sum((0, 1)))
@@ -39,7 +39,7 @@ def assert_within(tolerance, result, expected, floor=FLOOR):
         ("ior 1", (0.9, 0.9, 0.9), "lamp", "none", 4.0),
         ("ior 1", (0.6, 0.9, 0.3), "grazing", "blocks", 0.4),
         ("ior 1", (0.6, 0.9, 0.3), "outside", "none", 200.0),
-        ("ior 1", (0.9, 0.9, 0.9), "aside", "corner", 115.0),  # dark is what light travels away from
+        ("ior 1", (0.9, 0.9, 0.9), "aside", "corner", 115.0),  # light travels away from dark texels
         ("ior 1", (0.9, 0.9, 0.9), "beside", "half", 200.0),  # dark below the lamp, where all harmonics meet
         ("ior 1.4", (0.999, 0.99, 0.9), "blocks", "half", 0.13),
         ("ior 1.4", (0.999, 0.9, 0.5), "smooth", "texels", 1.9),
@@ -65,9 +65,8 @@ def test_all_errors_are_below_the_tolerance(media, medium, albedo, light, shadow
     [("texels", 0.3), ("texels", 20.0), ("texels", 300.0), ("blocks", 20.0), ("blocks", 300.0)],
 )
 def test_patches_of_light_against_direct(media, light, mean_free_path):
-    """Beside grazing beams each texel shows how well kernels are integrated, and a score of directions what lies
-    between the angles that a basis is made for. 2e-5: toward grazing with ior 1 the border of the kernels' centres is
-    narrow for all 64 harmonics.
+    """Texels beside grazing beams test the integration of kernels, and a score of directions tests angles between those
+    of the basis. 2e-5: toward grazing with ior 1 the border of the kernels' centres is narrow for all 64 harmonics.
     """
     rng = np.random.default_rng(32)
     lit = np.zeros((SIZE, SIZE), np.float32)
@@ -105,7 +104,7 @@ def test_grazing_light_against_direct(media):
 
 
 def test_terms_are_left_out(media):
-    """A loose tolerance changes the result by about what it allows."""
+    """A loose tolerance changes the result by about the tolerance."""
     ((irradiance, directions),) = lights_of("lamp", SIZE, None)
     arguments = irradiance, directions, media["ior 1"], 0.9, 4.0, 1.0
     loose, strict = (convolve(*arguments, tolerance=tolerance) for tolerance in (1e-2, 1e-7))

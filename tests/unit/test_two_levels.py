@@ -78,7 +78,7 @@ def test_two_levels_equal_one(ldf, direction, shape, pitch, mean_free_path, coar
 
 @pytest.mark.parametrize(("direction", "memory"), [(sun, 700_000), (sun, 1_500_000), (lamp, 4_000_000)])
 def test_tiles_on_two_levels_are_seamless(ldf, direction, memory):
-    """The coarse grid is one for all tiles, and what it leaves to the texels ends within their halo."""
+    """All tiles share one coarse grid, and the remaining fine part ends within their halo."""
     arguments, options = (ldf, (500, 610), direction, 60.0), {"tolerance": 2e-2}
     whole = solve(*arguments, coarsening=4, **options)
     tiled = solve(*arguments, coarsening=4, memory=memory, **options)
@@ -90,7 +90,7 @@ def test_tiles_on_two_levels_are_seamless(ldf, direction, memory):
 @pytest.mark.parametrize("mean_free_path", [20.0, 500.0])
 @pytest.mark.parametrize("angle", [20, 75])
 def test_two_levels_equal_direct(ldf, angle, mean_free_path):
-    """What docs/accuracy.md says of one direction."""
+    """Bound of docs/accuracy.md for one direction."""
     direction = travel(angle, 53)
     beams = light(120, 180)
     direct = convolve(beams, direction, ldf, ALBEDO, mean_free_path, 1.0, solver="direct")
@@ -102,7 +102,7 @@ def test_two_levels_equal_direct(ldf, angle, mean_free_path):
 
 
 def test_two_levels_keep_the_tolerance_where_directions_change(ldf):
-    """As `convolve` says, see `test_fft_keeps_the_tolerance_where_directions_change`."""
+    """The promise of `convolve`, see `test_fft_keeps_the_tolerance_where_directions_change`."""
     shape, tolerance = (40, 130), 1e-3
     beams, directions = light(*shape), lamp(*shape)
     direct = convolve(beams, directions, ldf, ALBEDO, (60.0, 42.0, 30.0), 1.0, solver="direct")
@@ -113,7 +113,7 @@ def test_two_levels_keep_the_tolerance_where_directions_change(ldf):
 
 
 def test_a_level_is_added_where_it_pays(ldf):
-    """Where light spreads farther than the plane, and not where it ends within a few texels."""
+    """True if light spreads farther than the plane, false if it ends within a few texels."""
     far, near = (ldf, (500, 500), sun, 40.0), (ldf, (200, 200), sun, 0.02)
     assert np.array_equal(solve(*far), solve(*far, coarsening=4))
     assert not np.array_equal(solve(*far), solve(*far, coarsening=1))

@@ -1,4 +1,4 @@
-"""Light that a slab returns unscattered from its far boundary, which every solver adds to what it spreads."""
+"""Light that a slab returns unscattered from its far boundary, which every solver adds to scattered light."""
 
 import math
 
@@ -36,7 +36,7 @@ def overlap(shift, size):
 
 @pytest.mark.parametrize("solver", ["fft", "direct", "adaptive"])
 @pytest.mark.parametrize(("angle", "azimuth"), [(0, 0), (35, 20), (60, -130)])
-def test_where_it_leaves(slab, solver, angle, azimuth):
+def test_the_position_where_it_leaves(slab, solver, angle, azimuth):
     """Albedo 0: nothing else does. Exits of less than 1e-6 of the incident power are left out."""
     path, pitch, size = 2.0, (0.3, 0.2), 41
     light = np.zeros((size, size), np.float32)
@@ -52,8 +52,8 @@ def test_where_it_leaves(slab, solver, angle, azimuth):
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_of_a_lamp(slab, threads):
-    """Where light covers a line of texels, power is found again; the bits don't depend on the threads."""
+def test_unscattered_light_of_a_lamp(slab, threads):
+    """The power of a lit line of texels is kept; the bits don't depend on the threads."""
     x, y = np.meshgrid(np.linspace(-2, 2, 150), np.linspace(-2, 2, 150))
     direction = np.stack([x, y, np.full_like(x, -1)], -1)
     direction = (direction / np.linalg.norm(direction, axis=-1, keepdims=True)).astype(np.float32)
@@ -72,6 +72,6 @@ def test_none_without_a_reflecting_boundary(medium):
     assert not convolve(light, travel(50, 0), library, 0, 1.0, 1.0).any()
 
 
-def test_what_is_displaced_beyond_the_plane_is_gone(slab):
+def test_light_displaced_beyond_the_plane_is_lost(slab):
     light = np.ones((3, 70), np.float32)
     assert not convolve(light, travel(60, 90), slab, 0, 1e8, 1.0).any()
