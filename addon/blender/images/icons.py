@@ -1,6 +1,7 @@
-"""Blender draws icons of materials in a thread, with the images that these show: before one goes, the thread has to.
+"""Changes of images while Blender draws icons of materials, with their images, in a thread.
 
-Blender's own operators see to that, and what scripts call, as `bpy.data.images.remove`, does not: it crashed.
+The thread must end before an image is freed. Blender's own operators end it; functions for scripts, such as
+`bpy.data.images.remove`, do not, and crash.
 """
 
 from __future__ import annotations
@@ -9,10 +10,10 @@ import bpy
 
 
 def stop_drawing() -> None:
-    """Before an image, or its pixels, are freed; in the main thread. Icons that are still shown are drawn later."""
+    """End the thread, before an image or its pixels are freed. Call it in the main thread; icons are drawn later."""
     if bpy.app.background:
         return
-    # Nothing else that ends these threads changes as little.
+    # Reloading an unused image ends the thread and changes nothing else.
     image = bpy.data.images.new(".Beamspread", 1, 1)
     try:
         with bpy.context.temp_override(edit_image=image):
@@ -23,17 +24,18 @@ def stop_drawing() -> None:
 
 
 def remove(image) -> None:
-    """Remove an image that may be shown."""
+    """Remove an image."""
     stop_drawing()
     bpy.data.images.remove(image)
 
 
 def reload(image) -> None:
-    """Have an image show its file anew."""
+    """Load the image's file again."""
     stop_drawing()
     image.reload()
 
 
 def scale(image, width: int, height: int) -> None:
+    """Scale an image to a size in texels."""
     stop_drawing()
     image.scale(width, height)

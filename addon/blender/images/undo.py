@@ -1,6 +1,6 @@
-"""Undo brings back what an image has packed, but not the pixels that are shown: here they are loaded again.
+"""Undo of bakes. Blender restores the packed file of an image but not the pixels on display: they are loaded again.
 
-A file is not undone: what its image says of the bakes in it stays, too, and that the last one was undone.
+Undo does not restore files: an image with a file keeps the facts about its bakes, and the last one counts as undone.
 """
 
 from __future__ import annotations
