@@ -149,12 +149,8 @@ def write_file(
 
     `view_of` is the scene whose view transform a PNG gets, None for plain sRGB.
     """
-    folder = path.parent
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ImageError(f"The output folder {folder} cannot be made: {error.strerror}.") from error
-    protected = next((part for part in (path, folder) if part.exists() and is_read_only(part)), None)
+    make_folder(path.parent)
+    protected = next((part for part in (path, path.parent) if part.exists() and is_read_only(part)), None)
     if protected is not None:
         raise ImageError(f"The output cannot be written because {protected} is read-only.")
     if file_format == "EXR":
@@ -163,13 +159,24 @@ def write_file(
         write_png(path, texture, view_of)
 
 
-def write_exr(path: Path, texture: np.ndarray, attributes: dict[str, str] | None = None) -> None:
-    """Write linear RGB without compression, as Blender does; in 16 bits if the old file has 16 and the values fit.
+def make_folder(folder: Path) -> None:
+    """Make a folder if it does not exist; raises ImageError if that fails."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ImageError(f"The output folder {folder} cannot be made: {error.strerror}.") from error
 
-    The file keeps its `MADE_FOR` attribute.
+
+def write_exr(
+    path: Path, texture: np.ndarray, attributes: dict[str, str] | None = None, like: Path | None = None
+) -> None:
+    """Write linear RGB without compression, as Blender does.
+
+    The file keeps its `MADE_FOR` attribute. It has 16 bits if the file `like`, by default the old file, has 16 bits and
+    the values fit.
     """
     texture = np.ascontiguousarray(texture, np.float32)
-    half = is_half(path) and np.abs(texture).max() <= np.finfo(np.float16).max
+    half = is_half(like or path) and np.abs(texture).max() <= np.finfo(np.float16).max
     owner = {MADE_FOR: made_for(path)} if made_for(path) else {}
     with _whole_image(path) as temporary:
         native.write_exr(

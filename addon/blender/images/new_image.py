@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import os
-import shutil
 from pathlib import Path
 
 import bpy
@@ -15,7 +14,6 @@ from ...core.batch.names import stem
 from ...core.errors import ImageError
 from ...core.messages import Message, warning
 from ...core.target import Target
-from ...core.whole_file import whole_file
 from . import files, icons, undo
 
 
@@ -71,18 +69,10 @@ def separate_from_other_scene(image) -> tuple[Message, ...]:
     if owner is None or owner == Path(bpy.data.filepath).resolve() or not owner.exists():
         return ()  # a missing owner was renamed or moved: it is this scene
     new_path, made_for = _new_file(image.name)
-    try:
-        new_path.parent.mkdir(parents=True, exist_ok=True)
-        with whole_file(new_path) as temporary:
-            shutil.copyfile(path, temporary)
-    except OSError as error:
-        raise ImageError(f"The file {new_path} cannot be written: {error.strerror}.") from error
-    size = tuple(image.size)
+    files.make_folder(new_path.parent)
+    files.write_exr(new_path, files.linear_pixels(image), {files.MADE_FOR: made_for}, like=path)
     _point_to(image, new_path)
-    files.write_exr(new_path, files.linear_pixels(image), {files.MADE_FOR: made_for})
     icons.reload(image)
-    if tuple(image.size) != size:
-        icons.scale(image, *size)
     text = f"'{path.name}' belongs to '{owner.name}': the image '{image.name}' now has the file '{new_path.name}'."
     return (warning(image.name, text),)
 
