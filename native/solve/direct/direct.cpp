@@ -12,22 +12,22 @@ namespace beamspread {
 
 namespace {
 
-// The kernel of a beam at (theta, beta) is the sum over nodes j and harmonics m of
-//   weight_j,m(theta) [cos(m beta) A_jm + sin(m beta) B_jm],
-// A_jm and B_jm being texel integrals of c_jm(r) cos(m phi) and c_jm(r) sin(m phi). A term is a sum of some of these.
+// A sum of some of the kernels A_jm and B_jm, texel integrals of c_jm(r) cos(m phi) and c_jm(r) sin(m phi). The kernel
+// of a beam at (theta, beta) is the sum over nodes j and harmonics m of
+//   weight_j,m(theta) [cos(m beta) A_jm + sin(m beta) B_jm].
 struct Term {
     std::size_t node;
     Harmonics cosine{};
     Harmonics sine{};
 };
 
-// The combinations of node, harmonic and phase whose kernels are kept apart: one for a uniform direction.
-std::vector<Term> basis_terms(const OneDirection* one, const std::vector<RadialProfile>& profiles)
+// The terms with kernels of their own: one for a uniform direction, else one for each node, harmonic and phase.
+std::vector<Term> basis_terms(const OneDirection* uniform, const std::vector<RadialProfile>& profiles)
 {
     std::vector<Term> terms;
-    if (one != nullptr) {
+    if (uniform != nullptr) {
         Term term{0, {}, {}};
-        const double beta = azimuth(one->travel);
+        const double beta = azimuth(uniform->travel);
         for (std::size_t m = 0; m < profiles[0].harmonics(); ++m) {
             term.cosine[m] = std::cos(static_cast<double>(m) * beta);
             term.sine[m] = std::sin(static_cast<double>(m) * beta);
@@ -49,10 +49,10 @@ struct Beam {
     double irradiance;
     double cos_beta;
     double sin_beta;
-    LdfSource::AngleWeights weights;  // of the nodes; none where all beams have one direction
+    LdfSource::AngleWeights weights;  // of the nodes; empty for a uniform direction
 };
 
-// The lit texels of each row.
+// Beams of the lit texels of each row.
 std::vector<std::vector<Beam>> beam_rows(const Plane& plane, const PlaneLight& light, const LdfSource& ldf,
                                          Progress& progress)
 {
@@ -74,7 +74,7 @@ std::vector<std::vector<Beam>> beam_rows(const Plane& plane, const PlaneLight& l
     return rows;
 }
 
-// Irradiance times the factors of the terms for one beam, in the order of basis_terms.
+// Computes the irradiance of a beam times the factors of its terms, in the order of basis_terms.
 void find_factors(const Beam& beam, const std::vector<RadialProfile>& profiles, bool uniform, double* factor)
 {
     if (uniform) {
@@ -98,8 +98,8 @@ void find_factors(const Beam& beam, const std::vector<RadialProfile>& profiles, 
     }
 }
 
-// A term's kernel for the row offset dy and dx = -(width - 1) .. width - 1, from texel integrals of the quadrant of offsets
-// (first .. , 0 .. width - 1) around the texel where the beam enters; the other quadrants follow by symmetry.
+// A term's kernel for the row offset dy and dx = -(width - 1) .. width - 1. `quadrant` has the texel integrals of row
+// offsets from `first` and column offsets 0 .. width - 1 from the beam's texel; other quadrants follow by symmetry.
 std::vector<double> kernel_row(const TexelIntegrals& quadrant, const Term& term, std::size_t first, std::size_t width,
                                std::ptrdiff_t dy)
 {
@@ -107,7 +107,7 @@ std::vector<double> kernel_row(const TexelIntegrals& quadrant, const Term& term,
     double* right = values.data() + (width - 1);
     const std::size_t start = (static_cast<std::size_t>(std::abs(dy)) - first) * width;
     for (std::size_t m = 0; m < quadrant.harmonics; ++m) {
-        const std::size_t place = m * (quadrant.cosine.size() / quadrant.harmonics) + start;
+        const std::size_t index = m * (quadrant.cosine.size() / quadrant.harmonics) + start;
         // phi -> -phi for dy < 0, and phi -> pi - phi for dx < 0.
         const double by_sine = dy < 0 ? -term.sine[m] : term.sine[m];
         const double mirrored = m % 2 == 0 ? 1.0 : -1.0;
@@ -119,8 +119,8 @@ std::vector<double> kernel_row(const TexelIntegrals& quadrant, const Term& term,
             for (std::size_t x = 1; x < width; ++x)
                 values[width - 1 - x] += to_the_left * factor * integrals[x];
         };
-        add(term.cosine[m], quadrant.cosine.data() + place, mirrored);
-        add(by_sine, quadrant.sine.data() + place, -mirrored);
+        add(term.cosine[m], quadrant.cosine.data() + index, mirrored);
+        add(by_sine, quadrant.sine.data() + index, -mirrored);
     }
     return values;
 }
@@ -148,7 +148,7 @@ public:
         });
     }
 
-    // One row per term, dx = -(width - 1) .. width - 1, for the light of a row `dy` rows below or above.
+    // Kernels of light `dy` rows below or above: one row per term, dx = -(width - 1) .. width - 1.
     const std::vector<double>* below(std::size_t dy) const { return m_rows.data() + 2 * (dy - m_first) * m_terms; }
     const std::vector<double>* above(std::size_t dy) const { return below(dy) + m_terms; }
 
@@ -158,12 +158,13 @@ private:
     std::vector<std::vector<double>> m_rows;
 };
 
-// Row offsets whose kernels are kept at a time: of up to 64 MB, so that memory does not grow with the square of the
-// plane's size, and up to 16, which share the borders of their texels.
+// Number of row offsets with kernels in memory. The limit on bytes keeps memory from growing with the square of the
+// plane's size; neighbouring rows share the borders of their texels. Larger limits: less time, more memory.
 std::size_t rows_at_once(std::size_t terms, std::size_t width)
 {
-    constexpr std::size_t bytes = std::size_t{1} << 26;
-    return std::clamp<std::size_t>(bytes / (2 * terms * 2 * width * sizeof(double)), 1, 16);
+    constexpr std::size_t max_bytes = std::size_t{1} << 26;
+    constexpr std::size_t max_rows = 16;
+    return std::clamp<std::size_t>(max_bytes / (2 * terms * 2 * width * sizeof(double)), 1, max_rows);
 }
 
 }  // namespace
@@ -171,13 +172,13 @@ std::size_t rows_at_once(std::size_t terms, std::size_t width)
 std::vector<double> solve_direct(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium,
                                  Progress& progress)
 {
-    const auto* one = std::get_if<OneDirection>(&light.directions);
+    const auto* uniform = std::get_if<OneDirection>(&light.directions);
     const LdfSource& ldf = *medium.ldf;
     const std::vector<RadialProfile> profiles =
-        one != nullptr ? std::vector{ldf.profile(incidence_deg(one->travel), medium.albedo, Side::reflected)}
-                       : ldf.node_profiles(medium.albedo, Side::reflected);
-    const std::vector<Term> terms = basis_terms(one, profiles);
-    // Every row lights every row.
+        uniform != nullptr ? std::vector{ldf.profile(incidence_deg(uniform->travel), medium.albedo, Side::reflected)}
+                           : ldf.node_profiles(medium.albedo, Side::reflected);
+    const std::vector<Term> terms = basis_terms(uniform, profiles);
+    // Progress of one pair of rows.
     const double work = 1.0 / (static_cast<double>(plane.height) * static_cast<double>(plane.height));
     const std::vector<std::vector<Beam>> beams = beam_rows(plane, light, ldf, progress);
 
@@ -185,7 +186,7 @@ std::vector<double> solve_direct(const Plane& plane, const PlaneLight& light, co
     const auto add_row = [&](std::size_t target, std::size_t source, const std::vector<double>* kernels) {
         std::vector<double> factors(terms.size());
         for (const Beam& beam : beams[source]) {
-            find_factors(beam, profiles, one != nullptr, factors.data());
+            find_factors(beam, profiles, uniform != nullptr, factors.data());
             for (std::size_t k = 0; k < factors.size(); ++k)
                 if (factors[k] != 0.0)
                     add_scaled(sum.data() + target * plane.width, kernels[k].data() + (plane.width - 1 - beam.x),

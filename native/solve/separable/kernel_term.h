@@ -1,4 +1,4 @@
-// What kernels are made of: harmonics of profiles in metres.
+// Terms of kernels: harmonics of profiles, with lengths in metres.
 #pragma once
 
 #include <cstddef>
@@ -26,7 +26,7 @@ struct HarmonicRange {
 struct ScaledProfile {
     RadialProfile profile;
     double mean_free_path = 1.0;  // metres
-    double reach = 0.0;           // metres: what the profile holds farther out is left out
+    double reach = 0.0;           // metres; the profile counts as zero beyond
 };
 
 }  // namespace beamspread

@@ -15,15 +15,15 @@ namespace beamspread {
 namespace {
 
 constexpr std::size_t angle_count = Incidence::count;
-// Of a term, relative to the squared light, that is not rounding; at a tolerance of 1e-3 a hundred times as much
-// gives the same.
-constexpr double least_gain = 1e-14;
 
-// Steps of u(theta), linear in between: a quarter of them leaves the worst texel the same within 2 %.
+// Smallest gain of a term, relative to the squared light, above rounding errors.
+constexpr double min_gain = 1e-14;
+
+// Steps of the tables u(theta), which are linear in between. More: smaller errors, more memory.
 constexpr std::size_t table_steps = 4096;
 
-// Errors of m = 0 count so many times: under even light they add up, while those of the other harmonics cancel. Where
-// the radiance itself is not looked at; `adaptive` is off by as much with 1 to 6, within 2 %.
+// Weight of errors of m = 0, which add up under even light, over those of other harmonics, which cancel. Larger: more
+// exact totals, less exact detail.
 constexpr double power_weight = 3.0;
 
 using Matrix = Eigen::MatrixXd;
@@ -44,7 +44,7 @@ public:
                      [&](std::size_t a) { m_weights[a] = library.angle_weights(angle_deg(half_tangents[a])); });
     }
 
-    // Of a harmonic, [angle][node].
+    // Weights of a harmonic, [angle][node].
     Matrix of(std::size_t m, const std::vector<RadialProfile>& nodes) const
     {
         Matrix matrix = Matrix::Zero(index(m_weights.size()), index(nodes.size()));
@@ -74,15 +74,15 @@ private:
     std::vector<LdfSource::AngleWeights> m_weights;
 };
 
-std::vector<double> evenly(double first, double last, std::size_t count)
+std::vector<double> evenly_spaced(double first, double last, std::size_t count)
 {
-    std::vector<double> places(count);
+    std::vector<double> values(count);
     for (std::size_t i = 0; i < count; ++i)
-        places[i] = first + (last - first) * static_cast<double>(i) / static_cast<double>(count - 1);
-    return places;
+        values[i] = first + (last - first) * static_cast<double>(i) / static_cast<double>(count - 1);
+    return values;
 }
 
-// One harmonic of a medium's LDF at its simulated angles: power per radius bin, scaled so that squares sum to the
+// A medium's LDF at its simulated angles. Features are powers of radius bins, scaled so that their squares sum to the
 // chi-square distance to the mean LDF, relative to its power.
 struct AngularMedium {
     std::vector<RadialProfile> nodes;
@@ -91,20 +91,20 @@ struct AngularMedium {
     std::array<Matrix, harmonic_count> features;  // [node][radius bin]
 };
 
-AngularMedium describe(const ChannelMedium& of, const Incidence& incidence, const std::vector<double>& angles,
-                       double texel)
+AngularMedium angular_medium(const ChannelMedium& channel, const Incidence& incidence,
+                             const std::vector<double>& angles, double texel)
 {
     AngularMedium medium;
-    medium.nodes = of.ldf->node_profiles(of.albedo, Side::reflected);
+    medium.nodes = channel.ldf->node_profiles(channel.albedo, Side::reflected);
     const std::size_t nodes = medium.nodes.size();
-    medium.weights = NodeWeights(*of.ldf, angles);
+    medium.weights = NodeWeights(*channel.ldf, angles);
     const Vector share = Eigen::Map<const Vector>(incidence.share.data(), index(angle_count));
     const Vector mean_weights = medium.weights.of(0, medium.nodes).transpose() * share;
     for (std::size_t j = 0; j < nodes; ++j)
         medium.mean.add(medium.nodes[j], mean_weights[index(j)], 0.0);
 
-    // Circles that fit into the texel where the beam enters: all that is seen of them is their power.
-    const double inside = 0.5 * texel / of.mean_free_path;
+    // Join the bins inside the beam's own texel, which resolves their power alone.
+    const double inside = 0.5 * texel / channel.mean_free_path;
     std::vector<double> radii = profile_radii(medium.mean.detail());
     while (radii.size() > 1 && radii[1] <= inside)
         radii.erase(radii.begin());
@@ -126,11 +126,11 @@ AngularMedium describe(const ChannelMedium& of, const Incidence& incidence, cons
     for (std::size_t j = 0; j < nodes; ++j) {
         const Matrix bins = bins_of(medium.nodes[j]);
         for (Eigen::Index k = 0; k < bins.cols(); ++k) {
-            // What is left is rounding; 1e-8 of the power leaves no greater errors.
+            // Skip bins with nothing but rounding errors.
             if (mean_bins(0, k) <= 1e-12 * power)
                 continue;
             for (std::size_t m = 0; m < harmonic_count; ++m) {
-                // The mean of cos^2 (m phi) over a turn.
+                // Mean of cos^2(m phi) over a turn; m = 0 with its weight.
                 const double mean_square = m == 0 ? power_weight * power_weight : 0.5;
                 medium.features[m](index(j), k) =
                     std::sqrt(mean_square / (mean_bins(0, k) * power)) * bins(index(m), k);
@@ -144,7 +144,7 @@ AngularMedium describe(const ChannelMedium& of, const Incidence& incidence, cons
 
 struct KernelDecomposition::Angular {
     std::vector<AngularMedium> media;
-    std::vector<Vector> direction;  // of each term, unit vectors over the present angles
+    std::vector<Vector> direction;  // [term]: unit vectors over the present angles
     Vector root_share;
     std::map<const LdfSource*, NodeWeights> tables;
 };
@@ -157,11 +157,11 @@ KernelDecomposition::KernelDecomposition(const Incidence& incidence, const std::
         medium.ldf->check_angle(angle_deg(m_first));
         medium.ldf->check_angle(angle_deg(m_last));
     }
-    const std::vector<double> angles = evenly(m_first, m_last, angle_count);
+    const std::vector<double> angles = evenly_spaced(m_first, m_last, angle_count);
     for (const ChannelMedium& medium : media) {
-        m_angular->media.push_back(describe(medium, incidence, angles, texel));
+        m_angular->media.push_back(angular_medium(medium, incidence, angles, texel));
         if (!m_angular->tables.contains(medium.ldf))
-            m_angular->tables[medium.ldf] = NodeWeights(*medium.ldf, evenly(m_first, m_last, table_steps + 1));
+            m_angular->tables[medium.ldf] = NodeWeights(*medium.ldf, evenly_spaced(m_first, m_last, table_steps + 1));
     }
     const Vector root_share = Eigen::Map<const Vector>(incidence.share.data(), index(angle_count)).cwiseSqrt();
     m_angular->root_share = root_share;
@@ -171,13 +171,13 @@ KernelDecomposition::KernelDecomposition(const Incidence& incidence, const std::
             const Matrix rows = root_share.asDiagonal() * medium.weights.of(m, medium.nodes) * medium.features[m];
             gram += rows * rows.transpose() / static_cast<double>(media.size());
         }
-        if (gram.trace() <= least_gain)
+        if (gram.trace() <= min_gain)
             continue;
         const Eigen::SelfAdjointEigenSolver<Matrix> solver(gram);
         for (std::size_t rank = 0; rank < angle_count; ++rank) {
             const Eigen::Index i = index(angle_count - 1 - rank);
             const double gain = solver.eigenvalues()[i];
-            if (gain <= least_gain)
+            if (gain <= min_gain)
                 break;
             m_terms.push_back({m, rank, gain});
             m_angular->direction.emplace_back(solver.eigenvectors().col(i));
@@ -191,7 +191,7 @@ std::vector<std::size_t> KernelDecomposition::within(double tolerance) const
 {
     std::vector<std::size_t> order(m_terms.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
-    // Harmonics above 0 take two transforms each.
+    // Compute the gain per transform: harmonics above 0 take two.
     const auto worth = [&](std::size_t t) { return m_terms[t].m == 0 ? 2.0 * m_terms[t].gain : m_terms[t].gain; };
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return worth(a) < worth(b); });
     double error = 0.0;
@@ -222,7 +222,7 @@ LowRankBasis KernelDecomposition::basis(const std::vector<std::size_t>& chosen, 
         weights.emplace_back(ranks, std::vector<Harmonics>(medium.nodes.size()));
     for (const std::size_t t : chosen) {
         const auto& [m, rank, gain] = m_terms[t];
-        // The mean over the media, once for each of the two factors of the decomposition.
+        // Compute the right factor of the decomposition; gains are means over the media.
         const Vector by_angle = m_angular->root_share.cwiseProduct(m_angular->direction[t]) /
                                 std::sqrt(gain * static_cast<double>(m_media.size()));
         Vector values = Vector::Zero(index(table_steps + 1));

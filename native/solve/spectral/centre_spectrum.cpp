@@ -12,19 +12,20 @@ namespace beamspread {
 
 namespace {
 
-// Rows of a quadrant up to which sums take less time than transforms; 20 and 80 take as long, within 5 %.
-constexpr std::size_t most_summed_rows = 40;
+// Rows of a quadrant up to which its spectrum is summed; more rows are transformed, which takes less time then.
+constexpr std::size_t max_summed_rows = 40;
 
-// Rows that are transformed at once: a multiple of what the transforms do side by side. 8 and 32 take as long.
+// Rows that are transformed together, a multiple of the transforms' SIMD width. More: more cache.
 constexpr std::size_t lines_at_once = 16;
 
-// 2 pi steps / size; whole turns are left out before they cost digits.
+// Phase 2 pi steps / size, without whole turns, which would lose digits.
 double phase_of(std::size_t steps, std::size_t size)
 {
     return 2.0 * pi * static_cast<double>(steps % size) / static_cast<double>(size);
 }
 
-// The integrals over [x0, x0 + px] x [y0, y0 + py] of what lies outside the window, lengths in units of the plane.
+// Integrals over the texel [x0, x0 + px] x [y0, y0 + py] of the kernel outside the window. Lengths are in the plane's
+// unit.
 struct RingIntegrals {
     Harmonics cosine{};
     Harmonics sine{};
@@ -71,7 +72,7 @@ CentreSpectrum::CentreSpectrum(const PaddedPlane& plane, const KernelCentre& hal
     m_texels.resize(profiles.size() * per_profile);
     for (std::size_t p = 0; p < profiles.size(); ++p)
         integrate(profiles[p], plane, outside, m_texels.data() + p * per_profile);
-    if (m_height > most_summed_rows)
+    if (m_height > max_summed_rows)
         return;
     m_trig.resize(2 * m_height * m_frequencies);
     for (std::size_t y = 0; y < m_height; ++y) {
@@ -112,8 +113,8 @@ void CentreSpectrum::integrate(const ScaledProfile& scaled, const PaddedPlane& p
 CentreSpectrum::Sum CentreSpectrum::add_up(std::span<const KernelTerm> terms) const
 {
     Sum sum{std::vector<float>(m_width * m_stride), terms.front().phase == Phase::sine, terms.front().m % 2 == 1};
-    // A_m is even along x for even m, odd for odd m, and even along y; B_m the other way round. Sums over pairs of odd
-    // functions bring factors -i: squared for B_m of even m, once for odd m, where it is left out.
+    // A_m is even along y, and along x even for even m and odd for odd m; B_m has the opposite parities. Each odd axis
+    // brings a factor -i: squared for B_m of even m, and once for odd m, where the spectrum omits it.
     const double sign = sum.sine && !sum.odd_m ? -1.0 : 1.0;
     std::vector<double> column(m_height);
     for (std::size_t x = 0; x < m_width; ++x) {

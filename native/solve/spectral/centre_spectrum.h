@@ -1,4 +1,4 @@
-// Transforms of the texels around the poles of kernels.
+// Spectra of the centres of kernels: the texels around their poles.
 #pragma once
 
 #include <cstddef>
@@ -13,39 +13,38 @@
 
 namespace beamspread {
 
-// Few texels, integrated exactly (ldf/radial/texel_integral.h), less what the rings around bring to them, and transformed by
-// sums.
+// Spectra of few texels, which are integrated exactly (ldf/radial/texel_integral.h), minus the rings' part in them.
 class CentreSpectrum {
 public:
     CentreSpectrum(const PaddedPlane& plane, const KernelCentre& half_width, const std::vector<ScaledProfile>& profiles,
                    const std::optional<RadialWindow>& outside);
 
-    // A sum of terms that share their phase and whether m is even.
+    // A sum of terms with the same phase and parity of m.
     struct Sum {
-        std::vector<float> texels;  // [x][y] of a quadrant, y in whole blocks; signed as its spectrum
+        std::vector<float> texels;  // [x][y] of a quadrant, y in whole blocks; with the sign of the spectrum
         bool sine = false;
         bool odd_m = false;
     };
     Sum add_up(std::span<const KernelTerm> terms) const;
 
-    // Some columns of frequencies, and sums whose texels are read once for all of them.
+    // Working values of some columns of frequencies, and the sums that they share.
     struct Columns {
         std::vector<const Sum*> sums;
         std::size_t count = 0;
         std::vector<float> cosine;  // [column][x]: 1 or 0, then twice the cosine or sine
         std::vector<float> sine;
         std::vector<float> rows;    // [sum][column][y], summed along x
-        std::vector<float> lines;   // of some sums, mirrored halves added, padded
-        std::vector<Complex> half;  // their transforms
+        std::vector<float> lines;   // of some sums, with mirrored halves added, padded
+        std::vector<Complex> half;  // transforms of the lines
     };
-    // For kx = 2 pi frequency / padded_width of `count` frequencies from the first; the sums are those in `columns`.
+    // Prepares the columns kx = 2 pi frequency / padded_width of `count` frequencies, for the sums in `columns`.
     void start(std::size_t first_frequency, std::size_t count, Columns& columns) const;
 
-    // Frequencies ky up to that of Nyquist of a sum in one of the columns, see `KernelSpectra::spectrum`; not of
-    // wide centres.
+    // Spectrum of a sum in one of the columns, up to the Nyquist frequency of ky (see `KernelSpectra::spectrum`). Not
+    // for wide centres.
     void spectrum(const Columns& columns, std::size_t column, std::size_t sum, float* values) const;
 
-    // The same of sums [first, first + count), [sum][frequency]: the way for wide centres, whose rows are transformed.
+    // Spectra of sums [first, first + count), [sum][frequency], by transforms of rows: for wide centres.
     void spectra(Columns& columns, std::size_t column, std::size_t first, std::size_t count, float* values) const;
     bool is_wide() const { return m_trig.empty(); }
 

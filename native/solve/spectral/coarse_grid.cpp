@@ -18,7 +18,7 @@ std::vector<float> CoarseGrid::spread(const MakeLightRow& light, std::size_t fir
     const std::size_t step = m_y.step();
     const std::size_t items = (m_height + step - 1) / step;
     std::vector<float> result(count * nodes(), 0.0f);
-    // The texels of an item share the rows of nodes that their light goes to, [term][row][node].
+    // Compute the light of an item's texel rows, which go to the same rows of nodes: [term][row][node].
     const auto spread_rows = [&](std::size_t item) {
         std::vector<float> rows(count * spline_order * stride, 0.0f);
         RowScratch& scratch = pool.local();

@@ -1,4 +1,4 @@
-// Light brought from texels to the nodes of a coarse grid, and luminance brought back.
+// A coarse grid of nodes: spreads light from texels to nodes, and interpolates luminance from nodes to texels.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@ namespace beamspread {
 
 class CoarseGrid {
 public:
-    // `nodes`: the grid that stands for a plane of (height, width) texels.
+    // `nodes` is the coarse grid of a plane of (height, width) texels.
     CoarseGrid(const PaddedPlane& nodes, std::size_t width, std::size_t height)
         : m_width(width), m_height(height), m_x(width, nodes.texels_x), m_y(height, nodes.texels_y)
     {
@@ -20,7 +20,7 @@ public:
 
     std::size_t nodes() const { return m_x.nodes() * m_y.nodes(); }
 
-    // `count` terms of the light from `first` on, [term][node]. Advances the progress by `work`.
+    // Light of terms [first, first + count) on the nodes, [term][node]. Advances the progress by `work`.
     std::vector<float> spread(const MakeLightRow& light, std::size_t first, std::size_t count, Progress& progress,
                               double work) const;
 
@@ -29,7 +29,7 @@ public:
         std::vector<float> line;
     };
 
-    // Adds the values that a row of texels reads off the nodes.
+    // Adds the interpolated values of a row of texels.
     void add_interpolated(const std::vector<float>& nodes, const RowSpan& span, float* texels, Scratch& scratch) const;
 
 private:

@@ -10,13 +10,11 @@ namespace beamspread {
 
 namespace {
 
-// Rows of one work item: their pieces of columns fill cache lines. Of either, half and twice as many take as long,
-// within 5 %.
+// Rows and columns of one work item. The rows' pieces of columns fill cache lines.
 constexpr std::size_t rows_per_item = 16;
 constexpr std::size_t columns_per_item = 8;
 
-// Light terms whose columns are in the cache at once; a multiple of what the transforms do side by side. 8 and 32 take
-// as long, within 6 %.
+// Light terms with columns in the cache together, a multiple of the transforms' SIMD width. More: more cache.
 constexpr std::size_t terms_per_batch = 16;
 
 std::size_t rounds_of(std::size_t count, std::size_t at_once)
@@ -31,7 +29,7 @@ HarmonicRange harmonic_range(std::span<const LightTerm> terms)
         for (const std::vector<KernelTerm>& kernel : term.kernels)
             for (const KernelTerm& part : kernel)
                 range = {std::min(range.first, part.m), std::max(range.end, part.m + 1)};
-    return range.end == 0 ? HarmonicRange{} : range;  // light that no kernel spreads
+    return range.end == 0 ? HarmonicRange{} : range;  // empty without kernels
 }
 
 }  // namespace
@@ -56,7 +54,7 @@ void Convolution::solve(const MakeLightRow& light, const StoreRow& store, Progre
 {
     const std::vector<Span> across = tiles(m_plane.width, m_plane.tile_width);
     const std::vector<Span> up = tiles(m_plane.height, m_plane.tile_height);
-    // Rows and columns of every round, and the rows of the results.
+    // Compute the progress of one round's rows and columns; the rows of the results count as one more round.
     const std::size_t rounds = rounds_of(m_media, m_at_once.media) * rounds_of(m_terms.size(), m_at_once.terms);
     const double unit = work / ((static_cast<double>(rounds) + 1.0) * static_cast<double>(across.size() * up.size()));
     for (const Span& y : up)
@@ -97,7 +95,7 @@ void Convolution::solve_tile(const Tile& tile)
     }
 }
 
-// The terms' light in the window, padded and transformed along x.
+// Pads the terms' light in the window and transforms it along x.
 void Convolution::transform_light(const Tile& tile, std::size_t first, std::size_t count, ColumnSpectra& light)
 {
     const std::size_t stride = m_plane.padded_width;
@@ -141,7 +139,7 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
     const std::size_t offset = tile.y.first - tile.window_y.first;
     const std::size_t items = rounds_of(columns, columns_per_item);
     const HarmonicRange harmonics = harmonic_range(m_terms.subspan(first_term, count));
-    std::vector<const KernelSpectra::Part*> parts;  // of all terms, and for each of all media
+    std::vector<const KernelSpectra::Part*> parts;  // of all terms, each for all media
     std::vector<std::size_t> first_part;            // [term * media + medium]
     for (std::size_t t = 0; t < count; ++t)
         for (std::size_t k = 0; k < results.count(); ++k) {
@@ -184,7 +182,7 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
             for (std::size_t k = 0; k < results.count(); ++k) {
                 Complex* even = scratch.sums.data() + 2 * k * height;
                 const Complex* odd = even + height;
-                for (std::size_t f = 0; f < height; ++f)  // -i times the odd ones
+                for (std::size_t f = 0; f < height; ++f)  // add -i times the odd sums
                     even[f] += Complex(odd[f].imag(), -odd[f].real());
                 fft().complex_in_place(even, 1, height, false);
                 Complex* result = results.column(k, x);

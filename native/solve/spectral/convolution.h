@@ -1,4 +1,4 @@
-// Sums of lights convolved with their kernels, on one grid.
+// Convolution of light terms with their kernels on one grid, by FFT with overlap-save tiles.
 #pragma once
 
 #include <cstddef>
@@ -14,27 +14,26 @@
 
 namespace beamspread {
 
-// The light of some nodes of a row, one term after the other, each `stride` values after the one before.
+// The light of some nodes of a row, term after term, `stride` values apart.
 struct TermValues {
     const float* values;
     std::size_t stride;
 };
 
-// Terms [first, first + count) of a row's light, which stay until the next row is asked for.
+// Returns terms [first, first + count) of a row's light, which stay valid until the next call.
 using LightRow = std::function<TermValues(const RowSpan& span, std::size_t first, std::size_t count)>;
 using MakeLightRow = std::function<LightRow()>;
 
-// Takes a row of a result: `values` times `factor`. Called from several threads at once. The values may
-// be changed.
+// Takes a row of a result: `values` times `factor`. May change the values. Called from several threads at once.
 using StoreRow = std::function<void(std::size_t result, const RowSpan& span, float* values, double factor)>;
 
-// Solves the plane of `spectra` tile by tile, never with more than `budget` bytes for the spectra of the light and of
-// the results, unless one of each does not fit.
+// Solves the plane of `spectra` tile by tile, with at most `budget` bytes for the spectra of the light and of the
+// results (or one of each if that is more).
 class Convolution {
 public:
     Convolution(const KernelSpectra& spectra, std::span<const LightTerm> terms, std::size_t media, std::size_t budget);
 
-    // Advances the progress by `work`, or a little less.
+    // Advances the progress by at most `work`.
     void solve(const MakeLightRow& light, const StoreRow& store, Progress& progress, double work);
 
 private:
@@ -44,11 +43,11 @@ private:
         std::size_t count;
     };
 
-    // What a tile's steps share.
+    // Values that the steps of a tile share.
     struct Tile {
         Span x;
         Span y;
-        Span window_x;  // the nodes whose light reaches the tile
+        Span window_x;  // nodes with light that reaches the tile
         Span window_y;
         const MakeLightRow& light;
         const StoreRow& store;

@@ -13,22 +13,20 @@ namespace beamspread {
 
 namespace {
 
-// Samples of the transform: twice as fine as texels, whose frequencies the table holds. At half of it errors are the same;
-// at twice, the table would end at Nyquist.
+// Distance of the transform's samples, in units: half a texel, as the table has the frequencies of texels. At twice,
+// the table would end at the Nyquist frequency.
 constexpr double sample_step = 0.5;
 
-// Projections are integrated at the samples near the window: 16 and 64 leave the same errors, in the same time. Farther
-// away in proportion to the distance: half the growth brings the worst error of a slab's images from 1.6e-4 of the
-// brightest texel to 1.2e-5, for suns in up to 7 % more time, twice the growth leaves 1.4e-3; without images the
-// error is 2e-6 with all three.
+// Distance in units up to which projections are integrated at every sample, and growth of the distances beyond. Larger
+// growth: less time, larger errors around the mirror images of slabs.
 constexpr double even_until = 32.0;
 constexpr double growth = 1.012;
 
-// Across a panel the last harmonic turns by no more than this, which four points integrate to some 5e-6. With half of it
-// and twice, the worst texel is the same, in 3 % more and less time.
+// Largest phase, in radians, by which the last harmonic turns across a panel; four points integrate it to some 5e-6.
+// Larger: less time, larger errors.
 constexpr double panel_turn = pi;
 
-// Weights of four neighbours at t in [0, 1] between the second and the third (Lagrange).
+// Lagrange's weights of four neighbours at t in [0, 1] between the second and the third.
 std::array<double, 4> cubic_weights(double t)
 {
     const double a = t + 1.0;
@@ -48,8 +46,8 @@ std::vector<double> sample_positions(double end)
     return positions;
 }
 
-// Panels of the integrals: steps of a texel across the inner window, of half a deviation across the outer one, and bins
-// of the profile, halved.
+// Ends of the integrals' panels: steps of a unit across the inner window, of half a deviation across the outer one, and
+// halves of the profile's bins.
 std::vector<double> panel_breaks(const RadialWindow& window, double to_paths, RadialDetail detail)
 {
     const double end = window.end();
@@ -66,16 +64,16 @@ std::vector<double> panel_breaks(const RadialWindow& window, double to_paths, Ra
     }
     for (int i = 1; 0.5 * i * window.outer < end && window.outer > 0.0; ++i)
         breaks.push_back(0.5 * i * window.outer);
-    // Of the taper: 4 and 16 panels give the same.
-    for (int i = 0; i < 8 && window.taper > 0.0; ++i)
-        breaks.push_back(window.cut + window.taper * i / 8.0);
+    constexpr int taper_panels = 8;
+    for (int i = 0; i < taper_panels && window.taper > 0.0; ++i)
+        breaks.push_back(window.cut + window.taper * i / taper_panels);
     breaks.push_back(end);
     std::sort(breaks.begin(), breaks.end());
     return breaks;
 }
 
-// The integral over y of w(r) c_m(r) cos(m phi), cos(m phi) = T_m(x / r). Bins may be far wider than a turn of their
-// harmonics where they begin at x.
+// Projection onto x: the integral over y of w(r) c_m(r) cos(m phi), with cos(m phi) = T_m(x / r). Panels are divided
+// where their harmonics turn by more than `panel_turn`.
 Harmonics project(const RadialProfile& profile, const RadialWindow& window, double to_paths,
                   const std::vector<double>& breaks, double x)
 {
@@ -84,7 +82,7 @@ Harmonics project(const RadialProfile& profile, const RadialWindow& window, doub
         for (std::size_t q = 0; q < gauss_node.size(); ++q) {
             const double y = 0.5 * (y0 + y1 + (y1 - y0) * gauss_node[q]);
             const double r = std::hypot(x, y);
-            // Twice: for y and -y.
+            // Twice the weight, for y and -y.
             const double weight = gauss_weight[q] * (y1 - y0) * to_paths * to_paths * window.weight(r);
             const Harmonics c = profile.density(r * to_paths);
             double t0 = 1.0;
@@ -111,7 +109,7 @@ Harmonics project(const RadialProfile& profile, const RadialWindow& window, doub
     return sum;
 }
 
-bool holds(const RadialProfile& profile, std::size_t m)
+bool has_harmonic(const RadialProfile& profile, std::size_t m)
 {
     for (std::size_t k = 0; k < edge_count && m < profile.harmonics(); ++k)
         if (profile.remaining(radial_edge(k))[m] != 0.0)
@@ -124,16 +122,18 @@ bool holds(const RadialProfile& profile, std::size_t m)
 HankelTable::HankelTable(const std::vector<ScaledProfile>& profiles, const RadialWindow& window, double unit_m)
 {
     const std::size_t samples = static_cast<std::size_t>(std::ceil(window.end() / sample_step)) + 1;
-    // Neighbours in the table are within 0.2 radians of each other's phase, where kernels are long 0.4: that table
-    // would leave the cache, and such kernels hold little power at their ends. Half the length has 4e-6 of the
-    // brightest texel for 2e-6, twice the same.
-    const std::size_t length = fast_even_size((samples <= 2048 ? 32 : 16) * samples);
+    // Choose the length: neighbours in the table differ in phase by at most 0.2 radians, for long kernels 0.4. Their
+    // table would leave the cache, and they have little power at their ends.
+    constexpr std::size_t max_short_samples = 2048;
+    constexpr std::size_t oversampling = 32;
+    const std::size_t length =
+        fast_even_size((samples <= max_short_samples ? oversampling : oversampling / 2) * samples);
     m_k_step = 2.0 * pi / (static_cast<double>(length) * sample_step);
     m_column.assign(profiles.size() * harmonic_count, no_column);
     for (std::size_t m = 0; m < harmonic_count; ++m) {
         m_columns_below.push_back(m_columns);
         for (std::size_t p = 0; p < profiles.size(); ++p)
-            if (holds(profiles[p].profile, m))
+            if (has_harmonic(profiles[p].profile, m))
                 m_column[p * harmonic_count + m] = m_columns++;
     }
     m_columns_below.push_back(m_columns);
@@ -143,8 +143,8 @@ HankelTable::HankelTable(const std::vector<ScaledProfile>& profiles, const Radia
         add_profile(profiles[p], p, window, unit_m, samples, length);
 }
 
-// By the projection-slice theorem the two-dimensional transform of c_m(r) cos(m phi) along kx is the one-dimensional
-// transform of its projection onto x.
+// Adds the columns of a profile, by the projection-slice theorem (Bracewell 1956, doi:10.1071/PH560198): the
+// two-dimensional transform of c_m(r) cos(m phi) along kx is the one-dimensional transform of its projection onto x.
 void HankelTable::add_profile(const ScaledProfile& scaled, std::size_t index, const RadialWindow& window, double unit_m,
                               std::size_t samples, std::size_t length)
 {
@@ -161,9 +161,10 @@ void HankelTable::add_profile(const ScaledProfile& scaled, std::size_t index, co
     const auto projection = [&](double x, std::size_t m) {
         if (x < even_until)
             return projections[static_cast<std::size_t>(std::lround(x / sample_step))][m];
-        const double place = std::log(x / even_until) / log_growth;
-        const auto i = std::clamp<std::size_t>(static_cast<std::size_t>(place), 1, positions.size() - even_count - 3);
-        const auto w = cubic_weights(place - static_cast<double>(i));
+        const double position = std::log(x / even_until) / log_growth;
+        const auto i =
+            std::clamp<std::size_t>(static_cast<std::size_t>(position), 1, positions.size() - even_count - 3);
+        const auto w = cubic_weights(position - static_cast<double>(i));
         double value = 0.0;
         for (std::size_t j = 0; j < 4; ++j)
             value += w[j] * projections[even_count + i - 1 + j][m];
@@ -187,9 +188,9 @@ void HankelTable::add_profile(const ScaledProfile& scaled, std::size_t index, co
 
 void HankelTable::row(double k, std::size_t first, std::size_t count, float* values) const
 {
-    const double place = k / m_k_step;
-    const std::size_t row = std::min(static_cast<std::size_t>(place), m_rows - 4);
-    const auto w = cubic_weights(std::min(place - static_cast<double>(row), 1.0));
+    const double position = k / m_k_step;
+    const std::size_t row = std::min(static_cast<std::size_t>(position), m_rows - 4);
+    const auto w = cubic_weights(std::min(position - static_cast<double>(row), 1.0));
     const std::array<float, 4> weights = {static_cast<float>(w[0]), static_cast<float>(w[1]), static_cast<float>(w[2]),
                                           static_cast<float>(w[3])};
     interpolate(values, m_table.data() + row * m_columns + first, m_columns, weights.data(), count);

@@ -1,4 +1,4 @@
-// Radial transforms of the harmonics of kernels.
+// Hankel transforms of the harmonics of kernels.
 #pragma once
 
 #include <cstddef>
@@ -9,22 +9,22 @@
 
 namespace beamspread {
 
-// The two-dimensional transform of w(r) c_m(r) cos(m phi) is i^-m cos(m psi) H_m(k): H_m of all profiles and m, over k,
-// w being the ring of a window. Lengths in a unit that is fine enough for the ring's detail: where the window begins
-// and ends over less than that, and beyond the Nyquist frequency, nothing holds.
+// Table of H_m over k for all profiles and m: the two-dimensional Fourier transform of w(r) c_m(r) cos(m phi), with w
+// the ring of a window, is i^-m cos(m psi) H_m(k). Lengths are in a unit that resolves the ring's detail. The table is
+// wrong beyond the Nyquist frequency and for windows that begin or end within less than a unit.
 class HankelTable {
 public:
     static constexpr std::size_t no_column = static_cast<std::size_t>(-1);
 
     HankelTable(const std::vector<ScaledProfile>& profiles, const RadialWindow& window, double unit_m);
 
-    // Columns of harmonics below m, which come first.
+    // Number of columns of harmonics below m, which come first.
     std::size_t columns_below(std::size_t m) const { return m_columns_below[m]; }
 
-    // Place of a harmonic in a row; `no_column` where the profile lacks it.
+    // Column of a profile's harmonic; `no_column` if the profile lacks it.
     std::size_t column(std::size_t profile, std::size_t m) const { return m_column[profile * harmonic_count + m]; }
 
-    // H of `count` columns from `first` on at k radians per unit.
+    // H_m(k) of columns [first, first + count), k in radians per unit.
     void row(double k, std::size_t first, std::size_t count, float* values) const;
 
 private:

@@ -16,8 +16,8 @@ double sinc(double x)
     return x == 0.0 ? 1.0 : std::sin(x) / x;
 }
 
-// The transform of a texel at `turns` per node; on a coarser grid divided by that of the splines, once for the light
-// that they brought there and once for the luminance that they take away, to several texels per node.
+// Transform of a texel at `turns` per node. On a coarser grid it is divided by the transform of the splines twice, for
+// the light that they spread and the luminance that they interpolate, and by the texels per node.
 double texel_transform(double turns, std::size_t texels_per_node)
 {
     const auto step = static_cast<double>(texels_per_node);
@@ -54,7 +54,7 @@ void KernelSpectra::start(std::size_t frequency, const HarmonicRange& harmonics,
     const std::size_t functions = m_ring->columns_below(harmonics.end) - column.first_function;
     column.trig.resize(2 * (harmonics.end - harmonics.first) * frequencies);
     column.hankel.resize(functions * frequencies);
-    // Per metre, then per unit of length.
+    // Compute the frequency kx in radians per unit of length.
     const double x_turns = turns(frequency, m_plane.padded_width);
     const double kx = 2.0 * pi * x_turns * m_plane.unit() / m_plane.pitch_x;
     const auto texel_x = static_cast<float>(texel_transform(x_turns, m_plane.texels_x));
@@ -81,13 +81,13 @@ void KernelSpectra::start(std::size_t frequency, const HarmonicRange& harmonics,
         float* trig = column.trig.data() + 2 * (m - harmonics.first) * frequencies;
         std::copy(column.cosine.begin(), column.cosine.end(), trig);
         std::copy(column.sine.begin(), column.sine.end(), trig + frequencies);
-        // At the Nyquist frequency a function that is odd along that axis has no spectrum.
+        // At the Nyquist frequency, functions that are odd along its axis have no spectrum.
         if (x_nyquist)
             std::fill_n(m % 2 == 1 ? trig : trig + frequencies, frequencies, 0.0f);
         trig[2 * frequencies - 1] = 0.0f;
         next();
     }
-    constexpr std::size_t at_once = 16;  // fill a cache line of each function
+    constexpr std::size_t at_once = 16;  // frequencies that fill a cache line of each function
     column.values.resize(at_once * functions);
     for (std::size_t first = 0; first < frequencies; first += at_once) {
         const std::size_t count = std::min(at_once, frequencies - first);

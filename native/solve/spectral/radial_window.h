@@ -1,4 +1,5 @@
-// Smooth rings that a kernel is cut into.
+// Smooth windows that divide a kernel into rings, with the error function as in Ewald's sums (Ewald 1921,
+// doi:10.1002/andp.19213690304).
 #pragma once
 
 #include <cmath>
@@ -6,17 +7,17 @@
 
 namespace beamspread {
 
-// A window of standard deviation 1 falls like erfc around this radius; at its pole it is within erfc(4.75 / sqrt(2)) / 2 =
-// 1.0e-6 of 1, at its end within erfc(4.5 / sqrt(2)) / 2 = 3.4e-6 of 0. Half a deviation less each: 1.1e-5 and 3.2e-5.
+// Radius around which a window of standard deviation 1 falls like erfc, and its end. The window's error is erfc(4.75 /
+// sqrt(2)) / 2 = 1.0e-6 at its pole and erfc(4.5 / sqrt(2)) / 2 = 3.4e-6 at its end. Larger: smaller errors, more time.
 inline constexpr double window_radius = 4.75;
 inline constexpr double window_end = 9.25;
 
-// What is between two windows, up to a cut; lengths in texels.
+// The ring between two windows, tapered at a cut. Lengths are in texels.
 struct RadialWindow {
-    double inner = 0.0;  // standard deviations: the inner window is left out;
-    double outer = 0.0;  // of the outer one only the inside is kept; 0: no such window
-    double cut = 0.0;    // the ring is whole up to here,
-    double taper = 0.0;  // and falls to zero over this length beyond
+    double inner = 0.0;  // standard deviation of the inner window, which the ring excludes
+    double outer = 0.0;  // standard deviation of the outer window, outside of which the ring ends; 0: none
+    double cut = 0.0;    // radius at which the taper begins
+    double taper = 0.0;  // length over which it falls to zero
 
     double end() const { return cut + taper; }
 

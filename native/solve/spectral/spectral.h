@@ -40,7 +40,8 @@ public:
     std::size_t terms() const { return m_terms.terms.size(); }
 
 private:
-    // What light does beyond the reach of the texels' kernels, in the scale of the texels' sums before their own factor.
+    // What light does beyond the reach of the texels' kernels, in the scale of the texels' sums before their own
+    // factor.
     struct CoarseLuminance {
         CoarseGrid grid;
         std::vector<std::vector<float>> nodes;  // [result]

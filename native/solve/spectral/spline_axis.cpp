@@ -11,8 +11,8 @@ namespace beamspread {
 
 namespace {
 
-// M(u + s), s = 0 .. spline_order - 1, by the recursion of Schoenberg's cardinal splines on [0, order]:
-// M_(n+1)(t) = t / n M_n(t) + (n + 1 - t) / n M_n(t - 1).
+// Values of the spline M(u + s), s = 0 .. spline_order - 1, by the recursion of cardinal B-splines on [0, order]:
+//   M_(n+1)(t) = t / n M_n(t) + (n + 1 - t) / n M_n(t - 1).
 std::array<double, spline_order> spline_values(double u)
 {
     std::array<double, spline_order> values{1.0};
@@ -49,7 +49,7 @@ void SplineAxis::spread(const float* texels, float* nodes, std::vector<float>& s
     std::fill_n(nodes, m_nodes, 0.0f);
     scratch.resize(m_nodes);
     for (std::size_t phase = 0; phase < std::min(m_step, m_size); ++phase) {
-        // Texels of equal weights.
+        // Collect the texels of equal weights.
         const std::size_t count = (m_size - phase + m_step - 1) / m_step;
         for (std::size_t i = 0; i < count; ++i)
             scratch[i] = texels[phase + i * m_step];

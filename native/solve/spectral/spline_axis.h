@@ -1,4 +1,4 @@
-// Values on texels by way of a coarser grid.
+// Cardinal B-splines between texels and the nodes of a coarser grid.
 #pragma once
 
 #include <cstddef>
@@ -6,12 +6,13 @@
 
 namespace beamspread {
 
-// Order of the splines: polynomials of one degree less.
+// Order of the splines: one more than their polynomials' degree. Larger: smaller errors, more time.
 inline constexpr std::size_t spline_order = 8;
 
-// Texels along one axis, and nodes several texels apart: cardinal B-splines around the nodes take values from texels to
-// nodes, and back. The first node lies spline_order / 2 - 1 steps before the first texel. A detail of wave number k
-// comes with images of it, of relative size (k / (2 pi / step - k))^spline_order.
+// Texels along one axis, and nodes `step` texels apart. Cardinal B-splines (Schoenberg 1973,
+// doi:10.1137/1.9781611970555) around the nodes take values from texels to nodes and back. The first node lies
+// spline_order / 2 - 1 steps before the first texel. A detail of wave number k gets aliases of relative size (k / (2 pi
+// / step - k))^spline_order.
 class SplineAxis {
 public:
     SplineAxis(std::size_t size, std::size_t step);
@@ -19,17 +20,16 @@ public:
     std::size_t nodes() const { return m_nodes; }
     std::size_t step() const { return m_step; }
 
-    // A texel's weights at spline_order nodes, the first of which is that of number texel / step().
+    // A texel's weights at the spline_order nodes from node texel / step().
     const float* weights(std::size_t texel) const { return m_weights.data() + texel % m_step * spline_order; }
 
-    // The transform of the splines, by which a spectrum on the nodes differs from that on the texels, at `turns` per
-    // step.
+    // Fourier transform of a spline at `turns` per step: the factor between spectra on the nodes and on the texels.
     static double response(double turns);
 
-    // nodes[n] = the sum of all texels with their weights. `scratch` is resized as needed.
+    // Sets the nodes to the weighted sums of all texels. `scratch` is resized as needed.
     void spread(const float* texels, float* nodes, std::vector<float>& scratch) const;
 
-    // Adds the values at `count` texels from `first` on.
+    // Adds the interpolated values of texels [first, first + count).
     void add_interpolated(const float* nodes, std::size_t first, std::size_t count, float* texels,
                           std::vector<float>& scratch) const;
 

@@ -16,29 +16,28 @@ namespace beamspread {
 
 namespace {
 
-// On planes of up to so many texels, the square of this, all terms are kept: choosing would take as long.
-constexpr std::size_t small_plane = 192;
+// Side (square root of the number of texels) of planes up to which all terms are kept. Larger: a choice for fewer
+// planes, more transforms.
+constexpr std::size_t max_untruncated_side = 192;
 
-// What the texels looked at may use up of the tolerance. The rest is for those between, and for what the probe is off by:
-// over the lights of tests/bench/terms.py the worst of all texels then uses up .57.
-constexpr double share = 0.25;
+// Fraction of the tolerance that errors at the probed texels may use; the rest is for other texels and the probe's own
+// error. Larger: fewer terms, larger errors.
+constexpr double error_budget = 0.25;
 
-// So often there is a closer look around the texels where errors are largest. Without, the worst texel there is off by
-// twice as much, for 3 % fewer terms. Half as many texels are as good, twice as many take 1.2 times as long.
+// Number of refinement passes around the texels with the largest error, and sites in each. More: smaller errors, more
+// time.
 constexpr std::size_t refinements = 2;
 constexpr std::size_t worst_count = 12;
 
-// Errors relative to the brightest texel that transforms in single precision make anyway: half of the 1e-5 that tests
-// leave to deep shadow.
+// Error relative to the brightest texel that is always allowed: rounding of transforms in single precision.
 constexpr double rounding = 5e-6;
 
-// The mean of a site relative to what harmonic 0 alone would bring: where light travels away from, sums of harmonics are
-// small, and off by about this. Half and twice choose the same.
-constexpr double least_asymmetry = 0.01;
+// Smallest mean radiance of a site, over the radiance by harmonic 0 alone: where light travels away from the site, sums
+// of harmonics are small and off by about this.
+constexpr double min_asymmetry = 0.01;
 
-// Of many lights so many stand for all: the brightest, whose light changes most from texel to texel. Of 60 lamps of random
-// colours 2 and 8 choose the same terms, in the same time.
-constexpr std::size_t most_lights = 4;
+// Number of lights that are probed, the brightest, which change most between texels. More: smaller errors, more time.
+constexpr std::size_t max_probed_lights = 4;
 
 using Readings = std::vector<std::vector<float>>;  // [texel][result and function]
 
@@ -52,12 +51,12 @@ std::vector<std::size_t> representatives(const Incidence& incidence)
     std::vector<std::size_t> lights(incidence.extremes.size());
     std::iota(lights.begin(), lights.end(), std::size_t{0});
     std::ranges::stable_sort(lights, std::greater{}, [&](std::size_t l) { return incidence.extremes[l].irradiance; });
-    lights.resize(std::min(lights.size(), most_lights));
+    lights.resize(std::min(lights.size(), max_probed_lights));
     return lights;
 }
 
-// What each candidate brings to the radiance of the texels looked at, [texel and result][candidate], in units of the
-// error allowed there.
+// Each candidate's part of the radiance at the probed texels, [texel and result][candidate], in units of the allowed
+// error.
 Eigen::ArrayXXf relative_parts(const Readings& readings, const std::vector<KernelDecomposition::Term>& terms,
                                double tolerance)
 {
@@ -69,18 +68,18 @@ Eigen::ArrayXXf relative_parts(const Readings& readings, const std::vector<Kerne
         std::vector<double> nearby(sites);
         for (std::size_t s = 0; s < sites; ++s) {
             double all = 0.0;
-            double evenly = 0.0;  // by m = 0
+            double by_harmonic_0 = 0.0;
             for (std::size_t i = s * texels_per_site; i < (s + 1) * texels_per_site; ++i)
                 for (std::size_t c = 0; c < candidates; ++c) {
                     const auto part = static_cast<double>(readings[i][r * candidates + c]);
                     all += part;
-                    evenly += terms[c].m == 0 ? part : 0.0;
+                    by_harmonic_0 += terms[c].m == 0 ? part : 0.0;
                 }
-            nearby[s] = std::max(all, least_asymmetry * evenly) / static_cast<double>(texels_per_site);
+            nearby[s] = std::max(all, min_asymmetry * by_harmonic_0) / static_cast<double>(texels_per_site);
         }
         const double brightest = *std::max_element(nearby.begin(), nearby.end());
         for (std::size_t i = 0; i < readings.size(); ++i) {
-            const double allowed = share * tolerance * nearby[i / texels_per_site] + rounding * brightest;
+            const double allowed = error_budget * tolerance * nearby[i / texels_per_site] + rounding * brightest;
             for (std::size_t c = 0; c < candidates && allowed > 0.0; ++c)
                 parts(index(i * results + r), index(c)) =
                     static_cast<float>(static_cast<double>(readings[i][r * candidates + c]) / allowed);
@@ -89,12 +88,12 @@ Eigen::ArrayXXf relative_parts(const Readings& readings, const std::vector<Kerne
     return parts;
 }
 
-// Leaves out one after the other, those first that bring least per transform, as long as no error is beyond 1.
-// Finds those that are kept, and the errors of [texel and result].
-std::pair<std::vector<std::size_t>, Eigen::ArrayXf> leave_out(const Eigen::ArrayXXf& parts,
-                                                              const std::vector<KernelDecomposition::Term>& terms)
+// Drops terms in the order of their parts per transform, the smallest first, while no error exceeds 1. Returns the kept
+// terms, and the errors, [texel and result].
+std::pair<std::vector<std::size_t>, Eigen::ArrayXf> drop_terms(const Eigen::ArrayXXf& parts,
+                                                               const std::vector<KernelDecomposition::Term>& terms)
 {
-    // Fourth powers, as the few texels where a term brings most decide whether it is needed.
+    // Sum fourth powers: the few texels with the largest parts decide whether a term is needed.
     std::vector<float> worth(terms.size());
     parallel_for(worth.size(), [&](std::size_t c) {
         worth[c] = parts.col(index(c)).square().square().sum() / (terms[c].m > 0 ? 2.0f : 1.0f);
@@ -123,10 +122,10 @@ std::vector<Texel> worst_sites(const std::vector<Texel>& texels, const Eigen::Ar
     std::vector<Eigen::Index> order(static_cast<std::size_t>(sites));
     std::iota(order.begin(), order.end(), Eigen::Index{0});
     std::ranges::stable_sort(order, std::greater{}, [&](Eigen::Index site) { return worst[site]; });
-    std::vector<Texel> found;
+    std::vector<Texel> middles;
     for (std::size_t i = 0; i < std::min(worst_count, order.size()); ++i)
-        found.push_back(texels[static_cast<std::size_t>(order[i]) * texels_per_site + texels_per_site / 2]);
-    return found;
+        middles.push_back(texels[static_cast<std::size_t>(order[i]) * texels_per_site + texels_per_site / 2]);
+    return middles;
 }
 
 }  // namespace
@@ -136,11 +135,11 @@ std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const 
 {
     std::vector<std::size_t> candidates(kernels.terms().size());
     std::iota(candidates.begin(), candidates.end(), std::size_t{0});
-    if (light.changing.empty()) {  // all is to come
+    if (light.changing.empty()) {  // light is added later
         progress.advance(work);
         return kernels.within(tolerance);
     }
-    if (candidates.empty() || light.plane.texels() <= small_plane * small_plane)
+    if (candidates.empty() || light.plane.texels() <= max_untruncated_side * max_untruncated_side)
         return candidates;
 
     const std::vector<std::size_t> lights = representatives(incidence);
@@ -158,7 +157,7 @@ std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const 
                               readings.begin() + static_cast<std::ptrdiff_t>(first));
             progress.advance(part);
         });
-        auto [kept, error] = leave_out(relative_parts(readings, kernels.terms(), tolerance), kernels.terms());
+        auto [kept, error] = drop_terms(relative_parts(readings, kernels.terms(), tolerance), kernels.terms());
         if (round == refinements)
             return kept;
         const std::vector<Texel> more = sites_around(worst_sites(texels, error), light.plane, round);

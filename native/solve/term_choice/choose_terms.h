@@ -1,4 +1,4 @@
-// The terms of a low-rank basis that a plane's radiance needs.
+// Choice of the terms of a low-rank basis that a plane's radiance needs.
 #pragma once
 
 #include <cstddef>
@@ -10,13 +10,13 @@
 
 namespace beamspread {
 
-// A cheap choice of terms by which the radiance is off by at most `tolerance`, everywhere relative to the mean of the
-// 17 x 17 texels around, and hence relative to its sum; beside some 1e-5 of the brightest texel.
+// Chooses few terms with which the radiance is off by at most `tolerance`, everywhere relative to the mean of the 17 x
+// 17 texels around (and hence relative to its sum), besides some 1e-5 of the brightest texel.
 //
-// Errors of kernels cancel over light that varies smoothly and add up in the dark beside it, so the radiance decides,
-// at some texels: what every term brings there is found first, and then terms are left out as long as all that is left
-// out stays within a share of the tolerance. Small planes keep all. Without any light to look at, the kernels decide: they
-// are off by `tolerance`. Advances the progress by `work`.
+// Errors of kernels cancel over smooth light and add up in the dark beside it, hence the radiance at probed texels
+// decides: every term's part of it is computed, then terms are dropped while the sum of all dropped parts stays within
+// a fraction of the tolerance. Small planes keep all terms. Without light, the error of the kernels decides. Advances
+// the progress by `work`.
 std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const Incidence& incidence,
                                       const LightTerms& light, double tolerance, Progress& progress, double work);
 

@@ -13,21 +13,19 @@ namespace beamspread {
 
 namespace {
 
-// Pairs of texels among which sites are drawn, and how far apart the two are at most: borders of shadows, patterns of a
-// texel, of a site, and wider ones.
+// Number of texel pairs from which sites are drawn, and their largest distances in texels: light edges, patterns of a
+// site, and wider ones. More pairs: edges are found more reliably, more time.
 constexpr std::size_t pairs = 4096;
 constexpr std::array<std::size_t, 3> pair_reach = {1, site_reach, 4 * site_reach};
 
-// Sites anywhere, and where light changes from one texel of a pair to the other: without closer looks, half as many again
-// and twice as many leave the worst texel off by as much, and ask for more terms.
+// Number of sites anywhere, and of sites at pairs with different light. More: smaller errors, more terms.
 constexpr std::size_t anywhere = 32;
 constexpr std::size_t changing = 32;
 
-// Sites around each place where a light is extreme, at most so many texels away; without these, lights of
-// tests/bench/terms.py are off by up to 2.5 times the tolerance.
+// Largest distances, in texels, of the sites around each extreme of a light. More: smaller errors, more time.
 constexpr std::array<std::size_t, 4> extreme_reach = {0, site_reach / 2, 3 * site_reach / 2, 7 * site_reach / 2};
 
-// And around each texel that sites are asked around.
+// Largest distance, in texels, of `sites_around`.
 constexpr std::size_t around_reach = 3 * site_reach / 2;
 
 class Sites {
@@ -41,7 +39,7 @@ public:
         return {near(texel.y, reach, m_plane.height), near(texel.x, reach, m_plane.width)};
     }
 
-    // The middle, and one texel from each eighth of the square around it.
+    // Adds the middle, and one texel from each of the eight parts of the square around it.
     void add(const Texel& middle)
     {
         for (std::size_t i = 0; i < texels_per_site; ++i)
@@ -64,7 +62,7 @@ private:
         return first + below(std::min(size, at + reach + 1) - first);
     }
 
-    // In a third of the texels from `site_reach` before to as many behind that lie on the plane.
+    // A random texel in one third of those within `site_reach` that lie on the plane.
     std::size_t within(std::size_t at, std::size_t third, std::size_t size)
     {
         const std::size_t first = at - std::min(at, site_reach);
@@ -78,7 +76,7 @@ private:
     std::vector<Texel> m_texels;
 };
 
-// By how much the light of two texels differs, relative to the light.
+// Difference of the light of two texels, relative to the light.
 float change(const LightTerms& light, const std::vector<std::size_t>& lights, const Texel& a, const Texel& b)
 {
     float sum = 0.0f;
@@ -96,11 +94,11 @@ float change(const LightTerms& light, const std::vector<std::size_t>& lights, co
     return sum > 0.0f ? difference / sum : 0.0f;
 }
 
-// The texel nearest to the lines that the beams at some texels travel along: where these come from a lamp, harmonics of
-// any order add up around it with the same sign, also where it is dark. None if the lines are parallel or meet elsewhere.
+// The texel nearest to the lines along which the beams at some texels travel. Around a lamp, harmonics of any order add
+// up with the same sign, in the dark too. None if the lines are parallel or meet outside the plane.
 std::optional<Texel> origin(const Plane& plane, const PlaneLight& light, const std::vector<Texel>& texels)
 {
-    glm::dmat2 sum(0.0);  // of projections across the lines
+    glm::dmat2 sum(0.0);  // of the projections across the lines
     Vec2 projected(0.0);
     for (const auto& [y, x] : texels) {
         const Vec3 travel = travel_at(plane, light.directions, y, x);
@@ -111,14 +109,14 @@ std::optional<Texel> origin(const Plane& plane, const PlaneLight& light, const s
         sum += glm::outerProduct(across, across);
         projected += across * glm::dot(across, Vec2(x, y));
     }
-    constexpr double parallel = 1e-6;  // to a thousandth of a radian
+    constexpr double parallel = 1e-6;  // square of an angle of a thousandth of a radian
     const double trace = sum[0][0] + sum[1][1];
     if (glm::determinant(sum) <= parallel * trace * trace)
         return std::nullopt;
-    const Vec2 place = glm::inverse(sum) * projected;
-    const bool on_plane = place.x >= 0.0 && place.y >= 0.0 && place.x < static_cast<double>(plane.width) &&
-                          place.y < static_cast<double>(plane.height);
-    return on_plane ? std::optional(Texel{static_cast<std::size_t>(place.y), static_cast<std::size_t>(place.x)})
+    const Vec2 point = glm::inverse(sum) * projected;
+    const bool on_plane = point.x >= 0.0 && point.y >= 0.0 && point.x < static_cast<double>(plane.width) &&
+                          point.y < static_cast<double>(plane.height);
+    return on_plane ? std::optional(Texel{static_cast<std::size_t>(point.y), static_cast<std::size_t>(point.x)})
                     : std::nullopt;
 }
 
@@ -132,29 +130,29 @@ std::vector<Texel> probe_sites(const LightTerms& light, const std::vector<std::s
     for (const Texel& corner : {Texel{0, 0}, Texel{0, last.x}, Texel{last.y, 0}, last})
         sites.add(corner);
     std::vector<Texel> drawn;
-    std::vector<float> sums;  // of changes
+    std::vector<float> sums;  // cumulative changes
     for (std::size_t i = 0; i < pairs; ++i) {
         const Texel texel = sites.anywhere();
-        const Texel other = sites.near(texel, pair_reach[i % pair_reach.size()]);
-        drawn.push_back(i % 2 == 0 ? texel : other);
-        sums.push_back((sums.empty() ? 0.0f : sums.back()) + change(light, lights, texel, other));
+        const Texel neighbour = sites.near(texel, pair_reach[i % pair_reach.size()]);
+        drawn.push_back(i % 2 == 0 ? texel : neighbour);
+        sums.push_back((sums.empty() ? 0.0f : sums.back()) + change(light, lights, texel, neighbour));
     }
     for (std::size_t i = 0; i < anywhere; ++i)
         sites.add(drawn[i]);
     for (std::size_t i = 0; i < changing && sums.back() > 0.0f; ++i) {
-        const float place = sums.back() * (static_cast<float>(i) + 0.5f) / static_cast<float>(changing);
-        sites.add(drawn[static_cast<std::size_t>(std::ranges::lower_bound(sums, place) - sums.begin())]);
+        const float quantile = sums.back() * (static_cast<float>(i) + 0.5f) / static_cast<float>(changing);
+        sites.add(drawn[static_cast<std::size_t>(std::ranges::lower_bound(sums, quantile) - sums.begin())]);
     }
     for (const std::size_t l : lights) {
         const Incidence::Extremes& extremes = incidence.extremes[l];
         if (extremes.irradiance == 0.0)
             continue;
-        std::vector<Texel> places = {extremes.brightest, extremes.steepest, extremes.most_grazing};
-        if (const std::optional<Texel> from = origin(light.plane, light.changing[l], drawn))
-            places.push_back(*from);
-        for (const Texel& place : places)
+        std::vector<Texel> texels = {extremes.brightest, extremes.steepest, extremes.most_grazing};
+        if (const std::optional<Texel> lamp = origin(light.plane, light.changing[l], drawn))
+            texels.push_back(*lamp);
+        for (const Texel& texel : texels)
             for (const std::size_t reach : extreme_reach)
-                sites.add(sites.near(place, reach));
+                sites.add(sites.near(texel, reach));
     }
     return sites.take();
 }

@@ -14,20 +14,18 @@ namespace beamspread {
 
 namespace {
 
-// About as many as profiles have radius bins: 4 would save a term in fifty and take 1.4 times as long.
+// Rings per octave of radius. More: fewer terms, more time.
 constexpr double rings_per_octave = 3.0;
 
-// Beyond 64, the number of harmonics, even light sums up to nothing in all of them but 0; more of them lessen the noise
-// that is taken for what a function brings. Half of them here ask for 4 % more terms, a quarter far away for 3 %.
+// Directions in near and far rings: above 64, the number of harmonics, so that even light cancels in all harmonics but
+// 0. More: less noise, fewer terms, more time.
 constexpr std::size_t near_directions = 96;
 constexpr std::size_t far_directions = 384;
 
-// Of the tables of the angle, which the basis has 4096 of: functions change by some per cent from one to the next. Half
-// and twice ask for as many terms within 2 %, and the worst texel is as far off.
+// Steps of the tables over the angle, in which functions change by some per cent. More: more exact, more cache.
 constexpr std::size_t angle_steps = 256;
 
-// A site is as small beside rings of so many times its reach as a texel's neighbours are. Half asks for 3 % fewer terms,
-// twice for as many; the worst texel is as far off with either.
+// Radius, in texels, from which all texels of a site share a ring. Larger: more exact, more time.
 constexpr double far_radius = 5.0 * static_cast<double>(site_reach);
 
 }  // namespace
@@ -52,9 +50,9 @@ RadianceProbe::RadianceProbe(const LightTerms& light, std::vector<std::size_t> l
     }
     m_by_angle.resize(angle_steps * m_row_size);
     for (const auto& [m, rank, values] : basis.functions) {
-        m_places.push_back(starts[rank] + m);
+        m_positions.push_back(starts[rank] + m);
         for (std::size_t step = 0; step < angle_steps; ++step)
-            m_by_angle[step * m_row_size + m_places.back()] =
+            m_by_angle[step * m_row_size + m_positions.back()] =
                 values[(2 * step + 1) * (values.size() - 1) / (2 * angle_steps)].value;
     }
 
@@ -64,7 +62,7 @@ RadianceProbe::RadianceProbe(const LightTerms& light, std::vector<std::size_t> l
     const Plane& plane = light.plane;
     reach = std::min(reach, std::hypot(static_cast<double>(plane.width) * plane.pitch_x,
                                        static_cast<double>(plane.height) * plane.pitch_y));
-    // The first lies inside the texel itself.
+    // The first ring lies inside the texel itself.
     for (double r = 0.5 * std::min(plane.pitch_x, plane.pitch_y); m_radii.empty() || m_radii.back() < reach;
          r *= std::exp2(1.0 / rings_per_octave)) {
         m_radii.push_back(r);
@@ -98,8 +96,8 @@ std::vector<std::vector<float>> RadianceProbe::read(std::span<const Texel> site)
         add_rings(texel, 0, m_near, sums);
         parts.emplace_back();
         for (std::size_t r = 0; r < results; ++r)
-            for (const std::size_t place : m_places)
-                parts.back().push_back(sums[r * m_row_size + place]);
+            for (const std::size_t position : m_positions)
+                parts.back().push_back(sums[r * m_row_size + position]);
     }
     return parts;
 }
@@ -118,18 +116,19 @@ void RadianceProbe::add_rings(const Texel& texel, std::size_t first, std::size_t
         const Vec2 turn(std::cos(step), std::sin(step));
         const double inner = ring > 0 ? m_radii[ring - 1] : 0.0;
         const double phi = random.uniform() * step;
-        Vec2 way(std::cos(phi), std::sin(phi));  // from the light
+        Vec2 toward_probe(std::cos(phi), std::sin(phi));  // from the light
         for (std::size_t i = 0; i < directions; ++i) {
-            way = {way.x * turn.x - way.y * turn.y, way.x * turn.y + way.y * turn.x};
+            toward_probe = {toward_probe.x * turn.x - toward_probe.y * turn.y,
+                            toward_probe.x * turn.y + toward_probe.y * turn.x};
             const double r = inner + random.uniform() * (m_radii[ring] - inner);
-            const double x = static_cast<double>(texel.x) + 0.5 - r * way.x / plane.pitch_x;
-            const double y = static_cast<double>(texel.y) + 0.5 - r * way.y / plane.pitch_y;
+            const double x = static_cast<double>(texel.x) + 0.5 - r * toward_probe.x / plane.pitch_x;
+            const double y = static_cast<double>(texel.y) + 0.5 - r * toward_probe.y / plane.pitch_y;
             if (!(x >= 0.0 && y >= 0.0 && x < static_cast<double>(plane.width) &&
                   y < static_cast<double>(plane.height)))
                 continue;
             for (const std::size_t l : m_lights)
                 add_beam(m_light.changing[l], m_light.colors[l],
-                         {static_cast<std::size_t>(y), static_cast<std::size_t>(x)}, way, cosines, moments);
+                         {static_cast<std::size_t>(y), static_cast<std::size_t>(x)}, toward_probe, cosines, moments);
         }
         for (std::size_t r = 0; r < m_light.sets.results.size(); ++r) {
             const auto& [set, medium, members] = m_light.sets.results[r];
@@ -139,21 +138,23 @@ void RadianceProbe::add_rings(const Texel& texel, std::size_t first, std::size_t
     }
 }
 
-// Irradiance times u(theta) times cos(m (phi - beta)), phi being the azimuth of the way from the light to the texel.
+// Adds irradiance times u(theta) times cos(m (phi - beta)), with phi the azimuth of the direction from the light to the
+// probed texel.
 void RadianceProbe::add_beam(const PlaneLight& light, const std::vector<float>& colors, const Texel& texel,
-                             const Vec2& way, AlignedVector<float>& cosines, AlignedVector<float>& moments) const
+                             const Vec2& toward_probe, AlignedVector<float>& cosines,
+                             AlignedVector<float>& moments) const
 {
     const float irradiance = light.irradiance(texel.y, texel.x);
     if (irradiance == 0.0f)
         return;
     const Vec3 travel = travel_at(m_light.plane, light.directions, texel.y, texel.x);
     const double across = std::sqrt(travel.x * travel.x + travel.y * travel.y);
-    const Vec2 toward = across > 0.0 ? Vec2(travel) / across : Vec2(1.0, 0.0);
+    const Vec2 beam = across > 0.0 ? Vec2(travel) / across : Vec2(1.0, 0.0);
     const auto half_tangent = static_cast<float>(across / (glm::length(travel) - travel.z));
     const auto step = static_cast<std::size_t>(std::max((half_tangent - m_first_angle) * m_steps_per_angle, 0.0f));
     const float* by_angle = m_by_angle.data() + std::min(step, angle_steps - 1) * m_row_size;
-    multiple_angles(cosines.data(), static_cast<float>(glm::dot(toward, way)),
-                    static_cast<float>(toward.x * way.y - toward.y * way.x), irradiance, m_harmonics);
+    multiple_angles(cosines.data(), static_cast<float>(glm::dot(beam, toward_probe)),
+                    static_cast<float>(beam.x * toward_probe.y - beam.y * toward_probe.x), irradiance, m_harmonics);
     for (std::size_t set = 0; set < colors.size(); ++set)
         add_harmonics(moments.data() + set * m_row_size, by_angle, cosines.data(), colors[set], m_columns.data(),
                       m_columns.size());
