@@ -239,106 +239,79 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace beamspread {
 
-namespace {
+// Defines a function that calls the loop of that name for the best target.
+#define BEAMSPREAD_DISPATCH(name, parameters, arguments) \
+    HWY_EXPORT(name);                                    \
+    void name parameters                                 \
+    {                                                    \
+        HWY_DYNAMIC_DISPATCH(name) arguments;            \
+    }
 
-HWY_EXPORT(add_scaled);
+BEAMSPREAD_DISPATCH(add_scaled, (float* sum, const float* values, float factor, std::size_t count),
+                    (sum, values, factor, count))
+
 HWY_EXPORT(add_scaled_double);
-HWY_EXPORT(multiply_rows);
-HWY_EXPORT(scale);
-HWY_EXPORT(multiply);
-HWY_EXPORT(add_scaled_product);
-HWY_EXPORT(add_product);
-HWY_EXPORT(interpolate);
-HWY_EXPORT(rotate);
-HWY_EXPORT(find_steps);
-HWY_EXPORT(multiple_angles);
-HWY_EXPORT(add_harmonics);
-HWY_EXPORT(find_angles);
-HWY_EXPORT(add_sources);
-HWY_EXPORT(scatter_bits);
-
-}  // namespace
-
-void add_scaled(float* sum, const float* values, float factor, std::size_t count)
-{
-    HWY_DYNAMIC_DISPATCH(add_scaled)(sum, values, factor, count);
-}
-
 void add_scaled(double* sum, const double* values, double factor, std::size_t count)
 {
     HWY_DYNAMIC_DISPATCH(add_scaled_double)(sum, values, factor, count);
 }
 
-void multiply_rows(float* product, const float* factors, const float* rows, std::size_t columns, std::size_t count,
-                   std::size_t width)
-{
-    HWY_DYNAMIC_DISPATCH(multiply_rows)(product, factors, rows, columns, count, width);
-}
+BEAMSPREAD_DISPATCH(multiply_rows,
+                    (float* product, const float* factors, const float* rows, std::size_t columns, std::size_t count,
+                     std::size_t width),
+                    (product, factors, rows, columns, count, width))
 
-void scale(float* product, const float* values, float factor, std::size_t count)
-{
-    HWY_DYNAMIC_DISPATCH(scale)(product, values, factor, count);
-}
+BEAMSPREAD_DISPATCH(scale, (float* product, const float* values, float factor, std::size_t count),
+                    (product, values, factor, count))
 
-void multiply(float* product, const float* a, const float* b, std::size_t count)
-{
-    HWY_DYNAMIC_DISPATCH(multiply)(product, a, b, count);
-}
+BEAMSPREAD_DISPATCH(multiply, (float* product, const float* a, const float* b, std::size_t count),
+                    (product, a, b, count))
 
-void add_scaled_product(float* sum, const float* a, const float* b, float factor, std::size_t count)
-{
-    HWY_DYNAMIC_DISPATCH(add_scaled_product)(sum, a, b, factor, count);
-}
+BEAMSPREAD_DISPATCH(add_scaled_product, (float* sum, const float* a, const float* b, float factor, std::size_t count),
+                    (sum, a, b, factor, count))
 
-void add_product(std::complex<float>* sum, const float* factor, const std::complex<float>* values, std::size_t count)
-{
-    HWY_DYNAMIC_DISPATCH(add_product)(sum, factor, values, count);
-}
+BEAMSPREAD_DISPATCH(add_product,
+                    (std::complex<float> * sum, const float* factor, const std::complex<float>* values,
+                     std::size_t count),
+                    (sum, factor, values, count))
 
-void interpolate(float* result, const float* table, std::size_t stride, const float* weight, std::size_t count)
-{
-    HWY_DYNAMIC_DISPATCH(interpolate)(result, table, stride, weight, count);
-}
+BEAMSPREAD_DISPATCH(interpolate,
+                    (float* result, const float* table, std::size_t stride, const float* weight, std::size_t count),
+                    (result, table, stride, weight, count))
 
-void rotate(float* cosine, float* sine, const float* cos_beta, const float* sin_beta, std::size_t count)
-{
-    HWY_DYNAMIC_DISPATCH(rotate)(cosine, sine, cos_beta, sin_beta, count);
-}
+BEAMSPREAD_DISPATCH(rotate,
+                    (float* cosine, float* sine, const float* cos_beta, const float* sin_beta, std::size_t count),
+                    (cosine, sine, cos_beta, sin_beta, count))
 
-void find_steps(std::uint32_t* step, float* part, const float* half_tangent, float first, float per_step,
-                std::uint32_t steps, std::size_t count)
-{
-    HWY_DYNAMIC_DISPATCH(find_steps)(step, part, half_tangent, first, per_step, steps, count);
-}
+BEAMSPREAD_DISPATCH(find_steps,
+                    (std::uint32_t* step, float* part, const float* half_tangent, float first, float per_step,
+                     std::uint32_t steps, std::size_t count),
+                    (step, part, half_tangent, first, per_step, steps, count))
 
-void multiple_angles(float* cosine, float cos_angle, float sin_angle, float factor, std::size_t count)
-{
-    HWY_DYNAMIC_DISPATCH(multiple_angles)(cosine, cos_angle, sin_angle, factor, count);
-}
+BEAMSPREAD_DISPATCH(multiple_angles, (float* cosine, float cos_angle, float sin_angle, float factor, std::size_t count),
+                    (cosine, cos_angle, sin_angle, factor, count))
 
-void add_harmonics(float* sum, const float* values, const float* by_harmonic, float factor, const std::size_t* first,
-                   std::size_t blocks)
-{
-    HWY_DYNAMIC_DISPATCH(add_harmonics)(sum, values, by_harmonic, factor, first, blocks);
-}
+BEAMSPREAD_DISPATCH(add_harmonics,
+                    (float* sum, const float* values, const float* by_harmonic, float factor, const std::size_t* first,
+                     std::size_t blocks),
+                    (sum, values, by_harmonic, factor, first, blocks))
 
-void find_angles(const float* directions, const float* irradiance, float* cos_beta, float* sin_beta,
-                 float* half_tangent, std::size_t count)
-{
-    HWY_DYNAMIC_DISPATCH(find_angles)(directions, irradiance, cos_beta, sin_beta, half_tangent, count);
-}
+BEAMSPREAD_DISPATCH(find_angles,
+                    (const float* directions, const float* irradiance, float* cos_beta, float* sin_beta,
+                     float* half_tangent, std::size_t count),
+                    (directions, irradiance, cos_beta, sin_beta, half_tangent, count))
 
-void add_sources(double* const* sums, std::ptrdiff_t x, const LitColumn* source, std::ptrdiff_t last,
-                 const double* kernel)
-{
-    HWY_DYNAMIC_DISPATCH(add_sources)(sums, x, source, last, kernel);
-}
+BEAMSPREAD_DISPATCH(add_sources,
+                    (double* const* sums, std::ptrdiff_t x, const LitColumn* source, std::ptrdiff_t last,
+                     const double* kernel),
+                    (sums, x, source, last, kernel))
 
-void scatter_bits(double* result, const std::uint32_t* offsets, std::uint32_t block, std::uint32_t seed,
-                  std::size_t count)
-{
-    HWY_DYNAMIC_DISPATCH(scatter_bits)(result, offsets, block, seed, count);
-}
+BEAMSPREAD_DISPATCH(scatter_bits,
+                    (double* result, const std::uint32_t* offsets, std::uint32_t block, std::uint32_t seed,
+                     std::size_t count),
+                    (result, offsets, block, seed, count))
+
+#undef BEAMSPREAD_DISPATCH
 
 // Not vectorized: one load of a pair is faster than a gather.
 void look_up(float* __restrict result, const TableStep* table, const std::uint32_t* step, const float* part,
