@@ -1,4 +1,4 @@
-"""What is linked to the node's Base Color: evaluated at the texels, on the light's way in and out."""
+"""Links to the node's Base Color: evaluated at the texels, on the light's way in and out."""
 
 import bpy
 import numpy as np
@@ -119,7 +119,7 @@ def test_the_default_is_half_and_half():
     assert node_of(add_material()).texture_blur == 0.5
 
 
-def test_what_arrives_is_not_colored(plane):
+def test_arriving_light_is_not_colored(plane):
     bpy.context.scene.beamspread.output = "IRRADIANCE"
     material = plane.data.materials[0]
     link(material, add_image(material).outputs["Color"])

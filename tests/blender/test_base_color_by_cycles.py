@@ -1,4 +1,4 @@
-"""What is linked to the node's Base Color and only Cycles knows: evaluated at the texels, in a process of its own."""
+"""Links to the node's Base Color that only Cycles can evaluate, at the texels, in a child process."""
 
 import time
 
@@ -44,7 +44,7 @@ def quick():
 @pytest.fixture
 def plane():
     add_sun(30)
-    # Of a mean free path far below a texel, so that each shows its own colour.
+    # A mean free path far below a texel: each texel shows its own colour.
     material = add_material(color_mode="BASE_COLOR", base_color=(0.5,) * 3, mean_free_path=(0.001,) * 3)
     return add_plane(material=material)
 
@@ -91,9 +91,9 @@ def evaluated(obj, number=0):
 
 
 def cycles_emission(obj, tree_of, width, height):
-    """What Cycles bakes of emission, with a tree built by `tree_of(tree, socket)`; means of FINE x FINE places.
+    """Emission that Cycles bakes, with a tree built by `tree_of(tree, socket)`; means of FINE x FINE positions.
 
-    Of one sample each: of several, Cycles moves those back into a triangle that fall beyond its edge.
+    One sample each: with several, Cycles moves those beyond a triangle's edge back into it.
     """
     material = diffuse_material((0, 0, 0), "Truth")
     tree = material.node_tree
@@ -152,9 +152,10 @@ SHEARED = ((0, 0), (0.7, 0), (1, 1), (0.3, 1))
 
 @pytest.mark.parametrize(("uvs", "tolerance"), [(WHOLE, 0.005), (TURNED, 0.005), (SHEARED, 0.06)])
 def test_noise_is_as_in_a_bake_of_emission(uvs, tolerance):
-    """Texels inside, of the whole range; those of the sheared map's grid are others, and what lies between them, where
-    this noise changes by a tenth of its range from one to the next, is interpolated. Texels that cross the border hold
-    what is beside them."""
+    """Texels inside, of the whole range. The sheared map has another grid, and colours between its texels are
+    interpolated, where this noise changes by a tenth of its range per texel. Texels that cross the border hold their
+    neighbours' colour.
+    """
     turn = Euler((0.4, 0.2, 1.1)).to_matrix().to_4x4()
     matrix = Matrix.Translation((3, -2, 5)) @ turn @ Matrix.Diagonal((1, -2, 1, 1))
     add_sun(0)
@@ -194,7 +195,7 @@ def test_colours_of_vertices_inside_a_group():
     np.testing.assert_allclose(ours[..., 2], np.broadcast_to(0.6 - 0.4 * ramp, (SIZE, SIZE)), atol=0.01)
 
 
-def test_of_several_materials_the_others_stay_out():
+def test_other_materials_of_the_object_do_not_count():
     """Two sides of a corner share a map; the view hides it, and the other side's image has no pixels."""
     add_sun(30, 180)
     vertices = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)]
@@ -217,7 +218,7 @@ def test_of_several_materials_the_others_stay_out():
     assert np.ptp(ours) > 0.2
 
 
-def test_what_is_linked_from_another_file(plane, tmp_path):
+def test_nodes_linked_from_another_file(plane, tmp_path):
     add_noise_to(plane.data.materials[0])
     truth, _ = evaluated(plane)
     library = str(tmp_path / "library.blend")

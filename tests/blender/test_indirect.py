@@ -1,4 +1,4 @@
-"""Light that Cycles finds on a copy of the scene: what bounces, what glows; and the scene stays as it is."""
+"""Light that Cycles finds on a copy of the scene, bounced and emitted; the scene stays unchanged."""
 
 import importlib
 import math
@@ -46,7 +46,7 @@ def glowing_material(strength):
 
 
 def add_halves(tree, socket):
-    """Link what is .9, .5, .1 where x < 0, and .1, .5, .9 beyond."""
+    """Link a colour of .9, .5, .1 for x < 0, and .1, .5, .9 beyond."""
     place, split = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeSeparateXYZ")
     join = tree.nodes.new("ShaderNodeCombineXYZ")
     step, red, blue = (tree.nodes.new("ShaderNodeMath") for _ in range(3))
@@ -110,7 +110,7 @@ def test_a_wall_returns_light_as_in_cycles():
     ours = blocks(irradiance(floor, True) - irradiance(floor, False))
     material, image = target_material((GREY,) * 3, TEXELS)
     floor.data.materials[0] = material
-    # In 3.4 a bake of indirect light alone lacks what lamps send.
+    # In 3.4 a bake of indirect light alone lacks the lamps' light.
     both, direct = (cycles_bake(floor, image, passes, 2048) for passes in ({"DIRECT", "INDIRECT"}, {"DIRECT"}))
     truth = blocks(both - direct)
     lit = truth > 0.1 * truth.max()
@@ -124,7 +124,7 @@ def test_a_wall_returns_light_as_in_cycles():
 
 
 def test_materials_that_the_scene_does_not_use_are_no_obstacle():
-    """Of a deleted object, or of another scene: the copy that Cycles gets lacks them."""
+    """Materials of a deleted object, or of another scene, which Cycles' copy lacks."""
     floor = add_scene()
     expected = irradiance(floor, True)
     scenes.add_material("Unused").use_fake_user = True
@@ -153,8 +153,9 @@ def test_a_textured_floor_returns_its_colours(in_group):
 
 
 def test_bounced_light_spreads_as_any_other():
-    """The base colour is what returns of even light. That of a leaning wall is not even, and some leaves at the border:
-    of all of it, as much as of even light but for 10 %."""
+    """The base colour is the reflectance under even light. Light of a leaning wall is uneven, and some leaves at the
+    border: its reflectance agrees within 10 %.
+    """
     floor = add_scene()
     scenes.node_of(floor.data.materials[0]).mean_free_path = (0.005,) * 3
     arriving, leaving = (
@@ -200,7 +201,7 @@ FRAMES = {
 
 
 def fields_of(chart, **options):
-    """What shines on a chart."""
+    """Light that arrives on a chart."""
     request = {
         "strata": STRATA.tolist(),
         "light": "DIRECT",
@@ -221,10 +222,8 @@ def fields_of(chart, **options):
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("world", FRAMES.values(), ids=FRAMES.keys())
 def test_directions_of_a_glowing_square(world, mirrored):
-    """What arrives on a small plane, stratum by stratum, against sums over the square.
-
-    With noise of .4 %: within 1.5 % of all. Of the flow 7 %, as each stratum counts as one direction and the square
-    fills parts of few.
+    """Light on a small plane, stratum by stratum, against sums over the square. The noise is .4 %: within 1.5 % of the
+    sum. The flow agrees within 7 %, because each stratum counts as one direction and the square fills parts of few.
     """
     side, place = 0.6, np.array((0.5, 0.3, 0.8))
     corners = [place + (x * side / 2, y * side / 2, 0) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
@@ -260,7 +259,7 @@ def test_directions_of_a_glowing_square(world, mirrored):
 
 
 def test_rounds_are_independent():
-    """The noise that two rounds of four samples show is what their mean has: 7 % are three deviations of 1024 nodes."""
+    """Two rounds of four samples show the noise of their mean: 7 % are three deviations of 1024 nodes."""
     panel = scenes.add_mesh("Panel", [(0.2, 0, 0.8), (0.8, 0, 0.8), (0.8, 0.6, 0.8), (0.2, 0.6, 0.8)], [(0, 1, 2, 3)])
     panel.data.materials.append(glowing_material(2.0))
     axes = {"x_axis": [1, 0, 0], "y_axis": [0, 1, 0], "normal": [0, 0, 1]}
@@ -312,7 +311,7 @@ def new_collection(obj, state):
 
 @pytest.mark.skipif(bpy.app.version < (4, 0, 0), reason="light linking came in Blender 4.0")
 @pytest.mark.parametrize("add", [lambda: scenes.add_gobo("POINT"), add_checkered_panel], ids=["lamp", "mesh"])
-def test_linking_holds_for_what_cycles_computes(add):
+def test_linking_holds_for_light_that_cycles_computes(add):
     """Light that is linked to the floor, and that the wall does not block, against a bake: all of it within 1.5 %, and
     means of 4 x 4 texels within 4 % of E, as the checker's borders are a node wide. The wall would take a third away.
     Where it is not linked to the floor it is not asked for, and not spoken of."""
@@ -344,7 +343,7 @@ def irradiance_of_jobs(floor, linking, receivers, blockers):
     return bake.layers["Irradiance"]
 
 
-def test_what_leaks_into_a_closed_box_is_no_light(monkeypatch):
+def test_leaks_into_a_closed_box_are_no_light(monkeypatch):
     """Blender's first cube around a plane as wide: some ten-millionth of the light gets in along the edges."""
     monkeypatch.setattr(cycles_light, "NODES", 64)
     floor = scenes.add_plane("Floor", material=scenes.add_material())

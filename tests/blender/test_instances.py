@@ -1,4 +1,4 @@
-"""What stands in a scene through an instance of a collection alone is baked there, as if it were made real."""
+"""An object that renders only as an instance of a collection is baked there, as if the instance were made real."""
 
 import bpy
 import numpy as np
@@ -61,7 +61,7 @@ def real_mesh(obj, matrix):
 
 
 def make_real(holder, collection, matrix):
-    """Put the instanced objects into the scene in place of the instance; by name of what they were."""
+    """Replace the instance by real objects; by name of the originals."""
     found = {}
     for obj in collection.objects:
         found[obj.name] = real_mesh(obj, matrix @ obj.matrix_world)
@@ -130,7 +130,7 @@ CHANGES = [
 
 
 @pytest.mark.parametrize(("name", "change", "parts"), CHANGES, ids=[name or "offset" for name, _, _ in CHANGES])
-def test_what_makes_a_bake_out_of_date(name, change, parts):
+def test_changes_that_make_a_bake_out_of_date(name, change, parts):
     _, collection = add_tile()
     lamp = scenes.add_lamp((0, 0, 3))
     bpy.context.scene.collection.objects.unlink(lamp)
@@ -157,7 +157,7 @@ def test_another_instance_makes_it_out_of_date_and_says_why_it_cannot_be_baked_a
 
 
 def scatter(tile):
-    """As particles as well, five times."""
+    """Five instances as particles, too."""
     plane = add_plane("Ground")
     plane.modifiers.new("Hair", "PARTICLE_SYSTEM")
     settings = plane.particle_systems[0].settings
@@ -173,7 +173,7 @@ def test_particles_count_as_places():
 
 
 def test_instances_of_other_meshes_under_its_name_are_no_places():
-    """As geometry nodes make them."""
+    """Instances made by geometry nodes."""
     tile, collection = add_tile()
     tile.modifiers.new("Scatter", "NODES").node_group = group = scatter_group(tile)
     tree_info = next(one for one in group.nodes if one.bl_idname == "GeometryNodeObjectInfo")
@@ -212,7 +212,7 @@ HIDDEN = [(hide, "Holder"), (hide, "Middle"), (hide, "Tile"), (hide_collection, 
 
 
 @pytest.mark.parametrize(("change", "name"), HIDDEN, ids=[name for _, name in HIDDEN])
-def test_what_does_not_render_is_not_baked(change, name):
+def test_objects_that_do_not_render_are_not_baked(change, name):
     holder, _, _ = nested()
     add_sun()
     change(name)
@@ -240,7 +240,7 @@ SHOWN = [
 
 
 @pytest.mark.parametrize(("change", "name"), SHOWN, ids=[name for _, name in SHOWN])
-def test_what_the_viewport_hides_is_baked(change, name):
+def test_objects_that_the_viewport_hides_are_baked(change, name):
     holder, _, _ = nested()
     add_sun(30, 20)
     truth = bake_it(holder)
@@ -294,7 +294,7 @@ def test_a_batch_follows_the_instance(tmp_path):
     assert np.array_equal(bake_it(holder), two)
 
 
-def test_estimates_are_of_what_the_selected_one_shows():
+def test_estimates_are_for_the_objects_of_the_selected_instance():
     holder, _, _ = nested()
     add_plane("Other", material=add_material("Other"))
     bpy.context.scene.beamspread.use_indirect = True
@@ -387,7 +387,7 @@ def test_an_object_of_the_scene_is_baked_where_it_stands_itself():
 
 
 @pytest.mark.skipif(bpy.app.version < (4, 0, 0), reason="light linking came in Blender 4.0")
-def test_light_is_linked_to_what_the_instancer_shows():
+def test_light_is_linked_to_the_objects_of_the_instancer():
     holder, _, _ = nested()
     other = add_plane("Other")
     sun = add_sun(30, 20)
@@ -399,8 +399,8 @@ def test_light_is_linked_to_what_the_instancer_shows():
         assert np.array_equal(found, truth) if is_lit else not found.any()
 
 
-def test_indirect_light_is_that_of_what_is_made_real(monkeypatch):
-    """Of a bright wall of the collection and of a card of the scene, by the same random numbers."""
+def test_indirect_light_is_that_of_real_objects(monkeypatch):
+    """Light of a bright wall of the collection and of a card of the scene, with the same random numbers."""
     monkeypatch.setattr(cycles_light, "NODES", 16)
     for name in ("MIN_NOISE", "MAX_NOISE"):
         monkeypatch.setattr(cycles_light, name, 0.02)
@@ -438,7 +438,7 @@ def test_cycles_counts_an_instanced_lamp_once():
     np.testing.assert_allclose(irradiance(), truth, rtol=0, atol=0.02 * truth.max())
 
 
-def test_a_colour_by_cycles_is_that_of_what_is_made_real():
+def test_a_colour_by_cycles_is_that_of_real_objects():
     """By coordinates of its own and of the world, in an object that is skewed as it stands."""
     holder, collection, matrix = in_the_scene()
     material = bpy.data.materials["Medium"]

@@ -1,4 +1,4 @@
-"""Whatever a bake leaves out or can't light is named: in the window, in the batch's report, and by the engine."""
+"""Messages name all that a bake leaves out or can't light: in the window, in the batch's report, and by the engine."""
 
 from unittest.mock import MagicMock
 
@@ -114,7 +114,7 @@ def test_a_texture_reaches_a_group_by_its_input():
     assert found[15, 8, 1] / found[0, 8, 1] == pytest.approx(15.5 / 0.5, rel=1e-3)
 
 
-def test_instances_of_what_was_baked_are_no_mistake():
+def test_instances_of_a_baked_object_are_no_mistake():
     holder = add_instances()
     node_of(bpy.data.materials["Medium"]).image = bpy.data.images.new("Baked", 4, 4)
     assert "No mesh has a material" in messages_of(lambda: bpy.ops.beamspread.bake(objects="ALL"))
@@ -123,7 +123,7 @@ def test_instances_of_what_was_baked_are_no_mistake():
 
 
 def baked_with_messages(plane):
-    """Pixels of the plane, and what the window says of the bake."""
+    """Pixels of the plane, and the window's messages about the bake."""
     (texture,) = bake(plane)
     return texture, state.lines()
 
@@ -174,7 +174,7 @@ def add_foggy_world():
 
 
 @pytest.mark.parametrize("add", [add_hair, add_volume, add_foggy_world])
-def test_what_renders_and_no_bake_knows_is_named(add):
+def test_rendered_objects_that_no_bake_knows_are_named(add):
     plane = add_plane(material=add_material())
     add_sun(0)
     sentence = add()
@@ -213,7 +213,7 @@ def test_a_black_bake_says_why(add, words, tmp_path):
     assert state.lines() == [message]
 
 
-def test_a_panel_says_once_what_both_the_object_and_its_last_bake_say(monkeypatch):
+def test_a_panel_shows_a_message_of_object_and_last_bake_once(monkeypatch):
     said = []
     monkeypatch.setattr(bake_panel, "draw_lines", lambda _layout, _context, messages, _icon: said.extend(messages))
     select(add_grouped())

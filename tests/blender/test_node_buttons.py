@@ -1,4 +1,4 @@
-"""What the node's buttons do, and what a first bake does to a material's output."""
+"""The node's buttons, and the material's output after a first bake."""
 
 import math
 import subprocess

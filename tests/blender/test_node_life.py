@@ -42,7 +42,7 @@ def test_an_older_file_that_was_open_before_the_add_on_was_switched_on():
 
 
 def test_an_older_linked_node_has_no_texture():
-    """What belongs to another file keeps its inputs, which were none."""
+    """A node of another file keeps its inputs, which were none."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     with bpy.data.libraries.load(OLDER_FILE, link=True) as (_, linked):
         linked.materials = ["Marble"]
@@ -95,7 +95,7 @@ class TestOlderFile:
 
 def test_no_input_is_greyed_out_and_trees_without_that_get_it():
     node = node_of(add_material())
-    # As trees were that had all inputs and did not use this one.
+    # Earlier trees had all inputs and did not use this one.
     tree = node.node_tree
     tree.nodes.remove(tree.nodes[UNSEEN])
     tree.links.new(inner(node, EMISSION).inputs["Color"], inner(node, IMAGE).outputs["Color"])

@@ -1,4 +1,4 @@
-"""Glowing meshes, summed over their triangles by plain code, against what Cycles bakes on a white plane."""
+"""Glowing meshes, summed over their triangles by plain code, against Cycles' bake of a white plane."""
 
 import math
 
@@ -191,7 +191,7 @@ def test_an_image_glows_by_its_uv_map(coordinates):
     add_panel(Matrix.Translation((0, 0, 0.4)), (1.5, 1.5), material)
     light = read().lights[0]
     assert 4000 < len(light.triangles) < 20000
-    # Of texels on the diagonal Cycles samples a half, which tells where one side of the plane is brighter.
+    # Cycles samples one half of texels on the diagonal, which shows if one side of the plane is brighter.
     assert_agrees(texels=64)
 
 
@@ -306,7 +306,7 @@ def test_a_bake_of_all_keeps_the_light_of_a_material_with_an_unused_node():
     assert np.array_equal(scenes.pixels(scenes.image_of(plane)), alone)
 
 
-def test_what_is_not_understood_is_named():
+def test_unsupported_nodes_are_named():
     material, emission = glowing_material()
     tree = material.node_tree
     tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs[0], emission.inputs["Strength"])

@@ -1,4 +1,4 @@
-"""Lamps of a size, as read, against Cycles; and what of a lamp is read at all."""
+"""Lamps with a size against Cycles, and the properties of a lamp that are read."""
 
 import math
 
@@ -193,7 +193,7 @@ def flat_along_its_axis(lamp):
 @pytest.mark.parametrize("shrink", [zero_size, flat, nothing, flat_along_its_axis])
 @pytest.mark.parametrize("kind", ["AREA", "POINT", "SUN", "SPOT"])
 def test_no_size_at_all(kind, shrink):
-    """As Cycles, or named."""
+    """True if the light agrees with Cycles, or a message names the node."""
     lamp = add_lamp(kind, size=0.5) if kind == "AREA" else add_lamp(kind)
     if kind != "AREA" and shrink is zero_size:
         pytest.skip("lamps without a size have tests of their own")

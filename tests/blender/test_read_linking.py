@@ -146,7 +146,7 @@ def test_blockers(link):
     assert ours == cycles
 
 
-def test_an_instancer_stands_for_what_it_shows():
+def test_an_instancer_stands_for_its_objects():
     planes = add_planes()
     roof = scenes.add_plane("Roof", (3, 3), Matrix.Translation((0, 0, 1)))
     shown = new_collection("Shown", roof)

@@ -12,7 +12,7 @@ from beamspread.core.errors import NotSupportedError
 from cycles_truth import add_receiver, cycles_irradiance
 from mathutils import Matrix
 
-# Of even light from everywhere, Cycles' own sum is exact but for single precision.
+# Cycles sums even light from everywhere exactly, but for single precision.
 EXACT = {"rel": 2e-5, "abs": 2e-6}
 COLORS = (0.8, 0.3, 0.15, 1), (0.25, 0.6, 0.4, 1)
 
@@ -55,7 +55,7 @@ class World:
         return cycles
 
     def assert_near(self):
-        """Where Cycles does not see that the light is even, it takes random samples: 1024 of each of 16 texels."""
+        """Cycles takes random samples of light that it does not know to be even: 1024 for each of 16 texels."""
         return self.assert_agree(1024, rel=3e-3)
 
 
@@ -65,7 +65,7 @@ def world():
 
 
 def set_inputs(node, *values):
-    """Of the enabled inputs, in order."""
+    """Values of the enabled inputs, in order."""
     for socket, value in zip([socket for socket in node.inputs if socket.enabled], values):
         socket.default_value = value
 
@@ -115,7 +115,7 @@ def test_blackbody(world, temperature):
     assert world.ours() == pytest.approx(cycles, abs=0.004 * cycles.max())
 
 
-# Of a Mapping node: vector, location, rotation and scale.
+# Inputs of a Mapping node: vector, location, rotation and scale.
 PLACED = ((0.3, 0.5, 0.2), (0.1, -0.2, 0.3), (0.4, 0.5, 0.6), (1.5, 0.7, 2))
 PLAIN = [
     ("ShaderNodeMapRange", {}, (0.4, 0.1, 0.9, 2.0, -1.0)),
@@ -235,7 +235,7 @@ def test_the_world_as_diffuse_surfaces_see_it(world, output):
     path, mix = world.add("ShaderNodeLightPath"), world.add("ShaderNodeMixShader")
     other = world.add("ShaderNodeBackground")
     other.inputs["Color"].default_value = COLORS[1]
-    # What cameras alone see need not be understood.
+    # Nodes that cameras alone see are not evaluated.
     world.link(world.add("ShaderNodeTexNoise").outputs["Color"], other.inputs["Color"])
     world.background.inputs["Color"].default_value = COLORS[0]
     for socket, source in zip(mix.inputs, (path.outputs[output], world.background.outputs[0], other.outputs[0])):
@@ -245,7 +245,7 @@ def test_the_world_as_diffuse_surfaces_see_it(world, output):
 
 
 def test_shaders(world):
-    """Emission is Background; added, mixed, and what does not emit."""
+    """Emission counts as Background: added, mixed, and with shaders that do not emit."""
     emission = world.add("ShaderNodeEmission")
     emission.inputs["Color"].default_value, emission.inputs["Strength"].default_value = COLORS[0], 2
     world.background.inputs["Color"].default_value = COLORS[1]
@@ -269,7 +269,7 @@ def test_shaders(world):
     assert not world.assert_near().any()
 
 
-def test_what_is_not_understood_is_named(world):
+def test_unsupported_nodes_are_named(world):
     noise = world.add("ShaderNodeTexNoise", name="Clouds")
     world.show(noise.outputs["Color"])
     with pytest.raises(NotSupportedError, match="The node 'Clouds' is not supported"):

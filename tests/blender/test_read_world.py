@@ -1,4 +1,4 @@
-"""The world's panorama, summed over the sky by plain code, against what Cycles bakes on a white plane."""
+"""The world's panorama, summed over the sky by plain code, against Cycles' bake of a white plane."""
 
 import math
 
@@ -152,7 +152,7 @@ def test_a_turned_environment_keeps_its_texels(turn):
 
 
 def test_a_mirrored_and_a_stretched_environment():
-    """What no turn can do is looked up anew."""
+    """A change that is no rotation is evaluated again."""
     _, background = add_world()
     texture = add_environment(studio("sunset"), background, (0, 0, 0.7))
     mapping = texture.inputs["Vector"].links[0].from_node
@@ -251,7 +251,7 @@ def test_huge_images_are_averaged_with_their_energy():
     assert energy(small) == pytest.approx(energy(pixels), rel=1e-5)
 
 
-def test_what_is_not_understood_is_left_to_cycles():
+def test_unsupported_nodes_are_left_to_cycles():
     _, background = add_world()
     tree = background.id_data
     tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], background.inputs["Color"])

@@ -85,7 +85,7 @@ def add_card(material, size=(1.2, 1.2), **options):
 
 
 def our_irradiance(plane):
-    """By the add-on, at FINE x FINE points of each texel (FINE H, FINE W, 3), and what it warns of."""
+    """Transmittance by the add-on at FINE x FINE points of each texel (FINE H, FINE W, 3), and its warnings."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     illumination = read_illumination(depsgraph)
     polygons = fit_uv_maps(read_polygons(plane.evaluated_get(depsgraph), "Target"))
@@ -105,7 +105,7 @@ def in_texels(fine):
 
 
 def assert_agree(warnings=()):
-    """Within 1 % of the brightest where a texel is even, else among what we find within it; returns ours."""
+    """Within 1 % of the brightest if a texel is even, else within the range of our values in it; returns ours."""
     plane, image = add_receiver(Matrix())
     scenes.add_sun(20, 30)
     cycles = cycles_irradiance(plane, image)
@@ -210,7 +210,7 @@ def grouped(tree):
 
 
 def muted(tree):
-    """Cycles takes what a muted node hands on: of a mix the first shader."""
+    """A muted node passes on one input in Cycles: a mix its first shader."""
     mix = tree.mix(0.3, tree.transparent(0.6, 0.6, 0.6), tree.add("BsdfDiffuse"))
     mix.mute = True
     return mix
@@ -247,7 +247,7 @@ def test_trees_that_let_three_fifths_through(shader):
 
 
 @pytest.mark.parametrize("kind", ["BsdfGlass", "BsdfRefraction", "BsdfTranslucent", "Holdout"])
-def test_what_bends_or_spreads_light_throws_full_shadows(kind):
+def test_shaders_that_bend_or_spread_light_cast_full_shadows(kind):
     tree = Tree()
     add_card(tree.finish(tree.add(kind)))
     assert not assert_agree()[28, 34].any()
@@ -304,7 +304,7 @@ def test_a_volume_alone_lets_light_through_and_says_so():
     assert assert_agree(warnings=[words]).min() > 0
 
 
-def test_what_is_not_understood_is_opaque_and_named():
+def test_unsupported_nodes_are_opaque_and_named():
     tree = Tree("Mottled")
     factor = tree.add("TexNoise").outputs[0]
     add_card(tree.finish(tree.mix(factor, tree.transparent(1, 1, 1), tree.add("BsdfDiffuse"))))
