@@ -1,31 +1,33 @@
-"""Extends baked texels beyond the border of their chart, so that filtering never meets unbaked texels."""
+"""Margin: extends baked texels beyond the border of their chart, so that texture filters read no unbaked texels."""
 
 from __future__ import annotations
 
 import numpy as np
 
 NEIGHBOURS = [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)]
-# Coverage of a texel wholly inside a chart, but for rounding.
+
 WHOLE = 0.99
-# A straight edge leaves no texel inside the chart farther than this from one wholly inside it.
+"""Coverage from which a texel counts as completely inside a chart; the rest is rounding."""
+
 BORDER_RINGS = 2
+"""Distance (texels) within which every texel that a straight edge cuts has a neighbour completely inside the chart."""
 
 
 def extend_margin(texture: np.ndarray, coverage: np.ndarray, margin: int) -> np.ndarray:
     """Fill up to `margin` rings of texels around a chart with the mean of their filled neighbours.
 
-    A texel across the chart's edge holds the light of its part inside only, down to none: what the rings continue
-    is what surrounds the texels wholly inside, where there are any nearby.
+    A texel that the chart's edge cuts holds only the light of its part inside. The rings therefore continue the texels
+    completely inside, if there are any nearby.
 
     Parameters
     ----------
     texture : float32 (H, W, C)
-    coverage : (H, W), part of each texel inside the chart; where it is not 0, texels are kept as they are.
-    margin : rings of texels, >= 0.
+    coverage : (H, W), fraction of each texel inside the chart. Texels with a coverage above 0 stay as they are.
+    margin : number of rings of texels, >= 0.
 
     Returns
     -------
-    float32 (H, W, C), a new array; texels beyond the margin are those of `texture`.
+    float32 (H, W, C), a new array; texels beyond the margin stay as they are.
     """
     if margin < 0:
         raise ValueError(f"margin is {margin}; it must be 0 or more")
@@ -39,7 +41,7 @@ def extend_margin(texture: np.ndarray, coverage: np.ndarray, margin: int) -> np.
 
 def _add_rings(texture: np.ndarray, known: np.ndarray, count: int) -> np.ndarray:
     """A copy with `count` rings around the known texels filled."""
-    # A frame of unknown texels spares questions at the borders.
+    # A frame of unknown texels makes border checks unnecessary.
     result = np.pad(texture.astype(np.float32, copy=False), ((1, 1), (1, 1), (0, 0)))
     filled = np.pad(known, 1)
     rows, columns = np.nonzero(_touched(filled))
