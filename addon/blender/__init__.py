@@ -12,16 +12,16 @@ Each part imports only core and those above it (tests/unit/test_layers.py reads 
     cycles        light and colors that Cycles finds in a process of its own
     images        images of the scene: their files, facts about their bakes, storing results
     jobs          bakes of targets (run), their status (state), and changes since (out_of_date)
-    live          images that follow the scene while it is worked on
+    live          previews that follow the scene while it is worked on
     ui            panels
 """
 
 from . import preferences, settings
-from .images import image_operators, previews, sequence, undo
+from .images import image_operators, sequence, undo
 from .jobs import state
 from .jobs.out_of_date import stale
 from .jobs.run import engine, operator
-from .live import session
+from .live import timer
 from .node import buttons, menu, node
 from .registration import all_or_nothing
 from .ui import panels
@@ -31,7 +31,6 @@ PARTS = (
     settings,
     image_operators,
     sequence,
-    previews,
     undo,
     node,
     menu,
@@ -40,7 +39,7 @@ PARTS = (
     stale,
     engine,
     operator,
-    session,
+    timer,
     panels,
 )
 

@@ -18,9 +18,9 @@ import numpy as np
 from beamspread import Medium, library
 from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.surface import Surface
-from beamspread.core.live.media import Media
-from beamspread.core.live.picture import Studio, for_live
-from beamspread.core.live.subject import Subject
+from beamspread.core.live.library_service import LibraryService
+from beamspread.core.live.live_target import LiveTarget
+from beamspread.core.live.renderer import LiveRenderer, for_live
 from beamspread.core.material import Material
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import PointLight, SunLight
@@ -51,7 +51,7 @@ def in_window(resolution):
             results = json.loads(path.read_text()) if path.exists() else {"error": done.stdout + done.stderr}
         if "error" in results:
             raise RuntimeError(results["error"])
-        print(f"{shading}, {resolution} x {resolution}: seconds to the texture, to the drawn picture, worst, exact")
+        print(f"{shading}, {resolution} x {resolution}: seconds to the texture, to the drawn window, worst, exact")
         for name, row in results.items():
             numbers = " ".join(f"{row[key]:6.3f}" if key in row else 6 * " " for key in
                                ("stored", "drawn", "worst drawn", "exact"))  # fmt: skip
@@ -59,19 +59,19 @@ def in_window(resolution):
 
 
 def beside_bakes(resolution):
-    print("quick pictures beside bakes: sum of all errors over the sum, worst texel over the brightest, seconds")
+    print("quick renderings beside bakes: sum of all errors over the sum, worst texel over the brightest, seconds")
     for ior in (1.4, 1.0):
         library(Medium(0.8, ior))
         for name, light in LIGHTS.items():
             material = Material(albedo=(0.99, 0.9, 0.6), mean_free_path=(0.02,) * 3, anisotropy=0.8, ior=ior)
             rest = Illumination([light], CARD), Surface(material), for_live(BakeSettings())
-            subject = Subject(Target("Floor"), FLOOR, (resolution, resolution), resolution, *rest)
-            studio = Studio(Media())
-            exact = studio.exact(subject).texture
+            target = LiveTarget(Target("Floor"), FLOOR, (resolution, resolution), resolution, *rest)
+            renderer = LiveRenderer(LibraryService())
+            exact = renderer.exact(target).texture
             for side in (512, 256, 128, 64):
-                studio.quick(subject, side)
+                renderer.quick(target, side)
                 start, cpu = time.perf_counter(), time.process_time()
-                quick = studio.quick(subject, side).texture
+                quick = renderer.quick(target, side).texture
                 seconds = time.perf_counter() - start, time.process_time() - cpu
                 error = np.abs(quick - exact)
                 total, worst = (error.sum((0, 1)) / exact.sum((0, 1))).max(), (error / exact.max((0, 1))).max()

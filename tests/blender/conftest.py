@@ -4,7 +4,7 @@ import threading
 
 import bpy
 import pytest
-from beamspread.blender.live import session
+from beamspread.blender.live import timer
 
 
 @pytest.fixture(autouse=True)
@@ -20,5 +20,5 @@ def empty_file():
 def live_switched_off():
     """Live ends after the test, and its threads with it."""
     yield
-    session.end()
+    timer.end()
     assert not [thread.name for thread in threading.enumerate() if thread.name.startswith("Beamspread")]

@@ -4,20 +4,20 @@ import time
 
 import bpy
 import scenes
-from beamspread.blender.live import session
+from beamspread.blender.live import preview, timer
 
 PATIENCE_SECONDS = 30
 
 
 def settle(until=None):
-    """Take steps until all is painted, or until a condition holds."""
+    """Take steps until everything is rendered, or until a condition holds."""
     began = time.monotonic()
     bpy.context.view_layer.update()
     while True:
-        session.step(bpy.context)
-        live = session.live.session
-        calm = live is not None and not live.is_busy()
-        if until() if until else calm:
+        timer.step(bpy.context)
+        live = timer.live.session
+        is_calm = live is not None and not live.is_busy()
+        if until() if until else is_calm:
             return
         assert time.monotonic() < began + PATIENCE_SECONDS
         time.sleep(0.005)
@@ -37,14 +37,34 @@ def make_scene(image_size=64, **properties):
     return plane, lamp, material
 
 
+def shown_image(material):
+    """The image that renderers see in the material's node."""
+    return scenes.node_of(material).node_tree.nodes["Image"].image
+
+
+def shown_pixels(material):
+    return scenes.pixels(shown_image(material))
+
+
 def live_pixels(material):
+    """Pixels that renderers see once everything is rendered."""
     settle()
-    return scenes.pixels(scenes.node_of(material).image)
+    return shown_pixels(material)
+
+
+def hidden_images():
+    """Names of all images that Live has made."""
+    return {image.name for image in bpy.data.images if image.name.startswith(preview.NAME)}
+
+
+def shows_own_image(material):
+    """True if the node shows its own image, and nothing of Live is left."""
+    return shown_image(material) == scenes.node_of(material).image and not hidden_images()
 
 
 def switch_off():
     bpy.context.scene.beamspread.use_live = False
-    session.step(bpy.context)
+    timer.step(bpy.context)
 
 
 def save(folder, name="scene.blend"):
@@ -53,4 +73,4 @@ def save(folder, name="scene.blend"):
 
 def live_lines() -> list[str]:
     """Messages about Live, a line each."""
-    return [message.line() for message in session.messages()]
+    return [message.line() for message in timer.messages()]

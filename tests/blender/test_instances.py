@@ -9,14 +9,14 @@ from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.run.batch_run import bake_all
 from beamspread.blender.jobs.run.prepare import prepare_scene
 from beamspread.blender.jobs.state import Status, state
-from beamspread.blender.live import session
+from beamspread.blender.live import timer
 from beamspread.blender.node.find import find_bakeable
 from beamspread.blender.ui import bake_panel
 from beamspread.blender.ui.bake_panel import estimates
 from beamspread.core.batch import batch_options
 from beamspread.core.target import Target
 from instance_scenes import MIRRORED, SKEWED, WITHIN, add_instancer, add_tile, nest
-from live_scenes import live_lines, settle
+from live_scenes import live_lines, settle, shown_pixels
 from mathutils import Euler, Matrix
 from panel_layout import Layout, context
 from scenes import (
@@ -465,7 +465,7 @@ def test_a_colour_by_cycles_is_that_of_real_objects():
 @pytest.fixture
 def live():
     yield
-    session.end()
+    timer.end()
 
 
 def test_live_follows_the_instance(live):
@@ -477,13 +477,13 @@ def test_live_follows_the_instance(live):
     bpy.context.scene.beamspread.use_live = True
     settle()
     assert live_lines() == []
-    before = pixels(image)
+    before = shown_pixels(material)
     holder.rotation_euler.y += 0.4
     settle()
-    after = pixels(image)
+    after = shown_pixels(material)
     assert np.abs(after - before).max() > 0.05 * before.max()
     bpy.context.scene.beamspread.use_live = False
-    session.step(bpy.context)
+    timer.step(bpy.context)
     select(holder)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
     np.testing.assert_allclose(after, pixels(image), rtol=0, atol=0.02 * before.max())

@@ -1,4 +1,4 @@
-"""Live: images follow the scene. In background no timer runs: these tests take its steps."""
+"""Live: previews follow the scene. In background no timer runs: these tests take its steps."""
 
 import time
 
@@ -6,19 +6,27 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from beamspread.blender.live import session
-from live_scenes import live_lines, live_pixels, make_scene, settle
+from beamspread.blender.live import timer
+from live_scenes import (
+    hidden_images,
+    live_lines,
+    live_pixels,
+    make_scene,
+    settle,
+    shown_pixels,
+    shows_own_image,
+    switch_off,
+)
 
 pytestmark = pytest.mark.usefixtures("live_switched_off")
 
 
 def baked_pixels(plane):
-    bpy.context.scene.beamspread.use_live = False
-    session.step(bpy.context)
+    switch_off()
     return scenes.bake(plane)[0]
 
 
-def test_at_rest_the_picture_is_the_bake():
+def test_at_rest_the_preview_is_the_bake():
     plane, lamp, material = make_scene()
     live_pixels(material)
     lamp.location.x = -0.4
@@ -27,18 +35,18 @@ def test_at_rest_the_picture_is_the_bake():
 
 
 @pytest.mark.parametrize("change", ["lamp", "node"])
-def test_a_change_is_looked_at_before_the_next_step(change, monkeypatch):
+def test_a_change_is_scanned_before_the_next_step(change, monkeypatch):
     plane, lamp, material = make_scene()
     plane.location.x = 0.1
-    settle()  # more than lamps has been looked at: how long that takes is known
-    painter, asked = session.live.session._painter, []
-    monkeypatch.setattr(painter, "show", asked.append)
+    settle()  # a scan of more than lamps has been timed
+    thread, shown = timer.live.session._thread, []
+    monkeypatch.setattr(thread, "show", shown.append)
     if change == "lamp":
         lamp.location.x = -0.4
     else:
         scenes.node_of(material).albedo = (0.8, 0.7, 0.6)
     bpy.context.view_layer.update()
-    assert len(asked) == 1
+    assert len(shown) == 1
 
 
 def test_a_moved_lamp_reads_no_mesh(monkeypatch):
@@ -80,72 +88,104 @@ def test_every_change_is_followed(change):
     np.testing.assert_allclose(live, baked_pixels(plane), rtol=1e-4, atol=1e-5)
 
 
-def test_switched_off_images_have_their_bakes_again():
+def test_switched_off_nodes_show_their_own_images_again():
     plane, lamp, material = make_scene()
     baked = scenes.bake(plane)[0]
     lamp.location.x = -0.4
     assert np.abs(live_pixels(material) - baked).max() > 0.1 * baked.max()
-    bpy.context.scene.beamspread.use_live = False
-    session.step(bpy.context)
-    image = scenes.node_of(material).image
-    np.testing.assert_array_equal(scenes.pixels(image), baked)
-    assert not image.is_dirty
+    switch_off()
+    assert shows_own_image(material)
+    np.testing.assert_array_equal(shown_pixels(material), baked)
 
 
-def test_what_was_painted_by_hand_and_never_saved_comes_back():
-    _, _, material = make_scene()
-    image = scenes.node_of(material).image
-    by_hand = np.random.default_rng(1).random(64 * 64 * 4).astype(np.float32)
-    image.pixels.foreach_set(by_hand)
-    before = scenes.pixels(image)
-    live_pixels(material)
-    session.end()
-    np.testing.assert_array_equal(scenes.pixels(image), before)
-
-
-def test_nothing_is_written_or_packed(tmp_path):
-    _plane, _lamp, material = make_scene()
+def test_the_nodes_own_image_is_never_touched(tmp_path):
+    """Live neither writes its pixels nor its file, and packs nothing."""
+    _plane, lamp, material = make_scene()
     image = scenes.node_of(material).image
     image.colorspace_settings.is_data = True
     image.filepath_raw, image.file_format = str(tmp_path / "target.exr"), "OPEN_EXR"
     image.save()
     image.source = "FILE"
-    before = (tmp_path / "target.exr").read_bytes()
-    live_pixels(material)
-    assert image.is_dirty
+    file, pixels = (tmp_path / "target.exr").read_bytes(), scenes.pixels(image)
+    for x in (-0.4, 0.3):
+        lamp.location.x = x
+        assert live_pixels(material).max() > 0
+    assert not image.is_dirty
     assert image.packed_file is None
-    assert (tmp_path / "target.exr").read_bytes() == before
+    np.testing.assert_array_equal(scenes.pixels(image), pixels)
+    assert (tmp_path / "target.exr").read_bytes() == file
     assert len(list(tmp_path.iterdir())) == 1
 
 
-def test_a_bake_stays_until_something_changes():
-    plane, lamp, material = make_scene()
-    scenes.add_blocker(0.3)
-    live_pixels(material)
-    baked = scenes.bake(plane)[0]
-    image = scenes.node_of(material).image
-    for _ in range(5):
-        live_pixels(material)
-        bpy.context.view_layer.update()
-    assert not image.is_dirty
-    np.testing.assert_array_equal(scenes.pixels(image), baked)
-    lamp.location.x = -0.4
-    assert np.abs(live_pixels(material) - baked).max() > 0.1 * baked.max()
-
-
-def test_a_node_without_image_gets_one():
+def test_a_node_without_image_is_shown_in_the_resolution_of_the_scene():
     _plane, _lamp, material = make_scene()
-    scenes.node_of(material).image = None
+    node = scenes.node_of(material)
+    node.image = None
     bpy.context.scene.beamspread.resolution = 48
-    live_pixels(material)
-    image = scenes.node_of(material).image
-    assert tuple(image.size) == (48, 48)
-    assert image.is_float
-    assert scenes.pixels(image).max() > 0
+    assert live_pixels(material).max() > 0
+    assert live_pixels(material).shape == (48, 48, 3)
+    bpy.context.scene.beamspread.resolution = 32
+    assert live_pixels(material).shape == (32, 32, 3)
+    switch_off()
+    assert node.image is None
+    assert shows_own_image(material)
 
 
-def test_objects_that_share_an_image_keep_to_their_parts():
-    """What is outside of both stays."""
+def test_objects_of_one_material_without_image_share_a_preview():
+    """Their faces ask for images of different shapes; the preview has one."""
+    plane, _lamp, material = make_scene()
+    scenes.node_of(material).image = None
+    plane.data.uv_layers.active.data.foreach_set("uv", np.ravel([(0, 0), (0.5, 0), (0.5, 0.5), (0, 0.5)]))
+    wide = scenes.add_plane(
+        "Wide", size=(4, 1), material=material, uvs=np.add([(0, 0), (0.5, 0), (0.5, 0.5), (0, 0.5)], 0.5)
+    )
+    wide.location.x = 4
+    bpy.context.scene.beamspread.resolution = 64
+    pixels = live_pixels(material)
+    half = pixels.shape[0] // 2
+    assert pixels[:half, : pixels.shape[1] // 2].mean() > 0
+    assert pixels[half:, pixels.shape[1] // 2 :].mean() > 0
+    assert len(hidden_images()) == 1
+
+
+@pytest.mark.parametrize("kind", ["another size", "UDIM tiles", "lost file", "8 bits", "no pixels of its own"])
+def test_images_of_all_kinds(kind, tmp_path):
+    _plane, lamp, material = make_scene()
+    node, first = scenes.node_of(material), live_pixels(material).copy()
+    image = {
+        "another size": lambda: bpy.data.images.new("Other", 32, 16, float_buffer=True),
+        "UDIM tiles": lambda: bpy.data.images.new("Tiles", 32, 32, tiled=True),
+        "lost file": lambda: lost_image(tmp_path),
+        "8 bits": lambda: bpy.data.images.new("Bytes", 64, 64),
+        "no pixels of its own": lambda: None,
+    }[kind]()
+    node.image = image
+    lamp.data.energy *= 2
+    settle()
+    if kind == "UDIM tiles":
+        assert shows_own_image(material)
+        assert "has UDIM tiles" in live_lines()[0]
+        node.image = None
+        settle()
+    assert shown_pixels(material).mean() == pytest.approx(2 * first.mean(), rel=0.1)
+    assert not live_lines()
+    switch_off()
+    assert shows_own_image(material)
+
+
+def lost_image(folder):
+    """An image whose file is gone."""
+    image = bpy.data.images.new("Lost", 16, 16, float_buffer=True)
+    image.filepath_raw, image.file_format = str(folder / "lost.exr"), "OPEN_EXR"
+    image.save()
+    image.source = "FILE"
+    (folder / "lost.exr").unlink()
+    image.reload()
+    return image
+
+
+def test_objects_of_one_material_keep_to_their_parts():
+    """Texels outside of both have the values of the node's own image."""
     plane, _lamp, material = make_scene()
     bpy.context.scene.beamspread.margin = 0
     quarter = [(0, 0), (0.5, 0), (0.5, 0.5), (0, 0.5)]
@@ -160,28 +200,28 @@ def test_objects_that_share_an_image_keep_to_their_parts():
     assert values[:32, :32].mean() > values[32:, 32:].mean() > 0
 
 
-def test_what_live_leaves_out_is_said():
+def test_messages_name_the_light_that_live_leaves_out():
     _plane, _lamp, material = make_scene()
     bpy.context.scene.beamspread.use_indirect = True
     live_pixels(material)
     assert live_lines() == ["Live leaves out indirect light."]
 
 
-def test_what_cannot_follow_is_said_and_the_others_follow():
+def test_messages_name_objects_that_cannot_follow_and_the_others_follow():
     _plane, _lamp, material = make_scene()
     bent = scenes.add_plane("Bent", material=scenes.add_material("Other"))
     bent.location.x = 5
     bent.data.vertices[0].co.z = 0.5
     assert live_pixels(material).max() > 0
-    (said,) = live_lines()
-    assert said.startswith("Bent / Other: The faces are not flat")
+    (message,) = live_lines()
+    assert message.startswith("Bent / Other: The faces are not flat")
 
 
-def test_a_medium_without_library_is_stood_in_for_and_then_simulated(monkeypatch, tmp_path):
+def test_a_medium_without_library_is_simulated_and_then_shown(monkeypatch, tmp_path):
     monkeypatch.setenv("BEAMSPREAD_CACHE", str(tmp_path))
     plane, _lamp, material = make_scene(anisotropy=0.37, ior=1.37)
-    settle(lambda: session.live.session is not None and scenes.pixels(scenes.node_of(material).image).any())
-    assert not list(tmp_path.iterdir())
+    settle(lambda: any("simulates the medium (g 0.37, IOR 1.37)" in message for message in live_lines()))
+    assert not hidden_images()
     settle(lambda: list(tmp_path.iterdir()))
     np.testing.assert_allclose(live_pixels(material), baked_pixels(plane), rtol=1e-4)
 
@@ -195,25 +235,27 @@ ABUSE = {
     "mesh": lambda plane, lamp, material: plane.data.clear_geometry(),
     "scene": lambda plane, lamp, material: bpy.ops.scene.new(),
     "image's size": lambda plane, lamp, material: scenes.node_of(material).image.scale(32, 16),
-    "names": lambda plane, lamp, material: [setattr(one, "name", "New") for one in (plane, lamp, material)],
+    "names": lambda plane, lamp, material: [setattr(data, "name", "New") for data in (plane, lamp, material)],
     "edit mode": lambda plane, lamp, material: (scenes.select(plane), bpy.ops.object.mode_set(mode="EDIT")),
 }
 
 
 @pytest.mark.parametrize("happens", ABUSE.values(), ids=ABUSE)
-@pytest.mark.parametrize("is_painting", [False, True], ids=["at rest", "while painting"])
-def test_whatever_happens_to_what_it_shows(happens, is_painting, caplog):
+@pytest.mark.parametrize("is_rendering", [False, True], ids=["at rest", "while rendering"])
+def test_deleted_and_changed_data(happens, is_rendering, caplog):
     plane, lamp, material = make_scene()
     live_pixels(material)
-    if is_painting:
+    if is_rendering:
         lamp.location.x = -0.4
         bpy.context.view_layer.update()
-        session.step(bpy.context)
+        timer.step(bpy.context)
     happens(plane, lamp, material)
     for _ in range(20):
-        session.step(bpy.context)
+        timer.step(bpy.context)
         time.sleep(0.01)
     assert not caplog.records
+    switch_off()
+    assert not hidden_images()
 
 
 def test_it_goes_on_after_undo():
@@ -233,7 +275,7 @@ def test_another_file_ends_it():
     make_scene()
     settle()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    assert session.live.session is None
+    assert timer.live.session is None
 
 
 def test_frames_of_an_animation_are_followed():
@@ -249,7 +291,7 @@ def test_frames_of_an_animation_are_followed():
     np.testing.assert_allclose(last, baked_pixels(plane), rtol=1e-4)
 
 
-def test_back_to_what_was_baked_is_painted_again():
+def test_a_scene_that_goes_back_to_its_bake_is_rendered_again():
     plane, lamp, material = make_scene()
     live_pixels(material)
     baked = scenes.bake(plane)[0]
@@ -300,13 +342,15 @@ def test_a_texture_at_base_color_is_followed(monkeypatch):
     add_stripes(material, (0.3, 0.5))
     live_pixels(material)
     with monkeypatch.context() as patched:
-        patched.setattr("beamspread.blender.live.textures.read_texture", lambda *_: pytest.fail("it was read again"))
+        patched.setattr(
+            "beamspread.blender.live.texture_cache.read_texture", lambda *_: pytest.fail("it was read again")
+        )
         lamp.location.x = -0.4
         live = live_pixels(material).copy()
     np.testing.assert_allclose(live, baked_pixels(plane), rtol=1e-4, atol=1e-6)
 
 
-def test_a_texture_that_is_not_understood_is_said():
+def test_messages_name_textures_that_live_cannot_evaluate():
     _plane, _lamp, material = make_scene()
     noise = material.node_tree.nodes.new("ShaderNodeTexNoise")
     material.node_tree.links.new(scenes.node_of(material).inputs["Base Color"], noise.outputs["Color"])

@@ -1,28 +1,29 @@
-"""What Live shows is never kept, written or taken for a result. No timer runs here: the tests take its steps."""
+"""Live and bakes: a result shows as soon as it is there, and until the scene changes. The tests take Live's steps."""
 
 import bpy
 import numpy as np
 import pytest
 import scenes
-from beamspread.blender.images import previews
 from beamspread.blender.images.files import from_srgb
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.state import Status, state
-from beamspread.blender.live import session
-from live_scenes import live_lines, live_pixels, make_scene, save, settle, switch_off
+from beamspread.blender.live import timer
+from beamspread.blender.node import output
+from live_scenes import (
+    live_lines,
+    live_pixels,
+    make_scene,
+    save,
+    settle,
+    shown_image,
+    shown_pixels,
+    shows_own_image,
+    switch_off,
+)
 
 pytestmark = pytest.mark.usefixtures("live_switched_off")
 
 QUARTER = [(0, 0), (0.5, 0), (0.5, 0.5), (0, 0.5)]
-
-
-def stored_in_file(plane, folder):
-    """Bake the plane into a new image with a file, with Live still off; the file."""
-    bpy.context.scene.beamspread.image_storage = "FILES"
-    save(folder)
-    scenes.node_of(plane.data.materials[0]).image = None
-    scenes.bake(plane)
-    return next((folder / "textures").iterdir())
 
 
 def row(plane):
@@ -35,99 +36,121 @@ def make_atlas():
     bpy.context.scene.beamspread.margin = 0
     plane, lamp, material = make_scene()
     plane.data.uv_layers.active.data.foreach_set("uv", np.ravel(QUARTER))
-    other = scenes.add_plane("Other", material=scenes.add_material("Second"), uvs=np.add(QUARTER, 0.5))
+    other = scenes.add_plane("Other", material=scenes.add_material("Second", linked=True), uvs=np.add(QUARTER, 0.5))
     other.location.x = 2.5
     scenes.node_of(other.data.materials[0]).image = scenes.node_of(material).image
     bpy.context.view_layer.update()
     return plane, other, lamp, scenes.bake(plane, other)[0].copy()
 
 
-def test_a_bake_into_an_atlas_leaves_the_others_result_and_not_its_preview():
-    plane, _other, lamp, before = make_atlas()
-    material = plane.data.materials[0]
-    lamp.data.energy = 500
-    assert live_pixels(material)[32:, 32:].mean() > 2 * before[32:, 32:].mean()
-    after = scenes.bake(plane)[0]
-    assert after[:32, :32].mean() > 2 * before[:32, :32].mean()
-    np.testing.assert_array_equal(after[32:, 32:], before[32:, 32:])
-    assert not scenes.node_of(material).image.is_dirty
-
-
-def test_a_failed_bake_leaves_no_gap_in_what_live_shows():
-    plane, _other, lamp, before = make_atlas()
-    lamp.data.energy = 500
-    shown = live_pixels(plane.data.materials[0]).copy()
-    previews.give_back()
-    np.testing.assert_array_equal(scenes.pixels(scenes.node_of(plane.data.materials[0]).image), before)
-    np.testing.assert_array_equal(live_pixels(plane.data.materials[0]), shown)
-
-
-def test_a_picture_that_undo_brings_back_in_mid_bake_is_not_the_images_own():
+def test_a_bake_is_shown_until_something_changes():
     plane, lamp, material = make_scene()
-    before = scenes.bake(plane)[0].copy()
-    lamp.data.energy = 500
-    settle()
-    previews.give_back()
-    image = scenes.node_of(material).image
-    image.pixels.foreach_set(np.full(len(image.pixels), 0.5, np.float32))  # as undo in Blender 5.2 was seen to do
-    session.live.session.forget()
-    np.testing.assert_array_equal(scenes.pixels(image), before)
-    settle()
-    switch_off()
-    np.testing.assert_array_equal(scenes.pixels(scenes.node_of(material).image), before)
+    scenes.add_blocker(0.3)
+    live_pixels(material)
+    baked = scenes.bake(plane)[0]
+    for _ in range(5):
+        live_pixels(material)
+        bpy.context.view_layer.update()
+    assert shown_image(material) == scenes.node_of(material).image
+    np.testing.assert_array_equal(shown_pixels(material), baked)
+    lamp.location.x = -0.4
+    assert np.abs(live_pixels(material) - baked).max() > 0.1 * baked.max()
 
 
-def test_what_live_shows_is_not_taken_for_painted():
+def test_a_change_right_before_a_bake_is_in_it_and_the_bake_is_shown():
     plane, lamp, material = make_scene()
     scenes.bake(plane)
     settle()
-    lamp.location.x = -0.4
-    live_pixels(material)
-    lamp.location.x = 0.3
-    live_pixels(material)
-    assert scenes.node_of(material).image.is_dirty
-    assert row(plane).status == Status.BAKED
-    assert not row(plane).is_stale
+    lamp.data.energy = 5
+    baked = scenes.bake(plane)[0]
+    np.testing.assert_array_equal(live_pixels(material), baked)
+    assert shown_image(material) == scenes.node_of(material).image
 
 
-@pytest.mark.parametrize("storage", ["FILES", "PACKED"])
-def test_blender_saves_changed_images_as_it_closes(tmp_path, storage):
-    """Its dialog does so by itself, before it saves the file; the results are there again."""
+def test_a_change_after_a_bake_is_shown():
     plane, lamp, material = make_scene()
-    bpy.context.scene.beamspread.use_live = False
-    if storage == "FILES":
-        path = stored_in_file(plane, tmp_path)
-        before = path.read_bytes()
-    else:
-        scenes.bake(plane)
-    image = scenes.node_of(material).image
-    baked = scenes.pixels(image)
-    bpy.context.scene.beamspread.use_live = True
+    live_pixels(material)
+    baked = scenes.bake(plane)[0].copy()
+    timer.step(bpy.context)
+    lamp.data.energy = 5
+    assert live_pixels(material).mean() < 0.5 * baked.mean()
+
+
+def test_live_rests_while_a_bake_runs_and_shows_a_change_in_that_time_after_it(monkeypatch):
+    """A bake reads the scene when it starts. The window test has a bake that runs beside Live."""
+    plane, lamp, material = make_scene()
+    first = live_pixels(material).copy()
+    with monkeypatch.context() as running:
+        running.setattr(state, "is_running", lambda: True)
+        timer.step(bpy.context)
+        timer.step(bpy.context)
+    np.testing.assert_array_equal(shown_pixels(material), first)
+    baked = scenes.bake(plane)[0].copy()
+    lamp.data.energy = 5
+    assert live_pixels(material).mean() < 0.5 * baked.mean()
+
+
+def test_a_bake_into_an_atlas_keeps_the_result_of_the_other_object():
+    plane, other, lamp, before = make_atlas()
+    materials = plane.data.materials[0], other.data.materials[0]
     lamp.data.energy = 500
-    live_pixels(material)
-    bpy.ops.image.save_all_modified()
-    assert not image.is_dirty
-    save(tmp_path)
-    image.buffers_free()
-    np.testing.assert_array_equal(scenes.pixels(image), baked)
-    if storage == "FILES":
-        assert path.read_bytes() == before
+    assert live_pixels(materials[1])[32:, 32:].mean() > 2 * before[32:, 32:].mean()
+    after = scenes.bake(plane)[0]
+    assert after[:32, :32].mean() > 2 * before[:32, :32].mean()
+    np.testing.assert_array_equal(after[32:, 32:], before[32:, 32:])
+    settle()
+    np.testing.assert_array_equal(shown_pixels(materials[0]), after)
+    assert shown_pixels(materials[1])[32:, 32:].mean() > 2 * before[32:, 32:].mean()
 
 
-def test_what_is_saved_has_no_preview_and_live_goes_on(tmp_path):
-    _plane, _lamp, material = make_scene()
-    scenes.node_of(material).image = None
-    live_pixels(material)
-    save(tmp_path)
-    assert scenes.node_of(material).image is None
-    assert live_pixels(material).max() > 0
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
-    assert scenes.node_of(bpy.data.materials["Medium"]).image is None
-    assert not [image for image in bpy.data.images if image.source == "GENERATED"]
+def test_objects_with_copies_of_a_material_and_one_image_follow_each_on_its_own():
+    plane, lamp, material = make_scene()
+    copy = plane.copy()
+    copy.name, copy.location.x, copy.data = "A copy", 2.5, plane.data.copy()
+    copy.data.materials[0] = material.copy()
+    bpy.context.collection.objects.link(copy)
+    near, far = live_pixels(material).mean(), shown_pixels(copy.data.materials[0]).mean()
+    assert near > 2 * far > 0
+    lamp.location.x = 2.8
+    near, far = live_pixels(material).mean(), shown_pixels(copy.data.materials[0]).mean()
+    assert far > 2 * near > 0
+    assert not live_lines()
+    switch_off()
+    assert shows_own_image(material)
+    assert shows_own_image(copy.data.materials[0])
+
+
+def test_a_copy_with_the_same_material_leaves_the_preview_to_the_original():
+    plane, lamp, material = make_scene()
+    baked = scenes.bake(plane)[0].copy()
+    copy = plane.copy()
+    copy.name, copy.location.x = "A copy", 2.5
+    bpy.context.collection.objects.link(copy)
+    lamp.location.x = 0.29
+    for _ in range(3):
+        live = live_pixels(material)
+    assert live.mean() == pytest.approx(baked.mean(), rel=0.1)
+    assert [message for message in live_lines() if "A copy" in message and "of its own" in message]
+
+
+def test_live_makes_no_bake_out_of_date():
+    plane, lamp, material = make_scene()
+    texture = material.node_tree.nodes.new("ShaderNodeTexImage")
+    texture.image = bpy.data.images.new("Gray", 4, 4)
+    material.node_tree.links.new(scenes.node_of(material).inputs["Base Color"], texture.outputs["Color"])
+    output.make_plain(scenes.node_of(material))
+    scenes.bake(plane)
+    before = row(plane)
+    for x in (-0.4, 0.3):
+        lamp.location.x = x
+        live_pixels(material)
+    assert shown_image(material) != scenes.node_of(material).image
+    assert row(plane) == before
+    assert before.status == Status.BAKED
 
 
 @pytest.mark.parametrize("is_on", [True, False])
-def test_an_image_that_live_has_made_does_not_decide_where_results_are_kept(tmp_path, is_on):
+def test_a_bake_makes_the_image_of_a_node_without_one(tmp_path, is_on):
     plane, _lamp, material = make_scene()
     bpy.context.scene.beamspread.image_storage = "FILES"
     save(tmp_path)
@@ -135,45 +158,38 @@ def test_an_image_that_live_has_made_does_not_decide_where_results_are_kept(tmp_
     live_pixels(material)
     if not is_on:
         switch_off()
-        assert scenes.node_of(material).image is None
     scenes.bake(plane)
     image = scenes.node_of(material).image
     assert image.packed_file is None
     assert (tmp_path / "textures" / "Plane_Medium.exr").is_file()
     assert image.name == "Plane_Medium"
+    assert shown_image(material) == image
 
 
-def test_undo_brings_no_image_back_that_live_has_made():
-    _plane, _lamp, material = make_scene()
-    scenes.node_of(material).image = None
-    live_pixels(material)
-    bpy.ops.ed.undo_push(message="while it is shown")
-    switch_off()
-    bpy.ops.ed.undo_push(message="off")
-    bpy.ops.ed.undo()
-    assert not bpy.data.images.get("Plane_Medium")
-
-
-def test_an_image_that_is_renamed_gets_its_pixels_back():
+def test_undo_of_a_bake_has_live_go_on():
     plane, lamp, material = make_scene()
-    baked = scenes.bake(plane)[0].copy()
-    lamp.location.x = -0.4
-    live_pixels(material)
-    scenes.node_of(material).image.name = "Renamed"
-    lamp.location.y = 0.4
-    live_pixels(material)
-    switch_off()
-    np.testing.assert_array_equal(scenes.pixels(bpy.data.images["Renamed"]), baked)
+    scenes.bake(plane)
+    lamp.data.energy = 5
+    bpy.ops.ed.undo_push(message="light")
+    live = live_pixels(material).copy()
+    scenes.bake(plane)
+    bpy.ops.ed.undo_push(message="bake")
+    settle()
+    bpy.ops.ed.undo()
+    material = bpy.data.materials["Medium"]
+    np.testing.assert_allclose(live_pixels(material), live, rtol=1e-4)
+    assert shown_image(material) != scenes.node_of(material).image
 
 
-def test_make_float_and_resize_copy_no_preview():
+def test_make_float_and_resize_change_the_own_image_and_live_follows():
     plane, lamp, material = make_scene()
     node = scenes.node_of(material)
     node.image = bpy.data.images.new("Bytes", 64, 64, alpha=False)
     settle()
     baked = from_srgb(scenes.bake(plane)[0])
+    timer.step(bpy.context)
     lamp.data.energy = 5
-    assert from_srgb(live_pixels(material)).mean() < 0.5 * baked.mean()
+    assert live_pixels(material).mean() < 0.5 * baked.mean()
     bpy.ops.beamspread.make_float()
     assert node.image.is_float
     np.testing.assert_allclose(scenes.pixels(node.image), baked, atol=1e-6)
@@ -182,29 +198,5 @@ def test_make_float_and_resize_copy_no_preview():
     bpy.context.scene.beamspread.resolution = 32
     bpy.ops.beamspread.resize_image()
     assert scenes.pixels(node.image).mean() == pytest.approx(baked.mean(), rel=0.1)
-
-
-def test_a_change_during_a_bake_is_shown_after_it():
-    """The bake has read the light of before."""
-    plane, lamp, material = make_scene()
-    live_pixels(material)
-    baked = scenes.bake(plane)[0].copy()
-    lamp.data.energy = 5
-    assert live_pixels(material).mean() < 0.5 * baked.mean()
-
-
-@pytest.mark.parametrize("has_own_material", [False, True])
-def test_a_copy_leaves_the_image_to_the_original_and_live_says_so(has_own_material):
-    plane, lamp, material = make_scene()
-    baked = scenes.bake(plane)[0].copy()
-    copy = plane.copy()
-    copy.name, copy.location.x = "A copy", 2.5
-    bpy.context.collection.objects.link(copy)
-    if has_own_material:
-        copy.data = plane.data.copy()
-        copy.data.materials[0] = material.copy()
-    lamp.location.x = 0.29
-    for _ in range(3):
-        live = live_pixels(material)
-    assert live.mean() == pytest.approx(baked.mean(), rel=0.1)
-    assert [said for said in live_lines() if "A copy" in said and "of its own" in said]
+    assert live_pixels(material).shape == (32, 32, 3)
+    assert shown_pixels(material).mean() < 0.5 * baked.mean()

@@ -1,4 +1,4 @@
-"""Live in Rendered views of Cycles, which reads an image once: nodes show it a new one whenever things come to rest."""
+"""Live in Rendered views of Cycles, which reads an image once: nodes show it a new one whenever the scene rests."""
 
 import time
 
@@ -6,12 +6,21 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from beamspread.blender.live import session, stand_ins
-from live_scenes import live_pixels, make_scene, settle
+from beamspread.blender.live import session, timer
+from live_scenes import (
+    hidden_images,
+    live_pixels,
+    make_scene,
+    settle,
+    shown_image,
+    shown_pixels,
+    shows_own_image,
+    switch_off,
+)
 
 pytestmark = pytest.mark.usefixtures("live_switched_off")
 
-REST_SECONDS = session.CALM_SECONDS + stand_ins.PAUSE_SECONDS + 0.1
+REST_SECONDS = session.CALM_SECONDS + session.CYCLES_PAUSE_SECONDS + 0.1
 
 
 def views():
@@ -19,7 +28,7 @@ def views():
     return [area.spaces.active for area in areas if area.type == "VIEW_3D"]
 
 
-def look(shading):
+def shade(shading):
     for view in views():
         view.shading.type = shading
 
@@ -30,77 +39,79 @@ def scene():
         pytest.skip("this Blender starts without a 3D View")
     plane, lamp, material = make_scene()
     bpy.context.scene.render.engine = "CYCLES"
-    look("RENDERED")
+    shade("RENDERED")
     return plane, lamp, material
 
 
-def seen(material):
-    """What renderers see, once things rest."""
+def at_rest(material):
+    """The image that renderers see once the scene rests."""
     settle()
     end = time.monotonic() + REST_SECONDS
     while time.monotonic() < end:
-        session.step(bpy.context)
+        timer.step(bpy.context)
         bpy.context.view_layer.update()
         time.sleep(0.01)
-    return scenes.node_of(material).node_tree.nodes["Image"].image
+    return shown_image(material)
 
 
-def left_behind():
-    return [image.name for image in bpy.data.images if image.name.startswith(stand_ins.NAME)]
-
-
-def test_it_gets_a_new_image_whenever_things_come_to_rest(scene):
+def test_it_gets_a_new_image_whenever_the_scene_comes_to_rest(scene):
+    """Cycles recognizes images by their addresses."""
     _plane, lamp, material = scene
-    own = scenes.node_of(material).image
-    first = seen(material)
-    assert first != own
-    assert np.array_equal(scenes.pixels(first), scenes.pixels(own))
-    identity, before = first.as_pointer(), scenes.pixels(first).copy()
-    assert seen(material).as_pointer() == identity  # nothing has changed
+    first = at_rest(material)
+    address, pixels = first.as_pointer(), scenes.pixels(first).copy()
+    assert at_rest(material).as_pointer() == address  # nothing has changed
     lamp.location.x = -0.3
-    second = seen(material)
-    assert second.as_pointer() != identity  # by which Cycles knows it, also after a quick picture and an exact one
-    assert np.array_equal(scenes.pixels(second), scenes.pixels(own))
-    assert not np.allclose(scenes.pixels(second), before)
-    assert len(left_behind()) == 2  # the one before keeps its address
+    second = at_rest(material)
+    assert second.as_pointer() != address
+    assert not np.allclose(scenes.pixels(second), pixels)
+    assert len(hidden_images()) == 2  # the former one keeps its address
 
 
-@pytest.mark.parametrize("end", ["off", "another view", "save", "bake"])
-def test_then_nodes_show_their_own_image_again(scene, end, tmp_path):
-    plane, _lamp, material = scene
-    node = scenes.node_of(material)
-    assert seen(material) != node.image
+def test_other_views_follow_between_two_images(scene):
+    _plane, lamp, material = scene
+    image = at_rest(material)
+    name, before = image.name, scenes.pixels(image).copy()
+    lamp.location.x = -0.3
+    settle(lambda: np.abs(shown_pixels(material) - before).max() > 0.1 * before.max())
+    assert shown_image(material).name == name
+
+
+@pytest.mark.parametrize("end", ["off", "another view", "bake"])
+def test_no_image_stays_behind(scene, end):
+    plane, lamp, material = scene
+    at_rest(material)
+    lamp.location.x = -0.3
+    at_rest(material)
     if end == "off":
-        bpy.context.scene.beamspread.use_live = False
-        session.step(bpy.context)
+        switch_off()
     elif end == "another view":
-        look("MATERIAL")
-        session.step(bpy.context)
-    elif end == "save":
-        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+        shade("MATERIAL")
+        timer.step(bpy.context)
+        assert len(hidden_images()) == 1
+        return
     else:
         scenes.bake(plane)
-    assert node.node_tree.nodes["Image"].image == node.image
-    assert left_behind() == []
+        timer.step(bpy.context)
+    assert shows_own_image(material)
 
 
-def test_a_file_that_has_kept_one_shows_the_nodes_own_image(scene, tmp_path):
-    """As Blender's own automatic saving does, of which nobody is told."""
-    _plane, _lamp, material = scene
-    own = scenes.node_of(material).image
-    own.pack()
-    stand_in = bpy.data.images.new(stand_ins.NAME, 4, 4)
-    scenes.node_of(material).node_tree.nodes["Image"].image = stand_in
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
-    node = scenes.node_of(bpy.data.materials["Medium"])
-    assert node.node_tree.nodes["Image"].image == node.image == bpy.data.images["Target"]
-
-
-def test_others_follow_between_two_looks(scene):
-    _plane, lamp, material = scene
-    before = scenes.pixels(seen(material)).copy()
-    lamp.location.x = -0.3
-    own = live_pixels(material)  # the exact picture comes last
-    assert np.array_equal(scenes.pixels(scenes.node_of(material).node_tree.nodes["Image"].image), own)
-    assert np.abs(own - before).max() > 0.1 * before.max()
+def test_a_final_render_shows_the_preview(scene, tmp_path):
+    """F12 takes what the viewport shows, whether or not the node's own image has a file."""
+    plane, lamp, material = scene
+    scenes.bake(plane)
+    lamp.data.energy = 500
+    live = live_pixels(material).copy()
+    lamp.hide_render = True  # the coat would reflect it
+    bpy.context.scene.cycles.max_bounces = 0
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.type, camera.data.ortho_scale, camera.location.z = "ORTHO", 2.0, 5.0
+    bpy.context.collection.objects.link(camera)
+    render = bpy.context.scene.render
+    bpy.context.scene.camera, bpy.context.scene.cycles.samples = camera, 4
+    bpy.context.scene.cycles.use_denoising = False
+    render.resolution_x = render.resolution_y = 64
+    render.filepath, render.image_settings.file_format = str(tmp_path / "render.exr"), "OPEN_EXR"
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(render.filepath)
+    assert scenes.pixels(image).mean() == pytest.approx(live.mean(), rel=0.05)
+    np.testing.assert_array_equal(shown_pixels(material), live)

@@ -10,7 +10,7 @@ import pytest
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
-    """What live_window.py noted."""
+    """Results of live_window.py."""
     if not bpy.app.binary_path:
         pytest.skip("the bpy module opens no window")
     path = tmp_path_factory.mktemp("window") / "results.json"
@@ -28,24 +28,34 @@ def seen(tmp_path_factory):
     return results
 
 
-def test_pictures_come_while_lamps_are_dragged_and_where_somebody_looks(seen):
-    assert seen["painted in solid view"] == 0
-    assert seen["painted while dragged"] > 3
+def test_previews_follow_lamps_that_are_dragged_where_a_view_shows_materials(seen):
+    assert seen["shown in solid view"] == 0
+    assert seen["shown while dragged"] > 3
 
 
-def test_a_bake_has_the_images_to_itself_and_stays(seen):
+def test_live_rests_beside_a_bake_whose_result_stays(seen):
     assert seen["bake"] == ["RUNNING_MODAL"]
-    assert seen["painted during the bake"] == 0
-    assert seen["painted after the bake"] == 0
+    assert seen["shown beside the bake"]
+    assert seen["shown during the bake"] == 0
+    assert seen["a change during the bake is shown"]
+    assert seen["shown after the bake"] == 0
     assert seen["the bake stays"]
 
 
+def test_strokes_go_to_the_own_image(seen):
+    assert seen["slots while painting"] == ["Plane_Medium"]
+
+
 def test_no_image_goes_while_blender_draws_an_icon_with_it(seen):
-    """In a thread, which crashed."""
+    """Blender draws icons in a thread, which crashed."""
     assert seen["icons are drawn"] == [True, False]
 
 
-def test_nothing_ends_it_but_its_switch_and_it_leaves_nothing_behind(seen):
+def test_undo_shows_the_preview_at_once_and_live_goes_on(seen):
+    assert seen["shown right after undo"]
     assert seen["still on after undo"]
+
+
+def test_only_its_switch_ends_live_and_nothing_stays_behind(seen):
     assert seen["failure"] == ""
     assert seen["threads"] == []

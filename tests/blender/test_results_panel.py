@@ -1,7 +1,7 @@
 """What panels say of bakes."""
 
 from beamspread.blender.jobs.state import Row, Status, state
-from beamspread.blender.live import session
+from beamspread.blender.live import timer
 from beamspread.blender.ui import bake_panel
 from beamspread.core.messages import Level, Message, Messages, note, warning
 from beamspread.core.target import Target
@@ -35,7 +35,7 @@ def test_what_keeps_live_from_following_is_said_once(monkeypatch):
     target = Target("First", "One")
     message = Message(Level.ERROR, str(target), why)
     state.rows = {target: Row(target, Status.FAILED, (message,))}
-    monkeypatch.setattr(session, "messages", lambda: [message, note("", "Live leaves out indirect light.")])
+    monkeypatch.setattr(timer, "messages", lambda: [message, note("", "Live leaves out indirect light.")])
     bake_panel.draw_bake(layout, context())
     assert layout.said.count(why) == 1
     assert "indirect" in layout.said

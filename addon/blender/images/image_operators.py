@@ -10,7 +10,7 @@ from ...core.bake.runner import Bake
 from ...core.target import Target
 from ..node.find import find_node
 from ..registration import all_or_nothing, classes
-from . import files, icons, previews
+from . import files, icons
 from .facts import facts_of, set_facts
 from .new_image import store_new
 
@@ -36,7 +36,7 @@ class ImageOperator:
     @classmethod
     def poll(cls, context):
         image = image_in(context)
-        if image is None or previews.holds_previews_alone(image):
+        if image is None:
             return False
         return 0 not in image.size and image.library is None and cls.needed(context, image)
 
@@ -52,7 +52,6 @@ class BEAMSPREAD_OT_make_float(ImageOperator, bpy.types.Operator):
         return files.clips(image)
 
     def execute(self, context):
-        previews.give_back()
         image = image_in(context)
         name, bakes = image.name, facts_of(image).bakes
         bake = Bake(Target(""))
@@ -80,7 +79,6 @@ class BEAMSPREAD_OT_resize_image(ImageOperator, bpy.types.Operator):
         return tuple(image.size) != wanted_size(image, context.scene.beamspread.resolution)
 
     def execute(self, context):
-        previews.give_back()
         image = image_in(context)
         icons.scale(image, *wanted_size(image, context.scene.beamspread.resolution))
         image.update_tag()  # Blender sends no update for a new size

@@ -17,7 +17,7 @@ from ...core.target import Target
 from ..node.find import find_node
 from ..node.node import link_result
 from ..read.geometry import read_polygons
-from . import files, icons, previews
+from . import files, icons
 from .facts import note_bake, owners_of, users_of
 from .new_image import name_for, separate_from_other_scene, store_new
 
@@ -110,9 +110,6 @@ class Results:
 
     def _store_shown(self, node, bake: Bake, texture: np.ndarray) -> tuple[str, bpy.types.Image]:
         image = node.image
-        if image is not None and previews.holds_previews_alone(image):
-            icons.remove(image)  # which brings no settings of the user's
-            image = None
         if image is None:
             return self._new(bake, texture)
         bake.messages.add(*separate_from_other_scene(image))

@@ -1,11 +1,9 @@
-"""Images that follow the scene while it is worked on.
+"""Previews that follow the scene while it is worked on.
 
-marks      what has changed
-textures   base colours, read again where their nodes change
-reader     the scene as subjects of pictures; reads only what has changed
-saved      what an image was last saved as
-painting   images on which the user can paint: Live waits
-canvas     pixels of images, which get their own back
-stand_ins  images that Cycles sees in place of these
-session    steps of a timer: look, have it painted, show
+scene_changes  changes that depsgraph handlers note
+texture_cache  base colors of textures, read again only when their nodes change
+preview        hidden images that nodes show in place of their own
+reader         the scene as targets to render; reads only changed data
+session        one session: scans the scene, has it rendered beside the window, shows previews
+timer          switches the session on and off, steps it, and passes Blender's handlers on
 """

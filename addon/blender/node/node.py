@@ -24,6 +24,7 @@ from .tree import (
     is_inner_tree,
     make_inner_tree,
     show_image,
+    show_ior,
     show_values,
 )
 
@@ -80,7 +81,9 @@ def _edited(node, _context) -> None:
 
 def _ior_edited(node, context) -> None:
     _edited(node, context)
-    _show(node, context)
+    tree = own_tree(node)
+    if tree is not None:
+        show_ior(tree, node.ior)
 
 
 def _color_edited(node, _context) -> None:
@@ -93,14 +96,22 @@ def _color_edited(node, _context) -> None:
 
 
 def _show(node, _context) -> None:
-    """Bring image and IOR into the inner tree, and give the node a tree of its own first.
+    """Bring image and IOR into the node's inner tree."""
+    tree = own_tree(node)
+    if tree is not None:
+        show_values(tree, node.image, node.ior)
+        _color_edited(node, _context)
+
+
+def own_tree(node):
+    """The node's inner tree, up to date and the node's own from here on; None without one.
 
     A copied node shares the original's tree until then. In `copy()` Blender has not counted the users of the new node
     yet: another tree would leave the original's with too few, and Blender would drop it when it saves.
     """
     tree = node.node_tree
     if tree is None:
-        return
+        return None
     plain = plain_of(node)
     if _is_shared(tree, plain) and sum(node.node_tree == tree for node in all_nodes()) > 1:
         tree = tree.copy()
@@ -109,8 +120,7 @@ def _show(node, _context) -> None:
         if plain is not None:
             plain.node_tree = tree
     _upgrade(tree)
-    show_values(tree, node.image, node.ior)
-    _color_edited(node, _context)
+    return tree
 
 
 def _is_shared(tree, plain=None) -> bool:

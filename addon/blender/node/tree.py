@@ -136,6 +136,11 @@ def _normal_or_plain(tree, given):
 def show_values(tree, image, ior: float) -> None:
     """Bring an image and an index of refraction into the tree."""
     show_image(tree, image)
+    show_ior(tree, ior)
+
+
+def show_ior(tree, ior: float) -> None:
+    """Bring an index of refraction into the tree, whose image stays."""
     tree.nodes[FRESNEL].inputs["IOR"].default_value = max(ior, 1.0)
     # Without a step in refraction there is no coat, whatever the renderer's Fresnel node says at grazing angles.
     tree.nodes[COAT].inputs[1].default_value = 1.0 if ior > 1 else 0.0

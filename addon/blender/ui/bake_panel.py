@@ -21,7 +21,7 @@ from ..images.files import check_image
 from ..images.results import check_editable
 from ..jobs.run.linked_color import needs_cycles
 from ..jobs.state import Row, Status, state
-from ..live import session
+from ..live import timer
 from ..node.find import find_misplaced, find_node, find_targets, materials_of, rendered_counts, was_baked_elsewhere
 from ..popup import wrap
 from ..read.visibility import ObjectInstance, by_name, check_instance, with_instanced
@@ -104,7 +104,7 @@ def draw_bake(layout, context, material_name: str = "") -> None:
         row.use_property_split = False  # as wide as the buttons above
         row.prop(context.scene.beamspread, "use_live", toggle=True, icon="PLAY")
         # An error that keeps an object from being baked keeps Live from following it, too.
-        new = Messages(message for message in session.messages() if message not in shown)
+        new = Messages(message for message in timer.messages() if message not in shown)
         draw_lines(layout, context, [message.line() for message in new], "INFO")
         shown.add(*new)
     draw_results(layout, context, material_name, shown)

@@ -7,7 +7,6 @@ import bpy
 from .. import compat
 from ..images.files import clips
 from ..images.image_operators import image_in, wanted_size
-from ..images.previews import holds_previews_alone
 from ..jobs.run.engine import BeamspreadEngine, active_image
 from ..node.draw import draw_properties
 from ..node.find import find_node, find_node_in_groups
@@ -26,7 +25,7 @@ def _use_columns(layout) -> None:
 def draw_image_buttons(layout, context) -> None:
     """Draw Make Float if the node's image clips, and Resize if its size differs from the scene's resolution."""
     image = image_in(context)
-    if image is None or holds_previews_alone(image) or 0 in image.size or image.library is not None:
+    if image is None or 0 in image.size or image.library is not None:
         return
     if clips(image):
         layout.operator("beamspread.make_float", text="Make Float: image clips values above 1", icon="IMAGE_DATA")

@@ -1,9 +1,8 @@
-"""Pictures that follow a scene while it changes: quick first, exact when it rests.
+"""Renderings that follow a scene while it changes: quick at first, exact once it rests.
 
-media      the library of a medium, or the nearest one while its own is simulated
-fields     terms and kernels of a medium on a grid, kept for whatever light comes
-subject    what a picture is made of
-picture    luminance at few texels by these, and at all texels as a bake
-pace       how fine a picture may be to come in time
-painter    the thread that paints
+library_service  libraries of media: at hand, or simulated in the background
+fields           terms and kernels of a medium on a grid, cached for light of any directions
+live_target      everything that a rendering needs
+renderer         luminance at few texels with cached fields, and at all texels as in a bake
+render_thread    the thread that renders
 """

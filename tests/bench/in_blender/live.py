@@ -18,24 +18,25 @@ sys.path[:0] = [str(ROOT / "build" / "stage"), str(ROOT / "tests" / "blender")]
 
 import beamspread  # noqa: E402
 import scenes  # noqa: E402
-from beamspread.blender.live import canvas, session  # noqa: E402
+from beamspread.blender.live import preview, session, timer  # noqa: E402
+from beamspread.core.live.renderer import quick_side  # noqa: E402
 
 CHANGES, WARM_UP, PAUSE_SECONDS, PATIENCE_SECONDS = 14, 4, 0.05, 20.0
 times = {"stored": 0.0, "drawn": 0.0, "exact": 0.0}
 results = {}
 
 
-def note_pictures():
-    show = canvas.Canvas.show
+def note_renderings():
+    show = preview.Preview.show
 
-    def timed(self, image, picture):
-        show(self, image, picture)
+    def timed(self, rendering):
+        show(self, rendering)
         times["stored"] = time.perf_counter()
-        if picture.is_exact:
+        if rendering.is_exact:
             times["exact"] = times["stored"]
-        times["texels"] = picture.texture.shape[:2]
+        times["texels"] = max(rendering.texture.shape)
 
-    canvas.Canvas.show = timed
+    preview.Preview.show = timed
 
 
 def note_draws():
@@ -98,7 +99,7 @@ class Stopwatch:
 
 
 def changes(name, change):
-    """Make changes one after the other; each waits for the picture of the one before to be drawn."""
+    """Make changes one after the other; each waits until the preview of the one before is drawn."""
     watch = Stopwatch()
     for number in range(CHANGES):
         watch.start()
@@ -106,7 +107,7 @@ def changes(name, change):
         yield watch.is_drawn
         watch.stop()
         yield watch.is_over(watch.drawn[-1] + PAUSE_SECONDS)
-    quick = list(session.live.session._painter.paces.values())
+    lights = timer.live.session._targets[0].illumination.lights
     last = watch.began
     yield lambda: times["exact"] > last
     results[name] = {
@@ -114,7 +115,7 @@ def changes(name, change):
         "drawn": statistics.median(watch.drawn[WARM_UP:]),
         "worst drawn": max(watch.drawn[WARM_UP:]),
         "exact": times["exact"] - last,
-        "texels": min(quick[0].side(), times["texels"][0]),
+        "texels": min(quick_side(lights), times["texels"]),
     }
 
 
@@ -164,7 +165,7 @@ def scenario(shading, resolution):
 def main():
     path, shading, resolution = sys.argv[sys.argv.index("--") + 1 :]
     beamspread.register()
-    note_pictures()
+    note_renderings()
     steps = scenario(shading, int(resolution))
     waiting = {"for": lambda: True, "since": time.monotonic()}
 
@@ -173,7 +174,7 @@ def main():
             if not waiting["for"]():
                 if time.monotonic() - waiting["since"] < PATIENCE_SECONDS:
                     return 0.001
-                raise TimeoutError(f"waited in vain after {times}, {session.sentences()}")
+                raise TimeoutError(f"waited in vain after {times}, {timer.messages()}")
             waiting.update({"for": next(steps), "since": time.monotonic()})
             return 0.001
         except StopIteration:

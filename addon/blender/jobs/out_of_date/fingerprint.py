@@ -16,6 +16,7 @@ from ....core.errors import text_of
 from ....core.target import Target
 from ... import compat
 from ...node.find import find_node
+from ...node.tree import is_inner_tree
 from ...read.visibility import by_name, collection_of, render_visible_names, rendered_in
 from .pixels import Pixels, images_of, results
 from .scatter import Scatter, scatters
@@ -286,10 +287,16 @@ def _upstream(socket) -> list:
     tree = socket.id_data
     if not socket.is_linked:
         return []
-    nodes = [node for node in tree.nodes if node.bl_idname not in LEFT_OUT]
+    nodes = [node for node in tree.nodes if node.bl_idname not in LEFT_OUT and not _shows_bake(node)]
     links = [link for link in tree.links if link.to_node != socket.node or link.to_socket == socket]
     entered: dict = {}
     return [[_node_values(node, entered) for node in nodes], _links_between([*nodes, socket.node], links)]
+
+
+def _shows_bake(node) -> bool:
+    """True for a plain group, which stands for a Beamspread node."""
+    inner = getattr(node, "node_tree", None)
+    return inner is not None and is_inner_tree(inner)
 
 
 def image_part(image) -> str:

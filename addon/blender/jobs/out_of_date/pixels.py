@@ -17,6 +17,7 @@ import numpy as np
 from ...images.files import file_of
 from ...node.find import find_node
 from ...node.node import BeamspreadNode
+from ...node.tree import is_inner_tree
 
 # Files of more bytes would take more than about 10 ms to read.
 LARGE = 8 << 20
@@ -91,5 +92,6 @@ def _images_in(tree) -> Iterator:
                 continue
             if hasattr(node, "image"):
                 yield node.image
-            if getattr(node, "node_tree", None) not in {None, *trees}:
-                trees.append(node.node_tree)
+            inner = getattr(node, "node_tree", None)
+            if inner is not None and inner not in trees and not is_inner_tree(inner):
+                trees.append(inner)

@@ -15,7 +15,6 @@ from bpy.app.handlers import persistent
 from ....core.bake.runner import Bake
 from ....core.messages import Level, Message, note, warning
 from ....core.target import Target
-from ...images import previews
 from ...images.facts import Record, facts_of, note_bake, record_in, record_of, record_of_bake
 from ...images.files import file_of
 from ...images.sequence import file_at, is_sequence
@@ -104,7 +103,7 @@ def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
     if is_sequence(_image(target)):
         return _row_of_frames(target, record, now)
     changed = [] if record is None or now is None else record.changed(now)
-    if record is not None and not record.is_dirty and _is_painted(_image(target)):
+    if record is not None and not record.is_dirty and _image(target).is_dirty:
         changed.append("pixels of the image")
     if record is not None and _has_lost_its_file(_image(target)):
         changed = [*(name for name in changed if name != IMAGE), "file of the image, which is gone"]
@@ -139,10 +138,6 @@ def _row_of_frames(target: Target, record: Record | None, now: Parts | None) -> 
 def _has_lost_its_file(image) -> bool:
     path = file_of(image)
     return path is not None and not path.is_file()
-
-
-def _is_painted(image) -> bool:
-    return image.is_dirty and not previews.covers(image)
 
 
 def _why_later(image) -> list[Message]:

@@ -14,7 +14,6 @@ from ....core.errors import text_of
 from ....core.messages import Level, Message, Messages, warning
 from ....core.target import Target
 from ... import popup
-from ...images import previews
 from ...images.results import Results
 from ...node.find import NOTHING_FOUND, find_bakeable, find_misplaced
 from ...registration import all_or_nothing, classes
@@ -167,7 +166,6 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         if not targets and not misplaced:
             self._fail(Message(Level.ERROR, "", NOTHING_STALE if self.objects == "STALE" else NOTHING_FOUND))
             return False
-        previews.give_back()  # what is only shown is neither kept nor written beside a result
         state.forget_failures()
         self._parts = stale.parts_of(context, targets)
         preparation = read_scene(context, targets, context.scene.beamspread.for_bake())

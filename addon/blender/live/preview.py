@@ -1,0 +1,162 @@
+"""Hidden images that the inner trees of nodes show while Live is on; the nodes' own images are never touched."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import bpy
+import numpy as np
+
+from ...core.live.renderer import Rendering
+from ...core.target import Target
+from ..images import files, icons
+from ..node.find import find_node
+from ..node.node import all_nodes, own_tree
+from ..node.tree import IMAGE, show_image
+
+NAME = ".Beamspread Live"  # the dot hides it in menus
+
+
+SINGLE = "FILE", "GENERATED"
+"""Sources of images that are a single one, with no tiles or frames."""
+
+
+class Preview:
+    """The light of all targets of one material, over the pixels of the node's own image.
+
+    Undo and deleted data may take the hidden image away at any time, so it is looked up by its name; `place` makes
+    it anew from the pixels here. Methods that show something need `fits`.
+
+    Attributes
+    ----------
+    size : width and height in texels.
+    regions : bool (height, width), the texels of each target.
+    tree_name : name of the inner tree that shows the preview.
+    """
+
+    def __init__(self, material_name: str, size: tuple[int, int]) -> None:
+        self.size = size
+        self.regions: dict[Target, np.ndarray] = {}
+        self.tree_name = ""
+        self._material_name = material_name
+        self._pixels = np.zeros((size[1], size[0], 4), np.float32)
+        self._pixels[..., 3] = 1
+        self._name, self._former_name = "", ""
+        self._is_new_to_cycles = False
+
+    def names(self) -> set[str]:
+        """Names of its hidden images."""
+        return {self._name, self._former_name} - {""}
+
+    def is_shown(self) -> bool:
+        """True if the node's inner tree shows the preview."""
+        tree = getattr(self._node(), "node_tree", None)
+        image = None if tree is None else tree.nodes[IMAGE].image
+        return image is not None and image.name == self._name
+
+    def fits(self) -> bool:
+        """True if the node is still there and its own image has no other size."""
+        node = self._node()
+        image = getattr(node, "image", None)
+        if image is None:
+            return node is not None and node.node_tree is not None
+        return image.source in SINGLE and tuple(image.size) in (self.size, (0, 0))
+
+    def show(self, rendering: Rendering) -> None:
+        """Put a rendering into the preview."""
+        is_moved = self.regions.get(rendering.target) is not rendering.region
+        self.regions[rendering.target] = rendering.region
+        if is_moved:
+            self._copy_own_pixels()
+        np.copyto(self._pixels[..., :3], rendering.texture, where=rendering.region[..., None])
+        self.place(is_filled=False)
+
+    def place(self, is_filled: bool = True) -> None:
+        """Have the node's inner tree show the preview; `is_filled`: the hidden image has its pixels, if it exists."""
+        node = self._node()
+        image = bpy.data.images.get(self._name) if self._name else None
+        if image is None or tuple(image.size) != self.size:
+            image = files.make_image(NAME, *self.size)
+            self._name, is_filled = image.name, False
+        if not is_filled:
+            image.pixels.foreach_set(self._pixels.ravel())
+            image.update()
+            self._is_new_to_cycles = True
+        if node.node_tree.nodes[IMAGE].image != image:
+            tree = own_tree(node)
+            show_image(tree, image)
+            self.tree_name = tree.name
+
+    def renew(self) -> None:
+        """Show the same pixels in a new hidden image. Cycles, which reads an image once, starts again with it."""
+        if not self._is_new_to_cycles:
+            return
+        # Cycles recognizes images by their addresses: as long as the last two are there, the new one gets another.
+        oldest, self._former_name, self._name = self._former_name, self._name, ""
+        self.place()
+        _remove({oldest})
+        self._is_new_to_cycles = False
+
+    def remove_former(self) -> None:
+        """Remove the hidden image that the last one replaced."""
+        _remove({self._former_name})
+        self._former_name = ""
+
+    def hide(self) -> None:
+        """Have inner trees show the nodes' own images."""
+        _show_own_images(self.names())
+
+    def remove(self) -> None:
+        """Hide the preview and remove its hidden images."""
+        self.hide()
+        _remove(self.names())
+        self._name = self._former_name = ""
+
+    def drop(self, targets: Collection[Target]) -> None:
+        """Show the own image's pixels again in the regions of targets that are gone."""
+        for target in targets:
+            self.regions.pop(target, None)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Take the pixels outside of all regions from the node's own image as it is now."""
+        self._copy_own_pixels()
+        self.place(is_filled=False)
+
+    def _node(self):
+        return find_node(bpy.data.materials.get(self._material_name))
+
+    def _copy_own_pixels(self) -> None:
+        outside = ~np.any([*self.regions.values()], axis=0)
+        if not outside.any():
+            return
+        image = self._node().image
+        has_pixels = image is not None and tuple(image.size) == self.size
+        self._pixels[outside, :3] = files.linear_pixels(image)[outside] if has_pixels else 0
+
+
+def remove_strays(names: Collection[str] = ()) -> None:
+    """Remove hidden images other than these: undo, pasted objects and files that Blender saved by itself have some."""
+    hidden = {image.name for image in bpy.data.images if image.name.startswith(NAME) and image.library is None}
+    strays = hidden - set(names)
+    if strays:
+        _show_own_images(strays)
+        _remove(strays)
+
+
+def _show_own_images(names: Collection[str]) -> None:
+    """Have inner trees that show one of these images show the nodes' own ones."""
+    for node in all_nodes():
+        tree = node.node_tree
+        if tree is None or tree.library is not None or IMAGE not in tree.nodes:
+            continue
+        image = tree.nodes[IMAGE].image
+        if image is not None and image.name in names:
+            show_image(tree, node.image)
+
+
+def _remove(names: Collection[str]) -> None:
+    for name in names:
+        image = bpy.data.images.get(name) if name else None
+        if image is not None:
+            icons.remove(image)

@@ -1,0 +1,155 @@
+"""Live of this Blender: a timer switches the session on and off and steps it; handlers tell it what happens."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ...core import native
+from ...core.errors import text_of
+from ...core.messages import Messages, note
+from ..registration import all_or_nothing, handlers
+from .preview import remove_strays
+from .session import Session
+
+BUSY_SECONDS, IDLE_SECONDS, OFF_SECONDS = 0.01, 0.05, 0.5
+"""Seconds between steps: while something changes or is rendered, while nothing does, and while Live is off."""
+
+SHADED = {"MATERIAL", "RENDERED"}
+
+
+class _Live:
+    """The session of the process.
+
+    Attributes
+    ----------
+    session : None while Live is off.
+    failure : reason why Live was switched off; "" if the user did so.
+    """
+
+    def __init__(self) -> None:
+        self.session: Session | None = None
+        self.scene_name = ""
+        self.failure = ""
+        self.image_count = 0  # number of images at the last search for strays
+
+
+live = _Live()
+
+
+def messages() -> Messages:
+    """Messages of Live for panels."""
+    if live.session is not None:
+        return live.session.messages()
+    return Messages([note("", f"Live was switched off: {live.failure}")] if live.failure else [])
+
+
+def step(context) -> float:
+    """Do the work of one tick; the seconds until the next one."""
+    scene = context.scene
+    is_on = not native.problem and scene is not None and scene.beamspread.use_live
+    if not is_on or scene.name != live.scene_name:
+        end()
+    if len(bpy.data.images) != live.image_count:
+        _remove_strays()
+    if not is_on:
+        return OFF_SECONDS
+    if live.session is not None and live.session.rests(context):
+        return IDLE_SECONDS
+    if not bpy.app.background and not is_looked_at(context):
+        return IDLE_SECONDS
+    if live.session is None:
+        live.session, live.scene_name, live.failure = Session(), scene.name, ""
+    return BUSY_SECONDS if live.session.step(context) else IDLE_SECONDS
+
+
+def end(can_remove: bool = True) -> None:
+    """Switch off; `can_remove`: hidden images can be removed, see `Session.end`."""
+    session, live.session = live.session, None
+    if session is not None:
+        session.end(can_remove)
+
+
+def is_looked_at(context) -> bool:
+    """True if a window has a 3D View in Material Preview or Rendered."""
+    areas = (area for window in context.window_manager.windows for area in window.screen.areas)
+    return any(area.type == "VIEW_3D" and area.spaces.active.shading.type in SHADED for area in areas)
+
+
+def _remove_strays() -> None:
+    remove_strays(set() if live.session is None else live.session.names())
+    live.image_count = len(bpy.data.images)
+
+
+def _tick() -> float:
+    try:
+        return step(bpy.context)
+    except Exception as error:  # noqa: BLE001 - Blender would drop the timer, and Live would be on and dead
+        live.failure = text_of(error)
+        end()
+        bpy.context.scene.beamspread.use_live = False
+        return OFF_SECONDS
+
+
+@persistent
+def _changed(_scene, depsgraph) -> None:
+    is_shown = depsgraph.mode == "VIEWPORT" and depsgraph.scene.name == live.scene_name
+    if live.session is not None and is_shown:
+        live.session.note(depsgraph)
+
+
+@persistent
+def _undone(*_arguments) -> None:
+    if live.session is not None:
+        live.session.recover()
+    _remove_strays()
+
+
+@persistent
+def _hide(*_arguments) -> None:
+    """Show own images before a save, which keeps them, and Blender's Bake, which may fill that of a plain group."""
+    if live.session is not None:
+        live.session.hide()
+
+
+@persistent
+def _show(*_arguments) -> None:
+    if live.session is not None:
+        live.session.show()
+
+
+@persistent
+def _leave_file(*_arguments) -> None:
+    end(can_remove=False)
+
+
+@persistent
+def _enter_file(*_arguments) -> None:
+    _remove_strays()
+
+
+def _start() -> None:
+    if not bpy.app.background:
+        bpy.app.timers.register(_tick, first_interval=OFF_SECONDS, persistent=True)
+
+
+def _stop() -> None:
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+    end()
+
+
+register, unregister = all_or_nothing(
+    *handlers(
+        depsgraph_update_post=_changed,
+        frame_change_post=_changed,
+        undo_post=_undone,
+        redo_post=_undone,
+        save_pre=_hide,
+        save_post=_show,
+        object_bake_pre=_hide,
+        load_pre=_leave_file,
+        load_post=_enter_file,
+    ),
+    (_start, _stop),
+)

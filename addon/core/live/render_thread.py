@@ -1,0 +1,166 @@
+"""The thread that renders for Live: quickly while targets change, exactly once they rest."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+
+from ..errors import text_of
+from ..native import native
+from ..progress import Progress
+from ..target import Target
+from .library_service import LibraryService
+from .live_target import LiveTarget
+from .renderer import SIDES, LiveRenderer, Rendering, quick_side
+
+REST_SECONDS = 0.4
+"""Seconds without changes before targets are rendered exactly; more wastes less work on targets that still change."""
+
+
+@dataclass
+class Work:
+    """Progress on one target.
+
+    Attributes
+    ----------
+    key : `LiveTarget.key` of the last rendering.
+    has_libraries : True if that rendering used the libraries of its own media.
+    """
+
+    key: tuple | None = None
+    has_libraries: bool = False
+    is_exact: bool = False
+
+
+class RenderThread:
+    """Renders the targets that it was last asked to show.
+
+    A quick rendering is always finished, so that some appear during changes. An exact one stops at the next change.
+    """
+
+    def __init__(self, rest_seconds: float = REST_SECONDS) -> None:
+        self._renderings: queue.SimpleQueue[tuple[Work, Rendering]] = queue.SimpleQueue()
+        self.libraries = LibraryService(self._render_again)
+        self._renderer = LiveRenderer(self.libraries)
+        self._rest_seconds = rest_seconds
+        self._condition = threading.Condition()
+        self._targets: tuple[LiveTarget, ...] = ()
+        self._generation, self._done = 0, 0
+        self._is_ending = False
+        self._work: dict[Target, Work] = {}
+        self._thread = threading.Thread(target=self._run, daemon=True, name="Beamspread renderer")
+        self._thread.start()
+
+    def show(self, targets: Sequence[LiveTarget]) -> None:
+        """Render these targets from now on, in this order, in place of those before."""
+        with self._condition:
+            self._targets = tuple(targets)
+            self._generation += 1
+            self._condition.notify_all()
+
+    def adopt(self, targets: Collection[LiveTarget]) -> None:
+        """Count these targets as rendered exactly; older renderings of them are dropped."""
+        for target in targets:
+            self._work[target.target] = Work(target.key, has_libraries=True, is_exact=True)
+
+    def forget(self, targets: Collection[Target]) -> None:
+        """Render these targets anew when they are shown again."""
+        for target in targets:
+            self._work.pop(target, None)
+
+    def take(self) -> dict[Target, Rendering]:
+        """The last rendering of each target that was finished since the last call."""
+        latest = {}
+        while not self._renderings.empty():
+            work, rendering = self._renderings.get()
+            if self._work.get(rendering.target) is work:
+                latest[rendering.target] = rendering
+        return latest
+
+    def is_busy(self) -> bool:
+        """True while renderings are still to come."""
+        return self._done < self._generation or not self._renderings.empty() or self.libraries.is_busy()
+
+    def end(self) -> None:
+        """Have all threads stop soon."""
+        self.libraries.end()
+        with self._condition:
+            self._is_ending = True
+            self._condition.notify_all()
+
+    def join(self, seconds: float) -> bool:
+        """Wait for all threads; True if they have ended within this time."""
+        self._thread.join(seconds)
+        return self.libraries.join(seconds) and not self._thread.is_alive()
+
+    def _render_again(self) -> None:
+        with self._condition:
+            self._generation += 1
+            self._condition.notify_all()
+
+    def _run(self) -> None:
+        while True:
+            with self._condition:
+                self._condition.wait_for(lambda: self._done < self._generation or self._is_ending)
+                if self._is_ending:
+                    return
+                targets, generation = self._targets, self._generation
+            try:
+                if self._render(targets, generation):
+                    self._done = generation
+            except native.Cancelled:
+                continue
+
+    def _render(self, targets: Sequence[LiveTarget], generation: int) -> bool:
+        """Render all targets quickly and, after a rest, exactly; False if others are asked for meanwhile."""
+        missing: dict = {}
+        for target in targets:
+            if self._is_outdated(generation):
+                return False
+            missing.update(dict.fromkeys(self._render_quickly(target)))
+        self.libraries.request(list(missing))
+        with self._condition:
+            if self._condition.wait_for(lambda: self._is_outdated(generation), self._rest_seconds):
+                return False
+        for target in targets:
+            work = self._work.get(target.target)
+            if work is not None and work.has_libraries and not work.is_exact:
+                self._render_exactly(target, work, lambda _fraction: not self._is_outdated(generation))
+        return True
+
+    def _render_quickly(self, target: LiveTarget) -> list:
+        """Render a target unless its rendering is up to date; the media that it lacks libraries of."""
+        work = self._work.setdefault(target.target, Work())
+        missing = self._renderer.missing(target)
+        if work.key == target.key and (work.has_libraries or missing):
+            return missing
+        if not self._renderer.has_libraries(target):
+            return missing  # the service calls back once they are there
+        side = quick_side(target.illumination.lights)
+        failed = not self._put(work, target, lambda: self._renderer.quick(target, side, lambda _: not self._is_ending))
+        # An error would occur again in the exact rendering.
+        work.key, work.has_libraries, work.is_exact = target.key, not missing, failed
+        return missing
+
+    def _render_exactly(self, target: LiveTarget, work: Work, progress: Progress) -> None:
+        if quick_side(target.illumination.lights) < SIDES[-1] < max(self._renderer.size_of(target)):
+            # The exact rendering of a large image may take long.
+            self._put(work, target, lambda: self._renderer.quick(target, SIDES[-1], progress))
+        self._put(work, target, lambda: self._renderer.exact(target, progress))
+        work.is_exact = True
+
+    def _put(self, work: Work, target: LiveTarget, render: Callable[[], Rendering]) -> bool:
+        """Hand over a rendering, or the error in its place; True if there was none."""
+        try:
+            rendering = render()
+        except native.Cancelled:
+            raise
+        except Exception as error:  # noqa: BLE001 - the window shows it, and other targets are still to be rendered
+            rendering = Rendering(target.target, error=text_of(error))
+        self._renderings.put((work, rendering))
+        return not rendering.error
+
+    def _is_outdated(self, generation: int) -> bool:
+        return self._is_ending or self._generation != generation
