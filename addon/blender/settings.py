@@ -162,6 +162,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     use_live: BoolProperty(
         name="Live",
         description="Preview the bake while you change lights, objects and materials, without indirect light. "
+        "Nodes show a hidden preview image; their own image, and editors and other nodes that show it, do not follow. "
         "Switch off to see the last bake again",
         default=False,
     )
