@@ -1,1 +1,1 @@
-"""Where light arrives, where it comes from, and what stands in between."""
+"""Receivers, lights, and the meshes between them."""

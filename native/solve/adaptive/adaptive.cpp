@@ -5,27 +5,24 @@
 #include <cmath>
 
 #include "simd/loops.h"
+#include "solve/adaptive/even_squares.h"
 #include "solve/adaptive/multilevel_sum.h"
 #include "solve/adaptive/near_radius.h"
-#include "solve/adaptive/term_sums.h"
-#include "solve/adaptive/wide_beams.h"
 #include "solve/separable/term_row.h"
 
 namespace beamspread {
 
 namespace {
 
-// Share of the tolerance that each kind of approximation may use up: light that is not quite even within a square,
-// terms left out where directions differ, and twice that distance. Measured over three lamps and
-// three suns on 192 x 192 texels at a tolerance of 1e-3, errors sum to at most 1.3e-4 of the light and the worst texel is
-// off by 2.8e-4 of the brightest; with half the share by 1.5e-5 and 5e-5 in 1.24 times the time, with twice the share, by
-// another radius that is tried, 5e-5 and 2.1e-4 in .55 to 1.4 times.
+// Fraction of the tolerance for each kind of error: uneven light within a square, dropped terms, and (twice) coarser
+// grids for distant light. Larger: larger errors, less time.
 constexpr double tolerance_share = 0.25;
 
-// Each beam's kernel is a sum over terms, of a factor that depends on the beam times a kernel that does not.
+// Terms of the light. A beam's kernel is the sum over terms of a factor, which depends on the beam, times the term's
+// kernel.
 LightTerms choose_terms(const Plane& plane, PlaneLight light, const ChannelMedium& medium, double tolerance)
 {
-    // Half a share: what is left out is a root mean square, and a single texel may be farther off.
+    // The allowed error is a root mean square: take half a share, as single texels may have larger errors.
     const double allowed = 0.5 * tolerance_share * tolerance;
     light.color = {1.0};
     return light_terms(Problem{plane, {medium}, {std::move(light)}}, 1e-3 * allowed,
@@ -34,25 +31,24 @@ LightTerms choose_terms(const Plane& plane, PlaneLight light, const ChannelMediu
                        });
 }
 
-// All light by its angle of incidence; that of about the same angle as if all were the most grazing of it, whose kernels
-// are the narrowest.
+// All light in bins of the angle of incidence. Each bin counts as its most grazing light, which has the narrowest
+// kernels.
 std::vector<AngleLight> by_angle(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium)
 {
-    // Rounded up to 90 degrees exactly, an angle would be no angle of incidence.
-    constexpr float largest = 1.0f - 1e-6f;
-    // Even in tan(theta / 2): 4 to 7 degrees each. Half and twice as many find the same radius for a lamp and a sun; one bin
-    // takes up to 1.24 times as long.
+    // Largest tan(theta / 2): 90 degrees, after rounding, is no angle of incidence.
+    constexpr float max_half_tangent = 1.0f - 1e-6f;
     struct Bin {
         double power = 0.0;
         float most_grazing = 0.0f;
     };
-    std::array<Bin, 16> bins{};
+    constexpr std::size_t bin_count = 16;  // even in tan(theta / 2), 4 to 7 degrees each; more: smaller radii
+    std::array<Bin, bin_count> bins{};
     BeamRow row;
     for (std::size_t y = 0; y < plane.height; ++y)
         for (std::size_t x = 0, end = row.read(plane, light, {y, 0, plane.width}) ? plane.width : 0; x < end; ++x) {
             if (row.irradiance[x] == 0.0f)
                 continue;
-            const float angle = std::min(row.half_tangent[x], largest);
+            const float angle = std::min(row.half_tangent[x], max_half_tangent);
             Bin& bin = bins[static_cast<std::size_t>(angle * static_cast<float>(bins.size()))];
             bin.power += static_cast<double>(row.irradiance[x]);
             bin.most_grazing = std::max(bin.most_grazing, angle);
@@ -85,10 +81,11 @@ std::vector<double> solve_adaptive(const Plane& plane, const PlaneLight& light, 
     }
     const LightTerms terms = choose_terms(plane, light, medium, tolerance);
     const std::size_t count = terms.terms.size();
-    // The squares that cost less as beams of their width, four steps seen by all texels, than texel by texel. A texel is
-    // added to some 2000 others; for half and twice as many, time and errors are the same within 6 %.
+    // Select the squares that cost less as wide beams, four steps that all texels see, than texel by texel.
+    constexpr std::size_t max_wide_squares = 500;  // squares of the smallest wide size on the plane
     std::vector<Square> wide = squares;
-    std::erase_if(wide, [&](const Square& square) { return square.size * square.size < height * width / 500; });
+    std::erase_if(wide,
+                  [&](const Square& square) { return square.size * square.size < height * width / max_wide_squares; });
 
     const double distance = std::hypot(static_cast<double>(height) * pitch_y, static_cast<double>(width) * pitch_x);
     const double near = near_radius(by_angle(plane, light, medium), std::max(pitch_y, pitch_x), distance,
@@ -96,7 +93,7 @@ std::vector<double> solve_adaptive(const Plane& plane, const PlaneLight& light, 
     const double tried =
         tried_radius(terms, light, squares, wide, pitch_y, pitch_x, near, tolerance_share * tolerance, progress);
     TermSums texel_sums(terms, grid_levels(height, width, pitch_y, pitch_x, tried));
-    // The kernel of wide beams is the light that one texel spreads to all offsets, seen as coarsely.
+    // The kernel of wide beams is the light that one texel spreads to all offsets, on the same levels.
     TermSums kernel_sums(terms, grid_levels(2 * height - 1, 2 * width - 1, pitch_y, pitch_x, near));
 
     Grid sum(height, width);

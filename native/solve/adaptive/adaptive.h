@@ -9,10 +9,10 @@
 
 namespace beamspread {
 
-// The squares that it lights by a beam each, with the share of the tolerance that these may use up.
+// Squares that `solve_adaptive` lights by one beam each, within their fraction of the tolerance.
 std::vector<Square> beam_squares(const Plane& plane, const PlaneLight& light, double tolerance);
 
-// Exitance that a light of colour 1 causes over one medium, W/m^2, row by row; advances the progress by 1.
+// Exitance of one medium under a light of colour 1, W/m^2, row by row. Advances the progress by 1.
 std::vector<double> solve_adaptive(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium,
                                    double tolerance, Progress& progress);
 

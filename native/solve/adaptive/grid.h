@@ -8,11 +8,11 @@
 
 namespace beamspread {
 
-// Targets that are summed at a time, whose sums stay in registers.
+// Columns and rows of targets that are summed together, with their sums in registers.
 inline constexpr std::ptrdiff_t targets_at_once = target_columns;
 inline constexpr std::size_t rows_at_once = target_rows;
 
-// Values on a grid, row by row; rows are filled up with zeros to a multiple of the targets summed at a time.
+// Values on a grid, row by row. Zeros pad rows to a multiple of `targets_at_once`.
 struct Grid {
     std::size_t height;
     std::size_t width;
@@ -30,7 +30,7 @@ struct Grid {
     const double* row(std::size_t y) const { return values.data() + y * stride; }
 };
 
-// Some targets of a grid, in whole blocks of those that are summed at a time.
+// Some targets of a grid, in whole blocks of rows_at_once x targets_at_once.
 class Targets {
 public:
     Targets(std::size_t height, std::size_t width)
@@ -48,7 +48,8 @@ private:
     std::vector<char> m_has;
 };
 
-// Values for offsets -reach .. reach from a beam, rows upward; zeros on either side of a row for targets beyond.
+// Values of a kernel for offsets -reach .. reach from a beam, rows upward. Zeros on both sides of a row serve targets
+// beyond.
 class KernelTable {
 public:
     KernelTable(std::size_t reach_y, std::size_t reach_x)
@@ -61,7 +62,7 @@ public:
     std::ptrdiff_t reach_y() const { return m_reach_y; }
     std::ptrdiff_t reach_x() const { return m_reach_x; }
 
-    // The value at dx = 0; dx may be negative.
+    // Pointer to the value at dx = 0; dx may be negative.
     double* row(std::ptrdiff_t dy) { return m_values.data() + (dy + m_reach_y) * stride() + stride() / 2; }
     const double* row(std::ptrdiff_t dy) const { return m_values.data() + (dy + m_reach_y) * stride() + stride() / 2; }
 

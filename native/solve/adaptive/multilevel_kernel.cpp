@@ -10,20 +10,18 @@ namespace beamspread {
 
 namespace {
 
-// Below this size a coarser grid, with the points around its border, saves nothing: 16 gives the same in the same
-// time, 64 takes 1.2 times as long.
-constexpr double smallest_halved = 32.0;
+// Smallest number of points of an axis that is halved. Larger: fewer levels, more time.
+constexpr double min_halved_size = 32.0;
 
-// w(s), s being the distance over the near radius: of third order at 1, so that cubic interpolation sees no step in a
-// derivative that it uses, and of eighth order at 0, where kernels have a pole. Of (1 - (1 - s^2)^4)^q, q = 4 has half
-// the error of q = 2.
+// w(s) = (1 - (1 - s^2)^4)^4, s the distance over the near radius. Its derivatives up to the third vanish at 1, as
+// cubic interpolation needs; the eighth order at 0 compensates the kernels' pole.
 double window(double s)
 {
     const double inside = std::max(0.0, 1.0 - s * s);
     return std::pow(1.0 - std::pow(inside, 4), 4);
 }
 
-// Integrals over texels whose middles are a level's pitch apart; only those of the texels' own grid share borders.
+// Integrals over texels at the points of a level's grid. On the texels' own grid they share borders.
 TexelIntegrals integrate_quadrant(const RadialProfile& profile, const GridLevel& texels, const GridLevel& level,
                                   std::size_t height, std::size_t width)
 {
@@ -36,10 +34,10 @@ TexelIntegrals integrate_quadrant(const RadialProfile& profile, const GridLevel&
         const std::size_t row = at / width;
         const double x = x0 + static_cast<double>(at - row * width) * level.pitch_x;
         const double y = y0 + static_cast<double>(row) * level.pitch_y;
-        const TexelIntegrals one = integrate_texels(profile, {x, y, texels.pitch_x, texels.pitch_y, 1, 1});
+        const TexelIntegrals texel = integrate_texels(profile, {x, y, texels.pitch_x, texels.pitch_y, 1, 1});
         for (std::size_t m = 0; m < out.harmonics; ++m) {
-            out.cosine[m * height * width + at] = one.cosine[m];
-            out.sine[m * height * width + at] = one.sine[m];
+            out.cosine[m * height * width + at] = texel.cosine[m];
+            out.sine[m * height * width + at] = texel.sine[m];
         }
     });
     return out;
@@ -51,13 +49,13 @@ std::vector<GridLevel> grid_levels(std::size_t height, std::size_t width, double
 {
     std::vector<GridLevel> levels;
     while (true) {
-        const double smallest = std::max(smallest_halved, 2.0 * near);
+        const double min_size = std::max(min_halved_size, 2.0 * near);
         GridLevel level{height,
                         width,
                         pitch_y,
                         pitch_x,
-                        static_cast<double>(height) >= smallest,
-                        static_cast<double>(width) >= smallest};
+                        static_cast<double>(height) >= min_size,
+                        static_cast<double>(width) >= min_size};
         if (level.halves_y && level.halves_x) {
             level.halves_y = pitch_y <= std::numbers::sqrt2 * pitch_x;
             level.halves_x = pitch_x <= std::numbers::sqrt2 * pitch_y;
@@ -66,7 +64,7 @@ std::vector<GridLevel> grid_levels(std::size_t height, std::size_t width, double
         levels.push_back(level);
         if (!level.halves_y && !level.halves_x)
             return levels;
-        // A point before the first, and one or two after the last, so that everything lies between four.
+        // Add a point before the first and one or two after the last: cubic interpolation needs four points.
         if (level.halves_y) {
             height = height / 2 + 3;
             pitch_y *= 2.0;
@@ -103,7 +101,7 @@ MultilevelKernel::MultilevelKernel(const RadialProfile& profile, const std::vect
 
 std::vector<KernelTable> MultilevelKernel::tables(const HarmonicSum& harmonics) const
 {
-    std::vector<std::size_t> present;  // one, but for light of one direction
+    std::vector<std::size_t> present;  // several for light of one direction alone
     for (std::size_t m = 0; m < m_levels.front().integrals.harmonics; ++m)
         if (harmonics.cosine[m] != 0.0 || harmonics.sine[m] != 0.0)
             present.push_back(m);
@@ -114,7 +112,7 @@ std::vector<KernelTable> MultilevelKernel::tables(const HarmonicSum& harmonics) 
         parallel_for(level.height, [&](std::size_t i) {
             const auto dy = static_cast<std::ptrdiff_t>(i);
             for (std::size_t j = 0; j < level.width; ++j) {
-                // By parity of m: phi -> -phi for dy < 0, and phi -> pi - phi for dx < 0.
+                // Sum by the parity of m, for the symmetries phi -> -phi (dy < 0) and phi -> pi - phi (dx < 0).
                 std::array<double, 2> cosine{};
                 std::array<double, 2> sine{};
                 const std::size_t point = i * level.width + j;

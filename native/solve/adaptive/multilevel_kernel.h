@@ -10,8 +10,8 @@
 
 namespace beamspread {
 
-// A grid, the finest being that of the texels. The next coarser one has every other row or column or both. Lengths in
-// mean free paths.
+// A grid of the hierarchy. The finest is that of the texels; each next one has every other row, column, or both.
+// Lengths are in mean free paths.
 struct GridLevel {
     std::size_t height = 0;
     std::size_t width = 0;
@@ -19,11 +19,11 @@ struct GridLevel {
     double pitch_x = 1.0;
     bool halves_y = false;
     bool halves_x = false;
-    double near_radius = 0.0;  // pairs of points farther apart are left to coarser grids
+    double near_radius = 0.0;  // distance beyond which coarser grids sum the pairs of points
 };
 
-// `near` is the near radius of each level in points of its grid. An axis is halved where that leaves more points than
-// the near radius has, and the one with the finer pitch first, until texels are about square.
+// The grids of a plane; `near` is the near radius of each level in points of its grid. An axis is halved while it keeps
+// more points than the near radius has, the axis of the finer pitch first until points are about square.
 std::vector<GridLevel> grid_levels(std::size_t height, std::size_t width, double pitch_y, double pitch_x, double near);
 
 // A combination of harmonics of one profile: the sum over m of c_m(r) (cosine[m] cos(m phi) + sine[m] sin(m phi)).
@@ -32,10 +32,11 @@ struct HarmonicSum {
     Harmonics sine{};
 };
 
-// Kernels of one profile, the power that a texel's beam leaves in another texel, as the sum over levels k of
-//   K_k(r) = K(r) w_0(r) ... w_k-1(r) (1 - w_k(r)),
-// w_k rising smoothly from 0 at the beam to 1 at the near radius of level k, so that K_k is smooth enough for the grid of
-// level k and zero beyond its near radius (multilevel summation: Hardy et al. 2009, doi:10.1016/j.parco.2008.12.005).
+// Kernels of one profile, the power from a texel's beam in another texel, by multilevel summation (Hardy et al. 2009,
+// doi:10.1016/j.parco.2008.12.005): the sum over levels k of
+//   K_k(r) = K(r) w_0(r) ... w_k-1(r) (1 - w_k(r)).
+// w_k rises smoothly from 0 at the beam to 1 at the near radius of level k: K_k is smooth enough for the grid of level
+// k and zero beyond its near radius.
 class MultilevelKernel {
 public:
     MultilevelKernel(const RadialProfile& profile, const std::vector<GridLevel>& levels);
@@ -44,12 +45,13 @@ public:
     std::vector<KernelTable> tables(const HarmonicSum& harmonics) const;
 
 private:
-    // Of the offsets (0 .. height - 1, 0 .. width - 1) of a level's grid; the other quadrants follow by symmetry.
+    // Integrals for the offsets (0 .. height - 1, 0 .. width - 1) of a level's grid; other quadrants follow by
+    // symmetry.
     struct Quadrant {
         std::size_t height;
         std::size_t width;
         TexelIntegrals integrals;
-        std::vector<double> window;  // that K is multiplied by
+        std::vector<double> window;  // factor of K
     };
     std::vector<Quadrant> m_levels;
 };

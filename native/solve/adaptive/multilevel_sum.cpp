@@ -6,13 +6,14 @@
 
 #include "base/threads.h"
 #include "simd/loops.h"
+#include "solve/separable/term_row.h"
 
 namespace beamspread {
 
 namespace {
 
-// Coarse points first .. first + count - 1 that a fine point lies between, and their weights in cubic interpolation.
-// Where an axis is halved, coarse point j is fine point 2 (j - 1); otherwise they are the same.
+// Coarse points [first, first + count) around a fine point, with their weights in cubic interpolation. On a halved
+// axis, coarse point j is fine point 2 (j - 1); on others both are the same.
 struct Neighbours {
     std::size_t first;
     std::size_t count;
@@ -28,7 +29,7 @@ Neighbours neighbours(bool halved, std::size_t fine)
     return {fine / 2, 4, {-1.0 / 16.0, 9.0 / 16.0, 9.0 / 16.0, -1.0 / 16.0}};
 }
 
-// Hands light to the coarse points that its place is interpolated from: the transpose of cubic interpolation.
+// Light on the coarse grid, by the transpose of cubic interpolation.
 Grid gather(const Grid& fine, const GridLevel& level, const GridLevel& coarser)
 {
     Grid coarse(coarser.height, coarser.width);
@@ -36,7 +37,7 @@ Grid gather(const Grid& fine, const GridLevel& level, const GridLevel& coarser)
     parallel_for(coarse.height, [&](std::size_t coarse_y) {
         std::vector<double> row(fine.width + 2 * margin);
         const auto add = [&](std::size_t y, double weight) {
-            if (y < fine.height)  // neither beyond nor, wrapped around, before
+            if (y < fine.height)  // false before the first row too, where y wraps around
                 add_scaled(row.data() + margin, fine.row(y), weight, fine.width);
         };
         if (level.halves_y) {
@@ -62,7 +63,7 @@ Grid gather(const Grid& fine, const GridLevel& level, const GridLevel& coarser)
     return coarse;
 }
 
-// The coarse targets that fine ones are interpolated from.
+// Coarse targets from which the fine targets are interpolated.
 Targets coarser_targets(const Targets& fine, const GridLevel& level, const GridLevel& coarser)
 {
     Targets coarse(coarser.height, coarser.width);
@@ -98,8 +99,8 @@ void add_interpolated(Grid& fine, const Grid& coarse, const GridLevel& level, co
     });
 }
 
-// Sources other than zero of the rows from each row on, from left to right, and one that is never reached; first those
-// that begin before the grid.
+// Non-zero sources of each run of `rows_at_once` rows, from left to right, with a sentinel at the end. The first runs
+// begin before the grid.
 std::vector<std::vector<LitColumn>> source_rows(const Grid& light)
 {
     std::vector<std::vector<LitColumn>> rows(light.height + rows_at_once - 1);
@@ -120,6 +121,19 @@ std::vector<std::vector<LitColumn>> source_rows(const Grid& light)
     return rows;
 }
 
+std::size_t term_profile(const LightTerms& terms, std::size_t t)
+{
+    return terms.terms[t].kernels[0].front().profile;
+}
+
+HarmonicSum term_kernel(const LightTerms& terms, std::size_t t)
+{
+    HarmonicSum sum;
+    for (const KernelTerm& part : terms.terms[t].kernels[0])
+        (part.phase == Phase::cosine ? sum.cosine : sum.sine)[part.m] += part.weight;
+    return sum;
+}
+
 }  // namespace
 
 void add_pairs(Grid& sum, const Grid& light, const KernelTable& kernel, Progress& progress, double work,
@@ -130,7 +144,7 @@ void add_pairs(Grid& sum, const Grid& light, const KernelTable& kernel, Progress
     const std::size_t groups = (sum.height + rows_at_once - 1) / rows_at_once;
     parallel_for(groups, [&](std::size_t group) {
         std::array<double*, rows_at_once> rows{};
-        std::vector<double> beyond(sum.stride);  // rows that the grid does not have
+        std::vector<double> beyond(sum.stride);  // takes the sums of rows beyond the grid
         for (std::size_t i = 0; i < rows_at_once; ++i)
             rows[i] = group * rows_at_once + i < sum.height ? sum.row(group * rows_at_once + i) : beyond.data();
         const auto y = static_cast<std::ptrdiff_t>(group * rows_at_once);
@@ -159,19 +173,39 @@ Grid multilevel_sum(const std::vector<GridLevel>& levels, const std::vector<Kern
                     Progress& progress, double work, const Targets* only)
 {
     std::vector<Grid> sums;
-    std::vector<Targets> targets;  // of each level, if not all
+    std::vector<Targets> targets;  // [level]; empty for all targets
     for (std::size_t k = 0; k < levels.size(); ++k) {
         if (k > 0)
             light = gather(light, levels[k - 1], levels[k]);
         if (only != nullptr)
             targets.push_back(k == 0 ? *only : coarser_targets(targets.back(), levels[k - 1], levels[k]));
-        // Nearly all the work is on the finest grid.
+        // The finest grid has nearly all the work.
         add_pairs(sums.emplace_back(light.height, light.width), light, kernels[k], progress, k == 0 ? work : 0.0,
                   only != nullptr ? &targets[k] : nullptr);
     }
     for (std::size_t k = levels.size() - 1; k-- > 0;)
         add_interpolated(sums[k], sums[k + 1], levels[k], only != nullptr ? &targets[k] : nullptr);
     return std::move(sums.front());
+}
+
+Grid term_light(const LightTerms& terms, std::size_t t)
+{
+    Grid grid(terms.plane.height, terms.plane.width);
+    parallel_for(grid.height, [&](std::size_t y) {
+        TermRow row;
+        row.start(terms, {y, 0, grid.width}, t, 1);
+        std::copy_n(row.values(t), grid.width, grid.row(y));
+    });
+    return grid;
+}
+
+Grid TermSums::sum(std::size_t t, Grid light, Progress& progress, double work, const Targets* only)
+{
+    const std::size_t profile = term_profile(m_terms, t);
+    if (!m_kernels.contains(profile))
+        m_kernels.emplace(profile, MultilevelKernel(m_terms.profiles[profile].profile, m_levels));
+    return multilevel_sum(m_levels, m_kernels.at(profile).tables(term_kernel(m_terms, t)), std::move(light), progress,
+                          work, only);
 }
 
 }  // namespace beamspread

@@ -9,40 +9,37 @@
 #include "base/random.h"
 #include "base/vec.h"
 #include "simd/loops.h"
-#include "solve/adaptive/term_sums.h"
-#include "solve/adaptive/wide_beams.h"
+#include "solve/adaptive/even_squares.h"
+#include "solve/adaptive/multilevel_sum.h"
 
 namespace beamspread {
 
 namespace {
 
-// Below, in points of a grid, the window's own shape is too much for the interpolation. Errors with 4 and 16 differ by
-// no more than 2e-5 of the light, the time by 10 %.
-constexpr double least_near_radius = 8.0;
+// Smallest near radius, in points of a grid; with smaller ones the interpolation does not resolve the window. Larger:
+// smaller errors, more time.
+constexpr double min_near_radius = 8.0;
 
-// Radii that are tried and the one that they are compared with, of the bound. The work is as the square: compared with
-// the bound itself the same ones come out, trying takes 1.35 times as long.
-constexpr std::array<double, 3> parts = {0.2, 0.3, 0.44};
-constexpr double compared_with = 0.66;
+// Tried radii, and the radius that they are compared with, over the bound. The work grows with the square.
+constexpr std::array<double, 3> trial_radii = {0.2, 0.3, 0.44};
+constexpr double reference_radius = 0.66;
 
-// Blocks of texels that are looked at, one in each of 3 x 3 parts of the plane, and some around the brightest texel, at
-// distances 0, 4, 16, 64 and 256: with 4 x 4 and 8, the same radii come out in 1.1 times the time.
+// Probed blocks of texels: one in each of strata x strata parts of the plane, and some around the brightest texel, at
+// distances 0, 4, 16, 64 and 256. More: a safer choice, more time.
 constexpr std::size_t strata = 3;
 constexpr std::size_t around = 5;
 
-// Lit texels from which on it is worth trying: a lamp over 128 x 128 took as long by the bound, within a fifth; over
-// 256 x 256 it takes .55 to .8 of the time.
-constexpr std::size_t least_lit = 32768;
+// Number of lit texels from which trials save time.
+constexpr std::size_t min_lit = 32768;
 
-// Errors in the dark are compared with so much of the mean radiance: a texel far in the dark half of a plane is off by .7
-// of the tolerance, as by the bound; with .1 by 4.5 times the tolerance, in .65 of the time.
-constexpr double least_radiance = 0.003;
+// Smallest radiance that errors are compared with, over the mean. Larger: larger errors in the dark, less time.
+constexpr double min_radiance = 0.003;
 
-double kernel_at(const RadialProfile& profile, const Vec2& place)
+double kernel_at(const RadialProfile& profile, const Vec2& point)
 {
-    const double r = glm::length(place);
+    const double r = glm::length(point);
     const Harmonics density = profile.density(r);
-    const Vec2 turn = place / r;
+    const Vec2 turn = point / r;
     Vec2 multiple(1.0, 0.0);  // cos(m phi), sin(m phi)
     double sum = 0.0;
     for (std::size_t m = 0; m < profile.harmonics(); ++m) {
@@ -52,17 +49,15 @@ double kernel_at(const RadialProfile& profile, const Vec2& place)
     return sum;
 }
 
-// The sum of absolute errors for a beam of unit power: of the kernel against its interpolation from points as far apart
-// as those through which it is seen at that distance, on a grid turned by `axis` against the beam. Most comes from the
-// noise of simulated profiles, whose cubics meet four times an octave, so that no formula gives it.
+// Sum of absolute errors for a beam of unit power: of the kernel against its interpolation from points of the spacing
+// of the grid at that distance, along `axis` relative to the beam. Most of it is noise of simulated profiles, for which
+// there is no formula.
 double interpolation_error(const RadialProfile& profile, const Vec2& axis, double near, double first, double last)
 {
-    // Half the distance between the points, over distance / near: where the window has risen to a half, at .6 of the
-    // near radius. Half of it, a sun around a hole is off by ten times as much in .6 of the time; twice by a tenth in 1.9
-    // times.
+    // Half the distance of the points, over distance / near: the window has risen to one half at .6 of the near radius.
+    // Larger: smaller errors, more time.
     constexpr double spacing = 1.0 / 0.6;
-    // Two rings per octave and more than two directions per wave of the last harmonic: with half and with
-    // twice as many of either, results are the same to two digits of their errors.
+    // Choose two rings per octave, and more than two directions per period of the last harmonic.
     const int rings = static_cast<int>(std::ceil(2.0 * std::log2(last / first))) + 1;
     const int directions = 2 * static_cast<int>(profile.harmonics()) + 3;
     const double log_step = std::log(last / first) / rings;
@@ -72,33 +67,33 @@ double interpolation_error(const RadialProfile& profile, const Vec2& axis, doubl
         const double step = spacing * r / near;
         for (int j = 0; j < directions; ++j) {
             const double phi = 2.0 * pi * j / directions;
-            const Vec2 place(r * std::cos(phi), r * std::sin(phi));
-            const double exact = kernel_at(profile, place);
+            const Vec2 point(r * std::cos(phi), r * std::sin(phi));
+            const double exact = kernel_at(profile, point);
             const auto error = [&](const Vec2& by) {
                 const auto pair = [&](double k) {
-                    return kernel_at(profile, place + k * by) + kernel_at(profile, place - k * by);
+                    return kernel_at(profile, point + k * by) + kernel_at(profile, point - k * by);
                 };
                 return std::abs((9.0 * pair(1.0) - pair(3.0)) / 16.0 - exact);
             };
-            // Of the place that light comes from and of the one that it gets to.
+            // Count the error twice: for the point of entry and the point of exit.
             sum += 2.0 * (error(step * axis) + error(step * Vec2(-axis.y, axis.x))) * r * r;
         }
     }
     return sum * log_step * 2.0 * pi / directions;
 }
 
-// Their first texels.
-std::vector<Texel> blocks(const PlaneLight& light, const Plane& plane)
+// First texels of the probed blocks.
+std::vector<Texel> probed_blocks(const PlaneLight& light, const Plane& plane)
 {
     Random random(0, plane.height, plane.width);
-    std::vector<Texel> found;
+    std::vector<Texel> blocks;
     const auto add = [&](double y, double x) {
         const auto within = [](double at, std::size_t size) {
             return static_cast<std::size_t>(std::clamp(at, 0.0, static_cast<double>(size) - 1.0));
         };
         const std::size_t column = within(x, plane.width);
         const std::size_t row = within(y, plane.height);
-        found.push_back({row - row % rows_at_once, column - column % targets_at_once});
+        blocks.push_back({row - row % rows_at_once, column - column % targets_at_once});
     };
     for (std::size_t row = 0; row < strata; ++row)
         for (std::size_t column = 0; column < strata; ++column) {
@@ -112,7 +107,7 @@ std::vector<Texel> blocks(const PlaneLight& light, const Plane& plane)
         const double phi = 2.0 * pi * random.uniform();
         add(static_cast<double>(y) + r * std::sin(phi), static_cast<double>(x) + r * std::cos(phi));
     }
-    return found;
+    return blocks;
 }
 
 }  // namespace
@@ -123,7 +118,7 @@ double near_radius(const std::vector<AngleLight>& lights, double pitch, double d
     double power = 0.0;
     for (const AngleLight& light : lights)
         power += light.power * 2.0 * pi * light.profile.cumulative(distance)[0];
-    const auto largest = [&](double near) {
+    const auto error_bound = [&](double near) {
         const double first = 0.5 * near * pitch;
         if (first >= distance)
             return 0.0;
@@ -137,11 +132,10 @@ double near_radius(const std::vector<AngleLight>& lights, double pitch, double d
         }
         return sum;
     };
-    // The work is as the square: 1.1 and 1.44 change it by about 10 %, errors by less than 3e-5 of the light.
-    constexpr double finer = 1.2;
-    double near = least_near_radius;
-    while (largest(near) > allowed * std::max(power, 0.0))
-        near *= finer;
+    constexpr double growth = 1.2;  // of tried radii; larger: larger radii, less time for the search
+    double near = min_near_radius;
+    while (error_bound(near) > allowed * std::max(power, 0.0))
+        near *= growth;
     return near;
 }
 
@@ -155,15 +149,15 @@ double tried_radius(const LightTerms& terms, const PlaneLight& light, const std:
     const std::size_t lit = std::accumulate(squares.begin(), squares.end(), std::size_t{0}, texels) -
                             std::accumulate(wide.begin(), wide.end(), std::size_t{0}, texels);
     std::vector<double> radii;
-    for (const double part : parts)
-        if (part * bound >= least_near_radius)
-            radii.push_back(part * bound);
-    if (radii.empty() || lit < least_lit)
+    for (const double radius : trial_radii)
+        if (radius * bound >= min_near_radius)
+            radii.push_back(radius * bound);
+    if (radii.empty() || lit < min_lit)
         return bound;
-    radii.push_back(compared_with * bound);
-    const std::vector<Texel> looked_at = blocks(light, terms.plane);
+    radii.push_back(reference_radius * bound);
+    const std::vector<Texel> blocks = probed_blocks(light, terms.plane);
     Targets targets(height, width);
-    for (const Texel& block : looked_at)
+    for (const Texel& block : blocks)
         targets.add(block.y, block.x);
 
     std::vector<TermSums> sums;
@@ -192,15 +186,15 @@ double tried_radius(const LightTerms& terms, const PlaneLight& light, const std:
     const auto exact = [&](std::size_t y, std::size_t x) { return radiance.back().row(y)[x]; };
     double everywhere = 0.0;
     for (std::size_t i = 0; i < strata * strata; ++i)
-        everywhere += mean(looked_at[i], exact) / (strata * strata);
+        everywhere += mean(blocks[i], exact) / (strata * strata);
     for (std::size_t i = 0; i + 1 < radii.size(); ++i) {
-        double most = 0.0;
-        for (const Texel& block : looked_at) {
+        double max_error = 0.0;
+        for (const Texel& block : blocks) {
             const double error = mean(
                 block, [&](std::size_t y, std::size_t x) { return radiance[i].row(y)[x] - radiance.back().row(y)[x]; });
-            most = std::max(most, error / std::max(mean(block, exact), least_radiance * everywhere));
+            max_error = std::max(max_error, error / std::max(mean(block, exact), min_radiance * everywhere));
         }
-        if (most <= allowed)
+        if (max_error <= allowed)
             return radii[i];
     }
     return bound;

@@ -1,4 +1,5 @@
-// How near to a beam it must be seen as finely as it is: a bound, and what is tried on the light itself.
+// Radius around a beam within which it is evaluated at full resolution: an upper bound, and a smaller one found by
+// trial.
 #pragma once
 
 #include <vector>
@@ -10,26 +11,24 @@
 
 namespace beamspread {
 
-// Beams of about one angle.
+// Beams of about the same angle.
 struct AngleLight {
     RadialProfile profile;
     double power = 0.0;
 };
 
-// The near radius in points of a level's grid by which the absolute errors of a multilevel sum, of all beams in all texels,
-// add up to at most the fraction `allowed` of the light that comes back within a distance. Lengths in mean free paths.
+// Upper bound of the near radius, in points of a level's grid: the absolute errors of a multilevel sum, over all beams
+// and texels, add up to at most the fraction `allowed` of the light that returns within a distance. Lengths are in mean
+// free paths.
 double near_radius(const std::vector<AngleLight>& lights, double pitch, double distance, double allowed,
                    Progress& progress);
 
-// A near radius of at most `bound`. A bound adds up all errors as if they had one sign, while they have either and mostly
-// cancel. So smaller radii are tried on the light itself, at some blocks of texels: the least is taken by which the radiance
-// of each block differs from what it is by a larger radius by at most `allowed`, in the mean and relative to its own.
+// A near radius of at most `bound`, by trial. The bound adds up errors as if they had one sign, but they mostly cancel.
+// Smaller radii are tried on the light at some blocks of texels; the result is the smallest radius with which each
+// block's radiance differs from that of a larger radius by at most `allowed`, in the mean and relative to the radiance.
+// Errors at other texels may be larger (docs/tuning.md, "`trial_radii`").
 //
-// Measured, not bound: elsewhere errors may be larger. With a quarter of the tolerance allowed, all errors summed up to .08 of
-// the tolerance at most, and the worst texel was off by .34 of it, beside the brightest: lamps at a 50th to a fifth of the
-// width, suns at 70 and 85 degrees, whole, half, at random and in patterns, on 256 x 256 and 512 x 512 texels.
-//
-// `squares` are those of the light, of which `wide` are left out. Lengths in mean free paths.
+// `squares` are those of the light, without the `wide` ones. Lengths are in mean free paths.
 double tried_radius(const LightTerms& terms, const PlaneLight& light, const std::vector<Square>& squares,
                     const std::vector<Square>& wide, double pitch_y, double pitch_x, double bound, double allowed,
                     Progress& progress);

@@ -5,7 +5,7 @@
 
 #include "base/constants.h"
 #include "simd/loops.h"
-#include "solve/spectral/spline_axis.h"
+#include "solve/spectral/coarse_grid.h"
 
 namespace beamspread {
 

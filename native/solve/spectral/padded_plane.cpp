@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "fft/fft.h"
-#include "solve/spectral/spline_axis.h"
+#include "solve/spectral/coarse_grid.h"
 
 namespace beamspread {
 

@@ -13,7 +13,7 @@
 namespace beamspread {
 
 // A plane of nodes, the tiles in which it is solved, and their padded size. A node is a texel, or a node of a coarser
-// grid (solve/spectral/spline_axis.h).
+// grid (solve/spectral/coarse_grid.h).
 struct PaddedPlane {
     std::size_t width = 0;
     std::size_t height = 0;

@@ -51,7 +51,7 @@ HWY_INLINE FloatMask greater(Words a, Words b)
 
 // Order that moves the lanes of a mask to the front.
 #if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_SSE4
-// These targets lack a compress instruction. hn::Compress looks up the order for each vector anew, in a table of a
+// AVX2 and SSE4 have no compress instruction. hn::Compress looks up the order for each vector anew, in a table of a
 // kilobyte that GCC first copies onto the stack: two thirds of the walk's time with AVX2.
 using LaneOrder = Words;
 
