@@ -12,7 +12,7 @@ from beamspread.blender.jobs.run import batch_run
 from beamspread.blender.jobs.state import Status, state
 from beamspread.core.batch import batch_options
 from beamspread.core.target import Target
-from scenes import add_material, add_plane, add_sun, bake, image_of, save_scene
+from scenes import add_material, add_plane, add_sun, bake, image_of, node_of, save_scene
 
 PLANE = Target("Plane", "Medium")
 
@@ -122,3 +122,19 @@ def test_a_damaged_text_counts_as_no_facts(text):
     damaged = image()
     damaged[KEY] = {"facts": text}
     assert facts_of(damaged) == ImageFacts()
+
+
+def test_images_that_live_of_an_earlier_version_made_are_removed_on_load(tmp_path):
+    material = add_material(image=bpy.data.images.new("Plane_Medium", 4, 4, float_buffer=True))
+    add_plane(material=material)
+    packed = bpy.data.images.new("Packed", 4, 4)
+    packed.pixels[0] = 1.0
+    packed.pack()
+    packed.use_fake_user = True
+    for made in (node_of(material).image, packed):
+        made["beamspread_preview"] = True
+    path = str(save_scene(tmp_path))
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert node_of(bpy.data.materials["Medium"]).image is None
+    assert [image.name for image in bpy.data.images] == ["Packed"]
+    assert "beamspread_preview" not in bpy.data.images["Packed"]

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import bpy
+from bpy.app.handlers import persistent
 
 from ...core.bake.runner import Bake
 from ...core.exr_header import text_of
@@ -19,6 +20,8 @@ from ...core.messages import Level, Message, note, warning
 from ...core.target import Target
 from ..node.find import find_node, find_targets
 from ..read.visibility import with_instanced
+from ..registration import all_or_nothing, handlers
+from . import icons
 
 KEY = "beamspread"
 """Key of the group in an image: "facts", JSON, and "former", a pointer that keeps that image in the file."""
@@ -28,6 +31,9 @@ VERSION = 1
 
 OLD_KEYS = {name: f"beamspread_{name}" for name in ("results", "bakes", "stamp", "undone", "frames", "former")}
 """Keys of images in files of earlier versions, one for each fact."""
+
+OLD_PREVIEW = "beamspread_preview"
+"""Key of images that Live of earlier versions made for nodes without an image."""
 
 ATTRIBUTE = "beamspread:bake"
 """EXR attribute that holds the record of a frame of a batch."""
@@ -197,3 +203,16 @@ def _parsed(text: str) -> dict:
 def _record(entry: dict) -> Record:
     warnings, notes = entry.get("warnings", ()), entry.get("notes", ())
     return Record(entry.get("parts", {}), tuple(warnings), entry.get("is_dirty", False), tuple(notes))
+
+
+@persistent
+def _remove_old_previews(*_arguments) -> None:
+    """Remove images that Live of earlier versions made, unless they were saved or packed: their nodes had no image."""
+    for image in [image for image in bpy.data.images if OLD_PREVIEW in image]:
+        if image.source == "GENERATED" and image.packed_file is None:
+            icons.remove(image)
+        else:
+            del image[OLD_PREVIEW]
+
+
+register, unregister = all_or_nothing(*handlers(load_post=_remove_old_previews))
