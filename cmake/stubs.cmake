@@ -1,6 +1,8 @@
 # Writes FOLDER/_native.pyi, the types of the module in FOLDER, with the program STUBGEN (pybind11-stubgen).
 cmake_minimum_required(VERSION 3.25)
-set(ENV{PYTHONPATH} ${FOLDER})
+# pip finds the packages of an isolated build by the former value.
+cmake_path(CONVERT "${FOLDER};$ENV{PYTHONPATH}" TO_NATIVE_PATH_LIST paths)
+set(ENV{PYTHONPATH} "${paths}")
 execute_process(COMMAND ${STUBGEN} --exit-code --numpy-array-remove-parameters --output-dir ${FOLDER} _native
                 COMMAND_ERROR_IS_FATAL ANY)
 # A std::array of N numbers accepts any sequence.
