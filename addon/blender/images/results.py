@@ -80,9 +80,9 @@ class Results:
 
         `shown` is the image whose owners count: the node's, if `image` is beside it.
         """
-        receiver, others = bake.job.receiver, self._others(shown or image, bake)
-        if others:
-            parts = [part for other in others for part in self._parts_of(other, image)]
+        receiver, owners = bake.job.receiver, self._other_owners(shown or image, bake)
+        if owners:
+            parts = [part for owner in owners for part in self._parts_of(owner, image)]
             if overlaps(receiver, parts):
                 return None
             covered = receiver.coverage.copy()
@@ -117,9 +117,9 @@ class Results:
         if path is not None:
             return path, image
         self._check_room(image, bake)
-        owners = " and ".join(f"'{other}'" for other in self._others(image, bake))
+        names = " and ".join(f"'{owner}'" for owner in self._other_owners(image, bake))
         path, new = self._new(bake, texture)
-        bake.warn(image.name, f"The image '{image.name}' belongs to {owners}: '{bake.target}' now has '{new.name}'.")
+        bake.warn(image.name, f"The image '{image.name}' belongs to {names}: '{bake.target}' now has '{new.name}'.")
         return path, new
 
     def _new(self, bake: Bake, texture: np.ndarray) -> tuple[str, bpy.types.Image]:
@@ -141,25 +141,25 @@ class Results:
                 return path
         raise BakeError(f"Another object is baked to the same part of the image '{name}'.")
 
-    def _others(self, image, bake: Bake) -> list[Target]:
+    def _other_owners(self, image, bake: Bake) -> list[Target]:
         """Other targets whose results the image holds, or that come first in this run."""
         target = bake.target
         planned = self._planned.get(image.name, [])
         first = planned[: planned.index(target)] if target in planned else planned
         users = users_of(image)
-        others = dict.fromkeys([*owners_of(image), *(other for other in first if other in users)])
-        others.pop(target, None)
+        owners = dict.fromkeys([*owners_of(image), *(owner for owner in first if owner in users)])
+        owners.pop(target, None)
         if target.object_name in bpy.data.objects:
-            return list(others)
+            return list(owners)
         # The target was renamed during the bake: a target of the same material and charts is the target itself.
         return [
-            other
-            for other in others
-            if other.material_name != target.material_name or not self._covers(other, image, bake)
+            owner
+            for owner in owners
+            if owner.material_name != target.material_name or not self._covers(owner, image, bake)
         ]
 
-    def _covers(self, other: Target, image, bake: Bake) -> bool:
-        return overlaps(bake.job.receiver, self._parts_of(other, image))
+    def _covers(self, owner: Target, image, bake: Bake) -> bool:
+        return overlaps(bake.job.receiver, self._parts_of(owner, image))
 
     def _parts_of(self, target: Target, image) -> Parts:
         """The target's charts in the image."""
@@ -173,10 +173,10 @@ class Results:
         receiver, target = bake.job.receiver, bake.target
         if receiver.coverage.shape != tuple(image.size)[::-1]:
             return
-        for other in self._others(image, bake):
-            if other.material_name == target.material_name and overlaps(receiver, self._parts_of(other, image)):
+        for owner in self._other_owners(image, bake):
+            if owner.material_name == target.material_name and overlaps(receiver, self._parts_of(owner, image)):
                 raise BakeError(
-                    f"'{other.object_name}' is baked to the same part of the image '{image.name}' by the same "
+                    f"'{owner.object_name}' is baked to the same part of the image '{image.name}' by the same "
                     f"material: give '{target.object_name}' a material of its own (Object > Relations > Make "
                     "Single User > Materials), or move its UVs."
                 )
