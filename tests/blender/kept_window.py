@@ -1,4 +1,4 @@
-"""What test_kept_undo.py runs inside a Blender with a window: undo of bakes, and in the middle of one.
+"""Scenario of test_kept_undo.py in a Blender with a window: undo of bakes, also while one runs.
 
 xvfb-run blender --factory-startup --python THIS -- RESULTS.json
 """
@@ -31,7 +31,7 @@ def image():
 
 
 def shown_and_packed():
-    """Brightness of what is shown and of what a saved file would show."""
+    """Brightness of the pixels on display, and of the pixels that a saved file would show."""
     if image() is None:
         return [-1.0, -1.0]
     shown = float(scenes.pixels(image()).mean())
@@ -73,7 +73,7 @@ def scenario():
         yield lambda: True
         noted(name)
 
-    # In the middle of a bake that takes a while.
+    # Undo while a slow bake runs.
     settings = bpy.context.scene.beamspread
     settings.solver = "direct"
     image().scale(256, 256)

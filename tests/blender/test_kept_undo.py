@@ -18,7 +18,7 @@ from scenes import add_material, add_plane, add_sun, bake, node_of, pixels
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
-    """What kept_window.py noted: brightness of what is shown and of what is packed."""
+    """Results of kept_window.py: brightness of the pixels on display and of the packed pixels."""
     if not bpy.app.binary_path:
         pytest.skip("the bpy module opens no window")
     path = tmp_path_factory.mktemp("window") / "results.json"
@@ -48,7 +48,7 @@ def test_picture_and_packed_data_are_undone_together(seen):
 def test_a_running_bake_survives_undo_and_keeps_its_result(seen):
     assert seen["runs"]
     assert seen["still runs"]
-    # Of more texels, which see the border a little differently.
+    # This bake has more texels, which sample the border a little differently.
     assert seen["baked across undo"] == pytest.approx([7 * seen["baked 1"][0]] * 2, rel=0.05)
     assert not seen["said"]
     assert seen["undone at last"] == seen["baked 3"]
@@ -65,7 +65,7 @@ def row():
 
 @pytest.mark.parametrize("is_own", [False, True])
 def test_a_file_is_not_undone_and_the_results_say_so(is_own, tmp_path):
-    """That of an image which the bake has made, or one that was there before."""
+    """The file of an image that the bake has made, or of one that was there before."""
     image, settings = None, bpy.context.scene.beamspread
     settings.image_dir, settings.resolution, path = str(tmp_path), 16, tmp_path / "Plane_Medium.exr"
     if is_own:
