@@ -156,7 +156,7 @@ def seen():
 
 
 def picture(tmp_path):
-    """What F12 gives, (height, width, 3) linear."""
+    """Image of F12, (height, width, 3) linear."""
     scene = bpy.context.scene
     scene.render.image_settings.file_format, scene.render.filepath = "OPEN_EXR", str(tmp_path / "f12.exr")
     bpy.ops.render.render(write_still=True)
@@ -247,7 +247,7 @@ def row():
     return state.rows[Target("Plane", "Medium")]
 
 
-def test_the_panel_says_what_blenders_own_bake_fills():
+def test_the_panel_names_the_image_that_blenders_own_bake_fills():
     material = add_material()
     assert target_of_blender(None) == target_of_blender(material)
     assert target_of_blender(material).startswith("Select an Image Texture node")

@@ -68,7 +68,7 @@ def test_a_saved_file_has_no_preview_and_live_goes_on(tmp_path, has_image):
 
 
 def test_paint_is_saved_with_the_image_and_stays_through_live(tmp_path):
-    """Also when Blender saves all changed images, as it offers when a file is closed."""
+    """Blender saves all changed images, as it offers when a file is closed."""
     _plane, lamp, material, baked = make_baked_scene()
     image = scenes.node_of(material).image
     draw(image)

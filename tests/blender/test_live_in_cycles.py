@@ -96,7 +96,7 @@ def test_no_image_stays_behind(scene, end):
 
 
 def test_a_final_render_shows_the_preview(scene, tmp_path):
-    """F12 takes what the viewport shows, whether or not the node's own image has a file."""
+    """F12 renders the same image as the viewport, whether or not the node's own image has a file."""
     plane, lamp, material = scene
     scenes.bake(plane)
     lamp.data.energy = 500

@@ -1,4 +1,4 @@
-"""What panels say of bakes."""
+"""Messages about bakes in panels."""
 
 from beamspread.blender.jobs.state import Row, Status, state
 from beamspread.blender.live import timer
@@ -21,7 +21,7 @@ def test_each_row_says_why_it_is_out_of_date_and_other_messages_come_once():
     assert layout.said.count(left_out) == 1
 
 
-def test_why_it_failed_is_not_said_again_below_what_is_in_the_way():
+def test_the_reason_of_a_failure_is_shown_once():
     layout, why, target = Layout(), "The albedo's red is 1.", Target("First", "One")
     message = Message(Level.ERROR, str(target), why)
     state.rows = {target: Row(target, Status.FAILED, (message,), is_stale=True)}
@@ -30,7 +30,7 @@ def test_why_it_failed_is_not_said_again_below_what_is_in_the_way():
     assert why not in layout.said
 
 
-def test_what_keeps_live_from_following_is_said_once(monkeypatch):
+def test_the_obstacle_of_live_is_shown_once(monkeypatch):
     layout, why = Layout(), "It is not flat."
     target = Target("First", "One")
     message = Message(Level.ERROR, str(target), why)

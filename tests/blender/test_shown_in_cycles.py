@@ -35,7 +35,7 @@ def test_render_shows_the_bake(tmp_path, reopened):
     plane = add_plane(material=add_material(albedo=(0.99, 0.9, 0.5)))
     wall, sun = add_blocker(0.4), add_sun(45, 25, strength=5.0)
     (texture,) = bake(plane)
-    # What Cycles would add: the wall in front of the camera, and the coat's reflection of the sun.
+    # Light that Cycles would add: the wall in front of the camera, and the coat's reflection of the sun.
     wall.hide_render = sun.hide_render = True
     if reopened:
         path = str(tmp_path / "scene.blend")
@@ -67,7 +67,7 @@ def test_coat_reflects_only_with_an_ior_above_one(tmp_path):
 
 
 def render_with_bounce(path):
-    """As `render`, with one reflection."""
+    """Image of `render` with one reflection."""
     scene = bpy.context.scene
     scene.cycles.max_bounces = 1
     scene.camera = bpy.data.objects["Camera"]

@@ -1,4 +1,4 @@
-"""What stays known of a bake when names change, and when a bake with a file is undone."""
+"""Facts about a bake that remain when names change, and when a bake with a file is undone."""
 
 import bpy
 import pytest
@@ -43,7 +43,7 @@ def test_a_copy_is_not_taken_for_the_renamed_original():
     assert Status.BAKED not in standings()
 
 
-def test_undo_leaves_a_file_and_what_is_known_of_it(tmp_path):
+def test_undo_leaves_a_file_and_its_facts(tmp_path):
     bpy.context.scene.beamspread.image_storage = "FILES"
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
     plane = make_baked()

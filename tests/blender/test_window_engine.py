@@ -10,7 +10,7 @@ import pytest
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
-    """What window_engine.py noted."""
+    """Results of window_engine.py."""
     if not bpy.app.binary_path:
         pytest.skip("the bpy module opens no window")
     path = tmp_path_factory.mktemp("window") / "results.json"

@@ -1,4 +1,4 @@
-"""What test_window_engine.py runs inside a Blender with a window: F12, viewports, and nodes by copy and paste.
+"""Runs for test_window_engine.py inside a Blender with a window: F12, viewports, and nodes by copy and paste.
 
 xvfb-run blender --factory-startup --python THIS -- RESULTS.json
 """
@@ -64,8 +64,8 @@ def add_scene():
 
 
 def blender_s_own_bake(plane):
-    """Of irradiance into another image, before a white wall in the sun; sums with and without what bounces, and with a
-    lamp that only Cycles knows.
+    """Irradiance baked into another image, before a white wall in the sun; sums with and without bounced light, and
+    with a lamp that only Cycles can evaluate.
     """
     settings = bpy.context.scene.beamspread
     settings.quality, settings.output = "preview", "IRRADIANCE"

@@ -45,7 +45,7 @@ def test_interior_under_a_sun(folder, method):
     assert luminance[12, 12] == pytest.approx(sample.power * irradiance / math.pi, rel=1e-3)
 
 
-def test_what_the_artist_is_told(folder, tmp_path):
+def test_the_messages_for_the_artist(folder, tmp_path):
     def baked(where, sun=SUN, material=MATERIAL):
         return bake(SQUARE, Illumination([sun]), material, 0.0, settings(where))
 

@@ -14,12 +14,12 @@ def test_names_stay_plain_where_nothing_else_has_them():
     assert [*file_stems(things).values()] == ["Floor_Marble", "A_b_M", "Wall_Marble"]
 
 
-def test_those_that_would_be_called_the_same_are_told_apart_whatever_their_order():
+def test_equal_names_are_told_apart_in_any_order():
     things = [("A b", "M"), ("A/b", "M"), ("A_b", "M"), ("a_b", "m"), ("A", "b_M"), ("A", "b", "M"), ("other", "M")]
     names = file_stems(things)
     assert file_stems(things[::-1]) == names
     assert len({name.lower() for name in names.values()}) == len(things)
-    # What needed no change keeps its name, which pairs of names have rather than those with a layer.
+    # Names that need no change are kept; pairs of names have precedence over those with a layer.
     assert names["A", "b_M"] == "A_b_M"
     assert names["other", "M"] == "other_M"
     assert all(name.lower().startswith("a_b_m_") for names_, name in names.items() if name not in ("A_b_M", "other_M"))

@@ -177,7 +177,7 @@ def test_without_matplotlib_only_pictures_fail(run, slab_file):
 
 
 def test_reader_that_stops_reading(slab_file, tmp_path):
-    """As `| head` does: no traceback."""
+    """A closed pipe, as after `| head`: no traceback."""
     read, write = os.pipe()
     os.close(read)
     done = subprocess.run(
@@ -207,7 +207,7 @@ def start_on_terminal(folder, *arguments):
 
 
 def read_terminal(terminal, until=None):
-    """What a terminal shows, to its end or until a text appears."""
+    """Output of a terminal, to its end or until a text appears."""
     seen = b""
     while until is None or until not in seen:
         try:

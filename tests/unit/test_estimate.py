@@ -65,7 +65,7 @@ ALL = "sun", "lamp", "world"
 
 
 def peak_of(allowed, size, solver, names, color=COLORED, medium=(0.6, 1.4, 0.01, 0.0), layer="Combined"):
-    """Bytes at the peak, in a process of its own beside what it had before; whether it runs with `allowed` times that.
+    """Bytes at the peak of a separate process, beyond those before the bake; True if it runs with `allowed` times that.
 
     `medium`: anisotropy, ior, mean free path and thickness, of a plane of side 1.
     """

@@ -1,4 +1,4 @@
-"""What --resume leaves out: by the files' times and by what an earlier report says of them."""
+"""Bakes that --resume skips: by the files' times and by an earlier report."""
 
 import os
 
@@ -47,7 +47,7 @@ def test_a_report_must_agree(tmp_path):
     done.status, done.dark, done.lights = "written", True, 2
     record = earlier(tmp_path, done).skipped(wanted(tmp_path), needs_record=True)
     assert (record.status, record.dark, record.lights, record.path) == ("skipped", True, 2, done.path)
-    # And again by what the second run has reported.
+    # Once more, with the report of the second run.
     assert earlier(tmp_path, record).skipped(wanted(tmp_path)) == record
     for name, value in {
         "output": "IRRADIANCE",
