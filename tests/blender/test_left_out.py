@@ -50,7 +50,7 @@ def add_curve():
 MISPLACED = [
     (add_grouped, "Grouped", ["'Grouped' is in the node group 'Outer'", "Ctrl Alt G"]),
     (add_instances, "Shown", ["'Shown' has 2 instances", "Make Instances Real", "Make Single User"]),
-    (add_curve, "Spline", ["'Spline' is no mesh", "Convert"]),
+    (add_curve, "Spline", ["'Spline' is not a mesh", "Convert"]),
 ]
 
 

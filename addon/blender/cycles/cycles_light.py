@@ -163,8 +163,8 @@ class CyclesLight:
                 illumination = illumination.lit_by([FieldLight("Bounced light", *WHITE, False, fields)])
             elif irradiance > 0:
                 illumination = illumination.with_messages(NOTHING_BOUNCES)
-        found = [self._direct(receiver, name, step) for name, step in zip(others, each)]
-        return replace(job, illumination=illumination.lit_by(found))
+        lights = [self._direct(receiver, name, step) for name, step in zip(others, each)]
+        return replace(job, illumination=illumination.lit_by(lights))
 
     def _direct(self, receiver: Receiver, name: str, progress: Progress | None) -> Light:
         """Light of one object on the receiver."""
@@ -197,10 +197,10 @@ class CyclesLight:
             "most_samples": MAX_SAMPLES,
         }
         seconds = seconds_estimate(receiver.width, receiver.height)
-        found = run(self._copy.scene, "fields", {**request, **options}, progress, doing, seconds)
+        arrays = run(self._copy.scene, "fields", {**request, **options}, progress, doing, seconds)
         grids = (chart.grid for chart in receiver.charts)
-        fields = tuple(Field(grid.origin, grid.normal, found[f"radiance_{n}"]) for n, grid in enumerate(grids))
-        return fields, float(found["irradiance"])
+        fields = tuple(Field(grid.origin, grid.normal, arrays[f"radiance_{n}"]) for n, grid in enumerate(grids))
+        return fields, float(arrays["irradiance"])
 
 
 def _irradiance_in_the_open(receiver: Receiver, lights: Sequence[Light]) -> float:

@@ -1,4 +1,4 @@
-"""Where a scene has Beamspread nodes: what can be baked, and what can't because of where its node is."""
+"""Beamspread nodes of a scene: targets that can be baked, and nodes in places where no bake can use them."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ NOTHING_FOUND = "No mesh has a material with a Beamspread node: add one in the S
 
 
 def find_node(material):
-    """The material's Beamspread node (one that is linked rather than one that is not), or None."""
-    found = find_node_in_groups(material)
-    return found and found[0]
+    """The material's Beamspread node, or None; a linked node wins over others."""
+    node = find_node_in_groups(material)
+    return node and node[0]
 
 
 def find_node_in_groups(material) -> tuple | None:
-    """The node, and the group nodes around it: a node group counts if nothing else uses it, since it has one image."""
+    """The material's node and the group nodes around it, or None. Groups with other users don't count: a node has one image."""
     if material is None or not compat.uses_nodes(material):
         return None
-    found = [one for one in _nodes_in(material.node_tree) if all(map(_is_own, one[1]))]
-    found.sort(key=lambda one: (len(one[1]) > 0, not is_linked(one[0])))
-    return next(iter(found), None)
+    nodes = [(node, groups) for node, groups in _nodes_in(material.node_tree) if all(map(_has_one_user, groups))]
+    nodes.sort(key=lambda pair: (len(pair[1]) > 0, not is_linked(pair[0])))
+    return next(iter(nodes), None)
 
 
 def _nodes_in(tree) -> Iterator[tuple]:
@@ -44,8 +44,8 @@ def _nodes_in(tree) -> Iterator[tuple]:
             stack.append((iter(node.node_tree.nodes), (*groups, node)))
 
 
-def _is_own(group) -> bool:
-    """Whether a group node alone shows its tree."""
+def _has_one_user(group) -> bool:
+    """True if no other node shows the tree of a group node."""
     tree = group.node_tree.original
     return tree.users - tree.use_fake_user <= 1
 
@@ -56,45 +56,45 @@ def materials_of(obj) -> list:
 
 
 def find_targets(objects: Iterable) -> list[Target]:
-    """Everything to bake among the objects, in their order."""
+    """Targets among the objects, in their order."""
     return [Target(obj.name, material.name) for obj in objects for material in materials_of(obj)]
 
 
 def find_bakeable(view_layer, chosen: Iterable | None = None) -> list[Target]:
-    """The targets among the chosen objects, None: among the scene's, and among what only instances of these show.
+    """Targets among the chosen objects (None: the scene's), and among objects that only their instances show.
 
-    Of the latter a material that shows an image already has been baked elsewhere if it belongs to another file, or if
-    it stands in several places and nobody has chosen it.
+    A material of an instance that already shows an image is left out if it belongs to another file, or if it has
+    several instances and nobody has chosen it: it was baked elsewhere.
     """
     objects = list(view_layer.id_data.objects if chosen is None else chosen)
     inner = with_instanced(objects)[len(objects) :]
-    own = {obj.name for obj in (*view_layer.objects, *objects)} if inner else set()
-    found = [(obj, material) for obj in inner if obj.name not in own for material in materials_of(obj)]
-    places = rendered_counts(view_layer) if found and chosen is None else {}
+    names = {obj.name for obj in (*view_layer.objects, *objects)} if inner else set()
+    instanced = [(obj, material) for obj in inner if obj.name not in names for material in materials_of(obj)]
+    counts = rendered_counts(view_layer) if instanced and chosen is None else {}
     targets = find_targets(objects)
-    for obj, material in found:
-        if not was_baked_elsewhere(material) and (places.get(obj.name, 0) <= 1 or find_node(material).image is None):
+    for obj, material in instanced:
+        if not was_baked_elsewhere(material) and (counts.get(obj.name, 0) <= 1 or find_node(material).image is None):
             targets.append(Target(obj.name, material.name))
     return targets
 
 
 def was_baked_elsewhere(material) -> bool:
-    """Whether a material with a node belongs to another file and shows the image that was baked there."""
+    """True if a material with a node belongs to another file and shows the image that was baked there."""
     is_local = material.library is None and material.override_library is None
     return not is_local and find_node(material).image is not None
 
 
 def rendered_counts(view_layer) -> dict[str, int]:
-    """By name, in how many places a render shows objects; where they stand themselves, others don't count."""
+    """Number of instances that a render shows, by object name; 1 for objects of the view layer themselves."""
     visible = render_visible_names(view_layer)
     shown = count_instances(obj for obj in view_layer.objects if obj.name in visible)
     return {**shown, **dict.fromkeys(visible, 1)}
 
 
 def find_misplaced(objects: Iterable) -> list[Bake]:
-    """Beamspread nodes where no bake can use them: failures that say where, and what to do.
+    """Failed bakes of Beamspread nodes that no bake can use, with the remedy.
 
-    A node on what is no mesh that shows an image already has been baked elsewhere.
+    A node with an image on an object without a mesh is left out: it was baked elsewhere.
     """
     shown = with_instanced(objects)
     return [Bake(Target(obj.name, material.name), error=why) for obj in shown for material, why in _misplaced(obj)]
@@ -104,7 +104,7 @@ def _misplaced(obj) -> Iterator[tuple]:
     for material in _all_materials(obj):
         node = find_node(material)
         if node is not None and obj.type != "MESH" and node.image is None:
-            yield material, f"'{obj.name}' is no mesh: convert it to one (Object > Convert > Mesh)."
+            yield material, f"'{obj.name}' is not a mesh: convert it to one (Object > Convert > Mesh)."
         if node is None and compat.uses_nodes(material):
             for _, groups in _nodes_in(material.node_tree):
                 yield material, _why_not_in_group(material, groups)
@@ -116,8 +116,8 @@ def _all_materials(obj) -> list:
 
 
 def _why_not_in_group(material, groups: tuple) -> str:
-    shared = next(group.node_tree.name for group in groups if not _is_own(group))
+    shared = next(group.node_tree.name for group in groups if not _has_one_user(group))
     return (
-        f"The Beamspread node of '{material.name}' is in the node group '{shared}', used several times, though "
-        "a node has one image: make it single-user (click the number beside its name), or ungroup it (Ctrl Alt G)."
+        f"The Beamspread node of '{material.name}' has one image, but its node group '{shared}' is used several times: "
+        "make the group single-user (click the number beside its name), or ungroup it (Ctrl Alt G)."
     )

@@ -1,4 +1,4 @@
-"""The node's inner tree: what a renderer sees of it, made of nodes that every Blender has."""
+"""The node's inner tree, made of nodes that every Blender has: a renderer sees it in place of the node."""
 
 import bpy
 
@@ -12,7 +12,7 @@ FACING = "Facing"
 INPUT, EMISSION, UNSEEN, TOTAL, OUTPUT = "Input", "Emission", "Unseen", "Total", "Output"
 BAKED = "Is Baked"
 
-# Of the coat where no input has changed it; older trees have it in their Glossy node.
+# Roughness of the coat of older trees, in their Glossy node.
 ROUGHNESS_BEFORE = 0.1
 
 
@@ -50,12 +50,12 @@ def make_inner_tree() -> bpy.types.ShaderNodeTree:
 
 
 def is_inner_tree(tree) -> bool:
-    """Whether it was made here."""
+    """True if `make_inner_tree` made the tree."""
     return tree.name.startswith(NAME) and {IMAGE, FRESNEL, GLOSSY} <= set(tree.nodes.keys())
 
 
 def add_missing_inputs(tree) -> bool:
-    """Give a tree, perhaps one of an older file, the inputs that nodes have today; whether it lacked them."""
+    """Give a tree of an older file the inputs that nodes have today; True if it lacked them."""
     compat.set_shader_color(tree)
     lacks_inputs = not compat.has_input_socket(tree, NORMAL) and {FRESNEL, GLOSSY} <= set(tree.nodes.keys())
     if lacks_inputs:
@@ -80,7 +80,7 @@ def _add_inputs(tree) -> None:
 
 
 def _use_base_color(tree) -> None:
-    """Have the emission depend on the base colour, times 0: Blender 5 greys out inputs that no output depends on."""
+    """Make the emission depend on the base color, times 0: Blender 5 grays out inputs that no output depends on."""
     nothing = _add(tree, "ShaderNodeVectorMath", UNSEEN, (-600, 250))
     nothing.operation = "MULTIPLY"
     nothing.inputs[1].default_value = (0.0, 0.0, 0.0)
@@ -113,7 +113,7 @@ def _show_unbaked(tree) -> None:
 
 
 def _normal_or_plain(tree, given):
-    """The given normal, or the surface's own where nothing is linked: a group's input is the null vector then."""
+    """The given normal, or the surface's own without a link: the group's input is then the null vector."""
     link = tree.links.new
     geometry = _add(tree, "ShaderNodeNewGeometry", FACING, (-1400, -650))
     length = _add(tree, "ShaderNodeVectorMath", "Length", (-1200, -450))
@@ -121,15 +121,15 @@ def _normal_or_plain(tree, given):
     missing = _add(tree, "ShaderNodeMath", "Missing", (-1000, -450))
     missing.operation = "LESS_THAN"
     missing.inputs[1].default_value = 0.5
-    own = _add(tree, "ShaderNodeVectorMath", "Own", (-1000, -650))
-    own.operation = "SCALE"
+    surface_normal = _add(tree, "ShaderNodeVectorMath", "Own", (-1000, -650))
+    surface_normal.operation = "SCALE"
     total = _add(tree, "ShaderNodeVectorMath", "Normal", (-800, -450))
     link(length.inputs[0], given)
     link(missing.inputs[0], length.outputs["Value"])
-    link(own.inputs[0], geometry.outputs["Normal"])
-    link(own.inputs["Scale"], missing.outputs[0])
+    link(surface_normal.inputs[0], geometry.outputs["Normal"])
+    link(surface_normal.inputs["Scale"], missing.outputs[0])
     link(total.inputs[0], given)
-    link(total.inputs[1], own.outputs[0])
+    link(total.inputs[1], surface_normal.outputs[0])
     return total.outputs[0]
 
 
@@ -142,7 +142,7 @@ def show_values(tree, image, ior: float) -> None:
 def show_ior(tree, ior: float) -> None:
     """Bring an index of refraction into the tree, whose image stays."""
     tree.nodes[FRESNEL].inputs["IOR"].default_value = max(ior, 1.0)
-    # Without a step in refraction there is no coat, whatever the renderer's Fresnel node says at grazing angles.
+    # Without a step in refraction there is no coat, though a Fresnel node reflects at grazing angles.
     tree.nodes[COAT].inputs[1].default_value = 1.0 if ior > 1 else 0.0
 
 

@@ -1,1 +1,1 @@
-"""What the window shows."""
+"""Panels of the window."""

@@ -119,10 +119,9 @@ def target_of_blender(material) -> str:
 
 
 def _base_color_images(material) -> set:
-    found = find_node_in_groups(material)
-    if found is None or BASE_COLOR not in found[0].inputs:
+    node, groups = find_node_in_groups(material) or (None, ())
+    if node is None or BASE_COLOR not in node.inputs:
         return set()
-    node, groups = found
     sources = Links().readers(InputSocket(node.inputs[BASE_COLOR], groups))
     return {getattr(source.node, "image", None) for source in sources if source.socket.is_output}
 
