@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import textwrap
+
 import bpy
 
 MAX_LETTERS = 80
@@ -16,12 +18,7 @@ DELAY_SECONDS = 0.05
 
 def wrap(text: str, width: int) -> list[str]:
     """Lines of at most `width` letters, unless a word is longer."""
-    lines = [""]
-    for word in text.split():
-        if lines[-1] and len(lines[-1]) + len(word) >= width:
-            lines.append("")
-        lines[-1] = f"{lines[-1]} {word}".strip()
-    return lines
+    return textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False) or [""]
 
 
 def show_soon(title: str, messages: list[str]) -> None:

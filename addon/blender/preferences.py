@@ -6,7 +6,6 @@ There are none if the package is registered without being an enabled add-on, as 
 from __future__ import annotations
 
 import functools
-import textwrap
 from pathlib import Path
 
 import bpy
@@ -15,6 +14,7 @@ from bpy.props import IntProperty, StringProperty
 from ..core import native
 from ..core.ldf import library
 from . import compat
+from .popup import wrap
 from .registration import all_or_nothing, classes
 
 PACKAGE = __package__.rpartition(".")[0]
@@ -92,7 +92,7 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
         if native.problem:
             characters = max(40, int(context.region.width / context.preferences.system.ui_scale / 7))
             column = layout.column(align=True)
-            for number, line in enumerate(textwrap.wrap(native.problem, characters)):
+            for number, line in enumerate(wrap(native.problem, characters)):
                 column.label(text=line, icon="BLANK1" if number else "ERROR")
         layout.use_property_split = True
         layout.use_property_decorate = False

@@ -15,6 +15,7 @@ from ...core.exr_header import is_half, text_of
 from ...core.native import native
 from ...core.whole_file import whole_file
 from .. import compat
+from ..read.image_nodes import from_srgb
 from . import icons, undo
 from .facts import facts_of
 
@@ -124,11 +125,6 @@ def to_srgb(linear: np.ndarray) -> np.ndarray:
     """Encode linear values with the sRGB transfer function (IEC 61966-2-1), clipped to 0..1."""
     clipped = np.clip(linear, 0, 1)
     return np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055).astype(np.float32)
-
-
-def from_srgb(encoded: np.ndarray) -> np.ndarray:
-    """Linear values from those of `to_srgb`."""
-    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 def clips(image) -> bool:

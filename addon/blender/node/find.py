@@ -21,7 +21,7 @@ def find_node(material):
 
 
 def find_node_in_groups(material) -> tuple | None:
-    """The material's node and the group nodes around it, or None. Groups with other users don't count: a node has one image."""
+    """The material's node and the group nodes around it, or None; groups with other users don't count."""
     if material is None or not compat.uses_nodes(material):
         return None
     nodes = [(node, groups) for node, groups in _nodes_in(material.node_tree) if all(map(_has_one_user, groups))]

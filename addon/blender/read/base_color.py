@@ -8,6 +8,7 @@ import numpy as np
 
 from ...core.errors import MissingImageError, NotSupportedError
 from ...core.scene.receiver import Receiver
+from ...core.scene.sampling import sample_positions
 from .image_nodes import Images, Pixels
 from .nodes import Evaluator, InputSocket, Links, Source, converted, shows_bake
 from .shading import ON_NO_PATH, ShadingPoints
@@ -52,11 +53,10 @@ def read_base_color(
     to_local, images, links = np.array(instance.matrix.inverted_safe(), dtype=float), Images(), Links()
     width, height, uv_map = receiver.width, receiver.height, _uv_map(instance.obj)
     side = _positions_along_texels(links, wanted, max(width, height))
-    middles = (np.arange(side) + 0.5) / side
     colors = []
     for chart in receiver.charts:
         total = np.zeros((chart.grid.height, chart.grid.width, 3), np.float32)
-        for at in ((across, up) for across in middles for up in middles):
+        for at in sample_positions(side):
             uvs, positions = chart.uvs(width, height, at), chart.grid.positions(at)
             strip = max(1, MAX_POSITIONS // chart.grid.width)
             for first in range(0, chart.grid.height, strip):

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import MissingImageError, NotSupportedError
+from ...core.scene.sampling import bilinear, nearest
 from .node_math import rotation_matrix
 from .nodes import InputSocket, Links, Source
 
@@ -147,7 +148,7 @@ class Images:
         """Outputs of an Image Texture node at UVs (N, 3)."""
         stored = self._stored(node)
         columns, rows = uvs[..., 0] * stored.shape[1], uvs[..., 1] * stored.shape[0]
-        texels = lookup(stored, columns, rows, node.interpolation != "Closest", node.extension, node.extension)
+        texels = sampled(node, stored, columns, rows, node.extension, node.extension)
         return outputs_of(node, texels)
 
     def _stored(self, node) -> np.ndarray:
@@ -197,51 +198,11 @@ def environment_coordinates(directions: np.ndarray, shape: tuple) -> tuple[np.nd
     return columns, (0.5 + np.arctan2(z, np.hypot(x, y)) / np.pi) * shape[0]
 
 
-def lookup(pixels, columns, rows, is_smooth: bool, across: str, along: str) -> np.ndarray:
-    """Pixels (H, W, C) at positions in texels from the image's corner, (N,) each -> (N, C)."""
-    if not is_smooth:
-        return _texels(pixels, np.floor(columns), np.floor(rows), across, along)
-    column, row = np.floor(columns - 0.5), np.floor(rows - 0.5)
-    right, up = (columns - 0.5 - column)[..., None], (rows - 0.5 - row)[..., None]
-    below = _texels(pixels, column, row, across, along) * (1 - right)
-    below += _texels(pixels, column + 1, row, across, along) * right
-    above = _texels(pixels, column, row + 1, across, along) * (1 - right)
-    above += _texels(pixels, column + 1, row + 1, across, along) * right
-    return below * (1 - up) + above * up
-
-
-def _texels(pixels, columns, rows, across: str, along: str) -> np.ndarray:
-    height, width = pixels.shape[:2]
-    texels = pixels[_inside(rows, height, along), _inside(columns, width, across)].astype(float)
-    if across == "CLIP":
-        texels *= ((columns >= 0) & (columns < width) & (rows >= 0) & (rows < height))[..., None]
-    return texels
-
-
-def _inside(numbers, count: int, extension: str) -> np.ndarray:
-    if extension == "REPEAT":
-        numbers = np.mod(numbers, count)
-    elif extension == "MIRROR":
-        numbers = np.mod(numbers, 2 * count)
-        numbers = np.minimum(numbers, 2 * count - 1 - numbers)
-    return np.clip(numbers, 0, count - 1).astype(int)
-
-
-def resampled(texels: np.ndarray, transform: UVTransform, size: tuple[int, int]) -> np.ndarray:
-    """An image of another size (height, width) that looks the same."""
-    for axis in (0, 1):
-        count = texels.shape[axis]
-        if count == size[axis]:
-            continue
-        at = (np.arange(size[axis]) + 0.5) / size[axis] * count - (0.5 if transform.is_smooth else 0)
-        cell = np.floor(at).astype(int)
-        part = (at - cell if transform.is_smooth else np.zeros(len(at))).astype(np.float32)
-        part = part.reshape((-1, 1, 1) if axis == 0 else (1, -1, 1))
-        # Neighbors beyond the border; a clipped image counts as extended here.
-        wrap = {"repeat": "wrap"}.get(transform.extension, "clip")
-        low, high = (np.take(texels, cell + i, axis=axis, mode=wrap) for i in (0, 1))
-        texels = low * (1 - part) + high * part
-    return texels
+def sampled(node, pixels: np.ndarray, columns, rows, across: str, along: str) -> np.ndarray:
+    """Pixels (H, W, C) at positions in texels from the image's corner, (N,) or one, interpolated as the node says."""
+    sample = nearest if node.interpolation == "Closest" else bilinear
+    values = sample(pixels, np.atleast_1d(columns), np.atleast_1d(rows), across, along).astype(float)
+    return values if np.ndim(columns) else values[0]
 
 
 def alpha_of(node, stored: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from ...core.errors import NotSupportedError
-from .image_nodes import Images, environment_coordinates, lookup
+from .image_nodes import Images, environment_coordinates, sampled
 from .nodes import Evaluator, InputSocket, Links, Source, converted, shows_bake
 
 ZERO, DARK = np.zeros(1), np.zeros(3)
@@ -92,7 +92,7 @@ class ShadingPoints(Evaluator):
         if self.lookups is not None:
             self.lookups.append((pixels, directions))
         columns, rows = environment_coordinates(directions, pixels.shape)
-        return lookup(pixels, columns, rows, source.node.interpolation != "Closest", "REPEAT", "EXTEND")
+        return sampled(source.node, pixels, columns, rows, "REPEAT", "EXTEND")
 
     def _image(self, source: Source) -> np.ndarray | None:
         self._images.check(source.node)

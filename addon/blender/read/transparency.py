@@ -15,8 +15,9 @@ import numpy as np
 from ...core.errors import NotSupportedError
 from ...core.messages import Message, warning
 from ...core.native import native
+from ...core.scene.sampling import resized
 from .. import compat
-from .image_nodes import Pixels, UVTransform, alpha_of, color_of, resampled, uv_transform_of
+from .image_nodes import Pixels, UVTransform, alpha_of, color_of, uv_transform_of
 from .nodes import Evaluator, InputSocket, Links, Source, converted, shows_bake, surface_of
 
 # Size of the first evaluation, which tells images from constants.
@@ -121,8 +122,13 @@ class TexelEvaluator(Evaluator):
                 raise NotSupportedError("node", node.name, "its UV transform is not that of the other images")
             self.transform = transform
             self.largest = tuple(map(max, self.largest, stored.shape[:2]))
-            stored = np.zeros_like(stored[:1, :1]) if self._is_outside else resampled(stored, transform, self._size)
+            stored = np.zeros_like(stored[:1, :1]) if self._is_outside else self._resized(stored, transform)
         return evaluate(node, stored)
+
+    def _resized(self, stored: np.ndarray, transform: UVTransform) -> np.ndarray:
+        # A clipped or mirrored image counts as extended between its border and the outermost texels.
+        extension = "REPEAT" if transform.extension == "repeat" else "EXTEND"
+        return resized(stored, *self._size, extension, transform.is_smooth)
 
     def _light_path(self, source: Source) -> np.ndarray:
         """Light Path, which answers for shadow rays of any origin."""

@@ -9,6 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 
+def sample_positions(count: int) -> list[tuple[float, float]]:
+    """Centers of the `count` x `count` equal parts of a texel, across and up, in texels."""
+    centers = ((np.arange(count) + 0.5) / count).tolist()
+    return [(across, up) for across in centers for up in centers]
+
+
 def bilinear(
     values: np.ndarray, columns: np.ndarray, rows: np.ndarray, across: str = "EXTEND", along: str = "EXTEND"
 ) -> np.ndarray:

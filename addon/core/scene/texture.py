@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .receiver import Chart, Receiver
-from .sampling import bilinear
+from .sampling import bilinear, sample_positions
 
 # Largest number of samples of a finer texture along each side of a texel. More: less aliasing, more time.
 MAX_SAMPLES = 4
@@ -70,9 +70,8 @@ class Texture:
         """The colors of a chart on the grid of `target`, the same chart of `receiver`."""
         finer = max(self.receiver.width / receiver.width, self.receiver.height / receiver.height)
         count = int(np.clip(np.ceil(finer - 0.01), 1, MAX_SAMPLES))
-        middles = (np.arange(count) + 0.5) / count
         total = np.zeros((target.grid.height * target.grid.width, 3), np.float32)
-        for at in ((across, up) for across in middles for up in middles):
+        for at in sample_positions(count):
             x, y = chart.grid_positions(target.uvs(receiver.width, receiver.height, at), self.receiver)
             total += bilinear(color, x, y)
         return (total / count**2).reshape(target.grid.height, target.grid.width, 3)

@@ -17,7 +17,7 @@ from ....core.target import Target
 from ... import compat
 from ...node.find import find_node
 from ...node.tree import is_inner_tree
-from ...read.visibility import by_name, collection_of, render_visible_names, rendered_in
+from ...read.visibility import SOLID_TYPES, SURFACE_TYPES, by_name, collection_of, render_visible_names, rendered_in
 from .pixels import Pixels, images_of, results
 from .scatter import Scatter, scatters
 
@@ -32,8 +32,6 @@ BOUNCES = (
     *("transparent_max_bounces", "caustics_reflective", "caustics_refractive"),
 )
 
-GEOMETRY = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
-SOLID = GEOMETRY | {"CURVES", "VOLUME", "POINTCLOUD"}
 
 # Sockets of our node that change how it looks in a render and not what is baked.
 LOOKS = {"Roughness", "Normal"}
@@ -201,7 +199,7 @@ class Fingerprints:
         later = []
         for obj in objects:
             collection = collection_of(obj)
-            if obj.type == "LIGHT" or obj.type in SOLID or obj.instance_type != "NONE":
+            if obj.type == "LIGHT" or obj.type in SOLID_TYPES or obj.instance_type != "NONE":
                 if obj not in known:
                     text = self._lamp(obj) if obj.type == "LIGHT" else self._solid(obj, depsgraph)
                     known[obj] = text, [self._material(slot.material) for slot in obj.material_slots]
@@ -314,7 +312,7 @@ def _modifier(modifier) -> object:
 
 def _mesh(obj, depsgraph) -> str:
     """Of the corners, faces, UV maps and painted colours, with modifiers where the window shows the object."""
-    if obj.type not in GEOMETRY:
+    if obj.type not in SURFACE_TYPES:
         return obj.data.name_full if obj.data else ""
     evaluated = obj.evaluated_get(depsgraph)
     try:
