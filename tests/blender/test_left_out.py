@@ -48,7 +48,7 @@ def add_curve():
 
 
 MISPLACED = [
-    (add_grouped, "Grouped", ["'Grouped' is in the node group 'Outer'", "Ctrl Alt G"]),
+    (add_grouped, "Grouped", ["'Grouped' has one image, but its node group 'Outer'", "Ctrl Alt G"]),
     (add_instances, "Shown", ["'Shown' has 2 instances", "Make Instances Real", "Make Single User"]),
     (add_curve, "Spline", ["'Spline' is not a mesh", "Convert"]),
 ]

@@ -171,11 +171,11 @@ class State:
 state = State()
 
 
-def redraw(context) -> None:
-    """Have every area that shows the state show the new one."""
+def redraw(context, *area_types: str) -> None:
+    """Redraw the areas that show the state of bakes, and areas of these types."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type in {"PROPERTIES", "NODE_EDITOR"}:
+            if area.type in {"PROPERTIES", "NODE_EDITOR", *area_types}:
                 area.tag_redraw()
 
 

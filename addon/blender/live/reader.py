@@ -20,7 +20,7 @@ from ..node.find import find_bakeable, find_node
 from ..read.geometry import read_polygons
 from ..read.lights import read_illumination, with_lamps
 from ..read.scene_cache import SceneCache
-from ..read.visibility import ObjectInstance, check_instance, find_instances, render_visible_names
+from ..read.visibility import SURFACE_TYPES, ObjectInstance, check_instance, find_instances, render_visible_names
 from .preview import SINGLE
 from .scene_changes import SceneChanges
 from .texture_cache import TextureCache
@@ -32,7 +32,7 @@ INDIRECT = "indirect light"
 
 OUTPUT = "ShaderNodeOutputMaterial"
 
-READ_BY_BAKES = {"LIGHT", "MESH", "CURVE", "SURFACE", "FONT", "META"}
+READ_BY_BAKES = {"LIGHT", *SURFACE_TYPES}
 """Types of objects that bakes read."""
 
 

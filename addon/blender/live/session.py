@@ -12,7 +12,7 @@ from ...core.live.renderer import Rendering
 from ...core.messages import Level, Message, Messages, note
 from ...core.target import Target
 from ..images.facts import ImageFacts, facts_of, owners_of
-from ..jobs.state import state
+from ..jobs.state import redraw, state
 from ..node.find import find_node
 from .preview import Preview
 from .reader import Reader, shows_medium_alone
@@ -234,7 +234,7 @@ class Session:
             elif target in wanted:
                 shown |= self._show(rendering)
         if renderings:
-            redraw(context)
+            redraw(context, "VIEW_3D")
         return shown
 
     def _show(self, rendering: Rendering) -> bool:
@@ -333,11 +333,3 @@ def is_seen_by_cycles(context) -> bool:
         return False
     areas = (area for window in context.window_manager.windows for area in window.screen.areas)
     return any(area.type == "VIEW_3D" and area.spaces.active.shading.type == "RENDERED" for area in areas)
-
-
-def redraw(context) -> None:
-    """Redraw every area that shows previews or messages of Live."""
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type in {"VIEW_3D", "PROPERTIES", "NODE_EDITOR"}:
-                area.tag_redraw()

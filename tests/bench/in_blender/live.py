@@ -124,7 +124,7 @@ def redraws():
     watch, seconds = Stopwatch(), []
     for _ in range(CHANGES):
         watch.start()
-        session.redraw(bpy.context)
+        session.redraw(bpy.context, "VIEW_3D")
         yield lambda: times["drawn"] > watch.began
         seconds.append(times["drawn"] - watch.began)
     results["nothing, only drawn again"] = {"drawn": statistics.median(seconds)}
