@@ -118,24 +118,22 @@ def rays(library):
         native.EnvironmentLight(image, np.eye(3)),
         native.MeshLight(corners + (0, 0, 0.5), faces, np.ones((2, 3), np.float32)),
     ]
-    steep = lights[:3]  # within the angles of the library
-    coverage = np.ones((SIZE, SIZE), np.float32)
-    parts = [
-        part
-        for light in steep
-        for irradiance, direction in native.ray_layers(grid, light, rays=2)
-        for part in native.PlaneLight.of_channels(irradiance, direction, 3)
-    ]
-    size = (SIZE, SIZE)
-    medium = ([library] * 3, (0.9, 0.5, 0.1), (0.1, 0.1, 0.1), (pitch, pitch), 1e-2)
-    field = native.LightField(size, parts[:3], size, parts, *medium, threads=THREADS)
+    steep = [(light, (1, 0.5, 1), occluders) for light in lights[:3]]  # within the angles of the library
+    ones = np.ones((SIZE, SIZE, 3), np.float32)
+    surface = native.Surface(grid, ones[..., 0].copy(), 0.0, ones, ones)
+    medium = ([library] * 3, (0.9, 0.5, 0.1), (0.1, 0.1, 0.1))
     for light in lights:
         total, _ = native.gather_rays(grid, light, occluders, rays=8, even_rays=4, threads=THREADS)
         assert total.max() > 0
-    for light in steep:
-        field.add_rays(grid, light, (1, 1, 1), coverage, occluders, rays=8, even_rays=4, threads=THREADS)
-    field.add(parts[0])
-    assert np.isfinite(field.solve()).all()
+    arriving, flow = native.bake_arrival(surface, steep, rays=4, threads=THREADS)
+    assert arriving.max() > 0 > flow[..., 2].min()
+    for solver in ("fft", "direct", "adaptive"):
+        luminance = native.bake_luminance(surface, steep, *medium, solver, 1e-2, rays=2, threads=THREADS)
+        assert np.isfinite(luminance).all()
+    kept = native.LightField((SIZE, SIZE), *medium, (pitch, pitch), 60.0, 0.1, True, threads=THREADS)
+    assert np.isfinite(kept.luminance(surface, steep, rays=2, threads=THREADS)).all()
+    computed = native.FieldLight(np.ones((1, 2, 2, 3), np.float32), np.ones(1, np.float32), position=(0.1, 0.1, 1))
+    assert native.bake_arrival(surface, [(computed, (1, 1, 1), None)], threads=THREADS)[0].min() > 0.9
 
 
 def solvers(library, sun, point, direction):

@@ -38,6 +38,6 @@ PYBIND11_MODULE(_native, m)
     bind_scene(m);
     bind_rays(m);
     bind_solve(m);
-    bind_light_field(m);
+    bind_bake(m);
     bind_fft(m);
 }

@@ -1,7 +1,8 @@
-// Luminance of light that comes bit by bit, in memory that does not grow with it.
+// Light on a plane and the luminance that it causes, by the solver `fft`, in memory that does not grow with the light.
 #pragma once
 
-#include <vector>
+#include <memory>
+#include <optional>
 
 #include "base/progress.h"
 #include "solve/spectral/spectral.h"
@@ -9,33 +10,31 @@
 
 namespace beamspread {
 
-// By the fft solver. What is added is gone once it is: what the medium needs to know of it are a few moments.
 class LightField {
 public:
-    // `problem.lights` of one direction are kept as they are. Other ones, and a survey of the light to come, only tell
-    // how exactly what will be added is to be kept; with a survey alone, any light of its angles. Throws
-    // InvalidArgument, Cancelled.
+    // Chooses terms and advances the progress by `choice_work`. The arrays of `problem.lights` must outlive the field. Throws
+    // InvalidArgument, MemoryLimit, Cancelled.
     LightField(const Problem& problem, Progress& progress);
 
-    void add(const PlaneLight& light);
+    // Adds rays of the coming light of the problem: they are reduced to moments at once and not stored. `color` and
+    // `is_colored` as for `MomentSum`. Several threads may add rays of different rows at once.
+    void add(const RayRow& rays, const std::vector<double>& color, bool is_colored);
 
-    // Of rows that no other thread adds to.
-    void add(const RayBeams& rays, const std::vector<double>& color, bool is_colored);
-
-    // Writes (height, width, channels), radiance in W/(m^2 sr).
+    // Writes (height, width, channels), radiance in W/(m^2 sr): the sum over all lights and rays. Advances the progress by
+    // `spread_work`. Throws Cancelled.
     void solve(Progress& progress, float* luminance);
 
-    // Forgets what was added; terms and kernels stay for the light that comes next.
+    // Removes the rays that were added; terms and kernels stay.
     void clear();
 
-    const Problem& problem() const { return m_problem; }
-    std::size_t terms() const { return m_field.terms(); }
+    const Plane& plane() const { return m_problem.plane; }
+    std::size_t channels() const { return m_problem.channels.size(); }
+    std::size_t terms() const { return m_field->terms(); }
 
 private:
     Problem m_problem;
-    SpectralField m_field;
-    std::vector<float> m_unscattered;  // of lights that are not kept; empty: none of any
-    UnscatteredRays m_unscattered_rays;
+    std::unique_ptr<SpectralField> m_field;
+    std::optional<UnscatteredRays> m_unscattered;  // of rays; empty: none return unscattered
 };
 
 }  // namespace beamspread

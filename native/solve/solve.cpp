@@ -7,15 +7,15 @@
 #include "base/threads.h"
 #include "solve/adaptive/adaptive.h"
 #include "solve/direct/direct.h"
+#include "solve/light_field.h"
 #include "solve/problem/channel_sets.h"
-#include "solve/spectral/spectral.h"
 #include "solve/unscattered.h"
 
 namespace beamspread {
 
 namespace {
 
-// Light after light and medium after medium, for the solvers that share no work among them.
+// Each light over each medium alone, by solvers that share no work among them.
 void solve_apart(const Problem& problem, Progress& progress, float* luminance)
 {
     const std::size_t channels = problem.channels.size();
@@ -39,14 +39,16 @@ void solve_apart(const Problem& problem, Progress& progress, float* luminance)
 
 void solve(const Problem& problem, Progress& progress, float* luminance)
 {
-    with_threads(problem.threads, [&] {
-        validate(problem);
-        if (problem.solver == Solver::fft)
-            solve_spectral(problem, progress, luminance);
-        else
+    if (problem.solver == Solver::fft) {
+        progress.set_total(choice_work + spread_work);
+        LightField(problem, progress).solve(progress, luminance);
+    } else {
+        with_threads(problem.threads, [&] {
+            validate(problem);
             solve_apart(problem, progress, luminance);
-        add_unscattered(problem, luminance);
-    });
+            add_unscattered(problem, luminance);
+        });
+    }
     progress.finish();
 }
 

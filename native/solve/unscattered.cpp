@@ -190,21 +190,22 @@ struct UnscatteredRays::Exits {
 
 UnscatteredRays::UnscatteredRays(const Problem& problem) : m_plane(problem.plane), m_exits(std::make_unique<Exits>())
 {
-    // Of rays that come, those of a survey tell; the few beyond count as the last of these.
+    // Smallest and largest angle of the survey; rays outside count as at these.
     std::pair<float, float> angles{1.0f, 0.0f};
     const auto include = [&](const Plane& plane, const PlaneLight& light) {
         const auto [first, last] = present(plane, light);
         angles = {std::min(angles.first, first), std::max(angles.second, last)};
     };
-    for (const PlaneLight& light : problem.lights)
-        include(problem.plane, light);
-    for (const PlaneLight& light : problem.to_come.lights)
-        include(problem.to_come.plane, light);
+    for (const auto* lights : {&problem.lights, &problem.coming.examples})
+        for (const PlaneLight& light : *lights)
+            include(problem.plane, light);
+    for (const PlaneLight& light : problem.coming.survey)
+        include(problem.coming.plane, light);
     std::size_t count = 0;
     for (const ChannelMedium& medium : problem.channels)
         count += m_exits->tables.emplace_back(m_plane, medium, angles).count();
     double most = 0.0;  // W/m^2 in any channel
-    for (const auto* lights : {&problem.lights, &problem.to_come.lights})
+    for (const auto* lights : {&problem.lights, &problem.coming.survey, &problem.coming.examples})
         for (const PlaneLight& light : *lights) {
             const auto [y, x] = brightest(light.irradiance);
             most += static_cast<double>(light.irradiance(y, x)) * *std::ranges::max_element(light.color);
@@ -216,7 +217,7 @@ UnscatteredRays::UnscatteredRays(const Problem& problem) : m_plane(problem.plane
 
 UnscatteredRays::~UnscatteredRays() = default;
 
-void UnscatteredRays::add(const RayBeams& rays, const std::vector<double>& color)
+void UnscatteredRays::add(const RayRow& rays, const std::vector<double>& color)
 {
     if (m_sums.empty())
         return;
@@ -224,7 +225,7 @@ void UnscatteredRays::add(const RayBeams& rays, const std::vector<double>& color
     for (std::size_t x = 0; x < rays.width; ++x) {
         const Vec3 travel(rays.travel[3 * x], rays.travel[3 * x + 1], rays.travel[3 * x + 2]);
         const double across = std::hypot(travel.x, travel.y);
-        const double half_tangent = across / (1.0 - travel.z);
+        const double half_tangent = across / (glm::length(travel) - travel.z);
         const Vec2 step =
             across > 0.0 ? Vec2(travel.x / m_plane.pitch_x, travel.y / m_plane.pitch_y) / across : Vec2(0.0);
         for (std::size_t c = 0; c < channels; ++c) {

@@ -21,10 +21,10 @@ public:
     UnscatteredRays(const UnscatteredRays&) = delete;
     UnscatteredRays& operator=(const UnscatteredRays&) = delete;
 
-    // Whether nothing returns unscattered.
+    // True if nothing returns unscattered.
     bool none() const { return m_sums.empty(); }
 
-    void add(const RayBeams& rays, const std::vector<double>& color);
+    void add(const RayRow& rays, const std::vector<double>& color);
     void add_to(float* luminance) const;
     void clear();
 

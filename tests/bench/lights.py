@@ -16,7 +16,6 @@ import numpy as np
 from beamspread import Medium, library, presets
 from beamspread.core.bake import luminance as bakes
 from beamspread.core.bake.bake_settings import BakeSettings
-from beamspread.core.bake.gather import Gatherer
 from beamspread.core.native import native
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
@@ -64,8 +63,11 @@ def bake(size, lights, material, shadows=0):
 def transforms(size, lights, material):
     """Number of terms that the solver chooses for the light."""
     grid = floor(size)
-    gatherer = Gatherer(grid, Illumination(lights), SETTINGS)
-    arriving = [part for light in lights for part in gatherer.plane_lights(light)]
+    arriving = []
+    for light in lights:
+        irradiance, _ = native.gather_beams(grid.native(), light.native(), directions=False)
+        position = light.native().position_in(grid.native())
+        arriving.append(native.PlaneLight.from_point(irradiance, position, light.rgb().tolist()))
     libraries = [library(Medium(g, material.ior)) for g in material.channel_anisotropy]
     rest = list(material.albedo), list(material.mean_free_path), (grid.pitch_x, grid.pitch_y)
     return native.transforms(arriving, libraries, *rest, bakes.TOLERANCE)

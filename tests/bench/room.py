@@ -11,10 +11,10 @@ import sys
 import time
 
 import numpy as np
-from beamspread import presets
+from beamspread import library, presets
 from beamspread.core.bake import luminance as bakes
 from beamspread.core.bake.bake_settings import BakeSettings
-from beamspread.core.bake.gather import Gatherer
+from beamspread.core.bake.surface import channel_media
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import AreaLight, WorldLight
@@ -71,10 +71,11 @@ def balls(count=100, rings=71):
 
 
 def bake(size, seed, shapes):
-    Gatherer.seed = seed
     started = time.perf_counter()
     lights = [sky(), *areas()]
-    result = bakes.bake(floor(size), Illumination(lights, shapes), presets()["marble"], 0.0, BakeSettings())
+    marble = presets()["marble"]
+    sources = [library(medium) for medium in channel_media(marble, 0.0)]
+    result = bakes.spread(floor(size), Illumination(lights, shapes), marble, sources, BakeSettings(), seed=seed)
     return result, time.perf_counter() - started
 
 

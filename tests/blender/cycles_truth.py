@@ -7,8 +7,7 @@ import numpy as np
 import scenes
 from beamspread.blender.read.geometry import read_polygons
 from beamspread.blender.read.lights import read_illumination
-from beamspread.core.bake.bake_settings import BakeSettings
-from beamspread.core.bake.gather import Gatherer
+from beamspread.core.native import native
 from beamspread.core.scene.receiver import build_receiver
 from beamspread.core.scene.uv_map import fit_uv_maps
 from mathutils import Euler, Matrix
@@ -86,8 +85,5 @@ def our_irradiance(plane):
     polygons = read_polygons(plane.evaluated_get(depsgraph), plane.data.materials[0].name)
     receiver = build_receiver(fit_uv_maps(polygons), TEXELS, TEXELS)
     grid = receiver.charts[0].grid
-    gatherer = Gatherer(grid, illumination, BakeSettings(samples=8))
-    total = np.zeros((grid.height, grid.width, 3), np.float32)
-    for light in illumination.lights:
-        total += gatherer.totals(light, RAYS)[0] * light.rgb()
-    return receiver.to_texture([total]), receiver.coverage
+    total, _ = native.bake_arrival(grid.surface(), illumination.native_lights(grid), samples=8, rays=RAYS)
+    return receiver.to_texture([total * grid.coverage[..., None]]), receiver.coverage

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from beamspread.core.bake.arrival import arrive
 from beamspread.core.bake.bake_settings import IRRADIANCE, BakeSettings
-from beamspread.core.bake.gather import Gatherer
 from beamspread.core.bake.job import BakeJob
 from beamspread.core.bake.luminance import bake
 from beamspread.core.bake.surface import Surface
@@ -15,8 +15,6 @@ from beamspread.core.native import native
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight, LampFieldLight, WorldLight
-from beamspread.core.scene.lights.field_light import spline_weights
-from beamspread.core.scene.reach import Reach
 from beamspread.core.scene.receiver import Chart, Receiver
 
 WHITE = 1.0, (1.0, 1.0, 1.0), True
@@ -31,12 +29,9 @@ def light_of(grid, radiance):
     return FieldLight("Bounced", *WHITE, (Field(grid.origin, grid.normal, radiance.astype(np.float32)),))
 
 
-def reach_of(grid):
-    return Reach(grid, None, samples=1, rays=1)
-
-
 def totals(grid, light):
-    return Gatherer(grid, Illumination([light]), BakeSettings()).totals(light, 1)
+    """Irradiance and flow of the light on each texel."""
+    return arrive(grid, Illumination([light]), BakeSettings())
 
 
 def test_strata_share_the_hemisphere_and_directions_are_in_their_middle():
@@ -64,7 +59,11 @@ def test_interpolation_is_exact_for_straight_lines(texels, nodes):
     """In float32: within 1e-5 of the largest value."""
     line = 2 + 3 * (np.arange(nodes) + 0.5) / nodes if nodes > 1 else np.array([2.0])
     expected = 2 + 3 * (np.arange(texels) + 0.5) / texels if nodes > 1 else np.full(texels, 2.0)
-    np.testing.assert_allclose(spline_weights(texels, nodes) @ line, expected, atol=5e-5)
+    radiance = np.zeros((len(STRATA), nodes, 1, 3))
+    radiance[:] = line[:, None, None]
+    grid = grid_of(texels, 3)
+    irradiance, _ = totals(grid, light_of(grid, radiance))
+    np.testing.assert_allclose(irradiance[:, 1, 0], np.pi * expected, rtol=1e-5)
 
 
 def test_irradiance_and_flow_of_a_sloping_field():
@@ -83,35 +82,36 @@ def test_irradiance_and_flow_of_a_sloping_field():
 
 def test_no_negatives_and_no_overshoot_at_steps():
     grid = grid_of(64, 64)
-    radiance = np.zeros((len(STRATA), 8, 8, 3)) + 0.1
-    radiance[:, :, 4:], radiance[:, 3, 1] = 5.0, 40.0
-    radiance[:, :, 0] = 0.0001
-    layers = list(light_of(grid, radiance).parts(reach_of(grid)))
-    assert len(layers) == len(STRATA)
-    for (irradiance, _), weight in zip(layers, WEIGHTS):
+    radiance = np.zeros((8, 8, 3)) + 0.1
+    radiance[:, 4:], radiance[3, 1] = 5.0, 40.0
+    radiance[:, 0] = 0.0001
+    for part in range(0, len(STRATA), 5):
+        alone = np.zeros((len(STRATA), 8, 8, 3))
+        alone[part] = radiance
+        irradiance, _ = totals(grid, light_of(grid, alone))
         assert irradiance.min() >= 0
         # Only beyond the outermost nodes, where it goes on in a straight line, may it pass the largest.
-        assert irradiance[4:-4, 4:-4].max() <= 40 * np.pi * weight * 1.0001
+        assert irradiance[4:-4, 4:-4].max() <= 40 * np.pi * WEIGHTS[part] * 1.0001
 
 
 def test_dark_nodes_don_t_darken_what_is_beside_them():
     grid = grid_of(64, 64)
     radiance = np.ones((len(STRATA), 16, 16, 3))
     radiance[:, 6:10, 6:10] = 0  # inside a box that covers rows and columns 24 to 40
-    irradiance = sum(part for part, _ in light_of(grid, radiance).parts(reach_of(grid)))
+    irradiance, _ = totals(grid, light_of(grid, radiance))
     box = np.zeros((64, 64), bool)
     box[24:40, 24:40] = True
     np.testing.assert_allclose(irradiance[~box], np.pi, rtol=1e-5)
     assert irradiance[30:34, 30:34].max() == 0
 
 
-def test_a_bake_can_stop_between_its_parts():
+def test_a_bake_can_stop():
     grid = grid_of(64, 64)
+    light = light_of(grid, np.ones((len(STRATA), 4, 4, 3)))
     asked = []
-    reach = replace(reach_of(grid), progress=lambda fraction: asked.append(fraction) or len(asked) < 3)
     with pytest.raises(native.Cancelled):
-        list(light_of(grid, np.ones((len(STRATA), 4, 4, 3))).layers(reach))
-    assert asked == [0, 1 / len(STRATA), 2 / len(STRATA)]
+        arrive(grid, Illumination([light]), BakeSettings(), lambda fraction: asked.append(fraction) or False)
+    assert len(asked) == 1
 
 
 def test_no_light_flows_upward():
@@ -150,16 +150,15 @@ def test_light_of_a_lamp_comes_from_its_place(is_sun):
     radiance = np.ones((1, 5, 10, 3), np.float32) * (1, 2, 3)
     place = (0.0, 0.6, -0.8) if is_sun else (0.95, 2.45, 5.0)
     light = LampFieldLight("Lamp", *WHITE, (Field(grid.origin, grid.normal, radiance),), place, is_sun)
-    irradiance, direction = light.gather(grid, None)
+    irradiance, flow = totals(grid, light)
     np.testing.assert_allclose(irradiance, np.pi * np.broadcast_to((1, 2, 3), (10, 20, 3)), rtol=1e-5)
+    direction = flow / (2 * np.pi)
     if is_sun:
-        np.testing.assert_allclose(direction, (0.6, 0.0, -0.8))
+        np.testing.assert_allclose(direction, np.broadcast_to((0.6, 0.0, -0.8), (10, 20, 3)), atol=1e-6)
     else:
         # Straight above the fifth texel of the first row, and 1 beside the lamp.
-        np.testing.assert_allclose(direction[0, 4], (0, 0, -1), atol=1e-12)
-        np.testing.assert_allclose(direction[0, 14], np.array((1, 0, -2)) / 5**0.5, atol=1e-12)
-    flow = totals(grid, light)[1]
-    np.testing.assert_allclose(flow, 2 * np.pi * np.broadcast_to(direction, flow.shape), rtol=1e-5, atol=1e-5)
+        np.testing.assert_allclose(direction[0, 4], (0, 0, -1), atol=1e-6)
+        np.testing.assert_allclose(direction[0, 14], np.array((1, 0, -2)) / 5**0.5, atol=1e-6)
 
 
 def test_a_job_bakes_the_light_that_it_finds():

@@ -45,7 +45,7 @@ def suns(count):
 
 
 def bake_as_it_comes(monkeypatch, *arguments):
-    monkeypatch.setattr(luminance, "MOST_WAITING", 0)
+    monkeypatch.setattr(luminance, "MAX_STORED_BYTES", 0)
     return bake(*arguments)
 
 
@@ -142,7 +142,7 @@ def test_directions_of_a_low_wide_light_are_kept():
 @pytest.mark.parametrize("solver", ["direct", "adaptive"])
 def test_solvers_that_take_lights_apart_agree(solver, monkeypatch):
     """Ray by ray, each a light of one direction per texel: the same rays, so what differs is the solvers' tolerance."""
-    for name in ("MOST_RAYS", "FEWEST_RAYS"):
+    for name in ("MAX_RAYS", "MIN_RAYS"):
         monkeypatch.setattr(luminance, name, 2)
     arguments = grid(16), Illumination([sky()], WALL), MATERIAL, 0.0
     settings = replace(SETTINGS, samples=4)
@@ -152,7 +152,7 @@ def test_solvers_that_take_lights_apart_agree(solver, monkeypatch):
 
 def test_rays_return_unscattered_from_a_slab_as_lights_do(monkeypatch):
     """A fifth of a mean free path thick, where some per cent of the light returns from the far side unscattered."""
-    for name in ("MOST_RAYS", "FEWEST_RAYS"):
+    for name in ("MAX_RAYS", "MIN_RAYS"):
         monkeypatch.setattr(luminance, name, 2)
     settings = replace(SETTINGS, samples=4)
     arguments = grid(8), Illumination([sky()]), replace(MATERIAL, mean_free_path=(0.05, 0.05, 0.05)), 0.01
@@ -205,7 +205,7 @@ MEMORY = """
 import sys
 sys.path.insert(0, sys.argv[2])
 from test_light_field import *
-luminance.MOST_WAITING = 0
+luminance.MAX_STORED_BYTES = 0
 bake(grid(512), Illumination(lamps(int(sys.argv[1]))), MATERIAL, 0.0, SETTINGS)
 print([line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM")][0])
 """

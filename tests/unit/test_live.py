@@ -84,10 +84,10 @@ def test_quick_renderings_are_nearly_bakes(lights, total, worst, renderer):
 def test_a_cached_field_serves_other_light_and_forgets_the_light_before(renderer):
     renderer.quick(live_target(LAMP), 128)
     first = renderer.quick(live_target(LAMP, SUN), 128).texture  # other colors: another field
-    made = renderer.fields.made
+    made = renderer.kernels.made
     renderer.quick(live_target(SUN), 128)
     again = renderer.quick(live_target(LAMP, SUN), 128).texture
-    assert renderer.fields.made == made
+    assert renderer.kernels.made == made
     np.testing.assert_array_equal(again, first)
 
 

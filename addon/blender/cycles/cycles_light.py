@@ -11,13 +11,11 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ...core.bake.bake_settings import BakeSettings
-from ...core.bake.gather import Gatherer
+from ...core.bake.arrival import mean_open_irradiance
 from ...core.bake.job import BakeJob
 from ...core.errors import MaterialError, MissingImageError
 from ...core.messages import Message, warning
 from ...core.progress import Progress, stages
-from ...core.scene.illumination import Illumination
 from ...core.scene.lights import STRATA, Field, FieldLight, LampFieldLight, Light, WorldLight
 from ...core.scene.receiver import Receiver
 from .. import compat
@@ -206,7 +204,7 @@ class CyclesLight:
 def _irradiance_in_the_open(receiver: Receiver, lights: Sequence[Light]) -> float:
     """Mean irradiance, W/m^2, of the lights without occluders."""
     grids = [chart.grid for chart in receiver.charts]
-    means = [sum(Gatherer(grid, Illumination(lights), BakeSettings()).survey()[2]) for grid in grids]
+    means = [mean_open_irradiance(grid, lights) for grid in grids]
     areas = [grid.width * grid.pitch_x * grid.height * grid.pitch_y for grid in grids]
     return float(np.average(means, weights=areas))
 

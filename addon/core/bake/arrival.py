@@ -1,19 +1,25 @@
-"""Lights -> what arrives on a chart, all lights together: irradiance, and the way that it travels."""
+"""Light that arrives on a chart, all lights together: irradiance, and the direction in which it travels."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from ..progress import Progress, stages
+from ..native import native
+from ..progress import Progress
 from ..scene.grid import Grid
 from ..scene.illumination import Illumination
+from ..scene.lights import Light
 from .bake_settings import BakeSettings
-from .gather import Gatherer
 
-# Rays to a light of a size, for each of a texel's samples: no medium blurs the noise of half-shadows. At most 4096.
-RAYS_PER_SAMPLE, MOST_RAYS = 4, 4096
+# Rays to a light of a size for each sample of a texel, and for a texel at most. More: less noise in penumbras, which no
+# medium blurs.
+RAYS_PER_SAMPLE, MAX_RAYS = 4, 4096
+
+# Texels along a side, and rays from each, where nothing blocks the light.
+OPEN_TEXELS, OPEN_RAYS = 96, 4
 
 
 def arrive(
@@ -27,20 +33,28 @@ def arrive(
     flow : float32 (H, W, 3), sum over the light of its irradiance, the mean of the channels, times the unit vector
         along which it travels, in the plane's frame. Its direction is the mean one.
     """
-    rays = min(RAYS_PER_SAMPLE * settings.samples**2, MOST_RAYS)
-    whole = replace(grid, coverage=np.ones_like(grid.coverage), color_in=None)
-    gatherer = Gatherer(whole, illumination, settings)
-    irradiance, flow = np.zeros((2, grid.height, grid.width, 3), np.float32)
-    for light, step in zip(illumination.lights, stages(progress, [1.0] * len(illumination.lights))):
-        if light.is_behind(grid):
-            continue
-        white, white_flow = gatherer.totals(light, rays, step)
-        irradiance += white * light.rgb()
-        flow += white_flow * light.rgb().mean()
-    return irradiance, flow
+    return native.bake_arrival(
+        grid.surface(),
+        illumination.native_lights(grid),
+        samples=settings.samples,
+        rays=min(RAYS_PER_SAMPLE * settings.samples**2, MAX_RAYS),
+        threads=settings.threads,
+        progress=progress,
+    )
 
 
 def mean_direction(flow: np.ndarray) -> np.ndarray:
     """Unit vectors (H, W, 3) along the flow, 0 where there is none."""
     length = np.linalg.norm(flow, axis=-1, keepdims=True)
     return np.divide(flow, length, out=np.zeros_like(flow), where=length > 0)
+
+
+def mean_open_irradiance(grid: Grid, lights: Sequence[Light]) -> float:
+    """Mean irradiance of lights that nothing blocks, W/m^2."""
+    width, height = min(grid.width, OPEN_TEXELS), min(grid.height, OPEN_TEXELS)
+    pitch = {"pitch_x": grid.pitch_x * grid.width / width, "pitch_y": grid.pitch_y * grid.height / height}
+    whole = np.ones((height, width), np.float32)
+    coarse = replace(grid, width=width, height=height, coverage=whole, color_in=None, color_out=None, **pitch)
+    open_lights = Illumination(lights).native_lights(coarse)
+    irradiance, _ = native.bake_arrival(coarse.surface(), open_lights, samples=1, rays=OPEN_RAYS)
+    return float(irradiance.mean())

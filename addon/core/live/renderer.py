@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 
 from ..bake.bake_settings import COMBINED, BakeSettings
-from ..bake.gather import Gatherer
 from ..bake.luminance import spread
 from ..bake.margin import WHOLE, extend_margin
 from ..bake.surface import channel_media
@@ -19,12 +18,13 @@ from ..material import Material
 from ..progress import Progress
 from ..recent import keep_recent
 from ..scene.grid import Grid
+from ..scene.illumination import Illumination
 from ..scene.lights import Light
 from ..scene.receiver import Receiver, build_receiver, texture_size
 from ..scene.sampling import resized
 from ..scene.uv_map import fit_uv_maps
 from ..target import Target
-from .fields import Fields
+from .kernel_cache import KernelCache
 from .library_service import LibraryService
 from .live_target import LiveTarget
 
@@ -81,7 +81,7 @@ class LiveRenderer:
     """Renders targets, and caches everything that does not depend on the change between two renderings."""
 
     def __init__(self, libraries: LibraryService) -> None:
-        self.fields = Fields()
+        self.kernels = KernelCache()
         self._libraries = libraries
         self._last_libraries: dict[Target, list] = {}  # of each channel
         self._receivers: dict = {}
@@ -162,14 +162,14 @@ class LiveRenderer:
             "mean_free_path": material.mean_free_path,
             "threads": settings.threads,
         }
-        gatherer = Gatherer(grid, target.illumination, settings, QUICK_RAYS)
-        color = _common_color(gatherer, lights)
-        field = self.fields.empty(grid, medium, is_colored=color is None)
-        for light in lights:
-            if color is not None:
-                light = replace(light, color=(1.0, 1.0, 1.0), strength=float(light.rgb().max()))
-            gatherer.add_to(field, light, QUICK_RAYS, progress)
-        luminance = field.solve(progress)
+        color = _common_color(grid, target.illumination)
+        field = self.kernels.field(grid, medium, is_colored=color is None)
+        arriving = target.illumination.native_lights(grid)
+        if color is not None:
+            arriving = [(light, [max(rgb)] * 3, caster) for light, rgb, caster in arriving]
+        luminance = field.luminance(
+            grid.surface(), arriving, settings.samples, QUICK_RAYS, 0, settings.threads, progress
+        )
         return luminance if color is None else luminance * color
 
     def _uv_maps(self, target: LiveTarget) -> list:
@@ -258,11 +258,14 @@ def _are_few_suns(lights: Sequence[Light], grid: Grid) -> bool:
     return grid.width * grid.height >= MIN_EXACT_TEXELS
 
 
-def _common_color(gatherer: Gatherer, lights: Sequence[Light]) -> np.ndarray | None:
-    """Float32 (3,), at most 1: the color of all lights; None where they differ."""
+def _common_color(grid: Grid, illumination: Illumination) -> np.ndarray | None:
+    """Float32 (3,), 1 at most: the color of all lights, or None where they differ."""
+    lights = [light for light in illumination.lights if not light.is_behind(grid)]
+    casters = [illumination.caster(grid, light) for light in lights if light.cast_shadow]
+    is_colored = [light.is_colored for light in lights] + [caster.is_colored for caster in casters if caster]
     colors = np.array([light.rgb() / max(light.rgb().max(), 1e-30) for light in lights], np.float32)
     differ = np.abs(colors - colors[0]).max() > 1e-6
-    return None if differ or any(map(gatherer.is_colored, lights)) else colors[0]
+    return None if differ or any(is_colored) or grid.color_in is not None else colors[0]
 
 
 def for_live(settings: BakeSettings) -> BakeSettings:

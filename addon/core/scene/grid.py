@@ -66,3 +66,7 @@ class Grid:
         """The native `ReceiverGrid`."""
         axes = self.x_axis, self.y_axis, self.normal
         return native.ReceiverGrid(self.origin, *axes, self.pitch_x, self.pitch_y, self.width, self.height)
+
+    def surface(self):
+        """The native `Surface`, which views the arrays of the grid."""
+        return native.Surface(self.native(), self.coverage, self.clearance, self.color_in, self.color_out)

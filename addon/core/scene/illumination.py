@@ -78,6 +78,14 @@ class Illumination:
         more.lights = (*self.lights, *lights)
         return more
 
+    def native_lights(self, grid: Grid) -> list[tuple]:
+        """The lights that can reach a grid, as native code takes them: light, RGB strength, and `Occluders` or None."""
+        return [
+            (light.at(grid), light.rgb().tolist(), self.caster(grid, light) if light.cast_shadow else None)
+            for light in self.lights
+            if not light.is_behind(grid)
+        ]
+
     def with_lights(self, lights: Sequence[Light]) -> Illumination:
         """The same with these lights instead; shares the hierarchies."""
         other = copy(self)

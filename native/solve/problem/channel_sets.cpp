@@ -28,7 +28,7 @@ double common_factor(const std::vector<std::vector<double>>& colors, std::size_t
 ChannelSets::ChannelSets(const Problem& problem)
 {
     std::vector<std::vector<double>> colors;
-    for (const auto* lights : {&problem.lights, &problem.to_come.lights})
+    for (const auto* lights : {&problem.lights, &problem.coming.survey, &problem.coming.examples})
         for (const PlaneLight& light : *lights)
             colors.push_back(light.color);
     for (std::size_t c = 0; c < problem.channels.size(); ++c) {

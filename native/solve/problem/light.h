@@ -55,12 +55,12 @@ struct PlaneLight {
 std::vector<PlaneLight> lights_of_channels(const std::vector<View2D<const float>>& irradiance,
                                            const Directions& directions);
 
-// Rays of any directions that come from one light, one at each texel of a part of a row.
-struct RayBeams {
+// Rays of one light, one at each texel of a part of a row.
+struct RayRow {
     std::size_t y;
     std::size_t x;
     std::size_t width;
-    const float* travel;  // [texel][x, y, z]
+    const float* travel;      // [texel][x, y, z], of any length; z < 0
     const float* irradiance;  // [texel][channel], W/m^2
 };
 

@@ -12,19 +12,17 @@ namespace beamspread {
 
 namespace {
 
-// Sums over 10^8 texels, 1e38, and products with kernels, stay in single precision, which ends at 3.4e38.
-constexpr float most_irradiance = 1e30f;
+// Largest irradiance, W/m^2. Sums over 10^8 texels and products with kernels then stay in single precision.
+constexpr float max_irradiance = 1e30f;
 
-// There the widest plane, of 65536 texels, measures 7e-4 mean free paths: all of it lies within the tables' first bin of
-// radius, 2^-10, in which nothing is told apart.
-constexpr double most_paths_per_texel = 1e8;
+// Largest mean free path, texels. The widest plane, 65536 texels, then lies within the first radius bin of LDFs, 2^-10.
+constexpr double max_path_texels = 1e8;
 
-// Kernels are tabulated in units of the longer side, finely enough for the shorter one, which takes time and memory in
-// proportion. Beside `direct` the worst texel is off by 4e-7 of the brightest, as for squares.
-constexpr double most_aspect = 1000.0;
+// Largest ratio of a texel's sides. Solver `fft` tabulates kernels in units of the longer side; time and memory grow with
+// the ratio.
+constexpr double max_aspect = 1000.0;
 
-// By how much the squared length of a direction may differ from 1: unit vectors are off by 1e-7 in single precision and by
-// up to 1e-3 in half precision; what is off by more was never normalized.
+// Largest difference of a direction's squared length from 1. Half precision rounds unit vectors by 1e-3.
 constexpr double unit_tolerance = 2e-3;
 
 void check_direction(const Vec3& d)
@@ -40,7 +38,7 @@ void check_row(const PlaneLight& light, std::size_t y)
     const auto* field = std::get_if<PerTexel>(&light.directions);
     for (std::size_t x = 0; x < light.irradiance.width; ++x) {
         const float irradiance = light.irradiance(y, x);
-        if (!(irradiance >= 0.0f && irradiance <= most_irradiance))
+        if (!(irradiance >= 0.0f && irradiance <= max_irradiance))
             reject("irradiance", static_cast<double>(irradiance), "0 to 1e30 W/m^2");
         if (field != nullptr && irradiance > 0.0f) {
             const float* d = field->travel + 3 * (y * light.irradiance.width + x);
@@ -58,7 +56,7 @@ void check_light(const Plane& plane, std::size_t channels, const PlaneLight& lig
     if (light.color.size() != channels)
         reject("color", std::to_string(light.color.size()) + " channels", "as many as there are media");
     for (const double part : light.color)
-        if (!(part >= 0.0 && part <= static_cast<double>(most_irradiance)))
+        if (!(part >= 0.0 && part <= static_cast<double>(max_irradiance)))
             reject("color", part, "0 to 1e30");
     if (const auto* one = std::get_if<OneDirection>(&light.directions))
         check_direction(one->travel);
@@ -78,7 +76,7 @@ void validate(const Problem& problem)
         if (!(pitch > 0.0 && std::isfinite(pitch)))
             reject("pitch", pitch, "pitch > 0 metres");
     const auto [shorter, longer] = std::minmax(plane.pitch_x, plane.pitch_y);
-    if (problem.solver == Solver::fft && longer > most_aspect * shorter)
+    if (problem.solver == Solver::fft && longer > max_aspect * shorter)
         reject("pitch", longer / shorter, "sides of a ratio up to 1000 for the solver 'fft'");
     if (!(problem.tolerance > 0.0))
         reject("tolerance", problem.tolerance, "tolerance > 0");
@@ -86,20 +84,16 @@ void validate(const Problem& problem)
         reject("coarsening", static_cast<double>(problem.coarsening), "0, 1, 4, 8, 16, 32, 64");
     for (const ChannelMedium& channel : problem.channels) {
         check_albedo(channel.albedo);
-        if (!(channel.mean_free_path > 0.0 && channel.mean_free_path <= most_paths_per_texel * shorter))
+        if (!(channel.mean_free_path > 0.0 && channel.mean_free_path <= max_path_texels * shorter))
             reject("mean_free_path", channel.mean_free_path, "above 0 metres, and up to 1e8 texels");
     }
-    if (problem.lights.empty() && problem.to_come.lights.empty())
+    if (problem.lights.empty() && problem.coming.survey.empty())
         reject("lights", "empty", "at least one light");
-    for (const PlaneLight& light : problem.lights)
-        validate(problem, light);
-    for (const PlaneLight& light : problem.to_come.lights)
-        check_light(problem.to_come.plane, problem.channels.size(), light);
-}
-
-void validate(const Problem& problem, const PlaneLight& light)
-{
-    check_light(problem.plane, problem.channels.size(), light);
+    for (const auto* lights : {&problem.lights, &problem.coming.examples})
+        for (const PlaneLight& light : *lights)
+            check_light(plane, problem.channels.size(), light);
+    for (const PlaneLight& light : problem.coming.survey)
+        check_light(problem.coming.plane, problem.channels.size(), light);
 }
 
 }  // namespace beamspread

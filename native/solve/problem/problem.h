@@ -1,4 +1,4 @@
-// What a solver is asked: light on a plane of texels, and the medium beneath.
+// The task of a solver: light on a plane of texels, and the medium beneath.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace beamspread {
 
-// The medium that a colour channel sees.
+// The medium of a color channel.
 struct ChannelMedium {
     const LdfSource* ldf = nullptr;
     double albedo = 0.0;
@@ -18,10 +18,14 @@ struct ChannelMedium {
     bool operator==(const ChannelMedium&) const = default;
 };
 
-// Light that is still to come, at a few texels spread over the plane.
-struct LightSurvey {
+// Light that will be added to a light field later. It decides which terms the field keeps.
+struct ComingLight {
+    // All of that light at few texels, spread over a plane of the same size: its angles and colors.
     Plane plane;
-    std::vector<PlaneLight> lights;
+    std::vector<PlaneLight> survey;
+
+    // Some of that light at all texels; terms are chosen for its luminance. Empty: for any light of the survey's angles.
+    std::vector<PlaneLight> examples;
 };
 
 enum class Solver { fft, direct, adaptive };
@@ -31,18 +35,15 @@ struct Problem {
     std::vector<ChannelMedium> channels;
     std::vector<PlaneLight> lights;
     Solver solver = Solver::fft;
-    double tolerance = 1e-3;  // relative error of the radiance that an approximating solver may make
-    int threads = 0;
-    std::size_t memory = std::size_t{5} << 26;  // bytes that spectra may take at once; beyond, in tiles
-    std::size_t coarsening = 0;  // of the grid that light spreads far on, texels; 1: none, 0: what costs least
-    LightSurvey to_come{};           // in a field of light, see `SpectralField`
-    std::size_t most_for_light = 0;  // bytes that what is kept of light to come may take; 0: any
+    double tolerance = 1e-3;  // largest relative error of the luminance by an approximating solver
+    int threads = 0;          // 0: all
+    std::size_t memory = std::size_t{5} << 26;  // bytes of spectra at once; larger planes are solved in tiles
+    std::size_t coarsening = 0;  // texels per node of the coarse grid of solver `fft`; 1: no such grid, 0: the fastest
+    ComingLight coming{};
+    std::size_t max_moment_bytes = 0;  // bytes of moments of coming light; 0: any
 };
 
 // Throws InvalidArgument for a plane, media, light or options that solvers don't cover.
 void validate(const Problem& problem);
-
-// Likewise for a light that comes later.
-void validate(const Problem& problem, const PlaneLight& light);
 
 }  // namespace beamspread

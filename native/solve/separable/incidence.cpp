@@ -88,18 +88,18 @@ Histogram histogram_of(const Plane& plane, const std::vector<PlaneLight>& lights
 
 // The widest step between the angles of lit neighbours: what lies between them is off theirs by less. Of lamps; rays of
 // lights of a size differ by chance, and are many.
-double widest_step(const LightSurvey& survey)
+double widest_step(const ComingLight& coming)
 {
     float widest = 0.0f;
-    const std::size_t width = survey.plane.width;
-    for (const PlaneLight& light : survey.lights) {
+    const std::size_t width = coming.plane.width;
+    for (const PlaneLight& light : coming.survey) {
         if (!std::holds_alternative<FromPoint>(light.directions))
             continue;
         BeamRow row;
         BeamRow below;  // of the row before
-        for (std::size_t y = 0; y < survey.plane.height; ++y) {
+        for (std::size_t y = 0; y < coming.plane.height; ++y) {
             std::swap(row, below);
-            if (!row.read(survey.plane, light, {y, 0, width})) {
+            if (!row.read(coming.plane, light, {y, 0, width})) {
                 row.irradiance.assign(width, 0.0f);
                 continue;
             }
@@ -131,17 +131,17 @@ double angle_deg(double half_tangent)
     return 2.0 * std::atan(half_tangent) / radians_per_degree;
 }
 
-Incidence::Incidence(const Plane& plane, const std::vector<PlaneLight>& lights, const LightSurvey& to_come)
+Incidence::Incidence(const Plane& plane, const std::vector<PlaneLight>& lights, const ComingLight& coming)
 {
     Histogram histogram = histogram_of(plane, lights);
     extremes = histogram.extremes;
     extend(extremes, 0.0);
-    if (!to_come.lights.empty()) {
-        const Histogram later = histogram_of(to_come.plane, to_come.lights);
-        const double texels = static_cast<double>(plane.texels()) / static_cast<double>(to_come.plane.texels());
+    if (!coming.survey.empty()) {
+        const Histogram later = histogram_of(coming.plane, coming.survey);
+        const double texels = static_cast<double>(plane.texels()) / static_cast<double>(coming.plane.texels());
         add_scaled(histogram.light.data(), later.light.data(), texels, bin_count);
         add_scaled(histogram.beams.data(), later.beams.data(), texels, bin_count);
-        extend(later.extremes, widest_step(to_come));
+        extend(later.extremes, widest_step(coming));
     }
     if (none())
         return;

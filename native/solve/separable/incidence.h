@@ -31,7 +31,7 @@ struct Incidence {
     std::array<double, count> share{};
     std::vector<Extremes> extremes;  // [light], not of those to come
 
-    Incidence(const Plane& plane, const std::vector<PlaneLight>& lights, const LightSurvey& to_come = {});
+    Incidence(const Plane& plane, const std::vector<PlaneLight>& lights, const ComingLight& coming = {});
 
     bool none() const { return first > last; }
 

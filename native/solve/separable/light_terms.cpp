@@ -102,12 +102,12 @@ void add_basis(LightTerms& terms, LowRankBasis basis)
 
 void check_memory(const Problem& problem, std::size_t bytes)
 {
-    if (problem.most_for_light == 0 || bytes <= problem.most_for_light)
+    if (problem.max_moment_bytes == 0 || bytes <= problem.max_moment_bytes)
         return;
     const auto in_gigabytes = [](std::size_t of) { return std::ldexp(static_cast<double>(of), -30); };
     std::ostringstream text;
     text << std::fixed << std::setprecision(1) << "their light takes " << in_gigabytes(bytes) << " GB of memory, where "
-         << in_gigabytes(problem.most_for_light) << " GB are left for it";
+         << in_gigabytes(problem.max_moment_bytes) << " GB are left for it";
     throw MemoryLimit(text.str());
 }
 
@@ -124,27 +124,27 @@ LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& 
     else
         for (const auto& [travel, lights] : directions)
             add_direction(result, travel, lights, beyond);
+    const std::size_t kept = result.changing.size();
+    result.changing.insert(result.changing.end(), problem.coming.examples.begin(), problem.coming.examples.end());
     for (const PlaneLight& light : result.changing) {
         result.colors.emplace_back();
         for (std::size_t set = 0; set < result.sets.count(); ++set)
             result.colors.back().push_back(static_cast<float>(result.sets.color(light, set)));
     }
-    const bool is_to_come = !problem.to_come.lights.empty();
-    const Incidence incidence(problem.plane, result.changing, problem.to_come);
-    if (incidence.none())
+    const Incidence incidence(problem.plane, result.changing, problem.coming);
+    const auto drop_examples = [&] {
+        result.changing.resize(kept);
+        result.colors.resize(kept);
+    };
+    if (incidence.none()) {
+        drop_examples();
         return result;
+    }
     const KernelDecomposition kernels(incidence, result.sets.media,
                                       std::max(problem.plane.pitch_x, problem.plane.pitch_y));
     add_basis(result, kernels.basis(choose(kernels, incidence, result), beyond));
-    if (is_to_come) {
-        std::size_t kept = 0;
-        for (std::size_t l = 0; l < result.changing.size(); ++l)
-            if (std::holds_alternative<OneDirection>(result.changing[l].directions)) {
-                result.changing[kept] = result.changing[l];
-                result.colors[kept++] = result.colors[l];
-            }
-        result.changing.resize(kept);
-        result.colors.resize(kept);
+    drop_examples();
+    if (!problem.coming.survey.empty()) {
         const auto moments = std::count_if(result.terms.begin(), result.terms.end(),
                                            [](const LightTerm& term) { return term.fixed.empty(); });
         check_memory(problem, static_cast<std::size_t>(moments) * problem.plane.texels() * sizeof(float));

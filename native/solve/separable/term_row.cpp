@@ -89,19 +89,7 @@ void TermRow::start(const LightTerms& terms, const RowSpan& span, std::size_t fi
     }
 }
 
-void MomentSum::add(LightTerms& terms, const PlaneLight& light, std::size_t y)
-{
-    m_colors.clear();
-    for (std::size_t set = 0; set < terms.sets.count(); ++set)
-        m_colors.push_back(static_cast<float>(terms.sets.color(light, set)));
-    for (std::size_t x = 0; x < terms.plane.width; x += texels_at_once) {
-        const RowSpan span{y, x, std::min(texels_at_once, terms.plane.width - x)};
-        if (m_beams.read(terms.plane, light, span))
-            add_beams(terms, span);
-    }
-}
-
-void MomentSum::add(LightTerms& terms, const RayBeams& rays, const std::vector<double>& color, bool is_colored)
+void MomentSum::add(LightTerms& terms, const RayRow& rays, const std::vector<double>& color, bool is_colored)
 {
     const std::size_t channels = color.size();
     const std::size_t sets = terms.sets.count();

@@ -47,14 +47,12 @@ private:
     BeamMoments m_moments;
 };
 
-// Adds up light as it comes. One for each thread; no two may add to one row at the same time.
+// Adds rays to the moments of terms. One object for each thread; no two threads may add to one row at once.
 class MomentSum {
 public:
-    // Of a light of changing directions, or of one of the many directions of lights without a term of their own.
-    void add(LightTerms& terms, const PlaneLight& light, std::size_t y);
-
-    // `is_colored`: channels differ by more than factors; else the first is that of all. Times `color` in any case.
-    void add(LightTerms& terms, const RayBeams& rays, const std::vector<double>& color, bool is_colored);
+    // `is_colored`: true if channels differ by more than factors; else the largest counts for all. `color` is a factor of
+    // each channel.
+    void add(LightTerms& terms, const RayRow& rays, const std::vector<double>& color, bool is_colored);
 
 private:
     void add_beams(LightTerms& terms, const RowSpan& span, const float* irradiance = nullptr);

@@ -14,13 +14,12 @@ namespace beamspread {
 
 namespace {
 
-// Border of the kernels' centres, texels: errors of some 1e-6 of the brightest texel, and of some 1e-5 where a basis
-// sums many kernels of grazing light. Half: seven times the errors of suns; twice: the same ones.
+// Border of the kernels' centers, texels. Smaller: larger errors of suns.
 constexpr double centre_deviation = 3.0;
 
-// Power that kernels of changing directions may lack at their ends: dark texels are off by less than such a fraction of
-// the brightest. Half and twice: the same errors; ten times: beside a lamp's shadow twice as large.
-constexpr double most_beyond = 1e-5;
+// Largest fraction of a kernel's power outside its reach, for changing directions. Larger: less padding, larger errors in
+// the dark.
+constexpr double max_beyond = 1e-5;
 
 double nodes(const PaddedPlane& plane)
 {
@@ -42,11 +41,11 @@ LightTerms chosen_terms(const Problem& problem, Progress& progress)
     const auto choose = [&](const KernelDecomposition& kernels, const Incidence& incidence, const LightTerms& light) {
         return choose_terms(kernels, incidence, light, problem.tolerance, progress, choice_work);
     };
-    LightTerms result = light_terms(problem, std::min(1e-2 * problem.tolerance, most_beyond), choose);
-    if (problem.to_come.lights.empty())
+    LightTerms result = light_terms(problem, std::min(1e-2 * problem.tolerance, max_beyond), choose);
+    if (problem.coming.survey.empty())
         return result;
     for (const LightTerm& term : result.terms) {
-        progress.advance(0.0);  // on large planes, zeros take seconds
+        progress.advance(0.0);  // zeros of large planes take seconds
         result.moments.emplace_back(term.fixed.empty() ? problem.plane.texels() : 0);
     }
     return result;
@@ -63,12 +62,7 @@ SpectralField::SpectralField(const Problem& problem, Progress& progress)
 {
 }
 
-void SpectralField::add(const PlaneLight& light)
-{
-    parallel_for(m_problem.plane.height, [&](std::size_t y) { m_sums.local().add(m_terms, light, y); });
-}
-
-void SpectralField::add(const RayBeams& rays, const std::vector<double>& color, bool is_colored)
+void SpectralField::add(const RayRow& rays, const std::vector<double>& color, bool is_colored)
 {
     m_sums.local().add(m_terms, rays, color, is_colored);
 }
@@ -116,7 +110,7 @@ SpectralField::CoarseLuminance SpectralField::solve_coarse(const Level& level, P
         add_scaled(sums[result].data() + span.y * plane.width + span.x, values, static_cast<float>(factor * size),
                    span.width);
     };
-    // Beside the light on the nodes its spectra, which are as large, and those of the results.
+    // Memory: light on the nodes, its spectra, which are as large, and spectra of the results.
     const std::size_t for_light = m_problem.memory / 4;
     const std::size_t for_spectra = m_problem.memory / 2;
     const std::size_t at_once = std::clamp<std::size_t>(for_light / (grid.nodes() * sizeof(float)), 1, terms());
@@ -144,12 +138,6 @@ void SpectralField::store_row(std::size_t result, const RowSpan& span, const flo
         for (std::size_t x = 0; x < span.width; ++x)
             out[x * channels] = scaled * values[x];
     }
-}
-
-void solve_spectral(const Problem& problem, Progress& progress, float* luminance)
-{
-    progress.set_total(choice_work + spread_work);
-    SpectralField(problem, progress).solve(progress, luminance);
 }
 
 std::size_t count_terms(const Problem& problem, Progress& progress)

@@ -1,4 +1,4 @@
-// The fft solver: the direct solver's sums as products of spectra.
+// The fft solver: the sums of the direct solver as products of spectra (docs/method.md).
 #pragma once
 
 #include <cstddef>
@@ -15,33 +15,31 @@
 
 namespace beamspread {
 
-// What it takes of a progress to choose terms, and to solve: about the same for a lamp on 512 x 512 texels.
+// Units of progress that the choice of terms and the solution advance by. Both take about as long for a lamp on
+// 512 x 512 texels.
 inline constexpr double choice_work = 1.0;
 inline constexpr double spread_work = 1.0;
 
-// Light on a plane, and what becomes of it. Padded so that light that leaves the plane does not come back.
+// Light on a plane and its luminance. The plane is padded so that light that leaves it does not come back.
 class SpectralField {
 public:
-    // Chooses the terms. `problem.lights` are kept; with light to come only those of one direction are, see
-    // `light_terms`. What they look at must outlive the field.
+    // Chooses the terms. The arrays of `problem.lights` must outlive the field; those of `problem.coming` need not.
     SpectralField(const Problem& problem, Progress& progress);
 
-    // Adds light to that to come, see `MomentSum`. Rays of different rows may be added at the same time.
-    void add(const PlaneLight& light);
-    void add(const RayBeams& rays, const std::vector<double>& color, bool is_colored);
+    // Adds rays of coming light, see `MomentSum`. Several threads may add rays of different rows at once.
+    void add(const RayRow& rays, const std::vector<double>& color, bool is_colored);
 
     // Writes (height, width, channels) in W/(m^2 sr).
     void solve(Progress& progress, float* luminance);
 
-    // Forgets the light that was added, and keeps what does not depend on it.
+    // Removes the light that was added; terms and kernels stay.
     void clear();
 
-    // How many there are; what is solved costs in proportion to them.
+    // Number of terms. The time to solve grows in proportion.
     std::size_t terms() const { return m_terms.terms.size(); }
 
 private:
-    // What light does beyond the reach of the texels' kernels, in the scale of the texels' sums before their own
-    // factor.
+    // Luminance beyond the reach of the texels' kernels, in the scale of the texels' sums before their factor.
     struct CoarseLuminance {
         CoarseGrid grid;
         std::vector<std::vector<float>> nodes;  // [result]
@@ -53,15 +51,13 @@ private:
     Problem m_problem;
     LightTerms m_terms;
     Levels m_levels;
-    std::optional<KernelSpectra> m_spectra;  // of the texels, kept for the next time
+    std::optional<KernelSpectra> m_spectra;  // of the texels; empty until the first solution
     std::optional<KernelSpectra> m_coarse_spectra;
     PerThread<MomentSum> m_sums;
     PerThread<CoarseGrid::Scratch> m_scratch;
 };
 
-void solve_spectral(const Problem& problem, Progress& progress, float* luminance);
-
-// How many terms `problem` has.
+// Number of terms of `problem`.
 std::size_t count_terms(const Problem& problem, Progress& progress);
 
 }  // namespace beamspread

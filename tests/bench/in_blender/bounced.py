@@ -14,8 +14,8 @@ from pathlib import Path
 import beamspread
 import bpy
 import numpy as np
+from beamspread.core.native import native
 from beamspread.core.scene.lights import STRATA, WEIGHTS
-from beamspread.core.scene.lights.field_light import spline_weights
 
 sys.path.insert(0, str(Path(beamspread.__file__).with_name("blender") / "cycles"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blender"))
@@ -80,8 +80,11 @@ def irradiance(pixels):
 
 
 def between_nodes(values):
-    weights = spline_weights(TEXELS, NODES)
-    return np.stack([weights @ values[..., channel] @ weights.T for channel in range(3)], axis=-1)
+    """Values at texels, as irradiance of light whose radiance has these values at nodes."""
+    axes = (1, 0, 0), (0, 1, 0), (0, 0, 1)
+    surface = native.Surface(native.ReceiverGrid((0, 0, 0), *axes, 1.0, 1.0, TEXELS, TEXELS))
+    light = native.FieldLight(np.float32(values)[None], np.ones(1, np.float32), np.float32([[0, 0, -1]]))
+    return native.bake_arrival(surface, [(light, (1, 1, 1), None)])[0]
 
 
 def in_blocks(values):

@@ -44,13 +44,6 @@ class SunLight(TracedLight):
 
     has_one_direction = is_parallel
 
-    def beams(self, reach, directions=True):
-        if not self.has_size:
-            return super().beams(reach, directions)
-        irradiance, _ = self.totals(reach)
-        is_colored = reach.is_colored or reach.grid.color_in is not None
-        return irradiance if is_colored else irradiance[..., 0], reach.in_plane(self.direction)
-
     def is_behind(self, grid):
         return bool(np.dot(self.direction, grid.normal) >= math.sin(min(0.5 * self.angle, 0.5 * math.pi)))
 

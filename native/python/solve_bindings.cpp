@@ -1,13 +1,13 @@
+// Python names of native/solve: PlaneLight, convolve, transforms, adaptive_beams.
 #include <array>
 #include <cstdint>
-#include <numeric>
 #include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
 
 #include "base/error.h"
-#include "python/problem.h"
+#include "python/media.h"
 #include "solve/adaptive/adaptive.h"
 #include "solve/solve.h"
 #include "solve/spectral/spectral.h"
@@ -16,7 +16,15 @@ namespace beamspread {
 
 namespace {
 
-// Of any strides: channels of an array are looked at where they are.
+// A light and the arrays that it views.
+struct HeldLight {
+    PlaneLight light;
+    std::vector<py::object> arrays;
+};
+
+using Lights = std::vector<const HeldLight*>;
+
+// Arrays of any strides: a channel is viewed in place.
 using Plane2D = py::array_t<float, 0>;
 
 View2D<const float> channel_view(const Plane2D& irradiance, py::ssize_t channel)
@@ -70,31 +78,7 @@ std::vector<HeldLight> lights_of(const Plane2D& irradiance, const Array<float>& 
     return held;
 }
 
-double mean(const HeldLight& held)
-{
-    const View2D<const float>& irradiance = held.light.irradiance;
-    double sum = 0.0;
-    for (std::size_t y = 0; y < irradiance.height; ++y)
-        for (std::size_t x = 0; x < irradiance.width; ++x)
-            sum += static_cast<double>(irradiance(y, x));
-    const std::vector<double>& color = held.light.color;
-    return sum * std::accumulate(color.begin(), color.end(), 0.0) /
-           static_cast<double>(irradiance.height * irradiance.width * color.size());
-}
-
-std::vector<HeldLight> by_channel(const HeldLight& held)
-{
-    const std::size_t channels = held.light.color.size();
-    std::vector<HeldLight> lights(channels, held);
-    for (std::size_t c = 0; c < channels; ++c) {
-        std::vector<double> color(channels, 0.0);
-        color[c] = held.light.color[c];
-        lights[c].light.color = color;
-    }
-    return lights;
-}
-
-// That of all lights; without any, none.
+// The plane of the lights; empty without any.
 Plane plane_of(const Lights& lights, std::array<double, 2> pitch)
 {
     if (lights.empty())
@@ -103,15 +87,25 @@ Plane plane_of(const Lights& lights, std::array<double, 2> pitch)
     return {irradiance.width, irradiance.height, pitch[0], pitch[1]};
 }
 
+Problem problem_of(const Lights& lights, const Sources& ldf, const std::vector<double>& albedo,
+                   const std::vector<double>& mean_free_path, std::array<double, 2> pitch, double tolerance)
+{
+    Problem problem;
+    problem.plane = plane_of(lights, pitch);
+    problem.channels = media_of(ldf, albedo, mean_free_path);
+    for (const HeldLight* held : lights)
+        problem.lights.push_back(held->light);
+    problem.tolerance = tolerance;
+    return problem;
+}
+
 Array<float> convolve(const Lights& lights, const Sources& ldf, const std::vector<double>& albedo,
                       const std::vector<double>& mean_free_path, std::array<double, 2> pitch, const std::string& solver,
                       double tolerance, int threads, const py::object& progress, std::size_t memory,
                       std::size_t coarsening)
 {
-    Problem problem = problem_of(lights, ldf, albedo, mean_free_path, tolerance);
-    problem.plane = plane_of(lights, pitch);
-    problem.solver = named<Solver>("solver", solver,
-                                   {{"fft", Solver::fft}, {"direct", Solver::direct}, {"adaptive", Solver::adaptive}});
+    Problem problem = problem_of(lights, ldf, albedo, mean_free_path, pitch, tolerance);
+    problem.solver = named_solver(solver);
     problem.threads = threads;
     problem.memory = memory;
     problem.coarsening = coarsening;
@@ -126,8 +120,7 @@ Array<float> convolve(const Lights& lights, const Sources& ldf, const std::vecto
 std::size_t transforms(const Lights& lights, const Sources& ldf, const std::vector<double>& albedo,
                        const std::vector<double>& mean_free_path, std::array<double, 2> pitch, double tolerance)
 {
-    Problem problem = problem_of(lights, ldf, albedo, mean_free_path, tolerance);
-    problem.plane = plane_of(lights, pitch);
+    Problem problem = problem_of(lights, ldf, albedo, mean_free_path, pitch, tolerance);
     Progress unseen;
     const py::gil_scoped_release release;
     validate(problem);
@@ -165,7 +158,7 @@ Squares adaptive_beams(const HeldLight& light, double tolerance)
 
 void bind_solve(py::module_& m)
 {
-    py::class_<HeldLight>(m, "PlaneLight", R"(What arrives on a plane from one light, and what is known of where from.
+    py::class_<HeldLight>(m, "PlaneLight", R"(Light of one lamp on a plane.
 
 Parameters
 ----------
@@ -177,10 +170,8 @@ color : sequence of float
     Factor of the irradiance in each channel.
 )")
         .def(py::init(&light_of), py::arg("irradiance"), py::arg("direction"), py::arg("color"))
-        .def("mean", &mean, "float: mean irradiance of all texels and channels, W/m^2.")
-        .def("by_channel", &by_channel, "The same light as one for each channel.")
         .def_static("from_point", &point_light, py::arg("irradiance"), py::arg("position"), py::arg("color"),
-                    "All light comes from one position: x, y, z > 0 in metres from the outer corner of texel (0, 0).")
+                    "Light from one position: x, y, z > 0 in metres from the outer corner of texel (0, 0).")
         .def_static("of_channels", &lights_of, py::arg("irradiance"), py::arg("direction"), py::arg("channels"),
                     "Lights for irradiance (H, W) or (H, W, channels): one where channels differ by a factor, else one "
                     "for each.");
@@ -195,7 +186,8 @@ C libraries, albedos and mean free paths (metres), pitch (x, y) in metres; retur
 0 for what costs least.
 )");
     m.def("transforms", &transforms, py::arg("lights"), py::arg("ldf"), py::arg("albedo"), py::arg("mean_free_path"),
-          py::arg("pitch"), py::arg("tolerance"), "How many transforms of light the solver 'fft' makes of `convolve`.");
+          py::arg("pitch"), py::arg("tolerance"),
+          "int: number of transforms of light that the solver 'fft' makes for `convolve`.");
     m.def("adaptive_beams", &adaptive_beams, py::arg("light"), py::arg("tolerance"),
           R"(Squares that the adaptive solver lights by one beam each; the engine behind `beamspread.adaptive_beams`.
 

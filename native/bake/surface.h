@@ -1,0 +1,20 @@
+// Surface that a bake lights: samples with an area and a texture. Its samples are the texels of a plane's grid.
+#pragma once
+
+#include "scene/receiver.h"
+#include "solve/problem/light.h"
+
+namespace beamspread {
+
+struct Surface {
+    ReceiverGrid grid;
+    double clearance = 0.0;            // largest distance of the surface's faces to the plane, metres
+    const float* coverage = nullptr;   // [sample] fraction inside the mesh, 0 to 1; null: 1
+    const float* color_in = nullptr;   // [sample][channel] factors of light that enters; null: 1
+    const float* color_out = nullptr;  // [sample][channel] factors of light that leaves; null: 1
+
+    std::size_t samples() const { return grid.width * grid.height; }
+    Plane plane() const { return {grid.width, grid.height, grid.pitch_x, grid.pitch_y}; }
+};
+
+}  // namespace beamspread
