@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <memory>
 
-#include "ldf/library/ldf_image.h"
 #include "ldf/library/ldf_library.h"
 #include "python/casters.h"
 

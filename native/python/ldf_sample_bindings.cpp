@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "base/error.h"
-#include "ldf/library/ldf_image.h"
+#include "ldf/library/ldf_library.h"
 #include "ldf/samples/angular_space.h"
 #include "ldf/samples/interpolate.h"
 #include "ldf/samples/ldf_sample.h"

@@ -3,8 +3,6 @@
 #include <limits>
 
 #include "ldf/library/ldf_library.h"
-#include "medium/fresnel.h"
-#include "medium/henyey_greenstein.h"
 #include "medium/medium.h"
 #include "python/casters.h"
 #include "transport/exact/adding_doubling.h"

@@ -10,7 +10,7 @@
 #include "base/constants.h"
 #include "base/error.h"
 #include "base/threads.h"
-#include "medium/fresnel.h"
+#include "medium/medium.h"
 #include "transport/tally/tally_statistics.h"
 
 namespace beamspread {

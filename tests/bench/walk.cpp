@@ -16,8 +16,7 @@
 #include "base/constants.h"
 #include "base/random.h"
 #include "ldf/library/ldf_library.h"
-#include "medium/fresnel.h"
-#include "medium/henyey_greenstein.h"
+#include "medium/medium.h"
 
 using namespace beamspread;
 

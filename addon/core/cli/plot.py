@@ -19,7 +19,7 @@ COLORS = "magma"
 UNIT = r"$1/\mathrm{mfp}^2$"
 # Decades of a map below its brightest texel. More: more noise shows.
 MAX_DECADES = 6
-# Half width of the error band, in standard errors: 95 % of normally distributed values.
+# Distance of the error band from the curve, in standard errors: 95 % of normally distributed values.
 BAND = 2.0
 # Layout, in inches.
 MAP, GAP, MARGIN, BAR_MARGIN, TOP, AXIS_LABELS = 3.0, 0.45, 0.8, 1.05, 0.75, 0.85

@@ -10,7 +10,7 @@
 
 #include "base/constants.h"
 #include "base/error.h"
-#include "medium/fresnel.h"
+#include "medium/medium.h"
 #include "transport/exact/adding_doubling.h"
 
 namespace beamspread {

@@ -1,4 +1,4 @@
-#include "ldf/library/ldf_image.h"
+#include "ldf/library/ldf_library.h"
 
 #include <algorithm>
 #include <cmath>

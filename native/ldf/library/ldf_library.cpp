@@ -10,7 +10,7 @@
 #include "base/threads.h"
 #include "ldf/radial/radial_function.h"
 #include "ldf/radial/radial_profile.h"
-#include "medium/fresnel.h"
+#include "medium/medium.h"
 #include "transport/exact/adding_doubling.h"
 
 namespace beamspread {

@@ -69,18 +69,18 @@ private:
 
     ExrPart* find(const std::string& name)
     {
-        const auto found =
+        const auto part =
             std::find_if(m_parts.begin(), m_parts.end(), [&](const ExrPart& p) { return p.name == name; });
-        return found == m_parts.end() ? nullptr : &*found;
+        return part == m_parts.end() ? nullptr : &*part;
     }
 
     template <class T>
     T attribute(const ExrPart& part, const std::string& name) const
     {
-        const auto found = part.attributes.find(name);
-        if (found == part.attributes.end() || !std::holds_alternative<T>(found->second))
+        const auto entry = part.attributes.find(name);
+        if (entry == part.attributes.end() || !std::holds_alternative<T>(entry->second))
             fail("has no attribute '" + name + "' of the right type");
-        return std::get<T>(found->second);
+        return std::get<T>(entry->second);
     }
 
     std::uint64_t number(const ExrPart& part, const std::string& name) const

@@ -38,7 +38,7 @@ struct LdfSample {
 double exitance_at(const LdfSample& sample, const Vec2& point);
 
 // Throws InvalidArgument unless the exitance is finite and not negative. Undershoots of up to 10 % of the brightest
-// texel are allowed: truncated harmonics (ldf_image.h) and denoised simulations have them.
+// texel are allowed: truncated harmonics (`ldf_image`) and denoised simulations have them.
 void validate(const LdfSample& sample);
 
 // Write and read a one-part OpenEXR file; sample_file.cpp describes the layout. Throw IoError.

@@ -85,12 +85,12 @@ private:
 
     std::optional<double> number(const std::string& name) const
     {
-        const auto found = m_part.attributes.find(name);
-        if (found == m_part.attributes.end())
+        const auto entry = m_part.attributes.find(name);
+        if (entry == m_part.attributes.end())
             return std::nullopt;
-        if (const auto* real = std::get_if<double>(&found->second))
+        if (const auto* real = std::get_if<double>(&entry->second))
             return *real;
-        if (const auto* integer = std::get_if<int>(&found->second))
+        if (const auto* integer = std::get_if<int>(&entry->second))
             return *integer;
         fail(m_path, "has an attribute '" + name + "' that is no number");
     }

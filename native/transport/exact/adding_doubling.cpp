@@ -14,7 +14,7 @@
 #include "base/constants.h"
 #include "base/error.h"
 #include "base/threads.h"
-#include "medium/fresnel.h"
+#include "medium/medium.h"
 
 namespace beamspread {
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "medium/fresnel.h"
+#include "medium/medium.h"
 
 namespace beamspread {
 

@@ -188,14 +188,14 @@ std::vector<double> deviations_at(std::span<const float> deviations, std::span<c
     const double t = (x - low_end) / (log_absorption(albedos[high]) - low_end);
 
     const std::size_t rings = max_harmonics(harmonics, pole);
-    const float* kept =
+    const float* stored =
         deviations.data() + group * deviation_count(harmonics, radii) + count_before(harmonics, radii, pole);
     std::vector<double> result(rings * radius_bin_count, 0.0);
     for (const auto& [albedo_index, weight] : {std::pair(high - 1, 1.0 - t), std::pair(high, t)})
         for (std::size_t m = 0; m < rings; ++m)
             for (std::size_t k = 0; k < radii; ++k)
                 result[m * radius_bin_count + k] +=
-                    weight * static_cast<double>(kept[(albedo_index * rings + m) * radii + k]);
+                    weight * static_cast<double>(stored[(albedo_index * rings + m) * radii + k]);
     return result;
 }
 

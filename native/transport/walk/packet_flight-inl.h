@@ -23,7 +23,7 @@ struct Deflection {
     Floats pdf;  // per steradian
 };
 
-// The Henyey-Greenstein phase function, see medium/henyey_greenstein.h.
+// The Henyey-Greenstein phase function, see medium/medium.h.
 class PhaseFunction {
 public:
     explicit PhaseFunction(double g)
@@ -74,7 +74,7 @@ private:
     float m_pdf;
 };
 
-// Fresnel's reflectance from inside, see medium/fresnel.h.
+// Fresnel's reflectance from inside, see medium/medium.h.
 class Boundary {
 public:
     explicit Boundary(double ior)

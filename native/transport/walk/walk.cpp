@@ -5,8 +5,7 @@
 
 #include "base/constants.h"
 #include "base/vec.h"
-#include "medium/fresnel.h"
-#include "medium/henyey_greenstein.h"
+#include "medium/medium.h"
 
 namespace beamspread {
 
