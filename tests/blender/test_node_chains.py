@@ -9,12 +9,14 @@ from beamspread.blender.jobs.out_of_date.fingerprint import tree_values
 from beamspread.blender.node.find import find_node, find_node_in_groups
 from beamspread.blender.read import shading
 from beamspread.blender.read.image_nodes import Pixels, uv_transform_of
+from beamspread.blender.read.lights import read_illumination
 from beamspread.blender.read.node_math import FUNCTIONS
 from beamspread.blender.read.nodes import InputSocket, Links, surface_of
+from beamspread.blender.read.scene_cache import SceneCache
 from beamspread.blender.read.shading import ShadingPoints
 from beamspread.blender.read.transparency import TexelEvaluator
 from beamspread.core.errors import NotSupportedError
-from scenes import add_material, diffuse_material, node_of
+from scenes import add_material, add_plane, diffuse_material, node_of
 
 LONG = 400
 
@@ -185,6 +187,20 @@ def test_evaluation_can_be_cancelled(material):
     with pytest.raises(Stopped):
         points.value(surface)
     assert points.value(surface) == pytest.approx([2.0**40] * 3)  # a cancelled evaluation leaves nothing behind
+
+
+def test_reading_a_scene_can_be_cancelled(material):
+    """While the nodes of lamps, emissive and transparent materials and of the world are evaluated."""
+
+    class Stopped(Exception):
+        pass
+
+    def check():
+        raise Stopped
+
+    add_plane(material=material)
+    with pytest.raises(Stopped):
+        read_illumination(bpy.context.evaluated_depsgraph_get(), SceneCache(check))
 
 
 def test_values_are_dropped_after_their_last_reader(material):

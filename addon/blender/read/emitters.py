@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import copy
 
 import numpy as np
@@ -24,8 +25,8 @@ POSITIONS = 6
 class Materials:
     """Radiance of materials, each evaluated once."""
 
-    def __init__(self) -> None:
-        self.images = Images()
+    def __init__(self, check: Callable[[], None] | None = None) -> None:
+        self.images, self.check = Images(), check
         self._known: dict[str | None, np.ndarray | InputSocket | None] = {None: None}
 
     def read(self, material) -> np.ndarray | InputSocket | None:
@@ -44,7 +45,7 @@ class Materials:
         if surface is None:
             return None
         try:
-            light = ShadingPoints(images=self.images).value(surface)
+            light = ShadingPoints(images=self.images, check=self.check).value(surface)
         except NotSupportedError:
             return surface
         return light if light.any() else None
@@ -54,7 +55,7 @@ class EmissiveMesh:
     """Radiance of the triangles of an evaluated object, and the matrices of its instances."""
 
     def __init__(self, obj, materials: Materials) -> None:
-        self._images = materials.images
+        self._images, self._check = materials.images, materials.check
         self._parts: list[tuple[np.ndarray, np.ndarray]] = []
         self._matrices: list[np.ndarray] = []
         self.reason: NotSupportedError | None = None
@@ -113,7 +114,7 @@ class EmissiveMesh:
             positions = _middles(POSITIONS) @ (pieces @ uvs[:, None]).reshape(-1, 3, 2)
             flat = np.concatenate([positions.reshape(-1, 2), np.zeros((positions[..., 0].size, 1))], axis=1)
             outputs["ShaderNodeTexCoord", "UV"] = flat
-        light = ShadingPoints(outputs, self._images).value(surface)
+        light = ShadingPoints(outputs, self._images, check=self._check).value(surface)
         light = np.broadcast_to(light, (len(corners) * POSITIONS**2, 3)).reshape(len(corners), -1, 3).mean(axis=1)
         return corners, light.astype(np.float32)
 

@@ -23,7 +23,10 @@ from .world_light import read_world
 
 
 def read_illumination(depsgraph, cache: SceneCache | None = None) -> Illumination:
-    """Lights and occluders of all objects and instances that render; entries of the cache are not read again."""
+    """Lights and occluders of all objects and instances that render; entries of the cache are not read again.
+
+    The cache's `check` can cancel the evaluation of nodes.
+    """
     cache = cache or SceneCache()
     visible = render_visible_names(depsgraph.view_layer)
     lights, occluders = _Lights(depsgraph, cache), OccluderReader(cache)
@@ -122,7 +125,7 @@ class _Lights:
     def add_world(self, view_layer, world) -> None:
         key = world and (world.name, view_layer.use_sky)
         if self._cache.world is None or self._cache.world[0] != key:
-            self._cache.world = key, read_world(view_layer, world, self._cache.emission.images)
+            self._cache.world = key, read_world(view_layer, world, self._cache.emission.images, self._cache.check)
         light, reason = self._cache.world[1]
         if reason:
             text = f"The world '{world.name}' is left out."

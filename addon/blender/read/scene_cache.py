@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 from . import emitters, transparency
 
@@ -14,10 +14,12 @@ class SceneCache:
     ----------
     meshes : occluder meshes, by a key that names their data.
     emissive : emissive meshes, by object name and mesh.
-    world : its key (name and whether the view layer shows it) and what was read of it; None if nothing was.
+    world : key of the world (its name, and whether the view layer shows it) and its light; None if it was not read.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, check: Callable[[], None] | None = None) -> None:
+        """`check` is called while nodes are evaluated, and raises an exception to cancel that."""
+        self.check = check
         self.meshes: dict = {}
         self.emissive: dict = {}
         self._keys: dict[str, list[tuple[dict, tuple]]] = {}  # cache entries by the names that they depend on
@@ -54,7 +56,7 @@ class SceneCache:
 
     def forget_images(self) -> None:
         """Drop everything that may depend on images."""
-        self.emission, self.transparency = emitters.Materials(), transparency.Materials()
+        self.emission, self.transparency = emitters.Materials(self.check), transparency.Materials(self.check)
         self.meshes.clear()
         self.emissive.clear()
         self._keys.clear()

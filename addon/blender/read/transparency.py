@@ -154,7 +154,8 @@ def constant(value: int) -> MaterialTransmittance:
 class Materials:
     """Transmittances of materials, each evaluated once; `warnings` are about those that only Cycles can evaluate."""
 
-    def __init__(self) -> None:
+    def __init__(self, check: Callable[[], None] | None = None) -> None:
+        self._check = check
         self.warnings: list[Message] = []
         self._known: dict[str | None, MaterialTransmittance] = {None: constant(0)}
 
@@ -191,14 +192,14 @@ class Materials:
     def _evaluate(self, surface: InputSocket) -> MaterialTransmittance:
         # Pixels of this material alone: they may take gigabytes.
         pixels, links = Pixels(), Links()
-        probe = TexelEvaluator(pixels, PROBE, links=links)
+        probe = TexelEvaluator(pixels, PROBE, links=links, check=self._check)
         weight, transform = probe.value(surface), probe.transform
         if transform is None:
             return MaterialTransmittance(native.Transmittance(_color(weight)))
         # At the texels of the largest image, or between them.
         finer = max(1, FINE_SIDE // max(probe.largest)) if probe.is_bent else 1
         size = tuple(side * finer for side in probe.largest)
-        texels = _in_range(TexelEvaluator(pixels, size, links=links).value(surface))
+        texels = _in_range(TexelEvaluator(pixels, size, links=links, check=self._check).value(surface))
         if (texels[..., :1] == texels).all():
             texels = texels[..., :1]
         texels = np.ascontiguousarray(texels, np.float32)

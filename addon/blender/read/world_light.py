@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ...core.errors import NotSupportedError
@@ -17,7 +19,9 @@ WIDTH, HEIGHT = 1440, 720
 ROWS = 64
 
 
-def read_world(view_layer, world, images: Images) -> tuple[WorldLight | None, NotSupportedError | None]:
+def read_world(
+    view_layer, world, images: Images, check: Callable[[], None] | None = None
+) -> tuple[WorldLight | None, NotSupportedError | None]:
     """Light of a world, None if there is none or it is dark, and the reason why it is left out, if so."""
     if world is None or not view_layer.use_sky or not world.cycles_visibility.diffuse:
         return None, None
@@ -27,7 +31,7 @@ def read_world(view_layer, world, images: Images) -> tuple[WorldLight | None, No
     if surface is None:
         return None, None
     try:
-        return _panorama(world.name, surface, images), None
+        return _panorama(world.name, surface, images, check), None
     except NotSupportedError as error:
         return None, error
 
@@ -43,9 +47,9 @@ def _rows(matrix: np.ndarray) -> tuple:
     return tuple(tuple(row) for row in matrix.tolist())
 
 
-def _panorama(name: str, surface: InputSocket, images: Images) -> WorldLight | None:
+def _panorama(name: str, surface: InputSocket, images: Images, check: Callable[[], None] | None) -> WorldLight | None:
     probes = np.concatenate([np.eye(3), directions(3, 2, slice(None))])
-    points = _points(images, probes)
+    points = _points(images, probes, check)
     points.lookups = []
     light = points.value(surface)
     if light.ndim == 1:
@@ -56,7 +60,7 @@ def _panorama(name: str, surface: InputSocket, images: Images) -> WorldLight | N
         rows = slice(first, first + ROWS)
         # Rows of the matrix are the image's axes in the world.
         towards = directions(width, height, rows) @ to_image
-        light = _points(images, towards).value(surface)
+        light = _points(images, towards, check).value(surface)
         texels[rows] = light.reshape(-1, width, 3) if light.ndim > 1 else light
     if not texels.any():
         return None
@@ -91,7 +95,7 @@ def directions(width: int, height: int, rows: slice) -> np.ndarray:
     return towards.reshape(-1, 3)
 
 
-def _points(images: Images, towards: np.ndarray) -> ShadingPoints:
+def _points(images: Images, towards: np.ndarray, check: Callable[[], None] | None) -> ShadingPoints:
     """Points in these directions as a diffuse surface sees them; a world's nodes know only the direction."""
     outputs = {
         ("ShaderNodeTexCoord", "Generated"): towards,
@@ -101,7 +105,7 @@ def _points(images: Images, towards: np.ndarray) -> ShadingPoints:
         ("ShaderNodeNewGeometry", "Incoming"): -towards,
     }
     path = {("ShaderNodeLightPath", name): np.ones(1) for name in ("Is Diffuse Ray", "Is Reflection Ray")}
-    return ShadingPoints(ON_NO_PATH | outputs | path, images)
+    return ShadingPoints(ON_NO_PATH | outputs | path, images, check=check)
 
 
 def _without_noise(texels: np.ndarray) -> np.ndarray:
