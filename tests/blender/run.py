@@ -25,7 +25,7 @@ def main() -> int:
     stage = Path(os.environ.get("BEAMSPREAD_STAGE", ROOT / "build" / "stage"))
     # At the end: Blender's own numpy comes first.
     sys.path.append(str(test_site()))
-    sys.path[:0] = [str(stage), str(FOLDER)]
+    sys.path[:0] = [str(stage), str(FOLDER), str(FOLDER.parent)]
     os.chdir(ROOT)
 
     import beamspread

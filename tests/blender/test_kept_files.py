@@ -1,11 +1,8 @@
 """Files are complete or unchanged on a full disk, and if the process is killed while it writes."""
 
-import resource
-import signal
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
@@ -18,20 +15,10 @@ from beamspread.core.batch.report import BakeRecord, Report
 from beamspread.core.errors import ImageError
 from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
 
+from full_disk import full_after
+
 SIDE = 64
 NOISE = np.random.default_rng(0).random((SIDE, SIDE, 3), np.float32)
-
-
-@contextmanager
-def full_after(size):
-    """Limit files of this process to `size` bytes."""
-    before, limit = signal.signal(signal.SIGXFSZ, signal.SIG_IGN), resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limit[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limit)
-        signal.signal(signal.SIGXFSZ, before or signal.SIG_DFL)
 
 
 def saved_image(path, file_format, side=SIDE, is_float=False):

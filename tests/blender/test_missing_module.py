@@ -11,7 +11,6 @@ import bpy
 import pytest
 from scenes import add_material, add_plane, add_sun, bake, blender_command, node_of, pixels
 
-sys.path.append(str(Path(__file__).resolve().parents[1]))
 from spoilt_modules import empty, remove
 
 IN_BLENDER = """

@@ -2,16 +2,16 @@
 
 import errno
 import os
-import resource
-import signal
 import subprocess
 import sys
 import time
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 
 import pytest
 from beamspread.core import whole_file as module
 from beamspread.core.whole_file import whole_file
+
+from full_disk import full_after
 
 WRITER = """
 import os, signal, time
@@ -26,18 +26,6 @@ with whole_file({path!r}) as temporary:
 @pytest.fixture(autouse=True)
 def as_in_a_new_process(monkeypatch):
     monkeypatch.setattr(module, "_tidied", set())
-
-
-@contextmanager
-def full_after(size):
-    """Limit files of this process to `size` bytes."""
-    before, limit = signal.signal(signal.SIGXFSZ, signal.SIG_IGN), resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limit[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limit)
-        signal.signal(signal.SIGXFSZ, before)
 
 
 def write(path, text="whole"):
