@@ -9,7 +9,7 @@ import bpy
 
 from ...core import native
 from ...core.bake.estimate import in_words, ray_seconds, solver_seconds
-from ...core.bake.luminance import MOST_RAYS, rays_per_texel
+from ...core.bake.luminance import MAX_RAYS, rays_per_texel
 from ...core.errors import BakeError, message_of
 from ...core.messages import Messages
 from ...core.scene.uv_map import check_uvs
@@ -194,7 +194,7 @@ def estimates(context) -> list[str]:
         suns = lamps.count("SUN")
         seconds = sum(solver_seconds(*size, suns, len(lamps) - suns, "direct") for size in sizes)
         if seconds > LONG_SECONDS:
-            sized = f", up to {MOST_RAYS} times that if lamps have a size" if len(lamps) > suns else ""
+            sized = f", up to {MAX_RAYS} times that if lamps have a size" if len(lamps) > suns else ""
             found.append(f"Direct solver: at least {in_words(seconds)}{sized}. FFT gives the same in seconds.")
     elif settings.output == "LUMINANCE" and _has_wide_lights(context):
         seconds = sum(_seconds_of_rays(target, size, settings.for_bake()) for target, size in zip(chosen, sizes))
