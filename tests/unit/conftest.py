@@ -1,10 +1,14 @@
 """Marks the quick modules: `pytest -m fast` runs them in less than a minute."""
 
+import os
 from pathlib import Path
 
 import pytest
 
 HERE = Path(__file__).parent
+
+# Processes that tests start import the staged package, too.
+os.environ.setdefault("PYTHONPATH", str(HERE.parents[1] / "build" / "stage"))
 
 # Modules with more than five seconds of CPU time.
 SLOW = {
