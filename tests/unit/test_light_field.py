@@ -1,4 +1,4 @@
-"""Light that adds up as it comes gives what it gives together, in memory that doesn't grow with it."""
+"""Light added step by step gives the same result as all light together, in constant memory."""
 
 import math
 import subprocess
@@ -57,13 +57,13 @@ def relative_error(result, truth):
 @pytest.mark.parametrize("lights", [lamps(9), suns(3) + lamps(3), suns(7), suns(2)], ids=["9", "3 + 3", "7", "2"])
 @pytest.mark.parametrize("thickness", [0.0, 0.02], ids=["half-space", "slab"])
 def test_as_it_comes_is_as_together(lights, thickness, monkeypatch):
-    """Both keep to the tolerance, here of all terms: what differs is the basis and rounding."""
+    """Both keep the tolerance, here with all terms: the basis and rounding differ."""
     arguments = grid(48), Illumination(lights), MATERIAL, thickness, SETTINGS
     together = bake(*arguments)
     assert relative_error(bake_as_it_comes(monkeypatch, *arguments), together) < 0.1 * TOLERANCE
 
 
-def test_terms_are_chosen_for_what_comes(monkeypatch):
+def test_terms_are_chosen_for_the_survey(monkeypatch):
     """On planes of more than 192 x 192 texels few terms are kept, for four lamps that stand for all."""
     arguments = grid(256), Illumination(lamps(12)), MATERIAL, 0.0, SETTINGS
     together = bake(*arguments)
@@ -124,8 +124,8 @@ def split(light, count):
 def test_directions_of_a_low_wide_light_are_kept():
     """A panel against itself in 100 parts, each its own light: the parts have one direction each, but for .06 rad.
 
-    What they differ by, as the square of that angle, is some 3e-4 of the luminance; rays make 2e-3 of noise in the
-    penumbra, where ten parts make steps. The mean direction alone would be off by far more.
+    The difference grows with the square of that angle: some 3e-4 of the luminance. Rays make 2e-3 of noise in the
+    penumbra, where ten parts make steps. The mean direction alone would be far less exact.
     """
 
     def bake_one(lights):
@@ -141,7 +141,9 @@ def test_directions_of_a_low_wide_light_are_kept():
 
 @pytest.mark.parametrize("solver", ["direct", "adaptive"])
 def test_solvers_that_take_lights_apart_agree(solver, monkeypatch):
-    """Ray by ray, each a light of one direction per texel: the same rays, so what differs is the solvers' tolerance."""
+    """Ray by ray, each a light of one direction per texel: the same rays, so the difference is the solvers'
+    tolerance.
+    """
     for name in ("MAX_RAYS", "MIN_RAYS"):
         monkeypatch.setattr(luminance, name, 2)
     arguments = grid(16), Illumination([sky()], WALL), MATERIAL, 0.0
@@ -187,7 +189,9 @@ def test_light_of_many_colors_and_directions_has_the_power_of_its_parts():
 
 
 def test_a_narrow_sun_counts_as_one_direction():
-    """The widest sun that does, at 75 degrees, against its rays: that leaves out what grows with the angle's square."""
+    """The widest sun of one direction, at 75 degrees, against its rays: the error grows with the square of the
+    angle.
+    """
     angle = math.radians(75)
     sun = SunLight("Sun", 1.0, (1.0, 1.0, 1.0), True, (math.sin(angle), 0.0, -math.cos(angle)), WIDEST_SUN)
     one = bake(grid(48), Illumination([sun], WALL), MATERIAL, 0.0, SETTINGS)
