@@ -299,14 +299,14 @@ def test_a_bake_that_gets_no_light_is_no_success(add, output, tmp_path):
     assert "--allow-dark" not in output_text
 
 
-def test_what_fails_is_no_success_in_the_dark_either(tmp_path):
+def test_a_failed_bake_is_no_success_in_the_dark_either(tmp_path):
     add_plane(material=add_material(albedo=(1, 1, 1)))
     code, bakes, _ = run_batch(save_scene(tmp_path), "--allow-dark", "--output", tmp_path)
     assert (code, bakes[0]["status"], bakes[0]["dark"]) == (1, "failed", False)
 
 
 def test_a_lamp_behind_a_slab_is_named_and_nothing_is_simulated(tmp_path, monkeypatch):
-    """Of a medium that no package brings: its simulation would leave a file in the cache."""
+    """A medium that no package brings: its simulation would leave a file in the cache."""
     monkeypatch.setenv("BEAMSPREAD_CACHE", str(tmp_path / "cache"))
     add_plane(material=add_material(thickness=0.0375, anisotropy=0.31))
     sun = add_sun(0, matrix=Matrix.Rotation(np.pi, 4, "X"))
@@ -324,7 +324,7 @@ def test_a_lamp_behind_a_slab_is_named_and_nothing_is_simulated(tmp_path, monkey
     assert [*(tmp_path / "cache").rglob("*.exr")]
 
 
-def test_verbose_prints_what_is_read_and_the_stages(tmp_path):
+def test_verbose_prints_the_scene_and_the_stages(tmp_path):
     add_plane(size=(2, 1), material=add_material())
     add_plane("Wall", size=(9, 9), matrix=Matrix.Translation((0, 0, -1)))
     add_sun(0, strength=3.5, color=(1, 0.5, 0.25))

@@ -1,4 +1,4 @@
-"""How targets stand: never baked, baked, out of date and why, failed; what the panels and Bake Out of Date go by."""
+"""Status of targets: never baked, baked, out of date and why, failed; panels and Bake Out of Date use it."""
 
 import bpy
 import pytest
@@ -64,7 +64,7 @@ def test_a_script_that_removes_objects_is_no_obstacle(plane):
 
 
 def remove_inputs(tree):
-    """As nodes of the first version were."""
+    """Nodes of the first version."""
     if hasattr(tree, "interface"):
         for item in [one for one in tree.interface.items_tree if getattr(one, "in_out", "") == "INPUT"]:
             tree.interface.remove(item)
@@ -139,7 +139,7 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("name", CHANGES)
-def test_what_a_bake_read_makes_it_stale(plane, name):
+def test_a_change_of_data_that_a_bake_read_makes_it_stale(plane, name):
     change, part = CHANGES[name]
     change(plane)
     update()
@@ -161,7 +161,7 @@ def test_another_output_of_the_node_before_it(plane):
     assert "material" in row().messages[0].text
 
 
-def test_what_it_did_not_read_does_not(plane):
+def test_a_change_of_other_data_does_not(plane):
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     bpy.context.collection.objects.link(camera)
     camera.location = 1, 2, 3
@@ -194,7 +194,7 @@ def test_bakes_of_other_objects_do_not(plane):
     assert row(Target("Other", "Second")).status == Status.BAKED
 
 
-def test_only_what_is_stale_is_baked_again(plane):
+def test_only_stale_targets_are_baked_again(plane):
     other = add_plane("Other", matrix=Matrix.Translation((0, 0, -5)), material=add_material("Second"))
     bake(plane, other)
     assert "Nothing is out of date" in messages_of(lambda: bpy.ops.beamspread.bake(objects="STALE"))
@@ -287,7 +287,7 @@ def test_failures_of_an_object_that_is_gone_are_no_rows(plane):
     assert {str(target) for target in state.rows} == {"Plane / Medium"}
 
 
-def test_failures_stand_beside_what_was_baked_before(plane):
+def test_failures_stand_beside_earlier_bakes(plane):
     plane.hide_render = True
     select(plane)
     assert "hidden from render" in messages_of(bpy.ops.beamspread.bake)
@@ -318,8 +318,8 @@ def test_it_costs_little_to_look(plane):
         del stale.fingerprints._shape
 
 
-def test_what_geometry_nodes_scatter(plane):
-    """Moved in the tree, and another shape of what stands for points."""
+def test_objects_scattered_by_geometry_nodes(plane):
+    """Moved in the tree, and another shape of the points' object."""
     cube = add_plane("Leaf", size=(0.1, 0.1))
     cube.hide_render = True
     wall, group = bpy.data.objects["Wall"], scatter_group(cube)
@@ -337,7 +337,7 @@ def test_what_geometry_nodes_scatter(plane):
     assert "other objects" in row().messages[0].text
 
 
-def test_what_particles_scatter(plane):
+def test_objects_scattered_by_particles(plane):
     wall, leaf = bpy.data.objects["Wall"], add_plane("Leaf", size=(0.1, 0.1))
     wall.modifiers.new("Hair", "PARTICLE_SYSTEM")
     settings = wall.particle_systems[0].settings

@@ -94,7 +94,7 @@ def test_no_negatives_and_no_overshoot_at_steps():
         assert irradiance[4:-4, 4:-4].max() <= 40 * np.pi * WEIGHTS[part] * 1.0001
 
 
-def test_dark_nodes_don_t_darken_what_is_beside_them():
+def test_dark_nodes_don_t_darken_their_neighbours():
     grid = grid_of(64, 64)
     radiance = np.ones((len(STRATA), 16, 16, 3))
     radiance[:, 6:10, 6:10] = 0  # inside a box that covers rows and columns 24 to 40
@@ -115,7 +115,7 @@ def test_a_bake_can_stop():
 
 
 def test_no_light_flows_upward():
-    """Also beyond the outermost nodes, where what falls steeply would go on below zero."""
+    """Beyond the outermost nodes, too, where a steep fall would continue below zero."""
     grid = grid_of(64, 64)
     radiance = np.random.default_rng(2).random((len(STRATA), 8, 8, 3)) ** 8
     radiance[:, :, 0] = radiance[:, 0] = 0
@@ -184,7 +184,9 @@ def test_a_job_bakes_the_light_that_it_finds():
 
 
 def test_reflectance_of_a_surface():
-    """As the library's under even light: its calibration is right to .1 %, the sum over eight angles to .3 %."""
+    """Reflectance of the library under even light: its calibration is right to .1 %, the sum over eight angles to .3
+    %.
+    """
     material = Material(albedo=(0.9, 0.5, 0.99), mean_free_path=(0.1,) * 3, anisotropy=0.8, ior=1.4)
     expected = [library(native.Medium(g=0.8, ior=1.4)).diffuse_reflectance(albedo) for albedo in material.albedo]
     np.testing.assert_allclose(Surface(material).reflectance(), expected, rtol=4e-3)
@@ -192,8 +194,8 @@ def test_reflectance_of_a_surface():
 
 
 @pytest.mark.parametrize("faintest", [1e-22, 1e-44])
-def test_where_hardly_anything_arrives_light_has_a_direction_all_the_same(faintest):
-    """Also where the squares of single numbers have no digits left, and where these themselves have none."""
+def test_the_faintest_light_has_a_direction(faintest):
+    """Values whose squares underflow in single precision, and values that underflow themselves."""
     grid = grid_of(24, 24)
     radiance = np.full((len(STRATA), 4, 4, 3), faintest) * np.random.default_rng(2).random((len(STRATA), 1, 1, 1))
     radiance[:, :, :2] = 1.0
