@@ -1,5 +1,5 @@
-// Light that a slab's far boundary returns without a single scattering. It leaves displaced, and is otherwise as sharp
-// as it entered: of each texel's light squares, which are shared among the texels that they cover.
+// Light that a slab's far boundary returns without scattering (transport/exact/ballistic.h). It leaves displaced and as
+// sharp as it entered: each texel's light becomes squares, whose power the texels below share.
 #include "solve/unscattered.h"
 
 #include <algorithm>
@@ -17,25 +17,24 @@ namespace beamspread {
 
 namespace {
 
-// Against 8192, the worst texel of a lamp's light is off by 1.4e-4 of the brightest.
+// Steps of the tables over tan(theta / 2). More: smaller errors, more cache.
 constexpr std::size_t table_steps = 1024;
-constexpr std::size_t rows_per_strip = 64;  // with 16 to 256, times are the same
+constexpr std::size_t rows_per_strip = 64;  // texel rows of one work item
 
-// Exits with less than this share of the incident power at any angle are left out: of a slab of .25 that leaves 1.5e-6
-// of the brightest texel, ten times as much 4e-4, a hundred times 6e-4, in the same time.
+// Fraction of the incident power below which an exit is ignored at all angles. Larger: larger errors.
 constexpr double negligible_power = 1e-6;
 
-// Of sums in whole numbers, below the brightest light; above are 2^23 times as much.
+// Bits of integer sums below the brightest light; 23 bits are left above it.
 constexpr int fraction_bits = 40;
 
-// Distance and power of each exit over tan(theta / 2), which is smooth in both.
+// Distance and power of each exit over tan(theta / 2), in which both are smooth.
 class ExitTable {
 public:
     ExitTable(const Plane& plane, const ChannelMedium& medium, std::pair<float, float> half_tangents)
     {
         const auto [first, last] = half_tangents;
         if (first > last || medium.ldf->ballistic(angle_deg(first), Side::reflected).empty())
-            return;  // any angle tells: where one has exits, all have
+            return;  // all angles have exits, or none
         const double outside = 2.0 * (static_cast<double>(plane.width) * plane.pitch_x +
                                       static_cast<double>(plane.height) * plane.pitch_y);
         m_first = first;
@@ -55,7 +54,7 @@ public:
 
     struct Exit {
         float distance = 0.0f;  // metres
-        float power = 0.0f;  // per unit power incident
+        float power = 0.0f;  // per unit incident power
     };
 
     std::size_t count() const { return m_exits.size(); }
@@ -85,7 +84,7 @@ private:
     std::vector<std::vector<Exit>> m_exits;
 };
 
-// The least and the largest tan(theta / 2) of lit texels.
+// Smallest and largest tan(theta / 2) of lit texels.
 std::pair<float, float> present(const Plane& plane, const PlaneLight& light)
 {
     std::pair<float, float> range{1.0f, 0.0f};
@@ -103,7 +102,7 @@ std::pair<float, float> present(const Plane& plane, const PlaneLight& light)
     return range;
 }
 
-// Calls add(place, part) of the four texels that a texel covers whose corner is at (x, y), of those on the plane.
+// Calls add(texel, part) for each of the four texels on the plane that a texel with its corner at (x, y) covers.
 template <class Add>
 void share(const Plane& plane, float x, float y, const Add& add)
 {
@@ -113,7 +112,7 @@ void share(const Plane& plane, float x, float y, const Add& add)
     const std::array<float, 2> up = {1.0f - (y - below), y - below};
     for (std::size_t j = 0; j < 2; ++j)
         for (std::size_t i = 0; i < 2; ++i) {
-            // A negative place wraps around to a large one.
+            // Negative indices wrap around to large ones.
             const std::size_t column = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(left)) + i;
             const std::size_t row = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(below)) + j;
             if (column < plane.width && row < plane.height)
@@ -121,7 +120,7 @@ void share(const Plane& plane, float x, float y, const Add& add)
         }
 }
 
-// Exitance that some rows of light cause, over the rows that it can reach.
+// Exitance of some rows of light, over the rows that it can reach.
 struct Strip {
     std::size_t first_row = 0;
     std::vector<float> values;
@@ -204,13 +203,13 @@ UnscatteredRays::UnscatteredRays(const Problem& problem) : m_plane(problem.plane
     std::size_t count = 0;
     for (const ChannelMedium& medium : problem.channels)
         count += m_exits->tables.emplace_back(m_plane, medium, angles).count();
-    double most = 0.0;  // W/m^2 in any channel
+    double max_irradiance = 0.0;  // W/m^2, in any channel
     for (const auto* lights : {&problem.lights, &problem.coming.survey, &problem.coming.examples})
         for (const PlaneLight& light : *lights) {
             const auto [y, x] = brightest(light.irradiance);
-            most += static_cast<double>(light.irradiance(y, x)) * *std::ranges::max_element(light.color);
+            max_irradiance += static_cast<double>(light.irradiance(y, x)) * *std::ranges::max_element(light.color);
         }
-    m_unit = std::ldexp(most > 0.0 ? most : 1.0, -fraction_bits);
+    m_unit = std::ldexp(max_irradiance > 0.0 ? max_irradiance : 1.0, -fraction_bits);
     if (count > 0)
         m_sums.resize(m_plane.texels() * problem.channels.size());
 }

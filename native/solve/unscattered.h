@@ -1,4 +1,4 @@
-// What all solvers leave out, as it has no place in a smooth kernel.
+// Light that leaves a slab without scattering; added after every solver.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +9,13 @@
 
 namespace beamspread {
 
-// Light that a slab with an ior above 1 returns unscattered from its far boundary; adds to (height, width, channels).
+// Adds the light that a slab with an ior above 1 returns unscattered from its far boundary to (height, width,
+// channels).
 void add_unscattered(const Problem& problem, float* luminance);
 void add_unscattered(const Problem& problem, const PlaneLight& light, float* luminance);
 
-// Likewise of rays, from any number of threads at once: in whole numbers, whose sum does not depend on their order.
+// Sums the unscattered light of rays, from any number of threads at once, in integers: their sum does not depend on the
+// order.
 class UnscatteredRays {
 public:
     explicit UnscatteredRays(const Problem& problem);
@@ -33,7 +35,7 @@ private:
 
     Plane m_plane;
     std::unique_ptr<Exits> m_exits;
-    double m_unit;  // of the sums, W/(m^2 sr)
+    double m_unit;                     // of the sums, W/(m^2 sr)
     std::vector<std::int64_t> m_sums;  // [texel][channel]
 };
 

@@ -7,10 +7,10 @@ namespace beamspread {
 
 namespace {
 
-// Colours are given in single precision, so that quotients of two are off by up to 1.2e-7.
+// Largest relative difference of proportional colours. Quotients of single-precision colours are off by up to 1.2e-7.
 constexpr double same_color = 1e-6;
 
-// The factor between the light of two channels, if that is all they differ by; else 0.
+// The factor between the light of two channels; 0 if they are not proportional.
 double common_factor(const std::vector<std::vector<double>>& colors, std::size_t channel, std::size_t reference)
 {
     double factor = 0.0;

@@ -8,8 +8,9 @@
 
 namespace beamspread {
 
-// All light of a channel is a factor times that of its set: one set where all lights have the same colour, at most one
-// per channel where they differ. Channels of one set and medium share a result.
+// Sets of channels with proportional light: each channel's light is a factor times that of its set. Lights of one
+// colour make one set, lights of different colours at most one per channel. Channels of one set and medium share a
+// result.
 struct ChannelSets {
     struct Member {
         std::size_t channel;
@@ -25,7 +26,7 @@ struct ChannelSets {
 
     std::size_t count() const { return m_reference.size(); }
 
-    // The channel that stands for a set, and the colour of a light in it.
+    // The reference channel of a set, and a light's colour in it.
     std::size_t channel(std::size_t set) const { return m_reference[set]; }
     double color(const PlaneLight& light, std::size_t set) const { return light.color[m_reference[set]]; }
 

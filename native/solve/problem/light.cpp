@@ -10,15 +10,15 @@ namespace beamspread {
 
 namespace {
 
-// Six roundings of 2^-24 lie between a channel and a multiple of another, and hardly ever add up to more. Where they do,
-// channels count as different: that costs transforms and no accuracy.
+// Largest relative difference of proportional channels: six roundings of 2^-24, which hardly ever add up to more. If
+// they do, the channels count as different, which costs transforms and no accuracy.
 constexpr float same_light = 3e-7f;
 
 bool differ_by(float factor, const View2D<const float>& a, const View2D<const float>& b)
 {
     for (std::size_t y = 0; y < a.height; ++y)
         for (std::size_t x = 0; x < a.width; ++x)
-            if (!(std::abs(a(y, x) - factor * b(y, x)) <= same_light * a(y, x)))  // also where it is no number
+            if (!(std::abs(a(y, x) - factor * b(y, x)) <= same_light * a(y, x)))  // true for NaN too
                 return false;
     return true;
 }
@@ -41,21 +41,21 @@ std::vector<PlaneLight> lights_of_channels(const std::vector<View2D<const float>
     const std::size_t channels = irradiance.size();
     if (channels == 1)
         return {{irradiance.front(), directions, {1.0}}};
-    std::vector<float> most;
+    std::vector<float> largest;
     for (const View2D<const float>& channel : irradiance) {
         const Texel at = brightest(channel);
-        most.push_back(channel.height * channel.width > 0 ? channel(at.y, at.x) : 0.0f);
+        largest.push_back(channel.height * channel.width > 0 ? channel(at.y, at.x) : 0.0f);
     }
-    const auto reference = static_cast<std::size_t>(std::max_element(most.begin(), most.end()) - most.begin());
-    PlaneLight one{irradiance[reference], directions, std::vector<double>(channels, 1.0)};
+    const auto reference = static_cast<std::size_t>(std::max_element(largest.begin(), largest.end()) - largest.begin());
+    PlaneLight shared{irradiance[reference], directions, std::vector<double>(channels, 1.0)};
     bool same = true;
-    for (std::size_t c = 0; c < channels && most[reference] > 0.0f; ++c) {
-        const float factor = most[c] / most[reference];
-        one.color[c] = static_cast<double>(factor);
+    for (std::size_t c = 0; c < channels && largest[reference] > 0.0f; ++c) {
+        const float factor = largest[c] / largest[reference];
+        shared.color[c] = static_cast<double>(factor);
         same &= differ_by(factor, irradiance[c], irradiance[reference]);
     }
     if (same)
-        return {one};
+        return {shared};
     std::vector<PlaneLight> lights;
     for (std::size_t c = 0; c < channels; ++c) {
         lights.push_back({irradiance[c], directions, std::vector<double>(channels, 0.0)});

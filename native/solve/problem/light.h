@@ -10,7 +10,8 @@
 
 namespace beamspread {
 
-// Texel (0, 0) lies at the origin of the plane frame: x runs along its rows, y from row to row, z outward.
+// A plane of texels. Texel (0, 0) lies at the origin of the plane frame: x runs along rows, y from row to row, z
+// outward.
 struct Plane {
     std::size_t width = 0;
     std::size_t height = 0;
@@ -32,26 +33,26 @@ struct RowSpan {
     std::size_t width;
 };
 
-// What is known of the directions along which light travels: unit vectors of the plane frame with z < 0.
+// Directions along which light travels, unit vectors of the plane frame with z < 0.
 struct OneDirection {
     Vec3 travel{0.0, 0.0, -1.0};
 };
 struct FromPoint {
-    Vec3 position{};  // metres, z > 0: every texel's light travels from here to its middle
+    Vec3 position{};  // metres, z > 0; light travels from here to the middles of texels
 };
 struct PerTexel {
     const float* travel = nullptr;  // (height, width, 3) row by row
 };
 using Directions = std::variant<OneDirection, FromPoint, PerTexel>;
 
-// Lights add up.
+// One light on a plane.
 struct PlaneLight {
-    View2D<const float> irradiance;  // W/m^2 where the colour is 1
+    View2D<const float> irradiance;  // W/m^2 at colour 1
     Directions directions;
     std::vector<double> color;  // [channel], >= 0
 };
 
-// Light of some irradiance in each channel: one light where channels differ by a factor, else one for each of them.
+// Light with an irradiance for each channel: one light if channels are proportional, else one per channel.
 std::vector<PlaneLight> lights_of_channels(const std::vector<View2D<const float>>& irradiance,
                                            const Directions& directions);
 
@@ -69,14 +70,14 @@ struct BeamRow {
     std::vector<float> irradiance;
     std::vector<float> cos_beta;  // azimuth of travel
     std::vector<float> sin_beta;
-    std::vector<float> half_tangent;  // tan(theta / 2): smooth everywhere, and found without trigonometry
-    std::vector<float> travel;        // scratch
+    std::vector<float> half_tangent;  // tan(theta / 2), smooth everywhere and computed without trigonometry
+    std::vector<float> travel;        // working memory
 
-    // False where all of it is dark; the angles are not set then.
+    // Reads part of a row. False if all of it is dark; the angles are not set then.
     bool read(const Plane& plane, const PlaneLight& light, const RowSpan& span);
 };
 
-// The first, row by row, of the brightest texels.
+// The brightest texel; the first one, row by row, of several.
 Texel brightest(const View2D<const float>& irradiance);
 
 // Direction of the beam at a texel, of any length.

@@ -14,12 +14,12 @@ namespace beamspread {
 
 namespace {
 
-// From 0 to 1. Half ask for up to 3 % more terms, twice as many for the same.
+// Number of the histogram's bins, for tan(theta / 2) from 0 to 1. More: fewer terms, more memory.
 constexpr std::size_t bin_count = 2048;
 constexpr std::size_t rows_per_item = 16;
 
-// Rounded up to 90 degrees exactly, an angle would be no angle of incidence.
-constexpr double largest = 1.0 - 1e-6;
+// Largest tan(theta / 2): 90 degrees, after rounding, is no angle of incidence.
+constexpr double max_angle = 1.0 - 1e-6;
 
 struct Histogram {
     std::vector<double> light = std::vector<double>(bin_count);
@@ -33,12 +33,12 @@ void merge(const Incidence::Extremes& from, Incidence::Extremes& to)
         to.irradiance = from.irradiance;
         to.brightest = from.brightest;
     }
-    if (from.least < to.least) {
-        to.least = from.least;
+    if (from.min_angle < to.min_angle) {
+        to.min_angle = from.min_angle;
         to.steepest = from.steepest;
     }
-    if (from.greatest > to.greatest) {
-        to.greatest = from.greatest;
+    if (from.max_angle > to.max_angle) {
+        to.max_angle = from.max_angle;
         to.most_grazing = from.most_grazing;
     }
 }
@@ -86,17 +86,17 @@ Histogram histogram_of(const Plane& plane, const std::vector<PlaneLight>& lights
     return sum;
 }
 
-// The widest step between the angles of lit neighbours: what lies between them is off theirs by less. Of lamps; rays of
-// lights of a size differ by chance, and are many.
-double widest_step(const ComingLight& coming)
+// Largest step between the angles of lit neighbours in a lamp's survey: texels between them differ by less. Rays of
+// lights with a size are random and need no margin.
+double max_step(const ComingLight& coming)
 {
-    float widest = 0.0f;
+    float step = 0.0f;
     const std::size_t width = coming.plane.width;
     for (const PlaneLight& light : coming.survey) {
         if (!std::holds_alternative<FromPoint>(light.directions))
             continue;
         BeamRow row;
-        BeamRow below;  // of the row before
+        BeamRow below;  // the previous row
         for (std::size_t y = 0; y < coming.plane.height; ++y) {
             std::swap(row, below);
             if (!row.read(coming.plane, light, {y, 0, width})) {
@@ -107,16 +107,16 @@ double widest_step(const ComingLight& coming)
                 if (row.irradiance[x] == 0.0f)
                     continue;
                 if (x > 0 && row.irradiance[x - 1] > 0.0f)
-                    widest = std::max(widest, std::abs(row.half_tangent[x] - row.half_tangent[x - 1]));
+                    step = std::max(step, std::abs(row.half_tangent[x] - row.half_tangent[x - 1]));
                 if (y > 0 && below.irradiance[x] > 0.0f)
-                    widest = std::max(widest, std::abs(row.half_tangent[x] - below.half_tangent[x]));
+                    step = std::max(step, std::abs(row.half_tangent[x] - below.half_tangent[x]));
             }
         }
     }
-    return static_cast<double>(widest);
+    return static_cast<double>(step);
 }
 
-// Of four neighbours at t in [0, 1] between the second and the third.
+// Weights of four neighbours at t in [0, 1] between the second and the third, by a cubic B-spline.
 std::array<double, 4> cubic_b_spline(double t)
 {
     const double s = 1.0 - t;
@@ -141,7 +141,7 @@ Incidence::Incidence(const Plane& plane, const std::vector<PlaneLight>& lights, 
         const double texels = static_cast<double>(plane.texels()) / static_cast<double>(coming.plane.texels());
         add_scaled(histogram.light.data(), later.light.data(), texels, bin_count);
         add_scaled(histogram.beams.data(), later.beams.data(), texels, bin_count);
-        extend(later.extremes, widest_step(coming));
+        extend(later.extremes, max_step(coming));
     }
     if (none())
         return;
@@ -153,9 +153,9 @@ Incidence::Incidence(const Plane& plane, const std::vector<PlaneLight>& lights, 
         if (histogram.beams[i] == 0.0)
             continue;
         const double middle = (static_cast<double>(i) + 0.5) / static_cast<double>(bin_count);
-        const double place = std::clamp((middle - first) / step, 0.0, static_cast<double>(count - 1));
-        const double below = std::min(std::floor(place), static_cast<double>(count - 2));
-        const std::array<double, 4> weights = cubic_b_spline(place - below);
+        const double position = std::clamp((middle - first) / step, 0.0, static_cast<double>(count - 1));
+        const double below = std::min(std::floor(position), static_cast<double>(count - 2));
+        const std::array<double, 4> weights = cubic_b_spline(position - below);
         for (int k = 0; k < 4; ++k) {
             const auto node =
                 static_cast<std::size_t>(std::clamp(below + k - 1.0, 0.0, static_cast<double>(count - 1)));
@@ -171,15 +171,15 @@ Incidence::Incidence(const Plane& plane, const std::vector<PlaneLight>& lights, 
             share[i] = (light[i] / all_light + beams[i] / all_beams + 1.0 / static_cast<double>(occupied)) / 3.0;
 }
 
-void Incidence::extend(const std::vector<Extremes>& found, double margin)
+void Incidence::extend(const std::vector<Extremes>& lights, double margin)
 {
-    for (const Extremes& each : found) {
-        if (each.irradiance == 0.0)
+    for (const Extremes& light : lights) {
+        if (light.irradiance == 0.0)
             continue;
-        first = std::min(first, std::max(static_cast<double>(each.least) - margin, 0.0));
-        last = std::max(last, static_cast<double>(each.greatest) + margin);
+        first = std::min(first, std::max(static_cast<double>(light.min_angle) - margin, 0.0));
+        last = std::max(last, static_cast<double>(light.max_angle) + margin);
     }
-    last = std::min(last, largest);
+    last = std::min(last, max_angle);
 }
 
 }  // namespace beamspread

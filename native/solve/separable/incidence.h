@@ -1,4 +1,4 @@
-// Angles of incidence that occur in the light of a plane.
+// Distribution of the angles of incidence of a plane's light.
 #pragma once
 
 #include <array>
@@ -9,35 +9,35 @@
 
 namespace beamspread {
 
-// All angles are tan(theta / 2), in which LDFs are smooth everywhere.
+// Angles are tan(theta / 2), in which LDFs are smooth everywhere.
 struct Incidence {
-    // Where a light is brightest, steepest and most grazing: angles that few texels have are easily missed.
+    // Texels where a light is brightest, steepest and most grazing.
     struct Extremes {
         Texel brightest{};
         Texel steepest{};
         Texel most_grazing{};
-        double irradiance = 0.0;  // of the brightest, over all channels; 0: all is dark
-        float least = 1.0f;
-        float greatest = 0.0f;
+        double irradiance = 0.0;  // of the brightest texel, over all channels; 0: all texels are dark
+        float min_angle = 1.0f;
+        float max_angle = 0.0f;
     };
 
-    // Half as many ask for 3 % fewer to 10 % more terms, twice as many for 3 % fewer or more; errors are no larger with
-    // either.
+    // Number of angles at which kernels are compared. More: more memory and time, hardly other terms.
     static constexpr std::size_t count = 64;
-    double first = 1.0;  // beyond `last`: nothing is lit
+    double first = 1.0;  // larger than `last` if no texel is lit
     double last = 0.0;
-    // At `count` angles evenly from first to last, sum 1: the mean of the shares of light, of lit beams and of angles.
-    // Each angle that occurs counts at the four around it, so that a basis for these holds what is between them.
+    // Share of `count` even angles from first to last, with the sum 1: the mean of the shares of light, of lit beams
+    // and of angles. Each present angle counts at the four around it, hence a basis for these serves the angles between
+    // them.
     std::array<double, count> share{};
-    std::vector<Extremes> extremes;  // [light], not of those to come
+    std::vector<Extremes> extremes;  // [light], without coming light
 
     Incidence(const Plane& plane, const std::vector<PlaneLight>& lights, const ComingLight& coming = {});
 
     bool none() const { return first > last; }
 
 private:
-    // Reaches over what was found and so much beyond.
-    void extend(const std::vector<Extremes>& found, double margin);
+    // Extends the range to the extremes of some lights, and by a margin.
+    void extend(const std::vector<Extremes>& lights, double margin);
 };
 
 double angle_deg(double half_tangent);

@@ -12,11 +12,10 @@ namespace beamspread {
 
 namespace {
 
-// Directions that have a term each: a basis for 5 to 12 of them has 19 to 47 and takes 2.4 to 6 times as long, for 16 suns of
-// different colours over three media 2.5 times as long and 1.6 times the memory.
-constexpr std::size_t most_fixed_directions = 16;
+// Largest number of directions with a term each. Larger: less time for few directions, more for many.
+constexpr std::size_t max_fixed_directions = 16;
 
-// Every harmonic of a kernel whose beams travel toward azimuth beta.
+// All harmonics of a kernel for beams that travel toward azimuth beta.
 std::vector<KernelTerm> fixed_kernel(std::size_t profile, std::size_t harmonics, double beta, double factor)
 {
     std::vector<KernelTerm> kernel;
@@ -31,7 +30,7 @@ std::vector<KernelTerm> fixed_kernel(std::size_t profile, std::size_t harmonics,
     return kernel;
 }
 
-// The lights of each direction.
+// Directions, each with the indices of its lights.
 std::vector<std::pair<Vec3, std::vector<std::size_t>>> by_direction(const std::vector<PlaneLight>& lights)
 {
     std::vector<std::pair<Vec3, std::vector<std::size_t>>> groups;
@@ -47,15 +46,16 @@ std::vector<std::pair<Vec3, std::vector<std::size_t>>> by_direction(const std::v
     return groups;
 }
 
-// One direction's profile per medium; one light is transformed once for all its colours, several are added up first.
+// Adds the terms of one direction: a single light has one term for all its colours; several lights are summed in one
+// term per set.
 void add_direction(LightTerms& terms, const Vec3& travel, const std::vector<std::size_t>& lights, double beyond)
 {
     const std::size_t first_profile = terms.profiles.size();
     for (const ChannelMedium& medium : terms.sets.media) {
         ScaledProfile profile{medium.ldf->profile(incidence_deg(travel), medium.albedo, Side::reflected),
                               medium.mean_free_path, 0.0};
-        // 1e-7 and 1e-5 leave errors of 1.4e-6 and 2e-6 of a sun's brightest texel.
-        profile.reach = profile.profile.reach(std::min(beyond, 1e-6)) * medium.mean_free_path;
+        constexpr double max_beyond = 1e-6;  // fraction of power; smaller: smaller errors of suns, more padding
+        profile.reach = profile.profile.reach(std::min(beyond, max_beyond)) * medium.mean_free_path;
         terms.profiles.push_back(std::move(profile));
     }
     const bool alone = lights.size() == 1;
@@ -119,7 +119,7 @@ LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& 
     for (const PlaneLight& light : problem.lights)
         (std::holds_alternative<OneDirection>(light.directions) ? result.fixed : result.changing).push_back(light);
     const auto directions = by_direction(result.fixed);
-    if (directions.size() > most_fixed_directions)
+    if (directions.size() > max_fixed_directions)
         result.changing.insert(result.changing.end(), result.fixed.begin(), result.fixed.end());
     else
         for (const auto& [travel, lights] : directions)

@@ -1,4 +1,4 @@
-// What is convolved: the light on the plane, once per function of the direction.
+// Terms of a plane's light: for each function of the direction, light that one kernel spreads.
 #pragma once
 
 #include <cstddef>
@@ -11,23 +11,22 @@
 
 namespace beamspread {
 
-// Light that one kernel per result spreads.
+// Light that one kernel per result spreads: the weighted sum of some lights of one direction; or a moment of all lights
+// of changing directions, the sum of irradiance times colour in a set times u(theta) times cos or sin(m beta).
 struct LightTerm {
-    // The sum of some lights of one direction as they are; empty: of all lights of changing directions a moment, the
-    // sum of irradiance, colour in a set, a function u(theta) of the basis, and cos or sin(m beta).
     struct Share {
         std::size_t light;
         float weight;
     };
-    std::vector<Share> fixed;
+    std::vector<Share> fixed;  // empty for a moment
     std::size_t function = 0;
     Phase phase = Phase::cosine;
     std::size_t set = 0;
-    std::vector<std::vector<KernelTerm>> kernels;  // [result]: sorted, see `KernelSpectra::parts`; empty: none
+    std::vector<std::vector<KernelTerm>> kernels;  // [result], sorted, see `KernelSpectra::parts`; empty: none
 };
 
-// Lights of few directions have a term with all harmonics for each; all others add up to moments of one basis, however
-// many they are: row by row where the lights are kept, or as they come.
+// All terms. Lights of few directions have one term per direction, with all harmonics. All other lights, of any number,
+// add up to the moments of one basis: row by row from stored lights, or as they come.
 struct LightTerms {
     Plane plane;
     ChannelSets sets;
@@ -37,15 +36,16 @@ struct LightTerms {
     LowRankBasis basis;                      // of `changing`
     std::vector<LightTerm> terms;
     std::vector<ScaledProfile> profiles;
-    std::vector<std::vector<float>> moments;  // [term][texel] of light that came; empty: of none, or a fixed term's
+    std::vector<std::vector<float>> moments;  // [term][texel] of added light; empty for fixed terms and without it
 };
 
-// The terms of a decomposition that the lights of changing direction need.
+// Chooses the terms of a decomposition that lights of changing directions need.
 using TermChoice =
     std::function<std::vector<std::size_t>(const KernelDecomposition&, const Incidence&, const LightTerms&)>;
 
-// Kernels end where all but the fraction `beyond` of their power lies inside; those of one direction no earlier than for
-// a millionth. With light to come, only lights of one direction are kept; the others stand for it in the choice.
+// Makes the terms of a problem. Kernels end at the radius outside of which they have the fraction `beyond` of their
+// power, those of one direction at most a millionth. With coming light, lights of changing directions serve the choice
+// of terms alone.
 LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& choose);
 
 }  // namespace beamspread

@@ -9,10 +9,10 @@ namespace beamspread {
 
 namespace {
 
-// Texels of a row whose values stay in the cache from step to step.
+// Texels of a row that pass all steps together, in the cache.
 constexpr std::size_t texels_at_once = 512;
 
-// Of rays, which may reach only parts of a row.
+// Rays that pass all steps together; fewer than texels, because rays may reach parts of a row alone.
 constexpr std::size_t rays_at_once = 64;
 
 }  // namespace
@@ -20,7 +20,7 @@ constexpr std::size_t rays_at_once = 64;
 void BeamMoments::add(const LightTerms& terms, const BeamRow& beams, const std::vector<float>& colors,
                       std::size_t first, std::size_t end, const Values& values, const float* irradiance)
 {
-    if (first == end || terms.basis.functions.empty())  // a black medium needs none
+    if (first == end || terms.basis.functions.empty())  // the medium is black
         return;
     const std::size_t count = beams.irradiance.size();
     m_step.resize(count);
@@ -37,8 +37,8 @@ void BeamMoments::add(const LightTerms& terms, const BeamRow& beams, const std::
         std::copy_n(beams.irradiance.data(), count, m_cosine.data());
     std::fill_n(m_sine.data(), count, 0.0f);
     std::size_t m = 0;
-    std::optional<std::size_t> function;  // that m_u holds
-    std::optional<Phase> phase;           // of the product with it
+    std::optional<std::size_t> function;  // whose values are in m_u
+    std::optional<Phase> phase;           // of the product in m_product
     for (std::size_t t = first; t < end; ++t) {
         const LightTerm& term = terms.terms[t];
         if (!term.fixed.empty() || colors[term.set] == 0.0f)
@@ -101,7 +101,7 @@ void MomentSum::add(LightTerms& terms, const RayRow& rays, const std::vector<dou
         const float* irradiance = rays.irradiance + x * channels;
         for (auto* values : {&m_beams.irradiance, &m_beams.cos_beta, &m_beams.sin_beta, &m_beams.half_tangent})
             values->resize(span.width);
-        for (std::size_t i = 0; i < span.width; ++i)  // in any channel: what is 0 may have no direction
+        for (std::size_t i = 0; i < span.width; ++i)  // the largest channel; rays of 0 may have no direction
             m_beams.irradiance[i] = *std::max_element(irradiance + i * channels, irradiance + (i + 1) * channels);
         if (std::all_of(m_beams.irradiance.begin(), m_beams.irradiance.end(), [](float e) { return e == 0.0f; }))
             continue;

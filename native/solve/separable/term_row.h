@@ -13,27 +13,27 @@ namespace beamspread {
 // Adds beams of changing directions to the moments of terms.
 class BeamMoments {
 public:
-    // Where the value of a term at the first beam is.
+    // Returns the address of a term's value at the first beam.
     using Values = std::function<float*(std::size_t term)>;
 
-    // To terms [first, end); `colors`: of the beams in each set. `irradiance`: of the beams in each set, after each other;
-    // null: in all of them that of the beams.
+    // Adds beams to terms [first, end). `colors` has their colour in each set, `irradiance` their irradiance,
+    // [set][beam]; null: `beams.irradiance` in all sets.
     void add(const LightTerms& terms, const BeamRow& beams, const std::vector<float>& colors, std::size_t first,
              std::size_t end, const Values& values, const float* irradiance = nullptr);
 
 private:
     std::vector<std::uint32_t> m_step;  // in the tables of the basis
     std::vector<float> m_part;
-    std::vector<float> m_cosine;  // cos(m beta), sin(m beta), times irradiance where that is the same for all sets
+    std::vector<float> m_cosine;  // cos(m beta), sin(m beta), times irradiance if all sets share it
     std::vector<float> m_sine;
     std::vector<float> m_u;
     std::vector<float> m_product;
 };
 
-// The light of one row of texels: of lights that are kept, and what else has been added up.
+// The terms' light in one row of texels, from stored and added lights.
 class TermRow {
 public:
-    // Finds the values of terms [first, first + count).
+    // Computes the values of terms [first, first + count).
     void start(const LightTerms& terms, const RowSpan& span, std::size_t first, std::size_t count);
 
     const float* values(std::size_t term) const { return m_values.data() + (term - m_first) * m_width; }
@@ -47,11 +47,11 @@ private:
     BeamMoments m_moments;
 };
 
-// Adds rays to the moments of terms. One object for each thread; no two threads may add to one row at once.
+// Adds rays to the moments of terms. Each thread has its own object; threads must not add to the same row at once.
 class MomentSum {
 public:
-    // `is_colored`: true if channels differ by more than factors; else the largest counts for all. `color` is a factor of
-    // each channel.
+    // Adds rays times `color`, a factor of each channel. `is_colored` is true if the rays' channels are not
+    // proportional; otherwise the largest channel counts for all.
     void add(LightTerms& terms, const RayRow& rays, const std::vector<double>& color, bool is_colored);
 
 private:
