@@ -182,7 +182,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         """The settings as core needs them; arguments override the scene's."""
         return BakeSettings(
             solver=solver or self.solver,
-            layers=(OUTPUTS[output or self.output],),
+            layer=OUTPUTS[output or self.output],
             indirect=self.use_indirect if indirect is None else indirect,
             samples=self.samples,
             threads=preferences.threads(),

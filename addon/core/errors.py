@@ -62,7 +62,7 @@ def message_of(error: Exception, subject: str = "") -> Message:
     if isinstance(error, MemoryError):
         return Message(Level.ERROR, subject, "There is not enough memory.", "Lower the resolution.")
     if not isinstance(error, ValueError | OSError):
-        # Nothing that an artist does should lead here: keep the details for a bug report.
+        # An artist should never get here: keep the details for a bug report.
         import logging
 
         logging.getLogger(__name__).error("unexpected error", exc_info=error)

@@ -8,13 +8,13 @@ import pytest
 from beamspread.blender import preferences
 from beamspread.blender.cycles import process
 from beamspread.blender.jobs.run import linked_color
-from beamspread.blender.jobs.run.bake_queue import BakeQueue
+from beamspread.blender.jobs.run.linked_color import BaseColorByCycles
 from beamspread.blender.jobs.run.operator import BakeThread
 from beamspread.blender.jobs.run.prepare import read_scene
 from beamspread.blender.jobs.state import state
 from beamspread.blender.node.find import find_node
-from beamspread.blender.ui.bake_panel import estimates
 from beamspread.core.bake.runner import CANCELLED
+from beamspread.core.progress import Progress
 from beamspread.core.target import Target
 from mathutils import Euler, Matrix
 from scenes import (
@@ -47,6 +47,13 @@ def plane():
     # A mean free path far below a texel: each texel shows its own colour.
     material = add_material(color_mode="BASE_COLOR", base_color=(0.5,) * 3, mean_free_path=(0.001,) * 3)
     return add_plane(material=material)
+
+
+def with_color(job):
+    """The job after Cycles has evaluated its base color."""
+    step, *_ = job.steps
+    assert isinstance(step, BaseColorByCycles)
+    return step.run(job, Progress())
 
 
 def add_noise(tree, socket):
@@ -83,7 +90,7 @@ def bake_of(obj, number=0, size=SIZE, **changes):
 
 def evaluated(obj, number=0):
     """The colour and the coverage of the texels."""
-    job, _ = bake_of(obj, number).job.colored()
+    job = with_color(bake_of(obj, number).job)
     mean = np.array(job.surface.base_color)
     # color_in times color_out is the colour over its mean.
     colors = [chart.grid.color_in * chart.grid.color_out * mean for chart in job.receiver.charts]
@@ -248,13 +255,13 @@ def test_it_stops_within_two_seconds_and_leaves_the_scene(plane):
     add_noise_to(plane.data.materials[0])
     kinds = "images", "materials", "meshes", "objects", "node_groups", "scenes"
     before = [len(getattr(bpy.data, kind)) for kind in kinds]
-    thread = BakeThread(bake_of(plane))
+    thread = BakeThread(bake_of(plane), Progress())
     thread.start()
     asked = time.monotonic()
-    while not thread.doing.startswith("Evaluating the base color"):
+    while not thread.progress.stage.startswith("Evaluating the base color"):
         assert time.monotonic() - asked < 2
         time.sleep(0.01)
-    thread.cancel()
+    thread.progress.cancel()
     asked = time.monotonic()
     thread.join()
     assert time.monotonic() - asked < 2
@@ -274,23 +281,14 @@ def test_it_is_asked_for_once_in_a_run_and_only_where_it_counts(plane, monkeypat
     monkeypatch.setattr(linked_color, "colors_by_cycles", colors)
     settings, target = bpy.context.scene.beamspread.for_bake(), Target("Plane", material.name)
     preparation = read_scene(bpy.context, [target], settings)
-    turns = BakeQueue(preparation, [target, target], False)._turns
-    assert turns[0].seconds == turns[1].seconds + preparation.color_seconds(target) > turns[1].seconds
     for _ in range(2):
-        job, _ = preparation.bake(target).job.colored()
+        job = with_color(preparation.bake(target).job)
         assert job.surface.base_color == pytest.approx((0.4,) * 3)
     assert asked == [target]
-    select(plane)
-    (estimate,) = estimates(bpy.context)
-    assert estimate.startswith("Base color, by Cycles: about ")
-    assert bake_of(plane, output="IRRADIANCE").job.more_color is None
-    bpy.context.scene.beamspread.output = "IRRADIANCE"
-    assert estimates(bpy.context) == []
-    bpy.context.scene.beamspread.output = "LUMINANCE"
+    assert not any(isinstance(step, BaseColorByCycles) for step in bake_of(plane, output="IRRADIANCE").job.steps)
     image = material.node_tree.nodes.new("ShaderNodeTexImage")
     material.node_tree.links.new(base_color(material), image.outputs["Color"])
-    assert estimates(bpy.context) == []
-    assert bake_of(plane).job.more_color is None
+    assert not any(isinstance(step, BaseColorByCycles) for step in bake_of(plane).job.steps)
 
 
 def test_the_memory_of_cycles_counts(plane, monkeypatch):
@@ -299,11 +297,8 @@ def test_the_memory_of_cycles_counts(plane, monkeypatch):
     monkeypatch.setattr(preferences, "memory_limit", lambda: 500 * 2**20)  # more than the bake, less than Cycles takes
     assert bake_of(plane, 0, 512).job
     add_noise_to(plane.data.materials[0])
-    assert "Cycles' process for the base color of 512 x 512 texels takes about 1.0 GB" in bake_of(plane, 0, 512).error
+    assert "Evaluating the base color: 512 x 512 texels take about 1.0 GB" in bake_of(plane, 0, 512).error
     assert bake_of(plane, 0, 512, output="IRRADIANCE").job
-    select(plane)
-    (estimate,) = estimates(bpy.context)
-    assert estimate.endswith(", 1.0 GB of memory.")
 
 
 def test_blenders_own_bake_has_it(plane):

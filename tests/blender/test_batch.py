@@ -335,4 +335,4 @@ def test_verbose_prints_the_scene_and_the_stages(tmp_path):
     for words in ("1 lights; 4 triangles", "Sun 'Sun': strength 3.5, color 1 0.5 0.25", "32 x 16 texels, 2 x 1 scene"):
         assert f"Beamspread: {words}" in verbose.replace("'Plane': ", "")
         assert words not in quiet
-    assert [f"{stage}: " in verbose for stage in ("scene", "Combined of 'Plane'")] == [True, True]
+    assert [f"{stage}: " in verbose for stage in ("scene", "'Plane': Baking")] == [True, True]

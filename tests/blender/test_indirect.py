@@ -91,8 +91,7 @@ def baked(floor, indirect, output):
     (bake,) = jobs_of(floor, output=output)
     bake.run()
     assert not bake.error
-    (layer,) = bake.layers.values()
-    return layer
+    return bake.texture
 
 
 def irradiance(floor, indirect):
@@ -283,7 +282,7 @@ def test_a_lamp_that_only_cycles_understands():
     assert "Gobo" not in bake.job.illumination.by_cycles
     bake.run()
     assert not bake.error
-    ours = bake.layers["Irradiance"]
+    ours = bake.texture
     material, image = target_material((1, 1, 1), TEXELS)
     floor.data.materials[0] = material
     truth = cycles_bake(floor, image, {"DIRECT"}, 1024)
@@ -323,7 +322,7 @@ def test_linking_holds_for_light_that_cycles_computes(add):
     linking = bpy.data.objects["Gobo"].light_linking
     linking.receiver_collection = new_collection(floor, "EXCLUDE")
     (bake,) = jobs_of(floor)
-    assert bake.job.more_light is None
+    assert not bake.job.finds_light
     assert not any("Gobo" in str(one) for one in bake.messages)
     blocked = irradiance_of_jobs(floor, linking, new_collection(floor, "INCLUDE"), None)
     ours = irradiance_of_jobs(floor, linking, new_collection(floor, "INCLUDE"), new_collection(wall, "EXCLUDE"))
@@ -340,7 +339,7 @@ def irradiance_of_jobs(floor, linking, receivers, blockers):
     (bake,) = jobs_of(floor)
     bake.run()
     assert not bake.error
-    return bake.layers["Irradiance"]
+    return bake.texture
 
 
 def test_leaks_into_a_closed_box_are_no_light(monkeypatch):
@@ -364,10 +363,10 @@ def test_nothing_above_a_receiver_means_no_search():
     scenes.add_sun(40, 60, 3.0)
     below = scenes.add_plane("Below", matrix=Matrix.Translation((0, 0, -1)), material=scenes.add_material("Other"))
     first, second = jobs_of(floor, below)
-    assert first.job.more_light is None
-    assert second.job.more_light is not None  # the floor is above it
+    assert not first.job.finds_light
+    assert second.job.finds_light  # the floor is above it
     bpy.context.scene.beamspread.use_indirect = False
-    assert jobs_of(below)[0].job.more_light is None
+    assert not jobs_of(below)[0].job.finds_light
 
 
 def state():
@@ -417,7 +416,7 @@ def test_the_scene_stays_as_it_is(monkeypatch, tmp_path):
         before, there = state(), folders()
         (bake,) = jobs_of(floor)
         bake.run()
-        assert bake.layers
+        assert bake.texture is not None
         assert state() == before
 
         (bake,) = jobs_of(floor)

@@ -12,7 +12,6 @@ from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.live import timer
 from beamspread.blender.node.find import find_bakeable
 from beamspread.blender.ui import bake_panel
-from beamspread.blender.ui.bake_panel import estimates
 from beamspread.core.batch import batch_options
 from beamspread.core.target import Target
 from instance_scenes import MIRRORED, SKEWED, WITHIN, add_instancer, add_tile, nest
@@ -294,17 +293,6 @@ def test_a_batch_follows_the_instance(tmp_path):
     assert np.array_equal(bake_it(holder), two)
 
 
-def test_estimates_are_for_the_objects_of_the_selected_instance():
-    holder, _, _ = nested()
-    add_plane("Other", material=add_material("Other"))
-    bpy.context.scene.beamspread.use_indirect = True
-    stale.refresh(bpy.context)
-    for selected, is_of_both in ((holder, False), (add_sun(), True)):
-        select(selected)
-        (estimate,) = estimates(bpy.context)
-        assert ("for 2 objects" in estimate) == is_of_both
-
-
 def link_tiles(tmp_path, has_image):
     """An instance of a collection of another file, whose material may have been baked there."""
     add_tile()
@@ -423,7 +411,7 @@ def irradiance():
     settings = bpy.context.scene.beamspread.for_bake(output="IRRADIANCE")
     (bake,) = prepare_scene(bpy.context, find_bakeable(bpy.context.view_layer), settings)
     bake.run()
-    return bake.layers["Irradiance"]
+    return bake.texture
 
 
 def test_cycles_counts_an_instanced_lamp_once():

@@ -306,7 +306,7 @@ def test_an_image_is_resized_only_when_asked(tmp_path, settings, monkeypatch):
     assert asked == ["beamspread.resize_image"]
     bpy.context.view_layer.update()
     looks = []
-    monkeypatch.setattr(stale, "look_soon", lambda: looks.append(1))
+    monkeypatch.setattr(stale, "scan_soon", lambda: looks.append(1))
     with bpy.context.temp_override(object=None):
         assert bpy.ops.beamspread.resize_image() == {"FINISHED"}
     bpy.context.view_layer.update()

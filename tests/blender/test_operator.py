@@ -16,6 +16,8 @@ from beamspread.core.bake.layers import LAYERS
 from beamspread.core.bake.runner import CANCELLED, Bake
 from beamspread.core.batch import batch_options
 from beamspread.core.native import native
+from beamspread.core.progress import Progress
+from beamspread.core.scene.illumination import Illumination
 from beamspread.core.target import Target
 from mathutils import Matrix
 from scenes import add_material, add_mesh, add_plane, add_sun, bake, messages_of, node_of, pixels, select
@@ -342,20 +344,21 @@ def test_samples_of_a_folder(tmp_path):
 
 
 def test_other_layers_have_images_and_files_beside_the_combined_one(monkeypatch, tmp_path):
-    plain = BeamspreadSettings.for_bake
-    wanted = lambda self, *options: replace(plain(self, *options), layers=(COMBINED, "Half"))  # noqa: E731
-    monkeypatch.setattr(BeamspreadSettings, "for_bake", wanted)
-    monkeypatch.setitem(LAYERS, "Half", lambda *arguments: LAYERS[COMBINED](*arguments) / 2)
     plane = add_plane(material=add_material())
     add_sun(0)
     (combined,) = bake(plane)
     assert combined.max() > 0
     image = node_of(plane.data.materials[0]).image
+    plain = BeamspreadSettings.for_bake
+    monkeypatch.setattr(BeamspreadSettings, "for_bake", lambda *options: replace(plain(*options), layer="Half"))
+    monkeypatch.setitem(LAYERS, "Half", lambda *arguments: LAYERS[COMBINED](*arguments) / 2)
+    bake(plane)
     assert pixels(bpy.data.images[f"{image.name} Half"]) == pytest.approx(combined / 2)
     bake(plane)
     assert sorted(one.name for one in bpy.data.images) == ["Plane_Medium", "Plane_Medium Half"]
+    assert pixels(image) == pytest.approx(combined)
     report = bake_all(batch_options.parse(["--output", str(tmp_path)]))
-    assert [Path(one.path).name for one in report.bakes] == ["Plane_Medium.exr"]
+    assert [Path(one.path).name for one in report.bakes] == ["Plane_Medium_Half.exr"]
     assert native.read_exr(str(tmp_path / "Plane_Medium_Half.exr"))[0] == pytest.approx(combined / 2)
 
 
@@ -365,11 +368,6 @@ class EndlessJob:
     def messages(self):
         return []
 
-    def colored(self, progress):
-        return self, progress
-
-    lit = colored
-
     def run(self, progress):
         while progress(0.5):
             pass
@@ -377,30 +375,32 @@ class EndlessJob:
 
 
 def test_thread_stops_when_asked():
-    thread = BakeThread(Bake(Target("Plane"), EndlessJob()))
+    thread = BakeThread(Bake(Target("Plane"), EndlessJob()), Progress())
     thread.start()
-    thread.cancel()
+    thread.progress.cancel()
     thread.join(timeout=10)
     assert not thread.is_alive()
-    assert (thread.bake.status, thread.bake.layers) == (CANCELLED, {})
+    assert (thread.bake.status, thread.bake.texture) == (CANCELLED, None)
 
 
 class DeafJob(EndlessJob):
     """Ends without having asked whether to go on."""
 
-    def run(self, progress):
-        return {COMBINED: np.ones((2, 2, 3), np.float32)}
+    texture, illumination = np.ones((2, 2, 3), np.float32), Illumination([])
 
-    def is_dark(self, layers):
+    def run(self, progress):
+        return self
+
+    def is_dark(self):
         return False
 
-    def messages_after(self, layers):
+    def messages_after(self):
         return []
 
 
 def test_what_ends_after_escape_is_not_kept_either():
-    thread = BakeThread(Bake(Target("Plane"), DeafJob()))
-    thread.cancel()
+    thread = BakeThread(Bake(Target("Plane"), DeafJob()), Progress())
+    thread.progress.cancel()
     thread.start()
     thread.join(timeout=10)
-    assert (thread.bake.status, thread.bake.layers) == (CANCELLED, {})
+    assert (thread.bake.status, thread.bake.texture) == (CANCELLED, None)

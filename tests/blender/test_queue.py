@@ -1,4 +1,4 @@
-"""Turns of a run: first looks at media that are not simulated yet, jobs made when it is their turn, refusals."""
+"""Steps of a run: quick previews of media that are not simulated yet, jobs made in their turn, refusals."""
 
 import time
 from types import SimpleNamespace
@@ -7,20 +7,19 @@ import beamspread
 import bpy
 import pytest
 from beamspread.blender import popup, preferences
-from beamspread.blender.compat import has_denoiser
 from beamspread.blender.images.results import Results
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.run import operator, prepare
-from beamspread.blender.jobs.run.bake_queue import BakeQueue
+from beamspread.blender.jobs.run.bake_queue import BakeQueue, Pass
 from beamspread.blender.jobs.run.operator import BakeThread
 from beamspread.blender.jobs.run.prepare import read_scene
-from beamspread.blender.jobs.state import Status, state
+from beamspread.blender.jobs.state import Run, Status, duration, state
 from beamspread.blender.node.draw import draw_node
 from beamspread.blender.node.find import find_targets
-from beamspread.blender.ui.bake_panel import estimates
-from beamspread.core.bake.estimate import in_words
 from beamspread.core.bake.runner import CANCELLED
 from beamspread.core.ldf import library
+from beamspread.core.progress import Progress
+from beamspread.core.target import Target
 from mathutils import Matrix
 from scenes import add_material, add_plane, add_sun, messages_of, node_of, pixels, select
 
@@ -46,11 +45,12 @@ def queue(preview_first=True):
     return BakeQueue(read_scene(bpy.context, targets, bpy.context.scene.beamspread.for_bake()), targets, preview_first)
 
 
-def turns(made):
-    found = []
-    while (bake := made.next()) is not None:
-        found.append((bake.target.object_name, bake.job.settings.quality, bake.job.settings.indirect))
-    return found
+def steps(made):
+    return [(bake.target.object_name, bake.job.settings.quality, bake.job.settings.indirect) for bake in made]
+
+
+def first_bake():
+    return next(iter(queue()))
 
 
 def test_to_read_the_scene_changes_no_material():
@@ -72,18 +72,18 @@ def test_to_read_the_scene_changes_no_material():
         bpy.app.handlers.depsgraph_update_post.remove(note)
 
 
-def test_media_that_are_not_there_get_a_first_look_and_their_bake_after_all():
+def test_media_that_are_not_simulated_get_a_quick_preview_and_their_bake_after_all():
     plane("Unknown", **UNKNOWN)
     plane("Known", 5.0, **KNOWN)
     bpy.context.scene.beamspread.use_indirect = True
-    assert turns(queue()) == [
+    assert steps(queue()) == [
         ("Unknown", "preview", False),
         ("Known", "final", True),
         ("Unknown", "final", True),
     ]
-    assert turns(queue(preview_first=False)) == [("Unknown", "final", True), ("Known", "final", True)]
+    assert steps(queue(preview_first=False)) == [("Unknown", "final", True), ("Known", "final", True)]
     bpy.context.scene.beamspread.quality = "preview"
-    assert [turn[1] for turn in turns(queue())] == ["preview", "preview"]
+    assert [step[1] for step in steps(queue())] == ["preview", "preview"]
 
 
 def test_those_that_share_an_image_are_baked_together_again():
@@ -91,12 +91,10 @@ def test_those_that_share_an_image_are_baked_together_again():
     plane("Unknown", image=image, **UNKNOWN)
     plane("Known", 5.0, image=image, **KNOWN)
     plane("Apart", 9.0, **KNOWN)
-    assert [turn[0] for turn in turns(queue())] == ["Unknown", "Known", "Apart", "Unknown", "Known"]
+    assert [step[0] for step in steps(queue())] == ["Unknown", "Known", "Apart", "Unknown", "Known"]
     made = queue()
-    again = []
-    while made.next() is not None:
-        again.append(made.starts_again())
-    assert again == [False, False, False, True, False]
+    passes = [made.step.purpose for _ in made]
+    assert passes == [Pass.PREVIEW, Pass.PREVIEW, Pass.SINGLE, Pass.FINAL, Pass.FINAL]
 
 
 def test_nothing_is_simulated_for_passes_without_a_medium():
@@ -105,49 +103,36 @@ def test_nothing_is_simulated_for_passes_without_a_medium():
     assert len(queue()) == 1
 
 
-def test_the_fraction_of_a_run_never_falls():
-    plane("Unknown", **UNKNOWN)
-    plane("Known", 5.0, **KNOWN)
-    made, seen = queue(), [0.0]
-    while made.next() is not None:
-        seen += [made.fraction(0.0), made.fraction(0.5), made.fraction(1.0)]
-    assert seen == sorted(seen)
-    assert seen[-1] == pytest.approx(1)
-    # The final simulation is what takes long.
-    assert made.turn.is_again
-    assert made.fraction(0.0) < 0.3
-
-
 def test_jobs_are_made_when_it_is_their_turn(monkeypatch):
     for number in range(3):
         plane(f"Plane {number}", 5.0 * number)
     made = []
     build = prepare.build_receiver
     monkeypatch.setattr(prepare, "build_receiver", lambda *arguments: made.append(1) or build(*arguments))
-    waiting = queue()
+    waiting = iter(queue())
     assert len(made) == 0
-    waiting.next()
+    next(waiting)
     assert len(made) == 1
 
 
 def test_what_is_read_is_of_one_time():
     """The scene may change while others are baked."""
     planes = [plane(f"Plane {number}", 5.0 * number) for number in range(2)]
-    waiting = queue()
-    waiting.next()
+    waiting = iter(queue())
+    next(waiting)
     bpy.data.objects.remove(planes[1])
     bpy.data.lights["Sun"].energy = 7.0
-    bake = waiting.next()
+    bake = next(waiting)
     assert bake.job.receiver.charts[0].grid.origin[0] == pytest.approx(4.0)
     assert bake.job.illumination.lights[0].strength == 1.0
 
 
 def test_what_is_removed_before_its_turn_is_refused():
     planes = [plane(f"Plane {number}", 5.0 * number) for number in range(2)]
-    waiting, kept = queue(), Results()
-    assert kept.admit(waiting.next()).job
+    waiting, kept = iter(queue()), Results()
+    assert kept.admit(next(waiting)).job
     bpy.data.materials.remove(planes[1].data.materials[0])
-    refused = kept.admit(waiting.next())
+    refused = kept.admit(next(waiting))
     assert refused.job is None
     assert "was removed or renamed during the bake" in refused.error
 
@@ -158,7 +143,7 @@ def test_an_object_renamed_during_its_bake_gets_its_result():
     image = node_of(one.data.materials[0]).image
     before = pixels(image).mean()
     bpy.data.lights["Sun"].energy = 3.0
-    bake = kept.admit(queue().next())
+    bake = kept.admit(first_bake())
     one.name = "Table"
     bake.run()
     bake.keep(kept.store)
@@ -172,50 +157,33 @@ def test_a_bake_beyond_the_memory_limit_is_refused(monkeypatch):
     monkeypatch.setattr(preferences, "memory_limit", lambda: 1000)
     select(one)
     message = messages_of(bpy.ops.beamspread.bake)
-    assert "32 x 32 texels take about" in message
+    assert "Baking: 32 x 32 texels take about" in message
     assert "raise the memory limit" in message
     assert state.rows[find_targets([one])[0]].status == Status.FAILED
 
 
-def test_progress_says_what_is_done_and_how_long_it_lasts(monkeypatch):
-    words = []
-
-    class Listener:
-        def __call__(self, fraction):
-            return True
-
-        def say(self, said):
-            words.append(said)
-
+def test_progress_names_the_stages():
     plane("Unknown", **UNKNOWN)
-    bake = queue().next()
-    bake.run(Listener())
-    assert words == ["Simulating the medium, once (preview)", "Baking"]
+    stages, progress = [], Progress(lambda _fraction: stages.append(progress.stage))
+    first_bake().run(progress)
+    assert [*dict.fromkeys(stages)] == ["Simulating the material (quick preview)", "Baking"]
+
+
+def test_the_window_says_what_is_done_and_how_long_it_takes(monkeypatch):
     now = [100.0]
     monkeypatch.setattr("time.monotonic", lambda: now[0])
-    state.begin()
-    state.start(bake.target)
-    try:
-        state.update(0.3, 0.15, "Baking")
-        assert state.progress.in_short() == "15%"
-        now[0] += 10
-        state.update(0.5, 0.25, "Baking")
-        # Ten per cent in ten seconds, however far it was before.
-        assert state.progress.in_words() == "Baking 50%, all 25%, about 1 min left"
-        assert state.progress.in_short() == "25%, 1 min left"
-        # Where it stands still and leaps, the last half of the run counts, or all of it.
-        for now[0] in range(111, 151):
-            state.update(0.52, 0.26, "Baking")
-        now[0] += 1
-        state.update(0.54, 0.27, "Baking")
-        assert state.progress.in_short() == "27%, 5 min left"
-        state.update(0.3, 0.3 + 1e-9, "Baking")
-        assert state.progress.in_words().startswith("Baking 30%, about ")  # of a run of one, by rounding
-        state.ask_to_stop()
-        state.update(0.6, 0.3, "Stopping")
-        assert state.progress.in_words() == "Stopping 60%, all 30%"
-    finally:
-        state.stop()
+    progress = Progress()
+    first, second = progress.split([1, 1])
+    run = Run(progress, Target("Plane", "Stone"), "2 of 2")
+    first(1.0)
+    second.begin("Baking")
+    second(0.1)
+    assert run.line() == "Baking: Plane / Stone (2 of 2), 10% (Esc cancels)"
+    now[0] += 10
+    second(0.25)
+    assert run.in_short() == "25%, about 30 s left"
+    progress.cancel()
+    assert run.line() == "Stopping: Plane / Stone (2 of 2), 25% (Esc cancels)"
 
 
 @pytest.mark.parametrize("solver", ["fft", "direct", "adaptive"])
@@ -227,10 +195,10 @@ def test_a_bake_stops_within_two_seconds(solver, seconds):
     bpy.data.objects["Sun"].location.z = 1.0
     plane("Plane", **KNOWN)
     beamspread.library(beamspread.Medium(0.8, 1.0), quality="preview")  # to read it takes most of a second
-    thread = BakeThread(queue().next())
+    thread = BakeThread(first_bake(), Progress())
     thread.start()
     time.sleep(seconds)
-    thread.cancel()
+    thread.progress.cancel()
     asked = time.monotonic()
     thread.join()
     assert time.monotonic() - asked < 2
@@ -243,11 +211,11 @@ def test_the_search_for_indirect_light_stops_within_two_seconds():
     plane("Plane", **KNOWN)
     plane("Roof", **KNOWN).location.z = 1.0
     bpy.context.view_layer.update()
-    thread = BakeThread(queue().next())
+    thread = BakeThread(first_bake(), Progress())
     thread.start()
     time.sleep(1.0)
-    assert thread.doing.startswith("Finding indirect light")
-    thread.cancel()
+    assert thread.progress.stage.startswith("Finding indirect light")
+    thread.progress.cancel()
     asked = time.monotonic()
     thread.join()
     assert time.monotonic() - asked < 2
@@ -263,8 +231,8 @@ def test_unregistering_ends_what_runs_and_says_so(monkeypatch):
     bpy.data.lights["Sun"].type = "POINT"
     bpy.data.objects["Sun"].location.z = 1.0
     node = node_of(plane("Plane", **KNOWN).data.materials[0])
-    thread = BakeThread(queue().next())
-    state.start(thread.bake.target)
+    thread = BakeThread(first_bake(), Progress())
+    state.start(thread.progress, thread.bake.target)
     thread.start()
     operator.unregister()
     try:
@@ -277,42 +245,11 @@ def test_unregistering_ends_what_runs_and_says_so(monkeypatch):
         operator.register()
 
 
-def test_estimates_follow_solver_and_sizes():
-    one, other = plane("One"), plane("Other", 5.0)
-    settings = bpy.context.scene.beamspread
-    select(one)
-    assert estimates(bpy.context) == []
-    settings.use_indirect = True
-    (alone,) = estimates(bpy.context)
-    assert alone.startswith("Indirect light: about ")
-    assert ("no denoiser" in alone) == (not has_denoiser())
-    select(one, other)
-    (both,) = estimates(bpy.context)
-    assert "for 2 objects" in both
-    settings.use_indirect, settings.solver = False, "direct"
-    assert estimates(bpy.context) == []
-    settings.resolution = 2048
-    (sun,) = estimates(bpy.context)
-    bpy.data.lights["Sun"].type = "POINT"
-    (lamp,) = estimates(bpy.context)
-    assert sun.startswith("Direct solver: at least ")
-    assert " h." in sun
-    assert " days, up to 1024 times that if lamps have a size." in lamp
-    settings.solver, bpy.context.scene.world = "fft", None
-    bpy.data.lights["Sun"].shadow_soft_size = 0
-    assert estimates(bpy.context) == []
-    bpy.data.lights["Sun"].shadow_soft_size = 0.1
-    (sized,) = estimates(bpy.context)
-    assert sized.startswith("Light of a size, as the world's: about ")
-    settings.samples = 1
-    assert estimates(bpy.context) == []
-
-
 @pytest.mark.parametrize(
     ("seconds", "words"), [(0.2, "1 s"), (59, "59 s"), (90, "2 min"), (7200, "2 h"), (259200, "3 days")]
 )
 def test_times_in_words(seconds, words):
-    assert in_words(seconds) == words
+    assert duration(seconds) == words
 
 
 def test_preferences_have_defaults_where_the_add_on_is_not_enabled():
@@ -351,16 +288,17 @@ def test_long_sentences_are_wrapped():
     assert lines == ["one two", "three four", "five"]
 
 
-def test_a_first_look_is_kept_with_its_sentence():
-    """What the window does in two turns; the second one never comes."""
+def test_a_quick_preview_is_kept_with_its_message():
+    """The first of the two steps of a run in the window; the second one never comes."""
     one = plane("Unknown", **UNKNOWN)
-    waiting = queue()
-    bake = waiting.next()
+    made = queue()
+    bake = next(iter(made))
+    assert made.step.purpose == Pass.PREVIEW
     parts = stale.parts_of(bpy.context, [bake.target])
     bake.run()
     bake.keep(Results().store)
     state.note(bake)
-    stale.keep(bake, parts[bake.target], waiting.turn.is_first)
+    stale.keep(bake, parts[bake.target], is_preview=True)
     stale.refresh(bpy.context)
     row = state.rows[bake.target]
     assert row.is_stale

@@ -448,8 +448,8 @@ def test_looks_follow_a_change_at_once_and_take_at_most_a_tenth_of_the_time(monk
     monkeypatch.setitem(stale._last, "took", 0.0)
     for change, took, look in ((0, 0.8, 0.3), (1.2, 0.8, 1.5), (2.4, 0.01, 2.3 + 8), (10.5, 0.8, 10.8), (11.7, 0, 12)):
         now[0], seconds[0] = 1e6 + change, took
-        stale.look_soon()
-        while (rest := stale._look()) is not None:
+        stale.scan_soon()
+        while (rest := stale._scan()) is not None:
             now[0] += rest
         assert looked.pop() == pytest.approx(1e6 + look, abs=1e-3)
     monkeypatch.undo()

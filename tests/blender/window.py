@@ -17,7 +17,7 @@ sys.path[:0] = [str(FOLDER), str(FOLDER.parent.parent / "build" / "stage")]
 
 import beamspread  # noqa: E402
 import scenes  # noqa: E402
-from beamspread.blender import popup  # noqa: E402
+from beamspread.blender import compat, popup  # noqa: E402
 from beamspread.blender.jobs.run import operator  # noqa: E402
 from beamspread.blender.jobs.state import state  # noqa: E402
 from beamspread.blender.node import draw, menu  # noqa: E402
@@ -145,10 +145,15 @@ def brightness(name: str) -> float:
     return -1.0 if image is None else float(scenes.pixels(image).mean())
 
 
+def simulates() -> bool:
+    """True once the simulation has begun to tell how far it is."""
+    return state.run.progress.stage_fraction > 0
+
+
 def note_step() -> bool:
     """Keep what the run says that it does, each once; True."""
-    if state.progress is not None and state.progress.doing not in ("", *results["steps"]):
-        results["steps"].append(state.progress.doing)
+    if state.run is not None and state.run.progress.stage not in ("", *results["steps"]):
+        results["steps"].append(state.run.progress.stage)
     return True
 
 
@@ -171,7 +176,7 @@ def scenario():
     editor = next(area for area in areas() if area.type == "NODE_EDITOR")
     region = next(region for region in editor.regions if region.type == "WINDOW")
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=editor, region=region):
-        bpy.ops.wm.call_menu(name=menu._menu().__name__)
+        bpy.ops.wm.call_menu(name=compat.shader_menu().__name__)
     yield lambda: "menu" in results["drawn"]
     press_escape()
     yield lambda: True  # the menu takes it, and not the bake
@@ -179,7 +184,7 @@ def scenario():
     bpy.ops.ed.undo_push(message="before")
     results["returned"] = sorted(started(objects="ALL"))
     results["can start another"] = can_start()
-    results["running"] = str(state.progress.target)
+    results["running"] = str(state.run.target)
     yield ended
     results["baked"] = [brightness(name) for name in ("First", "Second")]
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
@@ -195,8 +200,9 @@ def scenario():
         image_of(name).scale(512, 512)
     before = [brightness(name) for name in ("First", "Second")]
     started(objects="ALL")
-    yield lambda: state.progress.own > 0.02
-    results["progress"] = [state.progress.own, state.progress.everything, state.progress.doing]
+    progress = state.run.progress
+    yield lambda: progress.stage_fraction > 0.02
+    results["progress"] = [progress.stage_fraction, progress.fraction, progress.stage, state.run.position]
     opened = []
     bpy.types.TOPBAR_MT_file.append(lambda _menu, _context: opened.append(True))
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
@@ -205,7 +211,7 @@ def scenario():
     press_escape()
     for _ in range(10):  # ticks of the operator's timer
         yield lambda: True
-    results["goes on behind a menu"] = state.is_running() and not state.should_stop()
+    results["goes on behind a menu"] = state.is_running() and not state.run.progress.is_cancelled
     began = time.monotonic()
     press_escape()
     yield ended
@@ -230,7 +236,7 @@ def scenario():
     results["steps"] = []
     started()
     yield lambda: note_step() and brightness("Second") != old
-    yield lambda: note_step() and results["steps"][-1] == "Simulating the medium, once" and state.progress.own > 0
+    yield lambda: note_step() and results["steps"][-1].endswith("(only the first time)") and simulates()
     looked = brightness("Second")
     bpy.ops.beamspread.cancel()
     yield ended
@@ -240,16 +246,16 @@ def scenario():
     settings.quality = "preview"
 
     results["of errors"] = []
-    for where in ("_start_next", "_take"):  # as it starts, and in the middle
+    for where in ("run", "end"):  # as it starts, and in the middle
 
         def fail(*_arguments):
             raise ValueError("what went wrong")
 
-        works, before = getattr(operator.BEAMSPREAD_OT_bake, where), len(results["popups"])
-        setattr(operator.BEAMSPREAD_OT_bake, where, fail)
+        works, before = getattr(operator._Run, where), len(results["popups"])
+        setattr(operator._Run, where, fail)
         started()
         yield ended
-        setattr(operator.BEAMSPREAD_OT_bake, where, works)
+        setattr(operator._Run, where, works)
         results["of errors"].append([results["popups"][before:], state.lines(), len(operator._timers)])
         results["after errors"] = [sorted(started())]
         yield ended

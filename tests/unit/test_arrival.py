@@ -35,16 +35,15 @@ def plane(coverage=1.0, normal=(0.0, 0.0, 1.0)):
     return Grid((-0.5, -0.5 * normal[2], 0.0), *axes, 1 / SIZE, 1 / SIZE, SIZE, SIZE, covered)
 
 
-def job(lights, *layers, grid=None, occluders=None, thickness=0.0, material=MATERIAL):
+def job(lights, layer=COMBINED, grid=None, occluders=None, thickness=0.0, material=MATERIAL):
     grid = grid or plane()
     receiver = Receiver(grid.coverage, (Chart(grid, grid.coverage),))
-    settings = BakeSettings(quality="preview", samples=2, margin=0, layers=layers or (COMBINED,))
+    settings = BakeSettings(quality="preview", samples=2, margin=0, layer=layer)
     return BakeJob("Plane", receiver, Illumination(lights, occluders), Surface(material, thickness), settings)
 
 
 def arriving(*lights, **options):
-    layers = job(lights, IRRADIANCE, DIRECTION, **options).run()
-    return layers[IRRADIANCE], layers[DIRECTION]
+    return tuple(job(lights, layer, **options).run().texture for layer in (IRRADIANCE, DIRECTION))
 
 
 def lamp_light():
@@ -96,12 +95,12 @@ def test_shadow_is_dark_and_has_no_direction():
 
 
 def test_convolve_makes_the_luminance_of_both_passes():
-    layers = job([LAMP], COMBINED, IRRADIANCE, DIRECTION).run()
+    luminance, irradiance, direction = (job([LAMP], layer).run().texture for layer in (COMBINED, IRRADIANCE, DIRECTION))
     ldf = beamspread.library(beamspread.Medium(g=0.0, ior=1.0), quality="preview")
     medium = ldf, MATERIAL.albedo, MATERIAL.mean_free_path
-    again = beamspread.convolve(layers[IRRADIANCE], layers[DIRECTION], *medium, pitch=1 / SIZE)
+    again = beamspread.convolve(irradiance, direction, *medium, pitch=1 / SIZE)
     # Both keep every term of so small a plane.
-    assert again == pytest.approx(layers[COMBINED], rel=1e-3)
+    assert again == pytest.approx(luminance, rel=1e-3)
 
 
 def no_simulation(*_arguments, **_options):
@@ -120,7 +119,7 @@ COLORED = Surface(MATERIAL, base_color=(0.5, 0.4, 0.3))
 
 def test_arriving_light_needs_no_medium(without_media):
     for layer in (IRRADIANCE, DIRECTION):
-        assert replace(job([SUN], layer), surface=COLORED).run()[layer].any()
+        assert replace(job([SUN], layer), surface=COLORED).run().texture.any()
 
 
 @pytest.mark.parametrize("layer", OUTPUTS.values())
@@ -132,9 +131,8 @@ def test_a_surely_dark_bake_takes_no_simulation(lights, layer, without_media):
     one.run()
     assert one.error == ""
     assert one.is_dark
-    assert list(one.layers) == [layer]
-    assert one.layers[layer].shape == (SIZE, SIZE, 3)
-    assert not one.layers[layer].any()
+    assert one.texture.shape == (SIZE, SIZE, 3)
+    assert not one.texture.any()
     (warning,) = one.messages
     assert "black" in warning.text
 
@@ -157,7 +155,7 @@ def test_a_bake_in_the_shadow_is_dark_and_says_so(layer):
 def test_a_medium_that_absorbs_all_light_is_not_dark():
     one = Bake(Target("Plane"), job([SUN], material=replace(MATERIAL, albedo=(0.0, 0.0, 0.0))))
     one.run()
-    assert not one.layers[COMBINED].any()
+    assert not one.texture.any()
     assert not one.is_dark
 
 

@@ -1,17 +1,17 @@
 """The bake of plain data: lights add up, colours and thickness act per channel, progress and cancel work."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import beamspread
 import numpy as np
 import pytest
 from beamspread.core.bake.arrival import arrive, mean_direction
 from beamspread.core.bake.bake_settings import COMBINED, BakeSettings
-from beamspread.core.bake.job import BakeJob
+from beamspread.core.bake.job import BakeJob, Step
 from beamspread.core.bake.layers import LAYERS
 from beamspread.core.bake.luminance import bake
-from beamspread.core.bake.runner import Bake
+from beamspread.core.bake.runner import Bake, Sink, run_bakes
 from beamspread.core.bake.surface import Surface
 from beamspread.core.errors import MaterialError
 from beamspread.core.material import Material
@@ -278,7 +278,7 @@ def test_job_works_out_the_albedo_of_a_base_colour():
     albedo = surface.resolve("preview").albedo
     library = beamspread.library(beamspread.Medium(g=0.0, ior=1.0), quality="preview")
     assert [library.diffuse_reflectance(value) for value in albedo] == pytest.approx([0.5, 0.3, 0.1], abs=1e-6)
-    texture = job([SUN], surface=surface).run()[COMBINED]
+    texture = job([SUN], surface=surface).run().texture
     expected = [reflectance(0, value) * 2 / math.pi for value in albedo]
     assert texture[12, 12] == pytest.approx(expected, rel=5e-3)
 
@@ -360,15 +360,14 @@ def test_a_new_kind_of_light_and_a_new_layer_need_nothing_but_themselves(monkeyp
         def is_behind(self, target):
             return False
 
-    def irradiance(one, target, _material, _progress):
-        return arrive(target, one.illumination, one.settings)[0]
+    def irradiance(target, illumination, _material, _thickness, settings, _progress, _bytes_for_light):
+        return arrive(target, illumination, settings)[0]
 
     monkeypatch.setitem(LAYERS, "Own", irradiance)
     sky = Sky("Sky", 3.0, (1.0, 0.5, 0.0), True)
-    layers = job([sky], settings=replace(SETTINGS, layers=(COMBINED, "Own"))).run()
-    assert list(layers) == [COMBINED, "Own"]
-    assert layers["Own"][12, 12] == pytest.approx([3, 1.5, 0])
-    assert layers[COMBINED][12, 12] == pytest.approx(reflectance(0) / math.pi * np.array([3, 1.5, 0]), rel=2e-3)
+    own, combined = (job([sky], settings=replace(SETTINGS, layer=layer)).run().texture for layer in ("Own", COMBINED))
+    assert own[12, 12] == pytest.approx([3, 1.5, 0])
+    assert combined[12, 12] == pytest.approx(reflectance(0) / math.pi * np.array([3, 1.5, 0]), rel=2e-3)
 
 
 def test_charts_are_baked_apart_on_planes_of_their_own():
@@ -380,7 +379,7 @@ def test_charts_are_baked_apart_on_planes_of_their_own():
     for chart in charts:
         chart.part_of(coverage)[:] = chart.coverage
     whole = BakeJob("Plane", Receiver(coverage, charts), Illumination([SUN]), Surface(MATERIAL), SETTINGS)
-    texture = whole.run()[COMBINED]
+    texture = whole.run().texture
     for chart, plane in zip(charts, planes):
         alone = bake(plane, Illumination([SUN]), MATERIAL, 0.0, SETTINGS)
         assert np.array_equal(chart.part_of(texture), alone)
@@ -388,39 +387,32 @@ def test_charts_are_baked_apart_on_planes_of_their_own():
     assert texture[12, 48] == pytest.approx(0.25 * reflectance(60) * 2 / math.pi, rel=2e-3)
 
 
-class FailingJob:
-    """Stands for a `BakeJob`, to see what a `Bake` makes of what happens in it."""
+@dataclass(frozen=True)
+class Ends(Step):
+    """Ends a job with a texture or an exception."""
 
-    def __init__(self, outcome):
-        self.outcome = outcome
+    outcome: object
 
-    def messages(self):
-        return [warning("", "Careful.")]
+    name = "Ending"
 
-    def colored(self, progress):
-        return self, progress
-
-    lit = colored
-
-    def is_dark(self, layers):
-        return False
-
-    def messages_after(self, layers):
-        return []
-
-    def run(self, progress):
+    def run(self, job, progress):
         if isinstance(self.outcome, BaseException):
             raise self.outcome
-        return self.outcome
+        return replace(job, texture=self.outcome)
 
 
-LAYER = {COMBINED: np.ones((2, 2, 3), np.float32)}
+TEXTURE = np.ones((2, 2, 3), np.float32)
+
+
+def ending_job(outcome):
+    illumination = Illumination([SUN], messages=[warning("", "Careful.")])
+    return replace(job([SUN]), illumination=illumination, steps=(Ends(outcome),))
 
 
 @pytest.mark.parametrize(
     ("outcome", "status", "error"),
     [
-        (LAYER, "written", ""),
+        (TEXTURE, "written", ""),
         (ValueError("No."), "failed", "No."),
         (MemoryError(), "failed", "There is not enough memory. Lower the resolution."),
         (KeyboardInterrupt(), "cancelled", "The bake was cancelled."),
@@ -429,52 +421,82 @@ LAYER = {COMBINED: np.ones((2, 2, 3), np.float32)}
 )
 def test_a_bake_notes_what_became_of_it(outcome, status, error):
     stored = []
-    one = Bake(Target("Plane", "Stone"), FailingJob(outcome))
+    one = Bake(Target("Plane", "Stone"), ending_job(outcome))
     one.run()
-    one.keep(lambda done: stored.append(dict(done.layers)) or "plane.exr")
+    one.keep(lambda done: stored.append(done.texture) or "plane.exr")
     assert (one.status, one.error) == (status, error)
-    assert stored == ([LAYER] if status == "written" else [])
+    assert [texture is TEXTURE for texture in stored] == ([True] if status == "written" else [])
     assert one.path == ("plane.exr" if status == "written" else "")
     assert [*map(str, one.messages)] == [*([error] if error else []), "Careful."]
-    assert one.layers == {}
+    assert one.texture is None
 
 
 def test_a_bake_that_cannot_be_stored_has_failed():
     def full_disk(_bake):
         raise OSError("no space left")
 
-    one = Bake(Target("Plane"), FailingJob(LAYER))
+    one = Bake(Target("Plane"), ending_job(TEXTURE))
     one.run()
     one.keep(full_disk)
-    assert (one.status, one.error, one.layers) == ("failed", "no space left", {})
+    assert (one.status, one.error, one.texture) == ("failed", "no space left", None)
 
 
-def test_a_job_gets_the_colors_that_it_lacks_before_it_runs():
-    """What there is to say of them comes beside what was said before, and progress goes on from there."""
-    before, fractions = job([SUN], surface=Surface(MATERIAL, base_color=(0.5,) * 3)), []
+def test_a_job_runs_its_steps_in_order():
+    """A step may change the surface and add messages; each has its part of the progress."""
+    before = job([SUN], surface=Surface(MATERIAL, base_color=(0.5,) * 3))
+    fractions, colored = [], Surface(MATERIAL, base_color=(0.3,) * 3)
 
-    def color(one, progress):
-        progress(0.0)
-        progress(1.0)
-        said = one.illumination.with_messages(warning("", "Paler than it looks."))
-        return replace(one, surface=Surface(MATERIAL, base_color=(0.3,) * 3), illumination=said)
+    class Color(Step):
+        name = "Coloring"
 
-    late = replace(before, more_color=color, color_seconds=1e6)
-    bake = Bake(Target("Plane"), late)
+        def weight(self, _job):
+            return 1e6
+
+        def run(self, job, progress):
+            progress(0.0)
+            progress(1.0)
+            illumination = job.illumination.with_messages(warning("", "Paler than it looks."))
+            return replace(job, surface=colored, illumination=illumination)
+
+    bake = Bake(Target("Plane"), replace(before, steps=(Color(), *before.steps)))
     assert not bake.messages
     bake.run(fractions.append)
     assert [*map(str, bake.messages)] == ["Paler than it looks."]
-    truth = replace(before, surface=Surface(MATERIAL, base_color=(0.3,) * 3)).run()
-    assert bake.layers[COMBINED] == pytest.approx(truth[COMBINED])
+    assert bake.texture == pytest.approx(replace(before, surface=colored).run().texture)
     assert fractions[0] == 0
     assert 0.999 < fractions[1] <= fractions[2]
     assert fractions == sorted(fractions)
-    dark = replace(late, illumination=Illumination([]), more_color=lambda *_: pytest.fail("nothing shows it"))
-    assert not dark.colored()[0].run()[COMBINED].any()
+
+
+def test_no_step_runs_in_the_dark():
+    class Unwanted(Step):
+        def run(self, job, progress):
+            pytest.fail("nothing shows it")
+
+    dark = replace(job([]), steps=(Unwanted(), Unwanted()))
+    assert not dark.run().texture.any()
+
+
+def test_a_run_stores_and_notes_each_bake():
+    class Host(Sink):
+        def __init__(self):
+            self.said = []
+
+        def store(self, bake):
+            self.said.append(("store", str(bake.target)))
+            return "a.exr"
+
+        def end(self, bake):
+            self.said.append((bake.status, str(bake.target)))
+
+    host = Host()
+    jobs = {"First": ending_job(TEXTURE), "Second": ending_job(ValueError("No.")), "Third": None}
+    run_bakes((Bake(Target(name), one, "" if one else "Gone.") for name, one in jobs.items()), host)
+    assert host.said == [("store", "First"), ("written", "First"), ("failed", "Second"), ("failed", "Third")]
 
 
 def test_a_bake_that_ended_before_it_was_cancelled_keeps_nothing():
-    one = Bake(Target("Plane"), FailingJob(LAYER))
+    one = Bake(Target("Plane"), ending_job(TEXTURE))
     one.run()
     one.cancel()
     one.keep(lambda _bake: pytest.fail("stored"))

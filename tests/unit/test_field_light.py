@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from beamspread.core.bake.arrival import arrive
 from beamspread.core.bake.bake_settings import IRRADIANCE, BakeSettings
-from beamspread.core.bake.job import BakeJob
+from beamspread.core.bake.job import BakeJob, Solve, Step
 from beamspread.core.bake.luminance import bake
 from beamspread.core.bake.surface import Surface
 from beamspread.core.ldf.library import library
@@ -167,20 +167,23 @@ def test_a_job_bakes_the_light_that_it_finds():
     receiver = Receiver(grid.coverage, (Chart(grid, grid.coverage),))
     seen = []
 
-    def find(job, progress):
-        seen.append(job.receiver)
-        if progress is not None and progress(0.5) is False:
-            raise native.Cancelled("stopped")
-        light = light_of(grid, np.ones((len(STRATA), 2, 2, 3)))
-        return replace(job, illumination=job.illumination.lit_by([light]))
+    class FindLight(Step):
+        finds_light = True
+
+        def run(self, job, progress):
+            seen.append(job.receiver)
+            progress.check(0.5)
+            light = light_of(grid, np.ones((len(STRATA), 2, 2, 3)))
+            return replace(job, illumination=job.illumination.lit_by([light]))
 
     surface = Surface(Material(albedo=(0.9,) * 3, mean_free_path=(0.1,) * 3))
-    job = BakeJob("Floor", receiver, Illumination([]), surface, BakeSettings(layers=(IRRADIANCE,)), find)
+    settings, steps = BakeSettings(layer=IRRADIANCE), (FindLight(), Solve())
+    job = BakeJob("Floor", receiver, Illumination([]), surface, settings, steps)
     assert job.messages() == []
-    np.testing.assert_allclose(job.lit()[0].run()[IRRADIANCE], np.pi, rtol=1e-5)
+    np.testing.assert_allclose(job.run().texture, np.pi, rtol=1e-5)
     assert seen == [receiver]
     with pytest.raises(native.Cancelled):
-        job.lit(lambda _fraction: False)
+        job.run(lambda _fraction: False)
 
 
 def test_reflectance_of_a_surface():

@@ -256,7 +256,7 @@ def test_quick_renderings_have_all_detail_of_a_texture(blur, renderer):
     assert textured.key != replace(textured, texture=replace(texture, blur=1.0)).key
     quick, exact = renderer.quick(textured, 64), renderer.exact(textured)
     job = BakeJob("Floor", texture.on(receiver), textured.illumination, textured.surface, textured.settings)
-    np.testing.assert_allclose(exact.texture, job.run()["Combined"], rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(exact.texture, job.run().texture, rtol=1e-4, atol=1e-6)
     total, worst = errors_of(quick, exact)
     assert total < (0.01 if blur == 0 else 0.05)
     assert worst < (0.02 if blur == 0 else 0.1)

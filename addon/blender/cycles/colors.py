@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 
 from ...core.bake.margin import extend_margin
 from ...core.errors import BakeError
-from ...core.progress import Progress
+from ...core.progress import Callback
 from ...core.scene.receiver import Receiver
 from ...core.target import Target
-from .cycles_light import START_SECONDS, CopyForCycles
+from .cycles_light import CopyForCycles
 from .process import run
 
 # Samples of each texel; more take longer.
@@ -25,9 +23,6 @@ ALL_PIXELS = 1 << 22
 # Memory of the child process, bytes, without that of the scene: for Blender itself, and for each baked pixel.
 BLENDER_BYTES, PIXEL_BYTES = 270 << 20, 190
 
-# Samples per second of a CPU core, for estimates.
-SAMPLES_PER_SECOND = 3e6
-
 # Rings of texels at the mesh's border that take the color of their neighbors.
 RINGS = 2
 
@@ -37,7 +32,7 @@ def colors_by_cycles(
     target: Target,
     matrix: list | None,
     receiver: Receiver,
-    progress: Progress | None = None,
+    progress: Callback | None = None,
 ) -> list[np.ndarray]:
     """Linear color averaged over each texel, float32 (grid height, grid width, 3) of each chart.
 
@@ -61,20 +56,12 @@ def colors_by_cycles(
         "height": receiver.height,
         **_samples(receiver.width, receiver.height),
     }
-    seconds = seconds_of_colors(receiver.width, receiver.height)
-    colors = run(copy.scene, "colors", request, progress, "Evaluating the base color", seconds)["colors"]
+    colors = run(copy.scene, "colors", request, progress, "Evaluating the base color")["colors"]
     known = np.isfinite(colors).all(axis=2)
     if not known.any():
         raise BakeError("Cycles found no texel on the mesh.")
     filled = extend_margin(np.where(known[..., None], colors, colors[known].mean(axis=0)), known, RINGS)
     return [chart.read(filled) for chart in receiver.charts]
-
-
-def seconds_of_colors(width: int, height: int) -> float:
-    """Estimate of the seconds that `colors_by_cycles` takes on this machine."""
-    chosen = _samples(width, height)
-    samples = width * height * chosen["positions"] ** 2 * chosen["samples"]
-    return START_SECONDS + samples / (SAMPLES_PER_SECOND * (os.cpu_count() or 1))
 
 
 def bytes_of_colors(width: int, height: int) -> int:

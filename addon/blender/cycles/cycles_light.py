@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import math
-import os
 import threading
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
 from ...core.bake.arrival import mean_open_irradiance
-from ...core.bake.job import BakeJob
+from ...core.bake.job import BakeJob, Step
 from ...core.errors import MaterialError, MissingImageError
 from ...core.messages import Message, warning
-from ...core.progress import Progress, stages
+from ...core.progress import Callback, Progress
 from ...core.scene.lights import STRATA, Field, FieldLight, LampFieldLight, Light, WorldLight
 from ...core.scene.receiver import Receiver
+from ...core.target import Target
 from .. import compat
 from ..node.find import find_node_in_groups
 from ..node.tree import BASE_COLOR
@@ -48,30 +48,34 @@ NOTHING_BOUNCES = warning(
 # Nodes along the longest side, and noise, of direct light whose nodes only Cycles can evaluate.
 DIRECT_NODES, DIRECT_NOISE = 256, 0.02
 
-# Estimates: seconds until Blender has started, paths per node without and with a denoiser, paths per second of a core.
-START_SECONDS, PATHS_PER_NODE, PATHS_TO_DENOISE, PATHS_PER_SECOND = 3.0, 600, 256, 1.5e5
-
 # Height above the receiver at which light is gathered, in nodes; objects below it cast no shadow.
 LIFT = 1e-3
 
 # Samples of each texel of the world's panorama, and of texels in tiles around a sun; more reduce noise.
 WORLD_SAMPLES, SUN_SAMPLES = 2, 256
-# Estimate of the seconds that a panorama takes.
-WORLD_SECONDS = 8.0
 
 WHITE = 1.0, (1.0, 1.0, 1.0)
 UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class CopyForCycles:
-    """A copy of a scene, with the colors that replace baked materials in it. Make it in the main thread."""
+    """A copy of a scene for Cycles, with what was already evaluated on it. Make it in the main thread.
+
+    Attributes
+    ----------
+    reflectances : colors that replace the baked materials, by name.
+    textures : names of the groups around the node of a material, of the node and of its input with a texture.
+    panorama : the world as a light, once it was rendered.
+    base_colors : evaluated base colors, by target.
+    """
 
     def __init__(self, scene, view_layer) -> None:
         self.scene = SceneCopy(scene, view_layer)
+        self.panorama: WorldLight | None = None
+        self.base_colors: dict[Target, object] = {}
         nodes = {material.name: find_node_in_groups(material) for material in bpy.data.materials}
         nodes = {name: node for name, node in nodes.items() if node is not None}
         self.reflectances = {name: _reflectance(node.surface()) for name, (node, _) in nodes.items()}
-        # Names of the groups around a node, of the node, and of its input with a texture.
         self.textures = {
             name: ([group.name for group in groups], node.name, BASE_COLOR)
             for name, (node, groups) in nodes.items()
@@ -95,9 +99,7 @@ class CyclesLight:
             obj.name: _position_of(obj) for obj in bpy.data.scenes[self._names[0]].objects if obj.type == "LIGHT"
         }
         self._copy = copy
-        self._panorama: WorldLight | None = None
         self._lacks_world_images = world is not None and bool(_missing_images_of(world))
-        self._has_world = True
         materials = (data for data in depsgraph.ids if isinstance(data, bpy.types.Material))
         self._missing = [message for material in materials for message in _warnings_of(material)]
 
@@ -112,19 +114,15 @@ class CyclesLight:
             return job
         # A world without its images is left out; Cycles would show it in magenta.
         is_lit = bool(world) or any(light.name == self._world for light in illumination.lights)
-        self._has_world = is_lit or not self._lacks_world_images
+        has_world = is_lit or not self._lacks_world_images
         if self.copy() is None:
             text = "Blender's own Bake could not ask Cycles for light that only Cycles can evaluate."
             missing = warning("", text, "Use Bake Beamspread.")
             return replace(job, illumination=illumination.with_messages(missing))
         illumination = illumination.found({world, *others} - {""}).with_messages(*self._copy.scene.warnings)
         illumination = illumination.with_messages(*self._missing) if bounced else illumination
-        return replace(
-            job,
-            illumination=illumination,
-            more_seconds=seconds_estimate(job.receiver.width, job.receiver.height) * (bounced + len(others)),
-            more_light=lambda found_for, progress: self._complete(found_for, world, others, bounced, progress),
-        )
+        step = LightByCycles(self._copy, world, {name: self._lamps.get(name) for name in others}, bounced, has_world)
+        return replace(job, illumination=illumination, steps=(step, *job.steps))
 
     def copy(self) -> CopyForCycles | None:
         """Copy of the scene; None if there is none and this is not the main thread."""
@@ -142,31 +140,53 @@ class CyclesLight:
                 return True
         return False
 
-    def _complete(
-        self, job: BakeJob, world: str, others: list[str], bounced: bool, progress: Progress | None
-    ) -> BakeJob:
-        """The job with the light that Cycles adds. Runs in any thread."""
-        weights = [float(bool(world) and self._panorama is None), 2.0 * bounced, *(1.0 for _ in others)]
-        first, second, *each = stages(progress, weights)
+
+@dataclass(frozen=True, eq=False)
+class LightByCycles(Step):
+    """Adds the light that only Cycles can evaluate.
+
+    Attributes
+    ----------
+    world : name of the world, "" if our own readers have read it.
+    lamps : names of objects; for lamps with the position that `LampFieldLight` needs, for other objects with None.
+    bounced : True if bounced light is added.
+    has_world : False if bounced light is that of a scene without its world.
+    """
+
+    copy: CopyForCycles
+    world: str
+    lamps: dict[str, tuple | None]
+    bounced: bool
+    has_world: bool
+
+    name = "Finding light with Cycles"
+    finds_light = True
+
+    def weight(self, _job: BakeJob) -> float:
+        return 2.0
+
+    def run(self, job: BakeJob, progress: Progress) -> BakeJob:
+        renders_world = bool(self.world) and self.copy.panorama is None
+        first, second, *rest = progress.split([1.0 * renders_world, 2.0 * self.bounced, *(1.0 for _ in self.lamps)])
         illumination, receiver = job.illumination, job.receiver
-        if world:
-            if self._panorama is None:
-                radiance = world_panorama(self._copy.scene, progress=first)
-                self._panorama = WorldLight(world, *WHITE, True, radiance, UPRIGHT)
-            illumination = illumination.lit_by([self._panorama])
-        if bounced:
+        if renders_world:
+            radiance = world_panorama(self.copy.scene, progress=first)
+            self.copy.panorama = WorldLight(self.world, *WHITE, True, radiance, UPRIGHT)
+        if self.world:
+            illumination = illumination.lit_by([self.copy.panorama])
+        if self.bounced:
             direct = _irradiance_in_the_open(receiver, illumination.lights)
             fields, irradiance = self._fields(receiver, second, "Finding indirect light", direct=direct)
             if irradiance >= NEGLIGIBLE * direct:
                 illumination = illumination.lit_by([FieldLight("Bounced light", *WHITE, False, fields)])
             elif irradiance > 0:
                 illumination = illumination.with_messages(NOTHING_BOUNCES)
-        lights = [self._direct(receiver, name, step) for name, step in zip(others, each)]
+        lights = [self._direct(receiver, name, part) for name, part in zip(self.lamps, rest)]
         return replace(job, illumination=illumination.lit_by(lights))
 
-    def _direct(self, receiver: Receiver, name: str, progress: Progress | None) -> Light:
+    def _direct(self, receiver: Receiver, name: str, progress: Progress) -> Light:
         """Light of one object on the receiver."""
-        lamp = self._lamps.get(name)
+        lamp = self.lamps[name]
         doing = f"Finding the light of '{name}'"
         options = {"light": "DIRECT", "only": [name], "noise": (DIRECT_NOISE, DIRECT_NOISE)}
         if lamp is None:
@@ -175,27 +195,24 @@ class CyclesLight:
         fields, _ = self._fields(receiver, progress, doing, **options, **whole)
         return LampFieldLight(name, *WHITE, False, fields, *lamp)
 
-    def _fields(
-        self, receiver: Receiver, progress: Progress | None, doing: str, **options
-    ) -> tuple[tuple[Field, ...], float]:
+    def _fields(self, receiver: Receiver, progress: Progress, doing: str, **options) -> tuple[tuple[Field, ...], float]:
         """Bounced light, or light as the options ask for, and an estimate of its mean irradiance, W/m^2."""
         request = {
             "charts": charts_of(receiver, NODES),
             "strata": STRATA.tolist(),
             "light": "INDIRECT",
-            "with_world": self._has_world,
+            "with_world": self.has_world,
             "only": [],
             "by_lamps": False,
-            "reflectances": self._copy.reflectances,
-            "textures": self._copy.textures,
+            "reflectances": self.copy.reflectances,
+            "textures": self.copy.textures,
             "noise": (MIN_NOISE, MAX_NOISE),
             "noise_of_all": NOISE_OF_ALL,
             "direct": 0.0,
             "negligible": NEGLIGIBLE,
             "most_samples": MAX_SAMPLES,
         }
-        seconds = seconds_estimate(receiver.width, receiver.height)
-        arrays = run(self._copy.scene, "fields", {**request, **options}, progress, doing, seconds)
+        arrays = run(self.copy.scene, "fields", {**request, **options}, progress, doing)
         grids = (chart.grid for chart in receiver.charts)
         fields = tuple(Field(grid.origin, grid.normal, arrays[f"radiance_{n}"]) for n, grid in enumerate(grids))
         return fields, float(arrays["irradiance"])
@@ -227,17 +244,6 @@ def charts_of(receiver: Receiver, nodes: int) -> list[dict]:
             }
         )
     return charts
-
-
-def seconds_estimate(width: int, height: int) -> float:
-    """Estimate of the seconds that bounced light takes on this machine, for a receiver of that many texels.
-
-    Measured in a white room, where light bounces longest. Scenes of millions of triangles take longer, since Cycles
-    prepares them some six times.
-    """
-    nodes = NODES * max(1, round(NODES * min(width, height) / max(width, height)))
-    paths = nodes * (PATHS_TO_DENOISE if compat.has_denoiser() else PATHS_PER_NODE)
-    return START_SECONDS + paths / (PATHS_PER_SECOND * (os.cpu_count() or 1))
 
 
 def _corners_of_solids(depsgraph) -> np.ndarray:
@@ -276,7 +282,7 @@ def _reflectance(surface) -> list[float]:
 
 
 def world_panorama(
-    copy: SceneCopy, width: int = 4096, height: int = 2048, progress: Progress | None = None
+    copy: SceneCopy, width: int = 4096, height: int = 2048, progress: Callback | None = None
 ) -> np.ndarray:
     """Radiance of the world by direction, for light on a diffuse surface.
 
@@ -294,4 +300,4 @@ def world_panorama(
         `progress` returned False.
     """
     request = {"width": width, "height": height, "samples": WORLD_SAMPLES, "fine_samples": SUN_SAMPLES}
-    return run(copy, "world", request, progress, "Rendering the world", WORLD_SECONDS)["radiance"]
+    return run(copy, "world", request, progress, "Rendering the world")["radiance"]

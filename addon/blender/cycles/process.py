@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core.errors import BakeError
-from ...core.progress import Progress, ask, say
+from ...core.progress import Callback, Progress
 from .scene_copy import SceneCopy
 
 CHILD = Path(__file__).with_name("child.py")
@@ -38,17 +38,16 @@ def run(
     copy: SceneCopy,
     task: str,
     request: dict,
-    progress: Progress | None = None,
+    progress: Callback | None = None,
     doing: str = "Cycles works",
-    seconds: float = 0.0,
 ) -> dict[str, np.ndarray]:
     """Have a child process do a task of child.py on the copy.
 
     Parameters
     ----------
     request : what the task needs, as JSON can hold it.
-    progress : called with 0..1 several times a second, returns False to stop; told what is `doing`.
-    seconds : that it will take, about; 0: nobody knows.
+    progress : called with 0..1 several times a second; returns False to stop.
+    doing : name of the stage for the progress.
 
     Returns
     -------
@@ -64,11 +63,11 @@ def run(
     name = uuid.uuid4().hex
     output, file = copy.folder / f"{name}.npz", copy.folder / f"{name}.json"
     file.write_text(json.dumps({**copy.request, **request, "task": task, "output": str(output), "mark": MARK}))
-    child, pace = _Child(_command(copy, file), counts_samples=task == "render"), _Pace(seconds)
+    child, progress = _Child(_command(copy, file), counts_samples=task == "render"), Progress.of(progress)
     try:
         while child.is_running(POLL_SECONDS):
-            say(progress, doing if child.has_answered else f"{doing} (Cycles starts)")
-            ask(progress, pace.fraction(child.fraction))
+            progress.begin(doing if child.has_answered else f"{doing} (Cycles starts)")
+            progress.check(child.fraction)
             if time.monotonic() - child.heard > SILENT_SECONDS:
                 raise BakeError(f"Cycles gave no sign of life for {SILENT_SECONDS / 60:.0f} minutes.")
     finally:
@@ -86,24 +85,6 @@ def _command(copy: SceneCopy, request: Path) -> list[str]:
     scripts = ["--enable-autoexec"] if copy.request["scripts"] else ["--disable-autoexec"]
     options = ["-b", "--factory-startup", *scripts, str(copy.file), "--python-exit-code", "3", "--python", str(CHILD)]
     return [copy.binary, *options, "--", str(copy.file), str(request)]
-
-
-class _Pace:
-    """Progress of a process that reports it seldom: by the time that has passed, relative to an estimate.
-
-    The estimate alone never completes it: when its time is over, a quarter is left.
-    """
-
-    def __init__(self, seconds: float) -> None:
-        self._began, self._seconds, self._fraction = time.monotonic(), seconds, 0.0
-
-    def fraction(self, told: float) -> float:
-        """Finished fraction, at least the one that the process `told`."""
-        if self._seconds:
-            part = (time.monotonic() - self._began) / self._seconds
-            told = max(told, part if part < 0.5 else 1 - 0.25 / part)
-        self._fraction = max(self._fraction, told)
-        return self._fraction
 
 
 class _Child:

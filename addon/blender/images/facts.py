@@ -18,7 +18,7 @@ from ...core.bake.runner import Bake
 from ...core.exr_header import text_of
 from ...core.messages import Level, Message, note, warning
 from ...core.target import Target
-from ..node.find import find_node, find_targets
+from ..node.find import find_targets, image_of
 from ..read.visibility import with_instanced
 from ..registration import all_or_nothing, handlers
 from . import icons
@@ -157,7 +157,7 @@ def users_of(image) -> list[Target]:
     return [
         target
         for target in find_targets(with_instanced(obj for obj in bpy.data.objects if obj.users_scene))
-        if find_node(bpy.data.materials[target.material_name]).image == image
+        if image_of(target) == image
     ]
 
 

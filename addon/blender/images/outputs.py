@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import bpy
-import numpy as np
 
 from ...core.bake.bake_settings import COMBINED, DIRECTION
 from ...core.bake.layers import LAYERS
@@ -14,7 +13,7 @@ from ...core.batch.batch_options import BatchOptions
 from ...core.batch.names import file_stems
 from ...core.errors import ImageError
 from ...core.target import Target
-from ..node.find import find_node, find_targets
+from ..node.find import find_targets, image_of
 from ..read.visibility import with_instanced
 from . import files
 from .results import Results
@@ -30,9 +29,21 @@ class Outputs:
         self._stems = file_stems(_names(target, layer) for target in targets for layer in LAYERS)
 
     def write(self, bake: Bake, frame: int, attributes: dict[str, str]) -> str:
-        """Write all layers; EXR files of frames get the attributes. The path of the first layer."""
-        paths = [self._write_layer(bake, frame, layer, texture, attributes) for layer, texture in bake.layers.items()]
-        return paths[0]
+        """Write the result of a bake; EXR files of frames get the attributes. The path of the file."""
+        layer, texture = bake.job.settings.layer, bake.texture
+        image = self.own_image(bake.target, layer)
+        if image is not None and tuple(image.size) == texture.shape[1::-1]:
+            filled = self._results.fill_shown(image, bake, texture)
+            if filled is not None:
+                return filled
+            text = f"The image '{image.name}' belongs to another object: '{bake.target}' has a file of its own."
+            bake.warn(image.name, text)
+        path = self.path(bake.target, layer, frame)
+        frame_attributes = attributes if self._options.frames else None
+        files.write_file(path, texture, _format_of(path), frame_attributes, view_of=self._view_of)
+        if path.suffix == files.EXTENSIONS["PNG"] and texture.max() > 1 and self._view_of is None:
+            bake.warn(path.name, f"'{path.name}' clips values above 1.", "EXR keeps them.")
+        return str(path)
 
     def path(self, target: Target, layer: str, frame: int) -> Path:
         """Path of a layer's file in the folder of outputs; raises ImageError if it can't have one."""
@@ -51,26 +62,11 @@ class Outputs:
         options = self._options
         if options.output is not None or options.frames is not None or layer != COMBINED:
             return None
-        image = find_node(bpy.data.materials[target.material_name]).image
+        image = image_of(target)
         path = None if image is None or image.source != "FILE" else files.file_of(image)
         if path is None or options.format not in (None, _format_of(path)):
             return None
         return image
-
-    def _write_layer(self, bake: Bake, frame: int, layer: str, texture: np.ndarray, attributes: dict[str, str]) -> str:
-        image = self.own_image(bake.target, layer)
-        if image is not None and tuple(image.size) == texture.shape[1::-1]:
-            filled = self._results.fill_shown(image, bake, texture)
-            if filled is not None:
-                return filled
-            text = f"The image '{image.name}' belongs to another object: '{bake.target}' has a file of its own."
-            bake.warn(image.name, text)
-        path = self.path(bake.target, layer, frame)
-        frame_attributes = attributes if self._options.frames else None
-        files.write_file(path, texture, _format_of(path), frame_attributes, view_of=self._view_of)
-        if path.suffix == files.EXTENSIONS["PNG"] and texture.max() > 1 and self._view_of is None:
-            bake.warn(path.name, f"'{path.name}' clips values above 1.", "EXR keeps them.")
-        return str(path)
 
 
 def _names(target: Target, layer: str) -> tuple[str, ...]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-
 import bpy
 import numpy as np
 
@@ -40,7 +38,7 @@ class Results:
         if bake.job is None:
             return bake
         try:
-            self._plan(_node(bake.target, bake.job.settings.layers).image, bake)
+            self._plan(_node(bake.target, bake.job.settings.layer).image, bake)
         except BakeError as error:
             return Bake(bake.target, error=error)
         return bake
@@ -55,25 +53,23 @@ class Results:
             self._parts[bake.target, receiver.width, receiver.height] = parts_of(receiver)
 
     def store(self, bake: Bake) -> str:
-        """Fill the image of the target's node, or a new one, and show it; other layers get images of their own.
+        """Fill the image of the target's node, or a new one, and show it; other layers have images of their own.
 
         If the node's image holds the result of another target, the target gets a new image. Returns the path of the
-        first layer's file, "" if it is packed.
+        file, "" if the image is packed.
 
         Raises
         ------
         BakeError
             The result can't be stored.
         """
-        node, paths = _node(bake.target, bake.layers), []
-        for layer, texture in bake.layers.items():
-            if layer == COMBINED:
-                path, image = self._store_shown(node, bake, texture)
-                bake.messages.add(*link_result(node, image))
-            else:
-                path = self._store_beside(node, bake, layer, texture)
-            paths.append(path)
-        return paths[0]
+        layer, texture = bake.job.settings.layer, bake.texture
+        node = _node(bake.target, layer)
+        if layer != COMBINED:
+            return self._store_beside(node, bake, layer, texture)
+        path, image = self._store_shown(node, bake, texture)
+        bake.messages.add(*link_result(node, image))
+        return path
 
     def fill(self, image, bake: Bake, texture: np.ndarray, shown=None) -> str | None:
         """Fill the bake's part of an image; the path of its file, None if the part belongs to another target.
@@ -182,13 +178,13 @@ class Results:
                 )
 
 
-def _node(target: Target, layers: Collection[str]):
+def _node(target: Target, layer: str):
     """The target's node; raises BakeError if it is gone, or if it must be changed and can't be."""
     material = bpy.data.materials.get(target.material_name)
     node = find_node(material)
     if node is None:
         raise BakeError("The material or its Beamspread node was removed or renamed during the bake: bake again.")
-    if COMBINED in layers:
+    if layer == COMBINED:
         check_editable(material)
     return node
 

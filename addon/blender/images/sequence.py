@@ -12,7 +12,7 @@ from ...core.batch.batch_options import parse
 from ...core.errors import ImageError
 from ...core.messages import Message, warning
 from ...core.target import Target
-from ..node.find import find_node, find_targets
+from ..node.find import find_targets, node_of
 from ..node.node import link_result
 from ..node.tree import follow_frames
 from ..read.visibility import with_instanced
@@ -101,7 +101,7 @@ Each node keeps its own image for Show Single Images"""
         return {"FINISHED"}
 
     def _show(self, target: Target, numbers: list[int], path: Path) -> None:
-        messages = show_frames(_node(target), numbers, path)
+        messages = show_frames(node_of(target), numbers, path)
         missing = numbers[-1] - numbers[0] + 1 - len(numbers)
         if missing:
             text = f"{missing} of the frames {numbers[0]} to {numbers[-1]} of '{target}' are missing."
@@ -133,13 +133,9 @@ def _local_targets(scene) -> list[Target]:
     return [target for target in targets if bpy.data.materials[target.material_name].library is None]
 
 
-def _node(target: Target):
-    return find_node(bpy.data.materials[target.material_name])
-
-
 def _nodes_with_frames(scene) -> list:
     """Nodes that show the frames of a batch."""
-    return [node for target in _local_targets(scene) if is_sequence((node := _node(target)).image)]
+    return [node for target in _local_targets(scene) if is_sequence((node := node_of(target)).image)]
 
 
 register, unregister = all_or_nothing(*classes(BEAMSPREAD_OT_show_frames, BEAMSPREAD_OT_show_single))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+import bpy
+
 from ...core.bake.runner import Bake
 from ...core.target import Target
 from .. import compat
@@ -18,6 +20,17 @@ def find_node(material):
     """The material's Beamspread node, or None; a linked node wins over others."""
     node = find_node_in_groups(material)
     return node and node[0]
+
+
+def node_of(target: Target):
+    """The target's Beamspread node, or None if it or its material is gone."""
+    return find_node(bpy.data.materials.get(target.material_name))
+
+
+def image_of(target: Target):
+    """The image of the target's node, or None."""
+    node = node_of(target)
+    return None if node is None else node.image
 
 
 def find_node_in_groups(material) -> tuple | None:

@@ -6,10 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...core.errors import MissingImageError, NotSupportedError
 from ...core.scene.receiver import Receiver
 from ...core.scene.sampling import sample_positions
-from .image_nodes import Images, Pixels
+from .image_nodes import Images
 from .nodes import Evaluator, InputSocket, Links, Source, converted, shows_bake
 from .shading import ON_NO_PATH, ShadingPoints
 from .visibility import ObjectInstance
@@ -65,22 +64,6 @@ def read_base_color(
                 total[rows] += _color(_OnChart(outputs, images, uv_map, links, check), wanted, uvs[rows].shape[:2])
         colors.append(np.maximum(total / side**2, 0))
     return colors
-
-
-def is_understood(wanted: InputSocket, obj) -> bool:
-    """True unless only Cycles can evaluate the nodes; reads no pixels."""
-    nowhere = _outputs(np.zeros((1, 1, 2)), np.zeros((1, 1, 3)), np.eye(4))
-    try:
-        _OnChart(nowhere, Images(_Unread()), _uv_map(obj)).value(wanted)
-    except NotSupportedError as error:
-        return isinstance(error, MissingImageError)
-    return True
-
-
-class _Unread(Pixels):
-    @staticmethod
-    def _read(_image) -> np.ndarray:
-        return np.ones((1, 1, 4), np.float32)
 
 
 def _uv_map(obj) -> str:

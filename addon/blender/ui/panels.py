@@ -14,7 +14,7 @@ from ..node.tree import BASE_COLOR
 from ..preferences import draw_help
 from ..read.nodes import InputSocket, Links
 from ..registration import all_or_nothing, classes
-from .bake_panel import draw_bake, draw_lines, estimates
+from .bake_panel import draw_bake, draw_lines
 
 
 def _use_columns(layout) -> None:
@@ -61,7 +61,6 @@ class BEAMSPREAD_PT_render(RenderPanel, bpy.types.Panel):
             column.prop(settings, name)
         draw_image_buttons(column, context)  # beside the resolution, which existing images don't follow
         column.prop(settings, "use_indirect")
-        draw_lines(column, context, estimates(context), "TIME")
 
 
 class BEAMSPREAD_PT_expert(RenderPanel, bpy.types.Panel):

@@ -13,7 +13,7 @@ from ..arrays import float_array
 from ..ldf.library import library
 from ..material import Material
 from ..native import native
-from ..progress import Progress, stages
+from ..progress import Callback, Progress
 
 Ldf: TypeAlias = (
     "native.LdfSource | native.LdfSample | Sequence[native.LdfSample]"
@@ -35,7 +35,7 @@ def luminance(
     solver: str = "fft",
     tolerance: float = 1e-3,
     threads: int = 0,
-    progress: Progress | None = None,
+    progress: Callback | None = None,
 ) -> NDArray[np.float32]:
     """Luminance that beams on a regular grid cause on a plane of a material.
 
@@ -76,7 +76,7 @@ def luminance(
     material.check()
     media = material.channel_media(thickness)
     distinct = list(dict.fromkeys(media))
-    *reading, solving = stages(progress, [1.0] * len(distinct) + [SOLVE_WEIGHT])
+    *reading, solving = Progress.of(progress).split([1.0] * len(distinct) + [SOLVE_WEIGHT])
     ldfs = {medium: library(medium, quality, part, threads) for medium, part in zip(distinct, reading)}
     return convolve(
         irradiance,
@@ -102,7 +102,7 @@ def convolve(
     solver: str = "fft",
     tolerance: float = 1e-3,
     threads: int = 0,
-    progress: Progress | None = None,
+    progress: Callback | None = None,
     interpolation: str = "angular",
 ) -> NDArray[np.float32]:
     """Luminance that beams on a regular grid of a plane cause (Manabe et al. 2012, Eq. 2).
@@ -167,7 +167,7 @@ def convolve_lights(
     solver: str = "fft",
     tolerance: float = 1e-3,
     threads: int = 0,
-    progress: Progress | None = None,
+    progress: Callback | None = None,
     interpolation: str = "angular",
 ) -> NDArray[np.float32]:
     """Luminance of several lights together: the sum of the results of `convolve` for each.
@@ -201,7 +201,7 @@ def solve(
     solver: str,
     tolerance: float,
     threads: int = 0,
-    progress: Progress | None = None,
+    progress: Callback | None = None,
     interpolation: str = "angular",
 ) -> NDArray[np.float32]:
     """`convolve_lights` for native lights, which have a color and may have one direction for all texels."""

@@ -1,9 +1,9 @@
-"""One bake as plain data: everything that `run` needs, nothing that knows the host."""
+"""One bake as plain data: all that its steps need, and nothing that depends on the host."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,33 +11,99 @@ import numpy as np
 from ..errors import BakeError
 from ..ldf.library import is_known, library
 from ..messages import Message, warning
-from ..progress import Progress, say, stages, timed
+from ..progress import Callback, Progress, timed
 from ..scene.illumination import Illumination
 from ..scene.receiver import Receiver
 from .bake_settings import COMBINED, BakeSettings
-from .estimate import (
-    NARROW,
-    SUNS,
-    WIDE,
-    bake_bytes,
-    machine_bytes,
-    pass_bytes,
-    ray_seconds,
-    simulation_seconds,
-    solver_seconds,
-)
 from .layers import LAYERS, WITHOUT_MEDIUM
-from .luminance import rays_per_texel
 from .margin import extend_margin
+from .memory import NARROW, SUNS, WIDE, bake_bytes, machine_bytes, pass_bytes
 from .surface import Surface
+
+
+class Step(ABC):
+    """One step of a job. Steps are plain data; they run in any thread.
+
+    Attributes
+    ----------
+    name : says what is done while the step runs.
+    finds_light : True if the step may add lights to the job.
+    """
+
+    name = ""
+    finds_light = False
+
+    @abstractmethod
+    def run(self, job: BakeJob, progress: Progress) -> BakeJob:
+        """The job with what the step adds to it."""
+
+    def weight(self, _job: BakeJob) -> float:
+        """Length of the step in a progress bar, relative to other steps; 0 if it takes no time."""
+        return 1.0
+
+    def memory_bytes(self, _job: BakeJob) -> float:
+        """Memory that the step takes at its peak, about, in bytes."""
+        return 0.0
+
+
+@dataclass(frozen=True)
+class Simulate(Step):
+    """Simulates the media of the surface, and caches them."""
+
+    name = "Simulating the material"
+
+    def weight(self, job: BakeJob) -> float:
+        return 4.0 if to_simulate(job.surface, job.settings) else 0.0
+
+    def run(self, job: BakeJob, progress: Progress) -> BakeJob:
+        media, settings = to_simulate(job.surface, job.settings), job.settings
+        for medium, part in zip(media, progress.split([1.0] * len(media))):
+            library(medium, settings.quality, part, settings.threads)
+        return job
+
+
+@dataclass(frozen=True)
+class Solve(Step):
+    """Computes the result from the light and the surface."""
+
+    name = "Baking"
+
+    def run(self, job: BakeJob, progress: Progress) -> BakeJob:
+        material, settings = job.surface.material, job.settings
+        if needs_medium(settings):
+            material = job.surface.resolve(settings.quality, None, settings.threads)
+        rest = material, job.surface.thickness, settings
+        charts = job.receiver.charts
+        values = [
+            LAYERS[settings.layer](chart.grid, job.illumination, *rest, part, job.bytes_for_light())
+            for chart, part in zip(charts, progress.split([1.0] * len(charts)))
+        ]
+        if not all(np.isfinite(on_grid).all() for on_grid in values):
+            text = "The bake produced values that are not numbers."
+            raise BakeError(text, "Check the strengths of the lights.")
+        texture = job.receiver.to_texture(values)
+        del values  # large
+        return replace(job, texture=extend_margin(texture, job.receiver.coverage, settings.margin))
+
+    def memory_bytes(self, job: BakeJob) -> float:
+        texels, lights, surface = job.receiver.coverage.size, job.illumination.lights, job.surface
+        if not needs_medium(job.settings):
+            return pass_bytes(texels)
+        is_narrow = not job.finds_light and all(light.has_one_direction for light in lights)
+        kind = (SUNS if all(light.is_parallel for light in lights) else NARROW) if is_narrow else WIDE
+        is_slab = surface.thickness > 0 and surface.material.ior > 1
+        paths = surface.thickness / max(surface.material.mean_free_path) if is_slab else math.inf
+        return bake_bytes(texels, job.settings.solver, kind, paths)
 
 
 @dataclass(frozen=True, eq=False)
 class BakeJob:
-    """A receiver with its light and its surface; `name` is what to call the receiver in messages.
+    """A receiver with its light, its surface, and the steps that are left.
 
-    `more_color` makes another job of it, with the surface and the texture that it lacks, `more_light` one with what its
-    illumination lacks, as bounced light, in whatever thread; they take about `color_seconds` and `more_seconds`.
+    Attributes
+    ----------
+    name : of the object, for messages.
+    texture : result, float32 (height, width, 3) with margin, row 0 at the bottom; None until the last step has run.
     """
 
     name: str
@@ -45,99 +111,53 @@ class BakeJob:
     illumination: Illumination
     surface: Surface
     settings: BakeSettings
-    more_light: Callable[[BakeJob, Progress | None], BakeJob] | None = None
-    more_seconds: float = 0.0
-    more_color: Callable[[BakeJob, Progress | None], BakeJob] | None = None
-    color_seconds: float = 0.0
+    steps: tuple[Step, ...] = (Simulate(), Solve())
+    texture: np.ndarray | None = None
 
-    def colored(self, progress: Progress | None = None) -> tuple[BakeJob, Progress | None]:
-        """The job with its colours, which may have more to warn of, and the progress that is left for `run`."""
-        if self.more_color is None or self._surely_dark():
-            return self, progress
+    def run(self, progress: Callback | None = None) -> BakeJob:
+        """The job after all its steps. It may have more messages than before."""
         self.surface.check()
-        coloring, rest = stages(progress, [self.color_seconds, self._finding_seconds() + self._baking_seconds()])
-        say(coloring, "Evaluating the base color")
-        with timed(f"base color of '{self.name}'"):
-            return replace(self.more_color(self, coloring), more_color=None), rest
+        job = self
+        weights = [step.weight(self) for step in self.steps]
+        for weight, part in zip(weights, Progress.of(progress).split(weights)):
+            if job._surely_dark():  # before a simulation, which takes long
+                return replace(job, steps=(), texture=np.zeros((*job.receiver.coverage.shape, 3), np.float32))
+            step, *rest = job.steps
+            if weight:
+                part.begin(step.name)
+            with timed(f"'{self.name}': {step.name}"):
+                job = replace(step.run(job, part), steps=tuple(rest))
+        return job
 
-    def lit(self, progress: Progress | None = None) -> tuple[BakeJob, Progress | None]:
-        """The `colored` job with all its light, which may have more to warn of, and the progress left for `run`."""
-        if self.more_light is None:
-            return self, progress
-        self.surface.check()
-        finding, rest = stages(progress, [self._finding_seconds(), self._baking_seconds()])
-        say(finding, "Finding indirect light")
-        with timed(f"bounced light of '{self.name}'"):
-            return replace(self.more_light(self, finding), more_light=None), rest
-
-    def run(self, progress: Progress | None = None) -> dict[str, np.ndarray]:
-        """The layers of a `lit` job: name -> float32 (height, width, 3), with margin, row 0 at the bottom."""
-        self.surface.check()
-        if self._surely_dark():  # at once: to simulate the medium may take half a minute
-            return {name: np.zeros((*self.receiver.coverage.shape, 3), np.float32) for name in self.settings.layers}
-        parts = len(self.settings.layers) * len(self.receiver.charts)
-        simulating, *solving = stages(progress, [self._simulation_seconds()] + [self._solver_seconds() / parts] * parts)
-        self._simulate(simulating)
-        say(progress, "Baking")
-        material, steps = self.surface.material, iter(solving)
-        if needs_medium(self.settings):
-            with timed(f"albedo of '{self.name}'"):
-                material = self.surface.resolve(self.settings.quality, None, self.settings.threads)
-        layers = {}
-        for name in self.settings.layers:
-            with timed(f"{name} of '{self.name}'"):
-                values = [LAYERS[name](self, chart.grid, material, next(steps)) for chart in self.receiver.charts]
-            if not all(np.isfinite(on_grid).all() for on_grid in values):
-                raise BakeError("The bake produced values that are not numbers: check the strengths of the lights.")
-            texture = self.receiver.to_texture(values)
-            del values  # large
-            layers[name] = extend_margin(texture, self.receiver.coverage, self.settings.margin)
-        return layers
-
-    def _simulate(self, progress: Progress | None) -> None:
-        media = to_simulate(self.surface, self.settings)
-        for medium, step in zip(media, stages(progress, [1.0] * len(media))):
-            library(medium, self.settings.quality, step, self.settings.threads)
-
-    def _finding_seconds(self) -> float:
-        return self.more_seconds if self.more_light else 0.0
-
-    def _baking_seconds(self) -> float:
-        return self._simulation_seconds() + self._solver_seconds()
-
-    def _simulation_seconds(self) -> float:
-        return simulation_seconds(self.settings.quality, self.settings.threads) * len(
-            to_simulate(self.surface, self.settings)
-        )
-
-    def _solver_seconds(self) -> float:
-        shape, settings = self.receiver.coverage.shape, self.settings
-        suns = sum(light.is_parallel for light in self.illumination.lights)
-        others = len(self.illumination.lights) - suns
-        seconds = solver_seconds(*shape, suns, others, settings.solver, settings.threads)
-        if not all(light.has_one_direction for light in self.illumination.lights):
-            rays = max(rays_per_texel(chart.grid, self.surface.material, settings) for chart in self.receiver.charts)
-            seconds += ray_seconds(shape[0] * shape[1], rays, settings.threads)
-        return 0.1 + seconds * len(settings.layers)
+    @property
+    def finds_light(self) -> bool:
+        """True if a step that is left may add lights."""
+        return any(step.finds_light for step in self.steps)
 
     def memory_bytes(self) -> float:
-        """The most memory that it takes, about, but for what is kept of light, and for the host and other processes."""
-        texels, lights, surface = self.receiver.coverage.size, self.illumination.lights, self.surface
-        if not needs_medium(self.settings):
-            return pass_bytes(texels)
-        is_narrow = self.more_light is None and all(light.has_one_direction for light in lights)
-        kind = (SUNS if all(light.is_parallel for light in lights) else NARROW) if is_narrow else WIDE
-        is_slab = surface.thickness > 0 and surface.material.ior > 1
-        paths = surface.thickness / max(surface.material.mean_free_path) if is_slab else math.inf
-        return bake_bytes(texels, self.settings.solver, kind, paths)
+        """Peak memory, bytes, about, without the light that is kept, the host and other processes."""
+        return max(step.memory_bytes(self) for step in self.steps)
+
+    def check_memory(self) -> None:
+        """Raise BakeError if a step would take more memory than the limit of the settings, or than the machine has."""
+        limit = self.settings.memory_limit or machine_bytes()
+        largest = max(self.steps, key=lambda step: step.memory_bytes(self))
+        needed = largest.memory_bytes(self)
+        if limit and needed > limit:
+            texels = f"{self.receiver.width} x {self.receiver.height} texels"
+            raise BakeError(
+                f"{largest.name}: {texels} take about {needed / 2**30:.1f} GB of memory, and {limit / 2**30:.1f} GB "
+                "are allowed.",
+                "Lower the resolution, or raise the memory limit in the add-on's preferences.",
+            )
 
     def bytes_for_light(self) -> int:
-        """What its limit leaves for what is kept of light; 0: any."""
+        """Memory that is left for the light that the fft solver keeps, bytes; 0: no limit."""
         limit = self.settings.memory_limit or machine_bytes()
-        return max(1, int(limit - self.memory_bytes())) if limit else 0
+        return max(1, int(limit - Solve().memory_bytes(self))) if limit else 0
 
     def messages(self) -> list[Message]:
-        """What the artist should know before the job runs."""
+        """Messages for the artist before the job runs."""
         return [*self.left_out(), *self._surely_dark()]
 
     def left_out(self) -> list[Message]:
@@ -146,9 +166,10 @@ class BakeJob:
 
     def _shining_through(self) -> list[Message]:
         """The warning about lights behind a slab: they shine through to the side that is baked."""
-        if COMBINED not in self.settings.layers or not self.surface.thickness:
+        if self.settings.layer != COMBINED or not self.surface.thickness:
             return []
-        backs = [replace(one.grid, normal=tuple(-value for value in one.grid.normal)) for one in self.receiver.charts]
+        grids = [chart.grid for chart in self.receiver.charts]
+        backs = [replace(grid, normal=tuple(-value for value in grid.normal)) for grid in grids]
         lights = [light for light in self.illumination.lights if not all(light.is_behind(back) for back in backs)]
         if not lights:
             return []
@@ -157,7 +178,7 @@ class BakeJob:
         return [warning(self.name, text)]
 
     def _surely_dark(self) -> list[Message]:
-        return [] if self.more_light is not None else self._dark_by_lights()
+        return [] if self.finds_light else self._dark_by_lights()
 
     def _dark_by_lights(self) -> list[Message]:
         """The warning that none of the lights can reach the receiver, whatever the occluders."""
@@ -169,25 +190,25 @@ class BakeJob:
             return [warning(self.name, text, "Flip its normals (Mesh > Normals > Flip in Edit Mode).")]
         return []
 
-    def is_dark(self, layers: dict[str, np.ndarray]) -> bool:
-        """Whether its result shows that no light arrived; what absorbs everything is black in any light."""
+    def is_dark(self) -> bool:
+        """True if the result shows that no light arrived; a surface that absorbs everything is black in any light."""
         if self._surely_dark():
             return True
         color = self.surface.base_color or self.surface.material.albedo
-        telling = [texture for name, texture in layers.items() if name in WITHOUT_MEDIUM or any(color)]
-        return bool(telling) and not any(texture.any() for texture in telling)
+        tells_light = self.settings.layer in WITHOUT_MEDIUM or any(color)
+        return tells_light and self.texture is not None and not self.texture.any()
 
-    def messages_after(self, layers: dict[str, np.ndarray]) -> list[Message]:
-        """The messages that follow from the result."""
-        if self._surely_dark() or not self.is_dark(layers):
+    def messages_after(self) -> list[Message]:
+        """Messages that follow from the result."""
+        if self._surely_dark() or not self.is_dark():
             return []
         text = f"No light reaches '{self.name}', so it is black."
-        return self._dark_by_lights() or [warning(self.name, text, "Look for objects that block the light.")]
+        return [warning(self.name, text, "Look for objects that block the light.")]
 
 
 def needs_medium(settings: BakeSettings) -> bool:
-    """Whether what the surface is made of matters to a bake."""
-    return not WITHOUT_MEDIUM.issuperset(settings.layers)
+    """True if the result depends on the material."""
+    return settings.layer not in WITHOUT_MEDIUM
 
 
 def to_simulate(surface: Surface, settings: BakeSettings) -> list:

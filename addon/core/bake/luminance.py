@@ -11,7 +11,7 @@ from ..ldf.library import library
 from ..ldf.samples import load_source
 from ..material import Material, check_thickness
 from ..native import native
-from ..progress import Progress, stages
+from ..progress import Callback, Progress
 from ..scene.grid import Grid
 from ..scene.illumination import Illumination
 from .bake_settings import BakeSettings
@@ -37,7 +37,7 @@ def bake(
     material: Material,
     thickness: float,
     settings: BakeSettings,
-    progress: Progress | None = None,
+    progress: Callback | None = None,
     bytes_for_light: int = 0,
 ) -> np.ndarray:
     """Luminance of a translucent plane.
@@ -66,7 +66,7 @@ def bake(
     """
     material.check()
     check_thickness(thickness)
-    media_progress, light_progress = stages(progress, [LIBRARY_PART, 1.0 - LIBRARY_PART])
+    media_progress, light_progress = Progress.of(progress).split([LIBRARY_PART, 1.0 - LIBRARY_PART])
     if settings.distributions == "library":
         sources = _libraries(material, thickness, settings, media_progress)
     else:
@@ -80,7 +80,7 @@ def spread(
     material: Material,
     sources: list,
     settings: BakeSettings,
-    progress: Progress | None = None,
+    progress: Callback | None = None,
     bytes_for_light: int = 0,
     seed: int = 0,
 ) -> np.ndarray:
@@ -126,10 +126,10 @@ def rays_per_texel(grid: Grid, material: Material, settings: BakeSettings) -> in
     return round(min(max(wanted, MIN_RAYS), MAX_RAYS) * (settings.samples / 4) ** 2) or 1
 
 
-def _libraries(material: Material, thickness: float, settings: BakeSettings, progress: Progress | None) -> list:
+def _libraries(material: Material, thickness: float, settings: BakeSettings, progress: Progress) -> list:
     """The LDF library of each channel; channels of the same medium share one."""
     media = channel_media(material, thickness)
     libraries = dict.fromkeys(media)
-    for medium, stage in zip(libraries, stages(progress, [1.0] * len(libraries))):
+    for medium, stage in zip(libraries, progress.split([1.0] * len(libraries))):
         libraries[medium] = library(medium, settings.quality, stage, settings.threads)
     return [libraries[medium] for medium in media]

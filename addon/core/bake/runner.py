@@ -1,16 +1,17 @@
-"""Runs jobs and notes what became of each; the window, the engine and the batch all bake through this."""
+"""Runs bakes one after the other; the window, the engine and the batch are its hosts."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from ..errors import message_of
 from ..messages import Level, Message, Messages, warning
 from ..native import native
-from ..progress import Progress
+from ..progress import Callback, Progress
 from ..target import Target
 from .job import BakeJob
 
@@ -18,14 +19,14 @@ WRITTEN, SKIPPED, FAILED, CANCELLED = "written", "skipped", "failed", "cancelled
 
 
 class Bake:
-    """One target, from its job to what became of it.
+    """One target, from its job to its result.
 
     Attributes
     ----------
-    job : None where there can be none; `error` says why.
+    job : None if there can be none; an error says why.
     status : one of the constants above; FAILED until `keep` has stored the result.
     messages : all messages for the artist; an error among them unless the status is WRITTEN.
-    layers : results of the job, see `BakeJob.run`; empty before it has run and once they are stored.
+    texture : result of the job, see `BakeJob`; None before it has run and once it is stored.
     path : file that `keep` has written, if any.
     seconds : wall-clock time of `run` and `keep`.
     is_dark : True if the job has run and no light arrived.
@@ -35,7 +36,7 @@ class Bake:
         self.target, self.job = target, job
         self.status = FAILED
         self.messages = Messages(job.messages() if job else ())
-        self.layers: dict[str, np.ndarray] = {}
+        self.texture: np.ndarray | None = None
         self.path = ""
         self.is_dark = False
         self.seconds = 0.0
@@ -57,33 +58,35 @@ class Bake:
     def warn(self, subject: str, text: str, remedy: str = "") -> None:
         self.messages.add(warning(subject, text, remedy))
 
-    def run(self, progress: Progress | None = None) -> None:
-        """Make the layers. Touches nothing of the host's, so that it may run in any thread."""
+    def run(self, progress: Callback | None = None) -> None:
+        """Run the job. Touches no data of the host, so that it may run in any thread."""
         if self.job is None:
             return
-        start = time.monotonic()
+        start, progress = time.monotonic(), Progress.of(progress)
         try:
-            self.job, rest = self.job.colored(progress)
-            job, rest = self.job.lit(rest)  # not kept: what was found is large
-            self.messages.add(*job.messages())
-            self.layers = job.run(rest)
-            self.is_dark = job.is_dark(self.layers)
-            self.messages.add(*job.messages_after(self.layers))
+            done = self.job.run(progress)
+            self.texture, self.is_dark = done.texture, done.is_dark()
+            self.messages.add(*done.messages(), *done.messages_after())
+            # The lights that steps have found are large, and no longer needed.
+            lights = self.job.illumination.lights
+            self.job = replace(done, illumination=done.illumination.with_lights(lights), texture=None)
         except (KeyboardInterrupt, native.Cancelled):
             self.cancel()
         except Exception as error:  # noqa: BLE001 - the others are still to be baked
             self.fail(error)
+        if progress.is_cancelled:
+            self.cancel()  # even if it ended, or failed, just before it would have stopped
         self.seconds += time.monotonic() - start
 
     def cancel(self) -> None:
         """Drop the result, so that nothing is kept."""
-        self.layers, self.status = {}, CANCELLED
+        self.texture, self.status = None, CANCELLED
         self.messages = Messages(self.messages.of(Level.WARNING, Level.INFO))
         self.fail("The bake was cancelled.")
 
     def keep(self, store: Callable[[Bake], str]) -> None:
-        """Have `store` put the layers where they belong; it returns the path of the file written, if one was."""
-        if not self.layers:
+        """Have `store` put the texture where it belongs; it returns the path of the file written, if one was."""
+        if self.texture is None:
             return
         start = time.monotonic()
         try:
@@ -92,5 +95,35 @@ class Bake:
         except Exception as error:  # noqa: BLE001 - e.g. the material was deleted meanwhile
             self.fail(error)
         finally:
-            self.layers = {}  # large
+            self.texture = None  # large
         self.seconds += time.monotonic() - start
+
+
+class Sink:
+    """Host of a run: runs the jobs where it likes, stores results and shows messages."""
+
+    def run(self, bake: Bake) -> Iterator[None]:
+        """Run the bake's job. A host with an event loop yields while the job runs in another thread."""
+        bake.run()
+        return iter(())
+
+    def store(self, bake: Bake) -> str:
+        """Put the texture of a bake where it belongs; the path of the file written, or ""."""
+        raise NotImplementedError
+
+    def end(self, bake: Bake) -> None:
+        """Take note of a bake that has ended: written, failed or cancelled."""
+
+
+def run_in_steps(bakes: Iterable[Bake], sink: Sink) -> Iterator[None]:
+    """Run, store and note each bake. Yields whenever `sink.run` does, so that a host can go on in between."""
+    for bake in bakes:
+        yield from sink.run(bake)
+        bake.keep(sink.store)
+        sink.end(bake)
+
+
+def run_bakes(bakes: Iterable[Bake], sink: Sink) -> None:
+    """Run, store and note each bake."""
+    for _ in run_in_steps(bakes, sink):
+        pass

@@ -10,7 +10,7 @@ import numpy as np
 from ..ldf.albedo import albedo_from_color
 from ..material import RGB, Material, check_base_color, check_thickness
 from ..native import native
-from ..progress import Progress, stages
+from ..progress import Callback, Progress
 
 
 def channel_media(material: Material, thickness: float) -> list:
@@ -24,9 +24,9 @@ class Surface:
 
     Attributes
     ----------
-    material : with its mean free path.
-    thickness : 0 for a half-space.
-    base_color : reflectance wanted under uniform diffuse light, or None where the material's albedo counts.
+    material : its lengths are in scene units.
+    thickness : thickness of the slab; 0 for a half-space.
+    base_color : reflectance under uniform diffuse light; None if the material's albedo counts.
     """
 
     material: Material
@@ -42,7 +42,7 @@ class Surface:
             check_base_color(self.base_color)
 
     def reflectance(self) -> list[float]:
-        """Of each channel, the diffuse part under uniform diffuse light, without noise and without a simulation."""
+        """Diffuse reflectance of each channel under uniform diffuse light, exact and without a simulation."""
         self.check()
         if self.base_color is not None:
             return list(map(float, self.base_color))
@@ -56,16 +56,16 @@ class Surface:
         return values
 
     def media(self) -> list:
-        """The native `Medium`s that its bake needs libraries of, each once."""
+        """Native `Medium`s that a bake needs libraries of, each once."""
         return list(dict.fromkeys(channel_media(self.material, self.thickness)))
 
-    def resolve(self, quality: str, progress: Progress | None = None, threads: int = 0) -> Material:
-        """The material, its albedo worked out from the base colour if there is one."""
+    def resolve(self, quality: str, progress: Callback | None = None, threads: int = 0) -> Material:
+        """The material, with the albedo that gives the base color if there is one."""
         self.check()
         if self.base_color is None:
             return self.material
         channels = zip(self.base_color, channel_media(self.material, self.thickness))
         albedo = []
-        for (color, medium), stage in zip(channels, stages(progress, [1.0] * len(self.base_color))):
+        for (color, medium), stage in zip(channels, Progress.of(progress).split([1.0] * len(self.base_color))):
             albedo.append(albedo_from_color(color, medium, quality, stage, threads)[0])
         return replace(self.material, albedo=tuple(albedo))

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..arrays import float_array
 from ..material import RGB
 from ..native import native
-from ..progress import Progress
+from ..progress import Callback
 from .library import library
 
 MAX_ALBEDO = 0.99999
@@ -18,7 +18,7 @@ MAX_ALBEDO = 0.99999
 
 
 def albedo_from_color(
-    color: ArrayLike, medium: native.Medium, quality: str = "final", progress: Progress | None = None, threads: int = 0
+    color: ArrayLike, medium: native.Medium, quality: str = "final", progress: Callback | None = None, threads: int = 0
 ) -> RGB:
     """Single-scattering albedo whose reflectance under uniform diffuse light is `color`.
 

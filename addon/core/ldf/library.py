@@ -9,15 +9,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..native import native
-from ..progress import Progress, say
+from ..progress import Callback, Progress
 from ..recent import keep_recent
 from ..whole_file import whole_file
 
 PHOTONS = {"preview": 80_000, "final": 4_000_000}
 """Photons per angle for a medium with g .8 and ior 1. More: less noise, more time; see `photons_for`."""
-
-SIMULATING = "Simulating the medium, once"
-"""Message of the progress bar during a simulation."""
 
 _MAX_PHOTONS = 4_000_000
 """Largest number of photons per angle. More: less noise in media of little scattering, more time."""
@@ -83,7 +80,7 @@ def photons_for(medium: native.Medium, quality: str) -> int:
 
 
 def make(
-    medium: native.Medium, quality: str, progress: Progress | None = None, kernel: str = "", threads: int = 0
+    medium: native.Medium, quality: str, progress: Callback | None = None, kernel: str = "", threads: int = 0
 ) -> native.LdfLibrary:
     """Simulate the library of a medium and make its totals exact."""
     photons = photons_for(medium, quality)
@@ -171,7 +168,7 @@ _MAX_LOADED = 8
 
 
 def library(
-    medium: native.Medium, quality: str = "final", progress: Progress | None = None, threads: int = 0
+    medium: native.Medium, quality: str = "final", progress: Callback | None = None, threads: int = 0
 ) -> native.LdfLibrary:
     """Load the LDF library of a medium, for every angle of incidence and albedo, or simulate it (up to minutes).
 
@@ -204,7 +201,8 @@ def library(
         raise ValueError(f"argument 'quality' is {quality!r}; allowed: 'final', 'preview'")
     if available := _available_library(medium, quality):
         return available
-    say(progress, SIMULATING + (" (preview)" if quality == "preview" else ""))
+    progress = Progress.of(progress)
+    progress.begin(f"Simulating the material ({'quick preview' if quality == 'preview' else 'only the first time'})")
     simulated = make(medium, quality, progress, threads=threads)
     path = _cache_path(medium, quality)
     _store(simulated, path)

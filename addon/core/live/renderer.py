@@ -270,4 +270,4 @@ def _common_color(grid: Grid, illumination: Illumination) -> np.ndarray | None:
 
 def for_live(settings: BakeSettings) -> BakeSettings:
     """The settings of a scene as Live uses them: the FFT solver, without indirect light."""
-    return replace(settings, solver="fft", indirect=False, layers=(COMBINED,))
+    return replace(settings, solver="fft", indirect=False, layer=COMBINED)

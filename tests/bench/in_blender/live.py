@@ -174,7 +174,7 @@ def main():
             if not waiting["for"]():
                 if time.monotonic() - waiting["since"] < PATIENCE_SECONDS:
                     return 0.001
-                raise TimeoutError(f"waited in vain after {times}, {timer.messages()}")
+                raise TimeoutError(f"waited in vain after {times}, {[*map(str, timer.messages())]}")
             waiting.update({"for": next(steps), "since": time.monotonic()})
             return 0.001
         except StopIteration:

@@ -1,7 +1,7 @@
-"""What bakes read of a scene, as short digests: where they still are the same, so is what would be baked.
+"""Digests of the parts of a scene that bakes read: while they stay the same, so does the result of a bake.
 
-They are made from the scene as the window has it, so that they cost little. Another version of Blender may make
-others: after a change of version a bake counts as stale.
+They are made from the scene as the window has it, so that they cost little. Another version of Blender may make other
+digests: after a change of version a bake counts as out of date.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ import numpy as np
 from ....core.errors import text_of
 from ....core.target import Target
 from ... import compat
-from ...node.find import find_node
+from ...node.find import find_node, node_of
 from ...node.tree import is_inner_tree
 from ...read.visibility import SOLID_TYPES, SURFACE_TYPES, by_name, collection_of, render_visible_names, rendered_in
 from .pixels import Pixels, images_of, results
 from .scatter import Scatter, scatters
 
 Parts = dict[str, str]
-"""By a name that artists understand, the digest of one part of what a bake reads."""
+"""Digests of the parts of a scene that a bake reads, by names for artists."""
 
 IMAGE, QUALITY, SETTINGS = "size of the image", "quality", "settings"
 
-# Of Cycles, for light that other objects return.
+# Cycles' settings for bounced light.
 BOUNCES = (
     *("max_bounces", "diffuse_bounces", "glossy_bounces", "transmission_bounces", "volume_bounces"),
     *("transparent_max_bounces", "caustics_reflective", "caustics_refractive"),
 )
 
 
-# Sockets of our node that change how it looks in a render and not what is baked.
+# Sockets of the Beamspread node that change its look in a render and not the bake.
 LOOKS = {"Roughness", "Normal"}
 
 _NODE_LOOKS = set(bpy.types.Node.bl_rna.properties.keys()) - {"mute"}
@@ -42,12 +42,12 @@ _DEEPEST = 4
 
 
 def digest(*values) -> str:
-    """Eight bytes of a hash, in hexadecimal."""
+    """Hash of the values, 8 bytes in hexadecimal."""
     return hashlib.blake2b(repr(values).encode(), digest_size=8).hexdigest()
 
 
 def values_of(struct, skipped: Iterable[str] = (), depth: int = 0) -> list:
-    """All properties of something of Blender's, nested ones included; other data-blocks by their names."""
+    """All properties of a Blender struct, nested ones included; other data-blocks by their names."""
     found = []
     for prop in struct.bl_rna.properties:
         name = prop.identifier
@@ -57,7 +57,7 @@ def values_of(struct, skipped: Iterable[str] = (), depth: int = 0) -> list:
         if prop.type == "COLLECTION":
             value = [values_of(one, (), depth + 1) for one in value or () if one is not None]
         elif isinstance(value, bpy.types.ID):
-            # Without the folder, which saving the file elsewhere makes relative: pixels are looked at for themselves.
+            # Without the folder, which becomes relative when the file is saved elsewhere. Pixels have their own digest.
             value = value.name_full, bpy.path.basename(getattr(value, "filepath", ""))
         elif isinstance(value, bpy.types.bpy_struct):
             value = values_of(value, (), depth + 1)
@@ -82,7 +82,7 @@ def tree_values(tree, entered: dict | None = None) -> list | int:
 
 
 def _links_between(nodes: Iterable, links: Iterable) -> list:
-    """Those of the links that have these nodes at both ends."""
+    """Links that have these nodes at both ends."""
     numbers = {node.name: number for number, node in enumerate(nodes)}
     ends = (
         (
@@ -114,7 +114,7 @@ def _plain(value) -> object:
 
 
 class Fingerprints:
-    """Digests of the targets of a scene; those of meshes, lamps and trees are kept until `forget` names them."""
+    """Digests of the targets of a scene. Those of meshes, lamps and trees are cached until `forget` names them."""
 
     def __init__(self) -> None:
         self._kept: dict[int, str] = {}
@@ -123,7 +123,7 @@ class Fingerprints:
         self._sees_media = True
 
     def forget(self, identifiers: Iterable[int] | None = None) -> None:
-        """What was kept of these data-blocks (of the original ones, `as_pointer()`); None: of all."""
+        """Drop the cached digests of these data-blocks (`as_pointer()` of the originals); None: of all."""
         if identifiers is None:
             self._kept.clear()
             self._images.clear()
@@ -135,11 +135,11 @@ class Fingerprints:
             self._images.pop(identifier, None)
 
     def forget_scatter(self) -> None:
-        """What objects scatter, since some geometry is another."""
+        """Drop the digests of scattered instances, since geometry has changed."""
         self._scatter.forget()
 
     def of(self, context, targets: Iterable[Target]) -> dict[Target, Parts]:
-        """The parts of each target of the context's scene; those that are no longer there are left out."""
+        """Digests of each target of the context's scene; targets that are gone are left out."""
         scene, view_layer = context.scene, context.view_layer
         depsgraph = context.evaluated_depsgraph_get()
         visible = render_visible_names(view_layer)
@@ -165,7 +165,7 @@ class Fingerprints:
         for target in targets:
             obj, node = objects.get(target.object_name), None
             if obj is not None:
-                node = find_node(bpy.data.materials.get(target.material_name))
+                node = node_of(target)
             if node is None:
                 continue
             mine, number = own.get(obj.name, ("", 0))
@@ -192,9 +192,10 @@ class Fingerprints:
         return digest(kept, _matrix(obj), obj.visible_diffuse, _links(obj))
 
     def _with_instanced(self, objects: Iterable, depsgraph, known: dict, place: str = "") -> Iterator[tuple]:
-        """Objects, and after them what they show of collections, each with a digest of its shape and place.
+        """Objects, and after them the objects of collections that they instance, each with a digest.
 
-        `known` gets, of each, the digest without the `place` of what shows it, and those of its materials.
+        `place` is the digest of the instance. `known` gets for each object its digest without `place`, and the digests
+        of its materials.
         """
         later = []
         for obj in objects:
@@ -212,7 +213,7 @@ class Fingerprints:
             yield from self._with_instanced(rendered_in(collection), depsgraph, known, there)
 
     def _solid(self, obj, depsgraph) -> str:
-        """Its shape and place, without its materials and what it shows of a collection."""
+        """Digest of shape and transform, without materials and instanced collections."""
         seen = obj.visible_diffuse, obj.visible_shadow, obj.show_instancer_for_render, obj.instance_type, _links(obj)
         shape = self._keep(obj, lambda: self._shape(obj, depsgraph))
         scattered = ()
@@ -228,7 +229,7 @@ class Fingerprints:
         return digest(_mesh(obj, depsgraph), modifiers, particles)
 
     def _material(self, material) -> str:
-        """As others see it: of a Beamspread node only the medium, whose light may bounce, and not the baked image."""
+        """Digest of a material for other objects: a Beamspread node counts by its medium, not by its baked image."""
         if material is None:
             return ""
         node = find_node(material)
@@ -237,7 +238,7 @@ class Fingerprints:
         return self._keep(material, lambda: digest(_tree_of(material), compat.has_transparent_shadow(material)))
 
     def _textures(self, owners: Iterable) -> str:
-        """Of the pixels of all textures but those that bakes have made."""
+        """Digest of the pixels of all textures, without the results of bakes."""
         names = {name for owner in dict.fromkeys(owners) if owner is not None for name in self._names_in(owner)}
         own = {image.name_full for image in results() if image is not None}
         images = {image.name_full: image for image in bpy.data.images} if names - own else {}
@@ -250,7 +251,7 @@ class Fingerprints:
         return self._images[key]
 
     def _surface(self, node) -> list:
-        # What isn't linked isn't read, and a node of an older file gets its inputs late.
+        # Only linked inputs are read; a node of an older file gets its inputs late.
         linked = (socket for socket in node.inputs if socket.is_linked and socket.name not in LOOKS)
         inputs = [(socket.identifier, _upstream(socket)) for socket in linked]
         return [repr(node.surface()), getattr(node, "side", ""), inputs]
@@ -271,7 +272,7 @@ def _matrix(obj) -> list:
 
 
 def _links(obj) -> list:
-    """Collections of light linking (Blender 4.0 on), by name."""
+    """Collections of light linking (Blender 4.0 and later), by name."""
     linking = compat.light_linking(obj)
     return values_of(linking) if linking is not None else []
 
@@ -281,7 +282,7 @@ def _tree_of(owner) -> list | None:
 
 
 def _upstream(socket) -> list:
-    """The tree before a socket, if it is linked: all of it, as a part is not worth the search."""
+    """Values of the whole tree of a socket, if it is linked."""
     tree = socket.id_data
     if not socket.is_linked:
         return []
@@ -298,11 +299,11 @@ def _shows_bake(node) -> bool:
 
 
 def image_part(image) -> str:
-    """Of the image that a node shows; None: it has none."""
+    """Digest of the size of the node's image; "" for None."""
     return digest(tuple(image.size)) if image is not None else ""
 
 
-# Of a material with our node, what a first bake itself adds or links.
+# Nodes that a first bake adds or links in a material.
 LEFT_OUT = {"BeamspreadNode", "ShaderNodeOutputMaterial"}
 
 
@@ -311,7 +312,7 @@ def _modifier(modifier) -> object:
 
 
 def _mesh(obj, depsgraph) -> str:
-    """Of the corners, faces, UV maps and painted colours, with modifiers where the window shows the object."""
+    """Digest of vertices, faces, UV maps and painted colors, with modifiers if the window shows the object."""
     if obj.type not in SURFACE_TYPES:
         return obj.data.name_full if obj.data else ""
     evaluated = obj.evaluated_get(depsgraph)
@@ -341,7 +342,7 @@ def _mesh(obj, depsgraph) -> str:
 
 
 def settings_part(scene, solver: str | None = None, indirect: bool | None = None) -> str:
-    """Of what decides how is baked; arguments go before the scene's."""
+    """Digest of the bake settings; arguments override the scene's."""
     own = scene.beamspread
     use_indirect = own.use_indirect if indirect is None else indirect
     bounces = (
@@ -351,6 +352,6 @@ def settings_part(scene, solver: str | None = None, indirect: bool | None = None
 
 
 def _quality(scene) -> str:
-    """Of the distributions; not shortened, as a bake may know better than the scene what it has used."""
+    """Quality of the distributions, or the folder of samples; no digest, since a quick preview replaces it."""
     own = scene.beamspread
     return own.quality if own.distributions == "LIBRARY" else bpy.path.abspath(own.sample_folder)

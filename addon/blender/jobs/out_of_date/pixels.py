@@ -1,8 +1,8 @@
-"""Marks of the pixels of textures: other ones where the pixels are others.
+"""Digests of the pixels of textures.
 
-Files are read once, as long as they are not written to again; large ones count by their size and time. Pixels are read
-only of what was painted and is not saved yet: Blender 3.4 does not tell of strokes. Once it is saved, it counts as
-another, though it may be the same.
+A file is read once until it is written again; large files count by size and time. Pixels in memory are read only for
+images that were painted and not saved, since Blender 3.4 does not report strokes. Saving such an image changes its
+digest.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ from ...node.find import find_node
 from ...node.node import BeamspreadNode
 from ...node.tree import is_inner_tree
 
-# Files of more bytes would take more than about 10 ms to read.
+# Bytes of a file above which its size and time are its digest; larger takes longer to read.
 LARGE = 8 << 20
 
-# Of what is painted and not saved: to read more takes longer than .2 s. More of it counts as painted, however often.
-MOST_VALUES = 4 * 2048**2
+# Values of a painted image above which it has one digest however often it is painted; more take longer than .2 s.
+MAX_VALUES = 4 * 2048**2
 
 
 class Pixels:
-    """Marks of images; those of files are kept until they change."""
+    """Digests of images, cached until their files change."""
 
     def __init__(self) -> None:
-        self._files: dict[Path, tuple] = {}  # time and size, mark
+        self._files: dict[Path, tuple] = {}  # time and size, digest
         self._packed: dict[tuple, str] = {}
 
     def forget(self) -> None:
-        """All images may be others."""
+        """Drop what is known of packed images: all may have changed."""
         self._packed.clear()
 
     def mark(self, image) -> str:
-        """Of what the image shows."""
+        """Digest of the pixels of an image."""
         if image.is_dirty:
-            if len(image.pixels) > MOST_VALUES:
+            if len(image.pixels) > MAX_VALUES:
                 return "painted"
             values = np.empty(len(image.pixels), np.float32)
             image.pixels.foreach_get(values)
@@ -68,7 +68,7 @@ def _hash(content: bytes | np.ndarray) -> str:
 
 
 def images_of(owner) -> set:
-    """Textures in the nodes of a material, lamp or world; with our node, where its base colour comes from some."""
+    """Images in the nodes of a material, lamp or world; with a Beamspread node only if its base color is linked."""
     tree = owner.node_tree
     if tree is None:
         return set()
@@ -79,7 +79,7 @@ def images_of(owner) -> set:
 
 
 def results() -> set:
-    """Images that Beamspread nodes show: what bakes make, and not what they read."""
+    """Images that Beamspread nodes show: results of bakes."""
     nodes: Iterable = (find_node(material) for material in bpy.data.materials)
     return {node.image for node in nodes if node is not None}
 

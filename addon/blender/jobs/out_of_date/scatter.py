@@ -1,4 +1,4 @@
-"""What geometry nodes, particles and instancing on vertices and faces scatter, as digests."""
+"""Digests of instances from geometry nodes, particles, and instancing on vertices and faces."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ import numpy as np
 
 
 def scatters(obj) -> bool:
-    """Whether the object may have instances that no other object of the scene stands for."""
+    """True if the object may have instances that are no objects of the scene."""
     if obj.instance_type in ("VERTS", "FACES") or any(modifier.type == "NODES" for modifier in obj.modifiers):
         return True
     return any(one.settings.render_type in ("OBJECT", "COLLECTION") for one in obj.particle_systems)
 
 
 class Scatter:
-    """Digests of what objects scatter, kept until geometry changes, or the object's place does."""
+    """Digests of the instances of objects, cached until geometry or the object's transform changes."""
 
     def __init__(self) -> None:
-        self._kept: dict[int, tuple] = {}  # by object: where it was, digest, materials of what is scattered
+        self._kept: dict[int, tuple] = {}  # by object: its transform, digest, materials of its instances
 
     def forget(self) -> None:
         self._kept.clear()
 
     def look(self, depsgraph, objects: Collection) -> None:
-        """Look again at those of the objects of which nothing is known; in one go, as there may be many instances."""
+        """Scan the objects that are not cached, in one pass, since there may be many instances."""
         unknown = {obj for obj in objects if self._kept.get(obj.as_pointer(), (None,))[0] != _place(obj)}
         if not unknown:
             return
@@ -39,7 +39,7 @@ class Scatter:
             self._kept[obj.as_pointer()] = _place(obj), one.digest(), one.materials
 
     def of(self, obj) -> tuple[str, list]:
-        """The digest of what the object scatters, and the materials of that."""
+        """Digest of the object's instances, and their materials."""
         _, text, materials = self._kept[obj.as_pointer()]
         return text, materials
 
@@ -70,7 +70,7 @@ class _Found:
 
 
 def _shape(obj) -> str:
-    """Of an evaluated object, which may be of geometry nodes alone."""
+    """Digest of the shape of an evaluated object, which geometry nodes may have made."""
     hashed = hashlib.blake2b(obj.type.encode(), digest_size=8)
     vertices = getattr(obj.data, "vertices", None)
     if vertices is None:

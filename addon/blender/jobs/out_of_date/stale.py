@@ -1,7 +1,6 @@
-"""Keeps the rows of `state` true: looks at what a scene's bakes have read once changes to the scene come to rest.
+"""Keeps the rows of `state` up to date: compares bakes with the scene once changes to it have come to rest.
 
-Handlers only note what changed; the look follows in a timer of the window. In background nobody waits for it, and
-whoever needs the rows calls `refresh`.
+Handlers only note what changed; a timer of the window scans the scene. In background no timer runs: call `refresh`.
 """
 
 from __future__ import annotations
@@ -19,21 +18,26 @@ from ...images.facts import Record, facts_of, note_bake, record_in, record_of, r
 from ...images.files import file_of
 from ...images.sequence import file_at, is_sequence
 from ...images.undo import is_undone
-from ...node.find import find_bakeable, find_misplaced, find_node
+from ...node.find import find_bakeable, find_misplaced, image_of
 from ...read.visibility import by_name
 from ...registration import all_or_nothing, handlers
 from ..state import Row, Status, redraw, state
 from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
 
-# After the last change; and after the last look so long that looks take at most such a part of the time. One alone may
-# take longer: the first of a file, and after undo, reads all meshes, and those that follow don't.
-REST_SECONDS, MOST_OF_THE_TIME = 0.3, 0.1
+REST_SECONDS = 0.3
+"""Seconds without changes before a scan."""
 
-FIRST_LOOK = "first look"
+MAX_SHARE = 0.1
+"""Largest share of the time that scans may take; more makes the window less responsive.
+
+The first scan of a file or after undo does not count: it reads all meshes, and later ones do not.
+"""
+
+QUICK_PREVIEW = "first look"  # as files of earlier versions have it
 
 fingerprints = Fingerprints()
 _waiting: list[tuple[Bake, Parts | None]] = []
-_last = {"change": 0.0, "took": 0.0, "next": 0.0, "is looking": False}
+_last = {"change": 0.0, "took": 0.0, "next": 0.0, "is scanning": False}
 
 
 def refresh(context) -> None:
@@ -48,9 +52,9 @@ def refresh(context) -> None:
 
 
 def _failures_of_others(scene, targets: list[Target]) -> list[Row]:
-    """Of what is no target, as a node inside a group.
+    """Rows of failures that have no target, as of a node inside a group.
 
-    Neither of an object that is gone, nor of one that has another material in its place by now.
+    Failures of objects that are gone, or that have another material by now, are left out.
     """
     others = [row for row in state.failures() if row.target not in targets]
     named, objects = {target.object_name for target in targets}, by_name(scene) if others else {}
@@ -61,23 +65,23 @@ def _failures_of_others(scene, targets: list[Target]) -> list[Row]:
 
 
 def parts_of(context, targets: list[Target]) -> dict[Target, Parts]:
-    """What bakes of the targets read now, to be kept with what they make; see `keep`."""
+    """Digests of the parts of the scene that bakes of the targets read now, for `keep`."""
     return fingerprints.of(context, targets)
 
 
-def keep(bake: Bake, parts: Parts | None, is_first_look: bool = False) -> None:
-    """Note in the node's image what the bake in it has read and said."""
-    image = _image(bake.target)
+def keep(bake: Bake, parts: Parts | None, is_preview: bool = False) -> None:
+    """Record in the node's image the digests and messages of the bake in it."""
+    image = image_of(bake.target)
     if image is None or parts is None:
         return
     parts = parts | {IMAGE: image_part(image)}  # the bake may have made it
-    if is_first_look:
-        parts[QUALITY] = FIRST_LOOK
+    if is_preview:
+        parts[QUALITY] = QUICK_PREVIEW
     note_bake(image, bake.target, record_of_bake(bake, parts, image.is_dirty))
 
 
 def keep_later(bake: Bake, parts: Parts | None) -> None:
-    """As `keep`, once Blender has put the bake's pixels into the image; from any thread."""
+    """Call `keep` later, once Blender has put the bake's pixels into the image; any thread may call this."""
     _waiting.append((bake, parts))
 
 
@@ -86,13 +90,8 @@ def _keep_waiting() -> None:
         keep(*_waiting.pop(0))
 
 
-def _image(target: Target):
-    node = find_node(bpy.data.materials.get(target.material_name))
-    return None if node is None else node.image
-
-
 def _record(target: Target, scene) -> Record | None:
-    image = _image(target)
+    image = image_of(target)
     if is_sequence(image):
         path = file_at(image, scene.frame_current)
         return path and record_in(path)
@@ -100,19 +99,19 @@ def _record(target: Target, scene) -> Record | None:
 
 
 def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
-    if is_sequence(_image(target)):
+    if is_sequence(image_of(target)):
         return _row_of_frames(target, record, now)
     changed = [] if record is None or now is None else record.changed(now)
-    if record is not None and not record.is_dirty and _image(target).is_dirty:
+    if record is not None and not record.is_dirty and image_of(target).is_dirty:
         changed.append("pixels of the image")
-    if record is not None and _has_lost_its_file(_image(target)):
+    if record is not None and _has_lost_its_file(image_of(target)):
         changed = [*(name for name in changed if name != IMAGE), "file of the image, which is gone"]
     said = state.status_of(target)
     if said is not None and said.status in (Status.FAILED, Status.CANCELLED):
         return replace(said, is_stale=bool(changed))
     if record is None:
         return Row(target, Status.NEVER)
-    earlier = (*_why_later(_image(target)), *record.messages())
+    earlier = (*_why_later(image_of(target)), *record.messages())
     subject = str(target)
     if changed and changed != [QUALITY]:
         why = warning(subject, f"Changed since its bake: {', '.join(changed)}.")
@@ -123,8 +122,8 @@ def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
 
 
 def _row_of_frames(target: Target, record: Record | None, now: Parts | None) -> Row:
-    """Of a sequence, by the frame that is shown; a bake does not make it anew, and so it is not up for one."""
-    first, last, *_ = facts_of(_image(target)).frames
+    """The row of an image sequence, by the frame that is shown. A bake does not renew it, so it is not up for one."""
+    first, last, *_ = facts_of(image_of(target)).frames
     subject, shown = str(target), f"Shows the frames {first} to {last} of a batch."
     if record is None or now is None:
         return Row(target, Status.BAKED, (note(subject, f"{shown} Changes since then are not known."),))
@@ -148,19 +147,19 @@ def _why_later(image) -> list[Message]:
 
 
 def _why_again(baked: str, wanted: str) -> str:
-    if baked == FIRST_LOOK:
+    if baked == QUICK_PREVIEW:
         return "Quick preview by direct light alone: its final bake has not ended."
     return f"Baked in {baked} quality, and not in {wanted}."
 
 
-def look_soon() -> None:
-    """Have the rows refreshed once nothing changes any more."""
+def scan_soon() -> None:
+    """Refresh the rows once nothing changes any more."""
     _last["change"] = time.monotonic()
-    if not bpy.app.background and not bpy.app.timers.is_registered(_look):
-        bpy.app.timers.register(_look, first_interval=REST_SECONDS)
+    if not bpy.app.background and not bpy.app.timers.is_registered(_scan):
+        bpy.app.timers.register(_scan, first_interval=REST_SECONDS)
 
 
-def _look() -> float | None:
+def _scan() -> float | None:
     began = time.monotonic()
     waiting = max(_last["change"] + REST_SECONDS, _last["next"]) - began
     if waiting > 0:
@@ -168,14 +167,14 @@ def _look() -> float | None:
     context = bpy.context
     if context.window is not None or context.window_manager.windows:
         window = context.window or context.window_manager.windows[0]
-        _last["is looking"] = True
+        _last["is scanning"] = True
         try:
             with context.temp_override(window=window):
                 refresh(bpy.context)
         finally:
             ended = time.monotonic()
             before, _last["took"] = _last["took"], ended - began
-            _last["is looking"], _last["next"] = False, ended + min(before, _last["took"]) / MOST_OF_THE_TIME
+            _last["is scanning"], _last["next"] = False, ended + min(before, _last["took"]) / MAX_SHARE
         redraw(bpy.context)
     return None
 
@@ -190,8 +189,8 @@ def _on_update(_scene, depsgraph) -> None:
     fingerprints.forget(changed)
     if any(update.is_updated_geometry and isinstance(update.id, bpy.types.Object) for update in depsgraph.updates):
         fingerprints.forget_scatter()
-    if not _last["is looking"]:
-        look_soon()  # also where there is no update: Blender 3.4 names none for strokes on images
+    if not _last["is scanning"]:
+        scan_soon()  # even without updates: Blender 3.4 reports none for strokes on images
 
 
 @persistent
@@ -206,14 +205,14 @@ def _before_loading(*_arguments) -> None:
 
 @persistent
 def _on_all(*_arguments) -> None:
-    """Undo and loading bring other data-blocks, of which nothing is known."""
+    """Undo and loading replace data-blocks: nothing is known about the new ones."""
     fingerprints.forget()
-    look_soon()
+    scan_soon()
 
 
-def _stop_looking() -> None:
-    if bpy.app.timers.is_registered(_look):
-        bpy.app.timers.unregister(_look)
+def _stop_scanning() -> None:
+    if bpy.app.timers.is_registered(_scan):
+        bpy.app.timers.unregister(_scan)
     fingerprints.forget()
 
 
@@ -227,5 +226,5 @@ register, unregister = all_or_nothing(
         load_pre=_before_loading,
         load_post=_on_all,
     ),
-    (look_soon, _stop_looking),
+    (scan_soon, _stop_scanning),
 )

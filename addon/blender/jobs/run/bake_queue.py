@@ -1,109 +1,78 @@
-"""The bakes of one run, each made when it is its turn."""
+"""The bakes of one run, each made when its turn comes."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-
-import bpy
+from enum import Enum
 
 from ....core.bake.bake_settings import FINAL, PREVIEW
-from ....core.bake.estimate import simulation_seconds
 from ....core.bake.runner import Bake
 from ....core.target import Target
-from ...cycles.cycles_light import seconds_estimate
-from ...node.find import find_node
+from ...node.find import node_of
 from .prepare import Preparation
 
-# Of a bake, beside what is known to take long.
-OTHER_SECONDS = 0.5
+
+class Pass(Enum):
+    """Purpose of a bake in its run: the only one of its target, its quick preview, or the bake after that preview."""
+
+    SINGLE = 1
+    PREVIEW = 2
+    FINAL = 3
 
 
 @dataclass(frozen=True)
 class BakeStep:
-    """One bake of a target; `is_first`: it is a first look, `is_again`: the bake that follows one."""
+    """One bake of a target in a run."""
 
     target: Target
     quality: str
-    seconds: float
-    is_first: bool = False
-    is_again: bool = False
+    purpose: Pass = Pass.SINGLE
 
 
 class BakeQueue:
-    """Turns in their order, and how far they are.
+    """The steps of a run in their order.
 
-    With `preview_first` nobody waits for a medium that is not simulated yet: its targets get a first look, by a quick
-    simulation and direct light alone, and are baked once all targets have something to show. So are those that share
-    an image with them, since a run fills each image as a whole.
+    With `preview_first`, targets whose medium is not simulated yet get a quick preview: a quick simulation and direct
+    light alone. They are baked once all targets have something to show. Targets that share an image with them take
+    part in this, since a run fills each image as a whole.
+
+    Attributes
+    ----------
+    step, number : step of the bake that was made last, and its number from 1 on.
     """
 
     def __init__(self, preparation: Preparation, targets: list[Target], preview_first: bool) -> None:
         self._preparation = preparation
-        self._turns = _turns(preparation, targets, preview_first)
-        self._next = 0
+        self._steps = _steps(preparation, targets, preview_first)
+        self.step: BakeStep | None = None
+        self.number = 0
 
     def __len__(self) -> int:
-        return len(self._turns)
+        return len(self._steps)
 
-    @property
-    def turn(self) -> BakeStep:
-        """The last one given out."""
-        return self._turns[self._next - 1]
-
-    def next(self) -> Bake | None:
-        """The next bake, in the main thread; None after the last."""
-        if self._next == len(self._turns):
-            return None
-        turn = self._turns[self._next]
-        self._next += 1
-        changes = {"quality": turn.quality} | ({"indirect": False} if turn.is_first else {})
-        return self._preparation.bake(turn.target, replace(self._preparation.settings, **changes))
-
-    def starts_again(self) -> bool:
-        """Whether the bake given out last is the first of those made again."""
-        return self.turn.is_again and not self._turns[self._next - 2].is_again
-
-    def fraction(self, own: float) -> float:
-        """Of the run, from that of the bake given out last."""
-        done = sum(turn.seconds for turn in self._turns[: self._next - 1]) + own * self.turn.seconds
-        return done / sum(turn.seconds for turn in self._turns)
+    def __iter__(self) -> Iterator[Bake]:
+        """Make the bakes, in the main thread."""
+        for number, step in enumerate(self._steps, 1):
+            self.number, self.step = number, step
+            changes = {"quality": step.quality} | ({"indirect": False} if step.purpose == Pass.PREVIEW else {})
+            yield self._preparation.bake(step.target, replace(self._preparation.settings, **changes))
 
 
-def _turns(preparation: Preparation, targets: list[Target], preview_first: bool) -> list[BakeStep]:
+def _steps(preparation: Preparation, targets: list[Target], preview_first: bool) -> list[BakeStep]:
     quality = preparation.settings.quality
-    unknown = {target: preparation.to_simulate(target, quality) for target in targets}
-    quick = [target for target in targets if preview_first and quality == FINAL and unknown[target]]
+    is_unknown = {target: bool(preparation.to_simulate(target, quality)) for target in targets}
+    quick = [target for target in targets if preview_first and quality == FINAL and is_unknown[target]]
     keys = {_image_key(target) for target in quick}
-    again = [target for target in targets if _image_key(target) in keys]
-    met: list = []
-    colored: set[Target] = set()
-
-    def seconds(target: Target, quality: str) -> float:
-        found = [medium for medium in preparation.to_simulate(target, quality) if (quality, medium) not in met]
-        met.extend((quality, medium) for medium in found)
-        coloring = 0.0 if target in colored else preparation.color_seconds(target)
-        colored.add(target)
-        return OTHER_SECONDS + coloring + simulation_seconds(quality, preparation.settings.threads) * len(found)
-
-    turns = []
-    for target in targets:
-        if target in again:
-            chosen = PREVIEW if target in quick else quality
-            turns.append(BakeStep(target, chosen, seconds(target, chosen), is_first=True))
-        else:
-            turns.append(BakeStep(target, quality, seconds(target, quality) + _indirect_seconds(preparation, target)))
-    for target in again:
-        took = seconds(target, quality) + _indirect_seconds(preparation, target)
-        turns.append(BakeStep(target, quality, took, is_again=True))
-    return turns
-
-
-def _indirect_seconds(preparation: Preparation, target: Target) -> float:
-    size = preparation.size(target)
-    return seconds_estimate(*size) if preparation.settings.indirect and size else 0.0
+    twice = [target for target in targets if _image_key(target) in keys]
+    first = [
+        BakeStep(target, PREVIEW if target in quick else quality, Pass.PREVIEW if target in twice else Pass.SINGLE)
+        for target in targets
+    ]
+    return first + [BakeStep(target, quality, Pass.FINAL) for target in twice]
 
 
 def _image_key(target: Target) -> str:
-    """The same for targets that go into the same image."""
-    node = find_node(bpy.data.materials.get(target.material_name))
+    """Equal for targets that fill the same image."""
+    node = node_of(target)
     return f"image {node.image.name}" if node is not None and node.image else f"material {target.material_name}"

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import bpy
 
-from ....core.bake.runner import CANCELLED, SKIPPED, WRITTEN, Bake
+from ....core.bake.runner import CANCELLED, SKIPPED, WRITTEN, Bake, Sink, run_bakes
 from ....core.batch.batch_options import BatchOptions
 from ....core.batch.inventory import Inventory
 from ....core.batch.report import BakeRecord, Report
 from ....core.batch.resume import PreviousReport
 from ....core.batch.stop import Stop
 from ....core.errors import BakeError
-from ....core.progress import timed
+from ....core.progress import Progress, timed
 from ....core.target import Target
 from ...images.facts import attributes_of, record_of_bake
 from ...images.files import file_of, size_of
@@ -36,12 +36,9 @@ def bake_all(options: BatchOptions, stop: Stop | None = None) -> Report:
     """
     if options.verbose:
         _show_log()
-    report, batch = Report(), _Batch(options, Stop() if stop is None else stop)
-    for record in batch.run():
-        report.bakes.append(record)
-        if record.status != CANCELLED:
-            stream = sys.stdout if record.status in (WRITTEN, SKIPPED) else sys.stderr
-            print(f"Beamspread: {record}", file=stream, flush=True)
+    batch = _Batch(options, Stop() if stop is None else stop)
+    batch.run_frames()
+    report = batch.report
     left = sum(record.status == CANCELLED for record in report.bakes)
     if left:
         print(f"Beamspread: stopped, {left} of {len(report.bakes)} bakes are left.", file=sys.stderr)
@@ -63,42 +60,64 @@ def _show_log() -> None:
     log.setLevel(logging.INFO)
 
 
-class _Batch:
-    """One run."""
+class _Batch(Sink):
+    """The bakes of all frames; `report` grows with each."""
 
     def __init__(self, options: BatchOptions, stop: Stop) -> None:
+        self.report = Report()
         self._options, self._stop, self._scene = options, stop, bpy.context.scene
+        self._frame = self._scene.frame_current
+        self._parts: dict[Target, Parts] = {}
         self._settings = self._scene.beamspread.for_bake(options.solver, options.pass_name, options.indirect)
         self._outputs = Outputs(self._scene, options)
         self._earlier = PreviousReport(options.report, _saved()) if options.resume else None
 
-    def run(self) -> Iterator[BakeRecord]:
+    def run_frames(self) -> None:
         """Bake frame by frame."""
-        current = self._scene.frame_current
-        first, last = self._options.frames or (current, current)
-        for frame in range(first, last + 1):
+        first, last = self._options.frames or (self._frame, self._frame)
+        for self._frame in range(first, last + 1):
             if self._options.frames and not self._stop:
-                self._scene.frame_set(frame)
-            yield from self._bake_frame(frame)
+                self._scene.frame_set(self._frame)
+            self._bake_frame()
 
-    def _bake_frame(self, frame: int) -> Iterator[BakeRecord]:
+    def _bake_frame(self) -> None:
         targets, impossible = self._find()
-        yield from (BakeRecord.of(bake, frame) for bake in impossible)
+        for bake in impossible:
+            self.end(bake)
         left = []
         for target in targets:
-            record = self._skipped(target, frame)
+            record = self._skipped(target)
             if record is None:
                 left.append(target)
             else:
-                yield record
-        parts = self._parts_of(left)
-        for bake in self._prepared(left):
-            self._bake(bake, frame, parts.get(bake.target))
-            self._remember(bake, parts.get(bake.target))
-            yield BakeRecord.of(bake, frame)
+                self._note(record)
+        self._parts = self._parts_of(left)
+        run_bakes(self._prepared(left), self)
+
+    def run(self, bake: Bake) -> Iterator[None]:
+        bake.run(Progress(_Printer(bake.target, self._stop)))
+        if self._stop and bake.job is not None and bake.texture is None:
+            bake.cancel()  # even if it failed: a terminal's Ctrl-C also ends the Blender that Cycles runs in
+        return iter(())
+
+    def store(self, bake: Bake) -> str:
+        # The size of the image is no part of a sequence.
+        parts = {name: digest for name, digest in self._parts.get(bake.target, {}).items() if name != IMAGE}
+        attributes = attributes_of(replace(record_of_bake(bake, parts), notes=())) if parts else {}
+        return self._outputs.write(bake, self._frame, attributes)
+
+    def end(self, bake: Bake) -> None:
+        self._remember(bake)
+        self._note(BakeRecord.of(bake, self._frame))
+
+    def _note(self, record: BakeRecord) -> None:
+        self.report.bakes.append(record)
+        if record.status != CANCELLED:
+            stream = sys.stdout if record.status in (WRITTEN, SKIPPED) else sys.stderr
+            print(f"Beamspread: {record}", file=stream, flush=True)
 
     def _find(self) -> tuple[list[Target], list[Bake]]:
-        """What to bake, and what can't be."""
+        """Targets to bake, and failed bakes of objects that can't be baked."""
         view_layer = bpy.context.view_layer
         if not self._options.objects:
             return find_bakeable(view_layer), find_misplaced(self._scene.objects)
@@ -113,26 +132,25 @@ class _Batch:
             targets += found
         return list(dict.fromkeys(targets)), impossible
 
-    def _skipped(self, target: Target, frame: int) -> BakeRecord | None:
-        """The record of what an earlier run has written."""
+    def _skipped(self, target: Target) -> BakeRecord | None:
+        """The record of a file that an earlier run has written."""
         if self._earlier is None or self._stop:
             return None
         settings, resolution = self._settings, self._options.resolution
-        layer = settings.layers[0]
-        own = self._outputs.own_image(target, layer)
+        own = self._outputs.own_image(target, settings.layer)
         try:
-            path = self._outputs.path(target, layer, frame) if own is None else file_of(own)
+            path = self._outputs.path(target, settings.layer, self._frame) if own is None else file_of(own)
         except BakeError:
-            return None  # and preparing says why
+            return None  # the preparation names the error
         size = size_of(path)
         if size is None or (resolution is not None and max(size) != resolution):
             return None
-        wanted = BakeRecord(target.object_name, target.material_name, frame, str(path), *size)
+        wanted = BakeRecord(target.object_name, target.material_name, self._frame, str(path), *size)
         wanted.output, wanted.indirect = settings.output, settings.indirect
         return self._earlier.skipped(wanted, needs_record=own is not None)
 
     def _parts_of(self, targets: list[Target]) -> dict[Target, Parts]:
-        """What bakes read that go to images which nodes show, or to frames."""
+        """Digests for bakes whose results go to images that nodes show, or to frames."""
         shown = [target for target in targets if self._options.frames or self._own_image(target) is not None]
         if not shown or self._stop:
             return {}
@@ -142,18 +160,18 @@ class _Batch:
 
     def _own_image(self, target: Target):
         try:
-            return self._outputs.own_image(target, self._settings.layers[0])
+            return self._outputs.own_image(target, self._settings.layer)
         except BakeError:
             return None
 
-    def _remember(self, bake: Bake, parts: Parts | None) -> None:
-        """Note what the image that the node shows has read, for a scene that goes on or is saved afterwards."""
+    def _remember(self, bake: Bake) -> None:
+        """Note in the node's image what the bake has read, for a scene that goes on or is saved afterwards."""
         own = self._own_image(bake.target) if bake.status == WRITTEN else None
         if own is not None and bake.path == str(file_of(own)):
-            stale.keep(bake, parts)
+            stale.keep(bake, self._parts.get(bake.target))
 
     def _prepared(self, targets: list[Target]) -> Iterator[Bake]:
-        """A bake for each target, prepared when its turn comes; once asked to stop, no more are."""
+        """A bake for each target, prepared when its turn comes; cancelled bakes once the batch is asked to stop."""
         if not targets:
             return
         prepared, inventory = iter(()), Inventory()
@@ -166,16 +184,6 @@ class _Batch:
                 for line in inventory.lines(bake):
                     logging.getLogger(__name__).info(line)
             yield bake
-
-    def _bake(self, bake: Bake, frame: int, parts: Parts | None) -> None:
-        bake.run(_Printer(bake.target, self._stop))
-        if self._stop and bake.job is not None and not bake.layers:
-            # Also where it failed: a terminal's Ctrl-C ends the Blender that looks for bounced light, too.
-            bake.cancel()
-        # A sequence does not tell its size.
-        read = {name: one for name, one in (parts or {}).items() if name != IMAGE}
-        said = attributes_of(replace(record_of_bake(bake, read), notes=())) if read else {}
-        bake.keep(lambda bake: self._outputs.write(bake, frame, said))
 
 
 def _cancelled(target: Target) -> Bake:
@@ -190,7 +198,7 @@ def _saved() -> float:
 
 
 class _Printer:
-    """Progress in lines of ten percent, until the batch is asked to stop."""
+    """Prints the progress of one bake in lines of ten percent, until the batch is asked to stop."""
 
     def __init__(self, subject: Target, stop: Stop) -> None:
         self._subject, self._stop = subject, stop

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import threading
 import uuid
+from collections.abc import Iterator
 
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
 from ....core.bake.bake_settings import COMBINED, BakeSettings
-from ....core.bake.runner import WRITTEN, Bake
+from ....core.bake.runner import WRITTEN, Bake, Sink, run_bakes
 from ....core.errors import ImageError, text_of
+from ....core.progress import Progress
 from ....core.target import Target
 from ... import compat
 from ...cycles.cycles_light import CopyForCycles
@@ -47,28 +49,45 @@ class BeamspreadEngine(bpy.types.RenderEngine):
 
 
 def bake_active_image(engine, depsgraph, obj, width: int, height: int) -> None:
-    """Fill the image that Blender bakes to; if that fails, Blender reports success all the same, but panels say so."""
+    """Fill the image that Blender bakes to. If that fails, Blender still reports success, but panels show the error."""
     # A layer name of its own per call: results of the same layer overwrite each other.
     result = engine.begin_result(0, 0, width, height, layer=f"Beamspread {uuid.uuid4()}")
     passes, filled = result.layers[0].passes, False
     try:
-        pixels = np.zeros((height, width, 4), np.float32)
         bakes = _prepare(depsgraph, obj, passes, (width, height))
-        for number, bake in enumerate(bakes):
-            bake.run(lambda fraction, done=number: _step(engine, (done + fraction) / len(bakes)))
-            bake.keep(lambda bake: _put(pixels, bake))
-            state.note(bake)
+        sink = _ActiveImage(engine, len(bakes), (width, height))
+        run_bakes(bakes, sink)
         for bake in bakes:
             for message in bake.messages:
                 engine.report({message.level.value}, f"{bake.target}: {message}")
         if all(bake.status == WRITTEN for bake in bakes):
-            compat.write_pass(passes["Combined"], pixels)
+            compat.write_pass(passes["Combined"], sink.pixels)
             filled = True
             fillings.add([bake for bake in bakes if _fills_own_image(bake)])
     except Exception as error:  # noqa: BLE001 - Blender would swallow it
         engine.report({"ERROR"}, text_of(error))
     finally:
         engine.end_result(result, cancel=not filled)
+
+
+class _ActiveImage(Sink):
+    """Collects the results of bakes that share the active image; `pixels` are RGBA, float32 (height, width, 4)."""
+
+    def __init__(self, engine, count: int, size: tuple[int, int]) -> None:
+        self._parts = iter(Progress(lambda fraction: _step(engine, fraction)).split([1.0] * count))
+        self.pixels = np.zeros((*size[::-1], 4), np.float32)
+
+    def run(self, bake: Bake) -> Iterator[None]:
+        bake.run(next(self._parts))
+        return iter(())
+
+    def store(self, bake: Bake) -> str:
+        inside = bake.job.receiver.inside()
+        self.pixels[inside, :3], self.pixels[inside, 3] = bake.texture[inside], 1
+        return ""
+
+    def end(self, bake: Bake) -> None:
+        state.note(bake)
 
 
 def _prepare(depsgraph, obj, passes, size: tuple[int, int]) -> list[Bake]:
@@ -86,14 +105,14 @@ def _prepare(depsgraph, obj, passes, size: tuple[int, int]) -> list[Bake]:
 
 
 def _check_active_image(material, settings: BakeSettings) -> None:
-    """Raise ImageError if what is baked would be taken for luminance, or would replace what the surface is made of."""
+    """Raise ImageError if the result would be taken for luminance, or would replace a texture of the surface."""
     node, active = find_node(material), active_image(material)
     if active is not None and active in _images_read(node):
         raise ImageError(
             f"The active image '{active.name}' is a texture of the Beamspread node and no target: if Blender has "
             "cleared it, reload it (Image > Reload), then add an Image Texture node with another image and select that."
         )
-    if COMBINED not in settings.layers and active is not None and active == node.image:
+    if settings.layer != COMBINED and active is not None and active == node.image:
         raise ImageError(
             f"The image '{active.name}' shows luminance in the Beamspread node: choose another active image for "
             f"{settings.output.lower()}."
@@ -101,20 +120,20 @@ def _check_active_image(material, settings: BakeSettings) -> None:
 
 
 def _fills_own_image(bake: Bake) -> bool:
-    """Whether the image that Blender bakes to is the one that the node shows as luminance."""
+    """True if the image that Blender bakes to is the one that the node shows as luminance."""
     material = bpy.data.materials[bake.target.material_name]
-    return COMBINED in bake.job.settings.layers and find_node(material).image == active_image(material)
+    return bake.job.settings.layer == COMBINED and find_node(material).image == active_image(material)
 
 
 class _Fillings:
-    """Bakes whose pixels Blender is about to put into images of nodes, and what they have read.
+    """Bakes whose pixels Blender is about to put into images of nodes, and the digests for them.
 
-    The window calls `begin` before it bakes and `end` after it, in the main thread; between them the engine adds bakes
-    in another. Scripts call neither, and bake in the main thread.
+    The window calls `begin` and `end` in the main thread around its bake; between them the engine adds bakes in
+    another thread. Scripts call neither, and bake in the main thread.
 
     Attributes
     ----------
-    copy : of the scene, for what only Cycles knows: in its thread the engine can make none.
+    copy : copy of the scene for Cycles; the engine's thread can make none.
     """
 
     def __init__(self) -> None:
@@ -135,7 +154,7 @@ class _Fillings:
 
     def end(self) -> None:
         self._parts = self.copy = None
-        stale.look_soon()
+        stale.scan_soon()
 
 
 fillings = _Fillings()
@@ -153,7 +172,7 @@ def _after_bake(*_arguments) -> None:
 
 
 def active_image(material):
-    """What Blender's Bake fills: the image of the texture node that was active last, or else of the first one."""
+    """The image that Blender's Bake fills: that of the texture node that was active last, or else of the first one."""
     if material is None or material.node_tree is None:
         return None
     textures = [node for node in material.node_tree.nodes if node.type == "TEX_IMAGE"]
@@ -174,20 +193,13 @@ def _images_read(node) -> set:
     return images - {None}
 
 
-def _put(pixels: np.ndarray, bake: Bake) -> str:
-    """Fill the bake's part of RGBA pixels with its first layer."""
-    inside = bake.job.receiver.inside()
-    pixels[inside, :3], pixels[inside, 3] = next(iter(bake.layers.values()))[inside], 1
-    return ""
-
-
 def _step(engine, fraction: float) -> bool:
     engine.update_progress(fraction)
     return not engine.test_break()
 
 
 def _materials_in(obj, passes, width: int, height: int) -> list[str]:
-    """Beamspread materials of the triangles that this image shows (Blender bakes one image at a time)."""
+    """Beamspread materials of the triangles that the image shows (Blender bakes one image at a time)."""
     wanted = {material.name for material in materials_of(obj)}
     shown = compat.baked_triangles(passes, width, height)
     triangles = np.unique(shown[shown >= 0])
@@ -203,7 +215,7 @@ def _materials_in(obj, passes, width: int, height: int) -> list[str]:
     return [name for name in dict.fromkeys(names) if name in wanted]
 
 
-# Panels of Blender that make sense with this engine: those for any engine, and EEVEE's for what any engine has.
+# Panels of Blender that suit this engine: those for any engine, and EEVEE's panels for features of any engine.
 HIDDEN_PANEL_PREFIXES = ("RENDER_PT_freestyle", "VIEWLAYER_PT_layer_passes", "WORLD_PT_viewport")
 EEVEE_PANELS = {
     "DATA_PT_EEVEE_light",

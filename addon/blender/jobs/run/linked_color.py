@@ -1,15 +1,13 @@
-"""A job's base colour from what is linked to its node."""
+"""The base color of a job, if it is linked to the node."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
-import bpy
 import numpy as np
 
-from ....core.bake.job import BakeJob, needs_medium
+from ....core.bake.job import BakeJob, Step
 from ....core.bake.surface import Surface
 from ....core.errors import BakeError, MissingImageError, NotSupportedError, text_of
 from ....core.material import RGB
@@ -18,26 +16,25 @@ from ....core.progress import Progress
 from ....core.scene.receiver import Receiver
 from ....core.scene.texture import mean_color, textured
 from ....core.target import Target
-from ...cycles.colors import colors_by_cycles, seconds_of_colors
+from ...cycles.colors import bytes_of_colors, colors_by_cycles
 from ...cycles.cycles_light import CopyForCycles
-from ...node.find import find_node_in_groups
 from ...node.tree import BASE_COLOR
-from ...read.base_color import is_understood, read_base_color
+from ...read.base_color import read_base_color
 from ...read.nodes import InputSocket
 from ...read.visibility import ObjectInstance
 
-# Rounding, or a little over by interpolation.
+# Largest base color without a warning; rounding and interpolation may exceed 1 a little.
 BRIGHTEST = 1.001
 
 
 @dataclass(frozen=True, eq=False)
 class BaseColor:
-    """What a node's texture brings to a job: its mean colour to the surface, the rest to the receiver.
+    """Base color of each texel. Its mean goes to the surface of a job, the rest to the receiver.
 
     Attributes
     ----------
-    colors : float32 (grid height, grid width, 3) of each chart, up to 1; none where they are not known.
-    blur : part of the texture that light meets on its way in.
+    colors : float32 (grid height, grid width, 3) of each chart, at most 1; empty if unknown.
+    blur : fraction of the texture that light passes on its way in.
     warnings : messages about the colors.
     unknown : sentence that names what only Cycles can evaluate; "" if there is nothing.
     """
@@ -58,20 +55,17 @@ class BaseColor:
         return cls(colors, mean_color(receiver, colors), blur, warnings)
 
     def on(self, surface: Surface) -> Surface:
-        """The surface with the mean colour, or as it is."""
+        """The surface with the mean color, or unchanged if that is unknown."""
         return surface if self.mean is None else replace(surface, base_color=self.mean)
 
     def in_job(self, job: BakeJob) -> BakeJob:
-        """A job on such a surface with the rest."""
+        """The job with the texture and the messages; its surface has the mean color already."""
         job = replace(job, illumination=job.illumination.with_messages(*self.warnings))
         return replace(job, receiver=textured(job.receiver, self.colors, self.blur)) if self.colors else job
 
 
 def read_texture(node, groups: tuple, placed: ObjectInstance, receiver: Receiver) -> BaseColor:
-    """What is linked to the node, at the places of an object's receiver.
-
-    `groups` are the group nodes around the node.
-    """
+    """Base color that is linked to the node, on the texels of a receiver. `groups` are the groups around the node."""
     try:
         colors = read_base_color(InputSocket(node.inputs[BASE_COLOR], groups), placed, receiver)
     except MissingImageError as error:
@@ -82,44 +76,47 @@ def read_texture(node, groups: tuple, placed: ObjectInstance, receiver: Receiver
     return BaseColor.of(colors, receiver, node.texture_blur, placed.obj.name)
 
 
-def needs_cycles(obj, material_name: str) -> bool:
-    """Whether a bake of one of an object's materials has Cycles evaluate a texture."""
-    place = find_node_in_groups(bpy.data.materials.get(material_name))
-    if place is None or not place[0].has_texture():
-        return False
-    return not is_understood(InputSocket(place[0].inputs[BASE_COLOR], place[1]), obj)
+@dataclass(frozen=True, eq=False)
+class BaseColorByCycles(Step):
+    """Evaluates a base color that only Cycles knows. The result, or the failure, holds for all jobs of the target.
+
+    Attributes
+    ----------
+    surface : of the node, without the base color.
+    blur : fraction of the texture that light passes on its way in.
+    matrix : rows of the matrix of the instance that is baked; None if the object itself is.
+    """
+
+    copy: CopyForCycles
+    target: Target
+    surface: Surface
+    blur: float
+    matrix: list | None
+
+    name = "Evaluating the base color"
+
+    def weight(self, _job: BakeJob) -> float:
+        return 0.0 if self.target in self.copy.base_colors else 1.0
+
+    def run(self, job: BakeJob, progress: Progress) -> BakeJob:
+        known = self.copy.base_colors
+        if self.target not in known:
+            known[self.target] = self._evaluate(job.receiver, progress)
+        return known[self.target].in_job(replace(job, surface=known[self.target].on(self.surface)))
+
+    def memory_bytes(self, job: BakeJob) -> float:
+        known = self.target in self.copy.base_colors
+        return 0.0 if known else bytes_of_colors(job.receiver.width, job.receiver.height)
+
+    def _evaluate(self, receiver: Receiver, progress: Progress) -> BaseColor:
+        try:
+            colors = colors_by_cycles(self.copy, self.target, self.matrix, receiver, progress)
+        except (BakeError, OSError) as error:
+            return not_evaluated(self.target, text_of(error))
+        return BaseColor.of(colors, receiver, self.blur, self.target.object_name)
 
 
-class ColorByCycles:
-    """A texture that only Cycles knows, of one target; what was found, or that nothing was, holds for all its jobs."""
-
-    def __init__(self, target: Target, surface: Surface, blur: float, placed: ObjectInstance) -> None:
-        self._target, self._surface, self._blur = target, surface, blur
-        # Plain, as it goes to a thread.
-        self._matrix = np.array(placed.matrix).tolist() if placed.is_instance else None
-        self._found: BaseColor | None = None
-
-    def in_job(self, job: BakeJob, copy: CopyForCycles | None) -> BakeJob:
-        """The job, which asks Cycles when it runs."""
-        if not needs_medium(job.settings):
-            return job
-        if copy is not None:
-            job = replace(job, illumination=job.illumination.with_messages(*copy.scene.warnings))
-        elif self._found is None:
-            self._found = self._missing("There is no copy of the scene.")
-        seconds = seconds_of_colors(job.receiver.width, job.receiver.height) if self._found is None else 0.0
-        return replace(job, more_color=partial(self._color, copy), color_seconds=seconds)
-
-    def _color(self, copy: CopyForCycles | None, job: BakeJob, progress: Progress | None) -> BakeJob:
-        if self._found is None:
-            try:
-                colors = colors_by_cycles(copy, self._target, self._matrix, job.receiver, progress)
-                self._found = BaseColor.of(colors, job.receiver, self._blur, self._target.object_name)
-            except (BakeError, OSError) as error:
-                self._found = self._missing(text_of(error))
-        return self._found.in_job(replace(job, surface=self._found.on(self._surface)))
-
-    def _missing(self, why: str) -> BaseColor:
-        name = self._target.object_name
-        text = f"Cycles could not evaluate the Base Color of '{name}': the node's own color is used. {why}"
-        return BaseColor(warnings=(warning(name, text),))
+def not_evaluated(target: Target, why: str) -> BaseColor:
+    """The base color if Cycles could not evaluate it: only a warning."""
+    text = f"Cycles could not evaluate the Base Color of '{target.object_name}': the node's own color is used. {why}"
+    return BaseColor(warnings=(warning(target.object_name, text),))

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator
 
 import bpy
 from bpy.props import EnumProperty
 
 from ....core import native
 from ....core.bake.bake_settings import COMBINED
-from ....core.bake.runner import CANCELLED, WRITTEN, Bake
+from ....core.bake.runner import CANCELLED, WRITTEN, Bake, Sink, run_bakes, run_in_steps
 from ....core.errors import text_of
 from ....core.messages import Level, Message, Messages, warning
+from ....core.progress import Progress
 from ....core.target import Target
 from ... import popup
 from ...images.results import Results
@@ -19,42 +21,117 @@ from ...node.find import NOTHING_FOUND, find_bakeable, find_misplaced
 from ...registration import all_or_nothing, classes
 from ..out_of_date import stale
 from ..state import redraw, state
-from .bake_queue import BakeQueue
+from .bake_queue import BakeQueue, Pass
 from .prepare import read_scene
 
 TIMER_SECONDS = 0.1
+"""Seconds between two looks at the thread of a bake."""
 
 NOTHING_STALE = "Nothing is out of date."
 
-# Of the run in the window.
 _timers: list[bpy.types.Timer] = []
+"""Timers of the run in the window."""
 
 
 class BakeThread(threading.Thread):
-    """Runs one bake; poll `fraction` and `doing` until it has ended."""
+    """Runs the job of one bake."""
 
-    def __init__(self, bake: Bake) -> None:
+    def __init__(self, bake: Bake, progress: Progress) -> None:
         super().__init__(daemon=True)
-        self.bake = bake
-        self.fraction, self.doing = 0.0, ""
-        self._stop_asked = threading.Event()
+        self.bake, self.progress = bake, progress
 
     def run(self) -> None:
-        self.bake.run(self)
-        if self._stop_asked.is_set():
-            # Also where it ended just before it saw that it should.
-            self.bake.cancel()
+        self.bake.run(self.progress)
 
-    def cancel(self) -> None:
-        """Ask the bake to stop; it ends soon after."""
-        self._stop_asked.set()
 
-    def __call__(self, fraction: float) -> bool:
-        self.fraction = fraction
-        return not self._stop_asked.is_set()
+class _Run(Sink):
+    """The bakes of one call of the operator.
 
-    def say(self, words: str) -> None:
-        self.doing = words
+    Attributes
+    ----------
+    written : targets whose results were stored.
+    problems : messages that nobody should miss.
+    """
+
+    def __init__(self, report, in_window: bool) -> None:
+        self._report_to, self._in_window = report, in_window
+        self._reported, self.problems = Messages(), Messages()
+        self.written: list[Target] = []
+        self._results, self._progress = Results(), Progress()
+        self._queue: BakeQueue | None = None
+        self._parts: dict = {}
+
+    def prepare(self, context, targets: list[Target], misplaced: list[Bake]) -> None:
+        """Read the scene. Nodes that no bake can use fail at once."""
+        state.forget_failures()
+        self._parts = stale.parts_of(context, targets)
+        preparation = read_scene(context, targets, context.scene.beamspread.for_bake())
+        self._queue = BakeQueue(preparation, targets, preview_first=self._in_window)
+        for bake in misplaced:
+            self.end(bake)
+
+    def bakes(self) -> Iterator[Bake]:
+        """The bakes in their order, until the run is cancelled."""
+        before = None
+        for bake in self._queue:
+            purpose = self._queue.step.purpose
+            if purpose == Pass.FINAL and before == Pass.PREVIEW:
+                self._results = Results()  # the same parts of the same images are filled again
+            before = purpose
+            yield self._results.admit(bake)
+            if self._progress.is_cancelled:
+                return
+
+    def run(self, bake: Bake) -> Iterator[None]:
+        if bake.job is None:
+            return
+        number, count = self._queue.number, len(self._queue)
+        progress = self._progress.split([1.0] * count)[number - 1]
+        if not self._in_window:
+            bake.run(progress)
+            return
+        state.start(self._progress, bake.target, f"{number} of {count}" if count > 1 else "")
+        thread = BakeThread(bake, progress)
+        thread.start()
+        while thread.is_alive():
+            yield
+
+    def store(self, bake: Bake) -> str:
+        return self._results.store(bake)
+
+    def end(self, bake: Bake) -> None:
+        purpose = self._queue.step.purpose if self._queue.step else Pass.SINGLE
+        if bake.status == CANCELLED and purpose == Pass.FINAL:
+            text = f"The final bake of '{bake.target}' was cancelled: its quick preview is kept."
+            self.report(warning(str(bake.target), text))
+            return
+        state.note(bake)
+        if bake.status == WRITTEN:
+            self.written.append(bake.target)
+            if bake.job.settings.layer == COMBINED:
+                stale.keep(bake, self._parts.get(bake.target), purpose == Pass.PREVIEW)
+            if bake.is_dark:
+                self.problems.add(*bake.messages.of(Level.WARNING))
+        elif bake.status == CANCELLED:
+            self.report(warning("", "The bake was cancelled: images keep their former pixels."))
+        else:
+            for message in bake.messages.of(Level.ERROR):
+                self.fail(message)
+        for message in bake.messages.of(Level.WARNING, Level.INFO):
+            self.report(message)
+
+    def fail(self, message: Message) -> None:
+        self.report(message)
+        self.problems.add(message)
+
+    def report(self, message: Message) -> None:
+        """Show a message in the Info editor and the console, once."""
+        if message in self._reported:
+            return
+        self._reported.add(message)
+        # In the window our own popup shows errors: Blender would open a second one for them.
+        is_error = message.level == Level.ERROR
+        self._report_to({"WARNING" if is_error and self._in_window else message.level.value}, message.line())
 
 
 class BEAMSPREAD_OT_bake(bpy.types.Operator):
@@ -67,14 +144,12 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
     objects: EnumProperty(
         name="Objects",
         items=[
-            ("SELECTED", "Selected", "The selected objects that have a Beamspread node; all if there are none", 0),
-            ("ALL", "All", "All objects of the scene that have a Beamspread node", 1),
-            ("STALE", "Out of Date", "Those baked before whose light, shape, material or settings changed since", 2),
+            ("SELECTED", "Selected", "Bake the selected objects. If none has a Beamspread node, bake all", 0),
+            ("ALL", "All", "Bake all objects that have a Beamspread node", 1),
+            ("STALE", "Out of Date", "Bake again every object that changed since its last bake", 2),
         ],
         default="SELECTED",
     )
-
-    _in_window = False
 
     @classmethod
     def description(cls, _context, properties):
@@ -91,18 +166,13 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         return True
 
     def execute(self, context):
-        if not self._prepare(context, preview_first=False):
-            return {"CANCELLED"}
-        while (bake := self._queue.next()) is not None:
-            bake = self._results.admit(bake)
-            bake.run()
-            self._take(bake)
+        if self._prepare(context, in_window=False):
+            run_bakes(self._run.bakes(), self._run)
         return self._finish(context)
 
     def invoke(self, context, _event):
         if bpy.app.background or context.window is None:
             return self.execute(context)
-        self._in_window, self._shown = True, ""
         return self._ending_by_errors(context, self._begin)
 
     def modal(self, context, event):
@@ -113,22 +183,23 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         _end_threads()
 
     def _ending_by_errors(self, context, step):
-        """What a step in the window returns; where it raises, Blender would call it again and again, without end."""
+        """The result of a step in the window. Blender would repeat a step that raises without end: it ends the run."""
         try:
             return step(context)
-        except Exception as error:  # noqa: BLE001 - whatever it is, the run ends and says so
+        except Exception as error:  # noqa: BLE001 - any error has to end the run, and to be shown
             text = f"An error of the add-on has ended the bake: {text_of(error)}"
-            if state.progress is not None:
-                state.note(Bake(state.progress.target, error=text))
+            if state.run is not None:
+                state.note(Bake(state.run.target, error=text))
             _end_threads()
-            self._fail(Message(Level.ERROR, "", text))
+            self._run.fail(Message(Level.ERROR, "", text))
             return self._finish(context)
 
     def _begin(self, context):
-        if not self._prepare(context, preview_first=True):
+        if not self._prepare(context, in_window=True):
             return self._finish(context)
-        state.begin()
-        if not self._start_next():
+        self._shown = ""
+        self._steps = run_in_steps(self._run.bakes(), self._run)
+        if not self._step():
             return self._finish(context)
         manager = context.window_manager
         _timers.append(manager.event_timer_add(TIMER_SECONDS, window=context.window))
@@ -139,39 +210,33 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
     def _go_on(self, context, event):
         if event.type == "ESC" and event.value == "PRESS" and _is_ours(context, event):
             state.ask_to_stop()
-        elif event.type != "TIMER":
-            return {"PASS_THROUGH"}
-        if state.should_stop():
-            self._thread.cancel()
-        if event.type == "ESC":
             return {"RUNNING_MODAL"}
-        if self._thread.is_alive():
-            self._show_progress(context)
+        if event.type != "TIMER":
             return {"PASS_THROUGH"}
-        bake = self._thread.bake
-        self._take(bake)
-        if bake.status != CANCELLED and self._start_next():
+        if self._step():
+            self._show_progress(context)
             return {"PASS_THROUGH"}
         _leave_window()
         return self._finish(context)
 
-    def _prepare(self, context, preview_first: bool) -> bool:
-        """Make the queue of bakes; False if there is nothing to do at all."""
-        self._written, self._reported, self._results = [], Messages(), Results()
-        self._problems = Messages()
+    def _step(self) -> bool:
+        """Go on with the run as far as that is possible now; False once it has ended."""
+        for _ in self._steps:
+            return True
+        return False
+
+    def _prepare(self, context, in_window: bool) -> bool:
+        """Make the run; False if there is nothing to do."""
+        self._run, self._in_window = _Run(self.report, in_window), in_window
         if native.problem:
-            self._fail(Message(Level.ERROR, "", native.problem))
+            self._run.fail(Message(Level.ERROR, "", native.problem))
             return False
         targets, misplaced = self._chosen(context)
         if not targets and not misplaced:
-            self._fail(Message(Level.ERROR, "", NOTHING_STALE if self.objects == "STALE" else NOTHING_FOUND))
+            nothing = NOTHING_STALE if self.objects == "STALE" else NOTHING_FOUND
+            self._run.fail(Message(Level.ERROR, "", nothing))
             return False
-        state.forget_failures()
-        self._parts = stale.parts_of(context, targets)
-        preparation = read_scene(context, targets, context.scene.beamspread.for_bake())
-        self._queue = BakeQueue(preparation, targets, preview_first)
-        for bake in misplaced:
-            self._take(bake)
+        self._run.prepare(context, targets, misplaced)
         return True
 
     def _chosen(self, context) -> tuple[list[Target], list[Bake]]:
@@ -185,84 +250,31 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
                 return targets, misplaced
         return find_bakeable(context.view_layer), find_misplaced(context.scene.objects)
 
-    def _start_next(self) -> bool:
-        """Start the next bake that can be; False if there is none."""
-        while (bake := self._queue.next()) is not None:
-            if self._queue.starts_again():
-                self._results = Results()  # the same parts of the same images are filled anew
-            bake = self._results.admit(bake)
-            if bake.job is None:
-                self._take(bake)
-                continue
-            state.start(bake.target, self._queue.fraction(0.0))
-            self._thread = BakeThread(bake)
-            self._thread.start()
-            return True
-        return False
-
     def _show_progress(self, context) -> None:
-        done = self._queue.fraction(self._thread.fraction)
-        doing = "Stopping" if state.should_stop() else self._thread.doing
-        state.update(self._thread.fraction, done, doing)
-        shown = state.progress.in_a_line()
-        if shown == self._shown:  # to draw takes time from the bake, and from whoever works on
+        line = state.run.line()
+        if line == self._shown:  # drawing takes time from the bake, and from the user
             return
-        self._shown = shown
-        context.window_manager.progress_update(int(100 * done))
+        self._shown = line
+        context.window_manager.progress_update(int(100 * state.run.progress.fraction))
         if context.workspace is not None:
-            context.workspace.status_text_set(shown)
+            context.workspace.status_text_set(line)
         redraw(context)
-
-    def _take(self, bake: Bake) -> None:
-        """Store what a bake has made, and say what there is to say."""
-        layers = set(bake.layers)
-        bake.keep(self._results.store)
-        if bake.status == CANCELLED and self._queue.turn.is_again:
-            text = f"The final bake of '{bake.target}' was cancelled: its quick preview is kept."
-            self._report(warning(str(bake.target), text))
-            return
-        state.note(bake)
-        if bake.status == WRITTEN:
-            self._written.append(bake.target)
-            if COMBINED in layers:
-                parts, is_first_look = self._parts.get(bake.target), self._queue.turn.is_first
-                stale.keep(bake, parts, is_first_look)
-            if bake.is_dark:
-                self._problems.add(*bake.messages.of(Level.WARNING))
-        elif bake.status == CANCELLED:
-            self._report(warning("", "The bake was cancelled: images keep their former pixels."))
-        else:
-            for message in bake.messages.of(Level.ERROR):
-                self._fail(message)
-        for message in bake.messages.of(Level.WARNING, Level.INFO):
-            self._report(message)
-
-    def _fail(self, message: Message) -> None:
-        self._report(message)
-        self._problems.add(message)
-
-    def _report(self, message: Message) -> None:
-        if message in self._reported:
-            return
-        self._reported.add(message)
-        # In the window our own popup shows errors: Blender would open a second one for them.
-        is_error = message.level == Level.ERROR
-        self.report({"WARNING" if is_error and self._in_window else message.level.value}, message.line())
 
     def _finish(self, context):
-        stale.look_soon()
+        stale.scan_soon()
         redraw(context)
-        if self._problems and self._in_window:
-            title = "Beamspread: some bakes need attention" if self._written else "Beamspread: nothing was baked"
-            popup.show_soon(title, [message.line() for message in self._problems])
-        if not self._written:
+        written, problems = self._run.written, self._run.problems
+        if problems and self._in_window:
+            title = "Beamspread: some bakes need attention" if written else "Beamspread: nothing was baked"
+            popup.show_soon(title, [message.line() for message in problems])
+        if not written:
             return {"CANCELLED"}
-        self.report({"INFO"}, f"Baked {', '.join(map(str, dict.fromkeys(self._written)))}")
+        self.report({"INFO"}, f"Baked {', '.join(map(str, dict.fromkeys(written)))}")
         return {"FINISHED"}
 
 
 def _is_ours(context, event) -> bool:
-    """Whether Esc is meant for the bake: menus, fields and operators started later get it before us anyway."""
+    """True if Esc is meant for the bake: menus, fields and operators started later get it before us anyway."""
     if event.ctrl or event.alt or event.shift or event.oskey:
         return False
     if context.screen is not None and context.screen.is_animation_playing:
@@ -272,7 +284,7 @@ def _is_ours(context, event) -> bool:
 
 
 def _area_under(screen, event):
-    """Where the mouse is: a modal operator's own context stays where it was started."""
+    """Area under the mouse: a modal operator's own context keeps the area where it was started."""
     for area in screen.areas if screen is not None else ():
         if 0 <= event.mouse_x - area.x < area.width and 0 <= event.mouse_y - area.y < area.height:
             return area
@@ -280,7 +292,7 @@ def _area_under(screen, event):
 
 
 class BEAMSPREAD_OT_cancel(bpy.types.Operator):
-    """Stop the bake that is running: images keep what they had (Esc)"""
+    """Stop the bake that is running: images keep their former pixels (Esc)"""
 
     bl_idname = "beamspread.cancel"
     bl_label = "Cancel"
@@ -296,7 +308,7 @@ class BEAMSPREAD_OT_cancel(bpy.types.Operator):
 
 
 def _leave_window() -> None:
-    """Take away what a run has in the window."""
+    """Remove the timer, the cursor and the status text of a run."""
     while _timers:
         bpy.context.window_manager.event_timer_remove(_timers.pop())
         bpy.context.window_manager.progress_end()
@@ -307,10 +319,10 @@ def _leave_window() -> None:
 
 
 def _end_threads() -> None:
-    """One that outlives its operator would end Blender with an error when that quits."""
+    """End all bakes: a thread that outlived its operator would make Blender end with an error."""
     for thread in threading.enumerate():
         if isinstance(thread, BakeThread):
-            thread.cancel()
+            thread.progress.cancel()
             thread.join()
     _leave_window()  # the operator goes without being asked to
 

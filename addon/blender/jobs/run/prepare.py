@@ -1,4 +1,4 @@
-"""How each target becomes a job, or a sentence that says why it can't; shared by operator, engine and batch."""
+"""Makes the job of each target, or the error that says why there is none; for operator, engine and batch."""
 
 from __future__ import annotations
 
@@ -6,17 +6,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import bpy
+import numpy as np
 
 from ....core.bake.bake_settings import BakeSettings
-from ....core.bake.estimate import machine_bytes
 from ....core.bake.job import BakeJob, needs_medium, to_simulate
 from ....core.bake.runner import Bake
 from ....core.bake.surface import Surface
-from ....core.errors import BakeError
 from ....core.scene.receiver import build_receiver, texture_size
 from ....core.scene.uv_map import fit_uv_maps
 from ....core.target import Target
-from ...cycles.colors import bytes_of_colors, seconds_of_colors
 from ...cycles.cycles_light import CopyForCycles, CyclesLight
 from ...images.files import check_image
 from ...images.sequence import is_sequence, size_of_frames
@@ -25,16 +23,16 @@ from ...node.node import BeamspreadNode
 from ...read.geometry import read_polygons
 from ...read.lights import read_illumination
 from ...read.visibility import ObjectInstance, as_rendered, check_instance, find_instances, render_visible_names
-from .linked_color import BaseColor, ColorByCycles, read_texture
+from .linked_color import BaseColor, BaseColorByCycles, not_evaluated, read_texture
 
-# Stands for a base color that is found when the job runs.
-SOME_COLOR = (0.5, 0.5, 0.5)
+PLACEHOLDER_COLOR = (0.5, 0.5, 0.5)
+"""Base color until Cycles has evaluated it."""
 
 
 def prepare_scene(
     context, targets: list[Target], settings: BakeSettings, resolution: int | None = None
 ) -> Iterator[Bake]:
-    """Read the scene as it would render at its current frame; a bake for each target, as they are asked for."""
+    """Read the scene as it would render at its current frame; makes a bake for each target when it is asked for."""
     return map(read_scene(context, targets, settings, resolution).bake, targets)
 
 
@@ -48,11 +46,11 @@ def read_scene(context, targets: list[Target], settings: BakeSettings, resolutio
     """
     depsgraph = context.evaluated_depsgraph_get()
     places = {material: find_node_in_groups(material) for material in bpy.data.materials}
-    # Also materials of other objects: their nodes must be known not to shine.
+    # Materials of other objects count as well: their Beamspread nodes must not emit light.
     for material, (_, around) in ((material, place) for material, place in places.items() if place is not None):
         evaluated = material.evaluated_get(depsgraph).node_tree
         groups = [group.node_tree for group in around]
-        # No more than needs it is tagged: views, and the material's icons, would start again.
+        # Tag only changed trees: a tag restarts viewports and material icons.
         for tree, copy in [(material.node_tree, evaluated), *((one, one.evaluated_get(depsgraph)) for one in groups)]:
             if not all(map(_is_current, tree.nodes, copy.nodes)):
                 tree.update_tag()
@@ -62,9 +60,9 @@ def read_scene(context, targets: list[Target], settings: BakeSettings, resolutio
 
 
 def _is_current(node, copy) -> bool:
-    """Whether a node is evaluated as it is.
+    """True if the evaluated copy of a node is up to date.
 
-    It is of an unknown class where that was before its class was registered, and values that scripts set tag nothing.
+    A copy is stale if its class was registered later, or if a script set a value, which tags nothing.
     """
     if copy.bl_idname != node.bl_idname or not isinstance(node, BeamspreadNode):
         return copy.bl_idname == node.bl_idname
@@ -72,11 +70,15 @@ def _is_current(node, copy) -> bool:
 
 
 class Preparation:
-    """What was read of a scene at one time, from which each target's job is made when it is its turn: jobs are large.
+    """A scene as it was read at one time. Each target's job is made when its turn comes, since jobs are large.
 
-    `size` overrides all other sizes, `visible` names the objects that render, None: all. Afterwards the depsgraph is
-    no longer needed, but for the copy of the scene that Cycles gets, where none is given: the first job that needs one
-    makes it.
+    Afterwards the depsgraph is not needed. The first job that needs a copy of the scene for Cycles makes one.
+
+    Parameters
+    ----------
+    size : width and height of the texture, overrides all other sizes.
+    visible : names of the objects that render; None: all.
+    copy : copy of the scene for Cycles, if there is one already.
     """
 
     def __init__(
@@ -105,52 +107,64 @@ class Preparation:
             except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
                 self._plans[target] = error
 
-    def size(self, target: Target) -> tuple[int, int] | None:
-        """Of the target's image, in texels."""
-        plan = self._plans[target]
-        return None if isinstance(plan, Exception) else plan.size
-
     def to_simulate(self, target: Target, quality: str) -> list:
-        """The media that its bake would have to simulate first."""
+        """Media that the target's bake would have to simulate first."""
         plan = self._plans[target]
         return [] if isinstance(plan, Exception) else to_simulate(plan.surface, replace(self.settings, quality=quality))
 
-    def color_seconds(self, target: Target) -> float:
-        """About how long Cycles takes for its base colour, where it does."""
-        plan = self._plans[target]
-        asks = (
-            needs_medium(self.settings) and not isinstance(plan, Exception) and isinstance(plan.texture, ColorByCycles)
-        )
-        return seconds_of_colors(*plan.size) if asks else 0.0
-
     def bake(self, target: Target, settings: BakeSettings | None = None) -> Bake:
-        """The target's bake, with its job or the reason why there is none; in the main thread."""
+        """The target's bake, with its job or the error; call it in the main thread."""
         plan = self._plans[target]
         if isinstance(plan, Exception):
             return Bake(target, error=plan)
         try:
             receiver = build_receiver(plan.maps, *plan.size)
             illumination = self._illumination.lighting(target.object_name)
-            job = BakeJob(target.object_name, receiver, illumination, plan.surface, settings or self.settings)
-            if isinstance(plan.texture, ColorByCycles):
-                job = plan.texture.in_job(job, self._by_cycles.copy())
-            elif plan.texture is not None:
-                job = plan.texture.in_job(job)
-            job = self._by_cycles.complete(job)
-            check_memory(job, self.settings.memory_limit)
+            settings = settings or self.settings
+            job = BakeJob(target.object_name, receiver, illumination, plan.surface, settings)
+            job = self._with_color(self._by_cycles.complete(job), target, plan)
+            job.check_memory()
             return Bake(target, job)
         except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
             return Bake(target, error=error)
 
+    def _with_color(self, job: BakeJob, target: Target, plan: _Plan) -> BakeJob:
+        """The job with the base color that is linked to the node, or a step that evaluates it."""
+        color = plan.color
+        if color is None:
+            return job
+        if not color.unknown:
+            return color.in_job(job)
+        if not needs_medium(job.settings):
+            return job
+        copy = self._by_cycles.copy()
+        if copy is None:
+            return not_evaluated(target, "There is no copy of the scene.").in_job(
+                replace(job, surface=plan.own_surface)
+            )
+        step = BaseColorByCycles(copy, target, plan.own_surface, color.blur, plan.matrix)
+        illumination = job.illumination.with_messages(*copy.scene.warnings)
+        return replace(job, illumination=illumination, steps=(step, *job.steps))
+
 
 @dataclass(frozen=True)
 class _Plan:
-    """What is kept of a target until it is its turn."""
+    """A target as it was read, until its job is made.
+
+    Attributes
+    ----------
+    surface : with the mean base color; a placeholder if only Cycles can evaluate it.
+    own_surface : of the node, without what is linked to it.
+    color : base color that is linked to the node, or None.
+    matrix : rows of the matrix of the instance that is baked; None if the object itself is.
+    """
 
     maps: list
     size: tuple[int, int]
     surface: Surface
-    texture: BaseColor | ColorByCycles | None = None
+    own_surface: Surface
+    color: BaseColor | None = None
+    matrix: list | None = None
 
 
 def _read_target(
@@ -170,25 +184,8 @@ def _read_target(
     maps = fit_uv_maps(read_polygons(placed.obj, target.material_name, placed.matrix))
     size = size or texture_size(maps, resolution or depsgraph.scene.beamspread.resolution)
     if not node.has_texture():
-        return _Plan(maps, size, surface)
-    texture = read_texture(node, groups, placed, build_receiver(maps, *size))
-    if texture.unknown:
-        by_cycles = ColorByCycles(target, surface, texture.blur, placed)
-        return _Plan(maps, size, replace(surface, base_color=SOME_COLOR), by_cycles)
-    return _Plan(maps, size, texture.on(surface), texture)
-
-
-def check_memory(job: BakeJob, limit: int) -> None:
-    """Raise BakeError if a bake, or Cycles before it, would take more bytes than allowed; 0: than the machine has."""
-    limit = limit or machine_bytes()
-    size = job.receiver.width, job.receiver.height
-    texels = f"{size[0]} x {size[1]} texels"
-    needs = [(job.memory_bytes(), f"{texels} take about")]
-    if job.more_color is not None:
-        needs.append((bytes_of_colors(*size), f"Cycles' process for the base color of {texels} takes about"))
-    needed, who = max(needs)
-    if limit and needed > limit:
-        raise BakeError(
-            f"{who} {needed / 2**30:.1f} GB of memory, and {limit / 2**30:.1f} GB are "
-            "allowed: lower the resolution, or raise the memory limit in the add-on's preferences."
-        )
+        return _Plan(maps, size, surface, surface)
+    color = read_texture(node, groups, placed, build_receiver(maps, *size))
+    mixed = replace(surface, base_color=PLACEHOLDER_COLOR) if color.unknown else color.on(surface)
+    matrix = np.array(placed.matrix).tolist() if placed.is_instance else None
+    return _Plan(maps, size, mixed, surface, color, matrix)

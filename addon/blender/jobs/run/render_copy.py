@@ -1,6 +1,6 @@
-"""Pictures of the scene while the engine is Beamspread: by Cycles or EEVEE, in another Blender on a copy of the scene.
+"""Renders while the engine is Beamspread: by Cycles or EEVEE, in another Blender on a copy of the scene.
 
-An engine may not start another one's render in its own process.
+An engine may not start the render of another engine in its own process.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ... import compat
 from ...cycles.process import run
 from ...cycles.scene_copy import SceneCopy
 
-# The window's main thread, which alone may read the scene, may be busy with a long step of the user's.
+# Seconds to wait for the main thread, which alone may read the scene and may be busy.
 PATIENCE_SECONDS = 60.0
 
 
@@ -59,7 +59,7 @@ def _step(engine, fraction: float) -> bool:
 
 
 def _in_main_thread(function: Callable):
-    """What the function returns; F12 in a window renders in a thread of its own, where the scene may not be read."""
+    """Call the function in the main thread: F12 in a window renders in another, which may not read the scene."""
     if threading.current_thread() is threading.main_thread():
         return function()
     outcome: dict[str, object] = {}
@@ -68,20 +68,20 @@ def _in_main_thread(function: Callable):
     def call() -> None:
         try:
             outcome["value"] = function()
-        except Exception as error:  # noqa: BLE001 - raised where it was asked for
+        except Exception as error:  # noqa: BLE001 - raised again in the other thread
             outcome["error"] = error
         done.set()
 
     bpy.app.timers.register(call)
     if not done.wait(PATIENCE_SECONDS):
-        raise BakeError("Blender's window was busy for a minute, so that no picture was begun: render again.")
+        raise BakeError("Blender's window was busy for a minute, so the render did not start.", "Render again.")
     if "error" in outcome:
         raise outcome["error"]
     return outcome["value"]
 
 
 def show_by_eevee(context) -> None:
-    """Have a viewport in Rendered mode show Material Preview with the scene's own light, soon: not while it draws."""
+    """Switch a viewport in Rendered mode to Material Preview with the scene's own light, once it has been drawn."""
     space = context.space_data
     if space is None or space.type != "VIEW_3D" or space.shading.type != "RENDERED":
         return

@@ -35,7 +35,7 @@ made = {
 corners = np.array([(-0.5, -0.5, 0), (0.5, -0.5, 0), (0.5, 0.5, 0), (-0.5, 0.5, 0)])
 square = fit_uv_maps(Polygons(corners, corners[:, :2] + 0.5, np.array([0, 4]), np.array([axes[2]], float)))
 material = Material(albedo=(0.95, 0.9, 0.8), mean_free_path=(path,) * 3, anisotropy=anisotropy, ior=ior)
-surface, settings = Surface(material, thickness), BakeSettings(solver=solver, quality="preview", layers=(layer,))
+surface, settings = Surface(material, thickness), BakeSettings(solver=solver, quality="preview", layer=layer)
 for medium in surface.media():
     beamspread.library(medium, quality="preview")
 
