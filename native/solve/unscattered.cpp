@@ -69,7 +69,7 @@ public:
         return {a.distance + part * (b.distance - a.distance), a.power + part * (b.power - a.power)};
     }
 
-    float largest_distance() const
+    float max_distance() const
     {
         float largest = 0.0f;
         for (const auto& exits : m_exits)
@@ -129,7 +129,7 @@ struct Strip {
 Strip strip_from(std::size_t first, const Plane& plane, const PlaneLight& light, const ExitTable& exits)
 {
     const std::size_t last = std::min(plane.height, first + rows_per_strip);
-    const double reach = static_cast<double>(exits.largest_distance()) / plane.pitch_y + 1.0;
+    const double reach = static_cast<double>(exits.max_distance()) / plane.pitch_y + 1.0;
     const auto rows = static_cast<std::size_t>(std::min(std::ceil(reach), static_cast<double>(plane.height)));
     Strip result{first - std::min(first, rows), {}};
     result.values.resize((std::min(plane.height, last + rows) - result.first_row) * plane.width);

@@ -46,3 +46,10 @@ def test_architecture_has_the_folders_of_cmake():
     core = page("docs/architecture.md").split("## The package")[0]
     rows = re.findall(r"^\| (`\S+`) \| (.*?) ?\| ", core, re.MULTILINE)
     assert rows[:-1] == [(f"`{folder}`", cell) for (folder, _), cell in zip(folders, cells)]
+
+
+def test_each_row_of_tuning_names_a_constant_of_its_file():
+    rows = re.findall(r"^\| (.*?) \| ((?:native|addon)/\S+) \|", page("docs/tuning.md"), re.MULTILINE)
+    assert len(rows) > 100
+    names = [(name.split("::")[-1], file) for cell, file in rows for name in re.findall(r"`([^`]+)`", cell)]
+    assert [(name, file) for name, file in names if not re.search(rf"\b{re.escape(name)}\b", page(file))] == []

@@ -122,7 +122,7 @@ VectorXd likeliest_scale(const VectorXd& power, const VectorXd& relative, const 
         h.diagonal().array() += 1.0;
         return h;
     };
-    const MatrixXd most_curved = hessian(relative);
+    const MatrixXd curvature_bound = hessian(relative);
     double damping = 0.0;
     VectorXd pull = VectorXd::Zero(albedos);
     VectorXd scale = VectorXd::Ones(bins);
@@ -134,7 +134,7 @@ VectorXd likeliest_scale(const VectorXd& power, const VectorXd& relative, const 
                 free(b) = 0.0;
         const MatrixXd curvature = hessian(free);
         const auto damped_step = [&]() -> VectorXd {
-            return -(curvature + damping * most_curved).ldlt().solve(gradient);
+            return -(curvature + damping * curvature_bound).ldlt().solve(gradient);
         };
         if (!(gradient.dot(curvature.ldlt().solve(gradient)) > settled))
             break;
