@@ -7,7 +7,6 @@
 #include "scene/area_light.h"
 #include "scene/environment_light.h"
 #include "scene/mesh_light.h"
-#include "scene/receiver.h"
 #include "scene/spot_light.h"
 #include "scene/sun_light.h"
 
@@ -66,15 +65,6 @@ std::unique_ptr<MeshLight> make_mesh_light(const py::array& vertices, const py::
                                        to_rows<Vec3f, float>("radiance", radiance, "contiguous float32 (M, 3)"));
 }
 
-py::object position_in(const Light& light, const ReceiverGrid& grid)
-{
-    const std::optional<LightSource> source = light.source();
-    if (!source || source->is_far)
-        return py::none();
-    const Vec3 position = grid.to_plane(source->position - grid.origin);
-    return py::make_tuple(position.x, position.y, position.z);
-}
-
 py::tuple irradiance(const Light& light, const Numbers& point, const Numbers& normal)
 {
     const Vec3 arriving = light.irradiance(to_vec3("point", point), to_vec3("normal", normal));
@@ -114,18 +104,6 @@ argument that is out of range, with a message that names it.
         .def_property_readonly("is_delta", &Light::is_delta,
                                "bool: True if the light has no size, so that one ray reaches each point.")
         .def_property_readonly("is_colored", &Light::is_colored, "bool: True if its rays differ in color.")
-        .def("position_in", &position_in, py::arg("grid"), R"(Position of a lamp without a size.
-
-Parameters
-----------
-grid : ReceiverGrid
-
-Returns
--------
-tuple of 3 floats or None
-    Metres along the grid's x_axis, y_axis and normal from the outer corner of texel (0, 0); None for a sun, and for a
-    light with a size.
-)")
         .def("irradiance", &irradiance, py::arg("point"), py::arg("normal"),
              R"(Irradiance at a point where nothing blocks the light.
 

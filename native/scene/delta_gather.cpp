@@ -56,7 +56,7 @@ public:
           m_rays(grid, occluders, settings.clearance),
           m_shadows(grid, m_source, occluders, m_rays.start(), settings.find_shadows),
           m_open_texel(gather_texel(0.0, 0.0, m_points, nullptr)),
-          m_open_travel(unblocked_direction(grid, light, grid.point(0.5, 0.5)))
+          m_far_travel(mean_direction(m_open_texel.flow))
     {
     }
 
@@ -68,7 +68,7 @@ public:
         Work& work = m_work.local();
         m_shadows.shade_band(band, work.shades);
         work.irradiance.resize(m_grid.width);
-        work.travel.assign(m_grid.width, m_open_travel);
+        work.travel.assign(m_grid.width, m_far_travel);
         const std::size_t rows = work.shades.size() / m_grid.width;
         for (std::size_t i = 0; i < rows; ++i)
             gather_row(band * Shadows::rows_per_band + i, &work.shades[i * m_grid.width], work, sink);
@@ -95,7 +95,7 @@ private:
             const Texel found = texel(static_cast<double>(x), static_cast<double>(y), shades[x]);
             work.irradiance[x] = Vec3f(found.irradiance);
             if (travel_varies)
-                work.travel[x] = mean_direction(found.flow, static_cast<double>(x), static_cast<double>(y));
+                work.travel[x] = mean_direction(found.flow);
         }
         sink.add({.sample = y * m_grid.width,
                   .count = m_grid.width,
@@ -195,22 +195,21 @@ private:
         sum.is_shaded |= count < steps.size();
         std::array<Vec3f, Occluders::packet_size> transmittance;
         occluders.transmit(std::span(shadow_rays).first(count), transmittance.data());
+        Texel result = sum;
         for (std::size_t i = 0; i < count; ++i) {
-            if (transmittance[i] != Vec3f(1.0f))
-                sum.is_shaded = true;
-            if (transmittance[i] == Vec3f(0.0f))
-                continue;
-            const Vec3 passed = arriving[i] * Vec3(transmittance[i]);
-            sum.irradiance += passed;
-            sum.flow += (occluders.is_colored() ? (passed.x + passed.y + passed.z) / 3.0 : passed.x) * rays[i].travel;
+            const Vec3 passed(transmittance[i]);
+            const double mean = occluders.is_colored() ? (passed.x + passed.y + passed.z) / 3.0 : passed.x;
+            result.is_shaded |= passed != Vec3(1.0);
+            result.irradiance += arriving[i] * passed;
+            result.flow += arriving[i] * mean * rays[i].travel;
         }
+        sum = result;
     }
 
-    Vec3f mean_direction(const Vec3& flow, double x, double y) const
+    Vec3f mean_direction(const Vec3& flow) const
     {
         const bool is_lit = glm::dot(flow, flow) > 0.0;
-        return Vec3f(is_lit ? glm::normalize(m_grid.to_plane(flow))
-                            : unblocked_direction(m_grid, m_light, m_grid.point(x + 0.5, y + 0.5)));
+        return is_lit ? Vec3f(glm::normalize(m_grid.to_plane(flow))) : Vec3f(0.0f, 0.0f, -1.0f);
     }
 
     const ReceiverGrid& m_grid;
@@ -224,19 +223,11 @@ private:
     ReceiverRays m_rays;
     Shadows m_shadows;
     Texel m_open_texel;  // texel (0, 0) where nothing blocks the light
-    Vec3f m_open_travel;
+    Vec3f m_far_travel;  // at all texels, if the light is infinitely far away
     PerThread<Work> m_work;
 };
 
 }  // namespace
-
-Vec3 unblocked_direction(const ReceiverGrid& grid, const Light& light, const Vec3& point)
-{
-    LightRay ray;
-    light.sample({&point, 1}, grid.normal, {}, &ray);
-    const Vec3 direction = glm::normalize(grid.to_plane(ray.travel));
-    return -direction.z > min_cos_theta ? direction : Vec3(0.0, 0.0, -1.0);
-}
 
 void gather_delta_rays(const ReceiverGrid& grid, const Light& light, const Occluders* occluders,
                        const RaySettings& settings, RaySink& sink, Progress& progress)

@@ -53,16 +53,12 @@ struct RaySettings {
     bool find_shadows = true;
 };
 
-// Direction of travel in the plane frame of a delta light at `point` where nothing blocks it: a unit vector with
-// z <= -min_cos_theta; (0, 0, -1) if light comes from behind or travels within the plane.
-Vec3 unblocked_direction(const ReceiverGrid& grid, const Light& light, const Vec3& point);
-
 // Hands all rays of a light to the sink; the rays of a texel add up to its light. The result is the same for any number
 // of threads. `occluders` may be null. Throws InvalidArgument, Cancelled.
 //
-// A delta light gives one ray per texel, which travels in the mean direction weighed by irradiance; in the dark in
-// `unblocked_direction` at the texel's center. A light of a size gives up to `rays` rays, of low discrepancy over the
-// texel and over the light, from a seed. Where nothing blocks it, they add up without noise to the sum of many more rays.
+// A delta light gives one ray per texel, which travels in the mean direction weighed by irradiance. A light of a size
+// gives up to `rays` rays, of low discrepancy over the texel and over the light, from a seed. Where nothing blocks it, they
+// add up without noise to the sum of many more rays. Rays without light travel along (0, 0, -1).
 void gather_rays(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, const RaySettings& settings,
                  RaySink& sink, Progress& progress);
 

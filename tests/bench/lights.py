@@ -65,9 +65,9 @@ def transforms(size, lights, material):
     grid = floor(size)
     arriving = []
     for light in lights:
-        irradiance, _ = native.gather_beams(grid.native(), light.native(), directions=False)
-        position = light.native().position_in(grid.native())
-        arriving.append(native.PlaneLight.from_point(irradiance, position, light.rgb().tolist()))
+        irradiance = np.ascontiguousarray(native.gather_rays(grid.native(), light.native())[0][..., 0])
+        position = np.subtract(light.position, grid.origin)
+        arriving.append(native.PlaneLight.from_point(irradiance, position.tolist(), light.rgb().tolist()))
     libraries = [library(Medium(g, material.ior)) for g in material.channel_anisotropy]
     rest = list(material.albedo), list(material.mean_free_path), (grid.pitch_x, grid.pitch_y)
     return native.transforms(arriving, libraries, *rest, bakes.TOLERANCE)

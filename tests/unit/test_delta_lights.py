@@ -208,19 +208,6 @@ def test_rays_keep_clear_of_the_plane_and_of_the_lamp(sun):
     np.testing.assert_array_equal((got == 0)[doubt > 1e-3], blocked[doubt > 1e-3])
 
 
-@settings(max_examples=20, deadline=None)
-@given(seed=st.integers(0, 10**6), mirrored=st.booleans())
-def test_lamps_know_their_place_in_the_plane(seed, mirrored):
-    axes, centre = rotation(seed), np.array([0.3, -0.2, 0.1])
-    axes[0] *= -1 if mirrored else 1
-    place = np.random.default_rng(seed).normal(size=3)
-    grid = native.ReceiverGrid(**make_grid(size=(2.0, 1.5), axes=axes, centre=centre))
-    world = place @ axes + centre
-    for lamp in (native.PointLight(world), native.SpotLight(world, np.eye(3), 1.0, 0.0)):
-        np.testing.assert_allclose(lamp.position_in(grid), place + (1.0, 0.75, 0.0), atol=1e-14)
-    assert native.SunLight(world).position_in(grid) is None
-
-
 def spot_falloff(travel, frame, size, blend, falloff):
     """Falloff of Cycles in Blender 3.4 ("legacy") and in 4.2 to 5.0 ("scaled")."""
     frame = np.asarray(frame, float)

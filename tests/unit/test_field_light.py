@@ -14,7 +14,7 @@ from beamspread.core.material import Material
 from beamspread.core.native import native
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
-from beamspread.core.scene.lights import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight, LampFieldLight, WorldLight
+from beamspread.core.scene.lights import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight, WorldLight
 from beamspread.core.scene.receiver import Chart, Receiver
 
 WHITE = 1.0, (1.0, 1.0, 1.0), True
@@ -145,11 +145,11 @@ def test_even_light_bakes_as_a_white_world_does():
 
 
 @pytest.mark.parametrize("is_sun", [False, True])
-def test_light_of_a_lamp_comes_from_its_place(is_sun):
+def test_light_of_a_lamp_comes_from_its_position(is_sun):
     grid = replace(grid_of(10, 20), x_axis=(0.0, 1.0, 0.0), y_axis=(-1.0, 0.0, 0.0))
     radiance = np.ones((1, 5, 10, 3), np.float32) * (1, 2, 3)
-    place = (0.0, 0.6, -0.8) if is_sun else (0.95, 2.45, 5.0)
-    light = LampFieldLight("Lamp", *WHITE, (Field(grid.origin, grid.normal, radiance),), place, is_sun)
+    source = {"direction": (0.0, 0.6, -0.8)} if is_sun else {"position": (0.95, 2.45, 5.0)}
+    light = FieldLight("Lamp", *WHITE, (Field(grid.origin, grid.normal, radiance),), **source)
     irradiance, flow = totals(grid, light)
     np.testing.assert_allclose(irradiance, np.pi * np.broadcast_to((1, 2, 3), (10, 20, 3)), rtol=1e-5)
     direction = flow / (2 * np.pi)

@@ -52,19 +52,12 @@ def test_without_occluders_there_is_no_noise(name):
 
 
 @pytest.mark.parametrize("name", LIGHTS)
-def test_layers_are_the_rays_that_are_summed(name):
-    light, grid, occluders = LIGHTS[name], make_grid(), card()
-    irradiance, flow = native.gather_rays(grid, light, occluders, rays=5, seed=9)
-    layers = native.ray_layers(grid, light, occluders, rays=5, seed=9)
-    assert len(layers) == 5
-    rays, directions = np.stack([a for a, _ in layers]), np.stack([b for _, b in layers])
-    assert rays.dtype == directions.dtype == np.float32
-    np.testing.assert_allclose(rays.sum(axis=0), irradiance, rtol=1e-6, atol=1e-7 * irradiance.max())
-    weight = rays.mean(axis=-1)
-    np.testing.assert_allclose((weight[..., None] * directions).sum(axis=0), flow, rtol=1e-5, atol=1e-6 * flow.max())
-    np.testing.assert_allclose(np.linalg.norm(directions, axis=-1), 1, atol=1e-6)
-    assert (directions[..., 2] < 0).all()
-    assert (rays >= 0).all()
+def test_a_ray_has_one_direction_toward_the_plane(name):
+    irradiance, flow = native.gather_rays(make_grid(), LIGHTS[name], card(), rays=1, seed=9)
+    assert irradiance.dtype == flow.dtype == np.float32
+    np.testing.assert_allclose(np.linalg.norm(flow, axis=-1), irradiance.mean(axis=-1), rtol=1e-5)
+    assert (irradiance >= 0).all()
+    assert (flow[irradiance.any(axis=-1)][:, 2] < 0).all()
 
 
 @pytest.mark.parametrize("name", LIGHTS)

@@ -15,7 +15,7 @@ from ...core.bake.job import BakeJob, Step
 from ...core.errors import MaterialError, MissingImageError
 from ...core.messages import Message, warning
 from ...core.progress import Callback, Progress
-from ...core.scene.lights import STRATA, Field, FieldLight, LampFieldLight, Light, WorldLight
+from ...core.scene.lights import STRATA, Field, FieldLight, Light, WorldLight
 from ...core.scene.receiver import Receiver
 from ...core.target import Target
 from .. import compat
@@ -148,7 +148,7 @@ class LightByCycles(Step):
     Attributes
     ----------
     world : name of the world, "" if our own readers have read it.
-    lamps : names of objects; for lamps with the position that `LampFieldLight` needs, for other objects with None.
+    lamps : position or direction of each lamp, as an argument of `FieldLight`; None for an object of another kind.
     bounced : True if bounced light is added.
     has_world : False if bounced light is that of a scene without its world.
     """
@@ -193,7 +193,7 @@ class LightByCycles(Step):
             return FieldLight(name, *WHITE, False, self._fields(receiver, progress, doing, **options)[0])
         whole = {"by_lamps": True, "strata": [[0.0, 1.0, 0.0, 1.0]], "charts": charts_of(receiver, DIRECT_NODES)}
         fields, _ = self._fields(receiver, progress, doing, **options, **whole)
-        return LampFieldLight(name, *WHITE, False, fields, *lamp)
+        return FieldLight(name, *WHITE, False, fields, **lamp)
 
     def _fields(self, receiver: Receiver, progress: Progress, doing: str, **options) -> tuple[tuple[Field, ...], float]:
         """Bounced light, or light as the options ask for, and an estimate of its mean irradiance, W/m^2."""
@@ -267,11 +267,11 @@ def _warnings_of(material) -> list[Message]:
     return [warning(material.name, f"{error.text} {text}", error.remedy) for error in _missing_images_of(material)]
 
 
-def _position_of(lamp) -> tuple:
-    """Position or direction of a lamp, and True if it is a direction; see `LampFieldLight`."""
+def _position_of(lamp) -> dict:
+    """Position of a lamp, or direction of a sun, as an argument of `FieldLight`."""
     if lamp.data.type != "SUN":
-        return tuple(lamp.matrix_world.translation), False
-    return tuple(-lamp.matrix_world.col[2].to_3d().normalized()), True
+        return {"position": tuple(lamp.matrix_world.translation)}
+    return {"direction": tuple(-lamp.matrix_world.col[2].to_3d().normalized())}
 
 
 def _reflectance(surface) -> list[float]:

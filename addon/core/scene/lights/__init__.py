@@ -1,6 +1,6 @@
 """The kinds of light that can be baked; strengths follow Cycles (see each class)."""
 
-from .field_light import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight, LampFieldLight
+from .field_light import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight
 from .glowing import MeshLight, WorldLight
 from .lamp_kinds import WIDEST_SUN, AreaLight, PointLight, SpotLight, SunLight
 from .light_base import Light, TracedLight
@@ -13,7 +13,6 @@ __all__ = [
     "AreaLight",
     "Field",
     "FieldLight",
-    "LampFieldLight",
     "Light",
     "MeshLight",
     "PointLight",

@@ -10,9 +10,9 @@ from ...native import native
 from ..grid import Grid, Vector
 from .light_base import Light
 
-# Rings of the hemisphere from the zenith down, by the squared sine of the angle where they end, and their sectors. The
-# rings are narrow near the horizon, where media differ most with the angle: the reflectance of even light is right to
-# .5 %, for a medium as dark as an albedo of .5 and without coat to 2 %.
+# Rings of the hemisphere from the zenith down: squared sine of the angle at the lower border, and number of sectors.
+# More are more exact, above all near the horizon: here the reflectance of even light is right to .5 %, and to 2 % for
+# an albedo of .5 without a coat.
 RINGS = ((0.25, 4), (0.6, 8), (0.85, 8), (0.96, 8), (1.0, 4))
 
 
@@ -25,14 +25,13 @@ def _strata() -> np.ndarray:
 
 
 STRATA = _strata()
-"""(K, 4): parts of the hemisphere.
+"""(K, 4): parts of the hemisphere, the begin and the extent of squared sine and of azimuth / 2 pi.
 
-Directions by the squared sine of their angle and their azimuth / 2 pi, each as where it begins and how far it reaches.
-Drawn by the cosine, both are even.
+Directions drawn by the cosine are even in both.
 """
 
 WEIGHTS = STRATA[:, 1] * STRATA[:, 3]
-"""(K,): the irradiance of each under even light, as part of all."""
+"""(K,): fraction of the irradiance of even light that each part gives."""
 
 
 def _directions() -> np.ndarray:
@@ -43,16 +42,16 @@ def _directions() -> np.ndarray:
 
 
 DIRECTIONS = _directions()
-"""Float32 (K, 3): unit vectors along which the light of each travels, in the plane's frame: the mean cosine."""
+"""Float32 (K, 3): unit vectors of travel of each part, in the plane's frame, at its mean cosine."""
 
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """What arrives at one plane.
+    """Radiance at one plane.
 
     Attributes
     ----------
-    origin, normal : of the `Grid` that it was computed for; its nodes are evenly spread over that grid.
+    origin, normal : those of its `Grid`, over which its nodes are evenly spread.
     radiance : float32 (K, rows, columns, 3), means by the cosine over K parts of the hemisphere, W/(m^2 sr).
     """
 
@@ -65,19 +64,29 @@ class Field:
 
 
 @dataclass(frozen=True, eq=False)
-class _ComputedLight(Light):
-    """`strength` is a factor.
+class FieldLight(Light):
+    """Light that was computed elsewhere; `strength` is a factor.
+
+    Its fields have the parts `STRATA`, and with a `position` or `direction` one part, the whole hemisphere.
 
     Attributes
     ----------
-    fields : one for each plane that it reaches.
+    fields : one for each plane that the light reaches.
+    position : world position of the lamp that all light comes from, or None.
+    direction : unit vector along which all light travels, world, or None.
     """
 
     fields: tuple[Field, ...]
+    position: Vector | None = None
+    direction: Vector | None = None
 
     @property
     def is_colored(self):
         return True
+
+    @property
+    def has_one_direction(self):
+        return self.position is not None or self.direction is not None
 
     def field_of(self, grid: Grid) -> Field | None:
         return next((field for field in self.fields if field.is_of(grid)), None)
@@ -86,41 +95,17 @@ class _ComputedLight(Light):
         field = self.field_of(grid)
         return field is None or not field.radiance.any()
 
-    def _radiance_at(self, grid: Grid) -> np.ndarray:
-        """Radiance of the field of a grid that the light reaches."""
-        return np.ascontiguousarray(self.field_of(grid).radiance, np.float32)
+    def at(self, grid):
+        radiance = np.ascontiguousarray(self.field_of(grid).radiance, np.float32)
+        whole = np.full(1, np.pi, np.float32)
+        axes = np.array((grid.x_axis, grid.y_axis, grid.normal))
+        if self.direction is not None:
+            return native.FieldLight(radiance, whole, (axes @ self.direction)[None].astype(np.float32))
+        if self.position is not None:
+            x, y, height = axes @ np.subtract(self.position, grid.origin)
+            # The center of a lamp of a size may lie below a plane that the lamp lights.
+            return native.FieldLight(radiance, whole, position=(x, y, max(height, 1e-3 * grid.pitch_x)))
+        return native.FieldLight(radiance, (np.pi * WEIGHTS).astype(np.float32), DIRECTIONS)
 
     def fault(self):
         return self._radiance_fault(*(field.radiance for field in self.fields)) or super().fault()
-
-
-@dataclass(frozen=True, eq=False)
-class FieldLight(_ComputedLight):
-    """Light from all over the hemisphere; its fields have the parts `STRATA`."""
-
-    has_one_direction = False
-
-    def at(self, grid):
-        return native.FieldLight(self._radiance_at(grid), (np.pi * WEIGHTS).astype(np.float32), DIRECTIONS)
-
-
-@dataclass(frozen=True, eq=False)
-class LampFieldLight(_ComputedLight):
-    """Light of a lamp; its fields have one part, the whole hemisphere.
-
-    Attributes
-    ----------
-    place : world position of the lamp, or for `is_sun` the unit vector along which its light travels.
-    """
-
-    place: Vector
-    is_sun: bool = False
-
-    def at(self, grid):
-        radiance, solid_angles = self._radiance_at(grid), np.full(1, np.pi, np.float32)
-        axes = np.array((grid.x_axis, grid.y_axis, grid.normal))
-        if self.is_sun:
-            return native.FieldLight(radiance, solid_angles, (axes @ self.place)[None].astype(np.float32))
-        x, y, height = axes @ np.subtract(self.place, grid.origin)
-        # The center of a lamp of a size may lie below a plane that the lamp lights.
-        return native.FieldLight(radiance, solid_angles, position=(x, y, max(height, 1e-3 * grid.pitch_x)))
