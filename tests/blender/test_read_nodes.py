@@ -244,6 +244,13 @@ def test_the_world_as_diffuse_surfaces_see_it(world, output):
     assert world.assert_near() == pytest.approx(COLORS[0][:3], rel=3e-3)
 
 
+def test_a_color_at_the_surface_is_an_emission(world):
+    color = world.add("ShaderNodeRGB")
+    color.outputs[0].default_value = COLORS[0]
+    world.link(color.outputs[0], world.output.inputs["Surface"])
+    assert world.assert_near() == pytest.approx(COLORS[0][:3], rel=3e-3)
+
+
 def test_shaders(world):
     """Emission counts as Background: added, mixed, and with shaders that do not emit."""
     emission = world.add("ShaderNodeEmission")
