@@ -1,4 +1,4 @@
-"""The Bake operator: fills and links images, says in one sentence what it cannot bake, and bakes the others."""
+"""The Bake operator fills and links images, reports targets that it cannot bake, and bakes the others."""
 
 import stat
 from dataclasses import replace
@@ -40,7 +40,7 @@ def test_first_bake_makes_links_and_packs_an_image():
     assert texture.shape == (16, 32, 3)
     assert node.image.is_float
     node.image.reload()
-    # What was packed, as half floats: 11 bits.
+    # Packed pixels, as half floats: 11 bits.
     assert pixels(node.image) == pytest.approx(texture, rel=2**-11)
     assert node.node_tree.nodes["Image"].image == node.image
     assert surface_source(plane.data.materials[0]) == node.outputs["BSDF"]
@@ -174,7 +174,7 @@ def test_instances_and_modifiers_cast_shadows():
     roof.modifiers.new("Shrink", "SOLIDIFY")
     roof.scale = (1e-3, 1e-3, 1e-3)
     (lit,) = bake(plane)
-    # What is left of it, a centimetre wide, meets one of the 16 samples of a texel at most.
+    # The remaining strip, a centimetre wide, meets one of the 16 samples of a texel at most.
     assert lit == pytest.approx(open_air, rel=1 / 16)
 
 
@@ -212,7 +212,7 @@ def test_two_round_tables_share_an_image():
     for coverage, texture in zip(coverages, alone):
         assert np.array_equal(together[coverage > 0], texture[coverage > 0])
     beside = (coverages[0] == 0) & (coverages[1] == 0)
-    # Means of what lies wholly inside are between its extremes; beyond the margin there is nothing.
+    # Means of texels wholly inside lie between their extremes; texels beyond the margin are empty.
     inside = together[(coverages[0] > 0.99) | (coverages[1] > 0.99)]
     filled = beside & together.any(axis=-1)
     assert (together[filled] >= 0.999 * inside.min(axis=0)).all()
@@ -275,7 +275,7 @@ def setting(name, value):
         (setting("thickness", -1.0), "thickness is -1"),
     ],
 )
-def test_what_cannot_be_baked_says_so_and_the_others_are_baked(spoil, words):
+def test_targets_that_cannot_be_baked_are_reported_and_the_others_are_baked(spoil, words):
     bad = add_plane("Bad", material=add_material("Spoilt"))
     good = add_plane("Good", matrix=Matrix.Translation((5, 0, 0)), material=add_material("Sound"))
     add_sun(0)
@@ -326,7 +326,7 @@ def test_nothing_to_bake():
 
 
 def test_samples_of_a_folder(tmp_path):
-    """Exitance far from the border is the power of the sample, whatever the material's anisotropy."""
+    """Exitance far from the border is the power of the sample, for any anisotropy of the material."""
     image = np.zeros((21, 21))
     image[8:13, 8:13] = 0.02
     for angle in (0, 60):
@@ -398,7 +398,7 @@ class DeafJob(EndlessJob):
         return []
 
 
-def test_what_ends_after_escape_is_not_kept_either():
+def test_a_bake_that_ends_after_escape_is_not_stored_either():
     thread = BakeThread(Bake(Target("Plane"), DeafJob()), Progress())
     thread.progress.cancel()
     thread.start()

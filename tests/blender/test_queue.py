@@ -115,7 +115,7 @@ def test_jobs_are_made_when_it_is_their_turn(monkeypatch):
     assert len(made) == 1
 
 
-def test_what_is_read_is_of_one_time():
+def test_the_scene_is_read_at_one_time():
     """The scene may change while others are baked."""
     planes = [plane(f"Plane {number}", 5.0 * number) for number in range(2)]
     waiting = iter(queue())
@@ -127,7 +127,7 @@ def test_what_is_read_is_of_one_time():
     assert bake.job.illumination.lights[0].strength == 1.0
 
 
-def test_what_is_removed_before_its_turn_is_refused():
+def test_a_material_removed_before_its_bake_is_refused():
     planes = [plane(f"Plane {number}", 5.0 * number) for number in range(2)]
     waiting, kept = iter(queue()), Results()
     assert kept.admit(next(waiting)).job
@@ -169,7 +169,7 @@ def test_progress_names_the_stages():
     assert [*dict.fromkeys(stages)] == ["Simulating the material (quick preview)", "Baking"]
 
 
-def test_the_window_says_what_is_done_and_how_long_it_takes(monkeypatch):
+def test_the_window_shows_the_step_and_the_remaining_time(monkeypatch):
     now = [100.0]
     monkeypatch.setattr("time.monotonic", lambda: now[0])
     progress = Progress()
@@ -222,7 +222,7 @@ def test_the_search_for_indirect_light_stops_within_two_seconds():
     assert thread.bake.status == CANCELLED
 
 
-def test_unregistering_ends_what_runs_and_says_so(monkeypatch):
+def test_unregistering_ends_the_run_with_a_message(monkeypatch):
     """Blender would end with an error if a thread of ours still ran when it quits."""
     status = []
     monkeypatch.setattr(bpy.types.WorkSpace, "status_text_set", lambda _workspace, text: status.append(text))

@@ -14,7 +14,7 @@ from beamspread.blender.ui import panels
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
-    """What window.py noted."""
+    """Results of window.py."""
     if not bpy.app.binary_path:
         pytest.skip("the bpy module opens no window")
     path = tmp_path_factory.mktemp("window") / "results.json"
@@ -63,7 +63,7 @@ def test_escape_ends_a_bake_of_minutes_and_keeps_the_images(seen):
     assert seen["messages of cancel"] == []  # the standing says it
 
 
-def test_escape_ends_what_was_opened_last(seen):
+def test_escape_ends_the_last_opened_tool(seen):
     assert seen["goes on behind a menu"]
 
 
@@ -75,7 +75,7 @@ def test_a_first_look_is_there_before_the_simulation_and_stays_if_that_is_cancel
     assert seen["out of date"]
 
 
-def test_what_fails_meanwhile_is_said_in_the_panels_and_the_others_are_baked(seen):
+def test_failures_are_shown_in_the_panels_and_the_others_are_baked(seen):
     sentence = "First / First: The material or its Beamspread node was removed or renamed during the bake: bake again."
     assert sentence in seen["messages of removal"]
     assert sentence.partition(": ")[2] in seen["shown"]
@@ -84,7 +84,7 @@ def test_what_fails_meanwhile_is_said_in_the_panels_and_the_others_are_baked(see
     assert seen["baked after removal"] == pytest.approx(100, rel=0.05)
 
 
-def test_what_cannot_start_is_said_in_one_popup(seen):
+def test_bakes_that_cannot_start_are_named_in_one_popup(seen):
     assert seen["refused"] == ["CANCELLED"]
     ((title, (sentence,)),) = seen["popups of refusal"]
     assert title == "Beamspread: nothing was baked"

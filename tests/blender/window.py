@@ -1,8 +1,8 @@
-"""What test_window.py runs inside a Blender with a window: events, timers and panels that are drawn for real.
+"""Runs for test_window.py inside a Blender with a window: events, timers and panels that are drawn for real.
 
     xvfb-run blender --factory-startup --enable-event-simulate --python THIS -- RESULTS.json
 
-Each step of the scenario waits for what it yields, and notes what it saw.
+Each step of the scenario waits for the condition that it yields, and records results.
 """
 
 import sys
@@ -32,7 +32,7 @@ results = {"drawn": {}, "shown": [], "popups": []}
 
 
 class WINDOW_OT_count_ticks(bpy.types.Operator):
-    """Counts what timers send to the window."""
+    """Counts the events that timers send to the window."""
 
     bl_idname = "window.count_ticks"
     bl_label = "Count Ticks"
@@ -53,7 +53,7 @@ def ticks_of_a_second():
 
 
 def count_draws(owner, name: str) -> None:
-    """Have calls of a function that draws counted under the name of its owner; what it raises is kept."""
+    """Count the calls of a drawing function under the name of its owner; store its exceptions."""
     function, label = getattr(owner, name), owner.__name__.rpartition(".")[2]
 
     def draw(first, second):  # Blender counts the arguments
@@ -68,7 +68,7 @@ def count_draws(owner, name: str) -> None:
 
 
 def prepare_panels() -> None:
-    """Count what is drawn, and have closed panels and those in another tab of the side bar be drawn as well."""
+    """Count drawn panels; closed panels and those in another tab of the side bar are drawn, too."""
     for panel in panels._classes:
         count_draws(panel, "draw")
         panel.bl_options = set()
@@ -151,7 +151,7 @@ def simulates() -> bool:
 
 
 def note_step() -> bool:
-    """Keep what the run says that it does, each once; True."""
+    """Store each step that the run reports, once; True."""
     if state.run is not None and state.run.progress.stage not in ("", *results["steps"]):
         results["steps"].append(state.run.progress.stage)
     return True
@@ -228,7 +228,7 @@ def scenario():
     results["baked after removal"] = brightness("Second") / before[1]
     yield lambda: results["messages of removal"][0].partition(": ")[2] in results["shown"]
 
-    # A medium that takes a minute: what a quick simulation gives is there long before.
+    # A medium that takes a minute: the result of a quick simulation comes long before.
     target = Target("Second", "Second")
     settings.quality, scenes.node_of(bpy.data.materials["Second"]).ior = "final", 1.234
     scenes.select(bpy.data.objects["Second"])

@@ -110,7 +110,7 @@ def test_receivers_near_each_other_share_the_shadows_of_their_scene():
     assert Illumination([SUN]).caster(grid()) is None
 
 
-def test_lights_share_the_shadows_of_what_may_block_them():
+def test_lights_share_the_shadows_of_their_blockers():
     others = Mesh(ROOF.vertices + (0, 0, 1), np.concatenate([ROOF.triangles] * 2))
     scene = Illumination([SUN], [Occluder("Roof", ROOF), Occluder("Others", others)])
 
@@ -163,8 +163,8 @@ def test_shadows_do_not_drift_far_from_the_world_origin(distance):
 
 
 @pytest.mark.parametrize("distance", [1e3, 1e6])
-def test_what_is_far_away_does_not_change_shadows_nearby(distance):
-    """Where rays start depends on what they might meet there, not on the largest coordinate of the scene."""
+def test_distant_objects_do_not_change_shadows_nearby(distance):
+    """The start of rays depends on nearby triangles, not on the largest coordinate of the scene."""
     card = np.array([(-0.31, -0.17, 0.0), (0.23, -0.29, 0.0), (0.07, 0.37, 0.031)])
     far = np.array([(0, 0, -10), (1, 0, -10), (0, 1, -10)]) + (distance, 0, 0)
     sun = replace(SUN, direction=(0.3, 0.2, -1.0))
@@ -326,7 +326,7 @@ def test_a_bake_that_no_light_reached_says_so_once():
     assert "No light reaches 'Plane'" in shadow
     assert said(job([SUN])) == []
     assert [BEHIND in warning for warning in said(job([SUN], **DOWN))] == [True]
-    # What absorbs everything is black in any light.
+    # A medium that absorbs all light is black in any light.
     assert said(job([SUN], surface=Surface(replace(MATERIAL, albedo=(0.0, 0.0, 0.0))))) == []
 
 
@@ -344,7 +344,7 @@ def test_a_bake_that_no_light_reached_says_so_once():
         (LAMP, ""),
     ],
 )
-def test_what_keeps_a_light_from_being_baked(light, words):
+def test_reasons_why_a_light_is_not_baked(light, words):
     assert light.fault() == words
 
 
@@ -419,7 +419,7 @@ def ending_job(outcome):
         (beamspread.Cancelled(), "cancelled", "The bake was cancelled."),
     ],
 )
-def test_a_bake_notes_what_became_of_it(outcome, status, error):
+def test_a_bake_records_its_result(outcome, status, error):
     stored = []
     one = Bake(Target("Plane", "Stone"), ending_job(outcome))
     one.run()

@@ -115,7 +115,7 @@ def test_a_bake_can_stop():
 
 
 def test_no_light_flows_upward():
-    """Beyond the outermost nodes, too, where a steep fall would continue below zero."""
+    """Light that falls steeply is not extrapolated below zero beyond the outermost nodes."""
     grid = grid_of(64, 64)
     radiance = np.random.default_rng(2).random((len(STRATA), 8, 8, 3)) ** 8
     radiance[:, :, 0] = radiance[:, 0] = 0

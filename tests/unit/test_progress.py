@@ -30,7 +30,7 @@ def test_false_stops_and_any_other_answer_goes_on(answer):
 
 
 @pytest.mark.parametrize("progress", [5, "bar", False])
-def test_what_is_no_function_is_named(progress):
+def test_an_object_that_is_no_function_is_named(progress):
     for call in (lambda: simulate(Medium(), [0], 1, progress=progress), lambda: Progress(progress)):
         with pytest.raises(ValueError, match=f"'progress' is {progress!r}; allowed: a function"):
             call()
