@@ -8,6 +8,7 @@ import pytest
 import scenes
 from beamspread.blender.read.geometry import read_polygons
 from beamspread.blender.read.lights import read_illumination
+from beamspread.core.native import native
 from beamspread.core.scene.receiver import build_receiver
 from beamspread.core.scene.uv_map import fit_uv_maps
 from cycles_truth import TEXELS, add_receiver, around, cycles_irradiance
@@ -93,8 +94,9 @@ def our_irradiance(plane):
     grid = receiver.charts[0].grid
     total = np.zeros((grid.height, grid.width, 3), np.float32)
     for lamp in illumination.lights:
-        light, _ = lamp.gather(grid, illumination.caster(grid, lamp), samples=2, clearance=grid.clearance)
-        total += (light if light.ndim == 3 else light[..., None]) * lamp.rgb()
+        options = {"samples": 2, "clearance": grid.clearance}
+        white, _ = native.gather_rays(grid.native(), lamp.native(), illumination.caster(grid, lamp), **options)
+        total += white * lamp.rgb()
     return receiver.to_texture([total]), [*map(str, illumination.messages)]
 
 

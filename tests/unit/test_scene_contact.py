@@ -10,6 +10,8 @@ from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import PointLight, SunLight
 from beamspread.core.scene.occluders import Mesh, Occluder
 
+from helpers import gather_beams
+
 SIZE = 80  # texels of a floor of 2 m
 TEXEL = 2 / SIZE
 TURNS = {"upright": (0.0, 0.0), "turned": (0.7, 0.0), "tilted": (0.7, 0.5)}
@@ -69,7 +71,8 @@ def light_past(*meshes, sun, turn, shift, is_instanced=False):
         step = 2**13 * 2.0 ** math.ceil(math.log2(TEXEL))
         origin = step * np.round(grid.centre / step)
         caster = native.Occluders([one.mesh.native(one.placements) for one in occluders], origin, max_copied=0)
-    return light.gather(grid, caster, samples=4)[0] / light.gather(grid, None, samples=4)[0]
+    shadowed, bare = (gather_beams(grid.native(), light.native(), occluders)[0] for occluders in (caster, None))
+    return shadowed / bare
 
 
 def middles():
