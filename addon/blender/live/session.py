@@ -57,7 +57,7 @@ class Session:
         self.seconds = 0.0
         self._read_anew()
 
-    # What happens in the scene
+    # Events
 
     def note(self, depsgraph) -> None:
         """Take the updates of a depsgraph."""
@@ -104,7 +104,7 @@ class Session:
         self._previews.clear()
         self._thread.join(END_SECONDS)
 
-    # What there is to tell
+    # State for panels and the timer
 
     def is_busy(self) -> bool:
         """True while renderings are still to come."""

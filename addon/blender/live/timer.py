@@ -1,4 +1,4 @@
-"""Live of this Blender: a timer switches the session on and off and steps it; handlers tell it what happens."""
+"""Live in this process: a timer switches the session on and off and steps it, and handlers pass on events."""
 
 from __future__ import annotations
 
@@ -121,6 +121,7 @@ def _show(*_arguments) -> None:
 @persistent
 def _leave_file(*_arguments) -> None:
     end(can_remove=False)
+    live.image_count = -1  # where the next file can't be opened, this one stays, and hidden images go in the next step
 
 
 @persistent

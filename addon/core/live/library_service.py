@@ -17,7 +17,7 @@ PATIENCE_SECONDS = 0.5
 
 
 class LibraryService:
-    """Serves libraries of media, and simulates in preview quality what is missing.
+    """Serves libraries of media, and simulates missing ones in preview quality.
 
     Parameters
     ----------
