@@ -10,8 +10,8 @@ class BakeError(ValueError):
 
     Attributes
     ----------
-    text : says what is wrong.
-    remedy : says what the artist can do; "" if `text` does.
+    text : names the problem.
+    remedy : advice for the artist; "" if `text` has it.
     """
 
     def __init__(self, text: str, remedy: str = "") -> None:

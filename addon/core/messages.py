@@ -22,8 +22,8 @@ class Message:
     Attributes
     ----------
     subject : name of the target, object, material, light or image that it is about; "" for none.
-    text : says what is wrong, or what was changed.
-    remedy : says what the artist can do; "" for nothing.
+    text : names the problem, or the change that was made.
+    remedy : advice for the artist; "" for none.
     """
 
     level: Level

@@ -25,7 +25,7 @@ class Progress:
     Attributes
     ----------
     fraction : finished fraction of the whole, 0..1; it never falls.
-    stage : name of what is being done.
+    stage : name of the current stage.
     """
 
     def __init__(self, callback: Callback | None = None) -> None:
@@ -55,7 +55,7 @@ class Progress:
         return parts
 
     def begin(self, stage: str) -> None:
-        """Name what this part does from now on."""
+        """Begin a stage with this part."""
         whole = self._whole
         if (whole.stage, whole._stage_part) != (stage, self):
             whole.stage, whole._stage_part, whole._stage_began = stage, self, time.monotonic()

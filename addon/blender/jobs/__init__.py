@@ -1,1 +1,1 @@
-"""Bakes: `run` makes and runs them, `state` is what panels show of them, `out_of_date` tells which to repeat."""
+"""Bakes: `run` makes and runs them, `state` holds their status for panels, `out_of_date` finds those to repeat."""

@@ -131,7 +131,7 @@ def draw_buttons(layout) -> None:
 
 
 def draw_progress(layout, context) -> None:
-    """Draw what is being done, how far it is, and Cancel."""
+    """Draw the stage, its progress, and Cancel."""
     column = layout.column(align=True)
     draw_lines(column, context, [state.run.title()], "RENDER_STILL")
     compat.draw_progress_bar(column, state.run.progress.stage_fraction, state.run.in_short())

@@ -26,7 +26,7 @@ class Step(ABC):
 
     Attributes
     ----------
-    name : says what is done while the step runs.
+    name : name of the stage, for progress and messages.
     finds_light : True if the step may add lights to the job.
     """
 
@@ -35,7 +35,7 @@ class Step(ABC):
 
     @abstractmethod
     def run(self, job: BakeJob, progress: Progress) -> BakeJob:
-        """The job with what the step adds to it."""
+        """The job after the step."""
 
     def weight(self, _job: BakeJob) -> float:
         """Length of the step in a progress bar, relative to other steps; 0 if it takes no time."""
@@ -181,7 +181,7 @@ class BakeJob:
         return [] if self.finds_light else self._dark_by_lights()
 
     def _dark_by_lights(self) -> list[Message]:
-        """The warning that none of the lights can reach the receiver, whatever the occluders."""
+        """The warning that none of the lights can reach the receiver, even without occluders."""
         lights = self.illumination.lights
         if not lights:
             return [warning("", "The scene has no light that can be baked, so the result is black.")]

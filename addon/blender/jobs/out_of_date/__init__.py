@@ -1,1 +1,1 @@
-"""Records of what each bake has read, and their comparison with the scene as it is now."""
+"""Digests of the scene that each bake has read, and their comparison with the present scene."""

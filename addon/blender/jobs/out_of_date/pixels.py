@@ -34,7 +34,7 @@ class Pixels:
         self._packed: dict[tuple, str] = {}
 
     def forget(self) -> None:
-        """Drop what is known of packed images: all may have changed."""
+        """Drop the digests of packed images: all may have changed."""
         self._packed.clear()
 
     def mark(self, image) -> str:

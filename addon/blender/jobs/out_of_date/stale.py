@@ -1,6 +1,6 @@
 """Keeps the rows of `state` up to date: compares bakes with the scene once changes to it have come to rest.
 
-Handlers only note what changed; a timer of the window scans the scene. In background no timer runs: call `refresh`.
+Handlers only note changes; a timer of the window scans the scene. In background no timer runs: call `refresh`.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _last = {"change": 0.0, "took": 0.0, "next": 0.0, "is scanning": False}
 def refresh(context) -> None:
     """Bring the rows of all targets of the context's scene up to date."""
     _keep_waiting()
-    context.view_layer.update()  # in 3.4 it has None in place of what a script has just removed
+    context.view_layer.update()  # in 3.4 it has None in place of removed objects
     targets = find_bakeable(context.view_layer, context.scene.objects)
     recorded = {target: record for target in targets if (record := _record(target, context.scene)) is not None}
     now = fingerprints.of(context, recorded) if recorded else {}

@@ -1,4 +1,4 @@
-"""Bakes of a whole scene, or of what options choose, into files; `batch.py` in the package's folder runs it."""
+"""Bakes of a whole scene, or of chosen objects, into files; `batch.py` in the package's folder runs it."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ from .prepare import prepare_scene
 
 
 def bake_all(options: BatchOptions, stop: Stop | None = None) -> Report:
-    """Bake every frame asked for and print what becomes of each bake; goes on when one fails.
+    """Bake every requested frame and print the outcome of each bake; goes on when one fails.
 
-    Once asked to stop, it notes what is left as cancelled.
+    Once asked to stop, it notes all further bakes as cancelled.
     """
     if options.verbose:
         _show_log()
@@ -45,13 +45,13 @@ def bake_all(options: BatchOptions, stop: Stop | None = None) -> Report:
     if not report.bakes:
         print(f"Beamspread: {NOTHING_FOUND}", file=sys.stderr)
     if report.dark() and not options.allow_dark:
-        names = ", ".join(dict.fromkeys(f"'{one.object}'" for one in report.dark()))
+        names = ", ".join(dict.fromkeys(f"'{record.object}'" for record in report.dark()))
         print(f"Beamspread: No light reaches {names}: an error, unless --allow-dark is given.", file=sys.stderr)
     return report
 
 
 def _show_log() -> None:
-    """Print what the package logs: what it reads, and how long each stage takes."""
+    """Print the log of the package: the lights and occluders that it reads, and the seconds of each stage."""
     log = logging.getLogger(__package__.rpartition(".blender.")[0])
     if not log.handlers:
         printer = logging.StreamHandler(sys.stdout)
@@ -124,12 +124,12 @@ class _Batch(Sink):
         targets, impossible, objects = [], [], by_name(self._scene)
         for name in self._options.objects:
             obj = objects.get(name)
-            found, misplaced = (find_bakeable(view_layer, [obj]), find_misplaced([obj])) if obj else ([], [])
-            if not found and not misplaced:
+            bakeable, misplaced = (find_bakeable(view_layer, [obj]), find_misplaced([obj])) if obj else ([], [])
+            if not bakeable and not misplaced:
                 missing = "has no material with a Beamspread node" if obj else "is not in the scene"
                 impossible.append(Bake(Target(name), error=f"The object '{name}' {missing}."))
             impossible += misplaced
-            targets += found
+            targets += bakeable
         return list(dict.fromkeys(targets)), impossible
 
     def _skipped(self, target: Target) -> BakeRecord | None:
@@ -137,9 +137,9 @@ class _Batch(Sink):
         if self._earlier is None or self._stop:
             return None
         settings, resolution = self._settings, self._options.resolution
-        own = self._outputs.own_image(target, settings.layer)
+        image = self._outputs.own_image(target, settings.layer)
         try:
-            path = self._outputs.path(target, settings.layer, self._frame) if own is None else file_of(own)
+            path = self._outputs.path(target, settings.layer, self._frame) if image is None else file_of(image)
         except BakeError:
             return None  # the preparation names the error
         size = size_of(path)
@@ -147,16 +147,16 @@ class _Batch(Sink):
             return None
         wanted = BakeRecord(target.object_name, target.material_name, self._frame, str(path), *size)
         wanted.output, wanted.indirect = settings.output, settings.indirect
-        return self._earlier.skipped(wanted, needs_record=own is not None)
+        return self._earlier.skipped(wanted, needs_record=image is not None)
 
     def _parts_of(self, targets: list[Target]) -> dict[Target, Parts]:
         """Digests for bakes whose results go to images that nodes show, or to frames."""
         shown = [target for target in targets if self._options.frames or self._own_image(target) is not None]
         if not shown or self._stop:
             return {}
-        own = settings_part(self._scene, self._options.solver, self._options.indirect)
-        found = stale.parts_of(bpy.context, shown)
-        return {target: parts | {SETTINGS: own} for target, parts in found.items()}
+        settings = settings_part(self._scene, self._options.solver, self._options.indirect)
+        parts_of = stale.parts_of(bpy.context, shown)
+        return {target: parts | {SETTINGS: settings} for target, parts in parts_of.items()}
 
     def _own_image(self, target: Target):
         try:
@@ -165,9 +165,9 @@ class _Batch(Sink):
             return None
 
     def _remember(self, bake: Bake) -> None:
-        """Note in the node's image what the bake has read, for a scene that goes on or is saved afterwards."""
-        own = self._own_image(bake.target) if bake.status == WRITTEN else None
-        if own is not None and bake.path == str(file_of(own)):
+        """Record the digests of the bake in the node's image, for a scene that is saved afterwards."""
+        image = self._own_image(bake.target) if bake.status == WRITTEN else None
+        if image is not None and bake.path == str(file_of(image)):
             stale.keep(bake, self._parts.get(bake.target))
 
     def _prepared(self, targets: list[Target]) -> Iterator[Bake]:

@@ -27,7 +27,7 @@ from .render_copy import render_picture, show_by_eevee
 
 
 class BeamspreadEngine(bpy.types.RenderEngine):
-    """Bakes translucent surfaces; pictures come from Cycles or EEVEE, and viewports show what EEVEE does."""
+    """Bakes translucent surfaces. Cycles or EEVEE render for it, and EEVEE draws its viewports."""
 
     bl_idname = "BEAMSPREAD"
     bl_label = "Beamspread"

@@ -36,7 +36,7 @@ class BaseColor:
     colors : float32 (grid height, grid width, 3) of each chart, at most 1; empty if unknown.
     blur : fraction of the texture that light passes on its way in.
     warnings : messages about the colors.
-    unknown : sentence that names what only Cycles can evaluate; "" if there is nothing.
+    unknown : sentence that names the node that only Cycles can evaluate; "" if there is none.
     """
 
     colors: tuple[np.ndarray, ...] = ()

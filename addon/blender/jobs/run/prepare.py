@@ -37,7 +37,7 @@ def prepare_scene(
 
 
 def read_scene(context, targets: list[Target], settings: BakeSettings, resolution: int | None = None) -> Preparation:
-    """Read what bakes of the targets need, as the scene would render at its current frame.
+    """Read the scene for bakes of the targets, as it would render at its current frame.
 
     Parameters
     ----------
@@ -51,7 +51,10 @@ def read_scene(context, targets: list[Target], settings: BakeSettings, resolutio
         evaluated = material.evaluated_get(depsgraph).node_tree
         groups = [group.node_tree for group in around]
         # Tag only changed trees: a tag restarts viewports and material icons.
-        for tree, copy in [(material.node_tree, evaluated), *((one, one.evaluated_get(depsgraph)) for one in groups)]:
+        for tree, copy in [
+            (material.node_tree, evaluated),
+            *((group, group.evaluated_get(depsgraph)) for group in groups),
+        ]:
             if not all(map(_is_current, tree.nodes, copy.nodes)):
                 tree.update_tag()
     with as_rendered(context.view_layer):
@@ -154,7 +157,7 @@ class _Plan:
     Attributes
     ----------
     surface : with the mean base color; a placeholder if only Cycles can evaluate it.
-    own_surface : of the node, without what is linked to it.
+    own_surface : surface of the node, without its linked base color.
     color : base color that is linked to the node, or None.
     matrix : rows of the matrix of the instance that is baked; None if the object itself is.
     """
@@ -171,7 +174,7 @@ def _read_target(
     depsgraph, target: Target, placed: ObjectInstance, resolution: int | None, size: tuple[int, int] | None
 ) -> _Plan:
     node, groups = find_node_in_groups(
-        next(one for one in materials_of(placed.obj) if one.name == target.material_name)
+        next(material for material in materials_of(placed.obj) if material.name == target.material_name)
     )
     surface = node.surface()
     surface.check()
@@ -179,8 +182,8 @@ def _read_target(
         image = node.image.original
         if not is_sequence(image):  # a batch fills its files
             check_image(image)
-        own = size_of_frames(image) if is_sequence(image) else tuple(image.size)
-        size = own if resolution is None else None
+        image_size = size_of_frames(image) if is_sequence(image) else tuple(image.size)
+        size = image_size if resolution is None else None
     maps = fit_uv_maps(read_polygons(placed.obj, target.material_name, placed.matrix))
     size = size or texture_size(maps, resolution or depsgraph.scene.beamspread.resolution)
     if not node.has_texture():
