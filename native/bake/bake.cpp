@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/constants.h"
+#include "simd/loops.h"
 #include "solve/solve.h"
 
 namespace beamspread {
@@ -22,7 +23,8 @@ constexpr std::size_t max_examples = 4;
 // Rays from each texel to an example that has a size. Larger: slower choice, less noise in it.
 constexpr int example_rays = 8;
 
-// Texels along a side and rays of the survey, which finds the angles and the mean irradiance of lights that nothing blocks.
+// Texels along a side and rays of the survey, which finds the angles and the mean irradiance of lights that nothing
+// blocks.
 constexpr std::size_t survey_texels = 96;
 constexpr int survey_rays = 4;
 
@@ -137,7 +139,8 @@ void scale_by_color_out(const Surface& surface, std::size_t channels, float* lum
         luminance[i] *= surface.color_out[i];
 }
 
-// Luminance of lights whose light is stored: all of it is known before the solver begins.
+// Luminance of lights whose irradiance is stored before the solver begins. Lights of many rays, which `direct` and
+// `adaptive` solve ray by ray, are stored one after the other.
 class StoredBake {
 public:
     StoredBake(const Surface& surface, const std::vector<SurfaceLight>& lights, const BakeOptions& options)
@@ -147,26 +150,40 @@ public:
 
     void run(Problem problem, Progress& progress, float* luminance) const
     {
+        const bool is_one_group = std::ranges::all_of(
+            m_lights, [&](const SurfaceLight& light) { return light.directions(m_surface.grid).has_value(); });
+        const std::size_t group_size = is_one_group ? std::max<std::size_t>(m_lights.size(), 1) : 1;
+        const std::size_t groups = m_lights.size() / group_size;
+        const std::size_t values = problem.plane.texels() * problem.channels.size();
         progress.set_total(light_work * static_cast<double>(m_lights.size()) + solver_work);
-        StoredLight stored;
-        for (const SurfaceLight& light : m_lights)
-            advance_by(progress, light_work, [&](Progress& part) {
-                RaySettings settings = ray_settings(m_surface, m_options, m_options.rays);
-                if (light.directions(m_surface.grid)) {
-                    stored.add_one_direction(m_surface, light, settings, part);
-                } else {
-                    settings.even_rays = 0;
-                    stored.add_rays(m_surface, light, settings, part);
-                }
-            });
-        problem.lights = stored.lights;
-        if (problem.lights.empty())
-            std::fill_n(luminance, problem.plane.texels() * problem.channels.size(), 0.0f);
-        else
-            advance_by(progress, solver_work, [&](Progress& part) { solve(problem, part, luminance); });
+        std::fill_n(luminance, values, 0.0f);
+        std::vector<float> part_of_sum;  // luminance of a group beside the first
+        for (std::size_t group = 0; group < groups; ++group) {
+            StoredLight stored;
+            for (std::size_t i = group * group_size; i < (group + 1) * group_size; ++i)
+                advance_by(progress, light_work, [&](Progress& part) { store(m_lights[i], stored, part); });
+            if (stored.lights.empty())
+                continue;
+            problem.lights = stored.lights;
+            part_of_sum.resize(group == 0 ? 0 : values);
+            advance_by(progress, solver_work / static_cast<double>(groups),
+                       [&](Progress& part) { solve(problem, part, group == 0 ? luminance : part_of_sum.data()); });
+            add_scaled(luminance, part_of_sum.data(), 1.0f, part_of_sum.size());
+        }
     }
 
 private:
+    void store(const SurfaceLight& light, StoredLight& stored, Progress& progress) const
+    {
+        RaySettings settings = ray_settings(m_surface, m_options, m_options.rays);
+        if (light.directions(m_surface.grid)) {
+            stored.add_one_direction(m_surface, light, settings, progress);
+        } else {
+            settings.even_rays = 0;
+            stored.add_rays(m_surface, light, settings, progress);
+        }
+    }
+
     const Surface& m_surface;
     const std::vector<SurfaceLight>& m_lights;
     const BakeOptions& m_options;

@@ -21,14 +21,14 @@ struct BakeOptions {
     int min_rays = 8;         // lights of a size: rays from each texel to each of them, at least
     std::uint32_t seed = 0;   // seed of the rays
     int threads = 0;          // 0: all
-    // Solver `fft`: bytes of irradiance of lights of one direction that are stored until the solver sees all of them. Beyond,
-    // light is added as moments, and terms are chosen for the brightest lights.
+    // Solver `fft`: bytes of irradiance of lights of one direction that are stored until the solver sees all of them.
+    // Beyond, light is added as moments, and terms are chosen for the brightest lights.
     std::size_t max_stored_bytes = std::size_t{512} << 20;
     std::size_t max_moment_bytes = 0;  // bytes of moments; 0: any
 };
 
-// Writes (height, width, channels), exitance / pi in W/(m^2 sr) (Manabe et al. 2012, Eq. 2). The result is the same for any
-// number of threads. Throws InvalidArgument, MemoryLimit, Cancelled.
+// Writes (height, width, channels), exitance / pi in W/(m^2 sr) (Manabe et al. 2012, Eq. 2). The result is the same for
+// any number of threads. Throws InvalidArgument, MemoryLimit, Cancelled.
 void bake_luminance(const Surface& surface, const std::vector<SurfaceLight>& lights,
                     const std::vector<ChannelMedium>& channels, const BakeOptions& options, Progress& progress,
                     float* luminance);
@@ -42,9 +42,9 @@ void bake_luminance(const Surface& surface, const std::vector<SurfaceLight>& lig
 std::unique_ptr<LightField> any_light_field(const Plane& plane, const std::vector<ChannelMedium>& channels,
                                             double max_angle, double tolerance, bool is_colored, int threads);
 
-// Light on the whole of each texel, without a medium. Writes the irradiance (height, width, channels), W/m^2, and the flow
-// (height, width, 3): the sum of the irradiance, the mean of its channels, times the unit vector along which it travels in
-// the plane's frame. Throws InvalidArgument, Cancelled.
+// Light on the whole of each texel, without a medium. Writes the irradiance (height, width, channels), W/m^2, and the
+// flow (height, width, 3): the sum of the irradiance, the mean of its channels, times the unit vector along which it
+// travels in the plane's frame. Throws InvalidArgument, Cancelled.
 void bake_arrival(const Surface& surface, const std::vector<SurfaceLight>& lights, const BakeOptions& options,
                   Progress& progress, float* irradiance, float* flow);
 

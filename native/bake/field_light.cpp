@@ -10,8 +10,8 @@ namespace beamspread {
 
 namespace {
 
-// Texels whose surroundings are lit by less than this fraction stay darker. Larger: darker beside things that stand on the
-// plane.
+// Texels whose surroundings are lit by less than this fraction stay darker. Larger: darker beside things that stand on
+// the plane.
 constexpr float min_lit_fraction = 0.5f;
 
 // Weights of the nodes along one axis at the center of a texel.

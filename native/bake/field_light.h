@@ -20,11 +20,12 @@ struct Lobe {
 
 class FieldLight {
 public:
-    // Light of lobes whose directions are the same at all texels. `radiance` is [lobe][row][column][channel] at nodes evenly
-    // spread over the plane, W/(m^2 sr), 0 or more; copied.
+    // Light of lobes whose directions are the same at all texels. `radiance` is [lobe][row][column][channel] at nodes
+    // evenly spread over the plane, W/(m^2 sr), 0 or more; copied.
     FieldLight(const float* radiance, std::size_t rows, std::size_t columns, std::span<const Lobe> lobes);
 
-    // One lobe whose light travels away from a point: metres from the outer corner of texel (0, 0), in the plane's frame.
+    // One lobe whose light travels away from a point: metres from the outer corner of texel (0, 0), in the plane's
+    // frame.
     FieldLight(const float* radiance, std::size_t rows, std::size_t columns, float solid_angle, const Vec3& position);
 
     std::size_t lobes() const { return m_lobes.size(); }

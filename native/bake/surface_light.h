@@ -30,7 +30,8 @@ struct SurfaceLight {
     // The direction at each texel that stands for the light inside a medium; none if its rays differ too much.
     std::optional<Directions> directions(const ReceiverGrid& grid) const;
 
-    // Hands the rays of strength 1 to the sink, of the covered part of each texel and of the color that the surface lets in.
+    // Hands the rays of strength 1 to the sink, of the covered part of each texel and of the color that the surface
+    // lets in.
     void gather(const Surface& surface, const RaySettings& settings, RaySink& sink, Progress& progress) const;
 };
 

@@ -13,6 +13,7 @@ from beamspread.core.bake import luminance
 from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.luminance import TOLERANCE, bake
 from beamspread.core.material import Material
+from beamspread.core.native import native
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import WIDEST_SUN, AreaLight, PointLight, SpotLight, SunLight, WorldLight
@@ -203,6 +204,19 @@ def test_a_narrow_sun_counts_as_one_direction():
 def test_a_black_medium_stays_black():
     black = replace(MATERIAL, albedo=(0.0, 0.0, 0.0))
     assert not bake(grid(32), Illumination([sky(), panel()], WALL), black, 0.0, SETTINGS).any()
+
+
+def test_colored_glass_colors_light_of_a_size():
+    """A pane above the whole plane: each channel has its part of the light without the pane, but for noise of rays."""
+    pane = np.array([(-3, -3, 0.2), (3, -3, 0.2), (3, 3, 0.2), (-3, 3, 0.2)], float)
+    color, faces = (0.8, 0.4, 0.1), np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
+    glass = Mesh(pane, faces, (native.Transmittance(color),), np.zeros(2, np.uint32))
+    for light in (panel(0.3, (0.4, 0.0, 0.6)), sky()):
+        dimmed, whole = (
+            bake(grid(24), Illumination([light], mesh), MATERIAL, 0.0, replace(SETTINGS, samples=4))
+            for mesh in (glass, None)
+        )
+        assert dimmed.mean(axis=(0, 1)) == pytest.approx(whole.mean(axis=(0, 1)) * color, rel=2e-2)
 
 
 MEMORY = """
