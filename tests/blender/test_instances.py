@@ -339,7 +339,7 @@ def hide_within(tile):
 
 
 PROBLEMS = {
-    "'Grouped' is in the node group 'Outer'": use_shared_group,
+    "'Grouped' has one image, but its node group 'Outer'": use_shared_group,
     "The object 'Tile' has 2 instances": instance_again,
     "UV map": remove_uvs,
     "The albedo's red is 1": make_black_holes,
