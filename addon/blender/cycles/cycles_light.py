@@ -59,7 +59,7 @@ UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class CopyForCycles:
-    """A copy of a scene for Cycles, with what was already evaluated on it. Make it in the main thread.
+    """A copy of a scene for Cycles, with results evaluated on it. Make it in the main thread.
 
     Attributes
     ----------
@@ -288,8 +288,8 @@ def world_panorama(
 
     Returns
     -------
-    float32 (height, width, 3), W/(m^2 sr), row 0 at the bottom: what an Environment Texture node (equirectangular)
-    would show the same world with. The direction of the point (u, v), each 0..1, has the azimuth 2 pi (0.5 - u) around
+    float32 (height, width, 3), W/(m^2 sr), row 0 at the bottom: the image of an equirectangular Environment Texture
+    node that shows the same world. The direction of the point (u, v), each 0..1, has the azimuth 2 pi (0.5 - u) around
     +Z from +X, and the elevation pi (v - 0.5).
 
     Raises

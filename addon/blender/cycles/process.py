@@ -45,7 +45,7 @@ def run(
 
     Parameters
     ----------
-    request : what the task needs, as JSON can hold it.
+    request : input of the task, in types of JSON.
     progress : called with 0..1 several times a second; returns False to stop.
     doing : name of the stage for the progress.
 
