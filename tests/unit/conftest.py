@@ -20,6 +20,7 @@ SLOW = {
     "test_light_field",
     "test_lights",
     "test_live",
+    "test_memory",
     "test_ray_gather",
     "test_tolerance",
     "test_two_levels",
