@@ -67,7 +67,7 @@ def test_a_signal_ends_a_batch_soon_and_leaves_a_report(tmp_path, number):
         scene, "--solver", "direct", "--resolution", 1024, "--no-indirect", "--verbose", "--output", tmp_path / "out"
     )
     try:
-        wait_for(lambda: "albedo of 'First'" in log.read_text(), process)  # now it bakes
+        wait_for(lambda: "'First': " in log.read_text(), process)  # now it solves
         began = time.monotonic()
         process.send_signal(number)
         assert process.wait(60) == SIGNALS[number], log.read_text()

@@ -261,6 +261,20 @@ def test_a_baked_image_is_no_light_by_any_way():
     assert (read().lights, read().by_cycles) == ((), {})
 
 
+def test_a_baked_image_mixed_with_a_texture_is_no_light():
+    """The texture is one that only Cycles evaluates."""
+    material = scenes.add_material()
+    scenes.add_plane(material=material)
+    node, tree = scenes.node_of(material), material.node_tree
+    emission, texture = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeTexNoise")
+    mix = tree.nodes.new("ShaderNodeMixRGB")
+    tree.links.new(mix.inputs["Color1"], node.outputs["Color"])
+    tree.links.new(mix.inputs["Color2"], texture.outputs["Color"])
+    tree.links.new(emission.inputs["Color"], mix.outputs["Color"])
+    tree.links.new(tree.get_output_node("CYCLES").inputs["Surface"], emission.outputs[0])
+    assert (read().lights, read().by_cycles, read().messages) == ((), {}, ())
+
+
 def test_an_unused_beamspread_node_takes_no_light_away():
     material, _ = glowing_material()
     add_panel(material=material)

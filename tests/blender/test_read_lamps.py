@@ -261,6 +261,8 @@ def test_a_falloff_of_another_kind_is_left_to_cycles(output):
 def test_gobos_and_profiles_are_left_to_cycles(node):
     tree, emission = emission_of(add_lamp("SPOT"))
     texture = tree.nodes.new(node)
+    if node == "ShaderNodeTexImage":
+        texture.image = bpy.data.images.new("Gobo", 4, 4)
     tree.links.new(texture.outputs[0], emission.inputs["Color"])
     assert list(read().by_cycles) == ["Lamp"]
 

@@ -133,7 +133,7 @@ def functions_with_new_instructions(path):
 
 @needs_objects
 def test_only_functions_for_newer_processors_use_their_instructions():
-    """Chosen at run time: clones that GCC makes for a target, and the walk's namespaces for one.
+    """Functions that are chosen at run time stand in Highway's namespaces, one for each target.
 
     A function of the standard library among them would be the copy that the linker may keep for everybody.
     """
@@ -141,9 +141,9 @@ def test_only_functions_for_newer_processors_use_their_instructions():
     objects = [path for path in objects if not re.search(r"ducc_avx|bench_", str(path))]
     assert len(objects) > 50
     found = {function for path in objects for _, function in functions_with_new_instructions(path)}
-    chosen = re.compile(r"\.(avx2|avx512f)$|\d+beamspread6N_AVX[23]\d+")
+    chosen = re.compile(r"\d+beamspread6N_AVX[23]\d+")
     assert {name for name in found if not chosen.search(name)} == set()
-    assert any(name.endswith(".avx2") for name in found)  # the check itself works
+    assert any(map(chosen.search, found))  # the check itself works
 
 
 @needs_objects

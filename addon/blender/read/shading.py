@@ -107,11 +107,14 @@ class ShadingPoints(Evaluator):
 
 
 def _product(points: ShadingPoints, source: Source, *names: str) -> np.ndarray:
-    """Product of inputs; if one is 0, the others need not be understood."""
+    """Product of inputs; if one is 0, the others need not be understood. Emission that shows a bake is no light."""
+    inputs = [source.input(name) for name in names]
+    if any(shows_bake(reader.node) for wanted in inputs for reader in points.links.readers(wanted)):
+        return DARK
     product, reason = np.ones(3), None
-    for name in names:
+    for wanted in inputs:
         try:
-            product = product * points.value(source.input(name))
+            product = product * points.value(wanted)
         except NotSupportedError as error:
             reason = reason or error
     if reason and product.any():
