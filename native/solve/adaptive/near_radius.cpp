@@ -54,8 +54,8 @@ double kernel_at(const RadialProfile& profile, const Vec2& point)
 // there is no formula.
 double interpolation_error(const RadialProfile& profile, const Vec2& axis, double near, double first, double last)
 {
-    // Half the distance of the points, over distance / near: the window has risen to one half at .6 of the near radius.
-    // Larger: smaller errors, more time.
+    // Ratio: half the distance of the points, over distance / near. The window has risen to one half at .6 of the near
+    // radius. Larger: smaller errors, more time.
     constexpr double spacing = 1.0 / 0.6;
     // Choose two rings per octave, and more than two directions per period of the last harmonic.
     const int rings = static_cast<int>(std::ceil(2.0 * std::log2(last / first))) + 1;

@@ -106,6 +106,3 @@ class FieldLight(Light):
             # The center of a lamp of a size may lie below a plane that the lamp lights.
             return native.FieldLight(radiance, whole, position=(x, y, max(height, 1e-3 * grid.pitch_x)))
         return native.FieldLight(radiance, (np.pi * WEIGHTS).astype(np.float32), DIRECTIONS)
-
-    def fault(self):
-        return self._radiance_fault(*(field.radiance for field in self.fields)) or super().fault()
