@@ -258,11 +258,14 @@ def test_progress_rises_to_one_and_can_stop_at_any_time():
 
 
 def test_most_of_the_progress_is_that_of_rays_where_a_light_has_a_size():
-    """1000 rays from each texel count .4 units each; the survey, the choice of terms and the solver count eight."""
+    """1000 rays from each texel count .4 units each; the survey, the choice of terms and the solver count eight.
+
+    The rays take a second, and each 50 ms have a report.
+    """
     area = AreaLight("Area", 10.0, (1.0, 1.0, 1.0), True, (0.0, 0.0, 0.5), np.eye(3), 0.3, 0.3, False, np.pi)
     seen = []
     bake(
-        grid(64),
+        grid(512, side=8.0),
         Illumination([area]),
         MATERIAL,
         0.0,
