@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import BakeError
-from ..ldf.library import is_known, library
+from ..ldf.library import SIMULATING, is_known, library
 from ..messages import Message, warning
 from ..progress import Callback, Progress, timed
 from ..scene.illumination import Illumination
@@ -26,7 +26,7 @@ class Step(ABC):
 
     Attributes
     ----------
-    name : name of the stage, for progress and messages.
+    name : for messages.
     finds_light : True if the step may add lights to the job.
     """
 
@@ -36,6 +36,10 @@ class Step(ABC):
     @abstractmethod
     def run(self, job: BakeJob, progress: Progress) -> BakeJob:
         """The job after the step."""
+
+    def stage(self, _job: BakeJob) -> str:
+        """Name of the step's first stage."""
+        return self.name
 
     def weight(self, _job: BakeJob) -> float:
         """Length of the step in a progress bar, relative to other steps; 0 if it takes no time."""
@@ -54,6 +58,9 @@ class Simulate(Step):
 
     def weight(self, job: BakeJob) -> float:
         return 4.0 if to_simulate(job.surface, job.settings) else 0.0
+
+    def stage(self, job: BakeJob) -> str:
+        return SIMULATING[job.settings.quality]
 
     def run(self, job: BakeJob, progress: Progress) -> BakeJob:
         media, settings = to_simulate(job.surface, job.settings), job.settings
@@ -124,7 +131,7 @@ class BakeJob:
                 return replace(job, steps=(), texture=np.zeros((*job.receiver.coverage.shape, 3), np.float32))
             step, *rest = job.steps
             if weight:
-                part.begin(step.name)
+                part.begin(step.stage(job))
             with timed(f"'{self.name}': {step.name}"):
                 job = replace(step.run(job, part), steps=tuple(rest))
         return job

@@ -19,6 +19,12 @@ PHOTONS = {"preview": 80_000, "final": 4_000_000}
 _MAX_PHOTONS = 4_000_000
 """Largest number of photons per angle. More: less noise in media of little scattering, more time."""
 
+SIMULATING = {
+    "preview": "Simulating the material (quick preview)",
+    "final": "Simulating the material (only the first time)",
+}
+"""Names of the stage of a simulation, by quality."""
+
 _FILE_VERSION = 10
 """Version of the simulation. Increment it when the simulation changes, so that cached files are made again."""
 
@@ -202,7 +208,7 @@ def library(
     if available := _available_library(medium, quality):
         return available
     progress = Progress.of(progress)
-    progress.begin(f"Simulating the material ({'quick preview' if quality == 'preview' else 'only the first time'})")
+    progress.begin(SIMULATING[quality])
     simulated = make(medium, quality, progress, threads=threads)
     path = _cache_path(medium, quality)
     _store(simulated, path)
