@@ -6,9 +6,9 @@ import bpy
 import numpy as np
 import pytest
 from beamspread.blender import preferences
+from beamspread.blender.cycles import colors as cycles_colors
 from beamspread.blender.cycles import process
-from beamspread.blender.jobs.run import linked_color
-from beamspread.blender.jobs.run.linked_color import BaseColorByCycles
+from beamspread.blender.cycles.colors import BaseColorByCycles
 from beamspread.blender.jobs.run.operator import BakeThread
 from beamspread.blender.jobs.run.prepare import read_scene
 from beamspread.blender.jobs.state import state
@@ -278,7 +278,7 @@ def test_it_is_asked_for_once_in_a_run_and_only_where_it_counts(plane, monkeypat
         asked.append(target)
         return [np.full((chart.grid.height, chart.grid.width, 3), 0.4, np.float32) for chart in receiver.charts]
 
-    monkeypatch.setattr(linked_color, "colors_by_cycles", colors)
+    monkeypatch.setattr(cycles_colors, "colors_by_cycles", colors)
     settings, target = bpy.context.scene.beamspread.for_bake(), Target("Plane", material.name)
     preparation = read_scene(bpy.context, [target], settings)
     for _ in range(2):

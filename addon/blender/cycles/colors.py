@@ -1,13 +1,19 @@
-"""Color that nodes give a receiver, by Cycles, which evaluates all nodes."""
+"""Base color that nodes give a receiver, by Cycles, which evaluates all nodes."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
+from ...core.bake.job import BakeJob, Step
 from ...core.bake.margin import extend_margin
-from ...core.errors import BakeError
-from ...core.progress import Callback
+from ...core.bake.surface import Surface
+from ...core.errors import BakeError, text_of
+from ...core.messages import warning
+from ...core.progress import Callback, Progress
 from ...core.scene.receiver import Receiver
+from ...core.scene.texture import BaseColor
 from ...core.target import Target
 from .cycles_light import CopyForCycles
 from .process import run
@@ -25,6 +31,52 @@ BLENDER_BYTES, PIXEL_BYTES = 270 << 20, 190
 
 # Rings of texels at the mesh's border that take the color of their neighbors.
 RINGS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class BaseColorByCycles(Step):
+    """Evaluates a base color that only Cycles knows. The result, or the failure, holds for all jobs of the target.
+
+    Attributes
+    ----------
+    surface : of the node, without the base color.
+    blur : fraction of the texture that light passes on its way in.
+    matrix : rows of the matrix of the instance that is baked; None if the object itself is.
+    """
+
+    copy: CopyForCycles
+    target: Target
+    surface: Surface
+    blur: float
+    matrix: list | None
+
+    name = "Evaluating the base color"
+
+    def weight(self, _job: BakeJob) -> float:
+        return 0.0 if self.target in self.copy.base_colors else 1.0
+
+    def run(self, job: BakeJob, progress: Progress) -> BakeJob:
+        known = self.copy.base_colors
+        if self.target not in known:
+            known[self.target] = self._evaluate(job.receiver, progress)
+        return replace(job, surface=self.surface).colored(known[self.target])
+
+    def memory_bytes(self, job: BakeJob) -> float:
+        known = self.target in self.copy.base_colors
+        return 0.0 if known else bytes_of_colors(job.receiver.width, job.receiver.height)
+
+    def _evaluate(self, receiver: Receiver, progress: Progress) -> BaseColor:
+        try:
+            colors = colors_by_cycles(self.copy, self.target, self.matrix, receiver, progress)
+        except (BakeError, OSError) as error:
+            return not_evaluated(self.target, text_of(error))
+        return BaseColor.of(colors, receiver, self.blur, self.target.object_name)
+
+
+def not_evaluated(target: Target, why: str) -> BaseColor:
+    """The base color if Cycles could not evaluate it: only a warning."""
+    text = f"Cycles could not evaluate the Base Color of '{target.object_name}': the node's own color is used. {why}"
+    return BaseColor(warnings=(warning(target.object_name, text),))
 
 
 def colors_by_cycles(

@@ -22,7 +22,7 @@ from .. import compat
 from ..node.find import find_node_in_groups
 from ..node.tree import BASE_COLOR
 from ..read.image_nodes import missing_images
-from ..read.nodes import InputSocket, Links, surface_of
+from ..read.nodes import Links, surface_of
 from ..read.visibility import SOLID_TYPES, render_visible_names, renders
 from .process import run
 from .scene_copy import SceneCopy
@@ -79,7 +79,7 @@ class CopyForCycles:
         self.textures = {
             name: ([group.name for group in groups], node.name, BASE_COLOR)
             for name, (node, groups) in nodes.items()
-            if node.has_texture() and not missing_images(Links(), InputSocket(node.inputs[BASE_COLOR], groups))
+            if node.has_texture() and not missing_images(Links(), node.color_input(groups))
         }
 
 

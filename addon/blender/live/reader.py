@@ -171,7 +171,7 @@ class Reader:
             self._lighting[target.object_name] = self._illumination.lighting(target.object_name)
         try:
             size = _image_size(material, node.image) or sizes.get(target.material_name)
-            texture = self._textures.read(depsgraph, target, self._polygons[target], size or settings.resolution)
+            color = self._textures.read(depsgraph, target, self._polygons[target], size or settings.resolution)
         except Exception as error:  # noqa: BLE001 - the other targets are still to be read
             self.errors[target] = text_of(error)
             return None
@@ -180,8 +180,8 @@ class Reader:
             "size": size,
             "resolution": settings.resolution,
             "illumination": self._lighting[target.object_name],
-            "surface": node.surface() if texture is None else texture.base_color.on(node.surface()),
-            "texture": None if texture is None else texture.texture,
+            "surface": node.surface() if color is None else node.surface().colored(color),
+            "texture": None if color is None else color.texture,
             "settings": for_live(settings.for_bake()),
         }
         former = self._live_targets.get(target)

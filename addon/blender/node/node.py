@@ -12,6 +12,7 @@ from ...core.errors import MaterialError
 from ...core.material import Material, presets
 from ...core.messages import Message
 from .. import compat
+from ..read.nodes import InputSocket
 from ..registration import all_or_nothing, handlers
 from .draw import draw_node
 from .output import link_output, plain_of
@@ -276,6 +277,10 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
     def has_texture(self) -> bool:
         """True if the base color comes from a link, and not from the node's own base color or albedo."""
         return BASE_COLOR in self.inputs and self.inputs[BASE_COLOR].is_linked
+
+    def color_input(self, groups: tuple = ()) -> InputSocket:
+        """The input for a texture, inside the group nodes around the node, outermost first."""
+        return InputSocket(self.inputs[BASE_COLOR], groups)
 
     def draw_buttons(self, _context, layout) -> None:
         draw_node(self, layout)

@@ -1,4 +1,4 @@
-"""Color that nodes give a receiver, at the sample positions of its grids."""
+"""Base color that nodes give a receiver, at the sample positions of its grids."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...core.errors import MissingImageError, NotSupportedError
+from ...core.messages import warning
 from ...core.scene.receiver import Receiver
 from ...core.scene.sampling import sample_positions
+from ...core.scene.texture import BaseColor
 from .image_nodes import Images
 from .nodes import Evaluator, InputSocket, Links, Source, converted, shows_bake
 from .shading import ON_NO_PATH, ShadingPoints
@@ -17,6 +20,33 @@ from .visibility import ObjectInstance
 MAX_POSITIONS = 1 << 20
 # Most sample positions along each side of a texel, for images finer than the texture.
 MAX_SIDE = 4
+
+
+def read_texture(
+    wanted: InputSocket,
+    blur: float,
+    instance: ObjectInstance,
+    receiver: Receiver,
+    check: Callable[[], None] | None = None,
+) -> BaseColor:
+    """Base color of a texture on the texels of a receiver.
+
+    Parameters
+    ----------
+    wanted : input that the texture is linked to.
+    blur : fraction of the texture that light passes on its way in.
+    instance : mesh object, for its own coordinates.
+    check : called now and then, raises an exception to cancel.
+    """
+    name = instance.obj.name
+    try:
+        colors = read_base_color(wanted, instance, receiver, check)
+    except MissingImageError as error:
+        text = f"The Base Color of '{name}' is left out: the node's own color is used. {error.text}"
+        return BaseColor(warnings=(warning(name, text, error.remedy),))
+    except NotSupportedError as error:
+        return BaseColor(unknown=str(error))
+    return BaseColor.of(colors, receiver, blur, name)
 
 
 class _OnChart(ShadingPoints):
@@ -40,9 +70,7 @@ def read_base_color(
 
     Parameters
     ----------
-    wanted : input that the color is linked to.
-    instance : mesh object, for coordinates of its own.
-    check : called now and then, raises an exception to cancel.
+    wanted, instance, check : as for `read_texture`.
 
     Raises
     ------

@@ -12,7 +12,7 @@ from ..node.draw import draw_properties
 from ..node.find import find_node, find_node_in_groups
 from ..node.tree import BASE_COLOR
 from ..preferences import draw_help
-from ..read.nodes import InputSocket, Links
+from ..read.nodes import Links
 from ..registration import all_or_nothing, classes
 from .bake_panel import draw_bake, draw_lines
 
@@ -121,7 +121,7 @@ def _base_color_images(material) -> set:
     node, groups = find_node_in_groups(material) or (None, ())
     if node is None or BASE_COLOR not in node.inputs:
         return set()
-    sources = Links().readers(InputSocket(node.inputs[BASE_COLOR], groups))
+    sources = Links().readers(node.color_input(groups))
     return {getattr(source.node, "image", None) for source in sources if source.socket.is_output}
 
 

@@ -14,6 +14,7 @@ from ..messages import Message, warning
 from ..progress import Callback, Progress, timed
 from ..scene.illumination import Illumination
 from ..scene.receiver import Receiver
+from ..scene.texture import BaseColor, textured
 from .bake_settings import COMBINED, BakeSettings
 from .layers import LAYERS, WITHOUT_MEDIUM
 from .margin import extend_margin
@@ -135,6 +136,13 @@ class BakeJob:
             with timed(f"'{self.name}': {step.name}"):
                 job = replace(step.run(job, part), steps=tuple(rest))
         return job
+
+    def colored(self, color: BaseColor) -> BakeJob:
+        """The job with a base color and its messages: the surface has its mean, the receiver the rest."""
+        illumination, receiver = self.illumination.with_messages(*color.warnings), self.receiver
+        if color.texture is not None:
+            receiver = textured(receiver, color.texture.colors, color.texture.blur)
+        return replace(self, illumination=illumination, receiver=receiver, surface=self.surface.colored(color))
 
     @property
     def finds_light(self) -> bool:

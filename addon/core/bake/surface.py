@@ -11,6 +11,7 @@ from ..ldf.albedo import albedo_from_color
 from ..material import RGB, Material, check_base_color, check_thickness
 from ..native import native
 from ..progress import Callback, Progress
+from ..scene.texture import BaseColor
 
 
 def channel_media(material: Material, thickness: float) -> list:
@@ -32,6 +33,10 @@ class Surface:
     material: Material
     thickness: float = 0.0
     base_color: RGB | None = None
+
+    def colored(self, color: BaseColor) -> Surface:
+        """The surface with the mean of a base color, or unchanged if the color is unknown."""
+        return self if color.mean is None else replace(self, base_color=color.mean)
 
     def check(self) -> None:
         """Raise MaterialError for values outside their range."""

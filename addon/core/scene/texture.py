@@ -9,14 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
+from ..messages import Message, warning
 from .receiver import Chart, Receiver
 from .sampling import bilinear, sample_positions
 
 # Largest number of samples of a finer texture along each side of a texel. More: less aliasing, more time.
 MAX_SAMPLES = 4
+# Largest base color without a warning; rounding and interpolation may exceed 1 a little.
+BRIGHTEST = 1.001
 
 
 def mean_color(receiver: Receiver, colors: Sequence[np.ndarray]) -> tuple[float, float, float]:
@@ -75,3 +79,33 @@ class Texture:
             x, y = chart.grid_positions(target.uvs(receiver.width, receiver.height, at), self.receiver)
             total += bilinear(color, x, y)
         return (total / count**2).reshape(target.grid.height, target.grid.width, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class BaseColor:
+    """Base color of each texel of a surface, or the reason why it is unknown.
+
+    Attributes
+    ----------
+    texture : colors, at most 1; None if they are unknown.
+    warnings : messages about the colors.
+    unknown : sentence that names the node that only Cycles can evaluate; "" if there is none.
+    """
+
+    texture: Texture | None = None
+    warnings: tuple[Message, ...] = ()
+    unknown: str = ""
+
+    @classmethod
+    def of(cls, colors: Sequence[np.ndarray], receiver: Receiver, blur: float, object_name: str) -> BaseColor:
+        """From colors on a receiver, as `Texture` has them; a warning if they are above 1."""
+        warnings = ()
+        if max(color.max(initial=0) for color in colors) > BRIGHTEST:
+            text = f"The Base Color of '{object_name}' is above 1 in places, which reflects more light than arrives."
+            warnings = (warning(object_name, text, "It is cut to 1."),)
+        return cls(Texture(receiver, tuple(color.clip(0, 1) for color in colors), blur), warnings)
+
+    @cached_property
+    def mean(self) -> tuple[float, float, float] | None:
+        """Mean color, which the medium has; None if the colors are unknown."""
+        return None if self.texture is None else mean_color(self.texture.receiver, self.texture.colors)

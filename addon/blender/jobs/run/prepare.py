@@ -13,17 +13,19 @@ from ....core.bake.job import BakeJob, needs_medium, to_simulate
 from ....core.bake.runner import Bake
 from ....core.bake.surface import Surface
 from ....core.scene.receiver import build_receiver, texture_size
+from ....core.scene.texture import BaseColor
 from ....core.scene.uv_map import fit_uv_maps
 from ....core.target import Target
+from ...cycles.colors import BaseColorByCycles, not_evaluated
 from ...cycles.cycles_light import CopyForCycles, CyclesLight
 from ...images.files import check_image
 from ...images.sequence import is_sequence, size_of_frames
 from ...node.find import find_node_in_groups, materials_of
 from ...node.node import BeamspreadNode
+from ...read.base_color import read_texture
 from ...read.geometry import read_polygons
 from ...read.lights import read_illumination
 from ...read.visibility import ObjectInstance, as_rendered, check_instance, find_instances, render_visible_names
-from .linked_color import BaseColor, BaseColorByCycles, not_evaluated, read_texture
 
 PLACEHOLDER_COLOR = (0.5, 0.5, 0.5)
 """Base color until Cycles has evaluated it."""
@@ -137,15 +139,15 @@ class Preparation:
         if color is None:
             return job
         if not color.unknown:
-            return color.in_job(job)
+            return job.colored(color)
         if not needs_medium(job.settings):
             return job
         copy = self._by_cycles.copy()
         if copy is None:
-            return not_evaluated(target, "There is no copy of the scene.").in_job(
-                replace(job, surface=plan.own_surface)
+            return replace(job, surface=plan.own_surface).colored(
+                not_evaluated(target, "There is no copy of the scene.")
             )
-        step = BaseColorByCycles(copy, target, plan.own_surface, color.blur, plan.matrix)
+        step = BaseColorByCycles(copy, target, plan.own_surface, plan.blur, plan.matrix)
         illumination = job.illumination.with_messages(*copy.scene.warnings)
         return replace(job, illumination=illumination, steps=(step, *job.steps))
 
@@ -159,6 +161,7 @@ class _Plan:
     surface : with the mean base color; a placeholder if only Cycles can evaluate it.
     own_surface : surface of the node, without its linked base color.
     color : base color that is linked to the node, or None.
+    blur : fraction of its texture that light passes on its way in.
     matrix : rows of the matrix of the instance that is baked; None if the object itself is.
     """
 
@@ -167,6 +170,7 @@ class _Plan:
     surface: Surface
     own_surface: Surface
     color: BaseColor | None = None
+    blur: float = 0.0
     matrix: list | None = None
 
 
@@ -188,7 +192,8 @@ def _read_target(
     size = size or texture_size(maps, resolution or depsgraph.scene.beamspread.resolution)
     if not node.has_texture():
         return _Plan(maps, size, surface, surface)
-    color = read_texture(node, groups, placed, build_receiver(maps, *size))
-    mixed = replace(surface, base_color=PLACEHOLDER_COLOR) if color.unknown else color.on(surface)
+    blur = node.texture_blur
+    color = read_texture(node.color_input(groups), blur, placed, build_receiver(maps, *size))
+    mixed = replace(surface, base_color=PLACEHOLDER_COLOR) if color.unknown else surface.colored(color)
     matrix = np.array(placed.matrix).tolist() if placed.is_instance else None
-    return _Plan(maps, size, mixed, surface, color, matrix)
+    return _Plan(maps, size, mixed, surface, color, blur, matrix)
