@@ -1,29 +1,12 @@
-"""Scenario of test_kept_undo.py in a Blender with a window: undo of bakes, also while one runs.
-
-xvfb-run blender --factory-startup --python THIS -- RESULTS.json
-"""
-
-import sys
-import time
-from pathlib import Path
+"""Scenario of test_kept_undo.py: undo of bakes, also while one runs."""
 
 import bpy
-
-FOLDER = Path(__file__).resolve().parent
-sys.path[:0] = [str(FOLDER), str(FOLDER.parent.parent / "build" / "stage")]
-
-import beamspread  # noqa: E402
-import scenes  # noqa: E402
-from beamspread.blender.jobs.state import state  # noqa: E402
-from scenario_player import play  # noqa: E402
+import scenes
+from beamspread.blender.jobs.state import state
+from scenario_player import in_window, is_over
 
 PATIENCE_SECONDS = 60
 results = {}
-
-
-def in_window(operator, *arguments):
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-        return operator(*arguments)
 
 
 def image():
@@ -89,13 +72,4 @@ def scenario():
     in_window(bpy.ops.ed.undo)
     yield lambda: True
     noted("undone at last")
-    drawn = time.monotonic()
-    yield lambda: time.monotonic() > drawn + 1
-
-
-def main() -> None:
-    beamspread.register()
-    play(scenario(), results, PATIENCE_SECONDS)
-
-
-main()
+    yield is_over(1.0)  # Blender draws the window

@@ -1,42 +1,90 @@
-"""Plays the steps of a test in a Blender with a window, between the window's events."""
+"""Plays the steps of a test in a Blender with a window, between the window's events.
 
+    xvfb-run blender --factory-startup --python THIS -- SCENARIO RESULTS.json
+
+SCENARIO names a module with `scenario()`, which yields the conditions that it waits for, `results`, which become the
+file, and `PATIENCE_SECONDS`, the longest that one step may take.
+"""
+
+import importlib
 import json
+import os
+import subprocess
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 
+FOLDER = Path(__file__).resolve().parent
+PAUSE_SECONDS = 0.02
 
-def play(
-    steps: Iterator[Callable[[], bool]], results: dict, patience: float, pause: float = 0.05, first: float = 0.1
-) -> None:
-    """Resume the scenario as soon as its condition holds; at its end write `results` and quit.
 
-    Parameters
-    ----------
-    steps : yields the conditions that it waits for.
-    results : "complete" or "error" joins them; they go to the file that the command line names last, as JSON.
-    patience, pause, first : seconds that one step may take, between two checks, and until the first.
-    """
+def results_of(scenario: str, folder: Path, *, size: tuple[int, int] = (1600, 1000)) -> dict:
+    """Results of a scenario that a new Blender with a window and an empty cache plays."""
+    import pytest  # which the new Blender lacks
+
+    if not bpy.app.binary_path:
+        pytest.skip("the bpy module opens no window")
+    path = folder / "results.json"
+    screen = ["xvfb-run", "-a", "-s", "-screen 0 1600x1000x24 +extension GLX"]
+    options = ["--factory-startup", "--enable-event-simulate", "--window-geometry", "0", "0", *map(str, size)]
+    script = ["--python-exit-code", "1", "--python", __file__, "--", scenario, str(path)]
+    environment = os.environ | {"BEAMSPREAD_CACHE": str(folder / "cache")}
+    command = [*screen, bpy.app.binary_path, *options, *script]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600, env=environment)
+    assert path.exists(), done.stdout + done.stderr
+    results = json.loads(path.read_text())
+    assert "error" not in results, results["error"]
+    assert results["complete"]
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stdout + done.stderr
+    return results
+
+
+def in_window(operator, *arguments, **options):
+    """Call an operator as the window does; its result."""
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        return operator(*arguments, **options)
+
+
+def is_over(seconds: float):
+    """Condition that so many seconds have passed."""
+    end = time.monotonic() + seconds
+    return lambda: time.monotonic() > end
+
+
+def play(steps: Iterator, results: dict, path: Path, patience: float) -> None:
+    """Resume the scenario as soon as its condition holds; at its end write `results` and quit."""
     waiting = {"for": lambda: True, "since": time.monotonic()}
 
     def step():
         try:
             if not waiting["for"]():
                 if time.monotonic() - waiting["since"] < patience:
-                    return pause
+                    return PAUSE_SECONDS
                 raise TimeoutError(f"line {steps.gi_frame.f_lineno} waited in vain")
             waiting.update({"for": next(steps), "since": time.monotonic()})
-            return pause
+            return PAUSE_SECONDS
         except StopIteration:
             results["complete"] = True
         except BaseException:  # noqa: BLE001 - the test shows it
             results["error"] = traceback.format_exc()
-        Path(sys.argv[-1]).write_text(json.dumps(results))
+        path.write_text(json.dumps(results))
         bpy.ops.wm.quit_blender()
         return None
 
-    bpy.app.timers.register(step, first_interval=first, persistent=True)
+    bpy.app.timers.register(step, first_interval=1.0, persistent=True)
+
+
+def main() -> None:
+    module = importlib.import_module(sys.argv[-2])
+    importlib.import_module("beamspread").register()
+    play(module.scenario(), module.results, Path(sys.argv[-1]), module.PATIENCE_SECONDS)
+
+
+if __name__ == "__main__":
+    sys.path[:0] = [str(FOLDER), str(FOLDER.parent.parent / "build" / "stage")]
+    main()

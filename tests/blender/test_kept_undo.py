@@ -3,36 +3,20 @@
 Files are not undone, which the results say, also without a window.
 """
 
-import json
-import subprocess
-from pathlib import Path
-
 import bpy
 import numpy as np
 import pytest
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.state import Status, state
 from beamspread.core.native import native
+from scenario_player import results_of
 from scenes import add_material, add_plane, add_sun, bake, node_of, pixels
 
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
     """Results of kept_window.py: brightness of the pixels on display and of the packed pixels."""
-    if not bpy.app.binary_path:
-        pytest.skip("the bpy module opens no window")
-    path = tmp_path_factory.mktemp("window") / "results.json"
-    screen = ["xvfb-run", "-a", "-s", "-screen 0 1600x1000x24 +extension GLX"]
-    script = ["--python-exit-code", "1", "--python", str(Path(__file__).with_name("kept_window.py")), "--", str(path)]
-    options = ["--factory-startup", "--window-geometry", "0", "0", "1600", "1000", *script]
-    done = subprocess.run([*screen, bpy.app.binary_path, *options], capture_output=True, text=True, timeout=300)
-    assert path.exists(), done.stdout + done.stderr
-    results = json.loads(path.read_text())
-    assert "error" not in results, results["error"]
-    assert results["complete"]
-    assert done.returncode == 0, done.stderr
-    assert "Traceback" not in done.stdout + done.stderr
-    return results
+    return results_of("kept_window", tmp_path_factory.mktemp("window"))
 
 
 def test_picture_and_packed_data_are_undone_together(seen):

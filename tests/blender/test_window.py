@@ -1,36 +1,17 @@
 """The operator and the panels in a window: started, watched, cancelled and undone by events, drawn for real."""
 
-import json
-import os
-import subprocess
-from pathlib import Path
-
 import bpy
 import pytest
 from beamspread.blender import compat
 from beamspread.blender.node import menu
 from beamspread.blender.ui import panels
+from scenario_player import results_of
 
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
     """Results of window.py."""
-    if not bpy.app.binary_path:
-        pytest.skip("the bpy module opens no window")
-    path = tmp_path_factory.mktemp("window") / "results.json"
-    screen = ["xvfb-run", "-a", "-s", "-screen 0 1600x1000x24 +extension GLX"]
-    options = ["--factory-startup", "--enable-event-simulate", "--window-geometry", "0", "0", "1600", "1000"]
-    script = ["--python-exit-code", "1", "--python", str(Path(__file__).with_name("window.py")), "--", str(path)]
-    command = [*screen, bpy.app.binary_path, *options, *script]
-    environment = os.environ | {"BEAMSPREAD_CACHE": str(path.parent / "cache")}
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment)
-    assert path.exists(), done.stdout + done.stderr
-    results = json.loads(path.read_text())
-    assert "error" not in results, results["error"]
-    assert results["complete"]
-    assert done.returncode == 0, done.stderr
-    assert "Traceback" not in done.stdout + done.stderr
-    return results
+    return results_of("window", tmp_path_factory.mktemp("window"))
 
 
 def test_every_panel_the_node_and_its_menu_are_drawn(seen):

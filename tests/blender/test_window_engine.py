@@ -1,31 +1,13 @@
 """The engine in a window: F12 beside the window's own thread, viewports; and the node by copy, paste and undo."""
 
-import json
-import subprocess
-from pathlib import Path
-
-import bpy
 import pytest
+from scenario_player import results_of
 
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
     """Results of window_engine.py."""
-    if not bpy.app.binary_path:
-        pytest.skip("the bpy module opens no window")
-    path = tmp_path_factory.mktemp("window") / "results.json"
-    screen = ["xvfb-run", "-a", "-s", "-screen 0 1600x1000x24 +extension GLX"]
-    options = ["--factory-startup", "--window-geometry", "0", "0", "1600", "1000"]
-    script = ["--python", str(Path(__file__).with_name("window_engine.py")), "--", str(path)]
-    done = subprocess.run(
-        [*screen, bpy.app.binary_path, *options, *script], capture_output=True, text=True, timeout=300
-    )
-    assert path.exists(), done.stdout + done.stderr
-    results = json.loads(path.read_text())
-    assert "error" not in results, results["error"]
-    assert results["complete"]
-    assert done.returncode == 0, done.stderr
-    return results
+    return results_of("window_engine", tmp_path_factory.mktemp("window"))
 
 
 def test_f12_shows_the_baked_image(seen):

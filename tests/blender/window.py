@@ -1,30 +1,19 @@
-"""Runs for test_window.py inside a Blender with a window: events, timers and panels that are drawn for real.
+"""Scenario of test_window.py: events, timers and panels that are drawn for real."""
 
-    xvfb-run blender --factory-startup --enable-event-simulate --python THIS -- RESULTS.json
-
-Each step of the scenario waits for the condition that it yields, and records results.
-"""
-
-import sys
 import time
 import traceback
-from pathlib import Path
 
+import beamspread
 import bpy
-
-FOLDER = Path(__file__).resolve().parent
-sys.path[:0] = [str(FOLDER), str(FOLDER.parent.parent / "build" / "stage")]
-
-import beamspread  # noqa: E402
-import scenes  # noqa: E402
-from beamspread.blender import compat, popup  # noqa: E402
-from beamspread.blender.jobs.run import operator  # noqa: E402
-from beamspread.blender.jobs.state import state  # noqa: E402
-from beamspread.blender.node import draw, menu  # noqa: E402
-from beamspread.blender.ui import bake_panel as shown  # noqa: E402
-from beamspread.blender.ui import panels  # noqa: E402
-from beamspread.core.target import Target  # noqa: E402
-from scenario_player import play  # noqa: E402
+import scenes
+from beamspread.blender import compat, popup
+from beamspread.blender.jobs.run import operator
+from beamspread.blender.jobs.state import state
+from beamspread.blender.node import draw, menu
+from beamspread.blender.ui import bake_panel as shown
+from beamspread.blender.ui import panels
+from beamspread.core.target import Target
+from scenario_player import in_window, is_over
 
 # The slowest step takes a second or two on an idle machine.
 PATIENCE_SECONDS = 60
@@ -48,8 +37,8 @@ class WINDOW_OT_count_ticks(bpy.types.Operator):
 
 def ticks_of_a_second():
     """Count them anew."""
-    results["ticks"], began = 0, time.monotonic()
-    yield lambda: time.monotonic() > began + 1
+    results["ticks"] = 0
+    yield is_over(1.0)
 
 
 def count_draws(owner, name: str) -> None:
@@ -116,13 +105,7 @@ def show_tabs() -> bool:
 
 def started(**options) -> set[str]:
     """Start the operator as a button does."""
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-        return bpy.ops.beamspread.bake("INVOKE_DEFAULT", **options)
-
-
-def can_start() -> bool:
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-        return bpy.ops.beamspread.bake.poll()
+    return in_window(bpy.ops.beamspread.bake, "INVOKE_DEFAULT", **options)
 
 
 def press_escape() -> None:
@@ -183,15 +166,13 @@ def scenario():
 
     bpy.ops.ed.undo_push(message="before")
     results["returned"] = sorted(started(objects="ALL"))
-    results["can start another"] = can_start()
+    results["can start another"] = in_window(bpy.ops.beamspread.bake.poll)
     results["running"] = str(state.run.target)
     yield ended
     results["baked"] = [brightness(name) for name in ("First", "Second")]
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-        bpy.ops.ed.undo()
-        results["after undo"] = [brightness(name) for name in ("First", "Second")]
-        bpy.ops.ed.redo()
-        results["after redo"] = [brightness(name) for name in ("First", "Second")]
+    for name in ("undo", "redo"):
+        in_window(getattr(bpy.ops.ed, name))
+        results[f"after {name}"] = [brightness(name) for name in ("First", "Second")]
 
     # A solver and a size that take minutes, under another light: only Esc ends that.
     settings, sun = bpy.context.scene.beamspread, bpy.data.objects["Sun"]
@@ -205,8 +186,7 @@ def scenario():
     results["progress"] = [progress.stage_fraction, progress.fraction, progress.stage, state.run.position]
     opened = []
     bpy.types.TOPBAR_MT_file.append(lambda _menu, _context: opened.append(True))
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-        bpy.ops.wm.call_menu("INVOKE_DEFAULT", name="TOPBAR_MT_file")
+    in_window(bpy.ops.wm.call_menu, "INVOKE_DEFAULT", name="TOPBAR_MT_file")
     yield lambda: opened
     press_escape()
     for _ in range(10):  # ticks of the operator's timer
@@ -272,8 +252,7 @@ def scenario():
 
     settings.solver, results["ticks"] = "direct", 0
     bpy.utils.register_class(WINDOW_OT_count_ticks)
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-        bpy.ops.window.count_ticks("INVOKE_DEFAULT")
+    in_window(bpy.ops.window.count_ticks, "INVOKE_DEFAULT")
     started()
     yield from ticks_of_a_second()
     results["ticks of a bake"] = results["ticks"]
@@ -287,15 +266,7 @@ def scenario():
     started()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     results["runs on in the next file"] = state.is_running()
-    # Blender crashes if it quits before it has drawn the new file.
-    loaded = time.monotonic()
-    yield lambda: time.monotonic() > loaded + 1
+    yield is_over(1.0)  # Blender crashes if it quits before it has drawn the new file
 
 
-def main() -> None:
-    prepare_panels()
-    beamspread.register()
-    play(scenario(), results, PATIENCE_SECONDS)
-
-
-main()
+prepare_panels()

@@ -1,20 +1,11 @@
-"""Runs for test_window_engine.py inside a Blender with a window: F12, viewports, and nodes by copy and paste.
-
-xvfb-run blender --factory-startup --python THIS -- RESULTS.json
-"""
+"""Scenario of test_window_engine.py: F12, viewports, and nodes by copy and paste."""
 
 import sys
-import time
 from pathlib import Path
 
 import bpy
-
-FOLDER = Path(__file__).resolve().parent
-sys.path[:0] = [str(FOLDER), str(FOLDER.parent.parent / "build" / "stage")]
-
-import beamspread  # noqa: E402
-import scenes  # noqa: E402
-from scenario_player import play  # noqa: E402
+import scenes
+from scenario_player import in_window, is_over
 
 PATIENCE_SECONDS = 90
 results = {}
@@ -27,11 +18,6 @@ def window():
 
 def area_of(kind: str):
     return next(area for area in window().screen.areas if area.type == kind)
-
-
-def f12() -> None:
-    with bpy.context.temp_override(window=window()):
-        bpy.ops.render.render("INVOKE_DEFAULT")
 
 
 def in_editor(operator, **options):
@@ -88,8 +74,7 @@ def blender_s_own_bake(plane):
         if name == "lamp":
             lamp = add_checkered_lamp()
         over.clear()
-        with bpy.context.temp_override(window=window()):
-            bpy.ops.object.bake("INVOKE_DEFAULT", type="COMBINED", margin=0)
+        in_window(bpy.ops.object.bake, "INVOKE_DEFAULT", type="COMBINED", margin=0)
         yield lambda: over
         yield lambda: not bpy.app.is_job_running("OBJECT_BAKE")
         results[f"own bake, {name}"] = scenes.pixels(image)[..., :3].sum(axis=(0, 1)).tolist()
@@ -113,6 +98,7 @@ def add_checkered_lamp():
 
 
 def scenario():
+    bpy.context.preferences.view.render_display_type = "NONE"
     bpy.app.handlers.render_complete.append(lambda *_: ended.append("complete"))
     plane = add_scene()
     area_of("DOPESHEET_EDITOR").ui_type = "ShaderNodeTree"
@@ -121,7 +107,7 @@ def scenario():
     yield lambda: viewport.type == "MATERIAL"
     results["scene light"] = viewport.use_scene_lights and viewport.use_scene_world
 
-    f12()
+    in_window(bpy.ops.render.render, "INVOKE_DEFAULT")
     yield lambda: ended
     results["f12"] = list(ended)
     path = str(Path(sys.argv[-1]).with_name("f12.exr"))
@@ -147,19 +133,7 @@ def scenario():
     )
     results["pasted"] = iors()
     for name in ("undo", "undo", "redo", "redo"):
-        with bpy.context.temp_override(window=window()):
-            getattr(bpy.ops.ed, name)()
+        in_window(getattr(bpy.ops.ed, name))
         yield lambda: True
     results["after undo and redo"] = iors()
-    began = time.monotonic()
-    yield lambda: time.monotonic() > began + 1
-
-
-def main() -> None:
-    beamspread.register()
-    play(scenario(), results, PATIENCE_SECONDS, first=1.0)
-
-
-bpy.context.preferences.view.show_splash = False
-bpy.context.preferences.view.render_display_type = "NONE"
-main()
+    yield is_over(1.0)
