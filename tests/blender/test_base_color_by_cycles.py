@@ -9,8 +9,8 @@ from beamspread.blender import preferences
 from beamspread.blender.cycles import colors as cycles_colors
 from beamspread.blender.cycles import process
 from beamspread.blender.cycles.colors import BaseColorByCycles
-from beamspread.blender.jobs.run.operator import BakeThread
-from beamspread.blender.jobs.run.prepare import read_scene
+from beamspread.blender.jobs.run.bake_plan import read_scene
+from beamspread.blender.jobs.run.bake_run import BakeThread
 from beamspread.blender.jobs.state import state
 from beamspread.blender.node.find import find_node
 from beamspread.core.bake.runner import CANCELLED
@@ -85,7 +85,8 @@ def add_checker(material, scale, one, other):
 def bake_of(obj, number=0, size=SIZE, **changes):
     settings = bpy.context.scene.beamspread.for_bake(**changes)
     target = Target(obj.name, obj.data.materials[number].name)
-    return read_scene(bpy.context, [target], settings, size).bake(target)
+    (plan,) = read_scene(bpy.context, [target], size)
+    return plan.bake(settings)
 
 
 def evaluated(obj, number=0):
@@ -280,9 +281,9 @@ def test_it_is_asked_for_once_in_a_run_and_only_where_it_counts(plane, monkeypat
 
     monkeypatch.setattr(cycles_colors, "colors_by_cycles", colors)
     settings, target = bpy.context.scene.beamspread.for_bake(), Target("Plane", material.name)
-    preparation = read_scene(bpy.context, [target], settings)
+    (plan,) = read_scene(bpy.context, [target])
     for _ in range(2):
-        job = with_color(preparation.bake(target).job)
+        job = with_color(plan.bake(settings).job)
         assert job.surface.base_color == pytest.approx((0.4,) * 3)
     assert asked == [target]
     assert not any(isinstance(step, BaseColorByCycles) for step in bake_of(plane, output="IRRADIANCE").job.steps)

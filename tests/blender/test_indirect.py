@@ -14,7 +14,7 @@ import scenes
 from beamspread.blender.compat import has_denoiser
 from beamspread.blender.cycles import cycles_light, process
 from beamspread.blender.cycles.scene_copy import PREFIX, SceneCopy, remove_leftovers
-from beamspread.blender.jobs.run.prepare import prepare_scene
+from beamspread.blender.jobs.run.bake_plan import prepare_scene
 from beamspread.blender.node.find import find_node
 from beamspread.core.bake.runner import CANCELLED, FAILED
 from beamspread.core.native import native

@@ -6,8 +6,8 @@ import pytest
 import scenes
 from beamspread.blender.cycles import cycles_light
 from beamspread.blender.jobs.out_of_date import stale
+from beamspread.blender.jobs.run.bake_plan import prepare_scene
 from beamspread.blender.jobs.run.batch_run import bake_all
-from beamspread.blender.jobs.run.prepare import prepare_scene
 from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.live import timer
 from beamspread.blender.node.find import find_bakeable

@@ -10,7 +10,7 @@ from beamspread.blender.images.facts import KEY, facts_of
 from beamspread.blender.images.results import Results
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.run import batch_run
-from beamspread.blender.jobs.run.prepare import prepare_scene
+from beamspread.blender.jobs.run.bake_plan import prepare_scene
 from beamspread.blender.jobs.state import state
 from beamspread.blender.node.find import find_targets
 from beamspread.blender.ui.panels import draw_image_buttons

@@ -4,7 +4,7 @@ import bpy
 from beamspread.blender.images.facts import facts_of
 from beamspread.blender.images.results import Results
 from beamspread.blender.jobs.run import batch_run
-from beamspread.blender.jobs.run.prepare import prepare_scene
+from beamspread.blender.jobs.run.bake_plan import prepare_scene
 from beamspread.blender.node.find import find_targets
 from beamspread.blender.ui.bake_panel import problems_of
 from beamspread.core.batch import batch_options

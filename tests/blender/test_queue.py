@@ -9,10 +9,9 @@ import pytest
 from beamspread.blender import popup, preferences
 from beamspread.blender.images.results import Results
 from beamspread.blender.jobs.out_of_date import stale
-from beamspread.blender.jobs.run import operator, prepare
-from beamspread.blender.jobs.run.bake_queue import BakeQueue, Pass
-from beamspread.blender.jobs.run.operator import BakeThread
-from beamspread.blender.jobs.run.prepare import read_scene
+from beamspread.blender.jobs.run import bake_plan, operator
+from beamspread.blender.jobs.run.bake_plan import Pass, read_scene, steps_of
+from beamspread.blender.jobs.run.bake_run import BakeThread
 from beamspread.blender.jobs.state import Run, Status, duration, state
 from beamspread.blender.node.draw import draw_node
 from beamspread.blender.node.find import find_targets
@@ -41,16 +40,17 @@ def plane(name, x=0.0, **properties):
 
 
 def queue(preview_first=True):
-    targets = find_targets(bpy.context.scene.objects)
-    return BakeQueue(read_scene(bpy.context, targets, bpy.context.scene.beamspread.for_bake()), targets, preview_first)
+    plans = read_scene(bpy.context, find_targets(bpy.context.scene.objects))
+    return steps_of(plans, bpy.context.scene.beamspread.for_bake(), preview_first)
 
 
-def steps(made):
-    return [(bake.target.object_name, bake.job.settings.quality, bake.job.settings.indirect) for bake in made]
+def in_words(steps):
+    jobs = (step.bake().job for step in steps)
+    return [(job.name, job.settings.quality, job.settings.indirect) for job in jobs]
 
 
 def first_bake():
-    return next(iter(queue()))
+    return queue()[0].bake()
 
 
 def test_to_read_the_scene_changes_no_material():
@@ -76,14 +76,14 @@ def test_media_that_are_not_simulated_get_a_quick_preview_and_their_bake_after_a
     plane("Unknown", **UNKNOWN)
     plane("Known", 5.0, **KNOWN)
     bpy.context.scene.beamspread.use_indirect = True
-    assert steps(queue()) == [
+    assert in_words(queue()) == [
         ("Unknown", "preview", False),
         ("Known", "final", True),
         ("Unknown", "final", True),
     ]
-    assert steps(queue(preview_first=False)) == [("Unknown", "final", True), ("Known", "final", True)]
+    assert in_words(queue(preview_first=False)) == [("Unknown", "final", True), ("Known", "final", True)]
     bpy.context.scene.beamspread.quality = "preview"
-    assert [step[1] for step in steps(queue())] == ["preview", "preview"]
+    assert [quality for _, quality, _ in in_words(queue())] == ["preview", "preview"]
 
 
 def test_those_that_share_an_image_are_baked_together_again():
@@ -91,10 +91,8 @@ def test_those_that_share_an_image_are_baked_together_again():
     plane("Unknown", image=image, **UNKNOWN)
     plane("Known", 5.0, image=image, **KNOWN)
     plane("Apart", 9.0, **KNOWN)
-    assert [step[0] for step in steps(queue())] == ["Unknown", "Known", "Apart", "Unknown", "Known"]
-    made = queue()
-    passes = [made.step.purpose for _ in made]
-    assert passes == [Pass.PREVIEW, Pass.PREVIEW, Pass.SINGLE, Pass.FINAL, Pass.FINAL]
+    assert [name for name, *_ in in_words(queue())] == ["Unknown", "Known", "Apart", "Unknown", "Known"]
+    assert [step.purpose for step in queue()] == [Pass.PREVIEW, Pass.PREVIEW, Pass.SINGLE, Pass.FINAL, Pass.FINAL]
 
 
 def test_nothing_is_simulated_for_passes_without_a_medium():
@@ -107,32 +105,32 @@ def test_jobs_are_made_when_it_is_their_turn(monkeypatch):
     for number in range(3):
         plane(f"Plane {number}", 5.0 * number)
     made = []
-    build = prepare.build_receiver
-    monkeypatch.setattr(prepare, "build_receiver", lambda *arguments: made.append(1) or build(*arguments))
-    waiting = iter(queue())
+    build = bake_plan.build_receiver
+    monkeypatch.setattr(bake_plan, "build_receiver", lambda *arguments: made.append(1) or build(*arguments))
+    steps = queue()
     assert len(made) == 0
-    next(waiting)
+    steps[0].bake()
     assert len(made) == 1
 
 
 def test_the_scene_is_read_at_one_time():
     """The scene may change while others are baked."""
     planes = [plane(f"Plane {number}", 5.0 * number) for number in range(2)]
-    waiting = iter(queue())
-    next(waiting)
+    first, second = queue()
+    first.bake()
     bpy.data.objects.remove(planes[1])
     bpy.data.lights["Sun"].energy = 7.0
-    bake = next(waiting)
+    bake = second.bake()
     assert bake.job.receiver.charts[0].grid.origin[0] == pytest.approx(4.0)
     assert bake.job.illumination.lights[0].strength == 1.0
 
 
 def test_a_material_removed_before_its_bake_is_refused():
     planes = [plane(f"Plane {number}", 5.0 * number) for number in range(2)]
-    waiting, kept = iter(queue()), Results()
-    assert kept.admit(next(waiting)).job
+    (first, second), kept = queue(), Results()
+    assert kept.admit(first.bake()).job
     bpy.data.materials.remove(planes[1].data.materials[0])
-    refused = kept.admit(next(waiting))
+    refused = kept.admit(second.bake())
     assert refused.job is None
     assert "was removed or renamed during the bake" in refused.error
 
@@ -292,9 +290,9 @@ def test_long_sentences_are_wrapped():
 def test_a_quick_preview_is_kept_with_its_message():
     """The first of the two steps of a run in the window; the second one never comes."""
     one = plane("Unknown", **UNKNOWN)
-    made = queue()
-    bake = next(iter(made))
-    assert made.step.purpose == Pass.PREVIEW
+    step = queue()[0]
+    bake = step.bake()
+    assert step.purpose == Pass.PREVIEW
     parts = stale.parts_of(bpy.context, [bake.target])
     bake.run()
     bake.keep(Results().store)

@@ -18,7 +18,7 @@ from ...core.bake.runner import Bake
 from ...core.exr_header import text_of
 from ...core.messages import Level, Message, note, warning
 from ...core.target import Target
-from ..node.find import find_targets, image_of
+from ..node.find import targets_of
 from ..read.visibility import with_instanced
 from ..registration import all_or_nothing, handlers
 from . import icons
@@ -154,11 +154,8 @@ def owners_of(image) -> list[Target]:
 
 def users_of(image) -> list[Target]:
     """Targets in any scene whose Beamspread node shows the image."""
-    return [
-        target
-        for target in find_targets(with_instanced(obj for obj in bpy.data.objects if obj.users_scene))
-        if image_of(target) == image
-    ]
+    objects = with_instanced(obj for obj in bpy.data.objects if obj.users_scene)
+    return [target.name for obj in objects for target in targets_of(obj) if target.image == image]
 
 
 def record_in(path: Path) -> Record | None:

@@ -12,7 +12,7 @@ from ...core.batch.batch_options import parse
 from ...core.errors import ImageError
 from ...core.messages import Message, warning
 from ...core.target import Target
-from ..node.find import find_targets, node_of
+from ..node.find import BakeTarget, targets_of
 from ..node.node import link_result
 from ..node.tree import follow_frames
 from ..read.visibility import with_instanced
@@ -85,14 +85,14 @@ Each node keeps its own image for Show Single Images"""
         shown, folders = [], []
         for target in _local_targets(context.scene):
             try:
-                numbers, path = find_frames(context.scene, target)
+                numbers, path = find_frames(context.scene, target.name)
             except ImageError as error:
                 self.report({"ERROR"}, str(error))
                 return {"CANCELLED"}
             folders.append(path.parent)
             if numbers:
                 self._show(target, numbers, path)
-                shown.append(f"'{target}' shows the frames {numbers[0]} to {numbers[-1]}")
+                shown.append(f"'{target.name}' shows the frames {numbers[0]} to {numbers[-1]}")
         if not shown:
             where = f" in {folders[0]}" if folders else ""
             self.report({"ERROR"}, f"There are no frames of a batch{where}: bake them with --frames A-B")
@@ -100,12 +100,12 @@ Each node keeps its own image for Show Single Images"""
         self.report({"INFO"}, ". ".join(shown))
         return {"FINISHED"}
 
-    def _show(self, target: Target, numbers: list[int], path: Path) -> None:
-        messages = show_frames(node_of(target), numbers, path)
+    def _show(self, target: BakeTarget, numbers: list[int], path: Path) -> None:
+        messages = show_frames(target.node, numbers, path)
         missing = numbers[-1] - numbers[0] + 1 - len(numbers)
         if missing:
-            text = f"{missing} of the frames {numbers[0]} to {numbers[-1]} of '{target}' are missing."
-            messages.append(warning(str(target), text))
+            text = f"{missing} of the frames {numbers[0]} to {numbers[-1]} of '{target.name}' are missing."
+            messages.append(warning(str(target.name), text))
         for message in messages:
             self.report({message.level.value}, str(message))
 
@@ -119,23 +119,23 @@ class BEAMSPREAD_OT_show_single(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return bool(_nodes_with_frames(context.scene))
+        return bool(_targets_with_frames(context.scene))
 
     def execute(self, context):
-        for node in _nodes_with_frames(context.scene):
-            node.image = facts_of(node.image).former
+        for target in _targets_with_frames(context.scene):
+            target.node.image = facts_of(target.image).former
         return {"FINISHED"}
 
 
-def _local_targets(scene) -> list[Target]:
+def _local_targets(scene) -> list[BakeTarget]:
     """Targets whose material is in this .blend file: a linked one cannot be changed."""
-    targets = find_targets(with_instanced(scene.objects))
-    return [target for target in targets if bpy.data.materials[target.material_name].library is None]
+    targets = (target for obj in with_instanced(scene.objects) for target in targets_of(obj))
+    return [target for target in targets if target.material.library is None]
 
 
-def _nodes_with_frames(scene) -> list:
-    """Nodes that show the frames of a batch."""
-    return [node for target in _local_targets(scene) if is_sequence((node := node_of(target)).image)]
+def _targets_with_frames(scene) -> list[BakeTarget]:
+    """Targets whose nodes show the frames of a batch."""
+    return [target for target in _local_targets(scene) if is_sequence(target.image)]
 
 
 register, unregister = all_or_nothing(*classes(BEAMSPREAD_OT_show_frames, BEAMSPREAD_OT_show_single))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import bpy
 
@@ -12,6 +13,36 @@ from .. import compat
 from ..read.visibility import count_instances, render_visible_names, with_instanced
 from .node import BeamspreadNode
 from .output import is_linked
+
+
+@dataclass(frozen=True)
+class BakeTarget:
+    """A target in Blender's data, original or evaluated. Undo replaces these data: keep the name for later.
+
+    Attributes
+    ----------
+    groups : group nodes around the node, outermost first.
+    """
+
+    obj: object
+    material: object
+    node: object
+    groups: tuple
+
+    @property
+    def name(self) -> Target:
+        return Target(self.obj.name, self.material.name)
+
+    @property
+    def image(self):
+        """The node's image among the original data, or None."""
+        return self.node.image and self.node.image.original
+
+    def was_baked_elsewhere(self) -> bool:
+        """True if the material belongs to another file and shows the image that was baked there."""
+        is_local = self.material.library is None and self.material.override_library is None
+        return not is_local and self.node.image is not None
+
 
 NOTHING_FOUND = "No mesh has a material with a Beamspread node: add one in the Shader Editor."
 
@@ -38,8 +69,7 @@ def find_node_in_groups(material) -> tuple | None:
     if material is None or not compat.uses_nodes(material):
         return None
     nodes = [(node, groups) for node, groups in _nodes_in(material.node_tree) if all(map(_has_one_user, groups))]
-    nodes.sort(key=lambda pair: (len(pair[1]) > 0, not is_linked(pair[0])))
-    return next(iter(nodes), None)
+    return min(nodes, key=lambda pair: (len(pair[1]) > 0, not is_linked(pair[0])), default=None)
 
 
 def _nodes_in(tree) -> Iterator[tuple]:
@@ -63,18 +93,20 @@ def _has_one_user(group) -> bool:
     return tree.users - tree.use_fake_user <= 1
 
 
-def materials_of(obj) -> list:
-    """The object's materials that have a Beamspread node, each once."""
-    return [material for material in _all_materials(obj) if obj.type == "MESH" and find_node(material) is not None]
+def targets_of(obj) -> list[BakeTarget]:
+    """The targets of an object: its materials that have a Beamspread node, each once."""
+    materials = _all_materials(obj) if obj.type == "MESH" else ()
+    nodes = ((material, find_node_in_groups(material)) for material in materials)
+    return [BakeTarget(obj, material, *node) for material, node in nodes if node is not None]
 
 
 def find_targets(objects: Iterable) -> list[Target]:
-    """Targets among the objects, in their order."""
-    return [Target(obj.name, material.name) for obj in objects for material in materials_of(obj)]
+    """Names of the targets among the objects, in their order."""
+    return [target.name for obj in objects for target in targets_of(obj)]
 
 
 def find_bakeable(view_layer, chosen: Iterable | None = None) -> list[Target]:
-    """Targets among the chosen objects (None: the scene's), and among objects that only their instances show.
+    """Names of the targets of the chosen objects (None: the scene's), and of objects that only their instances show.
 
     A material of an instance that already shows an image is left out if it belongs to another file, or if it has
     several instances and nobody has chosen it: it was baked elsewhere.
@@ -82,19 +114,11 @@ def find_bakeable(view_layer, chosen: Iterable | None = None) -> list[Target]:
     objects = list(view_layer.id_data.objects if chosen is None else chosen)
     inner = with_instanced(objects)[len(objects) :]
     names = {obj.name for obj in (*view_layer.objects, *objects)} if inner else set()
-    instanced = [(obj, material) for obj in inner if obj.name not in names for material in materials_of(obj)]
+    instanced = [target for obj in inner if obj.name not in names for target in targets_of(obj)]
     counts = rendered_counts(view_layer) if instanced and chosen is None else {}
-    targets = find_targets(objects)
-    for obj, material in instanced:
-        if not was_baked_elsewhere(material) and (counts.get(obj.name, 0) <= 1 or find_node(material).image is None):
-            targets.append(Target(obj.name, material.name))
-    return targets
-
-
-def was_baked_elsewhere(material) -> bool:
-    """True if a material with a node belongs to another file and shows the image that was baked there."""
-    is_local = material.library is None and material.override_library is None
-    return not is_local and find_node(material).image is not None
+    free = [target for target in instanced if not target.was_baked_elsewhere()]
+    free = [target for target in free if target.image is None or counts.get(target.obj.name, 0) <= 1]
+    return find_targets(objects) + [target.name for target in free]
 
 
 def rendered_counts(view_layer) -> dict[str, int]:

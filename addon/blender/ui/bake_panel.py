@@ -10,13 +10,12 @@ from ...core import native
 from ...core.errors import BakeError, message_of
 from ...core.messages import Messages
 from ...core.scene.uv_map import check_uvs
-from ...core.target import Target
 from .. import compat
 from ..images.files import check_image
 from ..images.results import check_editable
 from ..jobs.state import Row, Status, state
 from ..live import timer
-from ..node.find import find_misplaced, find_node, materials_of, rendered_counts, was_baked_elsewhere
+from ..node.find import find_misplaced, rendered_counts, targets_of
 from ..popup import wrap
 from ..read.visibility import ObjectInstance, check_instance, with_instanced
 
@@ -34,35 +33,32 @@ ICONS = {
 }
 
 
-def problems_of(obj, places: dict[str, int]) -> Messages:
+def problems_of(obj, counts: dict[str, int]) -> Messages:
     """Errors that a bake of the object would end with, as far as they are known without baking.
 
-    `places` is the result of `rendered_counts`. An error of the object as a whole comes once for each of its targets.
+    `counts` is the result of `rendered_counts`. An error of the object as a whole comes once for each of its targets.
     """
     misplaced = find_misplaced([obj] if obj.instance_type == "NONE" else [])
     messages = Messages(message for bake in misplaced for message in bake.messages)
-    materials, view_layer = materials_of(obj), bpy.context.view_layer
-    if materials and obj.name not in view_layer.objects:  # an instance alone
-        materials = [one for one in materials if not was_baked_elsewhere(one)]
-    if not materials:
-        return messages
-    times = places.get(obj.name, 0)
-    for material in materials:
-        node = find_node(material)
+    targets, view_layer = targets_of(obj), bpy.context.view_layer
+    if targets and obj.name not in view_layer.objects:  # an instance alone
+        targets = [target for target in targets if not target.was_baked_elsewhere()]
+    times = counts.get(obj.name, 0)
+    for target in targets:
         checks = [
             lambda: obj.data.uv_layers or check_uvs(None),
             lambda: check_instance(obj.name, ObjectInstance(obj, None, times) if times else None, view_layer),
-            lambda node=node: node.surface().check(),
+            lambda target=target: target.node.surface().check(),
         ]
         if bpy.context.scene.beamspread.output == "LUMINANCE":
-            checks.append(lambda material=material: check_editable(material))
-        if node.image is not None:
-            checks.append(lambda node=node: check_image(node.image))
+            checks.append(lambda target=target: check_editable(target.material))
+        if target.image is not None:
+            checks.append(lambda target=target: check_image(target.image))
         for check in checks:
             try:
                 check()
             except BakeError as error:
-                messages.add(message_of(error, str(Target(obj.name, material.name))))
+                messages.add(message_of(error, str(target.name)))
     return messages
 
 
@@ -105,12 +101,12 @@ def draw_problems(layout, context) -> Messages:
     """Draw and return the errors that selected objects, and the objects that these instance, would end with."""
     # `context.object` is empty in the render properties.
     view_layer = context.view_layer
-    chosen, places = list(view_layer.objects.selected)[:MAX_OBJECTS], rendered_counts(view_layer)
+    chosen, counts = list(view_layer.objects.selected)[:MAX_OBJECTS], rendered_counts(view_layer)
     inner = with_instanced(chosen)[len(chosen) :][:MAX_CHECKED]
-    own = {obj.name for obj in view_layer.objects} if inner else set()
+    known = {obj.name for obj in view_layer.objects} if inner else set()
     shown, left = Messages(), MAX_OBJECTS
-    for obj in [*chosen, *(one for one in inner if one.name not in own)]:
-        problems = problems_of(obj, places) if left else Messages()
+    for obj in [*chosen, *(obj for obj in inner if obj.name not in known)]:
+        problems = problems_of(obj, counts) if left else Messages()
         draw_lines(layout, context, dict.fromkeys(f"{obj.name}: {message}" for message in problems), "ERROR")
         shown.add(*problems)
         left -= bool(problems)

@@ -26,7 +26,7 @@ from ...node.find import NOTHING_FOUND, find_bakeable, find_misplaced
 from ...read.visibility import by_name
 from ..out_of_date import stale
 from ..out_of_date.fingerprint import IMAGE, SETTINGS, Parts, settings_part
-from .prepare import prepare_scene
+from .bake_plan import prepare_scene
 
 
 def bake_all(options: BatchOptions, stop: Stop | None = None) -> Report:

@@ -17,12 +17,12 @@ from ....core.progress import Progress
 from ....core.target import Target
 from ... import compat
 from ...cycles.cycles_light import CopyForCycles
-from ...node.find import NOTHING_FOUND, find_misplaced, find_node, find_targets, materials_of
+from ...node.find import NOTHING_FOUND, BakeTarget, find_misplaced, find_targets, image_of, targets_of
 from ...registration import all_or_nothing, classes, handlers
 from ..out_of_date import stale
 from ..out_of_date.fingerprint import Parts
 from ..state import state
-from .prepare import Preparation
+from .bake_plan import read_plans
 from .render_copy import render_picture, show_by_eevee
 
 
@@ -93,26 +93,25 @@ class _ActiveImage(Sink):
 def _prepare(depsgraph, obj, passes, size: tuple[int, int]) -> list[Bake]:
     """A bake for each material of the object that has its node and that the image shows."""
     try:
-        targets = [Target(obj.name, name) for name in _materials_in(obj, passes, *size)]
-        settings = depsgraph.scene.beamspread.for_bake()
+        settings, targets = depsgraph.scene.beamspread.for_bake(), _targets_in(obj, passes, *size)
         for target in targets:
-            _check_active_image(bpy.data.materials[target.material_name], settings)
-        preparation = Preparation(depsgraph, targets, settings, size=size, copy=fillings.copy)
-        bakes = [preparation.bake(target) for target in targets] or find_misplaced([obj])
+            _check_active_image(target, settings)
+        plans = read_plans(depsgraph, [target.name for target in targets], size=size, copy=fillings.copy)
+        bakes = [plan.bake(settings) for plan in plans] or find_misplaced([obj])
     except Exception as error:  # noqa: BLE001 - Blender would swallow it
         return [Bake(Target(obj.name), error=error)]
     return bakes or [Bake(Target(obj.name), error=NOTHING_FOUND)]
 
 
-def _check_active_image(material, settings: BakeSettings) -> None:
+def _check_active_image(target: BakeTarget, settings: BakeSettings) -> None:
     """Raise ImageError if the result would be taken for luminance, or would replace a texture of the surface."""
-    node, active = find_node(material), active_image(material)
-    if active is not None and active in _images_read(node):
+    active = active_image(target.material)
+    if active is not None and active in _images_read(target.node):
         raise ImageError(
             f"The active image '{active.name}' is a texture of the Beamspread node and no target: if Blender has "
             "cleared it, reload it (Image > Reload), then add an Image Texture node with another image and select that."
         )
-    if settings.layer != COMBINED and active is not None and active == node.image:
+    if settings.layer != COMBINED and active is not None and active == target.node.image:
         raise ImageError(
             f"The image '{active.name}' shows luminance in the Beamspread node: choose another active image for "
             f"{settings.output.lower()}."
@@ -121,8 +120,8 @@ def _check_active_image(material, settings: BakeSettings) -> None:
 
 def _fills_own_image(bake: Bake) -> bool:
     """True if the image that Blender bakes to is the one that the node shows as luminance."""
-    material = bpy.data.materials[bake.target.material_name]
-    return bake.job.settings.layer == COMBINED and find_node(material).image == active_image(material)
+    active = active_image(bpy.data.materials[bake.target.material_name])
+    return bake.job.settings.layer == COMBINED and image_of(bake.target) == active
 
 
 class _Fillings:
@@ -198,9 +197,8 @@ def _step(engine, fraction: float) -> bool:
     return not engine.test_break()
 
 
-def _materials_in(obj, passes, width: int, height: int) -> list[str]:
-    """Beamspread materials of the triangles that the image shows (Blender bakes one image at a time)."""
-    wanted = {material.name for material in materials_of(obj)}
+def _targets_in(obj, passes, width: int, height: int) -> list[BakeTarget]:
+    """Targets among the materials of the triangles that the image shows (Blender bakes one image at a time)."""
     shown = compat.baked_triangles(passes, width, height)
     triangles = np.unique(shown[shown >= 0])
     mesh = obj.to_mesh()
@@ -211,8 +209,8 @@ def _materials_in(obj, passes, width: int, height: int) -> list[str]:
     finally:
         obj.to_mesh_clear()
     used = {int(slot) for slot in np.unique(slots[triangles[triangles < len(slots)]])}
-    names = [slot.material.name for index, slot in enumerate(obj.material_slots) if index in used and slot.material]
-    return [name for name in dict.fromkeys(names) if name in wanted]
+    materials = {slot.material for index, slot in enumerate(obj.material_slots) if index in used}
+    return [target for target in targets_of(obj) if target.material in materials]
 
 
 # Panels of Blender that suit this engine: those for any engine, and EEVEE's panels for features of any engine.

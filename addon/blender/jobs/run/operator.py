@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
 
 import bpy
 from bpy.props import EnumProperty
 
 from ....core import native
-from ....core.bake.bake_settings import COMBINED
-from ....core.bake.runner import CANCELLED, WRITTEN, Bake, Sink, run_bakes, run_in_steps
+from ....core.bake.runner import Bake, run_bakes, run_in_steps
 from ....core.errors import text_of
-from ....core.messages import Level, Message, Messages, warning
-from ....core.progress import Progress
+from ....core.messages import Level, Message
 from ....core.target import Target
 from ... import popup
-from ...images.results import Results
 from ...node.find import NOTHING_FOUND, find_bakeable, find_misplaced
 from ...registration import all_or_nothing, classes
 from ..out_of_date import stale
 from ..state import redraw, state
-from .bake_queue import BakeQueue, Pass
-from .prepare import read_scene
+from .bake_plan import read_scene, steps_of
+from .bake_run import BakeRun, BakeThread
 
 TIMER_SECONDS = 0.1
 """Seconds between two looks at the thread of a bake."""
@@ -31,107 +27,6 @@ NOTHING_STALE = "Nothing is out of date."
 
 _timers: list[bpy.types.Timer] = []
 """Timers of the run in the window."""
-
-
-class BakeThread(threading.Thread):
-    """Runs the job of one bake."""
-
-    def __init__(self, bake: Bake, progress: Progress) -> None:
-        super().__init__(daemon=True)
-        self.bake, self.progress = bake, progress
-
-    def run(self) -> None:
-        self.bake.run(self.progress)
-
-
-class _Run(Sink):
-    """The bakes of one call of the operator.
-
-    Attributes
-    ----------
-    written : targets whose results were stored.
-    problems : messages that nobody should miss.
-    """
-
-    def __init__(self, report, in_window: bool) -> None:
-        self._report_to, self._in_window = report, in_window
-        self._reported, self.problems = Messages(), Messages()
-        self.written: list[Target] = []
-        self._results, self._progress = Results(), Progress()
-        self._queue: BakeQueue | None = None
-        self._parts: dict = {}
-
-    def prepare(self, context, targets: list[Target], misplaced: list[Bake]) -> None:
-        """Read the scene. Nodes that no bake can use fail at once."""
-        state.forget_failures()
-        self._parts = stale.parts_of(context, targets)
-        preparation = read_scene(context, targets, context.scene.beamspread.for_bake())
-        self._queue = BakeQueue(preparation, targets, preview_first=self._in_window)
-        for bake in misplaced:
-            self.end(bake)
-
-    def bakes(self) -> Iterator[Bake]:
-        """The bakes in their order, until the run is cancelled."""
-        before = None
-        for bake in self._queue:
-            purpose = self._queue.step.purpose
-            if purpose == Pass.FINAL and before == Pass.PREVIEW:
-                self._results = Results()  # the same parts of the same images are filled again
-            before = purpose
-            yield self._results.admit(bake)
-            if self._progress.is_cancelled:
-                return
-
-    def run(self, bake: Bake) -> Iterator[None]:
-        if bake.job is None:
-            return
-        number, count = self._queue.number, len(self._queue)
-        progress = self._progress.split([1.0] * count)[number - 1]
-        if not self._in_window:
-            bake.run(progress)
-            return
-        state.start(self._progress, bake.target, f"{number} of {count}" if count > 1 else "")
-        thread = BakeThread(bake, progress)
-        thread.start()
-        while thread.is_alive():
-            yield
-
-    def store(self, bake: Bake) -> str:
-        return self._results.store(bake)
-
-    def end(self, bake: Bake) -> None:
-        purpose = self._queue.step.purpose if self._queue.step else Pass.SINGLE
-        if bake.status == CANCELLED and purpose == Pass.FINAL:
-            text = f"The final bake of '{bake.target}' was cancelled: its quick preview is kept."
-            self.report(warning(str(bake.target), text))
-            return
-        state.note(bake)
-        if bake.status == WRITTEN:
-            self.written.append(bake.target)
-            if bake.job.settings.layer == COMBINED:
-                stale.keep(bake, self._parts.get(bake.target), purpose == Pass.PREVIEW)
-            if bake.is_dark:
-                self.problems.add(*bake.messages.of(Level.WARNING))
-        elif bake.status == CANCELLED:
-            self.report(warning("", "The bake was cancelled: images keep their former pixels."))
-        else:
-            for message in bake.messages.of(Level.ERROR):
-                self.fail(message)
-        for message in bake.messages.of(Level.WARNING, Level.INFO):
-            self.report(message)
-
-    def fail(self, message: Message) -> None:
-        self.report(message)
-        self.problems.add(message)
-
-    def report(self, message: Message) -> None:
-        """Show a message in the Info editor and the console, once."""
-        if message in self._reported:
-            return
-        self._reported.add(message)
-        # In the window our own popup shows errors: Blender would open a second one for them.
-        is_error = message.level == Level.ERROR
-        self._report_to({"WARNING" if is_error and self._in_window else message.level.value}, message.line())
 
 
 class BEAMSPREAD_OT_bake(bpy.types.Operator):
@@ -226,8 +121,8 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         return False
 
     def _prepare(self, context, in_window: bool) -> bool:
-        """Make the run; False if there is nothing to do."""
-        self._run, self._in_window = _Run(self.report, in_window), in_window
+        """Read the scene for the run; False if there is nothing to do. Nodes that no bake can use fail at once."""
+        self._run, self._in_window = BakeRun(self.report, in_window), in_window
         if native.problem:
             self._run.fail(Message(Level.ERROR, "", native.problem))
             return False
@@ -236,7 +131,11 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
             nothing = NOTHING_STALE if self.objects == "STALE" else NOTHING_FOUND
             self._run.fail(Message(Level.ERROR, "", nothing))
             return False
-        self._run.prepare(context, targets, misplaced)
+        state.forget_failures()
+        for bake in misplaced:
+            self._run.end(bake)
+        parts, plans = stale.parts_of(context, targets), read_scene(context, targets)
+        self._run.take(steps_of(plans, context.scene.beamspread.for_bake(), preview_first=in_window), parts)
         return True
 
     def _chosen(self, context) -> tuple[list[Target], list[Bake]]:

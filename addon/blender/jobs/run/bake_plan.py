@@ -1,0 +1,274 @@
+"""Plans of bakes: targets as the scene has them at one time, and the steps of a run; for operator, engine and batch.
+
+Jobs are large, so a plan makes its job when its turn comes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import bpy
+import numpy as np
+
+from ....core.bake.bake_settings import FINAL, PREVIEW, BakeSettings
+from ....core.bake.job import BakeJob, needs_medium, to_simulate
+from ....core.bake.runner import Bake
+from ....core.bake.surface import Surface
+from ....core.scene.illumination import Illumination
+from ....core.scene.receiver import build_receiver, texture_size
+from ....core.scene.texture import BaseColor
+from ....core.scene.uv_map import UvMap, fit_uv_maps
+from ....core.target import Target
+from ...cycles.colors import BaseColorByCycles, not_evaluated
+from ...cycles.cycles_light import CopyForCycles, CyclesLight
+from ...images.files import check_image
+from ...images.sequence import is_sequence, size_of_frames
+from ...node.find import BakeTarget, find_node_in_groups, targets_of
+from ...node.node import BeamspreadNode
+from ...read.base_color import read_texture
+from ...read.geometry import read_polygons
+from ...read.lights import read_illumination
+from ...read.visibility import ObjectInstance, as_rendered, check_instance, find_instances, render_visible_names
+
+PLACEHOLDER_COLOR = (0.5, 0.5, 0.5)
+"""Base color until Cycles has evaluated it."""
+
+
+@dataclass(frozen=True, eq=False)
+class BakePlan:
+    """A target as it was read, and the light of its scene. Plans need no depsgraph.
+
+    Attributes
+    ----------
+    image : full name of the node's image; "" if it has none.
+    maps, size : UV map of each chart; width and height of the texture.
+    surface : values of the node, without its linked base color.
+    by_cycles : completes the illumination, which all plans share.
+    color : base color that is linked to the node, or None.
+    blur : fraction of its texture that light passes on its way in.
+    matrix : rows of the matrix of the instance that is baked; None if the object itself is.
+    """
+
+    target: Target
+    image: str
+    maps: list[UvMap]
+    size: tuple[int, int]
+    surface: Surface
+    illumination: Illumination
+    by_cycles: CyclesLight
+    color: BaseColor | None = None
+    blur: float = 0.0
+    matrix: list | None = None
+
+    def surface_with_color(self) -> Surface:
+        """The surface with its mean base color; with a placeholder if only Cycles can evaluate it."""
+        if self.color is None:
+            return self.surface
+        if self.color.unknown:
+            return replace(self.surface, base_color=PLACEHOLDER_COLOR)
+        return self.surface.colored(self.color)
+
+    def to_simulate(self, settings: BakeSettings) -> list:
+        """Media that the bake would have to simulate first."""
+        return to_simulate(self.surface_with_color(), settings)
+
+    def bake(self, settings: BakeSettings) -> Bake:
+        """The bake, with its job or the error; call it in the main thread."""
+        try:
+            receiver = build_receiver(self.maps, *self.size)
+            illumination = self.illumination.lighting(self.target.object_name)
+            job = BakeJob(self.target.object_name, receiver, illumination, self.surface_with_color(), settings)
+            job = self._with_color(self.by_cycles.complete(job))
+            job.check_memory()
+            return Bake(self.target, job)
+        except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
+            return Bake(self.target, error=error)
+
+    def _with_color(self, job: BakeJob) -> BakeJob:
+        """The job with the base color that is linked to the node, or a step that evaluates it."""
+        if self.color is None:
+            return job
+        if not self.color.unknown:
+            return job.colored(self.color)
+        if not needs_medium(job.settings):
+            return job
+        copy = self.by_cycles.copy()
+        if copy is None:
+            unknown = not_evaluated(self.target, "There is no copy of the scene.")
+            return replace(job, surface=self.surface).colored(unknown)
+        step = BaseColorByCycles(copy, self.target, self.surface, self.blur, self.matrix)
+        illumination = job.illumination.with_messages(*copy.scene.warnings)
+        return replace(job, illumination=illumination, steps=(step, *job.steps))
+
+
+@dataclass(frozen=True, eq=False)
+class FailedPlan:
+    """A target that could not be read."""
+
+    target: Target
+    error: Exception
+    image = ""
+
+    def to_simulate(self, _settings: BakeSettings) -> list:
+        return []
+
+    def bake(self, _settings: BakeSettings) -> Bake:
+        return Bake(self.target, error=self.error)
+
+
+Plan = BakePlan | FailedPlan
+
+
+def prepare_scene(
+    context, targets: list[Target], settings: BakeSettings, resolution: int | None = None
+) -> Iterator[Bake]:
+    """Read the scene as it would render at its current frame; makes a bake for each target when it is asked for."""
+    return (plan.bake(settings) for plan in read_scene(context, targets, resolution))
+
+
+def read_scene(context, targets: list[Target], resolution: int | None = None) -> list[Plan]:
+    """Read the targets in the scene as it would render at its current frame.
+
+    Parameters
+    ----------
+    resolution : texels along the longer side; None keeps the size of the node's image, or the scene's setting where
+        there is none.
+    """
+    view_layer = context.view_layer
+    _update_nodes(context.evaluated_depsgraph_get())
+    with as_rendered(view_layer):
+        visible = render_visible_names(view_layer)
+        return read_plans(context.evaluated_depsgraph_get(), targets, visible, resolution)
+
+
+def _update_nodes(depsgraph) -> None:
+    """Tag the trees of Beamspread nodes whose evaluated copies are not up to date."""
+    for material in bpy.data.materials:  # of other objects, too: their Beamspread nodes must not emit light
+        _, around = find_node_in_groups(material) or (None, None)
+        if around is None:
+            continue
+        trees = [group.node_tree for group in around]
+        copies = [material.evaluated_get(depsgraph).node_tree, *(tree.evaluated_get(depsgraph) for tree in trees)]
+        # Tag only changed trees: a tag restarts viewports and material icons.
+        for tree, copy in zip([material.node_tree, *trees], copies):
+            if not all(map(_is_current, tree.nodes, copy.nodes)):
+                tree.update_tag()
+
+
+def _is_current(node, copy) -> bool:
+    """True if the evaluated copy of a node is up to date.
+
+    A copy is stale if its class was registered later, or if a script set a value, which tags nothing.
+    """
+    if copy.bl_idname != node.bl_idname or not isinstance(node, BeamspreadNode):
+        return copy.bl_idname == node.bl_idname
+    return (copy.surface(), copy.texture_blur) == (node.surface(), node.texture_blur)
+
+
+def read_plans(
+    depsgraph,
+    targets: list[Target],
+    visible: set[str] | None = None,
+    resolution: int | None = None,
+    size: tuple[int, int] | None = None,
+    copy: CopyForCycles | None = None,
+) -> list[Plan]:
+    """Read the targets and the light of a depsgraph, which is not needed afterwards.
+
+    Parameters
+    ----------
+    visible : names of the objects that render; None: all.
+    resolution : as for `read_scene`.
+    size : width and height of the texture, overrides all other sizes.
+    copy : copy of the scene for Cycles, if there is one already. Else the first job that needs one makes it.
+    """
+    try:
+        instances = find_instances(depsgraph, {target.object_name for target in targets}, visible)
+        light = read_illumination(depsgraph), CyclesLight(depsgraph, copy)
+    except Exception as error:  # noqa: BLE001 - each bake asked for needs an answer
+        return [FailedPlan(target, error) for target in targets]
+    plans: list[Plan] = []
+    for target in targets:
+        try:
+            instance = instances.get(target.object_name)
+            check_instance(target.object_name, instance, depsgraph.view_layer)
+            plans.append(_read_target(depsgraph, target, instance, resolution, size, light))
+        except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
+            plans.append(FailedPlan(target, error))
+    return plans
+
+
+def _read_target(
+    depsgraph,
+    target: Target,
+    instance: ObjectInstance,
+    resolution: int | None,
+    size: tuple[int, int] | None,
+    light: tuple[Illumination, CyclesLight],
+) -> BakePlan:
+    evaluated: BakeTarget = next(evaluated for evaluated in targets_of(instance.obj) if evaluated.name == target)
+    node, image = evaluated.node, evaluated.image
+    surface = node.surface()
+    surface.check()
+    if size is None and image is not None:
+        if not is_sequence(image):  # a batch fills its files
+            check_image(image)
+        image_size = size_of_frames(image) if is_sequence(image) else tuple(image.size)
+        size = image_size if resolution is None else None
+    polygons = read_polygons(instance.obj, target.material_name, instance.matrix)
+    maps = fit_uv_maps(polygons)
+    size = size or texture_size(maps, resolution or depsgraph.scene.beamspread.resolution)
+    plan = BakePlan(target, "" if image is None else image.name_full, maps, size, surface, *light)
+    if not node.has_texture():
+        return plan
+    receiver, blur = build_receiver(maps, *size), node.texture_blur
+    color = read_texture(node.color_input(evaluated.groups), blur, instance, receiver)
+    matrix = np.array(instance.matrix).tolist() if instance.is_instance else None
+    return replace(plan, color=color, blur=blur, matrix=matrix)
+
+
+class Pass(Enum):
+    """Purpose of a bake in its run: the only one of its target, its quick preview, or the bake after that preview."""
+
+    SINGLE = 1
+    PREVIEW = 2
+    FINAL = 3
+
+
+@dataclass(frozen=True)
+class BakeStep:
+    """One bake of a target in a run."""
+
+    plan: Plan
+    settings: BakeSettings
+    purpose: Pass = Pass.SINGLE
+
+    def bake(self) -> Bake:
+        """The bake; call it in the main thread."""
+        return self.plan.bake(self.settings)
+
+
+def steps_of(plans: list[Plan], settings: BakeSettings, preview_first: bool) -> list[BakeStep]:
+    """The steps of a run in their order.
+
+    With `preview_first`, targets whose medium is not simulated yet get a quick preview: a quick simulation and direct
+    light alone. They are baked once all targets have something to show. Targets that share an image with them take
+    part in this, since a run fills each image as a whole.
+    """
+    quick = [plan for plan in plans if preview_first and settings.quality == FINAL and plan.to_simulate(settings)]
+    images = {_image_key(plan) for plan in quick}
+    twice = [plan for plan in plans if _image_key(plan) in images]
+    first = []
+    for plan in plans:
+        changes = {"quality": PREVIEW} if plan in quick else {}
+        changes |= {"indirect": False} if plan in twice else {}
+        purpose = Pass.PREVIEW if plan in twice else Pass.SINGLE
+        first.append(BakeStep(plan, replace(settings, **changes), purpose))
+    return first + [BakeStep(plan, settings, Pass.FINAL) for plan in twice]
+
+
+def _image_key(plan: Plan) -> str:
+    """Equal for targets that fill the same image."""
+    return f"image {plan.image}" if plan.image else f"material {plan.target.material_name}"

@@ -1,0 +1,112 @@
+"""The bakes of one call of the operator: run in a thread or at once, stored, and told to the artist."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+
+from ....core.bake.bake_settings import COMBINED
+from ....core.bake.runner import CANCELLED, WRITTEN, Bake, Sink
+from ....core.messages import Level, Message, Messages, warning
+from ....core.progress import Progress
+from ....core.target import Target
+from ...images.results import Results
+from ..out_of_date import stale
+from ..out_of_date.fingerprint import Parts
+from ..state import state
+from .bake_plan import BakeStep, Pass
+
+
+class BakeThread(threading.Thread):
+    """Runs the job of one bake."""
+
+    def __init__(self, bake: Bake, progress: Progress) -> None:
+        super().__init__(daemon=True)
+        self.bake, self.progress = bake, progress
+
+    def run(self) -> None:
+        self.bake.run(self.progress)
+
+
+class BakeRun(Sink):
+    """The bakes of one call of the operator.
+
+    Attributes
+    ----------
+    written : targets whose results were stored.
+    problems : messages that nobody should miss.
+    """
+
+    def __init__(self, report: Callable[[set[str], str], None], in_window: bool) -> None:
+        self._report_to, self._in_window = report, in_window
+        self._reported, self.problems = Messages(), Messages()
+        self.written: list[Target] = []
+        self._results, self._progress = Results(), Progress()
+        self._steps: list[BakeStep] = []
+        self._number, self._purpose = 0, Pass.SINGLE
+        self._parts: dict[Target, Parts] = {}
+
+    def take(self, steps: list[BakeStep], parts: dict[Target, Parts]) -> None:
+        """Take the steps of the run, and the digests of all that they have read of each target."""
+        self._steps, self._parts = steps, parts
+
+    def bakes(self) -> Iterator[Bake]:
+        """The bakes in their order, until the run is cancelled."""
+        for number, step in enumerate(self._steps, 1):
+            self._number = number
+            if step.purpose == Pass.FINAL and self._purpose == Pass.PREVIEW:
+                self._results = Results()  # the same parts of the same images are filled again
+            self._purpose = step.purpose
+            yield self._results.admit(step.bake())
+            if self._progress.is_cancelled:
+                return
+
+    def run(self, bake: Bake) -> Iterator[None]:
+        if bake.job is None:
+            return
+        count = len(self._steps)
+        progress = self._progress.split([1.0] * count)[self._number - 1]
+        if not self._in_window:
+            bake.run(progress)
+            return
+        state.start(self._progress, bake.target, f"{self._number} of {count}" if count > 1 else "")
+        thread = BakeThread(bake, progress)
+        thread.start()
+        while thread.is_alive():
+            yield
+
+    def store(self, bake: Bake) -> str:
+        return self._results.store(bake)
+
+    def end(self, bake: Bake) -> None:
+        if bake.status == CANCELLED and self._purpose == Pass.FINAL:
+            text = f"The final bake of '{bake.target}' was cancelled: its quick preview is kept."
+            self.report(warning(str(bake.target), text))
+            return
+        state.note(bake)
+        if bake.status == WRITTEN:
+            self.written.append(bake.target)
+            if bake.job.settings.layer == COMBINED:
+                stale.keep(bake, self._parts.get(bake.target), self._purpose == Pass.PREVIEW)
+            if bake.is_dark:
+                self.problems.add(*bake.messages.of(Level.WARNING))
+        elif bake.status == CANCELLED:
+            self.report(warning("", "The bake was cancelled: images keep their former pixels."))
+        else:
+            for message in bake.messages.of(Level.ERROR):
+                self.fail(message)
+        for message in bake.messages.of(Level.WARNING, Level.INFO):
+            self.report(message)
+
+    def fail(self, message: Message) -> None:
+        self.report(message)
+        self.problems.add(message)
+
+    def report(self, message: Message) -> None:
+        """Show a message in the Info editor and the console, once."""
+        if message in self._reported:
+            return
+        self._reported.add(message)
+        # In the window our own popup shows errors: Blender would open a second one for them.
+        is_error = message.level == Level.ERROR
+        self._report_to({"WARNING" if is_error and self._in_window else message.level.value}, message.line())
