@@ -42,7 +42,7 @@ function(beamspread_keep_apart target)
     endif()
   elseif(APPLE)
     # Python's symbols come from the process that loads it.
-    target_link_options(${target} PRIVATE -undefined dynamic_lookup -Wl,-exported_symbol,_PyInit__native)
+    target_link_options(${target} PRIVATE -undefined dynamic_lookup "-Wl,-exported_symbol,_PyInit_*")
   elseif(WIN32)
     target_link_libraries(${target} PRIVATE Python::Module)
   endif()

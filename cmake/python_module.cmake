@@ -31,6 +31,13 @@ execute_process(COMMAND ${Python_EXECUTABLE} -c "import sysconfig; print(sysconf
                 OUTPUT_VARIABLE suffix OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
 string(SUBSTRING ${suffix} 1 -1 own_tag)
 python_module(_native ${own_tag} ${BEAMSPREAD_STAGE_DIR}/beamspread ${Python_INCLUDE_DIRS})
+# Functions that tests alone call, beside the staged package: neither the zip nor the wheel has them.
+add_library(_native_test MODULE tests/native_test.cpp native/python/casters.cpp)
+target_link_libraries(_native_test PRIVATE ${beamspread_libraries})
+target_include_directories(_native_test SYSTEM PRIVATE ${Python_INCLUDE_DIRS})
+set_target_properties(_native_test PROPERTIES PREFIX "" SUFFIX .${own_tag}
+                      LIBRARY_OUTPUT_DIRECTORY ${BEAMSPREAD_STAGE_DIR})
+beamspread_keep_apart(_native_test)
 # Types for editors and type checkers. A module with a sanitizer can't be imported to ask for them.
 get_filename_component(python_folder ${Python_EXECUTABLE} DIRECTORY)
 find_program(PYBIND11_STUBGEN pybind11-stubgen HINTS ${python_folder} ${CMAKE_SOURCE_DIR}/build/venv/bin)

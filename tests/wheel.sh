@@ -42,6 +42,7 @@ for numpy in "==1.26.4" ">=2"; do
     (cd "$out/numpy$numpy" && env -u PYTHONPATH bin/python ../../../tests/smoke.py && bin/python -m beamspread presets | sed -n 1,2p
         bin/python -c "import beamspread, pathlib, numpy; p = pathlib.Path(beamspread.__file__).parent
 assert (p / '_native.pyi').exists() and (p / 'py.typed').exists() and any((p / 'library').iterdir()), p
+assert not list(p.parent.rglob('_native_test*'))
 print(beamspread.__file__.split('site-packages')[1], 'with numpy', numpy.__version__)")
 done
 echo "wheel: $wheel"

@@ -75,6 +75,5 @@ void bind_rays(py::module_& m);
 void bind_scene(py::module_& m);
 void bind_solve(py::module_& m);
 void bind_bake(py::module_& m);
-void bind_fft(py::module_& m);
 
 }  // namespace beamspread

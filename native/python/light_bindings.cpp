@@ -65,33 +65,6 @@ std::unique_ptr<MeshLight> make_mesh_light(const py::array& vertices, const py::
                                        to_rows<Vec3f, float>("radiance", radiance, "contiguous float32 (M, 3)"));
 }
 
-py::tuple irradiance(const Light& light, const Numbers& point, const Numbers& normal)
-{
-    const Vec3 arriving = light.irradiance(to_vec3("point", point), to_vec3("normal", normal));
-    return py::make_tuple(arriving.x, arriving.y, arriving.z);
-}
-
-py::tuple sample(const Light& light, const Numbers& point, const Numbers& normal, const py::array& square)
-{
-    const auto places = to_rows<Vec2, double>("square", square, "contiguous float64 (N, 2)");
-    const std::vector<Vec3> points(places.size(), to_vec3("point", point));
-    std::vector<LightRay> rays(places.size());
-    light.sample(points, to_vec3("normal", normal), places, rays.data());
-    const auto count = static_cast<py::ssize_t>(rays.size());
-    Array<double> travel({count, py::ssize_t{3}});
-    Array<double> distance(count);
-    Array<float> flux({count, py::ssize_t{3}});
-    for (py::ssize_t i = 0; i < count; ++i) {
-        const LightRay& ray = rays[static_cast<std::size_t>(i)];
-        distance.mutable_at(i) = ray.distance;
-        for (int k = 0; k < 3; ++k) {
-            travel.mutable_at(i, k) = ray.travel[k];
-            flux.mutable_at(i, k) = ray.flux[k];
-        }
-    }
-    return py::make_tuple(travel, distance, flux);
-}
-
 }  // namespace
 
 void bind_lights(py::module_& m)
@@ -101,44 +74,7 @@ void bind_lights(py::module_& m)
 Its kinds are SunLight, PointLight, SpotLight, AreaLight, EnvironmentLight and MeshLight. Each raises ValueError for an
 argument that is out of range, with a message that names it.
 )")
-        .def_property_readonly("is_delta", &Light::is_delta,
-                               "bool: True if the light has no size, so that one ray reaches each point.")
-        .def_property_readonly("is_colored", &Light::is_colored, "bool: True if its rays differ in color.")
-        .def("irradiance", &irradiance, py::arg("point"), py::arg("normal"),
-             R"(Irradiance at a point where nothing blocks the light.
-
-Parameters
-----------
-point : 3 floats
-    World position, metres.
-normal : 3 floats
-    Unit vector out of the lit side of the plane there.
-
-Returns
--------
-tuple of 3 floats
-    W/m^2 in each channel.
-)")
-        .def("sample", &sample, py::arg("point"), py::arg("normal"), py::arg("square"),
-             R"(Rays from a point toward the light.
-
-Parameters
-----------
-point, normal
-    As for `irradiance`.
-square : ndarray, float64, shape (N, 2), C-contiguous
-    Places in the unit square, evenly spread for the density of rays that `flux` assumes.
-
-Returns
--------
-travel : ndarray, float64, shape (N, 3)
-    Unit vectors along which the light travels, world.
-distance : ndarray, float64, shape (N,)
-    Distance to the light, metres.
-flux : ndarray, float32, shape (N, 3)
-    W/m^2 on a surface that faces the ray, over the density of rays: the mean of flux times cosine to the normal is the
-    irradiance.
-)");
+        .def_property_readonly("is_colored", &Light::is_colored, "bool: True if its rays differ in color.");
 
     py::class_<SunLight, Light>(m, "SunLight", R"(A sun of 1 W/m^2 at normal incidence.
 

@@ -1,6 +1,7 @@
-// Media and solvers from Python's sequences and names.
+// Media, solvers and lights from Python's sequences and names.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
@@ -30,6 +31,35 @@ inline Solver named_solver(const std::string& solver)
 {
     return named<Solver>("solver", solver,
                          {{"fft", Solver::fft}, {"direct", Solver::direct}, {"adaptive", Solver::adaptive}});
+}
+
+// A light and the arrays that it views: Python's PlaneLight.
+struct HeldLight {
+    PlaneLight light;
+    std::vector<py::object> arrays;
+};
+
+using Lights = std::vector<const HeldLight*>;
+
+// The plane of the lights; empty without any.
+inline Plane plane_of(const Lights& lights, std::array<double, 2> pitch)
+{
+    if (lights.empty())
+        return {};
+    const View2D<const float>& irradiance = lights.front()->light.irradiance;
+    return {irradiance.width, irradiance.height, pitch[0], pitch[1]};
+}
+
+inline Problem problem_of(const Lights& lights, const Sources& ldf, const std::vector<double>& albedo,
+                          const std::vector<double>& mean_free_path, std::array<double, 2> pitch, double tolerance)
+{
+    Problem problem;
+    problem.plane = plane_of(lights, pitch);
+    problem.channels = media_of(ldf, albedo, mean_free_path);
+    for (const HeldLight* held : lights)
+        problem.lights.push_back(held->light);
+    problem.tolerance = tolerance;
+    return problem;
 }
 
 }  // namespace beamspread

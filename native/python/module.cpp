@@ -39,5 +39,4 @@ PYBIND11_MODULE(_native, m)
     bind_rays(m);
     bind_solve(m);
     bind_bake(m);
-    bind_fft(m);
 }

@@ -122,7 +122,6 @@ ValueError
     Wrong dtype or shape, a value outside 0 to 1.
 )")
         .def_property_readonly("is_opaque", &Transmittance::is_opaque, "bool: True if no light gets through anywhere.")
-        .def_property_readonly("is_clear", &Transmittance::is_clear, "bool: True if all light gets through everywhere.")
         .def_property_readonly("is_colored", &Transmittance::is_colored, "bool: True if channels differ somewhere.");
 
     py::class_<HeldMesh>(m, "OccluderMesh", R"(A mesh, its instances, and the light that its triangles let through.
@@ -172,15 +171,9 @@ ValueError
              py::arg("max_crossings") = py::none(), py::arg("max_copied") = OccluderSettings{}.max_copied)
         .def_property_readonly("triangle_count", &Occluders::triangle_count,
                                "int: number of triangles, with those of each placement.")
-        .def_property_readonly(
-            "instance_count", [](const Occluders& self) { return self.hulls().size(); },
-            "int: number of placements that share their mesh's triangles.")
         .def_property_readonly("is_opaque", &Occluders::is_opaque, "bool: True if all triangles block all light.")
         .def_property_readonly("is_colored", &Occluders::is_colored,
                                "bool: True if some let one channel through more than another.");
-
-    m.def("embree_version", &embree_version,
-          "Version of Embree in this module, 31305 for 3.13.5; the host may have another.");
 }
 
 }  // namespace beamspread

@@ -1,4 +1,4 @@
-// Python names of native/solve: PlaneLight, convolve, transforms, adaptive_beams.
+// Python names of native/solve: PlaneLight, convolve, adaptive_beams.
 #include <array>
 #include <cstdint>
 #include <string>
@@ -10,19 +10,10 @@
 #include "python/media.h"
 #include "solve/adaptive/adaptive.h"
 #include "solve/solve.h"
-#include "solve/spectral/spectral.h"
 
 namespace beamspread {
 
 namespace {
-
-// A light and the arrays that it views.
-struct HeldLight {
-    PlaneLight light;
-    std::vector<py::object> arrays;
-};
-
-using Lights = std::vector<const HeldLight*>;
 
 // Arrays of any strides: a channel is viewed in place.
 using Plane2D = py::array_t<float, 0>;
@@ -44,14 +35,6 @@ Directions directions_of(const Array<float>& direction, const View2D<const float
         direction.shape(2) == 3)
         return PerTexel{direction.data()};
     reject("direction", shape_text(direction), "(3,) or (H, W, 3) like irradiance");
-}
-
-HeldLight point_light(const Plane2D& irradiance, std::array<double, 3> position, const std::vector<double>& color)
-{
-    if (irradiance.ndim() != 2)
-        reject("irradiance", shape_text(irradiance), "(H, W)");
-    const Vec3 from(position[0], position[1], position[2]);
-    return {{channel_view(irradiance, 0), FromPoint{from}, color}, {irradiance}};
 }
 
 HeldLight light_of(const Plane2D& irradiance, const Array<float>& direction, const std::vector<double>& color)
@@ -78,27 +61,6 @@ std::vector<HeldLight> lights_of(const Plane2D& irradiance, const Array<float>& 
     return held;
 }
 
-// The plane of the lights; empty without any.
-Plane plane_of(const Lights& lights, std::array<double, 2> pitch)
-{
-    if (lights.empty())
-        return {};
-    const View2D<const float>& irradiance = lights.front()->light.irradiance;
-    return {irradiance.width, irradiance.height, pitch[0], pitch[1]};
-}
-
-Problem problem_of(const Lights& lights, const Sources& ldf, const std::vector<double>& albedo,
-                   const std::vector<double>& mean_free_path, std::array<double, 2> pitch, double tolerance)
-{
-    Problem problem;
-    problem.plane = plane_of(lights, pitch);
-    problem.channels = media_of(ldf, albedo, mean_free_path);
-    for (const HeldLight* held : lights)
-        problem.lights.push_back(held->light);
-    problem.tolerance = tolerance;
-    return problem;
-}
-
 Array<float> convolve(const Lights& lights, const Sources& ldf, const std::vector<double>& albedo,
                       const std::vector<double>& mean_free_path, std::array<double, 2> pitch, const std::string& solver,
                       double tolerance, int threads, const py::object& progress, std::size_t memory,
@@ -115,16 +77,6 @@ Array<float> convolve(const Lights& lights, const Sources& ldf, const std::vecto
     const py::gil_scoped_release release;
     solve(problem, report, data);
     return luminance;
-}
-
-std::size_t transforms(const Lights& lights, const Sources& ldf, const std::vector<double>& albedo,
-                       const std::vector<double>& mean_free_path, std::array<double, 2> pitch, double tolerance)
-{
-    Problem problem = problem_of(lights, ldf, albedo, mean_free_path, pitch, tolerance);
-    Progress unseen;
-    const py::gil_scoped_release release;
-    validate(problem);
-    return count_terms(problem, unseen);
 }
 
 using Squares = std::tuple<Array<std::int64_t>, Array<double>>;
@@ -170,8 +122,6 @@ color : sequence of float
     Factor of the irradiance in each channel.
 )")
         .def(py::init(&light_of), py::arg("irradiance"), py::arg("direction"), py::arg("color"))
-        .def_static("from_point", &point_light, py::arg("irradiance"), py::arg("position"), py::arg("color"),
-                    "Light from one position: x, y, z > 0 in metres from the outer corner of texel (0, 0).")
         .def_static("of_channels", &lights_of, py::arg("irradiance"), py::arg("direction"), py::arg("channels"),
                     "Lights for irradiance (H, W) or (H, W, channels): one where channels differ by a factor, else one "
                     "for each.");
@@ -185,9 +135,6 @@ C libraries, albedos and mean free paths (metres), pitch (x, y) in metres; retur
 `coarsening`: texels from node to node of the grid on which it spreads light far: 4, 8, 16, ... 64, 1 for no such grid,
 0 for what costs least.
 )");
-    m.def("transforms", &transforms, py::arg("lights"), py::arg("ldf"), py::arg("albedo"), py::arg("mean_free_path"),
-          py::arg("pitch"), py::arg("tolerance"),
-          "int: number of transforms of light that the solver 'fft' makes for `convolve`.");
     m.def("adaptive_beams", &adaptive_beams, py::arg("light"), py::arg("tolerance"),
           R"(Squares that the adaptive solver lights by one beam each; the engine behind `beamspread.adaptive_beams`.
 

@@ -67,12 +67,6 @@ ValueError
         .def(py::pickle(
             [](const Medium& a) { return py::make_tuple(a.g, a.ior, a.thickness); },
             [](const py::tuple& t) { return Medium{t[0].cast<double>(), t[1].cast<double>(), t[2].cast<double>()}; }));
-    m.def("fresnel", py::vectorize(&fresnel), py::arg("cos_theta_i"), py::arg("eta"),
-          "Reflectance of unpolarized light; eta is the index behind the boundary over the index before it.");
-    m.def("henyey_greenstein_pdf", py::vectorize(&henyey_greenstein_pdf), py::arg("cos_theta"), py::arg("g"),
-          "Density per steradian of a deflection.");
-    m.def("henyey_greenstein_sample", py::vectorize(&henyey_greenstein_sample), py::arg("g"), py::arg("u"),
-          "Cosine of a deflection, from u uniform in [0, 1).");
 }
 
 void bind_transport(py::module_& m)

@@ -263,11 +263,4 @@ std::uint32_t Occluders::trace(std::span<const ShadowRay> rays, Passage* passage
     return bits;
 }
 
-int embree_version()
-{
-    const embree::Device device(rtcNewDevice("ignore_config_files=1"));
-    embree::check(device.get());
-    return static_cast<int>(rtcGetDeviceProperty(device.get(), RTC_DEVICE_PROPERTY_VERSION));
-}
-
 }  // namespace beamspread

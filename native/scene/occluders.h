@@ -98,7 +98,4 @@ private:
     Vec3 m_origin;
 };
 
-// Version of the Embree that is called, 10000 major + 100 minor + patch: a host's own could take the place of ours.
-int embree_version();
-
 }  // namespace beamspread

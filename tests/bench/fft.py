@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 
+import _native_test
 import beamspread
 import numpy as np
 from beamspread import _native
@@ -35,13 +36,13 @@ def seconds(runs, function, *arguments, **options):
 
 def padded_size(size):
     """Twice the size or a faster one: lines whole pages apart share few lines of the cache."""
-    return _native.fast_size(2 * size)
+    return _native_test.fast_size(2 * size)
 
 
 def transform_seconds(size):
     """T for a plane of this size."""
     values = np.random.default_rng(0).random((padded_size(size),) * 2, np.float32)
-    return seconds(5, _native.real_transform, values)
+    return seconds(5, _native_test.real_transform, values)
 
 
 def shadows(size):
@@ -67,7 +68,8 @@ def transforms(size):
     spectrum = pyfftw.empty_aligned((padded, padded // 2 + 1), np.complex64)
     aligned = pyfftw.empty_aligned(values.shape, np.float32)
     print(f"\none real transform, {padded} x {padded}, single precision, CPU seconds")
-    print(f"  DUCC ({_native.fft_instruction_sets()[0]})       {seconds(3, _native.real_transform, values):8.3f}")
+    instruction_set = _native_test.fft_instruction_sets()[0]
+    print(f"  DUCC ({instruction_set})       {seconds(3, _native_test.real_transform, values):8.3f}")
     print(f"  SciPy               {seconds(3, scipy_fft.rfft2, values, workers=THREADS):8.3f}")
     for effort in ("FFTW_ESTIMATE", "FFTW_MEASURE"):
         start = time.perf_counter()

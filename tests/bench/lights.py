@@ -12,6 +12,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import _native_test
 import numpy as np
 from beamspread import Medium, library, presets
 from beamspread.core.bake import luminance as bakes
@@ -67,10 +68,10 @@ def transforms(size, lights, material):
     for light in lights:
         irradiance = np.ascontiguousarray(native.gather_rays(grid.native(), light.native())[0][..., 0])
         position = np.subtract(light.position, grid.origin)
-        arriving.append(native.PlaneLight.from_point(irradiance, position.tolist(), light.rgb().tolist()))
+        arriving.append(_native_test.light_from_point(irradiance, position.tolist(), light.rgb().tolist()))
     libraries = [library(Medium(g, material.ior)) for g in material.channel_anisotropy]
     rest = list(material.albedo), list(material.mean_free_path), (grid.pitch_x, grid.pitch_y)
-    return native.transforms(arriving, libraries, *rest, bakes.TOLERANCE)
+    return _native_test.transforms(arriving, libraries, *rest, bakes.TOLERANCE)
 
 
 def compare(size, count, material):

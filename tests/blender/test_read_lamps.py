@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+from _native_test import is_delta
 from beamspread.blender.read.lights import read_illumination
 from beamspread.core.scene.lights import AreaLight, PointLight, SpotLight, SunLight
 from cycles_truth import add_receiver, cycles_irradiance, our_irradiance
@@ -122,7 +123,7 @@ def test_fields():
 )
 def test_without_size(kind, option):
     add_lamp(kind, **{option: 0})
-    assert the_light().native().is_delta
+    assert is_delta(the_light().native())
 
 
 def test_a_soft_falloff_is_a_disk():

@@ -5,11 +5,11 @@ import re
 import subprocess
 from pathlib import Path
 
+import _native_test
 import numpy as np
 import pytest
-from beamspread.core.native import native
 
-SETS = native.fft_instruction_sets()
+SETS = _native_test.fft_instruction_sets()
 ROUNDING = 2.0**-24
 
 # Powers of two, other even sizes, odd ones, primes (those above some hundred as convolutions of twice the length).
@@ -44,12 +44,12 @@ def random_lines(count, size, kind):
 def test_lines_agree_with_numpy(size, instruction_set):
     for count in LINES:
         real, lines = random_lines(count, size, float), random_lines(count, size, complex)
-        half = native.real_lines(real, instruction_set)
+        half = _native_test.real_lines(real, instruction_set)
         assert_near(half, np.fft.rfft(real.astype(float)), size)
-        assert_near(native.half_lines(half, size, instruction_set), size * real.astype(float), size)
+        assert_near(_native_test.half_lines(half, size, instruction_set), size * real.astype(float), size)
         exact = lines.astype(complex)
-        assert_near(native.complex_lines(lines, True, instruction_set), np.fft.fft(exact), size)
-        assert_near(native.complex_lines(lines, False, instruction_set), size * np.fft.ifft(exact), size)
+        assert_near(_native_test.complex_lines(lines, True, instruction_set), np.fft.fft(exact), size)
+        assert_near(_native_test.complex_lines(lines, False, instruction_set), size * np.fft.ifft(exact), size)
 
 
 @pytest.mark.parametrize("instruction_set", SETS)
@@ -57,14 +57,14 @@ def test_lines_agree_with_numpy(size, instruction_set):
 def test_planes_agree_with_numpy(height, width, instruction_set):
     values = random_lines(height, width, float)
     wanted = np.fft.rfft2(values.astype(float))
-    error = np.abs(native.real_transform(values, instruction_set=instruction_set) - wanted)
+    error = np.abs(_native_test.real_transform(values, instruction_set=instruction_set) - wanted)
     assert np.linalg.norm(error) < tolerance(height * width) * np.linalg.norm(wanted)
 
 
 def test_the_fastest_is_the_default_and_every_thread_gives_the_same():
     values = random_lines(300, 420, float)
-    wanted = native.real_transform(values, 1, SETS[0])
-    np.testing.assert_array_equal(native.real_transform(values), wanted)
+    wanted = _native_test.real_transform(values, 1, SETS[0])
+    np.testing.assert_array_equal(_native_test.real_transform(values), wanted)
     assert SETS[-1] == "baseline"
     assert set(SETS) <= {"avx512", "avx2", "baseline"}
 
@@ -77,7 +77,7 @@ def test_the_sets_are_those_of_the_processor():
 
 @pytest.mark.parametrize("minimum", [1, 2, 97, 512, 1009, 2048, 4099, 10007, 65537, 104729])
 def test_fast_sizes_have_small_factors_and_lines_are_not_whole_pages(minimum):
-    size = native.fast_size(minimum)
+    size = _native_test.fast_size(minimum)
     assert minimum <= size <= max(1.2 * minimum, minimum + 4)
     assert size * np.dtype(np.complex64).itemsize % 4096 != 0
     rest = size
@@ -90,13 +90,16 @@ def test_fast_sizes_have_small_factors_and_lines_are_not_whole_pages(minimum):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: native.real_lines(np.ones((2, 4), np.float32), "sse9"), "instruction_set.*'sse9'.*'baseline'"),
-        (lambda: native.half_lines(np.ones((2, 3), np.complex64), 4, "AVX2"), "instruction_set.*'AVX2'.*'baseline'"),
-        (lambda: native.half_lines(np.ones((2, 3), np.complex64), 6), "size.*6"),
-        (lambda: native.complex_lines(np.ones((0, 3), np.complex64), True), r"values.*\(0, 3\).*not empty"),
-        (lambda: native.complex_lines(np.ones((1, 3), np.complex64), True, "mmx"), "instruction_set.*'mmx'"),
-        (lambda: native.real_transform(np.ones((2, 3), np.float32)), "values.*3 columns.*even"),
-        (lambda: native.real_transform(np.ones((2, 4), np.float32), 1, "avx"), "instruction_set.*'avx'"),
+        (lambda: _native_test.real_lines(np.ones((2, 4), np.float32), "sse9"), "instruction_set.*'sse9'.*'baseline'"),
+        (
+            lambda: _native_test.half_lines(np.ones((2, 3), np.complex64), 4, "AVX2"),
+            "instruction_set.*'AVX2'.*'baseline'",
+        ),
+        (lambda: _native_test.half_lines(np.ones((2, 3), np.complex64), 6), "size.*6"),
+        (lambda: _native_test.complex_lines(np.ones((0, 3), np.complex64), True), r"values.*\(0, 3\).*not empty"),
+        (lambda: _native_test.complex_lines(np.ones((1, 3), np.complex64), True, "mmx"), "instruction_set.*'mmx'"),
+        (lambda: _native_test.real_transform(np.ones((2, 3), np.float32)), "values.*3 columns.*even"),
+        (lambda: _native_test.real_transform(np.ones((2, 4), np.float32), 1, "avx"), "instruction_set.*'avx'"),
     ],
 )
 def test_bad_arguments_are_named(call, message):
@@ -105,7 +108,7 @@ def test_bad_arguments_are_named(call, message):
 
 
 BUILD = next(
-    (folder for folder in (Path(native.__file__).parents[2], Path(native.__file__).parents[2] / "release")
+    (folder for folder in (Path(_native_test.__file__).parents[1], Path(_native_test.__file__).parents[1] / "release")
      if (folder / "ducc_baseline.o").exists()),
     None,
 )  # fmt: skip

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from _native_test import light_from_point
 from beamspread import Cancelled, Medium, _native, convolve, convolve_lights, library
 from scipy.ndimage import uniform_filter
 
@@ -60,7 +61,7 @@ def test_the_colour_counts_in_the_brightness():
 
 def test_light_from_a_point_is_light_with_a_direction_per_texel(ldf):
     for place, color, beams, travel in lamps(2):
-        point = solve([_native.PlaneLight.from_point(beams, place, color.tolist())], ldf)
+        point = solve([light_from_point(beams, place, color.tolist())], ldf)
         # Directions per texel are rounded to single precision.
         assert point == pytest.approx(solve([_native.PlaneLight(beams, travel, color.tolist())], ldf), rel=1e-4)
 
@@ -68,9 +69,9 @@ def test_light_from_a_point_is_light_with_a_direction_per_texel(ldf):
 @pytest.mark.parametrize("solver", ["direct", "adaptive"])
 def test_other_solvers_take_the_same_lights(ldf, solver):
     size = 40
-    lights = [
-        _native.PlaneLight.from_point(beams, place, color.tolist()) for place, color, beams, _ in lamps(3, size)
-    ] + [_native.PlaneLight(np.ones((size, size), np.float32), np.array((0.6, 0, -0.8), np.float32), [0.2, 0.0, 1.0])]
+    lights = [light_from_point(beams, place, color.tolist()) for place, color, beams, _ in lamps(3, size)] + [
+        _native.PlaneLight(np.ones((size, size), np.float32), np.array((0.6, 0, -0.8), np.float32), [0.2, 0.0, 1.0])
+    ]
     result = solve(lights, ldf, 1e-3, solver)
     expected = solve(lights, ldf, 1e-5)
     assert np.abs(result - expected).sum() <= 2e-3 * expected.sum()

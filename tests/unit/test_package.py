@@ -56,6 +56,7 @@ def test_its_name_and_size(path):
 
 def test_all_of_it_is_in_one_folder_which_is_named(path, files):
     assert {name.split("/")[0] for name in files} == {"beamspread"}
+    assert not any("_native_test" in name for name in files)
     with zipfile.ZipFile(path) as archive:  # Blender 3.4 removes an older version's folder only then
         assert archive.namelist()[0] == "beamspread/"
 

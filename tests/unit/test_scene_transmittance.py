@@ -213,7 +213,6 @@ def test_occluders_know_whether_they_are_opaque_and_colored():
 
     opaque, clear = native.Transmittance((0, 0, 0)), native.Transmittance((1, 1, 1))
     assert opaque.is_opaque
-    assert clear.is_clear
     assert facts(opaque) == facts(clear) == facts(opaque, clear) == (True, False)
     assert facts(opaque, image(np.full((2, 2), 0.5))) == (False, False)
     assert facts(native.Transmittance((0.5, 0.5, 0.4))) == (False, True)
