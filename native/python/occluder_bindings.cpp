@@ -75,7 +75,7 @@ std::shared_ptr<Transmittance> make_color(const Numbers& color)
     return std::make_shared<Transmittance>(Vec3f(to_vec3("color", color)));
 }
 
-std::shared_ptr<Transmittance> make_image(const py::array& texels, const std::string& extension, bool is_smooth,
+std::shared_ptr<Transmittance> make_image(const py::array& texels, Extension extension, bool is_smooth,
                                           const Numbers& outside)
 {
     if (!py::isinstance<Array<float>>(texels) || texels.ndim() != 3 || (texels.shape(2) != 1 && texels.shape(2) != 3))
@@ -84,8 +84,27 @@ std::shared_ptr<Transmittance> make_image(const py::array& texels, const std::st
                           .width = static_cast<std::size_t>(texels.shape(1)),
                           .height = static_cast<std::size_t>(texels.shape(0)),
                           .channels = static_cast<std::size_t>(texels.shape(2))};
-    return std::make_shared<Transmittance>(view, to_extension(extension), is_smooth,
-                                           Vec3f(to_vec3("outside", outside)));
+    return std::make_shared<Transmittance>(view, extension, is_smooth, Vec3f(to_vec3("outside", outside)));
+}
+
+// The arguments that make the same transmittance; one color has no texels.
+py::tuple state_of(const Transmittance& transmittance)
+{
+    const Vec3f& color = transmittance.color();
+    py::object texels = py::none();
+    if (const std::vector<float> values = transmittance.texels(); !values.empty())
+        texels = Array<float>({transmittance.height(), transmittance.width(), transmittance.channels()}, values.data());
+    return py::make_tuple(texels, static_cast<int>(transmittance.extension()), transmittance.is_smooth(),
+                          py::make_tuple(color.x, color.y, color.z));
+}
+
+std::shared_ptr<Transmittance> from_state(const py::tuple& state)
+{
+    const auto color = state[3].cast<Numbers>();
+    if (state[0].is_none())
+        return make_color(color);
+    return make_image(state[0].cast<py::array>(), static_cast<Extension>(state[1].cast<int>()), state[2].cast<bool>(),
+                      color);
 }
 
 }  // namespace
@@ -101,9 +120,14 @@ color : 3 floats
     0 to 1 in each channel.
 )")
         .def(py::init(&make_color), py::arg("color"))
-        .def_static("from_image", &make_image, py::arg("texels"), py::arg("extension") = "repeat",
-                    py::arg("is_smooth") = true, py::arg("outside") = py::make_tuple(1.0, 1.0, 1.0),
-                    R"(A transmittance by an image, at the triangles' UVs.
+        .def_static(
+            "from_image",
+            [](const py::array& texels, const std::string& extension, bool is_smooth, const Numbers& outside) {
+                return make_image(texels, to_extension(extension), is_smooth, outside);
+            },
+            py::arg("texels"), py::arg("extension") = "repeat", py::arg("is_smooth") = true,
+            py::arg("outside") = py::make_tuple(1.0, 1.0, 1.0),
+            R"(A transmittance by an image, at the triangles' UVs.
 
 Parameters
 ----------
@@ -122,7 +146,8 @@ ValueError
     Wrong dtype or shape, a value outside 0 to 1.
 )")
         .def_property_readonly("is_opaque", &Transmittance::is_opaque, "bool: True if no light gets through anywhere.")
-        .def_property_readonly("is_colored", &Transmittance::is_colored, "bool: True if channels differ somewhere.");
+        .def_property_readonly("is_colored", &Transmittance::is_colored, "bool: True if channels differ somewhere.")
+        .def(py::pickle(&state_of, &from_state));
 
     py::class_<HeldMesh>(m, "OccluderMesh", R"(A mesh, its instances, and the light that its triangles let through.
 

@@ -77,6 +77,14 @@ Transmittance::Transmittance(const TexelArray& texels, Extension extension, bool
         include(outside);
 }
 
+std::vector<float> Transmittance::texels() const
+{
+    std::vector<float> values(m_texels.size());
+    std::transform(m_texels.begin(), m_texels.end(), values.begin(),
+                   [](std::uint16_t level) { return static_cast<float>(level) / levels; });
+    return values;
+}
+
 void Transmittance::include(const Vec3f& color)
 {
     m_lowest = std::min({m_lowest, color.x, color.y, color.z});

@@ -39,6 +39,15 @@ public:
 
     Vec3f at(const Vec2f& uv) const;
 
+    // The arguments that make the same transmittance. One color has no texels.
+    std::vector<float> texels() const;
+    std::size_t width() const { return m_width; }
+    std::size_t height() const { return m_height; }
+    std::size_t channels() const { return m_channels; }
+    Extension extension() const { return m_extension; }
+    bool is_smooth() const { return m_is_smooth; }
+    const Vec3f& color() const { return m_color; }
+
 private:
     void include(const Vec3f& color);
     Vec3f texel(std::int64_t x, std::int64_t y) const;

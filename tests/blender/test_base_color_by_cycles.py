@@ -1,5 +1,6 @@
 """Links to the node's Base Color that only Cycles can evaluate, at the texels, in a child process."""
 
+import pickle
 import time
 
 import bpy
@@ -290,6 +291,16 @@ def test_it_is_asked_for_once_in_a_run_and_only_where_it_counts(plane, monkeypat
     image = material.node_tree.nodes.new("ShaderNodeTexImage")
     material.node_tree.links.new(base_color(material), image.outputs["Color"])
     assert not any(isinstance(step, BaseColorByCycles) for step in bake_of(plane).job.steps)
+
+
+def test_a_job_from_a_file_asks_cycles_for_the_same(plane):
+    add_noise_to(plane.data.materials[0])
+    job = bake_of(plane).job
+    here, again = (with_color(one) for one in (job, pickle.loads(pickle.dumps(job))))
+    np.testing.assert_array_equal(here.receiver.charts[0].grid.color_in, again.receiver.charts[0].grid.color_in)
+    folder = job.steps[0].copy.scene.folder
+    del again
+    assert folder.exists()  # it belongs to the job that has made it
 
 
 def test_the_memory_of_cycles_counts(plane, monkeypatch):

@@ -1,6 +1,7 @@
 """Light past see-through triangles against closed forms."""
 
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -204,6 +205,22 @@ def test_a_ray_ends_after_so_many_crossings():
     cards = [card(native.Transmittance((0.9,) * 3), 1 + 0.1 * i) for i in range(5)]
     np.testing.assert_allclose(light_past(cards, max_crossings=5), 0.9**5, rtol=1e-6)
     assert not light_past(cards, max_crossings=4).any()
+
+
+@pytest.mark.parametrize("extension", ["repeat", "extend", "clip", "mirror"])
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("is_smooth", [False, True])
+def test_a_pickle_of_an_image_lets_the_same_light_through(extension, channels, is_smooth):
+    texels = np.random.default_rng(1).random((3, 5, channels))
+    before = image(texels, extension=extension, is_smooth=is_smooth, outside=(0.9, 0.5, 0.2))
+    lit, again = (light_past([card(item, uvs=3 * UVS - 1)]) for item in (before, pickle.loads(pickle.dumps(before))))
+    np.testing.assert_array_equal(lit, again)
+
+
+def test_a_pickle_of_a_color_lets_the_same_light_through():
+    before = native.Transmittance((0.3, 0.7, 0.1))
+    lit, again = (light_past([card(item)]) for item in (before, pickle.loads(pickle.dumps(before))))
+    np.testing.assert_array_equal(lit, again)
 
 
 def test_occluders_know_whether_they_are_opaque_and_colored():

@@ -61,6 +61,9 @@ UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class CopyForCycles:
     """A copy of a scene for Cycles, with results evaluated on it. Make it in the main thread.
 
+    A job in a file names the copy's folder, which goes with this object: a process that runs the job needs a Blender,
+    and the folder for as long as it runs.
+
     Attributes
     ----------
     reflectances : colors that replace the baked materials, by name.

@@ -32,7 +32,7 @@ class SceneCopy:
     """The scene as it is now, in a folder of its own. The data of this Blender stay as they are.
 
     Make it in the main thread (it reads `bpy.data`), and use it in any thread. The folder is removed with the object,
-    when the process ends, or by `remove()`.
+    when the process ends, or by `remove()`. A copy from a pickle is of the same folder, which it leaves alone.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class SceneCopy:
     def __init__(self, scene, view_layer) -> None:
         remove_leftovers()
         self.folder = Path(tempfile.mkdtemp(prefix=f"{PREFIX}{os.getpid()}-"))
-        self.remove = weakref.finalize(self, _remove, self.folder, _lock(self.folder))
+        self._remover = weakref.finalize(self, _remove, self.folder, _lock(self.folder))
         self.warnings: list[Message] = []
         self.binary = bpy.app.binary_path
         self.request = {
@@ -65,6 +65,15 @@ class SceneCopy:
     @property
     def file(self) -> Path:
         return self.folder / FILE
+
+    def __getstate__(self) -> dict:
+        """State for a process that uses the folder and does not own it."""
+        return {**self.__dict__, "_remover": None}
+
+    def remove(self) -> None:
+        """Remove the folder."""
+        if self._remover is not None:
+            self._remover()
 
     def __enter__(self) -> SceneCopy:
         return self

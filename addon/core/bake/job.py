@@ -108,6 +108,9 @@ class Solve(Step):
 class BakeJob:
     """A receiver with its light, its surface, and the steps that are left.
 
+    `pickle` writes a job to a file, which any process that can import this package runs with the same result. The
+    steps by Cycles (`blender/cycles`) have to run inside a Blender, on a machine that has their copy of the scene.
+
     Attributes
     ----------
     name : of the object, for messages.

@@ -47,6 +47,10 @@ class Illumination:
         # Native occluders by origin and names of blockers; all have the same origin.
         self._casters: dict = {}
 
+    def __getstate__(self) -> dict:
+        """State without the hierarchies, which another process builds again."""
+        return {**self.__dict__, "_casters": {}}
+
     def lighting(self, receiver: str) -> Illumination:
         """A copy with the lights that are linked to an object of that name; shares the hierarchies."""
         linked = copy(self)
