@@ -11,6 +11,7 @@ from beamspread.core.scene.lights import PointLight, SunLight
 from beamspread.core.scene.occluders import Mesh, Occluder
 
 from helpers import gather_beams
+from shapes import FACES, SQUARE, box, sphere
 
 SIZE = 80  # texels of a floor of 2 m
 TEXEL = 2 / SIZE
@@ -31,22 +32,7 @@ def floor(axes, shift):
     return Grid(corner, *map(tuple, axes), TEXEL, TEXEL, SIZE, SIZE, np.ones((SIZE, SIZE), np.float32))
 
 
-def box(low, high):
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    triangles = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))], np.uint32)
-    return np.array(low) + corners * np.subtract(high, low), triangles
-
-
-def sphere(steps=48):
-    zenith, azimuth = np.meshgrid(np.linspace(0, np.pi, steps + 1), np.linspace(0, 2 * np.pi, 2 * steps + 1))
-    points = np.stack([np.sin(zenith) * np.cos(azimuth), np.sin(zenith) * np.sin(azimuth), np.cos(zenith)], -1)
-    corner = (np.arange(2 * steps)[:, None] * (steps + 1) + np.arange(steps)).ravel()
-    a, b, c, d = corner, corner + 1, corner + steps + 2, corner + steps + 1
-    return points.reshape(-1, 3), np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]).astype(np.uint32)
-
-
-GROUND = np.array([(-3, -3, 0), (3, -3, 0), (3, 3, 0), (-3, 3, 0)], float), np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+GROUND = 3 * SQUARE, FACES
 
 
 def light_past(*meshes, sun, turn, shift, is_instanced=False):
@@ -108,7 +94,7 @@ def test_a_box_on_the_floor(bottom, turn, shift):
 def test_a_wall_that_crosses_the_floor(turn, shift):
     """A wall without thickness along x = .0125 (the middle of a texel's column): no gap at its foot."""
     x = 0.5 * TEXEL
-    wall = np.array([(x, -2, -0.5), (x, 2, -0.5), (x, 2, 0.5), (x, -2, 0.5)], float), GROUND[1]
+    wall = np.array([(x, -2, -0.5), (x, 2, -0.5), (x, 2, 0.5), (x, -2, 0.5)], float), FACES
     lit = light_past(wall, sun=(0.5, 0, -1), turn=turn, shift=shift)
     column = np.arange(SIZE)
     # Its shadow: x to x + .25, 10 texels.
@@ -125,7 +111,7 @@ def test_a_wall_that_crosses_the_floor(turn, shift):
 @pytest.mark.parametrize("sun", [(0, 0, -1), (0.1, 0.2, 3.0)], ids=["sun", "lamp"])
 def test_a_sphere_half_sunk(sun, is_instanced, turn, shift):
     """Light from above leaves a disk dark, of the radius of the sphere and no larger than a lamp makes it."""
-    vertices, triangles = sphere()
+    vertices, triangles, _ = sphere(48)
     lit = light_past((0.5 * vertices, triangles), sun=sun, turn=turn, shift=shift, is_instanced=is_instanced)
     x, y = middles()
     distance = np.hypot(x, y)

@@ -14,20 +14,8 @@ from beamspread.core.scene.occluders import Mesh, Occluder
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from helpers import gather_beams, travel
-
-
-def sphere(steps=12):
-    """Triangles of a sphere of radius 1 and their UVs."""
-    zenith, azimuth = np.meshgrid(np.linspace(0, np.pi, steps + 1), np.linspace(0, 2 * np.pi, 2 * steps + 1))
-    x, y, z = np.sin(zenith) * np.cos(azimuth), np.sin(zenith) * np.sin(azimuth), np.cos(zenith)
-    vertices = np.stack([x, y, z], -1).reshape(-1, 3)
-    width = steps + 1
-    corner = (np.arange(2 * steps)[:, None] * width + np.arange(steps)).ravel()
-    a, b, c, d = corner, corner + 1, corner + width + 1, corner + width
-    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]).astype(np.uint32)
-    uvs = np.stack([azimuth, zenith], -1).reshape(-1, 2)[triangles] / np.pi
-    return vertices, triangles, np.ascontiguousarray(uvs.reshape(-1, 6), np.float32)
+from helpers import gather_beams
+from shapes import make_grid, occluders, sphere
 
 
 def placements(rng, count, stretch, shift=(0, 0, 0)):
@@ -41,9 +29,8 @@ def placements(rng, count, stretch, shift=(0, 0, 0)):
     return np.array(rows)
 
 
-def floor(shift=(0, 0, 0), size=96):
-    corner = np.array(shift) - (1, 1, 0)
-    return native.ReceiverGrid(corner, (1, 0, 0), (0, 1, 0), (0, 0, 1), 2 / size, 2 / size, size, size)
+def floor(shift=(0, 0, 0)):
+    return native.ReceiverGrid(**make_grid(96, centre=shift))
 
 
 def see_through(kind):
@@ -83,69 +70,11 @@ def test_instances_shade_as_copies_do(seed, stretch, kind, far, is_sun):
     assert copied.triangle_count == shared.triangle_count == 12 * len(triangles)
     assert copied.is_opaque == shared.is_opaque == (kind == "opaque")
     light = native.SunLight((0.3, 0.2, -1)) if is_sun else native.PointLight(shift + (0.2, 0.1, 1.5))
-    one, other = (gather_beams(floor(shift), light, occluders)[0] for occluders in (copied, shared))
+    one, other = (gather_beams(floor(shift), light, casters)[0] for casters in (copied, shared))
     assert (one < 0.9 * one.max()).mean() > 0.01
     differs = np.abs(one - other) > 1e-6 * one.max()
     assert differs.mean() < 2e-3
     np.testing.assert_allclose(one.sum(), other.sum(), rtol=1e-4)
-
-
-@settings(max_examples=40, deadline=None)
-@given(
-    seed=st.integers(0, 10**6),
-    far=st.sampled_from([0.0, 1e4]),
-    lamp=st.sampled_from([None, (0.2, 0.1, 0.3), (0.2, 0.1, 1.5)]),
-    kind=st.sampled_from(["opaque", "color"]),
-    size=st.sampled_from([0.3, 1.0, 6.0]),
-)
-def test_boxes_of_instances_hide_no_shadow(seed, far, lamp, kind, size):
-    """The lamp or the whole receiver may lie within an instance's box."""
-    rng = np.random.default_rng(seed)
-    shift = far * np.array([0.6, -0.64, 0.48])
-    vertices, triangles, uvs = sphere(6)
-    transmittances, _ = see_through(kind)
-    materials = rng.integers(0, 2, (len(triangles), 1)).astype(np.uint32) if transmittances else None
-    places = placements(rng, 3, 3.0, shift).reshape(-1, 3, 4)
-    places[..., :3] *= size
-    mesh = native.OccluderMesh(vertices, triangles, places.reshape(-1, 12), transmittances, materials, uvs)
-    occluders = native.Occluders([mesh], shift, max_copied=0)
-    assert instance_count(occluders) == 3
-    light = native.SunLight((0.5, 0.3, -0.4)) if lamp is None else native.PointLight(shift + lamp)
-    found, traced = (gather_beams(floor(shift), light, occluders, find_shadows=find) for find in (True, False))
-    np.testing.assert_array_equal(found[0], traced[0])
-    np.testing.assert_array_equal(found[1], traced[1])
-
-
-@settings(max_examples=40, deadline=None)
-@given(
-    seed=st.integers(0, 10**6),
-    far=st.sampled_from([0.0, 1e4]),
-    angle=st.sampled_from([0.0, 60.0, 89.0]),
-    stretch=st.sampled_from([1.0, 30.0]),
-    size=st.sampled_from([1.0, 3000.0]),
-)
-def test_an_instanced_receiver_does_not_shadow_itself(seed, far, angle, stretch, size):
-    """The receiver is a part of an instance of a tessellated card, in a random plane, stretched along itself."""
-    rng = np.random.default_rng(seed)
-    axes, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-    centre = far * rng.normal(size=3)
-    x, y = np.meshgrid(np.linspace(-1, 1, 5), np.linspace(-1, 1, 5))
-    corner = (np.arange(4)[:, None] * 5 + np.arange(4)).ravel()
-    faces = [(corner, corner + 1, corner + 6), (corner, corner + 6, corner + 5)]
-    triangles = np.concatenate([np.stack(face, 1) for face in faces]).astype(np.uint32)
-    vertices = np.stack([x, y, np.zeros_like(x)], -1).reshape(-1, 3)
-    linear = axes.T * (size, size / stretch, 0.7 * size)
-    places = [np.column_stack([linear, centre]), np.column_stack([linear, centre - 5 * size * axes[2]])]
-    mesh = native.OccluderMesh(vertices, triangles, np.reshape(places, (2, 12)))
-    # The add-on has an origin near the receiver, too, not at it.
-    middle = centre + linear @ (*rng.uniform(-0.5, 0.5, 2), 0) * (size > 1)
-    occluders = native.Occluders([mesh], np.round(middle / 8) * 8, max_copied=0)
-    assert instance_count(occluders) == 2
-    half = np.array([0.9, 0.9 / stretch])
-    grid = native.ReceiverGrid(middle - half @ axes[:2], *axes, half[0] / 8, half[1] / 8, 16, 16)
-    local = travel(angle, seed % 360)
-    lit, _ = gather_beams(grid, native.SunLight(local @ axes), occluders)
-    np.testing.assert_allclose(lit, -local[2], rtol=1e-6)
 
 
 def test_flat_and_small_ones_are_copied():
@@ -155,13 +84,10 @@ def test_flat_and_small_ones_are_copied():
     flat[:, 2, :] = (0, 0, 0, 1)
     flat[:, 0, 3] = (-0.5, 0.0, 0.5)
     flat[1:, :, :3] *= 0.25
-    meshes = [
-        native.OccluderMesh(vertices, triangles, flat.reshape(-1, 12)),
-        native.OccluderMesh(vertices, triangles[:15].copy(), placements(np.random.default_rng(1), 9, 1.0)),
-    ]
-    occluders = native.Occluders(meshes, max_copied=0)
-    assert instance_count(occluders) == 0
-    lit, _ = gather_beams(floor(), native.SunLight((0, 0, -1)), native.Occluders(meshes[:1]))
+    disks = vertices, triangles, flat.reshape(-1, 12)
+    small = vertices, triangles[:15].copy(), placements(np.random.default_rng(1), 9, 1.0)
+    assert instance_count(occluders(disks, small, max_copied=0)) == 0
+    lit, _ = gather_beams(floor(), native.SunLight((0, 0, -1)), occluders(disks))
     # A disk of radius 1 around x = -.5, a polygon of 24 corners, and two of a quarter: one in it, one in part.
     x, y = np.meshgrid(*[(np.arange(96) + 0.5) / 48 - 1] * 2)
     distance = np.min([np.hypot(x + 0.5, y), 4 * np.hypot(x, y), 4 * np.hypot(x - 0.5, y)], axis=0)
@@ -195,27 +121,10 @@ def test_ten_million_triangles_of_instances_cost_no_seconds_per_light():
     assert time.process_time() - start < 3
 
 
-def test_every_number_of_threads_gives_the_same_bits():
-    vertices, triangles, uvs = sphere()
-    transmittances, _ = see_through("color")
-    materials = np.arange(len(triangles), dtype=np.uint32)[:, None] % 2
-    places = placements(np.random.default_rng(3), 40, 2.0)
-    lamp = native.PointLight((0.2, 0.1, 1.5))
-
-    def lit(threads):
-        mesh = native.OccluderMesh(vertices, triangles, places, transmittances, materials, uvs)
-        occluders = native.Occluders([mesh], max_copied=0)
-        return gather_beams(floor(), lamp, occluders, threads=threads)[0]
-
-    one, *more = [lit(threads) for threads in (1, 2, 7, 0)]
-    for other in more:
-        np.testing.assert_array_equal(one, other)
-
-
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_placements_that_are_no_numbers_are_named(bad):
     vertices, triangles, _ = sphere()
     places = placements(np.random.default_rng(3), 2, 1.0)
     places[1, 3] = bad
     with pytest.raises(ValueError, match=f"placements.*{bad}.*finite"):
-        native.Occluders([native.OccluderMesh(vertices, triangles, places)])
+        occluders((vertices, triangles, places))

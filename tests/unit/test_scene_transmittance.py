@@ -10,18 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from helpers import gather_beams
+from shapes import FACES, SQUARE, cast, make_grid, points_of, soup
 
 DOWN = native.SunLight((0, 0, -1))
-SQUARE = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
-FACES = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
 UVS = (SQUARE[:, :2] / 2 + 0.5)[FACES].astype(np.float32)  # row v = 0 at y = -1
 # Images keep 16 bits.
 LEVEL = 0.5 / 65535
 
 
-def grid(width=16, height=16):
-    axes = (1, 0, 0), (0, 1, 0), (0, 0, 1)
-    return native.ReceiverGrid((-1, -1, 0), *axes, 2 / width, 2 / height, width, height)
+def grid(width=16, height=None):
+    return native.ReceiverGrid(**make_grid(width, height))
 
 
 def card(transmittance, height=1.0, scale=1.0, uvs=None):
@@ -85,25 +83,13 @@ def test_every_crossing_counts_once(seed, count, height):
     corners = rng.uniform((-1, -1, 0.05), (1, 1, 0.6), (count, 1, 3)) + rng.normal(0, 0.5, (count, 3, 3))
     corners[..., 2] = np.abs(corners[..., 2])
     left = rng.uniform(0.2, 0.95, count).astype(np.float32)
-    mesh = native.OccluderMesh(
-        corners.reshape(-1, 3),
-        np.arange(3 * count, dtype=np.uint32).reshape(-1, 3),
-        None,
-        [native.Transmittance((t,) * 3) for t in left],
-        np.arange(count, dtype=np.uint32)[:, None],
-    )
+    grey = [native.Transmittance((t,) * 3) for t in left]
+    mesh = native.OccluderMesh(*soup(corners), None, grey, np.arange(count, dtype=np.uint32)[:, None])
     lamp = np.array([0.1, 0.05, height])
     got = light_past([mesh], native.PointLight(lamp), samples=1) / light_past([], native.PointLight(lamp), samples=1)
-    middles = (np.arange(16) + 0.5) / 8 - 1
-    points = np.stack([*np.meshgrid(middles, middles), np.zeros((16, 16))], -1)
-    way, wanted, doubt = lamp - points, np.ones((16, 16)), np.full((16, 16), np.inf)
-    for (a, b, c), t in zip(corners, left):
-        p, q = np.cross(way, c - a), np.cross(points - a, b - a)
-        det = p @ (b - a)
-        u, v, along = ((points - a) * p).sum(-1) / det, (q * way).sum(-1) / det, q @ (c - a) / det
-        inside, ahead = np.minimum(np.minimum(u, v), 1 - u - v), np.minimum(along, 1 - along)
-        wanted *= np.where((inside > 0) & (ahead > 0), t, 1)
-        doubt = np.fmin(doubt, np.abs(np.fmin(inside, ahead)))
+    points = points_of(make_grid(16), 1)[:, :, 0]
+    crossed, doubt = cast(points, lamp - points, 1.0, *soup(corners))
+    wanted = np.where(crossed, left[:, None, None], 1).prod(0)
     clear = doubt > 1e-4  # else rounding decides whether a ray meets an edge
     assert clear.mean() > 0.8
     # Single precision of the quotient of two irradiances.
@@ -161,29 +147,6 @@ def test_stripes_are_exact_in_the_mean():
     # Eight images of four stripes on 16 texels: half an image each, two stripes.
     wanted = np.stack([stripes[0, :2].mean(0), stripes[0, 2:].mean(0)] * 8)
     np.testing.assert_allclose(lit, np.broadcast_to(wanted, lit.shape), atol=2 * LEVEL)
-
-
-@settings(max_examples=30, deadline=None)
-@given(seed=st.integers(0, 10**6), count=st.integers(1, 30), colored=st.booleans(), far=st.sampled_from([0, 1e4]))
-def test_finding_shadows_and_threads_change_nothing(seed, count, colored, far):
-    rng = np.random.default_rng(seed)
-    shift = far * np.array([0.6, -0.64, 0.48])
-    corners = rng.uniform((-1, -1, -0.2), (1, 1, 1), (count, 1, 3)) + rng.normal(0, 0.4, (count, 3, 3))
-    colors = [np.full(3, rng.random()) if not colored else rng.random(3) for _ in range(3)]
-    see_through = [native.Transmittance((0, 0, 0)), *map(native.Transmittance, colors)]
-    triangles = np.arange(3 * count, dtype=np.uint32).reshape(-1, 3)
-    materials = rng.integers(0, 4, (count, 1)).astype(np.uint32)
-    mesh = native.OccluderMesh(corners.reshape(-1, 3) + shift, triangles, None, see_through, materials)
-    occluders = native.Occluders([mesh], shift)
-    place = native.ReceiverGrid(shift - (1, 1, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 1 / 40, 1 / 40, 80, 80)
-    for light in (native.SunLight((0.3, 0.2, -1)), native.PointLight(shift + (0.2, 0.1, 1.4))):
-        first, *others = [
-            gather_beams(place, light, occluders, find_shadows=find, threads=threads)
-            for find, threads in ((True, 1), (False, 1), (True, 0), (True, 3))
-        ]
-        for other in others:
-            np.testing.assert_array_equal(first[0], other[0])
-            np.testing.assert_array_equal(first[1], other[1])
 
 
 def test_the_order_of_triangles_does_not_change_a_bit():
