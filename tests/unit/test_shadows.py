@@ -40,7 +40,9 @@ def random_mesh(rng, kind, count, size, slant, axes, centre):
         materials = rng.integers(0, 2, (len(triangles), 1)).astype(np.uint32)
         return native.OccluderMesh(vertices, triangles, places.reshape(-1, 12), see_through(rng), materials, uvs)
     middle = rng.uniform([-1.5, -1.2, -0.3], [1.5, 1.2, 1.5], (count, 1, 3))
-    local = (middle + rng.normal(0, size, (count, 3, 3))).reshape(-1, 3)
+    offset = rng.normal(0, size, (count, 3, 3))
+    middle[::3, :, 2], offset[::3, :, 2] = 0.1 * middle[::3, :, 2], 0.05 * offset[::3, :, 2]  # at the start of rays
+    local = (middle + offset).reshape(-1, 3)
     beyond = 3000 * (np.array([slant, 0.3, 1.0]) + [(0, 0, 0), (0.0003, 0, 0), (0, 0.0003, 0)])
     mesh = soup(np.concatenate([local, beyond]) @ axes + centre)
     if kind == "opaque":
