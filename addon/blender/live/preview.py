@@ -52,7 +52,7 @@ class Preview:
         """True if the node's inner tree shows the preview."""
         tree = getattr(self._node(), "node_tree", None)
         image = None if tree is None else tree.nodes[IMAGE].image
-        return image is not None and image.name == self._name
+        return image is not None and image.name == self._name and image.has_data
 
     def fits(self) -> bool:
         """True if the node is still there and its own image has no other size."""
@@ -96,6 +96,16 @@ class Preview:
         self.place()
         _remove({oldest})
         self._is_new_to_cycles = False
+
+    def mark_saved(self) -> bool:
+        """Have Blender take the hidden image for saved, or it asks to save that with every file; False if it did."""
+        image = bpy.data.images.get(self._name)
+        if image is None or not image.is_dirty:
+            return False
+        image.pack()
+        # Each undo step would store the packed pixels: the image keeps those in memory, see `is_shown`.
+        image.pack(data=b"0", data_len=1)
+        return True
 
     def remove_former(self) -> None:
         """Remove the hidden image that the last one replaced."""

@@ -25,7 +25,7 @@ SMALL_SCAN_SECONDS = 0.01
 """Scans shorter than this (seconds) run inside the depsgraph update; longer ones wait for the timer."""
 
 CALM_SECONDS = 0.3
-"""Seconds without changes before Cycles gets a new preview, which restarts its render."""
+"""Seconds without changes before Cycles gets a new preview, which restarts its render, and before it counts as saved."""
 
 CYCLES_PAUSE_SECONDS = 1.0
 """Seconds between two previews for Cycles while renderings are still to come; more restarts it less often."""
@@ -156,7 +156,10 @@ class Session:
         if shown:
             self.seconds = time.perf_counter() - changed_at
         self._follow_cycles(context, shown)
-        return has_changed or shown or self.is_busy()
+        is_busy = has_changed or shown or self.is_busy()
+        if not is_busy and time.perf_counter() - self._changed_at >= CALM_SECONDS:
+            any(preview.mark_saved() for preview in self._previews.values())  # one in each step
+        return is_busy
 
     def _leave_to_painter(self, settings) -> None:
         """Have nodes show their own images, so that Blender's paint slots have these."""
