@@ -76,3 +76,17 @@ def unregister() -> None:
     from . import blender
 
     blender.unregister()
+
+
+def glTF2_pre_export_callback(_settings) -> None:  # Blender's exporter looks for this name in add-ons
+    """Have glTF files get the bakes, not the previews of Live."""
+    from .blender.live import timer
+
+    timer.hide_previews()
+
+
+def glTF2_post_export_callback(_settings) -> None:
+    """Show the previews of Live again."""
+    from .blender.live import timer
+
+    timer.show_previews()

@@ -1,11 +1,14 @@
 """Previews of Live stay out of files, of undo and of the images that artists paint on. The tests take Live's steps."""
 
+import json
+
 import beamspread
 import bpy
 import numpy as np
 import pytest
 import scenes
 from beamspread.blender.live import preview, timer
+from beamspread.blender.node import output
 from live_scenes import (
     hidden_images,
     live_pixels,
@@ -77,6 +80,25 @@ def test_blender_does_not_ask_to_save_a_preview_at_rest():
         np.testing.assert_array_equal(shown_pixels(material), live)
     shown_image(material).reload()  # Blender frees pixels that it takes for saved if memory runs short
     np.testing.assert_array_equal(live_pixels(material), live)
+
+
+@pytest.mark.filterwarnings("ignore")  # of Blender's exporter
+def test_gltf_files_get_the_bake(tmp_path):
+    """Blender's exporter calls functions of each add-on by their names."""
+    _plane, _lamp, material, _baked = make_baked_scene()
+    live = live_pixels(material).copy()
+    output.make_plain(scenes.node_of(material))
+    bpy.ops.preferences.addon_enable(module="io_scene_gltf2")
+    addon = bpy.context.preferences.addons.new()
+    addon.module = beamspread.__name__
+    try:
+        bpy.ops.export_scene.gltf(filepath=str(tmp_path / "scene.gltf"), export_format="GLTF_SEPARATE")
+    finally:
+        bpy.context.preferences.addons.remove(addon)
+    images = [image["name"] for image in json.loads((tmp_path / "scene.gltf").read_text()).get("images", ())]
+    follows_groups = bpy.app.version >= (4, 0, 0)
+    assert images == [scenes.node_of(material).image.name] * follows_groups
+    np.testing.assert_array_equal(shown_pixels(material), live)
 
 
 def test_paint_is_saved_with_the_image_and_stays_through_live(tmp_path):

@@ -98,14 +98,13 @@ class Preview:
         self._is_new_to_cycles = False
 
     def mark_saved(self) -> bool:
-        """Have Blender take the hidden image for saved, or it asks to save that with every file; False if it did."""
-        image = bpy.data.images.get(self._name)
-        if image is None or not image.is_dirty:
-            return False
-        image.pack()
-        # Each undo step would store the packed pixels: the image keeps those in memory, see `is_shown`.
-        image.pack(data=b"0", data_len=1)
-        return True
+        """Have Blender take hidden images for saved, or it asks to save them with every file; False if it did."""
+        images = [image for image in map(bpy.data.images.get, self.names()) if image is not None and image.is_dirty]
+        for image in images:
+            image.pack()
+            # Each undo step would store the packed pixels: the image keeps those in memory, see `is_shown`.
+            image.pack(data=b"0", data_len=1)
+        return bool(images)
 
     def remove_former(self) -> None:
         """Remove the hidden image that the last one replaced."""

@@ -25,7 +25,7 @@ SMALL_SCAN_SECONDS = 0.01
 """Scans shorter than this (seconds) run inside the depsgraph update; longer ones wait for the timer."""
 
 CALM_SECONDS = 0.3
-"""Seconds without changes before Cycles gets a new preview, which restarts its render, and before it counts as saved."""
+"""Seconds without changes before Cycles gets a new preview, which restarts its render, or previews count as saved."""
 
 CYCLES_PAUSE_SECONDS = 1.0
 """Seconds between two previews for Cycles while renderings are still to come; more restarts it less often."""

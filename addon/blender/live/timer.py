@@ -106,14 +106,15 @@ def _undone(*_arguments) -> None:
 
 
 @persistent
-def _hide(*_arguments) -> None:
-    """Show own images before a save, which keeps them, and Blender's Bake, which may fill that of a plain group."""
+def hide_previews(*_arguments) -> None:
+    """Show own images before saves and exports, which keep them, and Blender's Bake, which may fill a plain group's."""
     if live.session is not None:
         live.session.hide()
 
 
 @persistent
-def _show(*_arguments) -> None:
+def show_previews(*_arguments) -> None:
+    """Show previews again after a save or an export."""
     if live.session is not None:
         live.session.show()
 
@@ -146,9 +147,9 @@ register, unregister = all_or_nothing(
         frame_change_post=_changed,
         undo_post=_undone,
         redo_post=_undone,
-        save_pre=_hide,
-        save_post=_show,
-        object_bake_pre=_hide,
+        save_pre=hide_previews,
+        save_post=show_previews,
+        object_bake_pre=hide_previews,
         load_pre=_leave_file,
         load_post=_enter_file,
     ),
