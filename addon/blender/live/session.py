@@ -156,10 +156,9 @@ class Session:
         if shown:
             self.seconds = time.perf_counter() - changed_at
         self._follow_cycles(context, shown)
-        is_busy = has_changed or shown or self.is_busy()
-        if not is_busy and time.perf_counter() - self._changed_at >= CALM_SECONDS:
-            any(preview.mark_saved() for preview in self._previews.values())  # one in each step
-        return is_busy
+        if not shown and not has_changed and time.perf_counter() - self._changed_at >= CALM_SECONDS:
+            any(preview.mark_saved() for preview in self._previews.values())  # at most one in each step
+        return has_changed or shown or self.is_busy()
 
     def _leave_to_painter(self, settings) -> None:
         """Have nodes show their own images, so that Blender's paint slots have these."""
