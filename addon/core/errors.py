@@ -11,7 +11,7 @@ class BakeError(ValueError):
     Attributes
     ----------
     text : names the problem.
-    remedy : advice for the artist; "" if `text` has it.
+    remedy : advice for the artist; "" if there is none.
     """
 
     def __init__(self, text: str, remedy: str = "") -> None:

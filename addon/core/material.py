@@ -97,33 +97,31 @@ class Material:
         """Raise MaterialError if a value is outside the range of light transport."""
         for channel, value in zip(CHANNELS, self.albedo):
             if not 0 <= value < 1:
-                raise MaterialError(
-                    f"The albedo's {channel} is {value:g}; it must be at least 0 and below 1, "
-                    "because a medium without any absorption never lets light end (try 0.999)."
-                )
+                remedy = "It must be at least 0 and below 1 (try 0.999): without absorption, light never ends."
+                raise MaterialError(f"The albedo's {channel} is {value:g}.", remedy)
         for channel, value in zip(CHANNELS, self.mean_free_path):
             if not (value > 0 and math.isfinite(value)):
                 raise MaterialError(
-                    f"The mean free path's {channel} is {value:g}; it must be a length above 0 (marble: 0.0004 m)."
+                    f"The mean free path's {channel} is {value:g}.", "It must be a length above 0 (marble: 0.0004 m)."
                 )
         for value in (self.anisotropy, *self.channel_anisotropy):
             if not -1 < value < 1:
-                raise MaterialError(f"The anisotropy is {value:g}; it must lie between -1 and 1, both excluded.")
+                raise MaterialError(f"The anisotropy is {value:g}.", "It must lie between -1 and 1, both excluded.")
         if not (self.ior >= 1 and math.isfinite(self.ior)):
-            raise MaterialError(f"The IOR is {self.ior:g}; it must be 1 or more.")
+            raise MaterialError(f"The IOR is {self.ior:g}.", "It must be 1 or more.")
 
 
 def check_thickness(thickness: float) -> None:
     """Raise MaterialError unless `thickness` (metres, 0: half-space) can be simulated."""
     if not (thickness >= 0 and math.isfinite(thickness)):
-        raise MaterialError(f"The thickness is {thickness:g}; it must be a length above 0, or 0 for endlessly thick.")
+        raise MaterialError(f"The thickness is {thickness:g}.", "It must be above 0, or 0 for endlessly thick.")
 
 
 def check_base_color(color: RGB) -> None:
     """Raise MaterialError unless every channel is a reflectance."""
     for channel, value in zip(CHANNELS, color):
         if not 0 <= value <= 1:
-            raise MaterialError(f"The base colour's {channel} is {value:g}; it must be between 0 and 1.")
+            raise MaterialError(f"The base color's {channel} is {value:g}.", "It must be between 0 and 1.")
 
 
 def presets() -> dict[str, Material]:

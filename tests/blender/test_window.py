@@ -57,7 +57,7 @@ def test_a_first_look_is_there_before_the_simulation_and_stays_if_that_is_cancel
 
 
 def test_failures_are_shown_in_the_panels_and_the_others_are_baked(seen):
-    sentence = "First / First: The material or its Beamspread node was removed or renamed during the bake: bake again."
+    sentence = "First / First: The material or its Beamspread node was removed or renamed during the bake. Bake again."
     assert sentence in seen["messages of removal"]
     assert sentence.partition(": ")[2] in seen["shown"]
     assert any(sentence in sentences for _, sentences in seen["popups"])

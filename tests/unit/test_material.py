@@ -186,7 +186,7 @@ def test_base_color_makes_the_albedo_irrelevant():
 
 @pytest.mark.parametrize("value", [1.3, -0.1, math.nan])
 def test_base_color_out_of_range(value):
-    with pytest.raises(MaterialError, match=r"base colour's green is .* between 0 and 1"):
+    with pytest.raises(MaterialError, match=r"base color's green is .* between 0 and 1"):
         Surface(Material(**GOOD), base_color=(0.5, value, 0.5)).check()
 
 

@@ -40,21 +40,25 @@ def check_image(image) -> None:
     """Raise ImageError with one sentence if a bake could not be stored in the image."""
     name = f"The image '{image.name}'"
     if image.source == "TILED":
-        raise ImageError(f"{name} has UDIM tiles, which cannot be baked yet: choose a single image in the node.")
+        raise ImageError(f"{name} has UDIM tiles, which cannot be baked yet.", "Choose a single image in the node.")
     if image.source == "SEQUENCE" and facts_of(image).frames:
-        raise ImageError(f"{name} holds the frames of a batch: Show Single Images (Render > Beamspread > Batch) first.")
+        raise ImageError(
+            f"{name} holds the frames of a batch.", "Use Show Single Images (Render > Beamspread > Animation) first."
+        )
     if image.source not in {"FILE", "GENERATED"}:
-        raise ImageError(f"{name} is a sequence, movie or viewer: choose a single image in the node.")
+        raise ImageError(f"{name} is a sequence, movie or viewer.", "Choose a single image in the node.")
     if image.library is not None:
-        raise ImageError(f"{name} belongs to another .blend file: make it local or choose another in the node.")
+        raise ImageError(f"{name} belongs to another .blend file.", "Make it local, or choose another in the node.")
     path = file_of(image)
     if path is not None:
         if not path.is_file():
-            raise ImageError(f"{name} has lost its file {path}: restore it or clear the image in the node.")
+            raise ImageError(f"{name} has lost its file {path}.", "Restore it, or clear the image in the node.")
         if is_read_only(path) or is_read_only(path.parent):
-            raise ImageError(f"{name} cannot be saved because {path} is read-only: allow writing or choose another.")
+            raise ImageError(
+                f"{name} cannot be saved because {path} is read-only.", "Allow writing, or choose another."
+            )
     if 0 in image.size:
-        raise ImageError(f"{name} has no pixels: its file may be damaged, so choose another image in the node.")
+        raise ImageError(f"{name} has no pixels: its file may be damaged.", "Choose another image in the node.")
 
 
 def fill_image(image, texture: np.ndarray) -> str:
@@ -67,7 +71,7 @@ def fill_image(image, texture: np.ndarray) -> str:
     """
     check_image(image)
     if tuple(image.size) != texture.shape[1::-1]:
-        raise ImageError(f"The image '{image.name}' changed its size during the bake: bake it again.")
+        raise ImageError(f"The image '{image.name}' changed its size during the bake.", "Bake it again.")
     path = file_of(image)
     encoded = to_srgb(texture) if _is_encoded(image) else texture
     if path is None:
@@ -148,7 +152,10 @@ def write_file(
     make_folder(path.parent)
     protected = next((part for part in (path, path.parent) if part.exists() and is_read_only(part)), None)
     if protected is not None:
-        raise ImageError(f"The output cannot be written because {protected} is read-only.")
+        raise ImageError(
+            f"The output cannot be written because {protected} is read-only.",
+            "Allow writing, or choose another folder.",
+        )
     if file_format == "EXR":
         write_exr(path, texture, attributes)
     else:

@@ -32,7 +32,7 @@ def store_new(name: str, texture: np.ndarray, bake: Bake, is_data: bool = False)
         try:
             return _in_file(name, texture, is_data)
         except ImageError as error:
-            bake.warn(name, f"{error} The new image is packed into the .blend file instead.")
+            bake.warn(name, f"{error.text} The new image is packed into the .blend file instead.", error.remedy)
     image = files.make_image(name, *texture.shape[1::-1], is_data=is_data)
     return files.fill_image(image, texture), image
 

@@ -50,9 +50,9 @@ class Outputs:
         options = self._options
         file_format, folder = options.format or self._settings.format, options.output or self._settings.output_dir
         if folder.startswith("//") and not bpy.data.filepath:
-            raise ImageError("The scene was never saved, so there is no folder to write to: give one with --output.")
+            raise ImageError("The scene was never saved, so there is no folder to write to.", "Give one with --output.")
         if layer == DIRECTION and file_format == "PNG":
-            raise ImageError("A PNG can't hold directions, which have negative parts: choose EXR.")
+            raise ImageError("A PNG can't hold directions, which have negative parts.", "Choose EXR.")
         number = f"_{frame:04d}" if options.frames else ""
         name = f"{self._stems[_names(target, layer)]}{number}{files.EXTENSIONS[file_format]}"
         return Path(bpy.path.abspath(folder)).absolute() / name

@@ -135,7 +135,9 @@ class Results:
             path = self.fill(image, bake, texture, node.image)
             if path is not None:
                 return path
-        raise BakeError(f"Another object is baked to the same part of the image '{name}'.")
+        raise BakeError(
+            f"Another object is baked to the same part of the image '{name}'.", "Move the UVs of one of them."
+        )
 
     def _other_owners(self, image, bake: Bake) -> list[Target]:
         """Other targets whose results the image holds, or that come first in this run."""
@@ -173,8 +175,9 @@ class Results:
             if owner.material_name == target.material_name and overlaps(receiver, self._parts_of(owner, image)):
                 raise BakeError(
                     f"'{owner.object_name}' is baked to the same part of the image '{image.name}' by the same "
-                    f"material: give '{target.object_name}' a material of its own (Object > Relations > Make "
-                    "Single User > Materials), or move its UVs."
+                    "material.",
+                    f"Give '{target.object_name}' a material of its own (Object > Relations > Make Single User > "
+                    "Materials), or move its UVs.",
                 )
 
 
@@ -183,7 +186,7 @@ def _node(target: Target, layer: str):
     material = bpy.data.materials.get(target.material_name)
     node = find_node(material)
     if node is None:
-        raise BakeError("The material or its Beamspread node was removed or renamed during the bake: bake again.")
+        raise BakeError("The material or its Beamspread node was removed or renamed during the bake.", "Bake again.")
     if layer == COMBINED:
         check_editable(material)
     return node
@@ -193,8 +196,9 @@ def check_editable(material) -> None:
     """Raise BakeError if changes of the material are lost when the file is closed."""
     if material.library is not None or material.override_library is not None:
         raise BakeError(
-            f"The material '{material.name}' belongs to another .blend file, so this one can't keep its image: make it "
-            "local (Object > Relations > Make Local > Selected Objects, Data and Materials), or bake in that file."
+            f"The material '{material.name}' belongs to another .blend file, so this one can't keep its image.",
+            "Make it local (Object > Relations > Make Local > Selected Objects, Data and Materials), or bake in that "
+            "file.",
         )
 
 

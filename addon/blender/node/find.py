@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import bpy
 
 from ...core.bake.runner import Bake
+from ...core.errors import BakeError
 from ...core.target import Target
 from .. import compat
 from ..read.visibility import count_instances, render_visible_names, with_instanced
@@ -44,7 +45,7 @@ class BakeTarget:
         return not is_local and self.node.image is not None
 
 
-NOTHING_FOUND = "No mesh has a material with a Beamspread node: add one in the Shader Editor."
+NOTHING_FOUND = BakeError("No mesh has a material with a Beamspread node.", "Add one in the Shader Editor.")
 
 
 def find_node(material):
@@ -134,17 +135,17 @@ def find_misplaced(objects: Iterable) -> list[Bake]:
     A node with an image on an object without a mesh is left out: it was baked elsewhere.
     """
     shown = with_instanced(objects)
-    return [Bake(Target(obj.name, material.name), error=why) for obj in shown for material, why in _misplaced(obj)]
+    return [Bake(Target(obj.name, material.name), error=error) for obj in shown for material, error in _misplaced(obj)]
 
 
 def _misplaced(obj) -> Iterator[tuple]:
     for material in _all_materials(obj):
         node = find_node(material)
         if node is not None and obj.type != "MESH" and node.image is None:
-            yield material, f"'{obj.name}' is not a mesh: convert it to one (Object > Convert > Mesh)."
+            yield material, BakeError(f"'{obj.name}' is not a mesh.", "Convert it to one (Object > Convert > Mesh).")
         if node is None and compat.uses_nodes(material):
             for _, groups in _nodes_in(material.node_tree):
-                yield material, _why_not_in_group(material, groups)
+                yield material, _error_of_group(material, groups)
 
 
 def _all_materials(obj) -> list:
@@ -152,9 +153,9 @@ def _all_materials(obj) -> list:
     return list(dict.fromkeys(material for material in materials if material is not None))
 
 
-def _why_not_in_group(material, groups: tuple) -> str:
+def _error_of_group(material, groups: tuple) -> BakeError:
     shared = next(group.node_tree.name for group in groups if not _has_one_user(group))
-    return (
-        f"The Beamspread node of '{material.name}' has one image, but its node group '{shared}' is used several times: "
-        "make the group single-user (click the number beside its name), or ungroup it (Ctrl Alt G)."
+    return BakeError(
+        f"The Beamspread node of '{material.name}' has one image, but its node group '{shared}' is used several times.",
+        "Make the group single-user (click the number beside its name), or ungroup it (Ctrl Alt G).",
     )

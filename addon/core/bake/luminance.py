@@ -105,8 +105,8 @@ def spread(
         )
     except native.MemoryLimit as error:
         raise BakeError(
-            f"{grid.width} x {grid.height} texels are too many: {error}. Lower the resolution, or raise the memory "
-            "limit in the add-on's preferences."
+            f"{grid.width} x {grid.height} texels are too many: {error}.",
+            "Lower the resolution, or raise the memory limit in the add-on's preferences.",
         ) from error
     except ValueError as error:
         if settings.distributions == "library":

@@ -21,10 +21,12 @@ def load_source(folder: str, method: str):
     """
     path = Path(folder)
     if not folder or not path.is_dir():
-        raise BakeError(f"There is no folder of LDF samples at '{folder}': choose one in the Beamspread settings.")
+        raise BakeError(f"There is no folder of LDF samples at '{folder}'.", "Choose one in the Beamspread settings.")
     files = sorted(file for file in path.iterdir() if file.suffix.lower() == ".exr")
     if not files:
-        raise BakeError(f"The folder of LDF samples '{folder}' holds no EXR file.")
+        raise BakeError(
+            f"The folder of LDF samples '{folder}' holds no EXR file.", "Choose another in the Beamspread settings."
+        )
     try:
         stats = [file.stat() for file in files]
         return _load(tuple((file, stat.st_mtime_ns, stat.st_size) for file, stat in zip(files, stats)), method)

@@ -144,7 +144,7 @@ def build_receiver(maps: Sequence[UvMap], width: int, height: int) -> Receiver:
             covered = chart.part_of(coverage)
             np.minimum(covered + chart.coverage, 1, out=covered)
     if not in_chart(coverage).any():
-        raise ReceiverError("The UV map covers no texel of the image: enlarge it or the image.")
+        raise ReceiverError("The UV map covers no texel of the image.", "Enlarge it, or the image.")
     return Receiver(coverage, charts)
 
 

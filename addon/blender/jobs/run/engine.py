@@ -108,13 +108,14 @@ def _check_active_image(target: BakeTarget, settings: BakeSettings) -> None:
     active = active_image(target.material)
     if active is not None and active in _images_read(target.node):
         raise ImageError(
-            f"The active image '{active.name}' is a texture of the Beamspread node and no target: if Blender has "
-            "cleared it, reload it (Image > Reload), then add an Image Texture node with another image and select that."
+            f"The active image '{active.name}' is a texture of the Beamspread node and no target.",
+            "If Blender has cleared it, reload it (Image > Reload), then add an Image Texture node with another image "
+            "and select that.",
         )
     if settings.layer != COMBINED and active is not None and active == target.node.image:
         raise ImageError(
-            f"The image '{active.name}' shows luminance in the Beamspread node: choose another active image for "
-            f"{settings.output.lower()}."
+            f"The image '{active.name}' shows luminance in the Beamspread node.",
+            f"Choose another active image for {settings.output.lower()}.",
         )
 
 

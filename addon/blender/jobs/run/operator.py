@@ -9,7 +9,7 @@ from bpy.props import EnumProperty
 
 from ....core import native
 from ....core.bake.runner import Bake, run_bakes, run_in_steps
-from ....core.errors import text_of
+from ....core.errors import BakeError, message_of, text_of
 from ....core.messages import Level, Message
 from ....core.target import Target
 from ... import popup
@@ -23,7 +23,7 @@ from .bake_run import BakeRun, BakeThread
 TIMER_SECONDS = 0.1
 """Seconds between two looks at the thread of a bake."""
 
-NOTHING_STALE = "Nothing is out of date."
+NOTHING_STALE = BakeError("Nothing is out of date.")
 
 _timers: list[bpy.types.Timer] = []
 """Timers of the run in the window."""
@@ -128,8 +128,7 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
             return False
         targets, misplaced = self._chosen(context)
         if not targets and not misplaced:
-            nothing = NOTHING_STALE if self.objects == "STALE" else NOTHING_FOUND
-            self._run.fail(Message(Level.ERROR, "", nothing))
+            self._run.fail(message_of(NOTHING_STALE if self.objects == "STALE" else NOTHING_FOUND))
             return False
         state.forget_failures()
         for bake in misplaced:
