@@ -9,7 +9,6 @@
 #include "fft/fft.h"
 #include "medium/medium.h"
 #include "python/media.h"
-#include "python/vectors.h"
 #include "scene/light.h"
 #include "scene/occluders.h"
 #include "solve/solve.h"

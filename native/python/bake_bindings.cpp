@@ -8,7 +8,6 @@
 
 #include "bake/bake.h"
 #include "python/media.h"
-#include "python/vectors.h"
 
 namespace beamspread {
 
@@ -94,6 +93,22 @@ std::vector<SurfaceLight> lights_of(const LightTuples& tuples)
     return lights;
 }
 
+// Array of a vector of 3 for each texel of a grid.
+Array<float> new_vectors(const ReceiverGrid& grid)
+{
+    return Array<float>({grid.height, grid.width, std::size_t{3}});
+}
+
+BakeOptions options_of(int samples, int rays, std::uint32_t seed, int threads)
+{
+    BakeOptions options;
+    options.samples = samples;
+    options.rays = rays;
+    options.seed = seed;
+    options.threads = threads;
+    return options;
+}
+
 HeldField make_field(std::pair<std::size_t, std::size_t> shape, const Sources& ldf, const std::vector<double>& albedo,
                      const std::vector<double>& mean_free_path, std::array<double, 2> pitch, double max_angle,
                      double tolerance, bool is_colored, int threads)
@@ -129,11 +144,7 @@ Array<float> field_luminance(HeldField& held, const HeldSurface& surface, const 
     if (surface.surface.grid.width != plane.width || surface.surface.grid.height != plane.height)
         reject("surface", "of another size", "the size of the field");
     const std::vector<SurfaceLight> lights = lights_of(light_tuples);
-    BakeOptions options;
-    options.samples = samples;
-    options.rays = rays;
-    options.seed = seed;
-    options.threads = threads;
+    const BakeOptions options = options_of(samples, rays, seed, threads);
     Progress report(progress_callback(progress));
     Array<float> result({plane.height, plane.width, held.field->channels()});
     float* data = result.mutable_data();
@@ -146,11 +157,7 @@ py::tuple arrival(const HeldSurface& held, const LightTuples& light_tuples, int 
                   int threads, const py::object& progress)
 {
     const std::vector<SurfaceLight> lights = lights_of(light_tuples);
-    BakeOptions options;
-    options.samples = samples;
-    options.rays = rays;
-    options.seed = seed;
-    options.threads = threads;
+    const BakeOptions options = options_of(samples, rays, seed, threads);
     Progress report(progress_callback(progress));
     Array<float> irradiance = new_vectors(held.surface.grid);
     Array<float> flow = new_vectors(held.surface.grid);

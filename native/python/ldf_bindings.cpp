@@ -14,14 +14,13 @@ Array<float> image(const LdfLibrary& library, double angle, double albedo, std::
                    const std::string& side, double beam_diameter)
 {
     const Side image_of = side_from_name(side);
+    const std::size_t texels_along = image_side(size);
     std::vector<float> texels;
     {
         const py::gil_scoped_release release;
-        texels = make(library, angle, albedo, image_side(size), pitch, image_of, beam_diameter);
+        texels = make(library, angle, albedo, texels_along, pitch, image_of, beam_diameter);
     }
-    Array<float> result({size, size});
-    std::copy(texels.begin(), texels.end(), result.mutable_data());
-    return result;
+    return to_array<float>(std::move(texels), {texels_along, texels_along});
 }
 
 }  // namespace

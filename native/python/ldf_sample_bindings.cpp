@@ -99,29 +99,29 @@ Interpolation method_from_name(const std::string& name)
                                  {"planar", Interpolation::planar}});
 }
 
-LdfSample interpolate_samples(const std::vector<std::shared_ptr<LdfSample>>& samples, double angle, double albedo,
-                              std::optional<double> g, const std::string& method, std::optional<double> height)
+using Samples = std::vector<const LdfSample*>;
+
+void check_samples(const std::string& name, const Samples& samples)
 {
-    std::vector<const LdfSample*> pointers;
-    for (const auto& sample : samples) {
-        if (!sample)
-            reject("samples", "with None", "LdfSamples");
-        pointers.push_back(sample.get());
-    }
-    const Interpolation interpolation = method_from_name(method);
-    const py::gil_scoped_release release;
-    return interpolate(pointers, angle, albedo, g, interpolation, height);
+    if (std::ranges::find(samples, nullptr) != samples.end())
+        reject(name, "with None", "LdfSamples");
 }
 
-std::shared_ptr<SampleSource> sample_source(const std::vector<std::shared_ptr<LdfSample>>& samples,
-                                            const std::string& method)
+LdfSample interpolate_samples(const Samples& samples, double angle, double albedo, std::optional<double> g,
+                              const std::string& method, std::optional<double> height)
 {
+    check_samples("samples", samples);
+    const Interpolation interpolation = method_from_name(method);
+    const py::gil_scoped_release release;
+    return interpolate(samples, angle, albedo, g, interpolation, height);
+}
+
+std::shared_ptr<SampleSource> sample_source(const Samples& samples, const std::string& method)
+{
+    check_samples("ldf", samples);
     std::vector<LdfSample> copies;
-    for (const auto& sample : samples) {
-        if (!sample)
-            reject("ldf", "with None", "LdfSamples");
+    for (const LdfSample* sample : samples)
         copies.push_back(*sample);
-    }
     return std::make_shared<SampleSource>(std::move(copies), method_from_name(method));
 }
 
@@ -188,11 +188,7 @@ OSError
         .def_property_readonly("power", &LdfSample::power,
                                "Power that leaves within the image, per unit incident power.")
         .def_property_readonly(
-            "brightest",
-            [](const LdfSample& self) {
-                const Vec2 point = brightest_point(self);
-                return py::make_tuple(point.x, point.y);
-            },
+            "brightest", [](const LdfSample& self) { return pair(brightest_point(self)); },
             R"(H, the brightest point, (u, v) in mean free paths.
 
 H lies on v = 0, as an LDF is even in v. The image is smoothed until its noise, the part odd in v, is below 1 % of the
@@ -230,7 +226,7 @@ ValueError
 )");
     space
         .def(py::init([](std::array<double, 2> origin, std::array<double, 2> brightest, double height) {
-                 return AngularSpace(Vec2(origin[0], origin[1]), Vec2(brightest[0], brightest[1]), height);
+                 return AngularSpace({origin[0], origin[1]}, {brightest[0], brightest[1]}, height);
              }),
              py::arg("origin"), py::arg("brightest"), py::arg("height"))
         .def("to_angular", &to_angular, py::arg("u"), py::arg("v"),

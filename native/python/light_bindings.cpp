@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "base/constants.h"
-#include "python/vectors.h"
+#include "python/casters.h"
 #include "scene/area_light.h"
 #include "scene/environment_light.h"
 #include "scene/mesh_light.h"
@@ -88,7 +88,10 @@ disk : str
     "even": of even radiance, and 1 W/m^2 at normal incidence, as Cycles in Blender 4.5. "flat": each part of a flat
     disk gives the same flux, as in 3.4; E at normal incidence is smaller, by 1.7 % for an angle of 30 degrees.
 )")
-        .def(py::init(&make_sun), py::arg("direction"), py::arg("angle") = 0.0, py::arg("disk") = "even");
+        .def(py::init(&make_sun), py::arg("direction"), py::arg("angle") = 0.0, py::arg("disk") = "even")
+        .def_readonly_static(
+            "max_parallel_angle", &SunLight::max_parallel_angle,
+            "float: largest angle, radians, of a sun that counts as parallel light but for its shadows.");
 
     py::class_<PointLight, Light>(m, "PointLight", R"(A point lamp of 1 W.
 

@@ -36,7 +36,6 @@ PYBIND11_MODULE(_native, m)
     bind_transport(m);
     bind_image(m);
     bind_scene(m);
-    bind_rays(m);
     bind_solve(m);
     bind_bake(m);
 }

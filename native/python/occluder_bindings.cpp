@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "python/vectors.h"
+#include "python/casters.h"
 #include "scene/occluders.h"
 
 namespace beamspread {

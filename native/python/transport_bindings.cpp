@@ -19,10 +19,8 @@ py::tuple exact(const Medium& medium, const std::vector<double>& angles, const s
         const py::gil_scoped_release release;
         totals = exact_totals(medium, angles, albedos, threads);
     }
-    const auto table = [&](const std::vector<double>& values) {
-        Array<double> array({angles.size(), albedos.size()});
-        std::copy(values.begin(), values.end(), array.mutable_data());
-        return array;
+    const auto table = [&](std::vector<double>& values) {
+        return to_array<double>(std::move(values), {angles.size(), albedos.size()});
     };
     return py::make_tuple(table(totals.reflectance), table(totals.transmittance));
 }

@@ -15,12 +15,12 @@ enum class SunDisk {
     flat,
 };
 
-// Widest sun, radians, whose axis stands for all its directions inside a medium. The error of the luminance grows with
-// the square of the angle: 6e-4 at 80 degrees of incidence, 5e-3 at 85.
-inline constexpr double max_parallel_angle = 2.0 * pi / 180.0;
-
 class SunLight final : public Light {
 public:
+    // Largest angle, radians, of a sun whose axis stands for all its directions inside a medium. The error of the luminance
+    // grows with the square of the angle: 6e-4 at 80 degrees of incidence, 5e-3 at 85.
+    static constexpr double max_parallel_angle = 2.0 * pi / 180.0;
+
     // `direction` of travel from the disk's center, any length but 0; `angle`: full angle of the disk, 0 to pi radians.
     // Throws InvalidArgument.
     explicit SunLight(const Vec3& direction, double angle = 0.0, SunDisk disk = SunDisk::even);

@@ -16,7 +16,7 @@ from beamspread.core.material import Material
 from beamspread.core.native import native
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
-from beamspread.core.scene.lights import WIDEST_SUN, AreaLight, PointLight, SpotLight, SunLight, WorldLight
+from beamspread.core.scene.lights import AreaLight, PointLight, SpotLight, SunLight, WorldLight
 from beamspread.core.scene.occluders import Mesh
 
 SETTINGS = BakeSettings(quality="preview", samples=1, margin=0)
@@ -194,7 +194,9 @@ def test_a_narrow_sun_counts_as_one_direction():
     angle.
     """
     angle = math.radians(75)
-    sun = SunLight("Sun", 1.0, (1.0, 1.0, 1.0), True, (math.sin(angle), 0.0, -math.cos(angle)), WIDEST_SUN)
+    sun = SunLight(
+        "Sun", 1.0, (1.0, 1.0, 1.0), True, (math.sin(angle), 0.0, -math.cos(angle)), native.SunLight.max_parallel_angle
+    )
     one = bake(grid(48), Illumination([sun], WALL), MATERIAL, 0.0, SETTINGS)
     rays = bake(grid(48), Illumination([replace(sun, angle=1.0001 * sun.angle)], WALL), MATERIAL, 0.0, SETTINGS)
     difference = np.abs(one - rays) / rays.mean(axis=(0, 1))

@@ -2,14 +2,13 @@
 
 from .field_light import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight
 from .glowing import MeshLight, WorldLight
-from .lamp_kinds import WIDEST_SUN, AreaLight, PointLight, SpotLight, SunLight
-from .light_base import Light, TracedLight
+from .lamp_kinds import AreaLight, PointLight, SpotLight, SunLight
+from .light_base import Light
 
 __all__ = [
     "DIRECTIONS",
     "STRATA",
     "WEIGHTS",
-    "WIDEST_SUN",
     "AreaLight",
     "Field",
     "FieldLight",
@@ -18,6 +17,5 @@ __all__ = [
     "PointLight",
     "SpotLight",
     "SunLight",
-    "TracedLight",
     "WorldLight",
 ]

@@ -80,6 +80,8 @@ class FieldLight(Light):
     position: Vector | None = None
     direction: Vector | None = None
 
+    has_size = False
+
     @property
     def is_colored(self):
         return True

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...native import native
-from .light_base import TracedLight
+from .light_base import Light
 
 
 @dataclass(frozen=True, eq=False)
-class WorldLight(TracedLight):
+class WorldLight(Light):
     """Light from everywhere, infinitely far away; `strength` is a factor.
 
     Attributes
@@ -40,7 +40,7 @@ class WorldLight(TracedLight):
 
 
 @dataclass(frozen=True, eq=False)
-class MeshLight(TracedLight):
+class MeshLight(Light):
     """Triangles that glow on both sides; `strength` is a factor.
 
     Attributes

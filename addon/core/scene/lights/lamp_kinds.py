@@ -9,15 +9,11 @@ import numpy as np
 
 from ...native import native
 from ..grid import Vector
-from .light_base import TracedLight
-
-# Widest sun, radians, that counts as parallel light but for its shadows. The error of the luminance grows with the
-# square of the angle: 6e-4 at 80 degrees of incidence, 5e-3 at 85.
-WIDEST_SUN = math.radians(2.0)
+from .light_base import Light
 
 
 @dataclass(frozen=True)
-class SunLight(TracedLight):
+class SunLight(Light):
     """Light from a disk infinitely far away; `strength` is the irradiance at normal incidence, W/m^2.
 
     Attributes
@@ -40,7 +36,7 @@ class SunLight(TracedLight):
 
     @property
     def is_parallel(self):
-        return self.angle <= WIDEST_SUN
+        return self.angle <= native.SunLight.max_parallel_angle
 
     has_one_direction = is_parallel
 
@@ -49,7 +45,7 @@ class SunLight(TracedLight):
 
 
 @dataclass(frozen=True)
-class PointLight(TracedLight):
+class PointLight(Light):
     """Light of a ball into all directions; `strength` is Cycles' watts.
 
     Attributes
@@ -80,7 +76,7 @@ class PointLight(TracedLight):
 
 
 @dataclass(frozen=True)
-class SpotLight(TracedLight):
+class SpotLight(Light):
     """A point light behind a cone; `strength` is Cycles' watts, of the whole ball.
 
     Attributes
@@ -108,7 +104,7 @@ class SpotLight(TracedLight):
 
 
 @dataclass(frozen=True)
-class AreaLight(TracedLight):
+class AreaLight(Light):
     """A rectangle or ellipse that shines from its front, of the radiance `strength` / (4 area).
 
     That is Cycles' watts in Blender 3.4; in 4.2 and 4.5 a watt gives strength / (pi area), 4 / pi of it.

@@ -34,19 +34,23 @@ class Light(ABC):
     is_parallel = False
 
     # True if several rays reach a point.
-    has_size = False
+    has_size = True
 
     # True if one direction per texel stands for the light inside a medium.
-    has_one_direction = True
+    has_one_direction = False
 
     @property
     def is_colored(self) -> bool:
         """True if parts of it differ in color."""
         return False
 
-    @abstractmethod
-    def at(self, grid: Grid):
-        """The native light of strength 1 and color 1 that reaches a grid."""
+    def native(self):
+        """The native light of strength 1 and without `color`, where it is the same for all grids."""
+        raise NotImplementedError
+
+    def at(self, _grid: Grid):
+        """The native light of strength 1 and without `color` that reaches a grid."""
+        return self.native()
 
     @abstractmethod
     def is_behind(self, grid: Grid) -> bool:
@@ -73,16 +77,3 @@ class Light(ABC):
         if all(np.isfinite(values).all() and (values >= 0).all() for values in radiance):
             return ""
         return f"The radiance of '{self.name}' has negative values, or values that are not numbers."
-
-
-class TracedLight(Light):
-    """A light whose rays native code traces."""
-
-    has_size, has_one_direction = True, False
-
-    @abstractmethod
-    def native(self):
-        """The native `Light`, of strength 1 and without `color`."""
-
-    def at(self, _grid):
-        return self.native()

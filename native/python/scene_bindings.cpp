@@ -1,9 +1,11 @@
-// Python names of receivers in native/scene: ReceiverGrid, coverage.
+// Python names of receivers and the tracer in native/scene: ReceiverGrid, coverage, gather_rays.
 #include <algorithm>
 #include <memory>
 
-#include "python/vectors.h"
+#include "bake/surface_light.h"
+#include "python/casters.h"
 #include "scene/coverage.h"
+#include "scene/ray_gather.h"
 
 namespace beamspread {
 
@@ -42,6 +44,29 @@ Array<float> coverage(const py::array& corners, const py::array& corner_counts, 
         compute_coverage(points, counts, threads, texels);
     }
     return covered;
+}
+
+py::tuple gather(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, int rays, std::uint32_t seed,
+                 int threads, const py::object& callback, double clearance, int even_rays, int samples,
+                 bool find_shadows)
+{
+    RaySum sum(grid, 3, true);
+    const RaySettings settings{.samples = samples,
+                               .rays = rays,
+                               .even_rays = even_rays,
+                               .seed = seed,
+                               .clearance = clearance,
+                               .threads = threads,
+                               .find_shadows = find_shadows};
+    Progress progress(progress_callback(callback));
+    {
+        const py::gil_scoped_release released;
+        gather_rays(grid, light, occluders, settings, sum, progress);
+    }
+    const auto to_vectors = [&](auto values) {
+        return to_array<float>(std::move(values), {grid.height, grid.width, 3});
+    };
+    return py::make_tuple(to_vectors(std::move(sum.irradiance)), to_vectors(std::move(sum.flow)));
 }
 
 }  // namespace
@@ -96,6 +121,53 @@ Raises
 ------
 ValueError
     An argument is out of range; the message names it.
+)");
+    m.def("gather_rays", &gather, py::arg("grid"), py::arg("light"), py::arg("occluders") = py::none(),
+          py::arg("rays") = 16, py::arg("seed") = 0, py::arg("threads") = 0, py::arg("progress") = py::none(),
+          py::arg("clearance") = 0.0, py::arg("even_rays") = 0, py::arg("samples") = 4, py::arg("find_shadows") = true,
+          R"(Irradiance of a plane by a light, and its mean direction.
+
+Parameters
+----------
+grid : ReceiverGrid
+light : Light
+occluders : Occluders, optional
+    Meshes that cast shadows; None: nothing does.
+rays : int
+    Rays from each texel to a light with a size, 1 to 4096. Where nothing blocks the light, irradiance does not depend on
+    the number, and has no noise.
+seed : int
+    Seed of these rays.
+threads : int
+    0: all. The result is the same, bit for bit, for any number.
+progress : callable, optional
+    progress(fraction) returns False to stop.
+clearance : float
+    Height above the plane where shadow rays start, metres, besides what rounding needs: the largest distance of the
+    receiver's own faces to the plane, where they are among the occluders.
+even_rays : int
+    Rays of a first pass. They are enough in texels that, with their neighbors, see only light or only obstacles; `rays`
+    are traced from all others. 0: no first pass.
+samples : int
+    For a light without a size, samples x samples points in each texel, each with its own visibility; 1 to 64.
+find_shadows : bool
+    False: for a light without a size, rays are traced from every texel, also where none can be blocked or one triangle
+    blocks them all. The result is the same; for measurements.
+
+Returns
+-------
+irradiance : ndarray, float32, shape (height, width, 3)
+    W/m^2: cosine and visible part included. Row 0 is the lowest row.
+flow : ndarray, float32, shape (height, width, 3)
+    Sum over the rays of irradiance, the mean of its channels, times the unit vector of travel in the plane frame
+    (x_axis, y_axis, normal), W/m^2.
+
+Raises
+------
+ValueError
+    An argument is out of range; the message names it.
+Cancelled
+    `progress` returned False.
 )");
 }
 
