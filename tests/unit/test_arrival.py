@@ -6,17 +6,15 @@ from dataclasses import replace
 import beamspread
 import numpy as np
 import pytest
-from beamspread.core.bake.bake_settings import COMBINED, DIRECTION, IRRADIANCE, OUTPUTS, BakeSettings
-from beamspread.core.bake.job import BakeJob
+from beamspread.core.bake.bake_settings import COMBINED, DIRECTION, IRRADIANCE, OUTPUTS
 from beamspread.core.bake.runner import Bake
 from beamspread.core.bake.surface import Surface
 from beamspread.core.material import Material
-from beamspread.core.scene.grid import Grid
-from beamspread.core.scene.illumination import Illumination, Mesh
+from beamspread.core.scene.illumination import Mesh
 from beamspread.core.scene.lights import PointLight, SunLight
-from beamspread.core.scene.receiver import Chart, Receiver
 from beamspread.core.target import Target
 
+from bakes import SETTINGS, bake_job, square
 from helpers import travel
 
 SIZE = 24
@@ -28,18 +26,9 @@ ROOF = Mesh(np.array([[-9, -9, 1], [9, -9, 1], [0, 18, 1]], float), np.array([[0
 ROUNDING = 1e-5
 
 
-def plane(coverage=1.0, normal=(0.0, 0.0, 1.0)):
-    """A square of side 1 in the xy plane around the origin."""
-    covered = np.full((SIZE, SIZE), coverage, np.float32)
-    axes = (1.0, 0.0, 0.0), (0.0, normal[2], 0.0), normal
-    return Grid((-0.5, -0.5 * normal[2], 0.0), *axes, 1 / SIZE, 1 / SIZE, SIZE, SIZE, covered)
-
-
 def job(lights, layer=COMBINED, grid=None, occluders=None, thickness=0.0, material=MATERIAL):
-    grid = grid or plane()
-    receiver = Receiver(grid.coverage, (Chart(grid, grid.coverage),))
-    settings = BakeSettings(quality="preview", samples=2, margin=0, layer=layer)
-    return BakeJob("Plane", receiver, Illumination(lights, occluders), Surface(material, thickness), settings)
+    surface = Surface(material, thickness)
+    return bake_job(lights, occluders, surface, replace(SETTINGS, layer=layer), grid or square(SIZE))
 
 
 def arriving(*lights, **options):
@@ -76,13 +65,15 @@ def test_light_of_several_lights_adds_up_and_its_ways_are_weighed_with_its_power
 def test_axes_are_those_of_the_texture():
     """Seen from below, the rows run the other way."""
     below = replace(SUN, direction=tuple((travel(60, 30) * [1, 1, -1]).tolist()))
-    _, direction = arriving(below, grid=plane(normal=(0.0, 0.0, -1.0)))
+    turned = replace(square(SIZE), origin=(-0.5, 0.5, 0.0), y_axis=(0.0, -1.0, 0.0), normal=(0.0, 0.0, -1.0))
+    _, direction = arriving(below, grid=turned)
     assert direction[3, 5] == pytest.approx(travel(60, 30) * [1, -1, 1], abs=ROUNDING)
 
 
 def test_the_border_of_the_mesh_is_as_bright_as_its_inside():
     """A texel that lies inside by a third shows the light on that third, as renderers' bakes do."""
-    whole, third = arriving(SUN, LAMP), arriving(SUN, LAMP, grid=plane(coverage=1 / 3))
+    part = replace(square(SIZE), coverage=np.full((SIZE, SIZE), 1 / 3, np.float32))
+    whole, third = arriving(SUN, LAMP), arriving(SUN, LAMP, grid=part)
     assert all(np.array_equal(one, other) for one, other in zip(whole, third))
 
 
@@ -157,6 +148,7 @@ def test_a_medium_that_absorbs_all_light_is_not_dark():
     one.run()
     assert not one.texture.any()
     assert not one.is_dark
+    assert not one.messages
 
 
 def test_light_behind_a_slab_is_named():

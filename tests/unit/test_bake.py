@@ -1,55 +1,33 @@
 """The bake of plain data: lights add up, colours and thickness act per channel, progress and cancel work."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import beamspread
 import numpy as np
 import pytest
 from beamspread.core.bake.arrival import arrive, mean_direction
-from beamspread.core.bake.bake_settings import COMBINED, BakeSettings
-from beamspread.core.bake.job import BakeJob, Step
+from beamspread.core.bake.bake_settings import COMBINED
+from beamspread.core.bake.job import BakeJob
 from beamspread.core.bake.layers import LAYERS
 from beamspread.core.bake.luminance import bake
-from beamspread.core.bake.runner import Bake, Sink, run_bakes
 from beamspread.core.bake.surface import Surface
 from beamspread.core.errors import MaterialError
-from beamspread.core.material import Material
-from beamspread.core.messages import warning
 from beamspread.core.native import native
-from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import AreaLight, Light, PointLight, SpotLight, SunLight
 from beamspread.core.scene.occluders import Mesh, Occluder
 from beamspread.core.scene.receiver import Chart, Receiver, build_receiver
 from beamspread.core.scene.uv_map import Polygons, fit_uv_maps
-from beamspread.core.target import Target
 
-SETTINGS = BakeSettings(quality="preview", samples=2, margin=0)
-MATERIAL = Material(albedo=(0.9, 0.9, 0.9), mean_free_path=(0.01, 0.01, 0.01), anisotropy=0.0)
+from bakes import MATERIAL, SETTINGS, bake_job, square
+
 SUN = SunLight("Sun", 2.0, (1.0, 1.0, 1.0), True, (0.0, 0.0, -1.0))
 
 
-def grid(size=24, side=1.0):
-    """A square in the xy plane, centred on the origin."""
-    return Grid(
-        origin=(-side / 2, -side / 2, 0.0),
-        x_axis=(1.0, 0.0, 0.0),
-        y_axis=(0.0, 1.0, 0.0),
-        normal=(0.0, 0.0, 1.0),
-        pitch_x=side / size,
-        pitch_y=side / size,
-        width=size,
-        height=size,
-        coverage=np.ones((size, size), np.float32),
-    )
-
-
 def job(lights, occluders=None, surface=None, settings=SETTINGS, **frame):
-    """A bake of `grid` with its frame changed."""
-    plane = replace(grid(), **frame)
-    receiver = Receiver(plane.coverage, (Chart(plane, plane.coverage),))
-    return BakeJob("Plane", receiver, Illumination(lights, occluders), surface or Surface(MATERIAL), settings)
+    """A bake of a square with its frame changed."""
+    return bake_job(lights, occluders, surface, settings, replace(square(), **frame))
 
 
 def shifted(receiver, distance):
@@ -69,7 +47,7 @@ def reflectance(angle, albedo=0.9, thickness=math.inf):
 
 
 def test_interior_under_a_sun():
-    luminance = bake(grid(), Illumination([SUN]), MATERIAL, 0.0, SETTINGS)
+    luminance = bake(square(), Illumination([SUN]), MATERIAL, 0.0, SETTINGS)
     assert luminance.shape == (24, 24, 3)
     assert luminance.dtype == np.float32
     assert luminance[12, 12] == pytest.approx(reflectance(0) * 2 / math.pi, rel=2e-3)
@@ -78,8 +56,8 @@ def test_interior_under_a_sun():
 def test_lights_add_up_and_colours_stay_apart():
     red = replace(SUN, color=(1.0, 0.0, 0.0))
     blue = replace(SUN, color=(0.0, 0.0, 1.0), direction=(math.sin(0.5), 0.0, -math.cos(0.5)))
-    both = bake(grid(), Illumination([red, blue]), MATERIAL, 0.0, SETTINGS)
-    apart = sum(bake(grid(), Illumination([light]), MATERIAL, 0.0, SETTINGS) for light in (red, blue))
+    both = bake(square(), Illumination([red, blue]), MATERIAL, 0.0, SETTINGS)
+    apart = sum(bake(square(), Illumination([light]), MATERIAL, 0.0, SETTINGS) for light in (red, blue))
     assert both == pytest.approx(apart)
     assert not both[..., 1].any()
     assert both[12, 12, 0] > both[12, 12, 2] > 0
@@ -103,11 +81,11 @@ ROOF = Mesh(np.array([[-9, -9, 1], [9, -9, 1], [0, 18, 1]], float), np.array([[0
 
 def test_receivers_near_each_other_share_the_shadows_of_their_scene():
     under_roof = Illumination([SUN], ROOF)
-    near = under_roof.caster(grid())
+    near = under_roof.caster(square())
     assert near.triangle_count == 1
-    assert under_roof.caster(shifted(grid(), 3.0)) is near
-    assert under_roof.caster(shifted(grid(), 1e4)) is not near
-    assert Illumination([SUN]).caster(grid()) is None
+    assert under_roof.caster(shifted(square(), 3.0)) is near
+    assert under_roof.caster(shifted(square(), 1e4)) is not near
+    assert Illumination([SUN]).caster(square()) is None
 
 
 def test_lights_share_the_shadows_of_their_blockers():
@@ -115,16 +93,16 @@ def test_lights_share_the_shadows_of_their_blockers():
     scene = Illumination([SUN], [Occluder("Roof", ROOF), Occluder("Others", others)])
 
     def count(*names):
-        return scene.caster(grid(), linked(*names)).triangle_count
+        return scene.caster(square(), linked(*names)).triangle_count
 
     def linked(*names):
         return replace(SUN, blockers=frozenset(names))
 
-    assert scene.caster(grid(), SUN).triangle_count == count("Roof", "Others") == 3
+    assert scene.caster(square(), SUN).triangle_count == count("Roof", "Others") == 3
     assert (count("Roof"), count("Others", "Elsewhere")) == (1, 2)
-    assert scene.caster(grid(), linked("Elsewhere")) is None
-    assert scene.caster(grid(), linked("Roof")) is scene.caster(grid(), linked("Roof", "Elsewhere"))
-    assert scene.caster(grid(), SUN) is scene.caster(grid(), linked("Roof", "Others"))
+    assert scene.caster(square(), linked("Elsewhere")) is None
+    assert scene.caster(square(), linked("Roof")) is scene.caster(square(), linked("Roof", "Elsewhere"))
+    assert scene.caster(square(), SUN) is scene.caster(square(), linked("Roof", "Others"))
 
 
 def test_placements_of_one_mesh_stand_in_one_caster():
@@ -132,8 +110,8 @@ def test_placements_of_one_mesh_stand_in_one_caster():
     up[2, 3], aside[0, 3] = 1, 30
     card = Mesh(ROOF.vertices - (0, 0, 1), ROOF.triangles)
     scene = Illumination([SUN], [Occluder("A", card, aside[None]), Occluder("B", card, np.stack([up, aside]))])
-    assert scene.caster(grid()).triangle_count == 3
-    assert not bake(grid(), scene, MATERIAL, 0.0, SETTINGS).any()
+    assert scene.caster(square()).triangle_count == 3
+    assert not bake(square(), scene, MATERIAL, 0.0, SETTINGS).any()
 
 
 @pytest.mark.parametrize("distance", [1e4, 1e6])
@@ -150,7 +128,7 @@ def test_shadows_do_not_drift_far_from_the_world_origin(distance):
     def beams(offset):
         mesh = Mesh(card + offset, np.array([(0, 1, 2)], np.uint32))
         there = replace(lamp, position=tuple(np.array(lamp.position) + offset))
-        receiver = shifted(grid(256), offset)
+        receiver = shifted(square(256), offset)
         return light_beams(receiver, there, mesh, replace(SETTINGS, samples=4))
 
     (here, direction), (there, direction_there) = beams(np.zeros(3)), beams(offset)
@@ -170,7 +148,7 @@ def test_distant_objects_do_not_change_shadows_nearby(distance):
     sun = replace(SUN, direction=(0.3, 0.2, -1.0))
     alone = Mesh(card, np.array([(0, 1, 2)], np.uint32))
     both = [Occluder("", mesh) for mesh in (alone, Mesh(far, np.array([(0, 1, 2)], np.uint32)))]
-    near, wide = (light_beams(grid(256), sun, mesh)[0] for mesh in (alone, both))
+    near, wide = (light_beams(square(256), sun, mesh)[0] for mesh in (alone, both))
     assert (near == 0).any()
     assert np.array_equal(near, wide)
 
@@ -180,14 +158,14 @@ def turned_grid(turn):
     axes, _ = np.linalg.qr(np.random.default_rng(turn).normal(size=(3, 3)))
     x_axis, y_axis, normal = (tuple(axis) for axis in axes)
     origin = tuple(-0.5 * (axes[0] + axes[1]))
-    return replace(grid(), origin=origin, x_axis=x_axis, y_axis=y_axis, normal=normal), axes
+    return replace(square(), origin=origin, x_axis=x_axis, y_axis=y_axis, normal=normal), axes
 
 
 @pytest.mark.parametrize("height", [0.0, 1e-30, 1e-17, 1e-16, 1e-12])
 def test_a_lamp_in_the_plane_adds_nothing(height):
     lamp = PointLight("Lamp", 100.0, (1.0, 1.0, 1.0), True, (0.013, 0.21, height))
-    sun = bake(grid(), Illumination([SUN]), MATERIAL, 0.0, SETTINGS)
-    assert np.array_equal(bake(grid(), Illumination([lamp, SUN]), MATERIAL, 0.0, SETTINGS), sun)
+    sun = bake(square(), Illumination([SUN]), MATERIAL, 0.0, SETTINGS)
+    assert np.array_equal(bake(square(), Illumination([lamp, SUN]), MATERIAL, 0.0, SETTINGS), sun)
 
 
 @pytest.mark.parametrize("kind", ["point", "sun"])
@@ -211,7 +189,7 @@ def test_light_along_a_turned_plane_adds_nothing(kind):
 
 
 def test_no_light():
-    assert not bake(grid(), Illumination([]), MATERIAL, 0.0, SETTINGS).any()
+    assert not bake(square(), Illumination([]), MATERIAL, 0.0, SETTINGS).any()
 
 
 @pytest.mark.parametrize("kind", ["point", "spot"])
@@ -220,41 +198,41 @@ def test_lamp_above_the_centre(kind):
     place = ("Lamp", 100.0, (1.0, 1.0, 1.0), True, (0.0, 0.0, 2.0))
     axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     lamp = PointLight(*place) if kind == "point" else SpotLight(*place, axes, math.radians(120), 0.0)
-    luminance = bake(grid(), Illumination([lamp]), MATERIAL, 0.0, SETTINGS)
+    luminance = bake(square(), Illumination([lamp]), MATERIAL, 0.0, SETTINGS)
     irradiance = 100 / (4 * math.pi * 2**2)
     assert luminance[12, 12] == pytest.approx(reflectance(0) * irradiance / math.pi, rel=0.01)
     assert luminance[12, 4] == pytest.approx(luminance[12, 19], rel=0.01)
 
 
 def test_occluder_and_lamps_without_shadow():
-    assert not bake(grid(), Illumination([SUN], ROOF), MATERIAL, 0.0, SETTINGS).any()
-    free = bake(grid(), Illumination([replace(SUN, cast_shadow=False)], ROOF), MATERIAL, 0.0, SETTINGS)
-    assert free == pytest.approx(bake(grid(), Illumination([SUN]), MATERIAL, 0.0, SETTINGS))
+    assert not bake(square(), Illumination([SUN], ROOF), MATERIAL, 0.0, SETTINGS).any()
+    free = bake(square(), Illumination([replace(SUN, cast_shadow=False)], ROOF), MATERIAL, 0.0, SETTINGS)
+    assert free == pytest.approx(bake(square(), Illumination([SUN]), MATERIAL, 0.0, SETTINGS))
 
 
 def test_thickness_counts_in_mean_free_paths_of_each_channel():
     material = replace(MATERIAL, mean_free_path=(0.01, 0.02, 0.04))
-    luminance = bake(grid(), Illumination([SUN]), material, 0.04, SETTINGS)
+    luminance = bake(square(), Illumination([SUN]), material, 0.04, SETTINGS)
     expected = [reflectance(0, thickness=depth) * 2 / math.pi for depth in (4, 2, 1)]
     assert luminance[12, 12] == pytest.approx(expected, rel=0.01)
 
 
 def test_properties_are_checked_before_anything_runs():
     with pytest.raises(MaterialError, match="albedo"):
-        bake(grid(), Illumination([SUN]), replace(MATERIAL, albedo=(1.0, 0.5, 0.5)), 0.0, SETTINGS)
+        bake(square(), Illumination([SUN]), replace(MATERIAL, albedo=(1.0, 0.5, 0.5)), 0.0, SETTINGS)
     with pytest.raises(MaterialError, match="thickness"):
-        bake(grid(), Illumination([SUN]), MATERIAL, -1.0, SETTINGS)
+        bake(square(), Illumination([SUN]), MATERIAL, -1.0, SETTINGS)
 
 
 def test_progress_rises_to_one_and_can_stop_at_any_time():
     seen = []
-    sun = bake(grid(), Illumination([SUN, SUN]), MATERIAL, 0.0, SETTINGS, lambda done: seen.append(done) or True)
+    sun = bake(square(), Illumination([SUN, SUN]), MATERIAL, 0.0, SETTINGS, lambda done: seen.append(done) or True)
     assert (np.diff(seen) > -1e-9).all()
     assert 0 <= seen[0] <= seen[-1] <= 1
     for moment in (0.0, 0.6, 0.95):
         with pytest.raises(beamspread.Cancelled):
-            bake(grid(), Illumination([SUN, SUN]), MATERIAL, 0.0, SETTINGS, lambda done, m=moment: done < m)
-    assert np.array_equal(bake(grid(), Illumination([SUN, SUN]), MATERIAL, 0.0, SETTINGS), sun)
+            bake(square(), Illumination([SUN, SUN]), MATERIAL, 0.0, SETTINGS, lambda done, m=moment: done < m)
+    assert np.array_equal(bake(square(), Illumination([SUN, SUN]), MATERIAL, 0.0, SETTINGS), sun)
 
 
 def test_most_of_the_progress_is_that_of_rays_where_a_light_has_a_size():
@@ -263,15 +241,8 @@ def test_most_of_the_progress_is_that_of_rays_where_a_light_has_a_size():
     The rays take a second, and each 50 ms have a report.
     """
     area = AreaLight("Area", 10.0, (1.0, 1.0, 1.0), True, (0.0, 0.0, 0.5), np.eye(3), 0.3, 0.3, False, np.pi)
-    seen = []
-    bake(
-        grid(512, side=8.0),
-        Illumination([area]),
-        MATERIAL,
-        0.0,
-        replace(SETTINGS, samples=4),
-        lambda fraction: seen.append(fraction) or True,
-    )
+    seen, settings = [], replace(SETTINGS, samples=4)
+    bake(square(512, 8.0), Illumination([area]), MATERIAL, 0.0, settings, lambda done: seen.append(done) or True)
     assert (np.diff(seen) > -1e-9).all()
     assert len([fraction for fraction in seen if 0.1 < fraction < 0.9]) >= 3
 
@@ -288,7 +259,7 @@ def test_job_works_out_the_albedo_of_a_base_colour():
 
 def test_a_bake_uses_the_anisotropy_of_each_channel():
     material = replace(MATERIAL, anisotropy=0.5, anisotropy_rgb=(0.0, 0.7, 0.0))
-    luminance = bake(grid(), Illumination([SUN]), material, 0.0, SETTINGS)
+    luminance = bake(square(), Illumination([SUN]), material, 0.0, SETTINGS)
     forward = beamspread.library(beamspread.Medium(g=0.7, ior=1.0), quality="preview").reflectance(0, 0.9)
     expected = [value * 2 / math.pi for value in (reflectance(0), forward, reflectance(0))]
     assert luminance[12, 12] == pytest.approx(expected, rel=0.01)
@@ -317,20 +288,6 @@ def test_a_plane_lit_from_the_back_alone_says_so_before_it_is_baked():
     assert job([SUN, in_front], **DOWN).messages() == []
     (none_at_all,) = job([]).messages()
     assert "The scene has no light that can be baked" in none_at_all.text
-
-
-def test_a_bake_that_no_light_reached_says_so_once():
-    def said(one):
-        bake = Bake(Target("Plane"), one)
-        bake.run()
-        return [*map(str, bake.messages)]
-
-    (shadow,) = said(job([SUN], ROOF))
-    assert "No light reaches 'Plane'" in shadow
-    assert said(job([SUN])) == []
-    assert [BEHIND in warning for warning in said(job([SUN], **DOWN))] == [True]
-    # A medium that absorbs all light is black in any light.
-    assert said(job([SUN], surface=Surface(replace(MATERIAL, albedo=(0.0, 0.0, 0.0))))) == []
 
 
 @pytest.mark.parametrize(
@@ -377,7 +334,7 @@ def test_charts_are_baked_apart_on_planes_of_their_own():
     """The left half lies under the sun; the right half is turned by 60 degrees and takes half as much."""
     turned = {"normal": (math.sin(math.pi / 3), 0.0, 0.5), "x_axis": (0.5, 0.0, -math.sin(math.pi / 3))}
     coverage = np.zeros((24, 60), np.float32)
-    planes = [grid(), replace(grid(), **turned, coverage=grid().coverage * np.float32(0.5))]
+    planes = [square(), replace(square(), **turned, coverage=square().coverage * np.float32(0.5))]
     charts = tuple(Chart(plane, plane.coverage, (36 * place, 0)) for place, plane in enumerate(planes))
     for chart in charts:
         chart.part_of(coverage)[:] = chart.coverage
@@ -388,122 +345,6 @@ def test_charts_are_baked_apart_on_planes_of_their_own():
         assert np.array_equal(chart.part_of(texture), alone)
     assert not texture[:, 24:36].any()
     assert texture[12, 48] == pytest.approx(0.25 * reflectance(60) * 2 / math.pi, rel=2e-3)
-
-
-@dataclass(frozen=True)
-class Ends(Step):
-    """Ends a job with a texture or an exception."""
-
-    outcome: object
-
-    name = "Ending"
-
-    def run(self, job, progress):
-        if isinstance(self.outcome, BaseException):
-            raise self.outcome
-        return replace(job, texture=self.outcome)
-
-
-TEXTURE = np.ones((2, 2, 3), np.float32)
-
-
-def ending_job(outcome):
-    illumination = Illumination([SUN], messages=[warning("", "Careful.")])
-    return replace(job([SUN]), illumination=illumination, steps=(Ends(outcome),))
-
-
-@pytest.mark.parametrize(
-    ("outcome", "status", "error"),
-    [
-        (TEXTURE, "written", ""),
-        (ValueError("No."), "failed", "No."),
-        (MemoryError(), "failed", "There is not enough memory. Lower the resolution."),
-        (KeyboardInterrupt(), "cancelled", "The bake was cancelled."),
-        (beamspread.Cancelled(), "cancelled", "The bake was cancelled."),
-    ],
-)
-def test_a_bake_records_its_result(outcome, status, error):
-    stored = []
-    one = Bake(Target("Plane", "Stone"), ending_job(outcome))
-    one.run()
-    one.keep(lambda done: stored.append(done.texture) or "plane.exr")
-    assert (one.status, one.error) == (status, error)
-    assert [texture is TEXTURE for texture in stored] == ([True] if status == "written" else [])
-    assert one.path == ("plane.exr" if status == "written" else "")
-    assert [*map(str, one.messages)] == [*([error] if error else []), "Careful."]
-    assert one.texture is None
-
-
-def test_a_bake_that_cannot_be_stored_has_failed():
-    def full_disk(_bake):
-        raise OSError("no space left")
-
-    one = Bake(Target("Plane"), ending_job(TEXTURE))
-    one.run()
-    one.keep(full_disk)
-    assert (one.status, one.error, one.texture) == ("failed", "no space left", None)
-
-
-def test_a_job_runs_its_steps_in_order():
-    """A step may change the surface and add messages; each has its part of the progress."""
-    before = job([SUN], surface=Surface(MATERIAL, base_color=(0.5,) * 3))
-    fractions, colored = [], Surface(MATERIAL, base_color=(0.3,) * 3)
-
-    class Color(Step):
-        name = "Coloring"
-
-        def weight(self, _job):
-            return 1e6
-
-        def run(self, job, progress):
-            progress(0.0)
-            progress(1.0)
-            illumination = job.illumination.with_messages(warning("", "Paler than it looks."))
-            return replace(job, surface=colored, illumination=illumination)
-
-    bake = Bake(Target("Plane"), replace(before, steps=(Color(), *before.steps)))
-    assert not bake.messages
-    bake.run(fractions.append)
-    assert [*map(str, bake.messages)] == ["Paler than it looks."]
-    assert bake.texture == pytest.approx(replace(before, surface=colored).run().texture)
-    assert fractions[0] == 0
-    assert 0.999 < fractions[1] <= fractions[2]
-    assert fractions == sorted(fractions)
-
-
-def test_no_step_runs_in_the_dark():
-    class Unwanted(Step):
-        def run(self, job, progress):
-            pytest.fail("nothing shows it")
-
-    dark = replace(job([]), steps=(Unwanted(), Unwanted()))
-    assert not dark.run().texture.any()
-
-
-def test_a_run_stores_and_notes_each_bake():
-    class Host(Sink):
-        def __init__(self):
-            self.said = []
-
-        def store(self, bake):
-            self.said.append(("store", str(bake.target)))
-            return "a.exr"
-
-        def end(self, bake):
-            self.said.append((bake.status, str(bake.target)))
-
-    host = Host()
-    jobs = {"First": ending_job(TEXTURE), "Second": ending_job(ValueError("No.")), "Third": None}
-    run_bakes((Bake(Target(name), one, "" if one else "Gone.") for name, one in jobs.items()), host)
-    assert host.said == [("store", "First"), ("written", "First"), ("failed", "Second"), ("failed", "Third")]
-
-
-def test_a_bake_that_ended_before_it_was_cancelled_keeps_nothing():
-    one = Bake(Target("Plane"), ending_job(TEXTURE))
-    one.run()
-    one.cancel()
-    one.keep(lambda _bake: pytest.fail("stored"))
-    assert one.status == "cancelled"
 
 
 def test_albedo_from_color_is_public():

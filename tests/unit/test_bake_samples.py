@@ -10,15 +10,13 @@ from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.luminance import bake
 from beamspread.core.errors import BakeError
 from beamspread.core.ldf.samples import load_source
-from beamspread.core.material import Material
-from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import SunLight
 
-MATERIAL = Material(albedo=(0.9, 0.9, 0.9), mean_free_path=(0.01, 0.01, 0.01), anisotropy=0.0)
+from bakes import MATERIAL, square
+
 SUN = SunLight("Sun", 2.0, (1.0, 1.0, 1.0), True, (0.0, 0.0, -1.0))
-AXES = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-SQUARE = Grid((0.0, 0.0, 0.0), *AXES, 1 / 24, 1 / 24, 24, 24, np.ones((24, 24), np.float32))
+SQUARE = square()
 
 
 @pytest.fixture(scope="module")

@@ -12,17 +12,17 @@ from beamspread.core.bake.surface import Surface
 from beamspread.core.ldf.library import library
 from beamspread.core.material import Material
 from beamspread.core.native import native
-from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight, WorldLight
 from beamspread.core.scene.receiver import Chart, Receiver
+
+from bakes import square
 
 WHITE = 1.0, (1.0, 1.0, 1.0), True
 
 
 def grid_of(height, width, origin=(1.0, 2.0, 3.0)):
-    axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-    return Grid(origin, *axes, 0.1, 0.1, width, height, np.ones((height, width), np.float32))
+    return square(width, 0.1 * width, height, origin)
 
 
 def light_of(grid, radiance):

@@ -14,21 +14,14 @@ from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.luminance import TOLERANCE, bake
 from beamspread.core.material import Material
 from beamspread.core.native import native
-from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import AreaLight, PointLight, SpotLight, SunLight, WorldLight
 from beamspread.core.scene.occluders import Mesh
 
+from bakes import square
+
 SETTINGS = BakeSettings(quality="preview", samples=1, margin=0)
 MATERIAL = Material(albedo=(0.95, 0.9, 0.8), mean_free_path=(0.01, 0.01, 0.005), anisotropy=0.6, ior=1.4)
-
-
-def grid(size, side=1.0):
-    """A square in the xy plane, centred on the origin."""
-    pitch = {"pitch_x": side / size, "pitch_y": side / size}
-    axes = {"x_axis": (1.0, 0.0, 0.0), "y_axis": (0.0, 1.0, 0.0), "normal": (0.0, 0.0, 1.0)}
-    coverage = np.ones((size, size), np.float32)
-    return Grid((-side / 2, -side / 2, 0.0), **axes, **pitch, width=size, height=size, coverage=coverage)
 
 
 def lamps(count, seed=1):
@@ -59,14 +52,14 @@ def relative_error(result, truth):
 @pytest.mark.parametrize("thickness", [0.0, 0.02], ids=["half-space", "slab"])
 def test_as_it_comes_is_as_together(lights, thickness, monkeypatch):
     """Both keep the tolerance, here with all terms: the basis and rounding differ."""
-    arguments = grid(48), Illumination(lights), MATERIAL, thickness, SETTINGS
+    arguments = square(48), Illumination(lights), MATERIAL, thickness, SETTINGS
     together = bake(*arguments)
     assert relative_error(bake_as_it_comes(monkeypatch, *arguments), together) < 0.1 * TOLERANCE
 
 
 def test_terms_are_chosen_for_the_survey(monkeypatch):
     """On planes of more than 192 x 192 texels few terms are kept, for four lamps that stand for all."""
-    arguments = grid(256), Illumination(lamps(12)), MATERIAL, 0.0, SETTINGS
+    arguments = square(256), Illumination(lamps(12)), MATERIAL, 0.0, SETTINGS
     together = bake(*arguments)
     assert relative_error(bake_as_it_comes(monkeypatch, *arguments), together) < 2 * TOLERANCE
 
@@ -74,7 +67,7 @@ def test_terms_are_chosen_for_the_survey(monkeypatch):
 def test_the_number_of_threads_changes_no_bit(monkeypatch):
     results = [
         bake_as_it_comes(
-            monkeypatch, grid(48), Illumination(lamps(5)), MATERIAL, 0.02, replace(SETTINGS, threads=threads)
+            monkeypatch, square(48), Illumination(lamps(5)), MATERIAL, 0.02, replace(SETTINGS, threads=threads)
         )
         for threads in (1, 2, 5)
     ]
@@ -87,7 +80,7 @@ def test_light_between_the_places_of_a_survey_counts(monkeypatch):
     middle = (1.5 / 300, 1.5 / 300, 0.1)  # between texels 96 of which are looked at
     narrow = SpotLight("Narrow", 500.0, (1.0, 1.0, 1.0), True, middle, frame, math.radians(8), 0.0)
     lights = [*lamps(5), narrow]
-    arguments = grid(300), Illumination(lights), MATERIAL, 0.0, SETTINGS
+    arguments = square(300), Illumination(lights), MATERIAL, 0.0, SETTINGS
     together = bake(*arguments)
     result = bake_as_it_comes(monkeypatch, *arguments)
     assert together.max() > 20 * np.median(together)
@@ -96,7 +89,7 @@ def test_light_between_the_places_of_a_survey_counts(monkeypatch):
 
 def test_darkness_stays_dark(monkeypatch):
     behind = replace(lamps(1)[0], position=(0.0, 0.0, -1.0))
-    assert not bake_as_it_comes(monkeypatch, grid(32), Illumination([behind]), MATERIAL, 0.0, SETTINGS).any()
+    assert not bake_as_it_comes(monkeypatch, square(32), Illumination([behind]), MATERIAL, 0.0, SETTINGS).any()
 
 
 ASIDE = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))  # an area light that shines towards -x
@@ -130,7 +123,7 @@ def test_directions_of_a_low_wide_light_are_kept():
     """
 
     def bake_one(lights):
-        return bake(grid(64), Illumination(lights, WALL), MATERIAL, 0.0, replace(SETTINGS, samples=4))
+        return bake(square(64), Illumination(lights, WALL), MATERIAL, 0.0, replace(SETTINGS, samples=4))
 
     truth, whole = bake_one(split(panel(), 10)), bake_one([panel()])
     error = np.abs(whole - truth) / truth.mean(axis=(0, 1))
@@ -147,7 +140,7 @@ def test_solvers_that_take_lights_apart_agree(solver, monkeypatch):
     """
     for name in ("MAX_RAYS", "MIN_RAYS"):
         monkeypatch.setattr(luminance, name, 2)
-    arguments = grid(16), Illumination([sky()], WALL), MATERIAL, 0.0
+    arguments = square(16), Illumination([sky()], WALL), MATERIAL, 0.0
     settings = replace(SETTINGS, samples=4)
     apart = bake(*arguments, replace(settings, solver=solver))
     assert relative_error(bake(*arguments, settings), apart) < 4 * TOLERANCE
@@ -158,7 +151,7 @@ def test_rays_return_unscattered_from_a_slab_as_lights_do(monkeypatch):
     for name in ("MAX_RAYS", "MIN_RAYS"):
         monkeypatch.setattr(luminance, name, 2)
     settings = replace(SETTINGS, samples=4)
-    arguments = grid(8), Illumination([sky()]), replace(MATERIAL, mean_free_path=(0.05, 0.05, 0.05)), 0.01
+    arguments = square(8), Illumination([sky()]), replace(MATERIAL, mean_free_path=(0.05, 0.05, 0.05)), 0.01
     apart = bake(*arguments, replace(settings, solver="direct"))
     assert relative_error(bake(*arguments, settings), apart) < 4 * TOLERANCE
 
@@ -173,7 +166,7 @@ def sky():
 
 def test_light_of_many_colors_and_directions_has_the_power_of_its_parts():
     """A sky over an open plane: beams from everywhere, summed by angle of incidence, against the library itself."""
-    result = bake(grid(48, side=4.0), Illumination([sky()]), MATERIAL, 0.0, SETTINGS)
+    result = bake(square(48, side=4.0), Illumination([sky()]), MATERIAL, 0.0, SETTINGS)
     luminance_in_the_middle = result[16:32, 16:32].mean(axis=(0, 1))
     medium = beamspread.Medium(g=MATERIAL.anisotropy, ior=MATERIAL.ior)
     library = beamspread.library(medium, quality="preview")
@@ -194,18 +187,17 @@ def test_a_narrow_sun_counts_as_one_direction():
     angle.
     """
     angle = math.radians(75)
-    sun = SunLight(
-        "Sun", 1.0, (1.0, 1.0, 1.0), True, (math.sin(angle), 0.0, -math.cos(angle)), native.SunLight.max_parallel_angle
-    )
-    one = bake(grid(48), Illumination([sun], WALL), MATERIAL, 0.0, SETTINGS)
-    rays = bake(grid(48), Illumination([replace(sun, angle=1.0001 * sun.angle)], WALL), MATERIAL, 0.0, SETTINGS)
+    travel, widest = (math.sin(angle), 0.0, -math.cos(angle)), native.SunLight.max_parallel_angle
+    sun = SunLight("Sun", 1.0, (1.0, 1.0, 1.0), True, travel, widest)
+    one = bake(square(48), Illumination([sun], WALL), MATERIAL, 0.0, SETTINGS)
+    rays = bake(square(48), Illumination([replace(sun, angle=1.0001 * sun.angle)], WALL), MATERIAL, 0.0, SETTINGS)
     difference = np.abs(one - rays) / rays.mean(axis=(0, 1))
     assert 0 < difference.mean() < 2e-3
 
 
 def test_a_black_medium_stays_black():
     black = replace(MATERIAL, albedo=(0.0, 0.0, 0.0))
-    assert not bake(grid(32), Illumination([sky(), panel()], WALL), black, 0.0, SETTINGS).any()
+    assert not bake(square(32), Illumination([sky(), panel()], WALL), black, 0.0, SETTINGS).any()
 
 
 def test_colored_glass_colors_light_of_a_size():
@@ -215,7 +207,7 @@ def test_colored_glass_colors_light_of_a_size():
     glass = Mesh(pane, faces, (native.Transmittance(color),), np.zeros(2, np.uint32))
     for light in (panel(0.3, (0.4, 0.0, 0.6)), sky()):
         dimmed, whole = (
-            bake(grid(24), Illumination([light], mesh), MATERIAL, 0.0, replace(SETTINGS, samples=4))
+            bake(square(24), Illumination([light], mesh), MATERIAL, 0.0, replace(SETTINGS, samples=4))
             for mesh in (glass, None)
         )
         assert dimmed.mean(axis=(0, 1)) == pytest.approx(whole.mean(axis=(0, 1)) * color, rel=2e-2)
@@ -223,19 +215,19 @@ def test_colored_glass_colors_light_of_a_size():
 
 MEMORY = """
 import sys
-sys.path.insert(0, sys.argv[2])
+sys.path[:0] = sys.argv[2:]
 from test_light_field import *
 luminance.MAX_STORED_BYTES = 0
-bake(grid(512), Illumination(lamps(int(sys.argv[1]))), MATERIAL, 0.0, SETTINGS)
+bake(square(512), Illumination(lamps(int(sys.argv[1]))), MATERIAL, 0.0, SETTINGS)
 print([line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM")][0])
 """
 
 
 def test_memory_does_not_grow_with_the_lights():
     """65 lamps more would take 65 MiB on 512 x 512 texels if their light waited; that of terms differs."""
-    folder = str(Path(__file__).parent)
+    folders = [str(folder) for folder in Path(__file__).parents[:2]]
     peaks = [
-        int(subprocess.run([sys.executable, "-c", MEMORY, count, folder], capture_output=True, check=True).stdout)
+        int(subprocess.run([sys.executable, "-c", MEMORY, count, *folders], capture_output=True, check=True).stdout)
         for count in ("20", "85")
     ]
     assert peaks[1] - peaks[0] < 32 * 1024

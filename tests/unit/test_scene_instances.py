@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from _native_test import instance_count
 from beamspread.core.native import native
-from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import PointLight, SunLight
 from beamspread.core.scene.occluders import Mesh, Occluder
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bakes import square
 from helpers import gather_beams
 from shapes import make_grid, occluders, sphere
 
@@ -95,11 +95,6 @@ def test_flat_and_small_ones_are_copied():
     assert (lit[distance > 1.13] == 1).all()
 
 
-def plane_grid(size):
-    axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-    return Grid((-1.0, -1.0, 0.0), *axes, 2 / size, 2 / size, size, size, np.ones((size, size), np.float32))
-
-
 def test_ten_million_triangles_of_instances_cost_no_seconds_per_light():
     """A thousand spheres of ten thousand triangles; two cores under load took .1 s."""
     vertices, triangles, _ = sphere(72)
@@ -107,7 +102,7 @@ def test_ten_million_triangles_of_instances_cost_no_seconds_per_light():
     places = placements(rng, 1000, 1.0).reshape(-1, 3, 4)
     places[..., :3] *= 0.2
     scene = Illumination([], [Occluder("Spheres", Mesh(vertices, triangles), places)])
-    grid = plane_grid(64)
+    grid = square(64, 2.0)
     start = time.process_time()
     caster = scene.caster(grid)
     assert (instance_count(caster), caster.triangle_count) == (1000, 1000 * len(triangles))

@@ -6,18 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from beamspread.core.bake.arrival import arrive
-from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.luminance import bake
 from beamspread.core.material import Material
-from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import AreaLight, PointLight, SunLight
 from beamspread.core.scene.receiver import Chart, Receiver, build_receiver
 from beamspread.core.scene.texture import mean_color, textured
 from beamspread.core.scene.uv_map import Polygons, fit_uv_maps
 
+from bakes import SETTINGS, square
+
 SIZE = 24
-SETTINGS = BakeSettings(quality="preview", samples=2, margin=0)
 MATERIAL = Material(albedo=(0.9, 0.8, 0.7), mean_free_path=(0.02, 0.02, 0.02), anisotropy=0.0)
 AXES = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 COMMON = ("Light", 2.0, (1.0, 0.5, 2.0), True)
@@ -31,8 +30,7 @@ RANDOM = np.random.default_rng(1)
 
 @pytest.fixture
 def grid():
-
-    return Grid((-0.5, -0.5, 0.0), *AXES, 1 / SIZE, 1 / SIZE, SIZE, SIZE, np.ones((SIZE, SIZE), np.float32))
+    return square(SIZE)
 
 
 def luminance(grid, light, **settings):
