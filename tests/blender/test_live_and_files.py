@@ -41,6 +41,10 @@ def reopen(folder, name="scene.blend"):
     return bpy.data.materials["Medium"]
 
 
+def all_spaces():
+    return [space for screen in bpy.data.screens for area in screen.areas for space in area.spaces]
+
+
 def make_baked_scene():
     """A baked plane whose light has changed since, so that Live shows something else."""
     plane, lamp, material = make_scene()
@@ -119,9 +123,11 @@ def test_paint_is_saved_with_the_image_and_stays_through_live(tmp_path):
 
 
 def test_live_rests_while_textures_are_painted_and_shows_the_own_image():
-    """Strokes go to the image that the node's inner tree shows."""
+    """Strokes go to the image that the node's inner tree shows, and Blender gives that to Image Editors."""
     plane, lamp, material, baked = make_baked_scene()
     image = scenes.node_of(material).image
+    editor = next(space for space in all_spaces() if space.type == "IMAGE_EDITOR")
+    editor.image = shown_image(material)
     scenes.select(plane)
     bpy.ops.object.mode_set(mode="TEXTURE_PAINT")
     lamp.data.energy = 5
@@ -129,6 +135,8 @@ def test_live_rests_while_textures_are_painted_and_shows_the_own_image():
         timer.step(bpy.context)
         bpy.context.view_layer.update()
     assert list(material.texture_paint_images) == [image]
+    assert editor.image == image
+    assert not any(image.is_dirty for image in bpy.data.images)
     assert shown_image(material) == image
     np.testing.assert_array_equal(shown_pixels(material), baked)
     draw(image)

@@ -112,8 +112,13 @@ class Preview:
         self._former_name = ""
 
     def hide(self) -> None:
-        """Have inner trees show the nodes' own images."""
-        _show_own_images(self.names())
+        """Have inner trees show the nodes' own images, and Image Editors, which Texture Paint gives a tree's image."""
+        names = self.names()
+        _show_own_images(names)
+        spaces = (space for screen in bpy.data.screens for area in screen.areas for space in area.spaces)
+        for space in spaces:
+            if space.type == "IMAGE_EDITOR" and space.image is not None and space.image.name in names:
+                space.image = getattr(self._node(), "image", None)
 
     def remove(self) -> None:
         """Hide the preview and remove its hidden images."""

@@ -141,6 +141,8 @@ class Session:
             self._is_resting = True
             self._targets = []
             self._thread.show(())
+            for preview in self._previews.values():
+                preview.mark_saved()
         return True
 
     def step(self, context) -> bool:
