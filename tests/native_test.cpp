@@ -146,8 +146,6 @@ A subset of "avx512", "avx2" and "baseline". An empty `instruction_set` of the f
           "Transforms of lines of complex values, complex64 (N, size), by e^-i, or backward by e^i; both are plain "
           "sums.");
 
-    m.def("fresnel", py::vectorize(&fresnel), py::arg("cos_theta_i"), py::arg("eta"),
-          "Reflectance of unpolarized light; eta is the index behind the boundary over the index before it.");
     m.def("henyey_greenstein_pdf", py::vectorize(&henyey_greenstein_pdf), py::arg("cos_theta"), py::arg("g"),
           "Density per steradian of a deflection.");
     m.def("henyey_greenstein_sample", py::vectorize(&henyey_greenstein_sample), py::arg("g"), py::arg("u"),

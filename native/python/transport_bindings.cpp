@@ -65,6 +65,8 @@ ValueError
         .def(py::pickle(
             [](const Medium& a) { return py::make_tuple(a.g, a.ior, a.thickness); },
             [](const py::tuple& t) { return Medium{t[0].cast<double>(), t[1].cast<double>(), t[2].cast<double>()}; }));
+    m.def("fresnel", py::vectorize(&fresnel), py::arg("cos_theta_i"), py::arg("eta"),
+          "Reflectance of unpolarized light; eta is the index behind the boundary over the index before it.");
 }
 
 void bind_transport(py::module_& m)

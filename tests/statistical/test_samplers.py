@@ -3,6 +3,7 @@
 import _native_test
 import numpy as np
 import pytest
+from beamspread.core.native import native
 
 # Quantile of chi-square with 39 degrees of freedom at 1 - .01 / 7 (Sidak, seven values of g).
 CHI2_LIMIT = 70.9
@@ -24,13 +25,13 @@ def test_henyey_greenstein(g):
 
 def test_fresnel():
     """Normal incidence, Brewster's angle, total reflection and grazing: the formula's known values."""
-    assert _native_test.fresnel(1.0, 1.5) == pytest.approx(0.04)
+    assert native.fresnel(1.0, 1.5) == pytest.approx(0.04)
     brewster = np.cos(np.arctan(1.5))
     r_s = ((1 - 1.5**2) / (1 + 1.5**2)) ** 2
-    assert _native_test.fresnel(brewster, 1.5) == pytest.approx(r_s / 2)
-    assert _native_test.fresnel(0.7, 1 / 1.5) == 1
-    assert _native_test.fresnel(0.0, 1.5) == pytest.approx(1)
-    assert _native_test.fresnel(0.3, 1.0) == 0
+    assert native.fresnel(brewster, 1.5) == pytest.approx(r_s / 2)
+    assert native.fresnel(0.7, 1 / 1.5) == 1
+    assert native.fresnel(0.0, 1.5) == pytest.approx(1)
+    assert native.fresnel(0.3, 1.0) == 0
     theta = np.radians(40)
     inside = np.cos(np.arcsin(np.sin(theta) / 1.5))
-    assert _native_test.fresnel(inside, 1 / 1.5) == pytest.approx(_native_test.fresnel(np.cos(theta), 1.5))
+    assert native.fresnel(inside, 1 / 1.5) == pytest.approx(native.fresnel(np.cos(theta), 1.5))

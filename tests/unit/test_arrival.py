@@ -101,7 +101,7 @@ def no_simulation(*_arguments, **_options):
 @pytest.fixture
 def without_media(monkeypatch):
     """Loading an LDF fails."""
-    monkeypatch.setattr("beamspread.core.bake.luminance.library", no_simulation)
+    monkeypatch.setattr("beamspread.core.bake.layers.library", no_simulation)
     monkeypatch.setattr("beamspread.core.ldf.albedo.library", no_simulation)
 
 

@@ -6,11 +6,10 @@ from dataclasses import replace
 import beamspread
 import numpy as np
 import pytest
-from beamspread.core.bake.arrival import arrive, mean_direction
 from beamspread.core.bake.bake_settings import COMBINED
 from beamspread.core.bake.job import BakeJob
-from beamspread.core.bake.layers import LAYERS
-from beamspread.core.bake.luminance import bake
+from beamspread.core.bake.layers import LAYERS, arrive, bake, mean_direction
+from beamspread.core.bake.steps import BAKE_STEPS
 from beamspread.core.bake.surface import Surface
 from beamspread.core.errors import MaterialError
 from beamspread.core.native import native
@@ -338,7 +337,7 @@ def test_charts_are_baked_apart_on_planes_of_their_own():
     charts = tuple(Chart(plane, plane.coverage, (36 * place, 0)) for place, plane in enumerate(planes))
     for chart in charts:
         chart.part_of(coverage)[:] = chart.coverage
-    whole = BakeJob("Plane", Receiver(coverage, charts), Illumination([SUN]), Surface(MATERIAL), SETTINGS)
+    whole = BakeJob("Plane", Receiver(coverage, charts), Illumination([SUN]), Surface(MATERIAL), SETTINGS, BAKE_STEPS)
     texture = whole.run().texture
     for chart, plane in zip(charts, planes):
         alone = bake(plane, Illumination([SUN]), MATERIAL, 0.0, SETTINGS)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from beamspread import LdfSample, Medium, simulate
 from beamspread.core.bake.bake_settings import BakeSettings
-from beamspread.core.bake.luminance import bake
+from beamspread.core.bake.layers import bake
 from beamspread.core.errors import BakeError
-from beamspread.core.ldf.samples import load_source
+from beamspread.core.ldf.library import load_source
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import SunLight
 

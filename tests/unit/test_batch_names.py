@@ -1,6 +1,6 @@
 """Names of the batch's files: safe, distinct, and of the things alone, not of their order."""
 
-from beamspread.core.batch.names import file_stems, stem
+from beamspread.core.disk import file_stems, stem
 
 
 def test_letters_that_every_file_system_takes():

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from beamspread.core.exr_header import is_half, text_of
+from beamspread.core.disk import is_half, text_of
 from beamspread.core.native import native
 from hypothesis import example, given, settings
 from hypothesis import strategies as st

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from beamspread.core.bake.arrival import arrive
 from beamspread.core.bake.bake_settings import IRRADIANCE, BakeSettings
-from beamspread.core.bake.job import BakeJob, Solve, Step
-from beamspread.core.bake.luminance import bake
+from beamspread.core.bake.job import BakeJob
+from beamspread.core.bake.layers import arrive, bake
+from beamspread.core.bake.steps import Solve, Step
 from beamspread.core.bake.surface import Surface
 from beamspread.core.ldf.library import library
 from beamspread.core.material import Material

@@ -10,6 +10,7 @@ import pytest
 from beamspread import Medium, library
 from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.job import BakeJob
+from beamspread.core.bake.steps import BAKE_STEPS
 from beamspread.core.bake.surface import Surface
 from beamspread.core.live import library_service
 from beamspread.core.live.library_service import LibraryService
@@ -255,7 +256,7 @@ def test_quick_renderings_have_all_detail_of_a_texture(blur, renderer):
     assert textured.key != plain.key
     assert textured.key != replace(textured, texture=replace(texture, blur=1.0)).key
     quick, exact = renderer.quick(textured, 64), renderer.exact(textured)
-    job = BakeJob("Floor", texture.on(receiver), textured.illumination, textured.surface, textured.settings)
+    job = BakeJob("Floor", texture.on(receiver), textured.illumination, textured.surface, textured.settings, BAKE_STEPS)
     np.testing.assert_allclose(exact.texture, job.run().texture, rtol=1e-4, atol=1e-6)
     total, worst = errors_of(quick, exact)
     assert total < (0.01 if blur == 0 else 0.05)

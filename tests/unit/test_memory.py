@@ -13,6 +13,7 @@ from dataclasses import replace
 import beamspread
 import numpy as np
 from beamspread.core.bake.job import BakeJob
+from beamspread.core.bake.steps import BAKE_STEPS
 from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.surface import Surface
 from beamspread.core.errors import BakeError
@@ -47,7 +48,7 @@ def status(key):
 open("/proc/self/clear_refs", "w").write("5")  # the peak is that of now
 before = status("VmRSS")
 lights = Illumination([made[name] for name in names])
-job = BakeJob("Plane", build_receiver(square, size, size), lights, surface, settings)
+job = BakeJob("Plane", build_receiver(square, size, size), lights, surface, settings, BAKE_STEPS)
 job.run()
 peak = status("VmHWM") - before
 job = replace(job, settings=replace(settings, memory_limit=int(allowed * peak)))

@@ -3,8 +3,7 @@
 import os
 
 import pytest
-from beamspread.core.batch.report import BakeRecord, Report
-from beamspread.core.batch.resume import PreviousReport
+from beamspread.core.batch.report import BakeRecord, PreviousReport, Report
 
 SAVED = 1000.0
 

@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from beamspread.core.bake.arrival import arrive
-from beamspread.core.bake.luminance import bake
+from beamspread.core.bake.layers import arrive, bake
 from beamspread.core.material import Material
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import AreaLight, PointLight, SunLight

@@ -8,14 +8,14 @@ import time
 from contextlib import suppress
 
 import pytest
-from beamspread.core import whole_file as module
-from beamspread.core.whole_file import whole_file
+from beamspread.core import disk as module
+from beamspread.core.disk import whole_file
 
 from full_disk import full_after
 
 WRITER = """
 import os, signal, time
-from beamspread.core.whole_file import whole_file
+from beamspread.core.disk import whole_file
 with whole_file({path!r}) as temporary:
     temporary.write_text("half")
     print(temporary.name, flush=True)

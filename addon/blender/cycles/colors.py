@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...core.bake.job import BakeJob, Step
+from ...core.bake.job import BakeJob
 from ...core.bake.margin import extend_margin
+from ...core.bake.steps import Step
 from ...core.bake.surface import Surface
 from ...core.errors import BakeError, text_of
 from ...core.messages import warning

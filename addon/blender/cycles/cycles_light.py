@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...core.bake.arrival import mean_open_irradiance
-from ...core.bake.job import BakeJob, Step
+from ...core.bake.job import BakeJob
+from ...core.bake.layers import mean_open_irradiance
+from ...core.bake.steps import Step
 from ...core.errors import MaterialError, MissingImageError
 from ...core.messages import Message, warning
 from ...core.progress import Callback, Progress

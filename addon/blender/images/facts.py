@@ -15,7 +15,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...core.bake.runner import Bake
-from ...core.exr_header import text_of
+from ...core.disk import text_of
 from ...core.messages import Level, Message, note, warning
 from ...core.target import Target
 from ..node.find import targets_of

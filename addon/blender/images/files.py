@@ -10,10 +10,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ...core.disk import is_half, text_of, whole_file
 from ...core.errors import ImageError
-from ...core.exr_header import is_half, text_of
 from ...core.native import native
-from ...core.whole_file import whole_file
 from .. import compat
 from ..read.image_nodes import from_srgb
 from . import icons, undo

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ...core.bake.runner import Bake
-from ...core.batch.names import stem
+from ...core.disk import stem
 from ...core.errors import ImageError
 from ...core.messages import Message, warning
 from ...core.target import Target

@@ -10,7 +10,7 @@ from ...core.bake.bake_settings import COMBINED, DIRECTION
 from ...core.bake.layers import LAYERS
 from ...core.bake.runner import Bake
 from ...core.batch.batch_options import BatchOptions
-from ...core.batch.names import file_stems
+from ...core.disk import file_stems
 from ...core.errors import ImageError
 from ...core.target import Target
 from ..node.find import find_targets, image_of

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import math
+import os
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..errors import BakeError
-from ..ldf.library import SIMULATING, is_known, library
 from ..messages import Message, warning
 from ..progress import Callback, Progress, timed
 from ..scene.illumination import Illumination
 from ..scene.receiver import Receiver
 from ..scene.texture import BaseColor, textured
 from .bake_settings import COMBINED, BakeSettings
-from .layers import LAYERS, WITHOUT_MEDIUM
-from .margin import extend_margin
-from .memory import NARROW, SUNS, WIDE, bake_bytes, machine_bytes, pass_bytes
+from .layers import WITHOUT_MEDIUM
 from .surface import Surface
 
 
@@ -51,59 +48,6 @@ class Step(ABC):
         return 0.0
 
 
-@dataclass(frozen=True)
-class Simulate(Step):
-    """Simulates the media of the surface, and caches them."""
-
-    name = "Simulating the material"
-
-    def weight(self, job: BakeJob) -> float:
-        return 4.0 if to_simulate(job.surface, job.settings) else 0.0
-
-    def stage(self, job: BakeJob) -> str:
-        return SIMULATING[job.settings.quality]
-
-    def run(self, job: BakeJob, progress: Progress) -> BakeJob:
-        media, settings = to_simulate(job.surface, job.settings), job.settings
-        for medium, part in zip(media, progress.split([1.0] * len(media))):
-            library(medium, settings.quality, part, settings.threads)
-        return job
-
-
-@dataclass(frozen=True)
-class Solve(Step):
-    """Computes the result from the light and the surface."""
-
-    name = "Baking"
-
-    def run(self, job: BakeJob, progress: Progress) -> BakeJob:
-        material, settings = job.surface.material, job.settings
-        if needs_medium(settings):
-            material = job.surface.resolve(settings.quality, None, settings.threads)
-        rest = material, job.surface.thickness, settings
-        charts = job.receiver.charts
-        values = [
-            LAYERS[settings.layer](chart.grid, job.illumination, *rest, part, job.bytes_for_light())
-            for chart, part in zip(charts, progress.split([1.0] * len(charts)))
-        ]
-        if not all(np.isfinite(on_grid).all() for on_grid in values):
-            text = "The bake produced values that are not numbers."
-            raise BakeError(text, "Check the strengths of the lights.")
-        texture = job.receiver.to_texture(values)
-        del values  # large
-        return replace(job, texture=extend_margin(texture, job.receiver.coverage, settings.margin))
-
-    def memory_bytes(self, job: BakeJob) -> float:
-        texels, lights, surface = job.receiver.coverage.size, job.illumination.lights, job.surface
-        if not needs_medium(job.settings):
-            return pass_bytes(texels)
-        is_narrow = not job.finds_light and all(light.has_one_direction for light in lights)
-        kind = (SUNS if all(light.is_parallel for light in lights) else NARROW) if is_narrow else WIDE
-        is_slab = surface.thickness > 0 and surface.material.ior > 1
-        paths = surface.thickness / max(surface.material.mean_free_path) if is_slab else math.inf
-        return bake_bytes(texels, job.settings.solver, kind, paths)
-
-
 @dataclass(frozen=True, eq=False)
 class BakeJob:
     """A receiver with its light, its surface, and the steps that are left.
@@ -122,7 +66,7 @@ class BakeJob:
     illumination: Illumination
     surface: Surface
     settings: BakeSettings
-    steps: tuple[Step, ...] = (Simulate(), Solve())
+    steps: tuple[Step, ...]
     texture: np.ndarray | None = None
 
     def run(self, progress: Callback | None = None) -> BakeJob:
@@ -152,13 +96,18 @@ class BakeJob:
         """True if a step that is left may add lights."""
         return any(step.finds_light for step in self.steps)
 
+    @property
+    def memory_limit(self) -> int:
+        """Memory that a step may take, bytes: the limit of the settings, or all of the machine's; 0 if unknown."""
+        return self.settings.memory_limit or machine_bytes()
+
     def memory_bytes(self) -> float:
         """Peak memory, bytes, about, without the light that is kept, the host and other processes."""
         return max(step.memory_bytes(self) for step in self.steps)
 
     def check_memory(self) -> None:
         """Raise BakeError if a step would take more memory than the limit of the settings, or than the machine has."""
-        limit = self.settings.memory_limit or machine_bytes()
+        limit = self.memory_limit
         largest = max(self.steps, key=lambda step: step.memory_bytes(self))
         needed = largest.memory_bytes(self)
         if limit and needed > limit:
@@ -168,11 +117,6 @@ class BakeJob:
                 "are allowed.",
                 "Lower the resolution, or raise the memory limit in the add-on's preferences.",
             )
-
-    def bytes_for_light(self) -> int:
-        """Memory that is left for the light that the fft solver keeps, bytes; 0: no limit."""
-        limit = self.settings.memory_limit or machine_bytes()
-        return max(1, int(limit - Solve().memory_bytes(self))) if limit else 0
 
     def messages(self) -> list[Message]:
         """Messages for the artist before the job runs."""
@@ -224,14 +168,9 @@ class BakeJob:
         return [warning(self.name, text, "Look for objects that block the light.")]
 
 
-def needs_medium(settings: BakeSettings) -> bool:
-    """True if the result depends on the material."""
-    return settings.layer not in WITHOUT_MEDIUM
-
-
-def to_simulate(surface: Surface, settings: BakeSettings) -> list:
-    """The media that a bake has to simulate first, which takes long."""
-    uses_library = settings.distributions == "library" or surface.base_color is not None
-    if not (needs_medium(settings) and uses_library):
-        return []
-    return [medium for medium in surface.media() if not is_known(medium, settings.quality)]
+def machine_bytes() -> int:
+    """Memory of the machine, bytes; 0 if it can't be asked."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return 0

@@ -1,18 +1,186 @@
-"""The results that a bake can have. Each is a function of the light on a grid, and a line in `LAYERS`."""
+"""Layers: the results that a bake can have, each a function of the light on a grid, and a line in `LAYERS`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from ..material import Material
-from ..progress import Progress
-from ..scene.grid import Grid
+from ..errors import BakeError
+from ..ldf.library import library, load_source
+from ..material import Material, check_thickness
+from ..native import native
+from ..progress import Callback, Progress
 from ..scene.illumination import Illumination
-from .arrival import arrive, mean_direction
+from ..scene.lights import Light
+from ..scene.receiver import Grid
 from .bake_settings import COMBINED, DIRECTION, IRRADIANCE, BakeSettings
-from .luminance import bake
+from .surface import channel_media
+
+# Fraction of a bake's time that loading known libraries takes.
+LIBRARY_PART = 0.05
+
+# Largest relative error of a texel by the solver, see `convolve`. Larger: faster. Half a per cent is invisible.
+TOLERANCE = 5e-3
+
+# Rays from each texel to a light of a size at least, and to all of them together at 4 x 4 samples at most. More: less
+# noise, longer bakes.
+MIN_RAYS, MAX_RAYS = 8, 1024
+
+# Bytes of irradiance that are stored until the solver sees all lights, see `bake_luminance`.
+MAX_STORED_BYTES = 512 << 20
+
+# Rays of irradiance and direction to a light of a size, for each sample of a texel and for a texel at most. More: less
+# noise in penumbras, which no medium blurs.
+RAYS_PER_SAMPLE, MAX_PASS_RAYS = 4, 4096
+
+# Texels along a side, and rays from each, where nothing blocks the light.
+OPEN_TEXELS, OPEN_RAYS = 96, 4
+
+
+def bake(
+    grid: Grid,
+    illumination: Illumination,
+    material: Material,
+    thickness: float,
+    settings: BakeSettings,
+    progress: Callback | None = None,
+    bytes_for_light: int = 0,
+) -> np.ndarray:
+    """Luminance of a translucent plane.
+
+    Parameters
+    ----------
+    grid : the plane that light arrives on, scene units.
+    material : its mean free path is in the units of the grid.
+    thickness : in the units of the grid, 0 for a half-space.
+    progress : called with 0..1, returns False to stop.
+    bytes_for_light : largest memory, bytes, of the moments that the fft solver makes of light; 0: any.
+
+    Returns
+    -------
+    float32 (grid.height, grid.width, 3), exitance / pi in W/(m^2 sr), row 0 at the bottom.
+
+    Raises
+    ------
+    MaterialError
+        A property outside its range.
+    BakeError
+        Samples that are missing, damaged, or don't reach the albedos and angles of the scene; light that takes more
+        memory.
+    Cancelled
+        `progress` returned False.
+    """
+    material.check()
+    check_thickness(thickness)
+    media_progress, light_progress = Progress.of(progress).split([LIBRARY_PART, 1.0 - LIBRARY_PART])
+    if settings.distributions == "library":
+        sources = _libraries(material, thickness, settings, media_progress)
+    else:
+        sources = [load_source(settings.sample_folder, settings.distributions)] * 3
+    return spread(grid, illumination, material, sources, settings, light_progress, bytes_for_light)
+
+
+def spread(
+    grid: Grid,
+    illumination: Illumination,
+    material: Material,
+    sources: list,
+    settings: BakeSettings,
+    progress: Callback | None = None,
+    bytes_for_light: int = 0,
+    seed: int = 0,
+) -> np.ndarray:
+    """`bake` with the LDF of each channel given; the material is checked, and `settings.quality` does not count."""
+    try:
+        return native.bake_luminance(
+            grid.surface(),
+            illumination.native_lights(grid),
+            sources,
+            material.albedo,
+            material.mean_free_path,
+            settings.solver,
+            TOLERANCE,
+            samples=settings.samples,
+            rays=rays_per_texel(grid, material, settings),
+            min_rays=MIN_RAYS,
+            seed=seed,
+            threads=settings.threads,
+            max_stored_bytes=MAX_STORED_BYTES,
+            memory_limit=bytes_for_light,
+            progress=progress,
+        )
+    except native.MemoryLimit as error:
+        raise BakeError(
+            f"{grid.width} x {grid.height} texels are too many: {error}.",
+            "Lower the resolution, or raise the memory limit in the add-on's preferences.",
+        ) from error
+    except ValueError as error:
+        if settings.distributions == "library":
+            raise
+        raise BakeError(f"The LDF samples in '{settings.sample_folder}' don't reach this far: {error}.") from error
+
+
+def rays_per_texel(grid: Grid, material: Material, settings: BakeSettings) -> int:
+    """How many rays of each texel leave noise of a hundredth, in a penumbra, of what the medium spreads.
+
+    Light from a point fills some 4 pi l^2 texels, l the mean free path, over whose rays its noise is averaged; that of
+    n low-discrepancy rays falls about as n^-5/8, from .69 for one (tests/bench/room.py).
+    """
+    path = min(material.mean_free_path) / max(grid.pitch_x, grid.pitch_y)
+    texels = 1.0 + 4.0 * math.pi * path**2
+    wanted = (69.0 / math.sqrt(texels)) ** (8.0 / 5.0)
+    return round(min(max(wanted, MIN_RAYS), MAX_RAYS) * (settings.samples / 4) ** 2) or 1
+
+
+def _libraries(material: Material, thickness: float, settings: BakeSettings, progress: Progress) -> list:
+    """The LDF library of each channel; channels of the same medium share one."""
+    media = channel_media(material, thickness)
+    libraries = dict.fromkeys(media)
+    for medium, stage in zip(libraries, progress.split([1.0] * len(libraries))):
+        libraries[medium] = library(medium, settings.quality, stage, settings.threads)
+    return [libraries[medium] for medium in media]
+
+
+def arrive(
+    grid: Grid, illumination: Illumination, settings: BakeSettings, progress: Progress | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Light of all lights on the whole of each texel, whatever part of it lies inside the mesh.
+
+    Returns
+    -------
+    irradiance : float32 (H, W, 3), W/m^2 on the surface, cosine and visibility included.
+    flow : float32 (H, W, 3), sum over the light of its irradiance, the mean of the channels, times the unit vector
+        along which it travels, in the plane's frame. Its direction is the mean one.
+    """
+    return native.bake_arrival(
+        grid.surface(),
+        illumination.native_lights(grid),
+        samples=settings.samples,
+        rays=min(RAYS_PER_SAMPLE * settings.samples**2, MAX_PASS_RAYS),
+        threads=settings.threads,
+        progress=progress,
+    )
+
+
+def mean_direction(flow: np.ndarray) -> np.ndarray:
+    """Unit vectors (H, W, 3) along the flow, 0 where there is none."""
+    length = np.linalg.norm(flow, axis=-1, keepdims=True)
+    return np.divide(flow, length, out=np.zeros_like(flow), where=length > 0)
+
+
+def mean_open_irradiance(grid: Grid, lights: Sequence[Light]) -> float:
+    """Mean irradiance of lights that nothing blocks, W/m^2."""
+    width, height = min(grid.width, OPEN_TEXELS), min(grid.height, OPEN_TEXELS)
+    pitch = {"pitch_x": grid.pitch_x * grid.width / width, "pitch_y": grid.pitch_y * grid.height / height}
+    whole = np.ones((height, width), np.float32)
+    coarse = replace(grid, width=width, height=height, coverage=whole, color_in=None, color_out=None, **pitch)
+    open_lights = Illumination(lights).native_lights(coarse)
+    irradiance, _ = native.bake_arrival(coarse.surface(), open_lights, samples=1, rays=OPEN_RAYS)
+    return float(irradiance.mean())
+
 
 Layer = Callable[[Grid, Illumination, Material, float, BakeSettings, Progress, int], np.ndarray]
 """Takes the arguments of `luminance.bake`; float32 (grid height, grid width, 3), row 0 at the bottom."""

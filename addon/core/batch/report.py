@@ -1,12 +1,16 @@
-"""The result of each bake, and the JSON report of a batch."""
+"""The result of each bake: the JSON report of a batch, an earlier run's report, and the lines of `--verbose`."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 
 from ..bake.runner import FAILED, SKIPPED, WRITTEN, Bake
-from ..whole_file import whole_file
+from ..disk import whole_file
+from ..scene.illumination import Illumination
+from ..scene.lights import Light
 
 
 @dataclass
@@ -81,3 +85,88 @@ class Report:
         text = json.dumps({"bakes": [asdict(bake) for bake in self.bakes]}, indent=2, ensure_ascii=False)
         with whole_file(target) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
+
+
+KEPT = "An earlier run wrote it, after the scene was last saved."
+
+
+class PreviousReport:
+    """Records in the report of an earlier run; none if there is no report or it is damaged.
+
+    Parameters
+    ----------
+    report : path of the report, or None.
+    since : time when the scene was saved, as files have it. Older files belong to another state of the scene.
+    """
+
+    def __init__(self, report: str | None, since: float) -> None:
+        self._since = since
+        self._records: dict[tuple, BakeRecord] = {}
+        known = {field.name for field in fields(BakeRecord)}
+        for entry in _entries(report):
+            record = BakeRecord(**{key: value for key, value in entry.items() if key in known})
+            self._records[record.object, record.material, record.frame] = record
+
+    def skipped(self, wanted: BakeRecord, needs_record: bool = False) -> BakeRecord | None:
+        """The record of a bake that can be skipped, or None.
+
+        The file of `wanted` must be newer than the scene. If the report has the bake, the bake must have been written
+        to that file, with the same size, output and indirect light. The caller checks that the file is complete.
+
+        Parameters
+        ----------
+        needs_record : True if the report must have the bake, because the file may be the artist's.
+        """
+        path = Path(wanted.path)
+        if not path.is_file() or path.stat().st_mtime <= self._since:
+            return None
+        record = self._records.get((wanted.object, wanted.material, wanted.frame))
+        if record is None:
+            return None if needs_record else replace(wanted, status=SKIPPED, message=KEPT)
+        same = all(getattr(record, name) == getattr(wanted, name) for name in ("output", "indirect", "width", "height"))
+        if not same or record.status not in (WRITTEN, SKIPPED) or Path(record.path) != path:
+            return None
+        return replace(record, status=SKIPPED, message=record.message or KEPT)
+
+
+def _entries(report: str | None) -> list[dict]:
+    if report is None:
+        return []
+    try:
+        entries = json.loads(Path(report).read_text(encoding="utf-8"))["bakes"]
+        return [entry for entry in entries if isinstance(entry, dict) and "object" in entry]
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
+
+
+class Inventory:
+    """Lines of all bakes of a run. Bakes that share a light show its line once."""
+
+    def __init__(self) -> None:
+        self._shown: set[str] = set()
+
+    def lines(self, bake: Bake) -> Iterator[str]:
+        """New lines about the light of this bake, and a line about the bake."""
+        job = bake.job
+        if job is None:
+            return
+        for line in _light(job.illumination):
+            if line not in self._shown:
+                self._shown.add(line)
+                yield line
+        receiver, grids = job.receiver, [chart.grid for chart in job.receiver.charts]
+        sizes = [f"{grid.width * grid.pitch_x:.4g} x {grid.height * grid.pitch_y:.4g}" for grid in grids]
+        yield f"'{job.name}': {receiver.width} x {receiver.height} texels, {', '.join(sizes)} scene units"
+
+
+def _light(illumination: Illumination) -> Iterator[str]:
+    yield f"{len(illumination.lights)} lights; {illumination.triangle_count} triangles in the light's way"
+    yield from map(_line_of, illumination.lights)
+    yield from map(str, illumination.messages)
+
+
+def _line_of(light: Light) -> str:
+    kind = type(light).__name__.removesuffix("Light")
+    color = " ".join(f"{value:.4g}" for value in light.color)
+    shadow = "" if light.cast_shadow else ", throws no shadow"
+    return f"{kind} '{light.name}': strength {light.strength:.6g}, color {color}{shadow}"

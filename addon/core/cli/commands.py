@@ -1,16 +1,19 @@
-"""The commands. Each takes its options, prints its result, and raises errors."""
+"""The commands, and the function that runs one and turns its errors into an exit code and a message of one line."""
 
 from __future__ import annotations
 
 import math
+import os
+import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from ..ldf.albedo import albedo_from_color
 from ..ldf.library import angles_for, library, photons_for
 from ..material import presets
 from ..native import native
-from .options import MAX_MAPS
+from .options import MAX_MAPS, PROGRAM, make_parser
 from .terminal import ProgressBar, describe, specular, text_table, totals_table
 
 PLOT_ENDINGS = (".png", ".pdf", ".svg")
@@ -130,3 +133,32 @@ def _plot_module():
             f"(apt install python3-matplotlib, or pip install matplotlib): {error}"
         ) from error
     return plot
+
+
+DONE, FAILED, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Exit code: 0 done, 1 failed, 2 wrong use, 130 cancelled with Ctrl-C."""
+    options = make_parser().parse_args(arguments)
+    try:
+        COMMANDS[options.command](options)
+        sys.stdout.flush()
+    except (KeyboardInterrupt, native.Cancelled):
+        return _fail(options, "cancelled", INTERRUPTED)
+    except BrokenPipeError:
+        # The reader has closed the pipe, as `head` does. Python would report that again when it closes stdout.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+    except (CommandError, OSError) as error:
+        return _fail(options, str(error), FAILED)
+    except MemoryError:
+        return _fail(options, "there is not enough memory", FAILED)
+    except ValueError as error:
+        return _fail(options, str(error), WRONG_USE)
+    return DONE
+
+
+def _fail(options, message: str, code: int) -> int:
+    print(f"{PROGRAM} {options.command}: {message}", file=sys.stderr)
+    return code

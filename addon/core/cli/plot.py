@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator
 
-from ..whole_file import whole_file
+from ..disk import whole_file
 from .terminal import describe
 
 # Perceptually uniform, in print and for color-blind readers too.

@@ -1,4 +1,4 @@
-"""LDF libraries of any medium: shipped, cached, or simulated and then cached."""
+"""LDF sources: libraries of any medium, shipped, cached, or simulated and then cached; and folders of samples."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ import hashlib
 import os
 import sys
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 
+from ..disk import whole_file
+from ..errors import BakeError
 from ..native import native
 from ..progress import Callback, Progress
 from ..recent import keep_recent
-from ..whole_file import whole_file
 
 PHOTONS = {"preview": 80_000, "final": 4_000_000}
 """Photons per angle for a medium with g .8 and ior 1. More: less noise, more time; see `photons_for`."""
@@ -224,3 +226,36 @@ def _available_library(medium: native.Medium, quality: str) -> native.LdfLibrary
     path = _cache_path(medium, quality)
     available = _loaded.get(path) or _load_shipped(medium, quality) or _load(path, medium)
     return available and keep_recent(_loaded, path, available, _MAX_LOADED)
+
+
+def load_source(folder: str, method: str):
+    """LDF source, for `convolve`, of the samples in a folder: one per ``.exr`` file, sorted by name.
+
+    Files are read again only after a change.
+
+    Raises
+    ------
+    BakeError
+        The folder is missing or has no EXR file, a file is no sample, or the samples don't form a grid of one medium.
+    """
+    path = Path(folder)
+    if not folder or not path.is_dir():
+        raise BakeError(f"There is no folder of LDF samples at '{folder}'.", "Choose one in the Beamspread settings.")
+    files = sorted(file for file in path.iterdir() if file.suffix.lower() == ".exr")
+    if not files:
+        raise BakeError(
+            f"The folder of LDF samples '{folder}' holds no EXR file.", "Choose another in the Beamspread settings."
+        )
+    try:
+        stats = [file.stat() for file in files]
+        return _load_samples(tuple((file, stat.st_mtime_ns, stat.st_size) for file, stat in zip(files, stats)), method)
+    except OSError as error:
+        raise BakeError(f"{error}.") from error
+    except ValueError as error:
+        raise BakeError(f"The LDF samples in '{folder}' can't be interpolated: {error}.") from error
+
+
+@lru_cache(maxsize=1)
+def _load_samples(files: tuple[tuple[Path, int, int], ...], method: str):
+    """Source of the samples in files; times and sizes are part of the cache's key."""
+    return native.SampleSource([native.LdfSample.load(file) for file, _, _ in files], method)

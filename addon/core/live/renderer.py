@@ -9,18 +9,17 @@ from functools import cached_property
 import numpy as np
 
 from ..bake.bake_settings import COMBINED, BakeSettings
-from ..bake.luminance import spread
+from ..bake.layers import spread
 from ..bake.margin import WHOLE, extend_margin
 from ..bake.surface import channel_media
 from ..ldf.albedo import albedo_from_reflectance
-from ..ldf.samples import load_source
+from ..ldf.library import load_source
 from ..material import Material
 from ..progress import Progress
 from ..recent import keep_recent
-from ..scene.grid import Grid
 from ..scene.illumination import Illumination
 from ..scene.lights import Light
-from ..scene.receiver import Receiver, build_receiver, texture_size
+from ..scene.receiver import Grid, Receiver, build_receiver, texture_size
 from ..scene.sampling import resized
 from ..scene.uv_map import fit_uv_maps
 from ..target import Target

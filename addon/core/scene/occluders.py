@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from ..native import native
-from .grid import Vector
+from .receiver import Vector
 
 
 @dataclass(frozen=True, eq=False)

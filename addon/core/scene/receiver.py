@@ -1,7 +1,8 @@
-"""Receivers: texel grids of flat, UV-mapped polygons, and their positions in a texture.
+"""Receivers: grids of texels on planes, on which light arrives and is solved, and their positions in a texture.
 
-If the axes p_u and p_v of a chart's UV map are orthogonal, the chart's grid consists of the texture's texels. Otherwise
-it is a rectangular grid of the same density, and `Chart.write` resamples it bilinearly.
+Positions are world positions in scene units. Rows of all arrays run up the plane: row 0 is the bottom (v = 0), as
+Blender stores images. If the axes p_u and p_v of a chart's UV map are orthogonal, the chart's grid consists of the
+texture's texels. Otherwise it is a rectangular grid of the same density, and `Chart.write` resamples it bilinearly.
 """
 
 from __future__ import annotations
@@ -13,9 +14,68 @@ import numpy as np
 
 from ..errors import ReceiverError
 from ..native import native
-from .grid import Grid
 from .sampling import bilinear
 from .uv_map import UvMap
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """The grid. Its frame is the plane's: x along columns, y up the rows, z outward.
+
+    Attributes
+    ----------
+    origin : world position of the outer corner of texel (0, 0).
+    x_axis, y_axis : unit vectors along columns and (upward) rows, orthogonal; a mirrored UV map makes
+        (x_axis, y_axis, normal) left-handed, which is fine because LDFs are mirror-symmetric.
+    normal : unit vector, outward.
+    pitch_x, pitch_y : texel size along the axes, scene units.
+    width, height : number of texels.
+    coverage : float32 (height, width), fraction of each texel inside the mesh, 0..1.
+    clearance : largest distance of the mesh from the plane, scene units; shadow rays start above it.
+    color_in, color_out : float32 (height, width, 3), factors of entering and leaving light by the surface's texture;
+        None without a texture.
+    """
+
+    origin: Vector
+    x_axis: Vector
+    y_axis: Vector
+    normal: Vector
+    pitch_x: float
+    pitch_y: float
+    width: int
+    height: int
+    coverage: np.ndarray
+    clearance: float = 0.0
+    color_in: np.ndarray | None = None
+    color_out: np.ndarray | None = None
+
+    @property
+    def centre(self) -> np.ndarray:
+        """World position of the grid's centre."""
+        across = 0.5 * self.width * self.pitch_x * np.array(self.x_axis)
+        return self.origin + across + 0.5 * self.height * self.pitch_y * np.array(self.y_axis)
+
+    def positions(self, at: tuple[float, float] = (0.5, 0.5)) -> np.ndarray:
+        """World positions, float64 (height, width, 3), `at` columns and rows from each texel's corner."""
+        columns = (np.arange(self.width) + at[0])[None, :, None] * self.pitch_x * np.array(self.x_axis)
+        rows = (np.arange(self.height) + at[1])[:, None, None] * self.pitch_y * np.array(self.y_axis)
+        return np.array(self.origin) + columns + rows
+
+    def height_of(self, point: Vector) -> float:
+        """Distance of a world point from the plane, outward; negative behind it."""
+        return float(np.dot(np.subtract(point, self.origin), self.normal))
+
+    def native(self):
+        """The native `ReceiverGrid`."""
+        axes = self.x_axis, self.y_axis, self.normal
+        return native.ReceiverGrid(self.origin, *axes, self.pitch_x, self.pitch_y, self.width, self.height)
+
+    def surface(self):
+        """The native `Surface`, which views the arrays of the grid."""
+        return native.Surface(self.native(), self.coverage, self.clearance, self.color_in, self.color_out)
+
 
 # Overlap with a chart, in texels, below which texels at its border are not part of the grid: rounding of float32 UVs.
 EDGE_TOLERANCE = 1e-3

@@ -66,17 +66,16 @@ def phases(folder):
         from beamspread import batch, blender
         from beamspread.blender.images import files
         from beamspread.blender.jobs.run import batch_run as bakes
-        from beamspread.core.bake import job, luminance
+        from beamspread.core.bake import layers, steps
 
-        return batch, blender, files, bakes, job, luminance
+        return batch, blender, files, bakes, layers, steps
 
-    batch, blender, files, bakes, job, luminance = timed("import", import_all)()
+    batch, blender, files, bakes, layers, steps = timed("import", import_all)()
     time_calls("register", blender, "register")
     time_calls("extract", bakes, "prepare_scene")
-    time_calls("library from the cache", luminance, "_libraries")
-    time_calls("beams and visibility", luminance, "gather_unit")
-    time_calls("solve", luminance, "_spread")
-    time_calls("margin", job, "extend_margin")
+    time_calls("library from the cache", layers, "_libraries")
+    time_calls("light and solution", layers, "spread")
+    time_calls("margin", steps, "extend_margin")
     time_calls("image file", files, "write_file")
     time_calls("unregister", blender, "unregister")
     batch.run(["--output", folder, "--report", str(Path(folder) / "report.json")])

@@ -13,8 +13,9 @@ import bpy
 import numpy as np
 
 from ....core.bake.bake_settings import FINAL, PREVIEW, BakeSettings
-from ....core.bake.job import BakeJob, needs_medium, to_simulate
+from ....core.bake.job import BakeJob
 from ....core.bake.runner import Bake
+from ....core.bake.steps import BAKE_STEPS, needs_medium, to_simulate
 from ....core.bake.surface import Surface
 from ....core.scene.illumination import Illumination
 from ....core.scene.receiver import build_receiver, texture_size
@@ -72,14 +73,16 @@ class BakePlan:
 
     def to_simulate(self, settings: BakeSettings) -> list:
         """Media that the bake would have to simulate first."""
-        return to_simulate(self.surface_with_color(), settings)
+        return to_simulate(self.surface_with_color(), settings, BAKE_STEPS)
 
     def bake(self, settings: BakeSettings) -> Bake:
         """The bake, with its job or the error; call it in the main thread."""
         try:
             receiver = build_receiver(self.maps, *self.size)
             illumination = self.illumination.lighting(self.target.object_name)
-            job = BakeJob(self.target.object_name, receiver, illumination, self.surface_with_color(), settings)
+            job = BakeJob(
+                self.target.object_name, receiver, illumination, self.surface_with_color(), settings, BAKE_STEPS
+            )
             job = self._with_color(self.by_cycles.complete(job))
             job.check_memory()
             return Bake(self.target, job)

@@ -12,9 +12,7 @@ import bpy
 
 from ....core.bake.runner import CANCELLED, SKIPPED, WRITTEN, Bake, Sink, run_bakes
 from ....core.batch.batch_options import BatchOptions
-from ....core.batch.inventory import Inventory
-from ....core.batch.report import BakeRecord, Report
-from ....core.batch.resume import PreviousReport
+from ....core.batch.report import BakeRecord, Inventory, PreviousReport, Report
 from ....core.batch.stop import Stop
 from ....core.errors import BakeError
 from ....core.progress import Progress, timed

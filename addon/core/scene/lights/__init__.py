@@ -1,9 +1,8 @@
 """The kinds of light that can be baked; strengths follow Cycles (see each class)."""
 
 from .field_light import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight
-from .glowing import MeshLight, WorldLight
-from .lamp_kinds import AreaLight, PointLight, SpotLight, SunLight
 from .light_base import Light
+from .light_kinds import AreaLight, MeshLight, PointLight, SpotLight, SunLight, WorldLight
 
 __all__ = [
     "DIRECTIONS",

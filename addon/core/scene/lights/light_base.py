@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from ..grid import Grid, Vector
+from ..receiver import Grid, Vector
 
 
 @dataclass(frozen=True)

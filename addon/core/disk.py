@@ -1,15 +1,19 @@
-"""Files that are complete or unchanged: written beside the target, checked, then renamed."""
+"""Files on disk: complete or unchanged, their names, and facts from the headers of OpenEXR files."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import shutil
 import time
 import uuid
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from .native import native
 
 try:
     import fcntl
@@ -109,3 +113,51 @@ def _flush(path: Path) -> None:
             raise OSError("nothing was written")
         file.truncate(size)
         os.fsync(file.fileno())
+
+
+def is_half(path: Path) -> bool:
+    """True if there is an OpenEXR file whose channels all have 16 bits; the first part of several counts."""
+    return bool(_first_part(path).get("half"))
+
+
+def text_of(path: Path, name: str) -> str:
+    """The text of an attribute; "" if the file or the attribute is missing."""
+    value = _first_part(path).get("attributes", {}).get(name)
+    return value if isinstance(value, str) else ""
+
+
+def _first_part(path: Path) -> dict:
+    try:
+        return native.read_exr_header(str(path))[0]
+    except OSError:
+        return {}
+
+
+HASH_LETTERS = 6
+"""Letters that tell equal file names apart."""
+
+
+def file_stems(things: Iterable[tuple[str, ...]]) -> dict[tuple[str, ...], str]:
+    """File name without its extension for each tuple of names. No two file names differ only by case.
+
+    The result does not depend on the order. If several would get the same file name, the tuple that changed least
+    keeps it, and the others get additional letters.
+    """
+    groups = defaultdict(list)
+    for names in dict.fromkeys(things):
+        groups[stem(names).lower()].append(names)
+    result = {}
+    for group in groups.values():
+        first, *others = sorted(group, key=lambda names: ("_".join(names) != stem(names), len(names), names))
+        result[first] = stem(first)
+        result |= {names: f"{stem(names)}_{_letters(names)}" for names in others}
+    return result
+
+
+def stem(names: Iterable[str]) -> str:
+    """The names, joined, in letters that every file system accepts."""
+    return "_".join(re.sub(r"[^\w.-]+", "_", name).strip("._") or "unnamed" for name in names)
+
+
+def _letters(names: tuple[str, ...]) -> str:
+    return hashlib.sha256("\0".join(names).encode()).hexdigest()[:HASH_LETTERS]

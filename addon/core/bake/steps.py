@@ -1,0 +1,136 @@
+"""Steps of a job: simulation, solution, and the memory that they take, about."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import BakeError
+from ..ldf.library import SIMULATING, is_known, library
+from ..progress import Progress
+from .bake_settings import BakeSettings
+from .job import BakeJob, Step
+from .layers import LAYERS, WITHOUT_MEDIUM
+from .margin import extend_margin
+from .surface import Surface
+
+SUNS, NARROW, WIDE = range(3)
+"""Kinds of light: suns alone; one direction at each texel; any other."""
+
+BYTES = {
+    "fft": ((50e6, 80), (400e6, 80), (600e6, 80)),
+    "direct": ((50e6, 140), (100e6, 300), (250e6, 520)),
+    "adaptive": ((50e6, 140), (100e6, 180), (250e6, 400)),
+}
+"""Fixed bytes and bytes per texel, by solver and kind of light, without the light that the fft solver keeps.
+
+Peaks of processes with 256^2 to 2048^2 texels (tests/unit/test_memory.py), rounded up by a twentieth or more.
+"""
+
+OTHER_SOLVER = BYTES["direct"]
+"""The same of a solver that is not listed: the most that a listed one takes per texel."""
+
+PASS_BYTES = 50e6, 120
+"""The same of irradiance and direction, without a medium."""
+
+NARROW_SLAB, WIDE_SLAB = (200e6, 300), (800e6, 300)
+"""Additional bytes of slabs with an ior above 1, for one mean free path or less; they fall as 1 / thickness."""
+
+
+@dataclass(frozen=True)
+class Simulate(Step):
+    """Simulates the media of the surface, and caches them."""
+
+    name = "Simulating the material"
+
+    def weight(self, job: BakeJob) -> float:
+        return 4.0 if to_simulate(job.surface, job.settings) else 0.0
+
+    def stage(self, job: BakeJob) -> str:
+        return SIMULATING[job.settings.quality]
+
+    def run(self, job: BakeJob, progress: Progress) -> BakeJob:
+        media, settings = to_simulate(job.surface, job.settings), job.settings
+        for medium, part in zip(media, progress.split([1.0] * len(media))):
+            library(medium, settings.quality, part, settings.threads)
+        return job
+
+
+@dataclass(frozen=True)
+class Solve(Step):
+    """Computes the result from the light and the surface."""
+
+    name = "Baking"
+
+    def run(self, job: BakeJob, progress: Progress) -> BakeJob:
+        material, settings = job.surface.material, job.settings
+        if needs_medium(settings):
+            material = job.surface.resolve(settings.quality, None, settings.threads)
+        rest = material, job.surface.thickness, settings
+        charts = job.receiver.charts
+        values = [
+            LAYERS[settings.layer](chart.grid, job.illumination, *rest, part, self._bytes_for_light(job))
+            for chart, part in zip(charts, progress.split([1.0] * len(charts)))
+        ]
+        if not all(np.isfinite(on_grid).all() for on_grid in values):
+            text = "The bake produced values that are not numbers."
+            raise BakeError(text, "Check the strengths of the lights.")
+        texture = job.receiver.to_texture(values)
+        del values  # large
+        return replace(job, texture=extend_margin(texture, job.receiver.coverage, settings.margin))
+
+    def memory_bytes(self, job: BakeJob) -> float:
+        texels, lights, surface = job.receiver.coverage.size, job.illumination.lights, job.surface
+        if not needs_medium(job.settings):
+            return pass_bytes(texels)
+        is_narrow = not job.finds_light and all(light.has_one_direction for light in lights)
+        kind = (SUNS if all(light.is_parallel for light in lights) else NARROW) if is_narrow else WIDE
+        is_slab = surface.thickness > 0 and surface.material.ior > 1
+        paths = surface.thickness / max(surface.material.mean_free_path) if is_slab else math.inf
+        return bake_bytes(texels, job.settings.solver, kind, paths)
+
+    def _bytes_for_light(self, job: BakeJob) -> int:
+        """Memory that is left for the light that the fft solver keeps, bytes; 0: no limit."""
+        return max(1, int(job.memory_limit - self.memory_bytes(job))) if job.memory_limit else 0
+
+
+BAKE_STEPS = (Simulate(), Solve())
+"""Steps of a job whose light and colors are known."""
+
+
+def needs_medium(settings: BakeSettings) -> bool:
+    """True if the result depends on the material."""
+    return settings.layer not in WITHOUT_MEDIUM
+
+
+def to_simulate(surface: Surface, settings: BakeSettings) -> list:
+    """The media that a bake has to simulate first, which takes long."""
+    uses_library = settings.distributions == "library" or surface.base_color is not None
+    if not (needs_medium(settings) and uses_library):
+        return []
+    return [medium for medium in surface.media() if not is_known(medium, settings.quality)]
+
+
+def bake_bytes(texels: int, solver: str, light: int, mean_free_paths: float) -> float:
+    """Peak memory of a bake, bytes, without the light that the fft solver keeps.
+
+    Parameters
+    ----------
+    light : SUNS, NARROW or WIDE.
+    mean_free_paths : thickness of a slab with an ior above 1, or inf.
+    """
+    fixed, per_texel = BYTES.get(solver, OTHER_SOLVER)[light]
+    if solver == "fft" and light != SUNS:
+        slab, slab_per_texel = WIDE_SLAB if light == WIDE else NARROW_SLAB
+        thinness = 1 / max(mean_free_paths, 1.0)
+        fixed += slab * thinness
+        per_texel += slab_per_texel * thinness
+    return fixed + per_texel * texels
+
+
+def pass_bytes(texels: int) -> float:
+    """Peak memory of a bake of irradiance or direction, bytes."""
+    fixed, per_texel = PASS_BYTES
+    return fixed + per_texel * texels
