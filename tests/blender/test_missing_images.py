@@ -75,6 +75,19 @@ def test_the_world_is_left_out():
     assert "Find Missing Files" in text
 
 
+@pytest.mark.parametrize("source", ["TILED", "SEQUENCE"])
+def test_tiles_and_frames_that_are_gone_count_as_missing(source, tmp_path):
+    """With one of their files left, Cycles shows them."""
+    image = missing()
+    image.source = source
+    image.filepath = str(tmp_path / ("sky.<UDIM>.exr" if source == "TILED" else "sky0001.exr"))
+    add_world(image)
+    (text,) = texts(read())
+    assert "The world 'Sky' is left out. The image 'studio.hdr' is missing." in text
+    (tmp_path / ("sky.1001.exr" if source == "TILED" else "sky0007.exr")).touch()
+    assert not any("is missing" in text for text in texts(read()))
+
+
 def test_a_node_without_an_image_is_named():
     add_world(None)
     (text,) = texts(read())

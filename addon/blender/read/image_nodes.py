@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -100,12 +101,14 @@ class Pixels:
         Raises
         ------
         MissingImageError
-            The node has no image, or its file can't be read.
+            The node has no image, or its files can't be read.
         """
         image = node.image
         if image is None:
             raise MissingImageError(node=node.name)
         if image.source not in ("FILE", "GENERATED", "VIEWER"):
+            if _is_missing(image):
+                raise MissingImageError(image.name)
             raise NotSupportedError("image", image.name, "it is a sequence, a movie or tiled")
         if image.name_full not in self._known:
             self._known[image.name_full] = self._read(image)
@@ -169,11 +172,17 @@ def missing_images(links: Links, wanted: InputSocket) -> list[MissingImageError]
 
 
 def _is_missing(image) -> bool:
+    """True if none of the image's files, tiles or frames exists, and its pixels are nowhere else."""
     if image is None:
         return True
-    if image.source not in ("FILE", "MOVIE") or image.packed_file is not None or image.has_data:
+    if image.source not in ("FILE", "MOVIE", "TILED", "SEQUENCE") or image.packed_file is not None or image.has_data:
         return False
-    return not Path(bpy.path.abspath(image.filepath, library=image.library)).exists()
+    path = Path(bpy.path.abspath(image.filepath, library=image.library))
+    if image.source == "TILED":
+        return not any(Path(str(path).replace("<UDIM>", str(tile.number))).exists() for tile in image.tiles)
+    if image.source == "SEQUENCE":
+        return not any(path.parent.glob(glob.escape(path.stem.rstrip("0123456789")) + "*" + path.suffix))
+    return not path.exists()
 
 
 def shrunk(pixels: np.ndarray) -> np.ndarray:
