@@ -22,7 +22,7 @@ from .jobs import state
 from .jobs.out_of_date import stale
 from .jobs.run import engine, operator
 from .live import timer
-from .node import buttons, menu, node
+from .node import buttons, node
 from .registration import all_or_nothing
 from .ui import panels
 
@@ -34,7 +34,6 @@ PARTS = (
     facts,
     undo,
     node,
-    menu,
     buttons,
     state,
     stale,

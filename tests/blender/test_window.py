@@ -3,7 +3,7 @@
 import bpy
 import pytest
 from beamspread.blender import compat
-from beamspread.blender.node import menu
+from beamspread.blender.node import buttons
 from beamspread.blender.ui import panels
 from scenario_player import results_of
 
@@ -15,7 +15,7 @@ def seen(tmp_path_factory):
 
 
 def test_every_panel_the_node_and_its_menu_are_drawn(seen):
-    assert set(seen["drawn"]) == {panel.__name__ for panel in panels._classes} | {"draw", "menu"}
+    assert set(seen["drawn"]) == {panel.__name__ for panel in panels._classes} | {"draw", "buttons"}
 
 
 def test_a_bake_runs_beside_the_user_and_one_at_a_time(seen):
@@ -93,5 +93,5 @@ def test_loading_another_file_ends_the_bake(seen):
 def test_the_node_is_added_under_shader():
     shader_menu = compat.shader_menu()
     assert shader_menu.__name__ in compat.SHADER_MENUS
-    assert menu._draw in shader_menu.draw._draw_funcs
-    assert menu._draw not in getattr(bpy.types.NODE_MT_add.draw, "_draw_funcs", [])
+    assert buttons._draw_menu in shader_menu.draw._draw_funcs
+    assert buttons._draw_menu not in getattr(bpy.types.NODE_MT_add.draw, "_draw_funcs", [])

@@ -9,7 +9,7 @@ import scenes
 from beamspread.blender import compat, popup
 from beamspread.blender.jobs.run import operator
 from beamspread.blender.jobs.state import state
-from beamspread.blender.node import draw, menu
+from beamspread.blender.node import buttons, draw
 from beamspread.blender.ui import bake_panel as shown
 from beamspread.blender.ui import panels
 from beamspread.core.target import Target
@@ -63,7 +63,7 @@ def prepare_panels() -> None:
         panel.bl_options = set()
     panels.BEAMSPREAD_PT_node_editor.bl_category = "Node"
     count_draws(draw, "draw_properties")
-    count_draws(menu, "_draw")
+    count_draws(buttons, "_draw_menu")
     draw_lines = shown.draw_lines
 
     def record(layout, context, messages, icon):
@@ -160,7 +160,7 @@ def scenario():
     region = next(region for region in editor.regions if region.type == "WINDOW")
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=editor, region=region):
         bpy.ops.wm.call_menu(name=compat.shader_menu().__name__)
-    yield lambda: "menu" in results["drawn"]
+    yield lambda: "buttons" in results["drawn"]
     press_escape()
     yield lambda: True  # the menu takes it, and not the bake
 

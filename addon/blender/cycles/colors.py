@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...core.bake.job import BakeJob
+from ...core.bake.job import BakeJob, Step
 from ...core.bake.margin import extend_margin
-from ...core.bake.steps import Step
 from ...core.bake.surface import Surface
 from ...core.errors import BakeError, text_of
 from ...core.messages import warning
@@ -16,8 +15,8 @@ from ...core.progress import Callback, Progress
 from ...core.scene.receiver import Receiver
 from ...core.scene.texture import BaseColor
 from ...core.target import Target
-from .cycles_light import CopyForCycles
 from .process import run
+from .scene_copy import CopyForCycles
 
 # Samples of each texel; more take longer.
 MAX_SAMPLES, MIN_SAMPLES = 16, 4

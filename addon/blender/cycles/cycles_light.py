@@ -10,23 +10,19 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...core.bake.job import BakeJob
+from ...core.bake.job import BakeJob, Step
 from ...core.bake.layers import mean_open_irradiance
-from ...core.bake.steps import Step
-from ...core.errors import MaterialError, MissingImageError
+from ...core.errors import MissingImageError
 from ...core.messages import Message, warning
 from ...core.progress import Callback, Progress
 from ...core.scene.lights import STRATA, Field, FieldLight, Light, WorldLight
 from ...core.scene.receiver import Receiver
-from ...core.target import Target
 from .. import compat
-from ..node.find import find_node_in_groups
-from ..node.tree import BASE_COLOR
 from ..read.image_nodes import missing_images
 from ..read.nodes import Links, surface_of
 from ..read.visibility import SOLID_TYPES, render_visible_names, renders
 from .process import run
-from .scene_copy import SceneCopy
+from .scene_copy import CopyForCycles, SceneCopy
 
 # Nodes along the longest side of a receiver; more resolve bounced light more finely and take longer.
 NODES = 64
@@ -57,34 +53,6 @@ WORLD_SAMPLES, SUN_SAMPLES = 2, 256
 
 WHITE = 1.0, (1.0, 1.0, 1.0)
 UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
-
-class CopyForCycles:
-    """A copy of a scene for Cycles, with results evaluated on it. Make it in the main thread.
-
-    A job in a file names the copy's folder, which goes with this object: a process that runs the job needs a Blender,
-    and the folder for as long as it runs.
-
-    Attributes
-    ----------
-    reflectances : colors that replace the baked materials, by name.
-    textures : names of the groups around the node of a material, of the node and of its input with a texture.
-    panorama : the world as a light, once it was rendered.
-    base_colors : evaluated base colors, by target.
-    """
-
-    def __init__(self, scene, view_layer) -> None:
-        self.scene = SceneCopy(scene, view_layer)
-        self.panorama: WorldLight | None = None
-        self.base_colors: dict[Target, object] = {}
-        nodes = {material.name: find_node_in_groups(material) for material in bpy.data.materials}
-        nodes = {name: node for name, node in nodes.items() if node is not None}
-        self.reflectances = {name: _reflectance(node.surface()) for name, (node, _) in nodes.items()}
-        self.textures = {
-            name: ([group.name for group in groups], node.name, BASE_COLOR)
-            for name, (node, groups) in nodes.items()
-            if node.has_texture() and not missing_images(Links(), node.color_input(groups))
-        }
 
 
 class CyclesLight:
@@ -276,13 +244,6 @@ def _position_of(lamp) -> dict:
     if lamp.data.type != "SUN":
         return {"position": tuple(lamp.matrix_world.translation)}
     return {"direction": tuple(-lamp.matrix_world.col[2].to_3d().normalized())}
-
-
-def _reflectance(surface) -> list[float]:
-    try:
-        return surface.reflectance()
-    except MaterialError:  # of another object, whose own bake reports it
-        return [0.0, 0.0, 0.0]
 
 
 def world_panorama(

@@ -13,7 +13,14 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ...core.errors import MaterialError
 from ...core.messages import Message, warning
+from ...core.scene.lights import WorldLight
+from ...core.target import Target
+from ..node.find import find_node_in_groups
+from ..node.tree import BASE_COLOR
+from ..read.image_nodes import missing_images
+from ..read.nodes import Links
 from ..read.visibility import with_instanced
 
 try:
@@ -96,6 +103,41 @@ class SceneCopy:
             image.pixels.foreach_get(values)
             pixels[image.name] = values.reshape(image.size[1], image.size[0], image.channels)
         np.savez(self.folder / IMAGES, **pixels)
+
+
+class CopyForCycles:
+    """A copy of a scene for Cycles, with results evaluated on it. Make it in the main thread.
+
+    A job in a file names the copy's folder, which goes with this object: a process that runs the job needs a Blender,
+    and the folder for as long as it runs.
+
+    Attributes
+    ----------
+    reflectances : colors that replace the baked materials, by name.
+    textures : names of the groups around the node of a material, of the node and of its input with a texture.
+    panorama : the world as a light, once it was rendered.
+    base_colors : evaluated base colors, by target.
+    """
+
+    def __init__(self, scene, view_layer) -> None:
+        self.scene = SceneCopy(scene, view_layer)
+        self.panorama: WorldLight | None = None
+        self.base_colors: dict[Target, object] = {}
+        nodes = {material.name: find_node_in_groups(material) for material in bpy.data.materials}
+        nodes = {name: node for name, node in nodes.items() if node is not None}
+        self.reflectances = {name: _reflectance(node.surface()) for name, (node, _) in nodes.items()}
+        self.textures = {
+            name: ([group.name for group in groups], node.name, BASE_COLOR)
+            for name, (node, groups) in nodes.items()
+            if node.has_texture() and not missing_images(Links(), node.color_input(groups))
+        }
+
+
+def _reflectance(surface) -> list[float]:
+    try:
+        return surface.reflectance()
+    except MaterialError:  # of another object, whose own bake reports it
+        return [0.0, 0.0, 0.0]
 
 
 def remove_leftovers() -> None:

@@ -1,13 +1,14 @@
-"""Operators of the node's buttons."""
+"""Operators of the node's buttons, and its entry in the Shader Editor: Add > Shader > Beamspread."""
 
 from __future__ import annotations
 
 import bpy
 
-from .. import popup
+from .. import compat, popup
 from ..registration import all_or_nothing, classes
 from . import output, principled
 from .find import find_node
+from .node import BeamspreadNode
 
 
 def active_material(context):
@@ -97,6 +98,15 @@ class BEAMSPREAD_OT_from_principled(NodeOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
+def _draw_menu(self, context) -> None:
+    if getattr(context.space_data, "tree_type", "") == "ShaderNodeTree":
+        self.layout.separator()
+        operator = self.layout.operator("node.add_node", text=BeamspreadNode.bl_label)
+        operator.type = BeamspreadNode.bl_idname
+        operator.use_transform = True
+
+
 register, unregister = all_or_nothing(
-    *classes(BEAMSPREAD_OT_toggle_result, BEAMSPREAD_OT_make_plain, BEAMSPREAD_OT_from_principled)
+    *classes(BEAMSPREAD_OT_toggle_result, BEAMSPREAD_OT_make_plain, BEAMSPREAD_OT_from_principled),
+    (lambda: compat.shader_menu().append(_draw_menu), lambda: compat.shader_menu().remove(_draw_menu)),
 )

@@ -15,18 +15,18 @@ from .. import compat
 from ..read.nodes import InputSocket
 from ..registration import all_or_nothing, handlers
 from .draw import draw_node
-from .output import link_output, plain_of
+from .output import link_output
 from .tree import (
     BASE_COLOR,
-    IMAGE,
-    ROUGHNESS,
-    ROUGHNESS_BEFORE,
-    add_missing_inputs,
-    is_inner_tree,
+    all_nodes,
+    is_shared,
     make_inner_tree,
-    show_image,
+    own_tree,
+    release_unused_trees,
     show_ior,
+    show_own_images,
     show_values,
+    upgrade,
 )
 
 CUSTOM_PRESET = "CUSTOM"
@@ -102,35 +102,6 @@ def _show(node, _context) -> None:
     if tree is not None:
         show_values(tree, node.image, node.ior)
         _color_edited(node, _context)
-
-
-def own_tree(node):
-    """The node's inner tree, up to date and the node's own from here on; None without one.
-
-    A copied node shares the original's tree until then. In `copy()` Blender has not counted the users of the new node
-    yet: another tree would leave the original's with too few, and Blender would drop it when it saves.
-    """
-    tree = node.node_tree
-    if tree is None:
-        return None
-    plain = plain_of(node)
-    if _is_shared(tree, plain) and sum(node.node_tree == tree for node in all_nodes()) > 1:
-        tree = tree.copy()
-        tree.use_fake_user = True
-        node.node_tree = tree
-        if plain is not None:
-            plain.node_tree = tree
-    _upgrade(tree)
-    return tree
-
-
-def _is_shared(tree, plain=None) -> bool:
-    """True if nodes of other materials use the tree, too; its fake user counts as a user.
-
-    Before Blender 4.5, a copied material counts one user too many until the file is opened again.
-    """
-    users = 1 + (plain is not None and plain.node_tree == tree)
-    return tree.users - tree.use_fake_user > users
 
 
 def link_result(node, image) -> list[Message]:
@@ -252,7 +223,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
 
     def free(self) -> None:
         # Removing the tree here crashes on undo; without its fake user it goes when the file is saved.
-        if self.node_tree is not None and not _is_shared(self.node_tree):
+        if self.node_tree is not None and not is_shared(self.node_tree):
             self.node_tree.use_fake_user = False
 
     def surface(self) -> Surface:
@@ -294,52 +265,14 @@ def _decimal(value: float) -> float:
     return float(f"{value:.7g}")
 
 
-def all_nodes():
-    """Beamspread nodes of the file, in materials and in groups."""
-    trees = [material.node_tree for material in bpy.data.materials if material.node_tree] + list(bpy.data.node_groups)
-    return (node for tree in trees for node in tree.nodes if node.bl_idname == BeamspreadNode.bl_idname)
-
-
-@persistent
-def show_own_images(*_arguments) -> None:
-    """Have trees show the images of their nodes: undo, and files saved by Blender itself, restore Live's images."""
-    for node in all_nodes():
-        tree = node.node_tree
-        if tree is not None and tree.library is None and IMAGE in tree.nodes:
-            show_image(tree, node.image)
-
-
 @persistent
 def upgrade_nodes(*_arguments) -> None:
     """Give nodes of older files the inputs that they have today; links and values stay."""
     for tree in {node.node_tree for node in all_nodes()} - {None}:
-        _upgrade(tree)
+        upgrade(tree)
     for node in all_nodes():
         if node.id_data.library is None:
             _color_edited(node, None)
-
-
-@persistent
-def release_unused_trees(*_arguments) -> None:
-    """Release inner trees without a node: no node is told when its material is removed.
-
-    Removing them here would crash on undo. Without their fake user they are not saved.
-    """
-    trees = [
-        tree for tree in bpy.data.node_groups if is_inner_tree(tree) and tree.library is None and tree.use_fake_user
-    ]
-    for tree, users in bpy.data.user_map(subset=set(trees)).items() if trees else ():
-        if not users:
-            tree.use_fake_user = False
-
-
-def _upgrade(tree) -> None:
-    if tree.library is not None or not add_missing_inputs(tree):
-        return
-    # Existing nodes get a new input before it has a default.
-    for node in all_nodes():
-        if node.node_tree == tree:
-            node.inputs[ROUGHNESS].default_value = ROUGHNESS_BEFORE
 
 
 def _add_class() -> None:

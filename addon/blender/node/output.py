@@ -8,15 +8,9 @@ from ...core.errors import NotSupportedError
 from ...core.messages import Message, note, warning
 from ..read.nodes import InputSocket
 from ..read.shading import ShadingPoints
-from .tree import NORMAL, ROUGHNESS
+from .tree import NORMAL, ROUGHNESS, plain_of
 
 PLAIN_LABEL = "Baked Light"
-
-
-def plain_of(node):
-    """Group of plain nodes that shows the bake in the node's place, or None."""
-    plain = node.id_data.nodes.get(node.plain_node) if node.plain_node else None
-    return plain if plain is not None and plain.bl_idname == "ShaderNodeGroup" else None
 
 
 def is_linked(node) -> bool:

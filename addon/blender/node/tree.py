@@ -1,9 +1,10 @@
 """The node's inner tree, made of nodes that every Blender has: a renderer sees it in place of the node."""
 
 import bpy
+from bpy.app.handlers import persistent
 
 from .. import compat
-from ..read.nodes import INNER_TREE
+from ..read.nodes import INNER_TREE, OWN_NODE
 
 NAME = INNER_TREE
 BASE_COLOR, ROUGHNESS, NORMAL = "Base Color", "Roughness", "Normal"
@@ -167,3 +168,76 @@ def _add(tree, kind: str, name: str, location: tuple[int, int]):
     node = tree.nodes.new(kind)
     node.name, node.location = name, location
     return node
+
+
+def plain_of(node):
+    """Group of plain nodes that shows the bake in the node's place, or None."""
+    plain = node.id_data.nodes.get(node.plain_node) if node.plain_node else None
+    return plain if plain is not None and plain.bl_idname == "ShaderNodeGroup" else None
+
+
+def all_nodes():
+    """Beamspread nodes of the file, in materials and in groups."""
+    trees = [material.node_tree for material in bpy.data.materials if material.node_tree] + list(bpy.data.node_groups)
+    return (node for tree in trees for node in tree.nodes if node.bl_idname == OWN_NODE)
+
+
+def own_tree(node):
+    """The node's inner tree, up to date and the node's own from here on; None without one.
+
+    A copied node shares the original's tree until then. In `copy()` Blender has not counted the users of the new node
+    yet: another tree would leave the original's with too few, and Blender would drop it when it saves.
+    """
+    tree = node.node_tree
+    if tree is None:
+        return None
+    plain = plain_of(node)
+    if is_shared(tree, plain) and sum(node.node_tree == tree for node in all_nodes()) > 1:
+        tree = tree.copy()
+        tree.use_fake_user = True
+        node.node_tree = tree
+        if plain is not None:
+            plain.node_tree = tree
+    upgrade(tree)
+    return tree
+
+
+def is_shared(tree, plain=None) -> bool:
+    """True if nodes of other materials use the tree, too; its fake user counts as a user.
+
+    Before Blender 4.5, a copied material counts one user too many until the file is opened again.
+    """
+    users = 1 + (plain is not None and plain.node_tree == tree)
+    return tree.users - tree.use_fake_user > users
+
+
+def upgrade(tree) -> None:
+    if tree.library is not None or not add_missing_inputs(tree):
+        return
+    # Existing nodes get a new input before it has a default.
+    for node in all_nodes():
+        if node.node_tree == tree:
+            node.inputs[ROUGHNESS].default_value = ROUGHNESS_BEFORE
+
+
+@persistent
+def show_own_images(*_arguments) -> None:
+    """Have trees show the images of their nodes: undo, and files saved by Blender itself, restore Live's images."""
+    for node in all_nodes():
+        tree = node.node_tree
+        if tree is not None and tree.library is None and IMAGE in tree.nodes:
+            show_image(tree, node.image)
+
+
+@persistent
+def release_unused_trees(*_arguments) -> None:
+    """Release inner trees without a node: no node is told when its material is removed.
+
+    Removing them here would crash on undo. Without their fake user they are not saved.
+    """
+    trees = [
+        tree for tree in bpy.data.node_groups if is_inner_tree(tree) and tree.library is None and tree.use_fake_user
+    ]
+    for tree, users in bpy.data.user_map(subset=set(trees)).items() if trees else ():
+        if not users:
+            tree.use_fake_user = False

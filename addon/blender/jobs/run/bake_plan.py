@@ -23,7 +23,8 @@ from ....core.scene.texture import BaseColor
 from ....core.scene.uv_map import UvMap, fit_uv_maps
 from ....core.target import Target
 from ...cycles.colors import BaseColorByCycles, not_evaluated
-from ...cycles.cycles_light import CopyForCycles, CyclesLight
+from ...cycles.cycles_light import CyclesLight
+from ...cycles.scene_copy import CopyForCycles
 from ...images.files import check_image
 from ...images.sequence import is_sequence, size_of_frames
 from ...node.find import BakeTarget, find_node_in_groups, targets_of

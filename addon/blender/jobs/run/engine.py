@@ -16,7 +16,7 @@ from ....core.errors import ImageError, text_of
 from ....core.progress import Progress
 from ....core.target import Target
 from ... import compat
-from ...cycles.cycles_light import CopyForCycles
+from ...cycles.scene_copy import CopyForCycles
 from ...node.find import NOTHING_FOUND, BakeTarget, find_misplaced, find_targets, image_of, targets_of
 from ...registration import all_or_nothing, classes, handlers
 from ..out_of_date import stale
