@@ -7,7 +7,7 @@ set(ducc_src ${BEAMSPREAD_DEPENDENCIES}/include)
 # symbols could not). Only Linux's linker does that; other systems have the baseline alone.
 set(ducc_objects)
 function(ducc_instruction_set name)
-  add_library(ducc_${name} OBJECT ${CMAKE_SOURCE_DIR}/native/fft/instruction_sets/fft.cpp ${ducc_src}/ducc0/infra/mav.cc
+  add_library(ducc_${name} OBJECT ${CMAKE_SOURCE_DIR}/native/fft/instruction_sets/instruction_set.cpp ${ducc_src}/ducc0/infra/mav.cc
               ${ducc_src}/ducc0/infra/string_utils.cc ${ducc_src}/ducc0/infra/threading.cc)
   target_include_directories(ducc_${name} PRIVATE ${CMAKE_SOURCE_DIR}/native)
   # base/threads.h provides threads: a guest in another process brings no pool. DUCC's switch

@@ -8,8 +8,8 @@
 #include "bake/surface.h"
 #include "bake/surface_light.h"
 #include "base/progress.h"
-#include "solve/light_field.h"
 #include "solve/problem/problem.h"
+#include "solve/spectral/light_field.h"
 
 namespace beamspread {
 

@@ -8,7 +8,7 @@
 #include "base/progress.h"
 #include "base/view.h"
 #include "scene/ray_gather.h"
-#include "solve/problem/light.h"
+#include "solve/problem/problem.h"
 
 namespace beamspread {
 

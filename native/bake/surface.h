@@ -2,7 +2,7 @@
 #pragma once
 
 #include "scene/receiver.h"
-#include "solve/problem/light.h"
+#include "solve/problem/problem.h"
 
 namespace beamspread {
 

@@ -5,7 +5,6 @@
 
 #include "base/error.h"
 #include "ldf/library/ldf_library.h"
-#include "ldf/samples/angular_space.h"
 #include "ldf/samples/interpolate.h"
 #include "ldf/samples/ldf_sample.h"
 #include "ldf/samples/sample_source.h"

@@ -5,7 +5,7 @@
 #include "ldf/library/ldf_library.h"
 #include "medium/medium.h"
 #include "python/casters.h"
-#include "transport/exact/adding_doubling.h"
+#include "transport/exact/exact_totals.h"
 
 namespace beamspread {
 

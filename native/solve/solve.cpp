@@ -7,9 +7,9 @@
 #include "base/threads.h"
 #include "solve/adaptive/adaptive.h"
 #include "solve/direct/direct.h"
-#include "solve/light_field.h"
-#include "solve/problem/channel_sets.h"
-#include "solve/unscattered.h"
+#include "solve/problem/problem.h"
+#include "solve/problem/unscattered.h"
+#include "solve/spectral/light_field.h"
 
 namespace beamspread {
 

@@ -11,7 +11,7 @@
 #include "base/error.h"
 #include "base/threads.h"
 #include "medium/medium.h"
-#include "transport/tally/tally_statistics.h"
+#include "transport/tally/tally.h"
 
 namespace beamspread {
 
@@ -21,7 +21,7 @@ namespace {
 // threads to share.
 constexpr std::uint64_t max_photons_per_job = 200'000;
 
-// Consecutive batches in a group (transport/tally/tally_statistics.h).
+// Consecutive batches in a group (transport/tally/tally.h).
 constexpr std::size_t batches_per_group = batch_count / group_count;
 
 SideTallies empty_tallies(const Medium& medium, double theta_inside)

@@ -8,7 +8,7 @@
 
 #include "base/progress.h"
 #include "medium/medium.h"
-#include "transport/tally/tally_statistics.h"
+#include "transport/tally/tally.h"
 #include "transport/walk/walk.h"
 
 namespace beamspread {

@@ -129,10 +129,9 @@ def convolve(
         `direct` visits every pair of texels: exact and slow. `adaptive` replaces evenly lit squares by one beam each
         (section 3.3 of the paper) and resolves small beams more coarsely at a distance.
     tolerance : float
-        Largest error of `fft` and `adaptive`. The sum of the absolute errors of all texels stays below `tolerance`
-        times the sum of the luminance. The error of a texel stays below `tolerance` times the mean of the 17 x 17
-        texels around it (`fft`) or the brightest texel (`adaptive`). `fft` has a rounding error of some 1e-5 of the
-        brightest texel on top; docs/accuracy.md has the measurements.
+        Largest error of `fft` and `adaptive`, relative to the sum of all texels in the sum, and in a texel to the mean
+        of the 17 x 17 texels around it (`fft`, plus rounding) or to the brightest texel (`adaptive`). See
+        docs/accuracy.md.
     threads : int
         Number of threads, 0 for all. The result does not depend on it.
     progress : callable, optional
@@ -189,24 +188,8 @@ def convolve_lights(
         for irradiance, direction in lights
         for light in native.PlaneLight.of_channels(_irradiance(irradiance), float_array("direction", direction), 3)
     ]
-    return solve(arriving, ldf, albedo, mean_free_path, pitch, solver, tolerance, threads, progress, interpolation)
-
-
-def solve(
-    lights: Sequence[native.PlaneLight],
-    ldf: Ldf,
-    albedo: float | Sequence[float],
-    mean_free_path: float | Sequence[float],
-    pitch: float | Sequence[float],
-    solver: str,
-    tolerance: float,
-    threads: int = 0,
-    progress: Callback | None = None,
-    interpolation: str = "angular",
-) -> NDArray[np.float32]:
-    """`convolve_lights` for native lights, which have a color and may have one direction for all texels."""
     return native.convolve(
-        lights,
+        arriving,
         _sources(ldf, interpolation),
         _rgb("albedo", albedo),
         _rgb("mean_free_path", mean_free_path),

@@ -1,4 +1,4 @@
-#include "ldf/library/angle_spline.h"
+#include "ldf/library/ldf_library.h"
 
 #include <algorithm>
 #include <cmath>

@@ -11,7 +11,7 @@
 #include "base/constants.h"
 #include "base/error.h"
 #include "medium/medium.h"
-#include "transport/exact/adding_doubling.h"
+#include "transport/exact/exact_totals.h"
 
 namespace beamspread {
 

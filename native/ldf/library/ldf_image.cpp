@@ -5,8 +5,7 @@
 
 #include "base/constants.h"
 #include "base/error.h"
-#include "ldf/radial/disk_profile.h"
-#include "ldf/radial/texel_integral.h"
+#include "ldf/radial/radial_function.h"
 
 namespace beamspread {
 

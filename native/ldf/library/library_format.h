@@ -13,7 +13,7 @@
 //   "<side>.<j>.orders"  columns: order bins; line 0 and 1: mean and variance of the order; then one
 //                        line per batch: power that leaves;
 //   "<side>.<j>.scatter" columns: [pole][albedo][harmonic][radius bin], lines: groups of batches: their deviations
-//                        (transport/tally/tally_statistics.h), half precision.
+//                        (transport/tally/tally.h), half precision.
 // Each part has one channel, because sorting channels into pixels takes OpenEXR longer than reading.
 #pragma once
 

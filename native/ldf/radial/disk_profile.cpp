@@ -1,11 +1,11 @@
-#include "ldf/radial/disk_profile.h"
+#include "ldf/radial/radial_function.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "base/constants.h"
 #include "base/threads.h"
-#include "ldf/radial/radial_edges.h"
+#include "ldf/radial/radial_profile.h"
 
 namespace beamspread {
 

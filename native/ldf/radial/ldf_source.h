@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "ldf/radial/radial_profile.h"
-#include "transport/exact/ballistic.h"
+#include "transport/exact/exact_totals.h"
 #include "transport/tally/tally.h"
 
 namespace beamspread {

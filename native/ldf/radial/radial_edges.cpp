@@ -1,4 +1,4 @@
-#include "ldf/radial/radial_edges.h"
+#include "ldf/radial/radial_profile.h"
 
 #include <array>
 #include <cmath>

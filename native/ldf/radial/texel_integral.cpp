@@ -1,4 +1,4 @@
-#include "ldf/radial/texel_integral.h"
+#include "ldf/radial/radial_function.h"
 
 #include <algorithm>
 #include <array>

@@ -26,8 +26,7 @@
 #include <limits>
 
 #include "base/constants.h"
-#include "ldf/samples/angular_space.h"
-#include "ldf/samples/envelope.h"
+#include "ldf/samples/ldf_sample.h"
 
 namespace beamspread {
 

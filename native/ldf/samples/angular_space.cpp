@@ -1,4 +1,4 @@
-#include "ldf/samples/angular_space.h"
+#include "ldf/samples/ldf_sample.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include "base/constants.h"
 #include "base/error.h"
-#include "ldf/samples/envelope.h"
+#include "ldf/samples/interpolate.h"
 
 namespace beamspread {
 

@@ -1,4 +1,4 @@
-#include "ldf/samples/envelope.h"
+#include "ldf/samples/interpolate.h"
 
 #include <algorithm>
 #include <cmath>

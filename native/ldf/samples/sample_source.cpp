@@ -8,7 +8,7 @@
 
 #include "base/constants.h"
 #include "base/error.h"
-#include "ldf/samples/sample_grid.h"
+#include "ldf/samples/interpolate.h"
 
 namespace beamspread {
 

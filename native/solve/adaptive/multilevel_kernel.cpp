@@ -1,4 +1,4 @@
-#include "solve/adaptive/multilevel_kernel.h"
+#include "solve/adaptive/multilevel_sum.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,7 +6,7 @@
 
 #include "base/threads.h"
 #include "simd/loops.h"
-#include "solve/separable/term_row.h"
+#include "solve/separable/light_terms.h"
 
 namespace beamspread {
 

@@ -1,4 +1,4 @@
-#include "solve/adaptive/near_radius.h"
+#include "solve/adaptive/adaptive.h"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,6 @@
 #include "base/random.h"
 #include "base/vec.h"
 #include "simd/loops.h"
-#include "solve/adaptive/even_squares.h"
 #include "solve/adaptive/multilevel_sum.h"
 
 namespace beamspread {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "base/threads.h"
-#include "ldf/radial/texel_integral.h"
+#include "ldf/radial/radial_function.h"
 #include "simd/loops.h"
 
 namespace beamspread {

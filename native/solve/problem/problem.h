@@ -1,13 +1,95 @@
-// The task of a solver: light on a plane of texels, and the medium beneath.
+// The task of a solver: light on a plane of texels, and the media beneath.
 #pragma once
 
 #include <cstddef>
+#include <variant>
 #include <vector>
 
+#include "base/vec.h"
+#include "base/view.h"
 #include "ldf/radial/ldf_source.h"
-#include "solve/problem/light.h"
 
 namespace beamspread {
+
+// A plane of texels. Texel (0, 0) lies at the origin of the plane frame: x runs along rows, y from row to row, z
+// outward.
+struct Plane {
+    std::size_t width = 0;
+    std::size_t height = 0;
+    double pitch_x = 1.0;  // metres
+    double pitch_y = 1.0;
+
+    std::size_t texels() const { return width * height; }
+};
+
+struct Texel {
+    std::size_t y;
+    std::size_t x;
+};
+
+// Part of a row of texels.
+struct RowSpan {
+    std::size_t y;
+    std::size_t x;
+    std::size_t width;
+};
+
+// Directions along which light travels, unit vectors of the plane frame with z < 0.
+struct OneDirection {
+    Vec3 travel{0.0, 0.0, -1.0};
+};
+struct FromPoint {
+    Vec3 position{};  // metres, z > 0; light travels from here to the middles of texels
+};
+struct PerTexel {
+    const float* travel = nullptr;  // (height, width, 3) row by row
+};
+using Directions = std::variant<OneDirection, FromPoint, PerTexel>;
+
+// One light on a plane.
+struct PlaneLight {
+    View2D<const float> irradiance;  // W/m^2 at colour 1
+    Directions directions;
+    std::vector<double> color;  // [channel], >= 0
+};
+
+// Light with an irradiance for each channel: one light if channels are proportional, else one per channel.
+std::vector<PlaneLight> lights_of_channels(const std::vector<View2D<const float>>& irradiance,
+                                           const Directions& directions);
+
+// Rays of one light, one at each texel of a part of a row.
+struct RayRow {
+    std::size_t y;
+    std::size_t x;
+    std::size_t width;
+    const float* travel;      // [texel][x, y, z], of any length; z < 0
+    const float* irradiance;  // [texel][channel], W/m^2
+};
+
+// The angles of a light in part of a row.
+struct BeamRow {
+    std::vector<float> irradiance;
+    std::vector<float> cos_beta;  // azimuth of travel
+    std::vector<float> sin_beta;
+    std::vector<float> half_tangent;  // tan(theta / 2), smooth everywhere and computed without trigonometry
+    std::vector<float> travel;        // working memory
+
+    // Reads part of a row. False if all of it is dark; the angles are not set then.
+    bool read(const Plane& plane, const PlaneLight& light, const RowSpan& span);
+};
+
+// The brightest texel; the first one, row by row, of several.
+Texel brightest(const View2D<const float>& irradiance);
+
+// Direction of the beam at a texel, of any length.
+Vec3 travel_at(const Plane& plane, const Directions& directions, std::size_t y, std::size_t x);
+
+// Angle of incidence in degrees and azimuth in radians of a direction of travel.
+double incidence_deg(const Vec3& travel);
+double azimuth(const Vec3& travel);
+
+// Angle of incidence in degrees from tan(theta / 2).
+double angle_deg(double half_tangent);
 
 // The medium of a color channel.
 struct ChannelMedium {
@@ -45,5 +127,34 @@ struct Problem {
 
 // Throws InvalidArgument for a plane, media, light or options that solvers don't cover.
 void validate(const Problem& problem);
+
+// Sets of channels with proportional light: each channel's light is a factor times that of its set. Lights of one
+// colour make one set, lights of different colours at most one per channel. Channels of one set and medium share a
+// result.
+struct ChannelSets {
+    struct Member {
+        std::size_t channel;
+        double factor;
+    };
+    struct Result {
+        std::size_t set;
+        std::size_t medium;
+        std::vector<Member> members;
+    };
+
+    explicit ChannelSets(const Problem& problem);
+
+    std::size_t count() const { return m_reference.size(); }
+
+    // The reference channel of a set, and a light's colour in it.
+    std::size_t channel(std::size_t set) const { return m_reference[set]; }
+    double color(const PlaneLight& light, std::size_t set) const { return light.color[m_reference[set]]; }
+
+    std::vector<ChannelMedium> media;
+    std::vector<Result> results;
+
+private:
+    std::vector<std::size_t> m_reference;  // [set]
+};
 
 }  // namespace beamspread

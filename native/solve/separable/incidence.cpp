@@ -1,4 +1,4 @@
-#include "solve/separable/incidence.h"
+#include "solve/separable/low_rank.h"
 
 #include <algorithm>
 #include <cmath>
@@ -125,11 +125,6 @@ std::array<double, 4> cubic_b_spline(double t)
 }
 
 }  // namespace
-
-double angle_deg(double half_tangent)
-{
-    return 2.0 * std::atan(half_tangent) / radians_per_degree;
-}
 
 Incidence::Incidence(const Plane& plane, const std::vector<PlaneLight>& lights, const ComingLight& coming)
 {

@@ -1,15 +1,69 @@
-// Low-rank basis of kernels: few light terms instead of one beam per texel, for light of changing directions.
+// Low-rank basis of the kernels of all angles of incidence: few light terms instead of one beam per texel.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <memory>
 #include <vector>
 
+#include "ldf/radial/radial_profile.h"
 #include "simd/loops.h"
-#include "solve/separable/incidence.h"
-#include "solve/separable/kernel_term.h"
+#include "solve/problem/problem.h"
 
 namespace beamspread {
+
+// Angles are tan(theta / 2), in which LDFs are smooth everywhere.
+struct Incidence {
+    // Texels where a light is brightest, steepest and most grazing.
+    struct Extremes {
+        Texel brightest{};
+        Texel steepest{};
+        Texel most_grazing{};
+        double irradiance = 0.0;  // of the brightest texel, over all channels; 0: all texels are dark
+        float min_angle = 1.0f;
+        float max_angle = 0.0f;
+    };
+
+    // Number of angles at which kernels are compared. More: more memory and time, hardly other terms.
+    static constexpr std::size_t count = 64;
+    double first = 1.0;  // larger than `last` if no texel is lit
+    double last = 0.0;
+    // Share of `count` even angles from first to last, with the sum 1: the mean of the shares of light, of lit beams
+    // and of angles. Each present angle counts at the four around it, hence a basis for these serves the angles between
+    // them.
+    std::array<double, count> share{};
+    std::vector<Extremes> extremes;  // [light], without coming light
+
+    Incidence(const Plane& plane, const std::vector<PlaneLight>& lights, const ComingLight& coming = {});
+
+    bool none() const { return first > last; }
+
+private:
+    // Extends the range to the extremes of some lights, and by a margin.
+    void extend(const std::vector<Extremes>& lights, double margin);
+};
+
+enum class Phase { cosine, sine };
+
+// Part of a kernel: `weight` times the harmonic m of a profile.
+struct KernelTerm {
+    std::size_t profile;
+    std::size_t m;
+    Phase phase;
+    double weight;
+};
+
+// Harmonics [first, end).
+struct HarmonicRange {
+    std::size_t first = 0;
+    std::size_t end = 0;
+};
+
+struct ScaledProfile {
+    RadialProfile profile;
+    double mean_free_path = 1.0;  // metres
+    double reach = 0.0;           // metres; the profile counts as zero beyond
+};
 
 // The harmonic m of a kernel as the sum over i of u_i(theta) e_i(r). u_i is a table over tan(theta / 2), which is
 // smooth everywhere and needs no trigonometry; e_i is the harmonic m of one profile per medium.

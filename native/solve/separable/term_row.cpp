@@ -1,4 +1,4 @@
-#include "solve/separable/term_row.h"
+#include "solve/separable/light_terms.h"
 
 #include <algorithm>
 #include <optional>

@@ -1,11 +1,11 @@
-#include "solve/spectral/centre_spectrum.h"
+#include "solve/spectral/kernel_spectra.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "base/constants.h"
 #include "base/threads.h"
-#include "ldf/radial/texel_integral.h"
+#include "ldf/radial/radial_function.h"
 #include "simd/loops.h"
 
 namespace beamspread {

@@ -1,4 +1,4 @@
-#include "solve/spectral/coarse_grid.h"
+#include "solve/spectral/convolution.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "solve/spectral/hankel_table.h"
+#include "solve/spectral/kernel_spectra.h"
 
 #include <algorithm>
 #include <array>

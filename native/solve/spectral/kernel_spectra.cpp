@@ -5,7 +5,7 @@
 
 #include "base/constants.h"
 #include "simd/loops.h"
-#include "solve/spectral/coarse_grid.h"
+#include "solve/spectral/convolution.h"
 
 namespace beamspread {
 

@@ -1,4 +1,4 @@
-// Spectra of kernels on the frequencies of a padded plane, from Hankel transforms of their harmonics.
+// Spectra of kernels on the frequencies of a padded plane: of their centres, of their rings, and of both.
 #pragma once
 
 #include <cstddef>
@@ -6,12 +6,90 @@
 #include <span>
 #include <vector>
 
-#include "solve/separable/kernel_term.h"
-#include "solve/spectral/centre_spectrum.h"
-#include "solve/spectral/hankel_table.h"
+#include "fft/fft.h"
+#include "solve/separable/low_rank.h"
 #include "solve/spectral/padded_plane.h"
 
 namespace beamspread {
+
+// Table of H_m over k for all profiles and m: the two-dimensional Fourier transform of w(r) c_m(r) cos(m phi), with w
+// the ring of a window, is i^-m cos(m psi) H_m(k). Lengths are in a unit that resolves the ring's detail. The table is
+// wrong beyond the Nyquist frequency and for windows that begin or end within less than a unit.
+class HankelTable {
+public:
+    static constexpr std::size_t no_column = static_cast<std::size_t>(-1);
+
+    HankelTable(const std::vector<ScaledProfile>& profiles, const RadialWindow& window, double unit_m);
+
+    // Number of columns of harmonics below m, which come first.
+    std::size_t columns_below(std::size_t m) const { return m_columns_below[m]; }
+
+    // Column of a profile's harmonic; `no_column` if the profile lacks it.
+    std::size_t column(std::size_t profile, std::size_t m) const { return m_column[profile * harmonic_count + m]; }
+
+    // H_m(k) of columns [first, first + count), k in radians per unit.
+    void row(double k, std::size_t first, std::size_t count, float* values) const;
+
+private:
+    void add_profile(const ScaledProfile& scaled, std::size_t index, const RadialWindow& window, double unit_m,
+                     std::size_t samples, std::size_t length);
+
+    double m_k_step = 1.0;
+    std::size_t m_rows = 0;
+    std::size_t m_columns = 0;
+    std::vector<std::size_t> m_columns_below;  // [m]
+    std::vector<std::size_t> m_column;         // [profile][m]
+    std::vector<float> m_table;  // [k][column], the first row for -m_k_step
+};
+
+// Spectra of few texels, which are integrated exactly (ldf/radial/radial_function.h), minus the rings' part in them.
+class CentreSpectrum {
+public:
+    CentreSpectrum(const PaddedPlane& plane, const KernelCentre& half_width, const std::vector<ScaledProfile>& profiles,
+                   const std::optional<RadialWindow>& outside);
+
+    // A sum of terms with the same phase and parity of m.
+    struct Sum {
+        std::vector<float> texels;  // [x][y] of a quadrant, y in whole blocks; with the sign of the spectrum
+        bool sine = false;
+        bool odd_m = false;
+    };
+    Sum add_up(std::span<const KernelTerm> terms) const;
+
+    // Working values of some columns of frequencies, and the sums that they share.
+    struct Columns {
+        std::vector<const Sum*> sums;
+        std::size_t count = 0;
+        std::vector<float> cosine;  // [column][x]: 1 or 0, then twice the cosine or sine
+        std::vector<float> sine;
+        std::vector<float> rows;    // [sum][column][y], summed along x
+        std::vector<float> lines;   // of some sums, with mirrored halves added, padded
+        std::vector<Complex> half;  // transforms of the lines
+    };
+    // Prepares the columns kx = 2 pi frequency / padded_width of `count` frequencies, for the sums in `columns`.
+    void start(std::size_t first_frequency, std::size_t count, Columns& columns) const;
+
+    // Spectrum of a sum in one of the columns, up to the Nyquist frequency of ky (see `KernelSpectra::spectrum`). Not
+    // for wide centres.
+    void spectrum(const Columns& columns, std::size_t column, std::size_t sum, float* values) const;
+
+    // Spectra of sums [first, first + count), [sum][frequency], by transforms of rows: for wide centres.
+    void spectra(Columns& columns, std::size_t column, std::size_t first, std::size_t count, float* values) const;
+    bool is_wide() const { return m_trig.empty(); }
+
+private:
+    void integrate(const ScaledProfile& scaled, const PaddedPlane& plane, const std::optional<RadialWindow>& outside,
+                   float* kernels) const;
+
+    std::size_t m_width;   // texels of a quadrant
+    std::size_t m_height;
+    std::size_t m_stride;  // of y, in whole blocks
+    std::size_t m_padded_width;
+    std::size_t m_padded_height;
+    std::size_t m_frequencies;
+    std::vector<float> m_texels;  // [profile][m][phase][x][y], quadrant
+    std::vector<float> m_trig;    // [cos, sin][y][frequency]; empty: wide
+};
 
 // The spectra of texel integrals of c_m(r) cos(m phi) and c_m(r) sin(m phi).
 //

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "fft/fft.h"
-#include "solve/spectral/coarse_grid.h"
+#include "solve/spectral/convolution.h"
 
 namespace beamspread {
 
@@ -15,6 +15,9 @@ constexpr std::size_t max_centre_side = 32;
 
 // Largest distance of the coarse grid's nodes, in texels.
 constexpr std::size_t max_coarsening = 64;
+
+// Standard deviation of the centre's window, in texels. Larger: smaller errors of suns, more time.
+constexpr double centre_deviation = 3.0;
 
 // Standard deviation of the window between the levels, in nodes of the coarse grid. Larger: smaller errors, more time.
 constexpr double level_deviation = 3.0;
@@ -158,10 +161,10 @@ Levels choose_levels(const Plane& plane, const std::vector<ScaledProfile>& profi
         cut = std::max(cut, each.reach / unit);
     const double diagonal =
         std::hypot(static_cast<double>(width) * pitch_x / unit, static_cast<double>(height) * pitch_y / unit);
-    const double centre_deviation = widened(choice.centre_deviation, profiles, unit);
-    const double centre_end = window_end * centre_deviation;
+    const double deviation = widened(centre_deviation, profiles, unit);
+    const double centre_end = window_end * deviation;
     if (cut > centre_end && std::max(width, height) > max_centre_side) {
-        single.ring = {centre_deviation, 0.0, cut, 0.0};
+        single.ring = {deviation, 0.0, cut, 0.0};
         if (cut > diagonal) {
             // No two texels are farther apart than the diagonal. The taper avoids ringing of an abrupt end.
             single.ring->cut = diagonal;
@@ -184,14 +187,14 @@ Levels choose_levels(const Plane& plane, const std::vector<ScaledProfile>& profi
         if (choice.coarsening != 0 && choice.coarsening != coarsening)
             continue;
         const auto step = static_cast<double>(coarsening);
-        const double deviation = step * widened(level_deviation, profiles, step * unit);
-        if (window_end * deviation >= single.ring->cut)
+        const double border = step * widened(level_deviation, profiles, step * unit);
+        if (window_end * border >= single.ring->cut)
             break;
         Level fine = single;
-        fine.ring = inside(*single.ring, deviation);
+        fine.ring = inside(*single.ring, border);
         set_halo(fine);
         const Tiling tiling = choose_tiles(fine.plane, choice);
-        Level coarse = coarse_level(single.plane, *single.ring, coarsening, deviation);
+        Level coarse = coarse_level(single.plane, *single.ring, coarsening, border);
         const Tiling coarse_tiling = with_tiles(coarse.plane, 1, choice);
         const PaddedPlane& nodes = coarse_tiling.plane;
         // The results of all media stay in memory, beside several of the texels' spectra.

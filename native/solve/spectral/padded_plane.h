@@ -1,19 +1,57 @@
-// Grids on which light is transformed, and the choice of grids and tiles for a plane.
+// Grids on which light is transformed, the windows that divide kernels among them, and the choice of grids and tiles
+// for a plane.
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <optional>
 #include <vector>
 
-#include "solve/problem/light.h"
-#include "solve/separable/kernel_term.h"
-#include "solve/spectral/radial_window.h"
+#include "solve/problem/problem.h"
+#include "solve/separable/low_rank.h"
 
 namespace beamspread {
 
+// Radius around which a window of standard deviation 1 falls like erfc, and its end. The window's error is erfc(4.75 /
+// sqrt(2)) / 2 = 1.0e-6 at its pole and erfc(4.5 / sqrt(2)) / 2 = 3.4e-6 at its end. Larger: smaller errors, more time.
+inline constexpr double window_radius = 4.75;
+inline constexpr double window_end = 9.25;
+
+// The ring between two windows, tapered at a cut. Lengths are in texels.
+struct RadialWindow {
+    double inner = 0.0;  // standard deviation of the inner window, which the ring excludes
+    double outer = 0.0;  // standard deviation of the outer window, outside of which the ring ends; 0: none
+    double cut = 0.0;    // radius at which the taper begins
+    double taper = 0.0;  // length over which it falls to zero
+
+    double end() const { return cut + taper; }
+
+    double weight(double r) const
+    {
+        return (outside(r, inner) - (outer > 0.0 ? outside(r, outer) : 0.0)) * before_cut(r);
+    }
+
+private:
+    static double outside(double r, double deviation)
+    {
+        return 0.5 * std::erfc((window_radius - r / deviation) / std::numbers::sqrt2);
+    }
+
+    double before_cut(double r) const
+    {
+        if (r <= cut)
+            return 1.0;
+        if (r >= cut + taper)
+            return 0.0;
+        const double t = 1.0 - (r - cut) / taper;
+        return t * t * t * (10.0 + t * (6.0 * t - 15.0));
+    }
+};
+
 // A plane of nodes, the tiles in which it is solved, and their padded size. A node is a texel, or a node of a coarser
-// grid (solve/spectral/coarse_grid.h).
+// grid (solve/spectral/convolution.h).
 struct PaddedPlane {
     std::size_t width = 0;
     std::size_t height = 0;
@@ -69,8 +107,6 @@ struct Levels {
 
 // Parameters of the choice of levels, besides the plane.
 struct LevelChoice {
-    // Standard deviation of the centre's window, texels. Larger: smaller errors, more time.
-    double centre_deviation = 3.0;
     std::size_t budget = 0;      // bytes, for spectra
     std::size_t terms = 1;       // of the light
     std::size_t media = 1;       // results

@@ -9,7 +9,6 @@
 #include <Eigen/Dense>
 
 #include "base/threads.h"
-#include "solve/term_choice/probe_sites.h"
 #include "solve/term_choice/radiance_probe.h"
 
 namespace beamspread {

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "base/progress.h"
-#include "solve/separable/incidence.h"
 #include "solve/separable/light_terms.h"
+#include "solve/separable/low_rank.h"
 
 namespace beamspread {
 

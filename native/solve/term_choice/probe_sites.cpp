@@ -1,4 +1,4 @@
-#include "solve/term_choice/probe_sites.h"
+#include "solve/term_choice/radiance_probe.h"
 
 #include <algorithm>
 #include <array>

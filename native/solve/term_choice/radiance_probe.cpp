@@ -8,7 +8,6 @@
 #include "base/random.h"
 #include "base/threads.h"
 #include "simd/loops.h"
-#include "solve/term_choice/probe_sites.h"
 
 namespace beamspread {
 

@@ -1,4 +1,4 @@
-// Radiance at single texels of a plane, separately for each function of a basis.
+// Texels at which the radiance is probed, and the radiance there, separately for each function of a basis.
 #pragma once
 
 #include <cstddef>
@@ -7,8 +7,22 @@
 
 #include "base/threads.h"
 #include "solve/separable/light_terms.h"
+#include "solve/separable/low_rank.h"
 
 namespace beamspread {
+
+// Largest offset of a site's texels from its middle (17 x 17 texels), and number of texels that are probed in it; their
+// mean stands for the mean of all.
+inline constexpr std::size_t site_reach = 8;
+inline constexpr std::size_t texels_per_site = 9;
+
+// Texels of the probe sites, site after site, from a fixed seed: over the whole plane, at light edges and on their dark
+// side, and around the texels where each light is brightest, steepest, most grazing, and nearest to its lamp.
+std::vector<Texel> probe_sites(const LightTerms& light, const std::vector<std::size_t>& lights,
+                               const Incidence& incidence);
+
+// Texels of sites near some texels; other texels for every `draw`.
+std::vector<Texel> sites_around(const std::vector<Texel>& texels, const Plane& plane, std::size_t draw);
 
 // Sums light over rings around a texel, whose width grows with the radius: in each of the same number of directions,
 // the light at a random point of the ring times the kernel's integral over the ring. Exact to some per cent, which is

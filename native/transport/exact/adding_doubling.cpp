@@ -4,7 +4,7 @@
 // By reciprocity, the totals of a beam equal the radiance that the medium returns toward it under uniform diffuse
 // light. One vector of incident light therefore serves all beams; each beam adds a row to the matrices, a direction
 // that light leaves by and that does not feed back into the others.
-#include "transport/exact/adding_doubling.h"
+#include "transport/exact/exact_totals.h"
 
 #include <algorithm>
 #include <cmath>

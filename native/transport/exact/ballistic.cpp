@@ -1,4 +1,4 @@
-#include "transport/exact/ballistic.h"
+#include "transport/exact/exact_totals.h"
 
 #include <cmath>
 

@@ -29,7 +29,7 @@ inline std::size_t order_bin(std::uint32_t order)
 // larger files.
 inline constexpr std::uint32_t sharp_orders = 8;
 
-// Number of points that radii and azimuths are measured around, see transport/tally/poles.h.
+// Number of points that radii and azimuths are measured around, see transport/tally/tally.h.
 inline constexpr std::size_t pole_count = 3;
 
 // A tally has rows: one for each order bin around the first pole, then one for each sharp order around each other pole.

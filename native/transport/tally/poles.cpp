@@ -1,4 +1,4 @@
-#include "transport/tally/poles.h"
+#include "transport/tally/tally.h"
 
 #include <cmath>
 

@@ -1,18 +1,52 @@
-// Tally of the light that leaves one side of the medium, by scattering order, radius and azimuthal harmonic.
+// Tally of the light that leaves one side of the medium, by scattering order, pole, radius and azimuthal harmonic, and
+// statistics of finished tallies.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "base/platform.h"
+#include "medium/medium.h"
 #include "transport/tally/bins.h"
-#include "transport/tally/poles.h"
 
 namespace beamspread {
+
+enum class Side : std::size_t { reflected = 0, transmitted = 1 };
+inline constexpr std::size_t side_count = 2;
+
+// Light that leaves after few scatterings peaks, as 1 / r and sharper, at the beam's entry and exit, and in a slab also
+// around the beam's mirror images in the boundaries. Harmonics around one of these points do not resolve another, and
+// interpolation between angles fails because the images move. Each side therefore has several poles along the beam: its
+// entry (or first exit on the far side), and its next exits.
+
+// Largest number of reflections that an exit distinguishes. Reflections count while they follow the beam's order: the
+// far boundary first, then in turn.
+inline constexpr std::uint32_t max_reflections = 2 * (pole_count - 1);
+
+inline constexpr std::uint32_t reflections_after(std::uint32_t reflections, bool at_far_boundary)
+{
+    const bool as_the_beam = at_far_boundary == (reflections % 2 == 0);
+    return as_the_beam && reflections < max_reflections ? reflections + 1 : reflections;
+}
+
+// Pole of light after these reflections: the beam's latest exit. Later exits have no sharp light of it.
+inline constexpr std::size_t pole_of(std::uint32_t reflections, Side side)
+{
+    return (reflections + (side == Side::reflected ? 1 : 0)) / 2;
+}
+
+// u of each pole, [side][pole], mean free paths.
+using PolePositions = std::array<std::array<double, pole_count>, side_count>;
+PolePositions pole_positions(const Medium& medium, double theta_inside);
+
+// Number of scattering orders, from 0, that are tallied around their own poles; higher orders are tallied around the
+// first. 0: the medium shows no mirror images.
+std::uint32_t mirrored_orders(const Medium& medium);
 
 // Largest number of harmonics in the rows of a pole; `harmonics` has the number of each row.
 inline std::size_t max_harmonics(std::span<const std::size_t> harmonics, std::size_t pole)
@@ -28,7 +62,7 @@ using OrderWeights = std::array<double, order_bin_count>;
 // direction of travel. The walk absorbs nothing: an albedo a scales the sums of order n by a^n.
 struct Tally {
     std::array<double, pole_count> poles{};  // u, mean free paths
-    std::uint32_t mirrored_orders = 0;       // see transport/tally/poles.h
+    std::uint32_t mirrored_orders = 0;       // see transport/tally/tally.h
     // [row][radius bin][harmonic], see `ring`; empty if no light leaves this side
     std::vector<double, HugePageAllocator<double>> moments;
     OrderWeights weight{};         // sum of weight, [order bin], around all poles
@@ -86,5 +120,27 @@ struct Tally {
         }
     }
 };
+
+// Number of leading harmonics of each row, at least one, that reduce the error: their signal exceeds their noise.
+// `half` and `other` are the tallies of two halves of a simulation: the mean of their product is the signal, their
+// difference is noise.
+std::array<std::size_t, row_count> significant_harmonics(const Tally& half, const Tally& other);
+
+// Number n of groups of batches, each an independent simulation. The standard error of a texel is known to
+// 1 / sqrt(2 (n - 1)), 27 %; more groups: better known, larger files.
+inline constexpr std::size_t group_count = 8;
+
+// Number of deviations in a group, for these numbers of harmonics in each row and of radius bins.
+std::size_t deviation_count(std::span<const std::size_t> harmonics, std::size_t radii);
+
+// Deviation of each group's moments from their mean, divided by the m = 0 moment of the ring,
+// [group][pole][albedo][harmonic][radius bin], for the harmonics of the pole's rows. Rounding to five bits keeps files
+// small; with fewer bits, harmonics that cancel where no light leaves would not cancel any more.
+std::vector<float> relative_deviations(std::span<const Tally* const> groups, std::span<const std::size_t> harmonics,
+                                       std::size_t radii);
+
+// Deviations of one group around a pole, interpolated to an albedo, [harmonic][radius bin].
+std::vector<double> deviations_at(std::span<const float> deviations, std::span<const std::size_t> harmonics,
+                                  std::size_t radii, std::size_t group, std::size_t pole, double albedo);
 
 }  // namespace beamspread

@@ -1,4 +1,4 @@
-#include "transport/tally/tally_statistics.h"
+#include "transport/tally/tally.h"
 
 #include <algorithm>
 #include <array>

@@ -206,7 +206,7 @@ HWY_INLINE void reflect(Photons& photons, FloatMask mask, const Photons& from, F
     choose(hn::MulAdd(to_boundary, from.w.x, from.x.x), photons.x.x);
     choose(hn::MulAdd(to_boundary, from.w.y, from.x.y), photons.x.y);
     choose(hn::IfThenElse(up, hn::Zero(floats), hn::Set(floats, thickness)), photons.x.z);
-    // Count the reflection as `reflections_after` does (transport/tally/poles.h).
+    // Count the reflection as `reflections_after` does (transport/tally/tally.h).
     const Words meets = hn::IfThenElse(hn::RebindMask(words, up), hn::Set(words, far_reflection_bits << 1),
                                        hn::Set(words, far_reflection_bits));
     const Words next = hn::Or(hn::Add(photons.batch, photons.batch), hn::Set(words, reflection_bit(0)));

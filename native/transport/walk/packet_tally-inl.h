@@ -19,7 +19,7 @@ HWY_BEFORE_NAMESPACE();
 namespace beamspread {
 namespace HWY_NAMESPACE {
 
-// An exit's tag: order, side, batch and reflections (transport/tally/poles.h) in one word. n reflections are n bits set
+// An exit's tag: order, side, batch and reflections (transport/tally/tally.h) in one word. n reflections are n bits set
 // from `reflections_shift` on.
 constexpr int side_shift = 20;
 constexpr int batch_shift = 21;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "base/constants.h"
 #include "base/vec.h"
@@ -204,15 +205,31 @@ private:
     double m_weight = 1.0;
     double m_exit_weight = 1.0;  // balance heuristic of the exit along the walk
     std::uint32_t m_order = 0;
-    std::uint32_t m_reflections = 0;  // see transport/tally/poles.h
+    std::uint32_t m_reflections = 0;  // see transport/tally/tally.h
     std::uint32_t m_next_roulette;
 };
 
 }  // namespace
 
-void walk_photon(const Medium& medium, double theta_inside, Random& random, SideTallies& tallies)
+void walk_scalar(const WalkJob& job)
 {
-    Walk(medium, theta_inside, random, tallies).run();
+    for (std::size_t b = 0; b < job.photons.size(); ++b) {
+        Random random(job.seed, job.stream, job.first_batch + b);
+        SideTallies& tallies = job.tallies[b / job.batches_per_tally];
+        SideWeights before;
+        for (std::size_t side = 0; side < side_count; ++side)
+            before[side] = tallies[side].weight;
+        for (std::uint64_t done = 0; done < job.photons[b];) {
+            const std::uint64_t block = std::min(photons_per_progress, job.photons[b] - done);
+            for (std::uint64_t i = 0; i < block; ++i)
+                Walk(job.medium, job.theta_inside, random, tallies).run();
+            done += block;
+            job.progress.advance(static_cast<double>(block));
+        }
+        for (std::size_t side = 0; side < side_count; ++side)
+            std::transform(tallies[side].weight.begin(), tallies[side].weight.end(), before[side].begin(),
+                           job.weights[b][side].begin(), std::minus{});
+    }
 }
 
 }  // namespace beamspread

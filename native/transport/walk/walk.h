@@ -21,14 +21,10 @@ namespace beamspread {
 using SideTallies = std::array<Tally, side_count>;
 using SideWeights = std::array<OrderWeights, side_count>;
 
-// Walks one photon that entered at O, travelling at theta_inside (radians) from the inward normal toward +u, and
-// tallies its exits after at least one scattering. Unscattered light has a closed form (transport/exact/ballistic.h).
-void walk_photon(const Medium& medium, double theta_inside, Random& random, SideTallies& tallies);
-
-// Consecutive batches of photons for one angle.
+// Consecutive batches of photons that entered at O, travelling toward +u at one angle.
 struct WalkJob {
     const Medium& medium;
-    double theta_inside;
+    double theta_inside;  // radians from the inward normal
     std::uint64_t seed;
     std::uint64_t stream;  // of random numbers; seed, stream and batch determine the result
     std::size_t first_batch;
@@ -39,8 +35,12 @@ struct WalkJob {
     Progress& progress;
 };
 
-// One implementation of the walk. `scalar` calls walk_photon in a loop and is the reference for the others, which walk
-// one photon per vector lane, in single precision.
+// Walks all photons of a job one after the other and tallies their exits after at least one scattering. Unscattered
+// light has a closed form (transport/exact/exact_totals.h).
+void walk_scalar(const WalkJob& job);
+
+// One implementation of the walk. `scalar` is the reference for the others, which walk one photon per vector lane, in
+// single precision.
 struct WalkKernel {
     std::string_view name;
     void (*walk)(const WalkJob& job);

@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include "hwy/contrib/math/math-inl.h"
 #include "transport/walk/packet_flight-inl.h"
@@ -258,31 +257,6 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace beamspread {
-
-namespace {
-
-void walk_scalar(const WalkJob& job)
-{
-    for (std::size_t b = 0; b < job.photons.size(); ++b) {
-        Random random(job.seed, job.stream, job.first_batch + b);
-        SideTallies& tallies = job.tallies[b / job.batches_per_tally];
-        SideWeights before;
-        for (std::size_t side = 0; side < side_count; ++side)
-            before[side] = tallies[side].weight;
-        for (std::uint64_t done = 0; done < job.photons[b];) {
-            const std::uint64_t block = std::min(photons_per_progress, job.photons[b] - done);
-            for (std::uint64_t i = 0; i < block; ++i)
-                walk_photon(job.medium, job.theta_inside, random, tallies);
-            done += block;
-            job.progress.advance(static_cast<double>(block));
-        }
-        for (std::size_t side = 0; side < side_count; ++side)
-            std::transform(tallies[side].weight.begin(), tallies[side].weight.end(), before[side].begin(),
-                           job.weights[b][side].begin(), std::minus{});
-    }
-}
-
-}  // namespace
 
 std::vector<WalkKernel> walk_kernels()
 {

@@ -1,4 +1,4 @@
-#include "solve/problem/light.h"
+#include "solve/problem/problem.h"
 
 #include <algorithm>
 #include <cmath>
@@ -117,6 +117,11 @@ double incidence_deg(const Vec3& travel)
 double azimuth(const Vec3& travel)
 {
     return std::atan2(travel.y, travel.x);
+}
+
+double angle_deg(double half_tangent)
+{
+    return 2.0 * std::atan(half_tangent) / radians_per_degree;
 }
 
 }  // namespace beamspread

@@ -1,6 +1,6 @@
 // Compiled once per instruction set; BEAMSPREAD_FFT_INSTRUCTION_SET names the function that returns the variant. Only
 // the templates of DUCC in use are instantiated here.
-#include "fft/instruction_sets/fft.h"
+#include "fft/instruction_sets/instruction_set.h"
 
 #include "ducc0/fft/fftnd_impl.h"
 

@@ -1,4 +1,4 @@
-#include "solve/spectral/spectral.h"
+#include "solve/spectral/light_field.h"
 
 #include <algorithm>
 #include <span>
@@ -13,9 +13,6 @@
 namespace beamspread {
 
 namespace {
-
-// Border of the kernels' centers, texels. Smaller: larger errors of suns.
-constexpr double centre_deviation = 3.0;
 
 // Largest fraction of a kernel's power outside its reach, for changing directions. Larger: less padding, larger errors in
 // the dark.
@@ -41,39 +38,59 @@ LightTerms chosen_terms(const Problem& problem, Progress& progress)
     const auto choose = [&](const KernelDecomposition& kernels, const Incidence& incidence, const LightTerms& light) {
         return choose_terms(kernels, incidence, light, problem.tolerance, progress, choice_work);
     };
-    LightTerms result = light_terms(problem, std::min(1e-2 * problem.tolerance, max_beyond), choose);
-    if (problem.coming.survey.empty())
-        return result;
-    for (const LightTerm& term : result.terms) {
+    std::optional<LightTerms> result;
+    with_threads(problem.threads, [&] {
+        validate(problem);
+        result = light_terms(problem, std::min(1e-2 * problem.tolerance, max_beyond), choose);
+    });
+    for (const LightTerm& term : result->terms) {
+        if (problem.coming.survey.empty())
+            break;
         progress.advance(0.0);  // zeros of large planes take seconds
-        result.moments.emplace_back(term.fixed.empty() ? problem.plane.texels() : 0);
+        result->moments.emplace_back(term.fixed.empty() ? problem.plane.texels() : 0);
     }
-    return result;
+    return *std::move(result);
 }
 
 }  // namespace
 
-SpectralField::SpectralField(const Problem& problem, Progress& progress)
+LightField::LightField(const Problem& problem, Progress& progress)
     : m_problem(problem),
       m_terms(chosen_terms(problem, progress)),
-      m_levels(
-          choose_levels(problem.plane, m_terms.profiles,
-                        {centre_deviation, problem.memory, terms(), m_terms.sets.results.size(), problem.coarsening}))
+      m_levels(choose_levels(problem.plane, m_terms.profiles,
+                             {problem.memory, terms(), m_terms.sets.results.size(), problem.coarsening}))
 {
+    if (!problem.coming.survey.empty())
+        m_unscattered.emplace(problem);
+    m_problem.coming = {};
 }
 
-void SpectralField::add(const RayRow& rays, const std::vector<double>& color, bool is_colored)
+void LightField::add(const RayRow& rays, const std::vector<double>& color, bool is_colored)
 {
     m_sums.local().add(m_terms, rays, color, is_colored);
+    if (m_unscattered)
+        m_unscattered->add(rays, color);
 }
 
-void SpectralField::clear()
+void LightField::clear()
 {
     for (std::vector<float>& moments : m_terms.moments)
         std::fill(moments.begin(), moments.end(), 0.0f);
+    if (m_unscattered)
+        m_unscattered->clear();
 }
 
-void SpectralField::solve(Progress& progress, float* luminance)
+void LightField::solve(Progress& progress, float* luminance)
+{
+    with_threads(m_problem.threads, [&] {
+        spread(progress, luminance);
+        add_unscattered(m_problem, luminance);
+    });
+    if (m_unscattered)
+        m_unscattered->add_to(luminance);
+}
+
+void LightField::spread(Progress& progress, float* luminance)
 {
     if (m_terms.terms.empty()) {  // nothing is lit
         std::fill_n(luminance, m_problem.plane.texels() * m_problem.channels.size(), 0.0f);
@@ -84,7 +101,7 @@ void SpectralField::solve(Progress& progress, float* luminance)
     if (m_levels.coarse) {
         share = nodes(m_levels.texels.plane);
         share /= share + nodes(m_levels.coarse->plane);
-        coarse.emplace(solve_coarse(*m_levels.coarse, progress, 1.0 - share));
+        coarse.emplace(spread_coarsely(*m_levels.coarse, progress, 1.0 - share));
     }
     if (!m_spectra)
         m_spectra.emplace(m_levels.texels, m_terms.profiles, m_levels.outside_centre);
@@ -97,7 +114,7 @@ void SpectralField::solve(Progress& progress, float* luminance)
     convolution.solve(texel_rows(m_terms), store, progress, share);
 }
 
-SpectralField::CoarseLuminance SpectralField::solve_coarse(const Level& level, Progress& progress, double work)
+LightField::CoarseLuminance LightField::spread_coarsely(const Level& level, Progress& progress, double work)
 {
     const PaddedPlane& plane = level.plane;
     const CoarseGrid grid(plane, m_problem.plane.width, m_problem.plane.height);
@@ -128,8 +145,8 @@ SpectralField::CoarseLuminance SpectralField::solve_coarse(const Level& level, P
     return {grid, std::move(sums)};
 }
 
-void SpectralField::store_row(std::size_t result, const RowSpan& span, const float* values, double factor,
-                              float* luminance) const
+void LightField::store_row(std::size_t result, const RowSpan& span, const float* values, double factor,
+                           float* luminance) const
 {
     const std::size_t channels = m_problem.channels.size();
     for (const ChannelSets::Member& member : m_terms.sets.results[result].members) {
@@ -138,11 +155,6 @@ void SpectralField::store_row(std::size_t result, const RowSpan& span, const flo
         for (std::size_t x = 0; x < span.width; ++x)
             out[x * channels] = scaled * values[x];
     }
-}
-
-std::size_t count_terms(const Problem& problem, Progress& progress)
-{
-    return chosen_terms(problem, progress).terms.size();
 }
 
 }  // namespace beamspread

@@ -12,7 +12,6 @@ namespace beamspread {
 // Adds the light that a slab with an ior above 1 returns unscattered from its far boundary to (height, width,
 // channels).
 void add_unscattered(const Problem& problem, float* luminance);
-void add_unscattered(const Problem& problem, const PlaneLight& light, float* luminance);
 
 // Sums the unscattered light of rays, from any number of threads at once, in integers: their sum does not depend on the
 // order.
@@ -22,9 +21,6 @@ public:
     ~UnscatteredRays();
     UnscatteredRays(const UnscatteredRays&) = delete;
     UnscatteredRays& operator=(const UnscatteredRays&) = delete;
-
-    // True if nothing returns unscattered.
-    bool none() const { return m_sums.empty(); }
 
     void add(const RayRow& rays, const std::vector<double>& color);
     void add_to(float* luminance) const;
@@ -36,7 +32,7 @@ private:
     Plane m_plane;
     std::unique_ptr<Exits> m_exits;
     double m_unit;                     // of the sums, W/(m^2 sr)
-    std::vector<std::int64_t> m_sums;  // [texel][channel]
+    std::vector<std::int64_t> m_sums;  // [texel][channel]; empty: nothing returns unscattered
 };
 
 }  // namespace beamspread

@@ -1,6 +1,6 @@
-// Light that a slab's far boundary returns without scattering (transport/exact/ballistic.h). It leaves displaced and as
+// Light that a slab's far boundary returns without scattering (transport/exact/exact_totals.h). It leaves displaced and as
 // sharp as it entered: each texel's light becomes squares, whose power the texels below share.
-#include "solve/unscattered.h"
+#include "solve/problem/unscattered.h"
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,6 @@
 
 #include "base/constants.h"
 #include "base/threads.h"
-#include "solve/separable/incidence.h"
 
 namespace beamspread {
 
@@ -156,14 +155,6 @@ Strip strip_from(std::size_t first, const Plane& plane, const PlaneLight& light,
     return result;
 }
 
-}  // namespace
-
-void add_unscattered(const Problem& problem, float* luminance)
-{
-    for (const PlaneLight& light : problem.lights)
-        add_unscattered(problem, light, luminance);
-}
-
 void add_unscattered(const Problem& problem, const PlaneLight& light, float* luminance)
 {
     const Plane& plane = problem.plane;
@@ -181,6 +172,14 @@ void add_unscattered(const Problem& problem, const PlaneLight& light, float* lum
             };
         });
     }
+}
+
+}  // namespace
+
+void add_unscattered(const Problem& problem, float* luminance)
+{
+    for (const PlaneLight& light : problem.lights)
+        add_unscattered(problem, light, luminance);
 }
 
 struct UnscatteredRays::Exits {
