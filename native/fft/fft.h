@@ -15,6 +15,9 @@ namespace beamspread {
 
 using Complex = std::complex<float>;
 
+// Lines that are transformed together, a multiple of the transforms' SIMD width. More: more cache.
+inline constexpr std::size_t lines_at_once = 16;
+
 // The smallest even size of at least `min_size` whose transforms are fast.
 std::size_t fast_even_size(std::size_t min_size);
 

@@ -107,11 +107,11 @@ void find_steps(std::uint32_t* __restrict step, float* __restrict part, const fl
     for (std::size_t i = 0; i < count; ++i) {
         const float unbounded = (half_tangent[i] - first) * per_step;
         const float above = unbounded > 0.0f ? unbounded : 0.0f;
-        const float place = above < end ? above : end;
-        const auto whole = static_cast<std::int32_t>(place);
+        const float position = above < end ? above : end;
+        const auto whole = static_cast<std::int32_t>(position);
         const std::int32_t before = whole < last ? whole : last;
         step[i] = static_cast<std::uint32_t>(before);
-        part[i] = place - static_cast<float>(before);
+        part[i] = position - static_cast<float>(before);
     }
 }
 

@@ -97,13 +97,13 @@ AngleResult normalized(double angle_deg, const AngleSums& sums, double photons)
         if (sums.groups[0][side].moments.empty())
             continue;
         Tally tally = sum_of(sums, side, 0, 2);
-        const Tally other = sum_of(sums, side, 1, 2);
+        const Tally odd_groups = sum_of(sums, side, 1, 2);
         out.harmonics.assign(row_count, 1);
         if (angle_deg > 0.0) {  // at 0 degrees, symmetry makes all harmonics m > 0 noise
-            const auto counts = significant_harmonics(tally, other);
+            const auto counts = significant_harmonics(tally, odd_groups);
             out.harmonics.assign(counts.begin(), counts.end());
         }
-        tally.merge(other);
+        tally.merge(odd_groups);
         normalize_rings(tally, photons, out);
         out.radii = used_radii(out.power);
         out.mean_order.resize(order_bin_count);

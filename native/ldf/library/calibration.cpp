@@ -164,8 +164,8 @@ void calibrate(SideResult& side, const Observation& observed)
         std::transform(power, power + radius_bin_count, power,
                        [factor](float x) { return static_cast<float>(factor * static_cast<double>(x)); });
     }
-    // Scale each batch as if it were the whole simulation, to the same totals (Kalman update of its deviation). The
-    // mean of all batches stays.
+    // Scale each batch as if it were the whole simulation, to the same totals (update of its deviation: Kalman 1960, J.
+    // Basic Eng. 82, 35). The mean of all batches stays.
     powers = scale.asDiagonal() * powers;
     const VectorXd variance = relative.cwiseProduct((scale.cwiseProduct(before)).cwiseAbs2());
     const MatrixXd spread = variance.asDiagonal() * observed.weights.transpose();

@@ -47,19 +47,19 @@ Stencil derivative_stencil(const std::vector<std::size_t>& knots, std::size_t i)
 
 const Knots& knots(RadialDetail detail)
 {
-    static const auto table = [] {
+    static const auto tables = [] {
         std::array<Knots, 2> all;
-        for (const RadialDetail each : {RadialDetail::bins, RadialDetail::all}) {
-            Knots& of = all[static_cast<std::size_t>(each)];
+        for (const RadialDetail detail : {RadialDetail::bins, RadialDetail::all}) {
+            auto& [edge, stencil] = all[static_cast<std::size_t>(detail)];
             for (std::size_t k = 0; k < edge_count; ++k)
-                if (each == RadialDetail::all || is_bin_edge(k))
-                    of.edge.push_back(k);
-            for (std::size_t i = 0; i < of.edge.size(); ++i)
-                of.stencil.push_back(derivative_stencil(of.edge, i));
+                if (detail == RadialDetail::all || is_bin_edge(k))
+                    edge.push_back(k);
+            for (std::size_t i = 0; i < edge.size(); ++i)
+                stencil.push_back(derivative_stencil(edge, i));
         }
         return all;
     }();
-    return table[static_cast<std::size_t>(detail)];
+    return tables[static_cast<std::size_t>(detail)];
 }
 
 // Factors of the values (v) and slopes (s) at a bin's edges in its cubic Hermite polynomial, or in the derivative, at t
@@ -139,18 +139,18 @@ void RadialProfile::subdivide(std::size_t first, std::size_t last)
 }
 
 // Slopes of C_m at knot i. Far out g falls exponentially, by several times within a bin. A polynomial follows the
-// logarithm of the remaining power of m = 0 well, and the other harmonics' ratios to it.
+// logarithm of the remaining power of m = 0 well, and the profile harmonics' ratios to it.
 Harmonics RadialProfile::slope_at(std::size_t i, RadialDetail detail) const
 {
-    const Knots& of = knots(detail);
-    const Stencil& stencil = of.stencil[i];
+    const auto& [edge, stencils] = knots(detail);
+    const Stencil& stencil = stencils[i];
     Harmonics slope{};
     for (std::size_t j = 0; j < 5; ++j)
-        if (m_remaining[of.edge[stencil.first + j]][0] <= 0.0)
+        if (m_remaining[edge[stencil.first + j]][0] <= 0.0)
             return slope;  // beside the last bin with light, or noise of subtracted profiles
-    const Harmonics& here = m_remaining[of.edge[i]];
+    const Harmonics& here = m_remaining[edge[i]];
     for (std::size_t j = 0; j < 5; ++j) {
-        const Harmonics& there = m_remaining[of.edge[stencil.first + j]];
+        const Harmonics& there = m_remaining[edge[stencil.first + j]];
         slope[0] -= stencil.weight[j] * here[0] * std::log(there[0] / here[0]);
         for (std::size_t m = 1; m < m_harmonics; ++m)
             slope[m] -= stencil.weight[j] * here[0] * there[m] / there[0];
@@ -160,28 +160,28 @@ Harmonics RadialProfile::slope_at(std::size_t i, RadialDetail detail) const
     return slope;
 }
 
-void RadialProfile::add(const RadialProfile& other, double even_weight, double odd_weight)
+void RadialProfile::add(const RadialProfile& profile, double even_weight, double odd_weight)
 {
     Harmonics weights{};
-    for (std::size_t m = 0; m < other.m_harmonics; ++m)
+    for (std::size_t m = 0; m < profile.m_harmonics; ++m)
         weights[m] = m % 2 == 0 ? even_weight : odd_weight;
-    add(other, weights);
+    add(profile, weights);
 }
 
-void RadialProfile::add(const RadialProfile& other, const Harmonics& weights)
+void RadialProfile::add(const RadialProfile& profile, const Harmonics& weights)
 {
-    for (std::size_t m = 0; m < other.m_harmonics; ++m) {
+    for (std::size_t m = 0; m < profile.m_harmonics; ++m) {
         if (weights[m] == 0.0)
             continue;
         m_harmonics = std::max(m_harmonics, m + 1);
-        m_total[m] += weights[m] * other.m_total[m];
+        m_total[m] += weights[m] * profile.m_total[m];
         for (std::size_t k = 0; k < edge_count; ++k) {
-            m_remaining[k][m] += weights[m] * other.m_remaining[k][m];
-            m_slope[k][m] += weights[m] * other.m_slope[k][m];
+            m_remaining[k][m] += weights[m] * profile.m_remaining[k][m];
+            m_slope[k][m] += weights[m] * profile.m_slope[k][m];
         }
     }
-    m_support = std::max(m_support, other.m_support);
-    m_detail = std::max(m_detail, other.m_detail);
+    m_support = std::max(m_support, profile.m_support);
+    m_detail = std::max(m_detail, profile.m_detail);
 }
 
 void RadialProfile::keep_harmonics(std::size_t count)

@@ -70,10 +70,10 @@ public:
     RadialProfile(double centre, std::span<const double> bin_moments, RadialDetail detail);
 
     // Adds a weighted profile, with separate weights for harmonics of even and odd m. Keeps the centre.
-    void add(const RadialProfile& other, double even_weight, double odd_weight);
+    void add(const RadialProfile& profile, double even_weight, double odd_weight);
 
     // Adds a profile with a weight for each harmonic. Keeps the centre.
-    void add(const RadialProfile& other, const Harmonics& weights);
+    void add(const RadialProfile& profile, const Harmonics& weights);
 
     // Drops the harmonics from this m on.
     void keep_harmonics(std::size_t count);

@@ -39,11 +39,11 @@ struct BorderIntegral {
         }
     }
 
-    void add(const BorderIntegral& other, double sign)
+    void add(const BorderIntegral& integral, double sign)
     {
         for (std::size_t m = 0; m < harmonics; ++m) {
-            cosine[m] += sign * other.cosine[m];
-            sine[m] += sign * other.sine[m];
+            cosine[m] += sign * integral.cosine[m];
+            sine[m] += sign * integral.sine[m];
         }
     }
 };

@@ -75,12 +75,12 @@ struct Ring {
     double value = 0.0;
     double variance = 0.0;
 
-    void add(const Ring& other)
+    void add(const Ring& ring)
     {
-        count += other.count;
-        radius += other.radius;
-        value += other.value;
-        variance += other.variance;
+        count += ring.count;
+        radius += ring.radius;
+        value += ring.value;
+        variance += ring.variance;
     }
 };
 

@@ -30,7 +30,8 @@ std::vector<Square> even_squares(const Plane& plane, const PlaneLight& light, do
 // steps; each lights everything above and to the right of a corner. Steps of adjacent squares of the same light cancel.
 Grid take_steps(Grid& light, const std::vector<Square>& squares);
 
-// Kernel of a step: the sums of a kernel over all offsets below and to the left, for offsets from the corner.
+// Kernel of a step: the sums of a kernel over all offsets below and to the left, for offsets from the corner
+// (summed-area table: Crow 1984, doi:10.1145/800031.808600).
 KernelTable step_kernel(const Grid& kernel);
 
 // Beams of about the same angle.

@@ -12,8 +12,9 @@ namespace beamspread {
 
 namespace {
 
-// Coarse points [first, first + count) around a fine point, with their weights in cubic interpolation. On a halved
-// axis, coarse point j is fine point 2 (j - 1); on others both are the same.
+// Coarse points [first, first + count) around a fine point, with their weights in cubic interpolation (Brandt, Lubrecht
+// 1990, J. Comput. Phys. 90, 348). On a halved axis, coarse point j is fine point 2 (j - 1); on others both are the
+// same.
 struct Neighbours {
     std::size_t first;
     std::size_t count;

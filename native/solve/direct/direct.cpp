@@ -12,8 +12,9 @@ namespace beamspread {
 
 namespace {
 
-// A sum of some of the kernels A_jm and B_jm, texel integrals of c_jm(r) cos(m phi) and c_jm(r) sin(m phi). The kernel
-// of a beam at (theta, beta) is the sum over nodes j and harmonics m of
+// A sum of some of the kernels A_jm and B_jm (g of Manabe et al. 2012, Eq. 2, in azimuthal harmonics), texel integrals
+// of c_jm(r) cos(m phi) and c_jm(r) sin(m phi). The kernel of a beam at (theta, beta) is the sum over nodes j and
+// harmonics m of
 //   weight_j,m(theta) [cos(m beta) A_jm + sin(m beta) B_jm].
 struct Term {
     std::size_t node;

@@ -27,12 +27,12 @@ bool differ_by(float factor, const View2D<const float>& a, const View2D<const fl
 
 Texel brightest(const View2D<const float>& irradiance)
 {
-    Texel found{0, 0};
+    Texel maximum{0, 0};
     for (std::size_t y = 0; y < irradiance.height; ++y)
         for (std::size_t x = 0; x < irradiance.width; ++x)
-            if (irradiance(y, x) > irradiance(found.y, found.x))
-                found = {y, x};
-    return found;
+            if (irradiance(y, x) > irradiance(maximum.y, maximum.x))
+                maximum = {y, x};
+    return maximum;
 }
 
 std::vector<PlaneLight> lights_of_channels(const std::vector<View2D<const float>>& irradiance,
@@ -73,10 +73,10 @@ bool BeamRow::read(const Plane& plane, const PlaneLight& light, const RowSpan& s
         return false;
     for (auto* values : {&cos_beta, &sin_beta, &half_tangent})
         values->resize(count);
-    if (const auto* one = std::get_if<OneDirection>(&light.directions)) {
-        std::fill(cos_beta.begin(), cos_beta.end(), static_cast<float>(std::cos(azimuth(one->travel))));
-        std::fill(sin_beta.begin(), sin_beta.end(), static_cast<float>(std::sin(azimuth(one->travel))));
-        const double tangent = std::tan(0.5 * incidence_deg(one->travel) * radians_per_degree);
+    if (const auto* parallel = std::get_if<OneDirection>(&light.directions)) {
+        std::fill(cos_beta.begin(), cos_beta.end(), static_cast<float>(std::cos(azimuth(parallel->travel))));
+        std::fill(sin_beta.begin(), sin_beta.end(), static_cast<float>(std::sin(azimuth(parallel->travel))));
+        const double tangent = std::tan(0.5 * incidence_deg(parallel->travel) * radians_per_degree);
         std::fill(half_tangent.begin(), half_tangent.end(), static_cast<float>(tangent));
         return true;
     }
@@ -99,8 +99,8 @@ bool BeamRow::read(const Plane& plane, const PlaneLight& light, const RowSpan& s
 
 Vec3 travel_at(const Plane& plane, const Directions& directions, std::size_t y, std::size_t x)
 {
-    if (const auto* one = std::get_if<OneDirection>(&directions))
-        return one->travel;
+    if (const auto* parallel = std::get_if<OneDirection>(&directions))
+        return parallel->travel;
     if (const auto* point = std::get_if<FromPoint>(&directions))
         return Vec3((static_cast<double>(x) + 0.5) * plane.pitch_x, (static_cast<double>(y) + 0.5) * plane.pitch_y,
                     0.0) -

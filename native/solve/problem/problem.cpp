@@ -18,8 +18,8 @@ constexpr float max_irradiance = 1e30f;
 // Largest mean free path, texels. The widest plane, 65536 texels, then lies within the first radius bin of LDFs, 2^-10.
 constexpr double max_path_texels = 1e8;
 
-// Largest ratio of a texel's sides. Solver `fft` tabulates kernels in units of the longer side; time and memory grow with
-// the ratio.
+// Largest ratio of a texel's sides. Solver `fft` tabulates kernels in units of the longer side; time and memory grow
+// with the ratio.
 constexpr double max_aspect = 1000.0;
 
 // Largest difference of a direction's squared length from 1. Half precision rounds unit vectors by 1e-3.
@@ -58,8 +58,8 @@ void check_light(const Plane& plane, std::size_t channels, const PlaneLight& lig
     for (const double part : light.color)
         if (!(part >= 0.0 && part <= static_cast<double>(max_irradiance)))
             reject("color", part, "0 to 1e30");
-    if (const auto* one = std::get_if<OneDirection>(&light.directions))
-        check_direction(one->travel);
+    if (const auto* parallel = std::get_if<OneDirection>(&light.directions))
+        check_direction(parallel->travel);
     if (const auto* point = std::get_if<FromPoint>(&light.directions); point != nullptr && !(point->position.z > 0.0))
         reject("position", point->position.z, "above the plane");
     parallel_for(irradiance.height, [&](std::size_t y) { check_row(light, y); });

@@ -106,7 +106,8 @@ struct ComingLight {
     Plane plane;
     std::vector<PlaneLight> survey;
 
-    // Some of that light at all texels; terms are chosen for its luminance. Empty: for any light of the survey's angles.
+    // Some of that light at all texels; terms are chosen for its luminance. Empty: for any light of the survey's
+    // angles.
     std::vector<PlaneLight> examples;
 };
 

@@ -1,5 +1,5 @@
-// Light that a slab's far boundary returns without scattering (transport/exact/exact_totals.h). It leaves displaced and as
-// sharp as it entered: each texel's light becomes squares, whose power the texels below share.
+// Light that a slab's far boundary returns without scattering (transport/exact/exact_totals.h). It leaves displaced and
+// as sharp as it entered: each texel's light becomes squares, whose power the texels below share.
 #include "solve/problem/unscattered.h"
 
 #include <algorithm>
@@ -60,9 +60,9 @@ public:
 
     Exit at(std::size_t k, float half_tangent) const
     {
-        const float place = std::clamp((half_tangent - m_first) * m_per_step, 0.0f, static_cast<float>(table_steps));
-        const auto step = std::min(static_cast<std::size_t>(place), table_steps - 1);
-        const float part = place - static_cast<float>(step);
+        const float position = std::clamp((half_tangent - m_first) * m_per_step, 0.0f, static_cast<float>(table_steps));
+        const auto step = std::min(static_cast<std::size_t>(position), table_steps - 1);
+        const float part = position - static_cast<float>(step);
         const Exit& a = m_exits[k][step];
         const Exit& b = m_exits[k][step + 1];
         return {a.distance + part * (b.distance - a.distance), a.power + part * (b.power - a.power)};
@@ -146,8 +146,8 @@ Strip strip_from(std::size_t first, const Plane& plane, const PlaneLight& light,
                 const float exitance = row.irradiance[x] * exit.power * static_cast<float>(inv_pi);
                 share(plane, static_cast<float>(x) + exit.distance * row.cos_beta[x] * per_x,
                       static_cast<float>(y) + exit.distance * row.sin_beta[x] * per_y,
-                      [&](std::size_t place, float part) {
-                          result.values[place - result.first_row * plane.width] += exitance * part;
+                      [&](std::size_t texel, float part) {
+                          result.values[texel - result.first_row * plane.width] += exitance * part;
                       });
             }
         }
@@ -234,8 +234,8 @@ void UnscatteredRays::add(const RayRow& rays, const std::vector<double>& color)
                 const double exitance = irradiance * static_cast<double>(power) * inv_pi / m_unit;
                 share(m_plane, static_cast<float>(rays.x + x) + distance * static_cast<float>(step.x),
                       static_cast<float>(rays.y) + distance * static_cast<float>(step.y),
-                      [&](std::size_t place, float part) {
-                          std::atomic_ref(m_sums[place * channels + c])
+                      [&](std::size_t texel, float part) {
+                          std::atomic_ref(m_sums[texel * channels + c])
                               .fetch_add(std::llround(exitance * static_cast<double>(part)), std::memory_order_relaxed);
                       });
             }

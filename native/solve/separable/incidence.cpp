@@ -116,7 +116,8 @@ double max_step(const ComingLight& coming)
     return static_cast<double>(step);
 }
 
-// Weights of four neighbours at t in [0, 1] between the second and the third, by a cubic B-spline.
+// Weights of four neighbours at t in [0, 1] between the second and the third, by a cubic B-spline (de
+// Boor 2001, "A Practical Guide to Splines", Ch. IX).
 std::array<double, 4> cubic_b_spline(double t)
 {
     const double s = 1.0 - t;

@@ -124,7 +124,7 @@ LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& 
     else
         for (const auto& [travel, lights] : directions)
             add_direction(result, travel, lights, beyond);
-    const std::size_t kept = result.changing.size();
+    const std::size_t stored = result.changing.size();
     result.changing.insert(result.changing.end(), problem.coming.examples.begin(), problem.coming.examples.end());
     for (const PlaneLight& light : result.changing) {
         result.colors.emplace_back();
@@ -133,8 +133,8 @@ LightTerms light_terms(const Problem& problem, double beyond, const TermChoice& 
     }
     const Incidence incidence(problem.plane, result.changing, problem.coming);
     const auto drop_examples = [&] {
-        result.changing.resize(kept);
-        result.colors.resize(kept);
+        result.changing.resize(stored);
+        result.colors.resize(stored);
     };
     if (incidence.none()) {
         drop_examples();

@@ -123,9 +123,9 @@ void MomentSum::add(LightTerms& terms, const RayRow& rays, const std::vector<dou
 
 void MomentSum::add_beams(LightTerms& terms, const RowSpan& span, const float* irradiance)
 {
-    const std::size_t place = span.y * terms.plane.width + span.x;
+    const std::size_t first = span.y * terms.plane.width + span.x;
     m_moments.add(
-        terms, m_beams, m_colors, 0, terms.terms.size(), [&](std::size_t t) { return terms.moments[t].data() + place; },
+        terms, m_beams, m_colors, 0, terms.terms.size(), [&](std::size_t t) { return terms.moments[t].data() + first; },
         irradiance);
 }
 

@@ -15,9 +15,6 @@ namespace {
 // Rows of a quadrant up to which its spectrum is summed; more rows are transformed, which takes less time then.
 constexpr std::size_t max_summed_rows = 40;
 
-// Rows that are transformed together, a multiple of the transforms' SIMD width. More: more cache.
-constexpr std::size_t lines_at_once = 16;
-
 // Phase 2 pi steps / size, without whole turns, which would lose digits.
 double phase_of(std::size_t steps, std::size_t size)
 {

@@ -10,12 +10,8 @@ namespace beamspread {
 
 namespace {
 
-// Rows and columns of one work item. The rows' pieces of columns fill cache lines.
-constexpr std::size_t rows_per_item = 16;
+// Columns of one work item, whose pieces of rows fill cache lines. More: fewer items for threads to share.
 constexpr std::size_t columns_per_item = 8;
-
-// Light terms with columns in the cache together, a multiple of the transforms' SIMD width. More: more cache.
-constexpr std::size_t terms_per_batch = 16;
 
 std::size_t rounds_of(std::size_t count, std::size_t at_once)
 {
@@ -100,16 +96,16 @@ void Convolution::transform_light(const Tile& tile, std::size_t first, std::size
 {
     const std::size_t stride = m_plane.padded_width;
     const std::size_t columns = m_plane.columns();
-    const std::size_t items = rounds_of(tile.window_y.count, rows_per_item);
+    const std::size_t items = rounds_of(tile.window_y.count, lines_at_once);
     parallel_for(items, [&](std::size_t item) {
-        const std::size_t y0 = item * rows_per_item;
-        const std::size_t rows = std::min(rows_per_item, tile.window_y.count - y0);
+        const std::size_t y0 = item * lines_at_once;
+        const std::size_t rows = std::min(lines_at_once, tile.window_y.count - y0);
         RowScratch& scratch = m_row_scratch.local();
         while (scratch.rows.size() < rows)
             scratch.rows.push_back(tile.light());
-        scratch.lines.resize(rows_per_item * stride);
-        scratch.half.resize(rows_per_item * columns);
-        std::array<TermValues, rows_per_item> light_rows{};
+        scratch.lines.resize(lines_at_once * stride);
+        scratch.half.resize(lines_at_once * columns);
+        std::array<TermValues, lines_at_once> light_rows{};
         for (std::size_t y = 0; y < rows; ++y)
             light_rows[y] =
                 scratch.rows[y]({tile.window_y.first + y0 + y, tile.window_x.first, tile.window_x.count}, first, count);
@@ -150,7 +146,7 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
     first_part.push_back(parts.size());
     parallel_for(items, [&](std::size_t item) {
         ColumnScratch& scratch = m_column_scratch.local();
-        scratch.lines.resize(terms_per_batch * height);
+        scratch.lines.resize(lines_at_once * height);
         scratch.sums.resize(2 * results.count() * height);
         scratch.kernel.resize(height);
         const std::size_t last = std::min(columns, (item + 1) * columns_per_item);
@@ -158,8 +154,8 @@ void Convolution::convolve_columns(const Tile& tile, std::size_t first_term, std
         for (std::size_t x = item * columns_per_item; x < last; ++x) {
             std::fill(scratch.sums.begin(), scratch.sums.end(), Complex());
             m_spectra.start(x, harmonics, scratch.column);
-            for (std::size_t first = 0; first < count; first += terms_per_batch) {
-                const std::size_t batch = std::min(terms_per_batch, count - first);
+            for (std::size_t first = 0; first < count; first += lines_at_once) {
+                const std::size_t batch = std::min(lines_at_once, count - first);
                 for (std::size_t t = 0; t < batch; ++t) {
                     Complex* line = scratch.lines.data() + t * height;
                     std::copy_n(light.column(first + t, x), tile.window_y.count, line);
@@ -200,14 +196,14 @@ void Convolution::store_result(const Tile& tile, std::size_t medium, ColumnSpect
     const std::size_t stride = m_plane.padded_width;
     const std::size_t columns = m_plane.columns();
     const std::size_t offset = tile.x.first - tile.window_x.first;
-    const std::size_t items = rounds_of(tile.y.count, rows_per_item);
+    const std::size_t items = rounds_of(tile.y.count, lines_at_once);
     const double factor = 1.0 / (static_cast<double>(stride) * static_cast<double>(m_plane.padded_height));
     parallel_for(items, [&](std::size_t item) {
-        const std::size_t y0 = item * rows_per_item;
-        const std::size_t rows = std::min(rows_per_item, tile.y.count - y0);
+        const std::size_t y0 = item * lines_at_once;
+        const std::size_t rows = std::min(lines_at_once, tile.y.count - y0);
         RowScratch& scratch = m_row_scratch.local();
-        scratch.lines.resize(rows_per_item * stride);
-        scratch.half.resize(rows_per_item * columns);
+        scratch.lines.resize(lines_at_once * stride);
+        scratch.half.resize(lines_at_once * columns);
         for (std::size_t x = 0; x < columns; ++x) {
             const Complex* column = results.column(plane, x) + y0;
             for (std::size_t y = 0; y < rows; ++y)

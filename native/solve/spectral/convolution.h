@@ -27,8 +27,8 @@ using MakeLightRow = std::function<LightRow()>;
 // Takes a row of a result: `values` times `factor`. May change the values. Called from several threads at once.
 using StoreRow = std::function<void(std::size_t result, const RowSpan& span, float* values, double factor)>;
 
-// Solves the plane of `spectra` tile by tile, with at most `budget` bytes for the spectra of the light and of the
-// results (or one of each if that is more).
+// Solves the plane of `spectra` tile by tile by overlap-save (Oppenheim, Schafer 2009, Sec. 8.7), with at most `budget`
+// bytes for the spectra of the light and of the results (or one of each if that is more).
 class Convolution {
 public:
     Convolution(const KernelSpectra& spectra, std::span<const LightTerm> terms, std::size_t media, std::size_t budget);

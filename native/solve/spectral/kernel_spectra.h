@@ -13,8 +13,9 @@
 namespace beamspread {
 
 // Table of H_m over k for all profiles and m: the two-dimensional Fourier transform of w(r) c_m(r) cos(m phi), with w
-// the ring of a window, is i^-m cos(m psi) H_m(k). Lengths are in a unit that resolves the ring's detail. The table is
-// wrong beyond the Nyquist frequency and for windows that begin or end within less than a unit.
+// the ring of a window, is i^-m cos(m psi) H_m(k) (Baddour 2009, J. Opt. Soc. Am. A 26, 1767). Lengths are in a unit
+// that resolves the ring's detail. The table is wrong beyond the Nyquist frequency and for windows that begin or end
+// within less than a unit.
 class HankelTable {
 public:
     static constexpr std::size_t no_column = static_cast<std::size_t>(-1);

@@ -14,8 +14,8 @@ namespace beamspread {
 
 namespace {
 
-// Largest fraction of a kernel's power outside its reach, for changing directions. Larger: less padding, larger errors in
-// the dark.
+// Largest fraction of a kernel's power outside its reach, for changing directions. Larger: less padding, larger errors
+// in the dark.
 constexpr double max_beyond = 1e-5;
 
 double nodes(const PaddedPlane& plane)

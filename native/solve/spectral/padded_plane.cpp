@@ -37,17 +37,17 @@ constexpr double max_deviation = 16.0;
 double widened(double deviation, const std::vector<ScaledProfile>& profiles, double unit)
 {
     double power = 0.0;
-    for (const ScaledProfile& each : profiles)
-        power = std::max(power, each.profile.total());
+    for (const ScaledProfile& scaled : profiles)
+        power = std::max(power, scaled.profile.total());
     std::size_t harmonics = 0;
-    for (const ScaledProfile& each : profiles) {
-        const double border = window_radius * deviation * unit / each.mean_free_path;
-        harmonics = std::max(harmonics, each.profile.harmonics_beyond(border, negligible_outside * power));
+    for (const ScaledProfile& scaled : profiles) {
+        const double border = window_radius * deviation * unit / scaled.mean_free_path;
+        harmonics = std::max(harmonics, scaled.profile.harmonics_beyond(border, negligible_outside * power));
     }
     deviation = std::max(deviation, static_cast<double>(harmonics) / harmonics_per_deviation);
-    for (const ScaledProfile& each : profiles)
-        if (each.profile.detail() == RadialDetail::all)
-            deviation = std::max(deviation, std::min(0.5 * fine_end * each.mean_free_path / unit, max_deviation));
+    for (const ScaledProfile& scaled : profiles)
+        if (scaled.profile.detail() == RadialDetail::all)
+            deviation = std::max(deviation, std::min(0.5 * fine_end * scaled.mean_free_path / unit, max_deviation));
     return deviation;
 }
 
@@ -59,8 +59,8 @@ struct Tiling {
 // Cost of the light's angles and their harmonics, for all terms in memory together, in transforms along one axis.
 constexpr double angles_cost = 4.0;
 
-// Number of transforms of a tile's node in `Convolution`, those along x and along y counting half each: the light again
-// for every part of the media, the results for every part of the terms.
+// Number of transforms of a tile's node in `Convolution`, those along x and along y counting half profile: the light
+// again for every part of the media, the results for every part of the terms.
 double transforms(const LevelChoice& choice, const SpectraAtOnce& at_once)
 {
     const auto rounds = [](std::size_t count, std::size_t at) {
@@ -157,8 +157,8 @@ Levels choose_levels(const Plane& plane, const std::vector<ScaledProfile>& profi
     Level single{{width, height, pitch_x, pitch_y}, KernelCentre{}, std::nullopt};
     const double unit = single.plane.unit();
     double cut = 0.0;
-    for (const ScaledProfile& each : profiles)
-        cut = std::max(cut, each.reach / unit);
+    for (const ScaledProfile& scaled : profiles)
+        cut = std::max(cut, scaled.reach / unit);
     const double diagonal =
         std::hypot(static_cast<double>(width) * pitch_x / unit, static_cast<double>(height) * pitch_y / unit);
     const double deviation = widened(centre_deviation, profiles, unit);

@@ -15,7 +15,7 @@ namespace beamspread {
 
 namespace {
 
-// Side (square root of the number of texels) of planes up to which all terms are kept. Larger: a choice for fewer
+// Side (square root of the number of texels) of planes up to which all terms are chosen. Larger: a choice for fewer
 // planes, more transforms.
 constexpr std::size_t max_untruncated_side = 192;
 
@@ -87,8 +87,8 @@ Eigen::ArrayXXf relative_parts(const Readings& readings, const std::vector<Kerne
     return parts;
 }
 
-// Drops terms in the order of their parts per transform, the smallest first, while no error exceeds 1. Returns the kept
-// terms, and the errors, [texel and result].
+// Drops terms in the order of their parts per transform, the smallest first, while no error exceeds 1. Returns the
+// chosen terms, and the errors, [texel and result].
 std::pair<std::vector<std::size_t>, Eigen::ArrayXf> drop_terms(const Eigen::ArrayXXf& parts,
                                                                const std::vector<KernelDecomposition::Term>& terms)
 {
@@ -100,17 +100,17 @@ std::pair<std::vector<std::size_t>, Eigen::ArrayXf> drop_terms(const Eigen::Arra
     std::vector<std::size_t> order(terms.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::ranges::stable_sort(order, {}, [&](std::size_t c) { return worth[c]; });
-    std::vector<std::size_t> kept;
+    std::vector<std::size_t> chosen;
     Eigen::ArrayXf error = Eigen::ArrayXf::Zero(parts.rows());
     for (const std::size_t c : order) {
         Eigen::ArrayXf next = error + parts.col(index(c));
         if (next.abs().maxCoeff() <= 1.0f)
             error.swap(next);
         else
-            kept.push_back(c);
+            chosen.push_back(c);
     }
-    std::ranges::sort(kept);
-    return {std::move(kept), std::move(error)};
+    std::ranges::sort(chosen);
+    return {std::move(chosen), std::move(error)};
 }
 
 // The middles of the sites with the largest errors.
@@ -156,9 +156,9 @@ std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const 
                               readings.begin() + static_cast<std::ptrdiff_t>(first));
             progress.advance(part);
         });
-        auto [kept, error] = drop_terms(relative_parts(readings, kernels.terms(), tolerance), kernels.terms());
+        auto [chosen, error] = drop_terms(relative_parts(readings, kernels.terms(), tolerance), kernels.terms());
         if (round == refinements)
-            return kept;
+            return chosen;
         const std::vector<Texel> more = sites_around(worst_sites(texels, error), light.plane, round);
         texels.insert(texels.end(), more.begin(), more.end());
     }

@@ -1,5 +1,5 @@
 // Adding-doubling on radiance averaged over the azimuth, with a quadrature of cosines inside the medium (van de Hulst
-// 1980, doi:10.1016/B978-0-12-710701-1.X5001-0; Prahl, van Gemert, Welch 1993, doi:10.1364/AO.32.000559).
+// 1980, "Multiple Light Scattering"; Prahl, van Gemert, Welch 1993, doi:10.1364/AO.32.000559).
 //
 // By reciprocity, the totals of a beam equal the radiance that the medium returns toward it under uniform diffuse
 // light. One vector of incident light therefore serves all beams; each beam adds a row to the matrices, a direction
@@ -152,7 +152,7 @@ Angular angular_problem(const Medium& medium, std::span<const double> angles_deg
     a.among = {kernel(p, even), kernel(p, odd)};
     a.to_beams = {kernel(p_beams, even), kernel(p_beams, odd)};
     // Renormalize the phase function: its quadrature error counts as unscattered too, which conserves energy (Grant,
-    // Hunt 1969, doi:10.1098/rspa.1969.0187).
+    // Hunt 1969, Proc. R. Soc. Lond. A 313, 183).
     const VectorXd lost =
         VectorXd::Ones(a.cosine.size()) - a.among.forward.rowwise().sum() - a.among.backward.rowwise().sum();
     a.among.forward.diagonal() += lost;
@@ -168,7 +168,7 @@ struct Layer {
 };
 
 // Thin layer by diamond initialization, which conserves energy exactly: radiance inside is the mean of the two sides
-// (Wiscombe 1976, doi:10.1016/0022-4073(76)90056-X).
+// (Wiscombe 1976, J. Quant. Spectrosc. Radiat. Transfer 16, 637).
 Layer thin_layer(const Angular& a, double albedo, double thickness)
 {
     const Eigen::Index n = a.cosine.size();

@@ -59,7 +59,8 @@ inline std::size_t max_harmonics(std::span<const std::size_t> harmonics, std::si
 using OrderWeights = std::array<double, order_bin_count>;
 
 // Sums over photons of weight * cos(m phi), with (r, phi) the point of exit around a pole and phi = 0 along the beam's
-// direction of travel. The walk absorbs nothing: an albedo a scales the sums of order n by a^n.
+// direction of travel. The walk absorbs nothing: an albedo a scales the sums of order n by a^n, so one simulation
+// serves all albedos (Kienle, Patterson 1996, Phys. Med. Biol. 41, 2221).
 struct Tally {
     std::array<double, pole_count> poles{};  // u, mean free paths
     std::uint32_t mirrored_orders = 0;       // see transport/tally/tally.h
@@ -107,24 +108,24 @@ struct Tally {
         weight_order2[bin] += w * n * n;
     }
 
-    void merge(const Tally& other)
+    void merge(const Tally& tally)
     {
         for (std::size_t row = 0; row < row_count; ++row)
-            if (other.weight[order_bin_of(row)] != 0.0)
+            if (tally.weight[order_bin_of(row)] != 0.0)
                 for (std::size_t i = ring_offsets[row]; i < ring_offsets[row + 1]; ++i)
-                    moments[i] += other.moments[i];
+                    moments[i] += tally.moments[i];
         for (std::size_t b = 0; b < order_bin_count; ++b) {
-            weight[b] += other.weight[b];
-            weight_order[b] += other.weight_order[b];
-            weight_order2[b] += other.weight_order2[b];
+            weight[b] += tally.weight[b];
+            weight_order[b] += tally.weight_order[b];
+            weight_order2[b] += tally.weight_order2[b];
         }
     }
 };
 
 // Number of leading harmonics of each row, at least one, that reduce the error: their signal exceeds their noise.
-// `half` and `other` are the tallies of two halves of a simulation: the mean of their product is the signal, their
+// `first` and `second` are the tallies of two halves of a simulation: the mean of their product is the signal, their
 // difference is noise.
-std::array<std::size_t, row_count> significant_harmonics(const Tally& half, const Tally& other);
+std::array<std::size_t, row_count> significant_harmonics(const Tally& first, const Tally& second);
 
 // Number n of groups of batches, each an independent simulation. The standard error of a texel is known to
 // 1 / sqrt(2 (n - 1)), 27 %; more groups: better known, larger files.

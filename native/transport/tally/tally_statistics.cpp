@@ -15,22 +15,22 @@ constexpr double negligible = 3e-3;
 
 // Sums of cos(m phi) over an octave of radii and some rows.
 struct Octave {
-    std::array<double, harmonic_count> half{};
-    std::array<double, harmonic_count> other{};
+    std::array<double, harmonic_count> first{};
+    std::array<double, harmonic_count> second{};
 };
 
 // Sums rows and radii that texels see together. A ring alone cannot separate signal from noise: weak harmonics that
 // many rings share would be lost.
-std::vector<Octave> octaves(const Tally& half, const Tally& other, std::size_t first, std::size_t last)
+std::vector<Octave> octaves(const Tally& first, const Tally& second, std::size_t begin, std::size_t end)
 {
     std::vector<Octave> sums(1);
     for (std::size_t k = 0; k < radius_bin_count; ++k) {
         if (k > 1 && std::ilogb(radius_bin_edge(k - 1)) != std::ilogb(radius_bin_edge(k - 2)))
             sums.emplace_back();
-        for (std::size_t row = first; row < last; ++row)
+        for (std::size_t row = begin; row < end; ++row)
             for (std::size_t m = 0; m < harmonics_of(row); ++m) {
-                sums.back().half[m] += half.ring(row, k)[m];
-                sums.back().other[m] += other.ring(row, k)[m];
+                sums.back().first[m] += first.ring(row, k)[m];
+                sums.back().second[m] += second.ring(row, k)[m];
             }
     }
     return sums;
@@ -43,14 +43,14 @@ std::size_t significant_count(const std::vector<Octave>& octaves, std::size_t co
     std::array<double, harmonic_count> noise{};
     double power = 0.0;
     for (const Octave& octave : octaves) {
-        const double ring = octave.half[0] + octave.other[0];
+        const double ring = octave.first[0] + octave.second[0];
         if (!(ring > 0.0))
             continue;
         power += ring;
         // cos^2 has the mean 1/2, and c_m is twice the mean of cos(m phi).
         for (std::size_t m = 1; m < count; ++m) {
-            const double a = octave.half[m];
-            const double b = octave.other[m];
+            const double a = octave.first[m];
+            const double b = octave.second[m];
             signal[m] += 2.0 * 4.0 * a * b / ring;
             noise[m] += 2.0 * (a - b) * (a - b) / ring;
         }
@@ -142,16 +142,16 @@ void add_deviations(std::vector<std::vector<float>>& by_group, std::span<const T
 
 }  // namespace
 
-std::array<std::size_t, row_count> significant_harmonics(const Tally& half, const Tally& other)
+std::array<std::size_t, row_count> significant_harmonics(const Tally& first, const Tally& second)
 {
     std::array<std::size_t, row_count> counts{};
-    for (std::size_t first = 0; first < row_count;) {
-        const bool is_octave = first >= exact_orders && first < order_bin_count;
-        const std::size_t last = first + (is_octave ? 4 : 1);
-        const std::size_t count = significant_count(octaves(half, other, first, last), harmonics_of(first));
-        std::fill(counts.begin() + static_cast<std::ptrdiff_t>(first),
-                  counts.begin() + static_cast<std::ptrdiff_t>(last), count);
-        first = last;
+    for (std::size_t begin = 0; begin < row_count;) {
+        const bool is_octave = begin >= exact_orders && begin < order_bin_count;
+        const std::size_t end = begin + (is_octave ? 4 : 1);
+        const std::size_t count = significant_count(octaves(first, second, begin, end), harmonics_of(begin));
+        std::fill(counts.begin() + static_cast<std::ptrdiff_t>(begin),
+                  counts.begin() + static_cast<std::ptrdiff_t>(end), count);
+        begin = end;
     }
     return counts;
 }

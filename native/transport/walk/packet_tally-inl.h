@@ -102,7 +102,7 @@ private:
         }
     }
 
-    // Converts sums of T_8j c^k to sums of T_8j+k = 2 T_8j T_k - T_8j-k.
+    // Converts sums of T_8j c^k to sums of T_8j+k = 2 T_8j T_k - T_8j-k (Abramowitz, Stegun 1964, Eq. 22.7.24).
     static void blocks_to_harmonics(double* sums, std::size_t count)
     {
         for (std::size_t first = 0; first < count; first += block) {

@@ -69,8 +69,8 @@ struct WalkPlan {
     // sum of expected exits along a long walk.
     std::uint32_t last_expected_order;
 
-    // Russian roulette is played at the scattering orders 2^k first_roulette. Internal reflection keeps light inside
-    // for longer and delays it.
+    // Russian roulette (Arvo, Kirk 1990, doi:10.1145/97879.97886) is played at the scattering orders 2^k
+    // first_roulette. Internal reflection keeps light inside for longer and delays it.
     std::uint32_t first_roulette;
 };
 
