@@ -12,7 +12,7 @@
 #include "scene/light.h"
 #include "scene/occluders.h"
 #include "solve/solve.h"
-#include "solve/spectral/spectral.h"
+#include "solve/spectral/light_field.h"
 
 namespace beamspread {
 
@@ -109,8 +109,7 @@ std::size_t transforms(const Lights& lights, const Sources& ldf, const std::vect
     Problem problem = problem_of(lights, ldf, albedo, mean_free_path, pitch, tolerance);
     Progress unseen;
     const py::gil_scoped_release release;
-    validate(problem);
-    return count_terms(problem, unseen);
+    return LightField(problem, unseen).terms();
 }
 
 }  // namespace

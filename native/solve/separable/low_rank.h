@@ -12,7 +12,8 @@
 
 namespace beamspread {
 
-// Angles are tan(theta / 2), in which LDFs are smooth everywhere.
+// Distribution of the angles of incidence of a plane's light. Angles are tan(theta / 2), in which LDFs are smooth
+// everywhere.
 struct Incidence {
     // Texels where a light is brightest, steepest and most grazing.
     struct Extremes {

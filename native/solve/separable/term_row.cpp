@@ -9,11 +9,8 @@ namespace beamspread {
 
 namespace {
 
-// Texels of a row that pass all steps together, in the cache.
-constexpr std::size_t texels_at_once = 512;
-
-// Rays that pass all steps together; fewer than texels, because rays may reach parts of a row alone.
-constexpr std::size_t rays_at_once = 64;
+// Beams of a row that pass all steps together. More: more cache.
+constexpr std::size_t beams_at_once = 512;
 
 }  // namespace
 
@@ -80,8 +77,8 @@ void TermRow::start(const LightTerms& terms, const RowSpan& span, std::size_t fi
     }
     if (!has_moments)
         return;
-    for (std::size_t x = 0; x < span.width; x += texels_at_once) {
-        const RowSpan part{span.y, span.x + x, std::min(texels_at_once, span.width - x)};
+    for (std::size_t x = 0; x < span.width; x += beams_at_once) {
+        const RowSpan part{span.y, span.x + x, std::min(beams_at_once, span.width - x)};
         for (std::size_t l = 0; l < terms.changing.size(); ++l)
             if (m_beams.read(terms.plane, terms.changing[l], part))
                 m_moments.add(terms, m_beams, terms.colors[l], first, first + count,
@@ -96,8 +93,8 @@ void MomentSum::add(LightTerms& terms, const RayRow& rays, const std::vector<dou
     m_colors.resize(sets);
     for (std::size_t set = 0; set < sets; ++set)
         m_colors[set] = static_cast<float>(color[terms.sets.channel(set)]);
-    for (std::size_t x = 0; x < rays.width; x += rays_at_once) {
-        const RowSpan span{rays.y, rays.x + x, std::min(rays_at_once, rays.width - x)};
+    for (std::size_t x = 0; x < rays.width; x += beams_at_once) {
+        const RowSpan span{rays.y, rays.x + x, std::min(beams_at_once, rays.width - x)};
         const float* irradiance = rays.irradiance + x * channels;
         for (auto* values : {&m_beams.irradiance, &m_beams.cos_beta, &m_beams.sin_beta, &m_beams.half_tangent})
             values->resize(span.width);

@@ -6,8 +6,6 @@
 #define BEAMSPREAD_TRANSPORT_PACKET_TALLY_INL_H
 #endif
 
-#include <hwy/cache_control.h>
-
 #include <array>
 #include <vector>
 
@@ -87,7 +85,6 @@ public:
 
 private:
     static constexpr std::size_t capacity = 256;
-    static constexpr std::size_t exits_ahead = 8;  // distance of prefetches, in exits
     template <class T>
     using Queue = std::array<T, capacity + 2 * lane_count>;
 
@@ -127,12 +124,7 @@ private:
         for (std::size_t i = 0; i < m_count; i += lane_count)
             find_bins(i);
         for (std::size_t i = 0; i < m_count; ++i)
-            m_ring[i] = find_ring(i);
-        for (std::size_t i = 0; i < m_count; ++i) {
-            if (i + exits_ahead < m_count)
-                fetch_ring(i + exits_ahead);
-            add_one(i);
-        }
+            add_exit(i);
         m_count = 0;
     }
 
@@ -179,36 +171,15 @@ private:
         hn::StoreU(row, integers, m_row.data() + from);
     }
 
-    static HWY_INLINE std::size_t batch_of(std::uint32_t tag) { return (tag & batch_bits) >> batch_shift; }
-
-    HWY_INLINE Tally& tally_of(std::uint32_t tag) const
-    {
-        return (*m_tallies[batch_of(tag)])[(tag >> side_shift) & 1u];
-    }
-
-    HWY_INLINE double* find_ring(std::size_t i) const
-    {
-        return tally_of(m_tag[i]).ring(static_cast<std::size_t>(m_row[i]), static_cast<std::size_t>(m_radius_bin[i]));
-    }
-
-    // Prefetches a ring, which the processor cannot predict.
-    HWY_INLINE void fetch_ring(std::size_t i) const
-    {
-        const double* ring = m_ring[i];
-        const std::size_t count = harmonics_of(static_cast<std::size_t>(m_row[i]));
-        for (std::size_t m = 0; m < count; m += block)
-            hwy::Prefetch(ring + m);
-    }
-
-    HWY_INLINE void add_one(std::size_t i)
+    HWY_INLINE void add_exit(std::size_t i)
     {
         const std::uint32_t tag = m_tag[i];
-        const std::size_t batch = batch_of(tag);
+        const std::size_t batch = (tag & batch_bits) >> batch_shift;
         const std::size_t side = (tag >> side_shift) & 1u;
         const auto row = static_cast<std::size_t>(m_row[i]);
         const std::size_t bin = order_bin_of(row);
-        Tally& tally = tally_of(tag);
-        add_blocks(m_ring[i], harmonics_of(row), m_x[i], m_weight[i]);
+        Tally& tally = (*m_tallies[batch])[side];
+        add_blocks(tally.ring(row, static_cast<std::size_t>(m_radius_bin[i])), harmonics_of(row), m_x[i], m_weight[i]);
         const auto w = static_cast<double>(m_weight[i]);
         const double n = static_cast<double>(tag & order_bits);
         m_job.weights[batch][side][bin] += w;
@@ -268,7 +239,6 @@ private:
     Queue<std::uint32_t> m_tag{};
     Queue<std::int32_t> m_row{};
     Queue<std::int32_t> m_radius_bin{};
-    Queue<double*> m_ring{};
 };
 
 }  // namespace HWY_NAMESPACE
