@@ -74,7 +74,7 @@ class BakePlan:
 
     def to_simulate(self, settings: BakeSettings) -> list:
         """Media that the bake would have to simulate first."""
-        return to_simulate(self.surface_with_color(), settings, BAKE_STEPS)
+        return to_simulate(self.surface_with_color(), settings)
 
     def bake(self, settings: BakeSettings) -> Bake:
         """The bake, with its job or the error; call it in the main thread."""
