@@ -75,7 +75,7 @@ class Preview:
         """Have the node's inner tree show the preview; `is_filled`: the hidden image has its pixels, if it exists."""
         node = self._node()
         image = bpy.data.images.get(self._name) if self._name else None
-        if image is None or tuple(image.size) != self.size:
+        if image is None or not image.has_data or tuple(image.size) != self.size:
             image = files.make_image(NAME, *self.size)
             self._name, is_filled = image.name, False
         if not is_filled:
