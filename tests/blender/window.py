@@ -7,7 +7,7 @@ import beamspread
 import bpy
 import scenes
 from beamspread.blender import compat, popup
-from beamspread.blender.jobs.run import operator
+from beamspread.blender.jobs.run import bake_run, operator
 from beamspread.blender.jobs.state import state
 from beamspread.blender.node import buttons, draw
 from beamspread.blender.ui import bake_panel as shown
@@ -231,11 +231,11 @@ def scenario():
         def fail(*_arguments):
             raise ValueError("what went wrong")
 
-        works, before = getattr(operator._Run, where), len(results["popups"])
-        setattr(operator._Run, where, fail)
+        works, before = getattr(bake_run.BakeRun, where), len(results["popups"])
+        setattr(bake_run.BakeRun, where, fail)
         started()
         yield ended
-        setattr(operator._Run, where, works)
+        setattr(bake_run.BakeRun, where, works)
         results["of errors"].append([results["popups"][before:], state.lines(), len(operator._timers)])
         results["after errors"] = [sorted(started())]
         yield ended
