@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from beamspread import LdfLibrary, Medium, presets, simulate
 from beamspread.core.cli import plot
-from beamspread.core.cli.terminal import totals_table
+from beamspread.core.cli.commands import totals_table
 from PIL import Image
 
 COMMAND = [sys.executable, "-m", "beamspread"]

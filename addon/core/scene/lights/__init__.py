@@ -1,8 +1,7 @@
 """The kinds of light that can be baked; strengths follow Cycles (see each class)."""
 
 from .field_light import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight
-from .light_base import Light
-from .light_kinds import AreaLight, MeshLight, PointLight, SpotLight, SunLight, WorldLight
+from .light_kinds import AreaLight, Light, MeshLight, PointLight, SpotLight, SunLight, WorldLight
 
 __all__ = [
     "DIRECTIONS",

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...native import native
 from ..receiver import Grid, Vector
-from .light_base import Light
+from .light_kinds import Light
 
 # Rings of the hemisphere from the zenith down: squared sine of the angle at the lower border, and number of sectors.
 # More are more exact, above all near the horizon: here the reflectance of even light is right to .5 %, and to 2 % for
