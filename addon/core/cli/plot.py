@@ -12,7 +12,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator
 
 from ..disk import whole_file
-from .terminal import describe
+from .commands import describe
 
 # Perceptually uniform, in print and for color-blind readers too.
 COLORS = "magma"
