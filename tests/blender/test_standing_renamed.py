@@ -73,6 +73,4 @@ def test_a_file_that_is_gone_is_said(tmp_path):
     assert standings() == [Status.STALE]
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
     assert standings() == [Status.STALE]
-    assert [row.messages[0].text for row in state.rows.values()] == [
-        "Changed since its bake: file of the image, which is gone."
-    ]
+    assert [row.messages[0].text for row in state.rows.values()] == ["Changed since its bake: image file (missing)."]

@@ -121,7 +121,7 @@ class Session:
         messages.add(*self._reader.messages())
         medium = self._thread.libraries.simulating
         if medium:
-            messages.add(note("", f"Live simulates the medium ({medium}) in preview quality, and shows it then."))
+            messages.add(note("", f"Live first simulates the medium ({medium}), in preview quality."))
         if self._reader.left_out:
             messages.add(note("", f"Live leaves out {', '.join(self._reader.left_out)}."))
         return messages

@@ -105,7 +105,7 @@ def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
     if record is not None and not record.is_dirty and image_of(target).is_dirty:
         changed.append("pixels of the image")
     if record is not None and _has_lost_its_file(image_of(target)):
-        changed = [*(name for name in changed if name != IMAGE), "file of the image, which is gone"]
+        changed = [*(name for name in changed if name != IMAGE), "image file (missing)"]
     said = state.status_of(target)
     if said is not None and said.status in (Status.FAILED, Status.CANCELLED):
         return replace(said, is_stale=bool(changed))
