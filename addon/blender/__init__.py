@@ -17,7 +17,7 @@ Each part imports only core and those above it (tests/unit/test_layers.py reads 
 """
 
 from . import preferences, settings
-from .images import facts, image_operators, sequence, undo
+from .images import facts, image_operators, undo
 from .jobs import state
 from .jobs.out_of_date import stale
 from .jobs.run import engine, operator
@@ -30,7 +30,6 @@ PARTS = (
     preferences,
     settings,
     image_operators,
-    sequence,
     facts,
     undo,
     node,

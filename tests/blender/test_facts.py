@@ -5,8 +5,17 @@ from dataclasses import asdict
 
 import bpy
 import pytest
-from beamspread.blender.images.facts import KEY, Frames, ImageFacts, Record, facts_of, note_bake, record_of, set_facts
-from beamspread.blender.images.sequence import is_sequence
+from beamspread.blender.images.facts import (
+    KEY,
+    Frames,
+    ImageFacts,
+    Record,
+    facts_of,
+    is_sequence,
+    note_bake,
+    record_of,
+    set_facts,
+)
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.run import batch_run
 from beamspread.blender.jobs.state import Status, state

@@ -117,7 +117,7 @@ def test_a_shared_material_is_refused_before_the_bake_with_a_remedy():
     select(copy)
     message = messages_of(bpy.ops.beamspread.bake)
     assert "'Plane' is baked to the same part of the image" in message
-    assert "give 'Plane.001' a material of its own" in message
+    assert "Give 'Plane.001' a material of its own" in message
     assert np.array_equal(pixels(image_of(plane)), before)
     assert np.array_equal(bake(plane)[0], before)
 

@@ -3,9 +3,8 @@
 import bpy
 import numpy as np
 import pytest
-from beamspread.blender.images.facts import ATTRIBUTE
+from beamspread.blender.images.facts import ATTRIBUTE, is_sequence
 from beamspread.blender.images.files import write_exr
-from beamspread.blender.images.sequence import is_sequence
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.run import batch_run
 from beamspread.blender.jobs.state import Status, state

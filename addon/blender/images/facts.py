@@ -7,6 +7,8 @@ Targets are recorded by name: pointers would keep deleted objects in the file.
 from __future__ import annotations
 
 import json
+import os
+import re
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -156,6 +158,32 @@ def users_of(image) -> list[Target]:
     """Targets in any scene whose Beamspread node shows the image."""
     objects = with_instanced(obj for obj in bpy.data.objects if obj.users_scene)
     return [target.name for obj in objects for target in targets_of(obj) if target.image == image]
+
+
+def file_of(image) -> Path | None:
+    """Absolute path of the image's file, None if its pixels live in the .blend file."""
+    if image.source == "GENERATED" or image.packed_file is not None:
+        return None
+    return Path(os.path.normpath(bpy.path.abspath(image.filepath, library=image.library)))
+
+
+def is_sequence(image) -> bool:
+    """True if the image is a sequence that was made here."""
+    return image is not None and image.source == "SEQUENCE" and facts_of(image).frames is not None
+
+
+def size_of_frames(image) -> tuple[int, int]:
+    """Width and height of such a sequence's frames, which `Image.size` does not tell."""
+    frames = facts_of(image).frames
+    return frames.width, frames.height
+
+
+def file_at(image, frame: int) -> Path | None:
+    """The file that such a sequence has for a frame, or None."""
+    frames, path = facts_of(image).frames, file_of(image)
+    if not frames.first <= frame <= frames.last:
+        return None
+    return path.with_name(re.sub(r"\d+$", f"{frame:04d}", path.stem) + path.suffix)
 
 
 def record_in(path: Path) -> Record | None:

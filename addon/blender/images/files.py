@@ -16,7 +16,7 @@ from ...core.native import native
 from .. import compat
 from ..read.image_nodes import from_srgb
 from . import icons, undo
-from .facts import facts_of
+from .facts import facts_of, file_of
 
 EXTENSIONS = {"EXR": ".exr", "PNG": ".png"}
 """Extensions of the formats that bakes are written in."""
@@ -26,13 +26,6 @@ EXTENSIONS_WITH_RANGE = {".exr", ".hdr"}
 
 MADE_FOR = "beamspread:madeFor"
 """EXR attribute that names the .blend file and the image that the file belongs to."""
-
-
-def file_of(image) -> Path | None:
-    """Absolute path of the image's file, None if its pixels live in the .blend file."""
-    if image.source == "GENERATED" or image.packed_file is not None:
-        return None
-    return Path(os.path.normpath(bpy.path.abspath(image.filepath, library=image.library)))
 
 
 def check_image(image) -> None:

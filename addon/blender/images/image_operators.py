@@ -1,18 +1,31 @@
-"""Buttons that change the image of a node: to float, and to the scene's resolution."""
+"""Buttons that change the image of a node: to float, to the scene's resolution, to the frames of a batch and back.
+
+The frames are shown as an image sequence, which follows the scene's frame.
+"""
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import bpy
 
+from ...core.bake.bake_settings import COMBINED
 from ...core.bake.runner import Bake
+from ...core.batch.batch_options import parse
+from ...core.errors import ImageError
+from ...core.messages import Message, warning
 from ...core.target import Target
-from ..node.find import find_node
+from ..node.find import BakeTarget, find_node, targets_of
+from ..node.node import link_result
+from ..node.tree import follow_frames
+from ..read.visibility import with_instanced
 from ..registration import all_or_nothing, classes
 from . import files, icons
-from .facts import facts_of, set_facts
+from .facts import Frames, facts_of, is_sequence, set_facts
 from .new_image import store_new
+from .outputs import Outputs
 
 
 def image_in(context):
@@ -85,4 +98,103 @@ class BEAMSPREAD_OT_resize_image(ImageOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-register, unregister = all_or_nothing(*classes(BEAMSPREAD_OT_make_float, BEAMSPREAD_OT_resize_image))
+def find_frames(scene, target: Target) -> tuple[list[int], Path]:
+    """Numbers of the frames that a batch with the scene's settings has written for a target, and the first one's file.
+
+    Raises
+    ------
+    ImageError
+        Such a batch has no folder to write to.
+    """
+    path = Outputs(scene, parse(["--frames", "1-1"])).path(target, COMBINED, 1)
+    start, ending = path.name.removesuffix(f"0001{path.suffix}"), path.suffix
+    pattern = re.compile(rf"{re.escape(start)}(\d{{4,}}){re.escape(ending)}")
+    names = (file.name for file in path.parent.iterdir()) if path.parent.is_dir() else ()
+    numbers = sorted(int(match[1]) for name in names if (match := pattern.fullmatch(name)))
+    return numbers, path.with_name(f"{start}{numbers[0]:04d}{ending}") if numbers else path
+
+
+def show_frames(node, numbers: list[int], path: Path) -> list[Message]:
+    """Have the node show the sequence that begins with the file; messages as of `link_result`."""
+    former = (is_sequence(node.image) and facts_of(node.image).former) or node.image
+    image = bpy.data.images.load(str(path))
+    size = tuple(image.size)  # a sequence has none
+    image.name = re.sub(r"_\d+$", "", path.stem) + " frames"
+    image.source = "SEQUENCE"
+    image.filepath = bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
+    facts = facts_of(image)
+    facts.frames, facts.former = Frames(numbers[0], numbers[-1], *size), former
+    set_facts(image, facts)
+    messages = link_result(node, image)
+    follow_frames(node.node_tree, numbers[0], numbers[-1])
+    return messages
+
+
+class BEAMSPREAD_OT_show_frames(bpy.types.Operator):
+    """Show the frames that a batch (--frames) has written to its folder. They follow the scene's frame. \
+Each node keeps its own image for Show Single Images"""
+
+    bl_idname = "beamspread.show_frames"
+    bl_label = "Show Frames"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        shown, folders = [], []
+        for target in _local_targets(context.scene):
+            try:
+                numbers, path = find_frames(context.scene, target.name)
+            except ImageError as error:
+                self.report({"ERROR"}, str(error))
+                return {"CANCELLED"}
+            folders.append(path.parent)
+            if numbers:
+                self._show(target, numbers, path)
+                shown.append(f"'{target.name}' shows the frames {numbers[0]} to {numbers[-1]}")
+        if not shown:
+            where = f" in {folders[0]}" if folders else ""
+            self.report({"ERROR"}, f"There are no frames of a batch{where}: bake them with --frames A-B")
+            return {"CANCELLED"}
+        self.report({"INFO"}, ". ".join(shown))
+        return {"FINISHED"}
+
+    def _show(self, target: BakeTarget, numbers: list[int], path: Path) -> None:
+        messages = show_frames(target.node, numbers, path)
+        missing = numbers[-1] - numbers[0] + 1 - len(numbers)
+        if missing:
+            text = f"{missing} of the frames {numbers[0]} to {numbers[-1]} of '{target.name}' are missing."
+            messages.append(warning(str(target.name), text))
+        for message in messages:
+            self.report({message.level.value}, str(message))
+
+
+class BEAMSPREAD_OT_show_single(bpy.types.Operator):
+    """Have Beamspread nodes show their own images in place of the frames of a batch"""
+
+    bl_idname = "beamspread.show_single"
+    bl_label = "Show Single Images"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return bool(_targets_with_frames(context.scene))
+
+    def execute(self, context):
+        for target in _targets_with_frames(context.scene):
+            target.node.image = facts_of(target.image).former
+        return {"FINISHED"}
+
+
+def _local_targets(scene) -> list[BakeTarget]:
+    """Targets whose material is in this .blend file: a linked one cannot be changed."""
+    targets = (target for obj in with_instanced(scene.objects) for target in targets_of(obj))
+    return [target for target in targets if target.material.library is None]
+
+
+def _targets_with_frames(scene) -> list[BakeTarget]:
+    """Targets whose nodes show the frames of a batch."""
+    return [target for target in _local_targets(scene) if is_sequence(target.image)]
+
+
+register, unregister = all_or_nothing(
+    *classes(BEAMSPREAD_OT_make_float, BEAMSPREAD_OT_resize_image, BEAMSPREAD_OT_show_frames, BEAMSPREAD_OT_show_single)
+)

@@ -14,9 +14,8 @@ from bpy.app.handlers import persistent
 from ....core.bake.runner import Bake
 from ....core.messages import Level, Message, note, warning
 from ....core.target import Target
-from ...images.facts import Record, facts_of, note_bake, record_in, record_of, record_of_bake
+from ...images.facts import Record, facts_of, file_at, is_sequence, note_bake, record_in, record_of, record_of_bake
 from ...images.files import file_of
-from ...images.sequence import file_at, is_sequence
 from ...images.undo import is_undone
 from ...node.find import find_bakeable, find_misplaced, image_of
 from ...read.visibility import by_name

@@ -25,8 +25,8 @@ from ....core.target import Target
 from ...cycles.colors import BaseColorByCycles, not_evaluated
 from ...cycles.cycles_light import CyclesLight
 from ...cycles.scene_copy import CopyForCycles
+from ...images.facts import is_sequence, size_of_frames
 from ...images.files import check_image
-from ...images.sequence import is_sequence, size_of_frames
 from ...node.find import BakeTarget, find_node_in_groups, targets_of
 from ...node.node import BeamspreadNode
 from ...read.base_color import read_texture
