@@ -78,12 +78,19 @@ def around(values):
     return np.stack([padded[i : i + height, j : j + width] for i in range(3) for j in range(3)])
 
 
-def our_irradiance(plane):
+def lamp_over(plane, kind, euler, place=(0.3, -0.2, 1.1), scale=(1, 1, 1), power=30, **options):
+    """An orange lamp, placed relative to the side of the plane that its normal points to."""
+    matrix = frame_of(plane) @ Matrix.LocRotScale(place, Euler(euler), scale)
+    return scenes.add_lamp(None, power, kind, kind, matrix, **({"color": (1, 0.5, 0.25)} | options))
+
+
+def our_irradiance(plane, texels=TEXELS):
     """The same by the add-on, and the coverage of the texels."""
+    bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     illumination = read_illumination(depsgraph).lighting(plane.name)
     polygons = read_polygons(plane.evaluated_get(depsgraph), plane.data.materials[0].name)
-    receiver = build_receiver(fit_uv_maps(polygons), TEXELS, TEXELS)
+    receiver = build_receiver(fit_uv_maps(polygons), texels, texels)
     grid = receiver.charts[0].grid
     total, _ = native.bake_arrival(grid.surface(), illumination.native_lights(grid), samples=8, rays=RAYS)
     return receiver.to_texture([total * grid.coverage[..., None]]), receiver.coverage

@@ -2,7 +2,7 @@
 
 import bpy
 from mathutils import Euler, Matrix
-from scenes import add_blocker, add_material, add_plane
+from scenes import add_blocker, add_instancer, add_material, add_plane, new_collection
 
 WITHIN = Matrix.Translation((0.3, -0.2, 0.1)) @ Euler((0.1, 0.2, 0.7)).to_matrix().to_4x4()
 TURNED = Euler((0.1, -0.2, 2.0)).to_matrix().to_4x4()
@@ -15,20 +15,9 @@ def add_tile(matrix=WITHIN, **properties):
     """A plane and a wall upon it in a collection that the scene does not have; it, and its material."""
     material = add_material(**properties)
     tile, wall = add_plane("Tile", matrix=matrix, material=material), add_blocker(0.5, matrix=matrix)
-    collection = bpy.data.collections.new("Tiles")
+    collection = new_collection("Tiles", tile, wall)
     collection.instance_offset = OFFSET
-    for obj in (tile, wall):
-        bpy.context.scene.collection.objects.unlink(obj)
-        collection.objects.link(obj)
     return tile, collection
-
-
-def add_instancer(collection, matrix, name="Holder", within=None):
-    holder = bpy.data.objects.new(name, None)
-    holder.instance_type, holder.instance_collection = "COLLECTION", collection
-    holder.matrix_world = matrix
-    (within or bpy.context.scene.collection).objects.link(holder)
-    return holder
 
 
 def nest(collection):

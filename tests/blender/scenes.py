@@ -10,7 +10,11 @@ from pathlib import Path
 import beamspread
 import bpy
 import numpy as np
+from beamspread.blender.jobs.run.batch_run import bake_all
+from beamspread.core.batch import batch_options
+from beamspread.core.native import native
 from mathutils import Matrix
+from nodes import Nodes, add_sockets
 
 REFERENCE = Path(__file__).resolve().parent.parent / "reference" / "adding_doubling.csv"
 BATCH = Path(beamspread.__file__).parent / "batch.py"
@@ -42,38 +46,45 @@ def add_plane(name="Plane", size=(2.0, 2.0), matrix=None, uvs=SQUARE_UVS, materi
 def add_material(name="Medium", image=None, linked=False, shader=False, **properties):
     """A material with a Beamspread node; it shows nothing, or with `shader` the Principled BSDF of new materials."""
     material = bpy.data.materials.new(name)
-    material.use_nodes = True
-    for link in () if shader else list(material.node_tree.links):
-        material.node_tree.links.remove(link)
-    node = material.node_tree.nodes.new("BeamspreadNode")
+    tree = Nodes(material).tree
+    for link in () if shader else list(tree.links):
+        tree.links.remove(link)
+    node = tree.nodes.new("BeamspreadNode")
     values = {"albedo": (0.9, 0.8, 0.6), "mean_free_path": (0.05,) * 3, "ior": 1.0}
     for key, value in (values | properties).items():
         setattr(node, key, value)
     node.image = image
     if linked:
-        output = material.node_tree.get_output_node("ALL")
-        material.node_tree.links.new(output.inputs["Surface"], node.outputs["BSDF"])
+        tree.links.new(tree.get_output_node("ALL").inputs["Surface"], node.outputs["BSDF"])
     return material
 
 
 def diffuse_material(color, name="Diffuse"):
-    material = bpy.data.materials.new(name)
-    if bpy.app.version < (5, 0, 0):
-        material.use_nodes = True
-    nodes = material.node_tree.nodes
-    nodes.clear()
-    diffuse, output = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeOutputMaterial")
-    diffuse.inputs["Color"].default_value = (*color, 1)
-    material.node_tree.links.new(output.inputs["Surface"], diffuse.outputs[0])
-    return material
+    nodes = Nodes(bpy.data.materials.new(name), clear=True)
+    return nodes.finish(nodes.add("BsdfDiffuse", {"Color": (*color, 1)}))
+
+
+def glowing_material(strength=3.0, color=(1, 1, 1, 1), name="Glow"):
+    """A material with an emission alone; the color may be a socket."""
+    nodes = Nodes(bpy.data.materials.new(name), clear=True)
+    return nodes.finish(nodes.add("Emission", {"Color": color, "Strength": strength}))
+
+
+def add_world(color=(1, 1, 1, 1), strength=1.0, name="World"):
+    """A world for the scene, whose background has a color; its nodes and the background."""
+    world = bpy.context.scene.world = bpy.data.worlds.new(name)
+    nodes = Nodes(world)
+    background = nodes.of_type("BACKGROUND")
+    nodes.set(background.inputs["Color"], color)
+    background.inputs["Strength"].default_value = strength
+    return nodes, background
 
 
 def add_group_material():
     """A material whose Beamspread node sits in a group within a group."""
     groups = [bpy.data.node_groups.new(name, "ShaderNodeTree") for name in ("Outer", "Inner")]
     material = bpy.data.materials.new("Grouped")
-    material.use_nodes = True
-    for tree, group in zip((material.node_tree, groups[0]), groups):
+    for tree, group in zip((Nodes(material).tree, groups[0]), groups):
         tree.nodes.new("ShaderNodeGroup").node_tree = group
     groups[1].nodes.new("BeamspreadNode")
     return material
@@ -103,14 +114,37 @@ def add_sun(angle_deg=0.0, azimuth_deg=0.0, strength=1.0, color=(1, 1, 1), matri
     return obj
 
 
-def add_lamp(location, power=100.0):
-    """A point lamp, watts."""
-    data = bpy.data.lights.new("Lamp", "POINT")
-    data.energy, data.shadow_soft_size = power, 0.0
-    obj = bpy.data.objects.new("Lamp", data)
-    obj.location = location
+def add_lamp(location=None, power=100.0, kind="POINT", name="Lamp", matrix=None, radius=0.0, **properties):
+    """A lamp, watts, with a light radius; None is Blender's own."""
+    data = bpy.data.lights.new(name, kind)
+    data.energy = power
+    if kind in ("POINT", "SPOT") and radius is not None:
+        data.shadow_soft_size = radius
+    for key, value in properties.items():
+        setattr(data, key, value)
+    obj = bpy.data.objects.new(name, data)
+    obj.matrix_world = matrix or Matrix.Translation(location)
     bpy.context.collection.objects.link(obj)
     return obj
+
+
+def add_instancer(collection, matrix=None, name="Holder", within=None):
+    """An instance of a collection."""
+    holder = bpy.data.objects.new(name, None)
+    holder.instance_type, holder.instance_collection = "COLLECTION", collection
+    holder.matrix_world = matrix or Matrix()
+    (within or bpy.context.scene.collection).objects.link(holder)
+    return holder
+
+
+def new_collection(name, *objects):
+    """A collection of these objects, which leave the scene's own collection; no part of the scene."""
+    collection = bpy.data.collections.new(name)
+    for obj in objects:
+        collection.objects.link(obj)
+        if obj.name in bpy.context.scene.collection.objects:
+            bpy.context.scene.collection.objects.unlink(obj)
+    return collection
 
 
 def add_blocker(height, matrix=None):
@@ -146,6 +180,24 @@ def save_scene(folder):
     path = folder / "scene.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     return path
+
+
+def reopen(folder):
+    """Save the scene and open the file."""
+    path = str(folder / "scene.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+
+
+def file_image(path, width=16, height=16, value=0.0, **options):
+    """An image whose EXR file has this value everywhere."""
+    native.write_exr(str(path), np.full((height, width, 3), value, np.float32), ["R", "G", "B"], **options)
+    return bpy.data.images.load(str(path))
+
+
+def run_batch(*arguments):
+    """Report of a batch of the open file, in this process."""
+    return bake_all(batch_options.parse([*map(str, arguments)]))
 
 
 def batch_command(scene, *arguments, program=()):
@@ -187,12 +239,7 @@ def fresnel(ior, angle_deg):
 def scatter_group(obj):
     """Instances of an object on the vertices of a mesh, moved."""
     tree = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
-    if hasattr(tree, "interface"):
-        tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-        tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    else:
-        tree.inputs.new("NodeSocketGeometry", "Geometry")
-        tree.outputs.new("NodeSocketGeometry", "Geometry")
+    add_sockets(tree, "NodeSocketGeometry", "Geometry", "Geometry")
     names = ("NodeGroupInput", "GeometryNodeInstanceOnPoints", "GeometryNodeTranslateInstances", "NodeGroupOutput")
     given, points, move, result = (tree.nodes.new(name) for name in names)
     info = tree.nodes.new("GeometryNodeObjectInfo")
@@ -207,20 +254,12 @@ def scatter_group(obj):
 
 def add_gobo(kind):
     """A lamp whose nodes only Cycles understands: a checker of directions."""
-    data = bpy.data.lights.new("Gobo", kind)
-    data.energy, data.shadow_soft_size = 60.0, 0.0
-    if bpy.app.version < (5, 0, 0):
-        data.use_nodes = True
-    tree = data.node_tree
-    emission = next(node for node in tree.nodes if node.type == "EMISSION")
-    checker, place = tree.nodes.new("ShaderNodeTexChecker"), tree.nodes.new("ShaderNodeNewGeometry")
-    checker.inputs["Color1"].default_value, checker.inputs["Color2"].default_value = (1, 0.2, 0.1, 1), (0, 0.5, 1, 1)
-    checker.inputs["Scale"].default_value = 4.0
-    tree.links.new(checker.inputs["Vector"], place.outputs["Normal"])
-    tree.links.new(emission.inputs["Color"], checker.outputs["Color"])
-    lamp = bpy.data.objects.new("Gobo", data)
-    lamp.location = (0.2, 0.1, 1.2)
-    bpy.context.collection.objects.link(lamp)
+    lamp = add_lamp((0.2, 0.1, 1.2), 60.0, kind, "Gobo")
+    nodes = Nodes(lamp.data)
+    normal = nodes.add("NewGeometry").outputs["Normal"]
+    colors = {"Color1": (1, 0.2, 0.1, 1), "Color2": (0, 0.5, 1, 1), "Scale": 4.0}
+    checker = nodes.add("TexChecker", {**colors, "Vector": normal})
+    nodes.set(nodes.of_type("EMISSION").inputs["Color"], checker.outputs["Color"])
 
 
 def blender_command(script, *arguments, scene=None):

@@ -18,6 +18,7 @@ from scenes import (
     add_sun,
     bake,
     batch_command,
+    file_image,
     node_of,
     pixels,
     save_scene,
@@ -102,8 +103,7 @@ def test_png_shows_srgb(tmp_path):
 
 def test_without_output_the_images_own_file_is_written(tmp_path):
     path = tmp_path / "own.exr"
-    native.write_exr(str(path), np.zeros((8, 8, 3), np.float32), ["R", "G", "B"])
-    add_plane(material=add_material(image=bpy.data.images.load(str(path))))
+    add_plane(material=add_material(image=file_image(path, 8, 8)))
     add_sun(0)
     code, bakes, _ = run_batch(save_scene(tmp_path))
     assert code == 0
@@ -140,8 +140,7 @@ def missing_image(folder):
 
 def read_only_image(folder):
     path = folder / "locked.exr"
-    native.write_exr(str(path), np.zeros((8, 8, 3), np.float32), ["R", "G", "B"])
-    image = bpy.data.images.load(str(path))
+    image = file_image(path, 8, 8)
     path.chmod(stat.S_IRUSR)
     return image
 

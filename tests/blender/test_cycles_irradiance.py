@@ -15,9 +15,10 @@ from cycles_truth import (
     around,
     cycles_irradiance,
     frame_of,
+    lamp_over,
     our_irradiance,
 )
-from mathutils import Euler, Matrix
+from mathutils import Matrix
 
 TOLERANCE = 0.01
 
@@ -33,20 +34,9 @@ UVS = {
 ABOVE = {"straight": (0.0, 0.0, 0.0), "oblique": (0.35, 0.25, 0.4)}
 
 
-def add_lamp(kind, plane, euler=(0, 0, 0), place=(0.3, -0.2, 1.1), scale=(1, 1, 1), color=(1, 0.5, 0.25), **options):
-    """A lamp without extent, placed relative to the side of the plane that its normal points to."""
-    data = bpy.data.lights.new(kind, kind)
-    data.color = color
-    for name, value in options.items():
-        setattr(data, name, value)
-    if kind == "SUN":
-        data.angle = 0
-    else:
-        data.shadow_soft_size = 0
-    lamp = bpy.data.objects.new(kind, data)
-    bpy.context.collection.objects.link(lamp)
-    lamp.matrix_world = frame_of(plane) @ Matrix.LocRotScale(place, Euler(euler), scale)
-    return lamp
+def add_lamp(kind, plane, euler=(0, 0, 0), power=10, **options):
+    size = {"angle": 0} if kind == "SUN" else {}
+    return lamp_over(plane, kind, euler, power=power, **size | options)
 
 
 def inside_one_triangle(plane):
@@ -91,21 +81,21 @@ def assert_agree(plane, image, least_lit=0.1):
 def test_planes(kind, world):
     plane, image = add_receiver(world)
     options = {"spot_size": 1.6, "spot_blend": 0.3} if kind == "SPOT" else {}
-    add_lamp(kind, plane, ABOVE["oblique"], energy=70, **options)
+    add_lamp(kind, plane, ABOVE["oblique"], power=70, **options)
     assert_agree(plane, image)
 
 
 @pytest.mark.parametrize("uvs", UVS.values(), ids=UVS.keys())
 def test_uv_layouts(uvs):
     plane, image = add_receiver(PLANES["stretched"], uvs)
-    add_lamp("POINT", plane, energy=20)
+    add_lamp("POINT", plane, power=20)
     assert_agree(plane, image)
 
 
 @pytest.mark.parametrize("angle", [0, 30, 60, 80, 89])
 def test_sun_angles(angle):
     plane, image = add_receiver(Matrix())
-    add_lamp("SUN", plane, (math.radians(angle), 0, 0.3), energy=3)
+    add_lamp("SUN", plane, (math.radians(angle), 0, 0.3), power=3)
     assert_agree(plane, image)
 
 
@@ -122,7 +112,7 @@ def test_light_from_behind_is_none():
 @pytest.mark.parametrize("euler", ABOVE.values(), ids=ABOVE.keys())
 def test_spot_falloff(euler, size, blend):
     plane, image = add_receiver(Matrix())
-    add_lamp("SPOT", plane, euler, energy=100, spot_size=math.radians(size), spot_blend=blend)
+    add_lamp("SPOT", plane, euler, power=100, spot_size=math.radians(size), spot_blend=blend)
     assert_agree(plane, image, least_lit=0.03)
 
 
@@ -134,13 +124,13 @@ def test_spot_falloff(euler, size, blend):
 @pytest.mark.parametrize("blend", [0.15, 1])
 def test_scaled_spot(scale, blend):
     plane, image = add_receiver(Matrix())
-    add_lamp("SPOT", plane, ABOVE["oblique"], scale=scale, energy=100, spot_size=1.0, spot_blend=blend)
+    add_lamp("SPOT", plane, ABOVE["oblique"], scale=scale, power=100, spot_size=1.0, spot_blend=blend)
     assert_agree(plane, image, least_lit=0.03)
 
 
 def test_spot_below_a_mirroring_parent():
     plane, image = add_receiver(Matrix())
-    lamp = add_lamp("SPOT", plane, (math.pi - 0.35, 0.25, 0.4), energy=100, spot_size=1.2, spot_blend=0.5)
+    lamp = add_lamp("SPOT", plane, (math.pi - 0.35, 0.25, 0.4), power=100, spot_size=1.2, spot_blend=0.5)
     parent = bpy.data.objects.new("Parent", None)
     bpy.context.collection.objects.link(parent)
     parent.matrix_world = Matrix.Translation((0, 0, 2.2)) @ Matrix.Diagonal((1, 1, -1, 1))
@@ -150,9 +140,9 @@ def test_spot_below_a_mirroring_parent():
 
 def test_lights_of_several_colors_add_up():
     plane, image = add_receiver(PLANES["tilted"])
-    add_lamp("SUN", plane, (0.4, 0, 0), color=(1, 0.2, 0.1), energy=2)
-    add_lamp("POINT", plane, color=(0.1, 1, 0.3), energy=30)
-    add_lamp("SPOT", plane, color=(0.2, 0.1, 1), energy=200, spot_size=1.2, spot_blend=1)
+    add_lamp("SUN", plane, (0.4, 0, 0), color=(1, 0.2, 0.1), power=2)
+    add_lamp("POINT", plane, color=(0.1, 1, 0.3), power=30)
+    add_lamp("SPOT", plane, color=(0.2, 0.1, 1), power=200, spot_size=1.2, spot_blend=1)
     # Cycles picks one of the lights for each sample: only means over many texels are free of noise.
     blocks = TEXELS // 8, 8, TEXELS // 8, 8, 3
     cycles = cycles_irradiance(plane, image, 4 * CYCLES_SAMPLES).reshape(blocks).mean(axis=(1, 3))
@@ -167,7 +157,7 @@ def test_shadow(kind, world):
     wall = scenes.add_blocker(0.5)
     wall.matrix_world = frame_of(plane)
     options = {"spot_size": 2.0, "spot_blend": 0.2} if kind == "SPOT" else {}
-    add_lamp(kind, plane, (0.2, 0.6, 0.4), place=(0.7, -0.3, 1.1), energy=50, **options)
+    add_lamp(kind, plane, (0.2, 0.6, 0.4), place=(0.7, -0.3, 1.1), power=50, **options)
     assert (our_irradiance(plane)[0].max(axis=2) == 0).sum() > 100
     assert_agree(plane, image)
 
@@ -177,7 +167,7 @@ def test_shadows_do_not_drift_far_from_the_world_origin(distance):
     """Blender's own matrices hold these positions exactly: multiples of an eighth, its spacing at 1000 km."""
     plane, _ = add_receiver(Matrix())
     wall = scenes.add_blocker(0.5)
-    lamp = add_lamp("POINT", plane, place=(0.75, -0.25, 1.125), energy=50)
+    lamp = add_lamp("POINT", plane, place=(0.75, -0.25, 1.125), power=50)
     here, _ = our_irradiance(plane)
     for obj in (plane, wall, lamp):
         obj.matrix_world = Matrix.Translation((distance, -distance // 2, distance // 4)) @ obj.matrix_world

@@ -7,24 +7,13 @@ from unittest.mock import MagicMock
 import bpy
 import numpy as np
 import pytest
+import scenes
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.run.render_copy import render_picture
 from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.ui.panels import target_of_blender
 from beamspread.core.target import Target
 from mathutils import Matrix
-from scenes import (
-    add_material,
-    add_mesh,
-    add_plane,
-    add_sun,
-    bake,
-    diffuse_reflectance,
-    messages_of,
-    node_of,
-    pixels,
-    select,
-)
 
 
 @pytest.fixture(autouse=True)
@@ -45,56 +34,56 @@ def add_active_image(material, name="Active", size=(32, 32)):
 
 
 def test_same_as_the_operator():
-    plane = add_plane(material=add_material())
-    add_sun(40, 30)
+    plane = scenes.add_plane(material=scenes.add_material())
+    scenes.add_sun(40, 30)
     image = add_active_image(plane.data.materials[0])
-    select(plane)
+    scenes.select(plane)
     assert bpy.ops.object.bake(type="COMBINED") == {"FINISHED"}
     assert state.lines() == []
-    filled = pixels(image)
+    filled = scenes.pixels(image)
     assert (filled > 0).all()
-    assert filled == pytest.approx(bake(plane)[0], abs=1e-6)
+    assert filled == pytest.approx(scenes.bake(plane)[0], abs=1e-6)
 
 
 def test_two_objects_with_an_image_each():
-    planes = [add_plane(name, material=add_material(name)) for name in "AB"]
+    planes = [scenes.add_plane(name, material=scenes.add_material(name)) for name in "AB"]
     planes[1].location.x = 5
-    add_sun(0)
+    scenes.add_sun(0)
     images = [add_active_image(plane.data.materials[0], plane.name, (16, 24)) for plane in planes]
-    select(*planes)
+    scenes.select(*planes)
     assert bpy.ops.object.bake(type="COMBINED") == {"FINISHED"}
-    assert (pixels(images[0]) > 0).all()
-    assert pixels(images[1]) == pytest.approx(pixels(images[0]), abs=1e-5)
+    assert (scenes.pixels(images[0]) > 0).all()
+    assert scenes.pixels(images[1]) == pytest.approx(scenes.pixels(images[0]), abs=1e-5)
 
 
 def test_two_materials_of_one_object_fill_their_images():
     vertices = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)]
-    corner = add_mesh("Corner", vertices, [(0, 1, 2, 3), (0, 3, 4, 5)], uvs=[(0, 0), (1, 0), (1, 1), (0, 1)] * 2)
+    corner = scenes.add_mesh("Corner", vertices, [(0, 1, 2, 3), (0, 3, 4, 5)], uvs=[(0, 0), (1, 0), (1, 1), (0, 1)] * 2)
     for index in range(2):
-        material = add_material(f"Side {index}", albedo=(0.9, 0.9, 0.9), mean_free_path=(0.002,) * 3)
+        material = scenes.add_material(f"Side {index}", albedo=(0.9, 0.9, 0.9), mean_free_path=(0.002,) * 3)
         corner.data.materials.append(material)
         corner.data.polygons[index].material_index = index
-    add_sun(30, 180)
+    scenes.add_sun(30, 180)
     bpy.context.scene.beamspread.quality = "final"
     images = [add_active_image(material, material.name) for material in corner.data.materials]
-    select(corner)
+    scenes.select(corner)
     assert bpy.ops.object.bake(type="COMBINED") == {"FINISHED"}
     assert state.lines() == []
     # The sun meets the floor at 30 degrees and the wall at 60: totals as in test_reflectance.py, and to its tolerance.
     for image, angle in zip(images, (30, 60)):
-        expected = diffuse_reflectance(1.0, 0.8, 0.9, angle) * math.cos(math.radians(angle)) / math.pi
-        assert pixels(image)[16, 16, 0] == pytest.approx(expected, rel=0.01)
+        expected = scenes.diffuse_reflectance(1.0, 0.8, 0.9, angle) * math.cos(math.radians(angle)) / math.pi
+        assert scenes.pixels(image)[16, 16, 0] == pytest.approx(expected, rel=0.01)
 
 
 def test_failure_is_reported_and_does_not_touch_the_rest():
-    plane = add_plane(material=add_material(albedo=(1.0, 0.5, 0.5)))
-    add_sun(0)
+    plane = scenes.add_plane(material=scenes.add_material(albedo=(1.0, 0.5, 0.5)))
+    scenes.add_sun(0)
     add_active_image(plane.data.materials[0])
-    select(plane)
-    messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
+    scenes.select(plane)
+    scenes.messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
     assert len(state.lines()) == 1
     assert "albedo's red is 1" in state.lines()[0]
-    node_of(plane.data.materials[0]).albedo = (0.5, 0.5, 0.5)
+    scenes.node_of(plane.data.materials[0]).albedo = (0.5, 0.5, 0.5)
     bpy.ops.object.bake(type="COMBINED")
     assert state.lines() == []
 
@@ -102,41 +91,41 @@ def test_failure_is_reported_and_does_not_touch_the_rest():
 @pytest.mark.parametrize("is_active", [True, False])
 def test_a_texture_of_the_node_is_not_baked_to(is_active):
     """Blender bakes to the first image texture where none is active, and clears it before it asks."""
-    plane = add_plane(material=add_material())
-    add_sun(0)
+    plane = scenes.add_plane(material=scenes.add_material())
+    scenes.add_sun(0)
     material = plane.data.materials[0]
     texture = add_active_image(material)
     texture.pixels.foreach_set([0.5] * len(texture.pixels))
     texture.pack()
     source = material.node_tree.nodes.active
-    material.node_tree.links.new(node_of(material).inputs["Base Color"], source.outputs["Color"])
+    material.node_tree.links.new(scenes.node_of(material).inputs["Base Color"], source.outputs["Color"])
     if not is_active:
-        material.node_tree.nodes.active = node_of(material)
-    select(plane)
-    messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
+        material.node_tree.nodes.active = scenes.node_of(material)
+    scenes.select(plane)
+    scenes.messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
     assert "reload it" in state.lines()[0]
     texture.reload()
-    assert np.array_equal(pixels(texture), np.full((32, 32, 3), 0.5))
+    assert np.array_equal(scenes.pixels(texture), np.full((32, 32, 3), 0.5))
 
 
 def test_plain_material_is_refused():
-    plane = add_plane(material=bpy.data.materials.new("Plain"))
+    plane = scenes.add_plane(material=bpy.data.materials.new("Plain"))
     plane.data.materials[0].use_nodes = True
     add_active_image(plane.data.materials[0])
-    select(plane)
-    messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
+    scenes.select(plane)
+    scenes.messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
     assert "Beamspread node" in state.lines()[-1]
 
 
 def test_viewport_hidden_caster_and_modifiers_render():
-    plane = add_plane(material=add_material())
-    roof = add_plane("Roof", size=(9, 9), matrix=Matrix.Translation((0, 0, 1)))
+    plane = scenes.add_plane(material=scenes.add_material())
+    roof = scenes.add_plane("Roof", size=(9, 9), matrix=Matrix.Translation((0, 0, 1)))
     roof.hide_viewport = True
-    add_sun(0)
+    scenes.add_sun(0)
     image = add_active_image(plane.data.materials[0])
-    select(plane)
+    scenes.select(plane)
     bpy.ops.object.bake(type="COMBINED")
-    assert np.array_equal(pixels(image), np.zeros((32, 32, 3)))
+    assert np.array_equal(scenes.pixels(image), np.zeros((32, 32, 3)))
 
 
 @pytest.fixture
@@ -152,7 +141,7 @@ def seen():
     scene.camera = camera
     scene.render.resolution_x, scene.render.resolution_y = 8, 6
     scene.cycles.samples, scene.cycles.use_denoising = 4, False
-    return add_plane(material=add_material(image=image, linked=True))
+    return scenes.add_plane(material=scenes.add_material(image=image, linked=True))
 
 
 def picture(tmp_path):
@@ -160,7 +149,7 @@ def picture(tmp_path):
     scene = bpy.context.scene
     scene.render.image_settings.file_format, scene.render.filepath = "OPEN_EXR", str(tmp_path / "f12.exr")
     bpy.ops.render.render(write_still=True)
-    return pixels(bpy.data.images.load(str(tmp_path / "f12.exr")))
+    return scenes.pixels(bpy.data.images.load(str(tmp_path / "f12.exr")))
 
 
 @pytest.mark.parametrize("engine", ["CYCLES", "EEVEE"])
@@ -211,7 +200,7 @@ def test_f12_says_how_far_it_is(seen):
 
 def test_f12_that_fails_says_why(seen, tmp_path, capfd):
     bpy.context.scene.camera = None
-    said = messages_of(lambda: picture(tmp_path)) + capfd.readouterr().out
+    said = scenes.messages_of(lambda: picture(tmp_path)) + capfd.readouterr().out
     assert "camera" in said
 
 
@@ -223,13 +212,13 @@ def test_panels_of_blender_know_the_engine():
 
 def test_its_own_bake_is_known_of_in_the_image_that_the_node_shows(tmp_path):
     """And not where another image is active; known again when the file is opened."""
-    plane = add_plane(material=add_material())
-    sun = add_sun(0)
+    plane = scenes.add_plane(material=scenes.add_material())
+    sun = scenes.add_sun(0)
     image = add_active_image(plane.data.materials[0])
-    select(plane)
+    scenes.select(plane)
     bpy.ops.object.bake(type="COMBINED")
     assert row().status == Status.NEVER
-    node_of(plane.data.materials[0]).image = image
+    scenes.node_of(plane.data.materials[0]).image = image
     bpy.ops.object.bake(type="COMBINED")
     assert row().status == Status.BAKED
     sun.data.energy = 3
@@ -237,8 +226,7 @@ def test_its_own_bake_is_known_of_in_the_image_that_the_node_shows(tmp_path):
     assert row().status == Status.STALE
     sun.data.energy = 1
     image.pack()
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
+    scenes.reopen(tmp_path)
     assert row().status == Status.BAKED
 
 
@@ -248,12 +236,14 @@ def row():
 
 
 def test_the_panel_names_the_image_that_blenders_own_bake_fills():
-    material = add_material()
+    material = scenes.add_material()
     assert target_of_blender(None) == target_of_blender(material)
     assert target_of_blender(material).startswith("Select an Image Texture node")
     texture = material.node_tree.nodes.new("ShaderNodeTexImage")
     texture.image = bpy.data.images.new("Filled", 4, 4)
     material.node_tree.nodes.active = texture
     assert target_of_blender(material) == "Fills 'Filled', the image of the selected Image Texture node."
-    material.node_tree.links.new(node_of(material).inputs["Base Color"], material.node_tree.nodes.active.outputs[0])
+    material.node_tree.links.new(
+        scenes.node_of(material).inputs["Base Color"], material.node_tree.nodes.active.outputs[0]
+    )
     assert "'Filled' is the base color" in target_of_blender(material)

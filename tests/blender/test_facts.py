@@ -17,11 +17,9 @@ from beamspread.blender.images.facts import (
     set_facts,
 )
 from beamspread.blender.jobs.out_of_date import stale
-from beamspread.blender.jobs.run import batch_run
 from beamspread.blender.jobs.state import Status, state
-from beamspread.core.batch import batch_options
 from beamspread.core.target import Target
-from scenes import add_material, add_plane, add_sun, bake, image_of, node_of, save_scene
+from scenes import add_material, add_plane, add_sun, bake, image_of, node_of, reopen, run_batch, save_scene
 
 PLANE = Target("Plane", "Medium")
 
@@ -51,8 +49,7 @@ def test_facts_survive_saving_the_file(tmp_path):
     first = image()
     first.use_fake_user = True
     set_facts(first, facts)
-    path = str(save_scene(tmp_path))
-    bpy.ops.wm.open_mainfile(filepath=path)
+    reopen(tmp_path)
     facts.former = bpy.data.images["Former"]  # nothing else shows it
     assert facts_of(bpy.data.images["Image"]) == facts
 
@@ -77,8 +74,7 @@ def test_a_bake_in_a_file_of_an_earlier_version_is_known(tmp_path):
     bpy.context.scene.beamspread.resolution = 16
     bake(plane)
     use_keys_of_earlier_versions(image_of(plane))
-    path = str(save_scene(tmp_path))
-    bpy.ops.wm.open_mainfile(filepath=path)
+    reopen(tmp_path)
     state.forget()
     stale.refresh(bpy.context)
     assert state.rows[PLANE].status == Status.BAKED
@@ -98,7 +94,7 @@ def test_frames_of_an_earlier_version_are_shown(tmp_path):
     save_scene(tmp_path)
     bake(plane)
     own = image_of(plane).name
-    assert batch_run.bake_all(batch_options.parse(["--frames", "3-4"])).all_written()
+    assert run_batch("--frames", "3-4").all_written()
     bpy.ops.beamspread.show_frames()
     use_keys_of_earlier_versions(image_of(plane))
     assert is_sequence(image_of(plane))
@@ -142,8 +138,7 @@ def test_images_that_live_of_an_earlier_version_made_are_removed_on_load(tmp_pat
     packed.use_fake_user = True
     for made in (node_of(material).image, packed):
         made["beamspread_preview"] = True
-    path = str(save_scene(tmp_path))
-    bpy.ops.wm.open_mainfile(filepath=path)
+    reopen(tmp_path)
     assert node_of(bpy.data.materials["Medium"]).image is None
     assert [image.name for image in bpy.data.images] == ["Packed"]
     assert "beamspread_preview" not in bpy.data.images["Packed"]

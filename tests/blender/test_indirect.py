@@ -22,6 +22,7 @@ from beamspread.core.scene.lights import DIRECTIONS, STRATA, WEIGHTS
 from beamspread.core.target import Target
 from cycles_truth import cycles_bake, target_material
 from mathutils import Euler, Matrix
+from nodes import Nodes, add_node, set_input
 
 TEXELS, GREY = 32, 0.5
 
@@ -36,31 +37,15 @@ def coarse(monkeypatch):
     bpy.context.scene.beamspread.margin = 0
 
 
-def glowing_material(strength):
-    material = scenes.diffuse_material((0, 0, 0), "Glow")
-    nodes = material.node_tree.nodes
-    emission = nodes.new("ShaderNodeEmission")
-    emission.inputs["Strength"].default_value = strength
-    material.node_tree.links.new(nodes["Material Output"].inputs["Surface"], emission.outputs[0])
-    return material
-
-
 def add_halves(tree, socket):
     """Link a colour of .9, .5, .1 for x < 0, and .1, .5, .9 beyond."""
-    place, split = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeSeparateXYZ")
-    join = tree.nodes.new("ShaderNodeCombineXYZ")
-    step, red, blue = (tree.nodes.new("ShaderNodeMath") for _ in range(3))
-    step.operation, red.operation, blue.operation = "GREATER_THAN", "MULTIPLY_ADD", "MULTIPLY_ADD"
-    step.inputs[1].default_value = 0.0
-    for node, slope, begin in ((red, -0.8, 0.9), (blue, 0.8, 0.1)):
-        node.inputs[1].default_value, node.inputs[2].default_value = slope, begin
-        tree.links.new(node.inputs[0], step.outputs[0])
-    join.inputs[1].default_value = 0.5
-    tree.links.new(split.inputs[0], place.outputs["Object"])
-    tree.links.new(step.inputs[0], split.outputs[0])
-    tree.links.new(join.inputs[0], red.outputs[0])
-    tree.links.new(join.inputs[2], blue.outputs[0])
-    tree.links.new(socket, join.outputs[0])
+    split = add_node(tree, "SeparateXYZ", {0: add_node(tree, "TexCoord").outputs["Object"]})
+    step = add_node(tree, "Math", {0: split.outputs[0], 1: 0.0}, operation="GREATER_THAN").outputs[0]
+    red, blue = (
+        add_node(tree, "Math", {0: step, 1: slope, 2: begin}, operation="MULTIPLY_ADD").outputs[0]
+        for slope, begin in ((-0.8, 0.9), (0.8, 0.1))
+    )
+    set_input(socket, add_node(tree, "CombineXYZ", {0: red, 1: 0.5, 2: blue}).outputs[0])
 
 
 def add_wall(color=(0.9, 0.6, 0.3)):
@@ -227,7 +212,7 @@ def test_directions_of_a_glowing_square(world, mirrored):
     side, place = 0.6, np.array((0.5, 0.3, 0.8))
     corners = [place + (x * side / 2, y * side / 2, 0) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     panel = scenes.add_mesh("Panel", [tuple(corner) for corner in corners], [(0, 1, 2, 3)], world)
-    panel.data.materials.append(glowing_material(2.0))
+    panel.data.materials.append(scenes.glowing_material(2.0))
     bpy.context.view_layer.update()
     axes = np.array(world.to_3x3().transposed())
     sign = -1.0 if mirrored else 1.0
@@ -260,7 +245,7 @@ def test_directions_of_a_glowing_square(world, mirrored):
 def test_rounds_are_independent():
     """Two rounds of four samples show the noise of their mean: 7 % are three deviations of 1024 nodes."""
     panel = scenes.add_mesh("Panel", [(0.2, 0, 0.8), (0.8, 0, 0.8), (0.8, 0.6, 0.8), (0.2, 0.6, 0.8)], [(0, 1, 2, 3)])
-    panel.data.materials.append(glowing_material(2.0))
+    panel.data.materials.append(scenes.glowing_material(2.0))
     axes = {"x_axis": [1, 0, 0], "y_axis": [0, 1, 0], "normal": [0, 0, 1]}
     chart = {"corner": [-0.005, -0.005, 0], **axes, "size": [0.01, 0.01], "nodes": [32, 32]}
     found = fields_of(chart, noise=(0.01, 0.01), most_samples=8)
@@ -293,12 +278,12 @@ def test_a_lamp_that_only_cycles_understands():
 
 def add_checkered_panel():
     """A glowing mesh whose nodes only Cycles understands."""
-    panel = scenes.add_plane("Gobo", (0.4, 0.4), Matrix.Translation((0.2, 0.1, 1.2)), material=glowing_material(8.0))
-    tree = panel.data.materials[0].node_tree
-    checker, place = tree.nodes.new("ShaderNodeTexChecker"), tree.nodes.new("ShaderNodeNewGeometry")
-    checker.inputs["Color1"].default_value, checker.inputs["Color2"].default_value = (1, 0.2, 0.1, 1), (0, 0.5, 1, 1)
-    tree.links.new(checker.inputs["Vector"], place.outputs["Incoming"])
-    tree.links.new(tree.nodes["Emission"].inputs["Color"], checker.outputs["Color"])
+    material = scenes.glowing_material(8.0)
+    nodes = Nodes(material)
+    colors = {"Color1": (1, 0.2, 0.1, 1), "Color2": (0, 0.5, 1, 1)}
+    checker = nodes.add("TexChecker", {**colors, "Vector": nodes.add("NewGeometry").outputs["Incoming"]})
+    nodes.set(nodes.of_type("EMISSION").inputs["Color"], checker.outputs["Color"])
+    scenes.add_plane("Gobo", (0.4, 0.4), Matrix.Translation((0.2, 0.1, 1.2)), material=material)
 
 
 def new_collection(obj, state):

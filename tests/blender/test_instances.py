@@ -7,28 +7,15 @@ import scenes
 from beamspread.blender.cycles import cycles_light
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.run.bake_plan import prepare_scene
-from beamspread.blender.jobs.run.batch_run import bake_all
 from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.live import timer
 from beamspread.blender.node.find import find_bakeable
 from beamspread.blender.ui import bake_panel
-from beamspread.core.batch import batch_options
 from beamspread.core.target import Target
 from instance_scenes import MIRRORED, SKEWED, WITHIN, add_instancer, add_tile, nest
 from live_scenes import live_lines, settle, shown_pixels
 from mathutils import Euler, Matrix
 from panel_layout import Layout, context
-from scenes import (
-    add_gobo,
-    add_material,
-    add_plane,
-    add_sun,
-    messages_of,
-    node_of,
-    pixels,
-    scatter_group,
-    select,
-)
 
 TILE = Target("Tile", "Medium")
 
@@ -41,10 +28,10 @@ def small():
 
 
 def bake_it(holder, material=TILE.material_name):
-    select(holder)
+    scenes.select(holder)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
-    node = node_of(bpy.data.materials[material])
-    found, node.image = pixels(node.image), None
+    node = scenes.node_of(bpy.data.materials[material])
+    found, node.image = scenes.pixels(node.image), None
     return found
 
 
@@ -92,7 +79,7 @@ def nested():
 def test_it_is_baked_as_if_made_real(add):
     """Within rounding of the places' product, which moves shadows' borders by as much."""
     holder, collection, matrix = add()
-    add_sun(30, 20)
+    scenes.add_sun(30, 20)
     ours = bake_it(holder)
     real = make_real(holder, collection, matrix)["Tile"]
     truth = bake_it(real)
@@ -136,7 +123,7 @@ def test_changes_that_make_a_bake_out_of_date(name, change, parts):
     collection.objects.link(lamp)
     holder = add_instancer(nest(collection)[0], SKEWED)
     assert row().status == Status.NEVER
-    select(holder)
+    scenes.select(holder)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
     assert row().status == Status.BAKED
     change(name)
@@ -147,17 +134,17 @@ def test_changes_that_make_a_bake_out_of_date(name, change, parts):
 
 def test_another_instance_makes_it_out_of_date_and_says_why_it_cannot_be_baked_again():
     _, collection = add_tile()
-    add_sun()
-    select(add_instancer(collection, SKEWED))
+    scenes.add_sun()
+    scenes.select(add_instancer(collection, SKEWED))
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
     add_instancer(collection, MIRRORED)
     assert row().status == Status.STALE
-    assert "'Tile' has 2 instances" in messages_of(lambda: bpy.ops.beamspread.bake(objects="STALE"))
+    assert "'Tile' has 2 instances" in scenes.messages_of(lambda: bpy.ops.beamspread.bake(objects="STALE"))
 
 
 def scatter(tile):
     """Five instances as particles, too."""
-    plane = add_plane("Ground")
+    plane = scenes.add_plane("Ground")
     plane.modifiers.new("Hair", "PARTICLE_SYSTEM")
     settings = plane.particle_systems[0].settings
     settings.type, settings.render_type, settings.instance_object, settings.count = "HAIR", "OBJECT", tile, 5
@@ -167,14 +154,14 @@ def test_particles_count_as_places():
     tile, collection = add_tile()
     add_instancer(collection, SKEWED)
     scatter(tile)
-    add_sun()
-    assert "'Tile' has 6 instances" in messages_of(lambda: bpy.ops.beamspread.bake(objects="ALL"))
+    scenes.add_sun()
+    assert "'Tile' has 6 instances" in scenes.messages_of(lambda: bpy.ops.beamspread.bake(objects="ALL"))
 
 
 def test_instances_of_other_meshes_under_its_name_are_no_places():
     """Instances made by geometry nodes."""
     tile, collection = add_tile()
-    tile.modifiers.new("Scatter", "NODES").node_group = group = scatter_group(tile)
+    tile.modifiers.new("Scatter", "NODES").node_group = group = scenes.scatter_group(tile)
     tree_info = next(one for one in group.nodes if one.bl_idname == "GeometryNodeObjectInfo")
     cube, points = group.nodes.new("GeometryNodeMeshCube"), tree_info.outputs["Geometry"].links[0].to_node
     cube.inputs["Size"].default_value = (0.01,) * 3
@@ -185,18 +172,20 @@ def test_instances_of_other_meshes_under_its_name_are_no_places():
     for source in (given, group.nodes["Move"]):
         group.links.new(join.inputs[0], source.outputs[0])
     group.links.new(result.inputs[0], join.outputs[0])
-    add_sun(30, 20)
+    scenes.add_sun(30, 20)
     assert bake_it(add_instancer(collection, SKEWED)).any()
 
 
 def test_an_instance_that_does_not_render_is_no_place():
     holder, collection, _ = in_the_scene()
-    add_sun(30, 20)
+    scenes.add_sun(30, 20)
     truth = bake_it(holder)
     add_instancer(collection, MIRRORED).hide_render = True
-    node_of(bpy.data.materials["Medium"]).image = bpy.data.images.new("Former", *truth.shape[1::-1], float_buffer=True)
+    scenes.node_of(bpy.data.materials["Medium"]).image = bpy.data.images.new(
+        "Former", *truth.shape[1::-1], float_buffer=True
+    )
     assert bpy.ops.beamspread.bake(objects="ALL") == {"FINISHED"}
-    assert np.array_equal(pixels(node_of(bpy.data.materials["Medium"]).image), truth)
+    assert np.array_equal(scenes.pixels(scenes.node_of(bpy.data.materials["Medium"]).image), truth)
 
 
 def hide(name):
@@ -213,10 +202,10 @@ HIDDEN = [(hide, "Holder"), (hide, "Middle"), (hide, "Tile"), (hide_collection, 
 @pytest.mark.parametrize(("change", "name"), HIDDEN, ids=[name for _, name in HIDDEN])
 def test_objects_that_do_not_render_are_not_baked(change, name):
     holder, _, _ = nested()
-    add_sun()
+    scenes.add_sun()
     change(name)
-    select(holder)
-    message = messages_of(bpy.ops.beamspread.bake)
+    scenes.select(holder)
+    message = scenes.messages_of(bpy.ops.beamspread.bake)
     assert "'Tile' is hidden from render" in message
     assert "and those of 'Holder' and 'Middle', which shows it, in the Outliner" in message
 
@@ -241,11 +230,11 @@ SHOWN = [
 @pytest.mark.parametrize(("change", "name"), SHOWN, ids=[name for _, name in SHOWN])
 def test_objects_that_the_viewport_hides_are_baked(change, name):
     holder, _, _ = nested()
-    add_sun(30, 20)
+    scenes.add_sun(30, 20)
     truth = bake_it(holder)
     change(name)
     assert bpy.ops.beamspread.bake(objects="ALL") == {"FINISHED"}
-    assert np.array_equal(pixels(node_of(bpy.data.materials["Medium"]).image), truth)
+    assert np.array_equal(scenes.pixels(scenes.node_of(bpy.data.materials["Medium"]).image), truth)
     assert [one.hide_viewport for one in (*bpy.data.objects, *bpy.data.collections)].count(True) == 1
 
 
@@ -256,7 +245,7 @@ def darkest(texture):
 
 def test_a_wall_that_does_not_render_throws_no_shadow():
     holder, collection, _ = in_the_scene()
-    add_sun(30, 20)
+    scenes.add_sun(30, 20)
     within = bpy.data.collections.new("Within")
     collection.children.link(within)
     collection.objects.unlink(bpy.data.objects["Wall"])
@@ -270,25 +259,25 @@ def test_a_wall_that_does_not_render_throws_no_shadow():
 @pytest.mark.parametrize("names", [[], ["Tile"], ["Holder"], ["Holder", "Tile"]])
 def test_a_batch_bakes_it(names, tmp_path):
     holder, _, _ = nested()
-    add_sun(30, 20)
+    scenes.add_sun(30, 20)
     truth = bake_it(holder)
     chosen = ["--object", *names] if names else []
-    report = bake_all(batch_options.parse([*chosen, "--output", str(tmp_path)]))
+    report = scenes.run_batch(*chosen, "--output", tmp_path)
     assert [(one.object, one.status) for one in report.bakes] == [("Tile", "written")]
     image = bpy.data.images.load(str(tmp_path / "Tile_Medium.exr"))
-    assert np.array_equal(pixels(image), truth)
+    assert np.array_equal(scenes.pixels(image), truth)
 
 
 def test_a_batch_follows_the_instance(tmp_path):
     holder, _, _ = in_the_scene()
-    add_sun(30, 20)
+    scenes.add_sun(30, 20)
     holder.rotation_euler = (0, 0, 0)
     for frame, angle in ((1, 0.0), (2, -0.4)):
         holder.rotation_euler.y = angle
         holder.keyframe_insert("rotation_euler", frame=frame)
-    report = bake_all(batch_options.parse(["--output", str(tmp_path), "--frames", "1-2"]))
+    report = scenes.run_batch("--output", tmp_path, "--frames", "1-2")
     assert report.all_written()
-    one, two = (pixels(bpy.data.images.load(one.path)) for one in report.bakes)
+    one, two = (scenes.pixels(bpy.data.images.load(one.path)) for one in report.bakes)
     assert np.abs(one - two).max() > 0.1 * one.max()
     assert np.array_equal(bake_it(holder), two)
 
@@ -297,7 +286,7 @@ def link_tiles(tmp_path, has_image):
     """An instance of a collection of another file, whose material may have been baked there."""
     add_tile()
     if has_image:
-        node_of(bpy.data.materials["Medium"]).image = bpy.data.images.new("Baked", 4, 4)
+        scenes.node_of(bpy.data.materials["Medium"]).image = bpy.data.images.new("Baked", 4, 4)
     path = str(tmp_path / "library.blend")
     bpy.data.libraries.write(path, {bpy.data.collections["Tiles"]})
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -308,11 +297,11 @@ def link_tiles(tmp_path, has_image):
 
 @pytest.mark.parametrize("has_image", [False, True])
 def test_one_of_another_file_is_refused_unless_it_was_baked_there(has_image, tmp_path):
-    select(link_tiles(tmp_path, has_image))
-    add_sun()
+    scenes.select(link_tiles(tmp_path, has_image))
+    scenes.add_sun()
     problems = bake_panel.draw_problems(Layout(), context())
     assert len(problems) == (not has_image)
-    message = messages_of(bpy.ops.beamspread.bake)
+    message = scenes.messages_of(bpy.ops.beamspread.bake)
     assert all(str(one) in message for one in problems)
     assert ("No mesh has a material" if has_image else "belongs to another .blend file") in message
 
@@ -331,7 +320,7 @@ def remove_uvs(tile):
 
 
 def make_black_holes(tile):
-    node_of(tile.data.materials[0]).albedo = (1, 1, 1)
+    scenes.node_of(tile.data.materials[0]).albedo = (1, 1, 1)
 
 
 def hide_within(tile):
@@ -350,23 +339,23 @@ PROBLEMS = {
 @pytest.mark.parametrize("sentence", PROBLEMS)
 def test_problems_inside_are_said_in_the_panel_and_by_the_bake(sentence):
     tile, collection = add_tile()
-    add_sun()
-    select(add_instancer(nest(collection)[0], SKEWED))
+    scenes.add_sun()
+    scenes.select(add_instancer(nest(collection)[0], SKEWED))
     assert not bake_panel.draw_problems(Layout(), context())
     PROBLEMS[sentence](tile)
     layout = Layout()
     bake_panel.draw_problems(layout, context())
     assert sentence in layout.said
     assert layout.said.count("Tile: ") == 1
-    assert sentence in messages_of(bpy.ops.beamspread.bake)
+    assert sentence in scenes.messages_of(bpy.ops.beamspread.bake)
 
 
 def test_an_object_of_the_scene_is_baked_where_it_stands_itself():
     """Though an instance shows it as well."""
-    plane = add_plane("Tile", material=add_material())
+    plane = scenes.add_plane("Tile", material=scenes.add_material())
     collection = bpy.data.collections.new("Tiles")
     collection.objects.link(plane)
-    add_sun(30)
+    scenes.add_sun(30)
     truth = bake_it(plane)
     add_instancer(collection, Matrix.Translation((0, 0, 9)) @ Euler((0, 0.8, 0)).to_matrix().to_4x4())
     bpy.context.view_layer.update()
@@ -377,8 +366,8 @@ def test_an_object_of_the_scene_is_baked_where_it_stands_itself():
 @pytest.mark.skipif(bpy.app.version < (4, 0, 0), reason="light linking came in Blender 4.0")
 def test_light_is_linked_to_the_objects_of_the_instancer():
     holder, _, _ = nested()
-    other = add_plane("Other")
-    sun = add_sun(30, 20)
+    other = scenes.add_plane("Other")
+    sun = scenes.add_sun(30, 20)
     truth = bake_it(holder)
     for linked, is_lit in ((holder, True), (other, False)):
         sun.light_linking.receiver_collection = links = bpy.data.collections.new("Links")
@@ -394,9 +383,11 @@ def test_indirect_light_is_that_of_real_objects(monkeypatch):
         monkeypatch.setattr(cycles_light, name, 0.02)
     holder, collection, matrix = nested()
     bpy.data.objects["Wall"].data.materials.append(scenes.diffuse_material((0.8, 0.1, 0.1)))
-    card = add_plane("Card", (3, 3), matrix @ WITHIN @ Matrix.Translation((0, -1, 1)) @ Matrix.Rotation(1.2, 4, "X"))
+    card = scenes.add_plane(
+        "Card", (3, 3), matrix @ WITHIN @ Matrix.Translation((0, -1, 1)) @ Matrix.Rotation(1.2, 4, "X")
+    )
     card.data.materials.append(scenes.diffuse_material((0.1, 0.8, 0.1)))
-    add_sun(30, 20)
+    scenes.add_sun(30, 20)
     direct = bake_it(holder)
     bpy.context.scene.beamspread.use_indirect = True
     ours = bake_it(holder)
@@ -416,8 +407,8 @@ def irradiance():
 
 def test_cycles_counts_an_instanced_lamp_once():
     """Beside a lamp that it alone understands, whose light it finds with all others switched off."""
-    add_plane(material=add_material())
-    add_gobo("POINT")
+    scenes.add_plane(material=scenes.add_material())
+    scenes.add_gobo("POINT")
     lamp, collection = scenes.add_lamp((0, 0, 1)), bpy.data.collections.new("Lamps")
     truth = irradiance()
     bpy.context.scene.collection.objects.unlink(lamp)
@@ -430,14 +421,14 @@ def test_a_colour_by_cycles_is_that_of_real_objects():
     """By coordinates of its own and of the world, in an object that is skewed as it stands."""
     holder, collection, matrix = in_the_scene()
     material = bpy.data.materials["Medium"]
-    tree, node = material.node_tree, node_of(material)
+    tree, node = material.node_tree, scenes.node_of(material)
     node.color_mode, node.mean_free_path, node.texture_blur = "BASE_COLOR", (0.001,) * 3, 0.0
     noise, mix = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeVectorMath")
     tree.links.new(mix.inputs[0], tree.nodes.new("ShaderNodeTexCoord").outputs["Object"])
     tree.links.new(mix.inputs[1], tree.nodes.new("ShaderNodeNewGeometry").outputs["Position"])
     tree.links.new(noise.inputs["Vector"], mix.outputs[0])
     tree.links.new(node.inputs["Base Color"], noise.outputs["Color"])
-    add_sun(30, 20)
+    scenes.add_sun(30, 20)
     ours = bake_it(holder)
     parent = bpy.data.objects.new("Parent", None)
     bpy.context.scene.collection.objects.link(parent)
@@ -460,8 +451,8 @@ def test_live_follows_the_instance(live):
     holder, _, _ = nested()
     image = bpy.data.images.new("Target", 64, 64, float_buffer=True, alpha=False)
     material = bpy.data.materials["Medium"]
-    node_of(material).image = image
-    add_sun(30, 20)
+    scenes.node_of(material).image = image
+    scenes.add_sun(30, 20)
     bpy.context.scene.beamspread.use_live = True
     settle()
     assert live_lines() == []
@@ -472,6 +463,6 @@ def test_live_follows_the_instance(live):
     assert np.abs(after - before).max() > 0.05 * before.max()
     bpy.context.scene.beamspread.use_live = False
     timer.step(bpy.context)
-    select(holder)
+    scenes.select(holder)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
-    np.testing.assert_allclose(after, pixels(image), rtol=0, atol=0.02 * before.max())
+    np.testing.assert_allclose(after, scenes.pixels(image), rtol=0, atol=0.02 * before.max())

@@ -11,11 +11,9 @@ import bpy
 import numpy as np
 import pytest
 from beamspread.blender.images import files
-from beamspread.blender.jobs.run.batch_run import bake_all
-from beamspread.core.batch import batch_options
 from beamspread.core.native import native
 from mathutils import Matrix
-from scenes import add_lamp, add_material, add_plane, add_sun, batch_command, save_scene
+from scenes import add_lamp, add_material, add_plane, add_sun, batch_command, run_batch, save_scene
 
 SIGNALS = {signal.SIGINT: 130, signal.SIGTERM: 143}
 
@@ -107,7 +105,7 @@ def test_cycles_ends_as_well(tmp_path, number):
 
 def run(*arguments):
     """Bake in this process; {object: record}."""
-    return {record.object: record for record in bake_all(batch_options.parse([*map(str, arguments)])).bakes}
+    return {record.object: record for record in run_batch(*arguments).bakes}
 
 
 @pytest.mark.parametrize("chosen", [["A b"], ["A/b"], ["A b", "A/b"], ["A/b", "A b"], ["Plain"]])
@@ -134,7 +132,7 @@ def test_resume_bakes_missing_damaged_and_older_files(tmp_path):
     os.utime(scene, (time.time() - 100,) * 2)
     report = tmp_path / "report.json"
     arguments = ["--output", tmp_path / "out", "--report", report]
-    first = bake_all(batch_options.parse([*map(str, arguments)]))
+    first = run_batch(*arguments)
     assert first.all_written()
     records = {record.object: record for record in first.bakes}
     Path(records["Missing"].path).unlink()
@@ -144,7 +142,7 @@ def test_resume_bakes_missing_damaged_and_older_files(tmp_path):
     records["Failed"].status = "failed"
     first.save(str(report))
     kept = Path(records["Kept"].path).stat().st_mtime_ns
-    second = bake_all(batch_options.parse([*map(str, arguments), "--resume"]))
+    second = run_batch(*arguments, "--resume")
     statuses = {record.object: record.status for record in second.bakes}
     assert statuses == {name: "skipped" if name == "Kept" else "written" for name in names}
     assert Path(records["Kept"].path).stat().st_mtime_ns == kept
@@ -163,7 +161,7 @@ def test_resume_takes_an_images_own_file_only_by_its_report(tmp_path):
     add_sun(0)
     os.utime(save_scene(tmp_path), (time.time() - 100,) * 2)
     report = tmp_path / "report.json"
-    first = bake_all(batch_options.parse(["--resume", "--report", str(report)]))
+    first = run_batch("--resume", "--report", report)
     assert [record.status for record in first.bakes] == ["written"]
     first.save(str(report))
     assert [record.status for record in run("--resume", "--report", report).values()] == ["skipped"]

@@ -9,11 +9,9 @@ import bpy
 import numpy as np
 import pytest
 from beamspread.blender.images import files
-from beamspread.blender.jobs.run.batch_run import bake_all
-from beamspread.core.batch import batch_options
 from beamspread.core.batch.report import BakeRecord, Report
 from beamspread.core.errors import ImageError
-from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
+from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, run_batch, select
 
 from full_disk import full_after
 
@@ -89,7 +87,7 @@ def test_a_bake_on_a_full_disk_fails_and_the_image_stays(tmp_path):
     select(plane)
     with full_after(20000):
         assert "own.bmp cannot be written" in messages_of(bpy.ops.beamspread.bake)
-        report = bake_all(batch_options.parse(["--output", str(tmp_path / "out")]))
+        report = run_batch("--output", tmp_path / "out")
     assert [record.status for record in report.bakes] == ["failed"]
     assert "cannot be written" in report.bakes[0].message
     assert not [*(tmp_path / "out").iterdir()]

@@ -1,23 +1,21 @@
 """Data of other .blend files: bakes that could not be stored are refused, all others are stored."""
 
 import bpy
+import scenes
 from beamspread.blender.images.facts import facts_of
 from beamspread.blender.images.results import Results
-from beamspread.blender.jobs.run import batch_run
 from beamspread.blender.jobs.run.bake_plan import prepare_scene
 from beamspread.blender.node.find import find_targets
 from beamspread.blender.ui.bake_panel import problems_of
-from beamspread.core.batch import batch_options
 from beamspread.core.target import Target
 from mathutils import Matrix
-from scenes import add_material, add_plane, add_sun, bake, image_of, messages_of, pixels, save_scene, select
 
 
 def link_from_library(folder):
     """Link a plane with a material, and a sun, from another file; the plane."""
-    add_plane(material=add_material())
-    add_sun(0)
-    path = save_scene(folder)
+    scenes.add_plane(material=scenes.add_material())
+    scenes.add_sun(0)
+    path = scenes.save_scene(folder)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.beamspread.quality, bpy.context.scene.beamspread.use_indirect = "preview", False
     bpy.context.scene.beamspread.resolution = 32
@@ -30,24 +28,23 @@ def link_from_library(folder):
 
 def test_a_linked_material_is_refused_before_the_bake(tmp_path):
     plane = link_from_library(tmp_path)
-    select(plane)
-    message = messages_of(bpy.ops.beamspread.bake)
+    scenes.select(plane)
+    message = scenes.messages_of(bpy.ops.beamspread.bake)
     assert "The material 'Medium' belongs to another .blend file" in message
-    assert image_of(plane) is None
+    assert scenes.image_of(plane) is None
     (late,) = prepare_scene(bpy.context, find_targets([plane]), bpy.context.scene.beamspread.for_bake())
     late.run()
     late.keep(Results().store)
     assert "belongs to another .blend file" in late.error
     # A batch changes nothing in it.
-    report = batch_run.bake_all(batch_options.parse(["--output", str(tmp_path / "out")]))
+    report = scenes.run_batch("--output", tmp_path / "out")
     assert [one.status for one in report.bakes] == ["written"]
     # Made local, as the sentence says, it keeps its result.
     bpy.ops.object.make_local(type="SELECT_OBDATA_MATERIAL")
     plane = bpy.data.objects["Plane"]
-    bake(plane)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "user.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "user.blend"))
-    assert pixels(image_of(bpy.data.objects["Plane"])).any()
+    scenes.bake(plane)
+    scenes.reopen(tmp_path)
+    assert scenes.pixels(scenes.image_of(bpy.data.objects["Plane"])).any()
 
 
 def test_an_overridden_material_is_refused_and_the_sentence_helps(tmp_path):
@@ -57,21 +54,20 @@ def test_an_overridden_material_is_refused_and_the_sentence_helps(tmp_path):
     material = plane.material_slots[0].material.override_create(remap_local_usages=True)
     assert plane.material_slots[0].material == material
     assert material.override_library is not None
-    select(plane)
-    message = messages_of(bpy.ops.beamspread.bake)
+    scenes.select(plane)
+    message = scenes.messages_of(bpy.ops.beamspread.bake)
     assert "The material 'Medium' belongs to another .blend file" in message
     assert "Make Local > Selected Objects, Data and Materials" in message
     said = " ".join(map(str, problems_of(plane, {"Plane": 1})))
     assert "belongs to another .blend file" in said  # before the bake, in the panel
-    assert image_of(plane) is None
+    assert scenes.image_of(plane) is None
     bpy.ops.object.make_local(type="SELECT_OBDATA_MATERIAL")
     plane = next(obj for obj in bpy.context.scene.objects if obj.type == "MESH")
     assert not problems_of(plane, {plane.name: 1})
-    bake(plane)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "user.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "user.blend"))
+    scenes.bake(plane)
+    scenes.reopen(tmp_path)
     plane = next(obj for obj in bpy.context.scene.objects if obj.type == "MESH")
-    assert pixels(image_of(plane)).any()
+    assert scenes.pixels(scenes.image_of(plane)).any()
 
 
 def test_a_linked_object_with_a_local_material_is_baked(tmp_path):
@@ -80,29 +76,31 @@ def test_a_linked_object_with_a_local_material_is_baked(tmp_path):
     bpy.context.collection.objects.link(plane)
     bpy.context.collection.objects.unlink(linked)
     plane.material_slots[0].link = "OBJECT"
-    plane.material_slots[0].material = add_material("Own")
-    select(plane)
+    plane.material_slots[0].material = scenes.add_material("Own")
+    scenes.select(plane)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
-    assert pixels(image_of(plane)).any()
+    assert scenes.pixels(scenes.image_of(plane)).any()
 
 
 def test_an_appended_image_is_no_ones(tmp_path):
     bpy.context.scene.beamspread.resolution = 32
-    plane = add_plane(material=add_material())
-    add_sun(0)
-    bake(plane)
+    plane = scenes.add_plane(material=scenes.add_material())
+    scenes.add_sun(0)
+    scenes.bake(plane)
     path = str(tmp_path / "copy.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
     with bpy.data.libraries.load(path) as (_, wanted):
         wanted.materials = ["Medium"]
-    other = add_plane("Other", matrix=Matrix.Translation((5, 0, 0)), material=wanted.materials[0])
-    image = image_of(other)
-    assert image != image_of(plane)
+    other = scenes.add_plane("Other", matrix=Matrix.Translation((5, 0, 0)), material=wanted.materials[0])
+    image = scenes.image_of(other)
+    assert image != scenes.image_of(plane)
     assert [*facts_of(image).bakes] == [Target("Plane", "Medium")]
-    bake(other)
-    assert image_of(other) == image
+    scenes.bake(other)
+    assert scenes.image_of(other) == image
 
 
 def test_frames_are_not_shown_in_linked_materials_and_the_operator_says_so(tmp_path):
     link_from_library(tmp_path)
-    assert "There are no frames of a batch: bake them with --frames A-B" in messages_of(bpy.ops.beamspread.show_frames)
+    assert "There are no frames of a batch: bake them with --frames A-B" in scenes.messages_of(
+        bpy.ops.beamspread.show_frames
+    )

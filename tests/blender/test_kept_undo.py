@@ -4,13 +4,11 @@ Files are not undone, which the results say, also without a window.
 """
 
 import bpy
-import numpy as np
 import pytest
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.state import Status, state
-from beamspread.core.native import native
 from scenario_player import results_of
-from scenes import add_material, add_plane, add_sun, bake, node_of, pixels
+from scenes import add_material, add_plane, add_sun, bake, file_image, node_of, pixels
 
 
 @pytest.fixture(scope="module")
@@ -53,8 +51,7 @@ def test_a_file_is_not_undone_and_the_results_say_so(is_own, tmp_path):
     image, settings = None, bpy.context.scene.beamspread
     settings.image_dir, settings.resolution, path = str(tmp_path), 16, tmp_path / "Plane_Medium.exr"
     if is_own:
-        native.write_exr(str(path), np.zeros((16, 16, 3), np.float32), ["R", "G", "B"])
-        image = bpy.data.images.load(str(path))
+        image = file_image(path, 16, 16)
     plane, sun = add_plane(material=add_material(image=image)), add_sun(0)
     for strength in (1.0, 3.0):
         sun.data.energy = strength

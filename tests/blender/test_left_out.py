@@ -4,14 +4,13 @@ from unittest.mock import MagicMock
 
 import bpy
 import pytest
+import scenes
 from beamspread.blender.compat import add_input_socket
 from beamspread.blender.jobs.out_of_date import stale
-from beamspread.blender.jobs.run.batch_run import bake_all
 from beamspread.blender.jobs.state import state
 from beamspread.blender.ui import bake_panel
-from beamspread.core.batch import batch_options
 from mathutils import Matrix
-from scenes import add_group_material, add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
+from nodes import Nodes
 
 
 @pytest.fixture(autouse=True)
@@ -22,27 +21,22 @@ def small():
 
 def add_grouped():
     """Its group is another material's, too."""
-    plane = add_plane("Grouped", material=add_group_material())
+    plane = scenes.add_plane("Grouped", material=scenes.add_group_material())
     plane.data.materials[0].copy()
     return plane
 
 
 def add_instances():
     """A plane that the scene has only as two instances of an instanced collection."""
-    plane = add_plane("Shown", material=add_material())
-    inner, outer = bpy.data.collections.new("Inner"), bpy.data.collections.new("Outer")
-    bpy.context.scene.collection.objects.unlink(plane)
-    inner.objects.link(plane)
-    for collection, place in ((inner, outer), (outer, bpy.context.scene.collection), (outer, bpy.context.collection)):
-        holder = bpy.data.objects.new(f"Instance of {collection.name}", None)
-        holder.instance_type, holder.instance_collection = "COLLECTION", collection
-        place.objects.link(holder)
-    return holder
+    plane = scenes.add_plane("Shown", material=scenes.add_material())
+    inner, outer = scenes.new_collection("Inner", plane), scenes.new_collection("Outer")
+    scenes.add_instancer(inner, name="Instance of Inner", within=outer)
+    return [scenes.add_instancer(outer, name="Instance of Outer") for _ in range(2)][1]
 
 
 def add_curve():
     curve = bpy.data.objects.new("Spline", bpy.data.curves.new("Spline", "CURVE"))
-    curve.data.materials.append(add_material())
+    curve.data.materials.append(scenes.add_material())
     bpy.context.scene.collection.objects.link(curve)
     return curve
 
@@ -57,14 +51,14 @@ MISPLACED = [
 @pytest.mark.parametrize(("add", "name", "words"), MISPLACED, ids=[name for _, name, _ in MISPLACED])
 def test_a_node_where_no_bake_can_use_it_is_named(add, name, words, tmp_path):
     obj = add()
-    add_sun(0)
-    select(obj)
-    message = messages_of(bpy.ops.beamspread.bake)
+    scenes.add_sun(0)
+    scenes.select(obj)
+    message = scenes.messages_of(bpy.ops.beamspread.bake)
     assert "No mesh has a material" not in message
     assert all(word in message for word in words)
     assert all(word in state.lines()[0] for word in words)
     for arguments in ([], ["--object", name]):
-        report = bake_all(batch_options.parse([*arguments, "--output", str(tmp_path)]))
+        report = scenes.run_batch(*arguments, "--output", tmp_path)
         assert [(one.object, one.status) for one in report.bakes] == [(name, "failed")]
         assert all(word in report.bakes[0].message for word in words)
 
@@ -72,26 +66,26 @@ def test_a_node_where_no_bake_can_use_it_is_named(add, name, words, tmp_path):
 @pytest.mark.parametrize("add", [add for add, _, _ in MISPLACED], ids=[name for _, name, _ in MISPLACED])
 def test_the_others_are_baked(add):
     add()
-    plane = add_plane("Sound", matrix=Matrix.Translation((5, 0, 0)), material=add_material("Sound"))
-    add_sun(0)
-    assert messages_of(lambda: bpy.ops.beamspread.bake(objects="ALL")).count("Error") == 1
-    assert (pixels(node_of(plane.data.materials[0]).image) > 0).all()
+    plane = scenes.add_plane("Sound", matrix=Matrix.Translation((5, 0, 0)), material=scenes.add_material("Sound"))
+    scenes.add_sun(0)
+    assert scenes.messages_of(lambda: bpy.ops.beamspread.bake(objects="ALL")).count("Error") == 1
+    assert (scenes.pixels(scenes.node_of(plane.data.materials[0]).image) > 0).all()
 
 
 def test_a_node_in_a_group_of_its_own_is_baked():
-    plane = add_plane(material=add_group_material())
-    add_sun(0)
-    select(plane)
+    plane = scenes.add_plane(material=scenes.add_group_material())
+    scenes.add_sun(0)
+    scenes.select(plane)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
     inner = bpy.data.node_groups["Inner"]
     node = next(node for node in inner.nodes if node.bl_idname == "BeamspreadNode")
-    assert (pixels(node.image) > 0).all()
+    assert (scenes.pixels(node.image) > 0).all()
     assert "Link the BSDF of the node in 'Inner'" in state.lines()[0]
     assert [one.bl_idname for one in inner.nodes] == ["BeamspreadNode"]
 
 
 def test_a_texture_reaches_a_group_by_its_input():
-    material = add_group_material()
+    material = scenes.add_group_material()
     outer, inner = bpy.data.node_groups["Outer"], bpy.data.node_groups["Inner"]
     node = next(node for node in inner.nodes if node.bl_idname == "BeamspreadNode")
     node.texture_blur, node.ior = 0.0, 1.0
@@ -104,11 +98,11 @@ def test_a_texture_reaches_a_group_by_its_input():
     checker = material.node_tree.nodes.new("ShaderNodeTexCoord")
     group = next(one for one in material.node_tree.nodes if one.bl_idname == "ShaderNodeGroup")
     material.node_tree.links.new(group.inputs["Tint"], checker.outputs["UV"])
-    plane = add_plane(material=material)
-    add_sun(0)
-    select(plane)
+    plane = scenes.add_plane(material=material)
+    scenes.add_sun(0)
+    scenes.select(plane)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
-    found = pixels(node.image)
+    found = scenes.pixels(node.image)
     # Red is u and green v: with the texture on top, the ratio of opposite texels is that of their colours.
     assert found[8, 15, 0] / found[8, 0, 0] == pytest.approx(15.5 / 0.5, rel=1e-3)
     assert found[15, 8, 1] / found[0, 8, 1] == pytest.approx(15.5 / 0.5, rel=1e-3)
@@ -116,15 +110,15 @@ def test_a_texture_reaches_a_group_by_its_input():
 
 def test_instances_of_a_baked_object_are_no_mistake():
     holder = add_instances()
-    node_of(bpy.data.materials["Medium"]).image = bpy.data.images.new("Baked", 4, 4)
-    assert "No mesh has a material" in messages_of(lambda: bpy.ops.beamspread.bake(objects="ALL"))
-    select(holder)
-    assert "'Shown' has 2 instances" in messages_of(bpy.ops.beamspread.bake)
+    scenes.node_of(bpy.data.materials["Medium"]).image = bpy.data.images.new("Baked", 4, 4)
+    assert "No mesh has a material" in scenes.messages_of(lambda: bpy.ops.beamspread.bake(objects="ALL"))
+    scenes.select(holder)
+    assert "'Shown' has 2 instances" in scenes.messages_of(bpy.ops.beamspread.bake)
 
 
 def baked_with_messages(plane):
     """Pixels of the plane, and the window's messages about the bake."""
-    (texture,) = bake(plane)
+    (texture,) = scenes.bake(plane)
     return texture, state.lines()
 
 
@@ -133,24 +127,22 @@ def baked_with_messages(plane):
     [(float("nan"), "is nan"), (-3.0, "is -3, and a bake cannot remove light")],
 )
 def test_a_light_of_impossible_power_is_named_and_left_out(power, words, tmp_path, capfd):
-    plane = add_plane(material=add_material())
-    add_sun(0)
+    plane = scenes.add_plane(material=scenes.add_material())
+    scenes.add_sun(0)
     expected, messages = baked_with_messages(plane)
     assert messages == []
-    broken = bpy.data.objects.new("Broken", bpy.data.lights.new("Broken", "POINT"))
-    broken.data.energy, broken.location.z = power, 1
-    bpy.context.scene.collection.objects.link(broken)
+    scenes.add_lamp((0, 0, 1), power, name="Broken")
     texture, messages = baked_with_messages(plane)
     assert texture == pytest.approx(expected)
     assert messages == [f"The light 'Broken' is left out. The power of 'Broken' {words}."]
     assert f"The light 'Broken' is left out. The power of 'Broken' {words}." in capfd.readouterr().out
-    (record,) = bake_all(batch_options.parse(["--output", str(tmp_path)])).bakes
+    (record,) = scenes.run_batch("--output", tmp_path).bakes
     assert (record.status, record.message) == ("written", messages[0])
 
 
 def add_hair():
-    plane = add_plane("Furry")
-    select(plane)
+    plane = scenes.add_plane("Furry")
+    scenes.select(plane)
     bpy.ops.object.particle_system_add()
     plane.particle_systems[0].settings.type = "HAIR"
     return "The hair of 'Furry' is not baked: neither its shadow nor its own light."
@@ -162,33 +154,28 @@ def add_volume():
 
 
 def add_foggy_world():
-    world = bpy.data.worlds.new("Hazy")
-    if bpy.app.version < (5, 0, 0):
-        world.use_nodes = True
-    tree = world.node_tree
-    tree.nodes.clear()
-    output, fog = tree.nodes.new("ShaderNodeOutputWorld"), tree.nodes.new("ShaderNodeVolumeScatter")
-    tree.links.new(output.inputs["Volume"], fog.outputs[0])
-    bpy.context.scene.world = world
+    world = bpy.context.scene.world = bpy.data.worlds.new("Hazy")
+    nodes = Nodes(world, clear=True)
+    nodes.add("OutputWorld", {"Volume": nodes.add("VolumeScatter").outputs[0]})
     return "The volume of the world 'Hazy' is not baked: neither the light that it absorbs nor its own light."
 
 
 @pytest.mark.parametrize("add", [add_hair, add_volume, add_foggy_world])
 def test_rendered_objects_that_no_bake_knows_are_named(add):
-    plane = add_plane(material=add_material())
-    add_sun(0)
+    plane = scenes.add_plane(material=scenes.add_material())
+    scenes.add_sun(0)
     sentence = add()
     _, messages = baked_with_messages(plane)
     assert messages == [sentence]
 
 
 def flipped():
-    return add_plane(matrix=Matrix.Diagonal((1, 1, -1, 1)), material=add_material())
+    return scenes.add_plane(matrix=Matrix.Diagonal((1, 1, -1, 1)), material=scenes.add_material())
 
 
 def in_shadow():
-    add_plane("Roof", size=(9, 9), matrix=Matrix.Translation((0, 0, 1)))
-    return add_plane(material=add_material())
+    scenes.add_plane("Roof", size=(9, 9), matrix=Matrix.Translation((0, 0, 1)))
+    return scenes.add_plane(material=scenes.add_material())
 
 
 @pytest.mark.parametrize(
@@ -197,13 +184,13 @@ def in_shadow():
 )
 def test_a_black_bake_says_why(add, words, tmp_path):
     plane = add()
-    add_sun(0)
+    scenes.add_sun(0)
     texture, (message,) = baked_with_messages(plane)
     assert not texture.any()
     assert all(word in message for word in words)
-    (record,) = bake_all(batch_options.parse(["--output", str(tmp_path), "--object", "Plane"])).bakes
+    (record,) = scenes.run_batch("--output", tmp_path, "--object", "Plane").bakes
     assert (record.status, record.message) == ("written", message)
-    node_of(plane.data.materials[0]).image = None
+    scenes.node_of(plane.data.materials[0]).image = None
     bpy.context.scene.render.engine = "BEAMSPREAD"
     active = plane.data.materials[0].node_tree.nodes.new("ShaderNodeTexImage")
     active.image = bpy.data.images.new("Active", 16, 16)
@@ -216,8 +203,8 @@ def test_a_black_bake_says_why(add, words, tmp_path):
 def test_a_panel_shows_a_message_of_object_and_last_bake_once(monkeypatch):
     said = []
     monkeypatch.setattr(bake_panel, "draw_lines", lambda _layout, _context, messages, _icon: said.extend(messages))
-    select(add_grouped())
-    messages_of(bpy.ops.beamspread.bake)
+    scenes.select(add_grouped())
+    scenes.messages_of(bpy.ops.beamspread.bake)
     (message,) = state.lines()
     bake_panel.draw_bake(MagicMock(), bpy.context)
     assert said == [message.replace("Grouped / Grouped: ", "Grouped: "), "Grouped: Failed"]

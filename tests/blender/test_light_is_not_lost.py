@@ -5,12 +5,21 @@ import math
 import bpy
 import numpy as np
 import pytest
-from beamspread.blender.jobs.run.batch_run import bake_all
-from beamspread.core.batch import batch_options
 from beamspread.core.native import native
 from cycles_truth import TEXELS, add_receiver, cycles_irradiance
 from mathutils import Euler, Matrix
-from scenes import add_blocker, add_material, add_mesh, add_plane, add_sun
+from nodes import Nodes
+from scenes import (
+    add_blocker,
+    add_lamp,
+    add_material,
+    add_mesh,
+    add_plane,
+    add_sun,
+    add_world,
+    glowing_material,
+    run_batch,
+)
 
 # Noise of Cycles: that of a texel is at most 1 / sqrt(1024) = 3 % of its light where light is partly hidden or varies
 # by as much as its mean, on average below 1 %; that of the sum of 64 x 64 texels below 0.1 %.
@@ -20,14 +29,8 @@ TEXEL = 0.02
 
 
 def add_light(kind, place=(0.3, -0.2, 1.0), energy=50.0, euler=(0, 0, 0), **properties):
-    data = bpy.data.lights.new(kind.title(), kind)
-    data.energy = energy
-    for name, value in properties.items():
-        setattr(data, name, value)
-    lamp = bpy.data.objects.new(data.name, data)
-    lamp.location, lamp.rotation_euler = place, Euler(euler)
-    bpy.context.collection.objects.link(lamp)
-    return lamp
+    matrix = Matrix.LocRotScale(place, Euler(euler), None)
+    return add_lamp(None, energy, kind, kind.title(), matrix, radius=None, **properties)
 
 
 def area():
@@ -35,14 +38,9 @@ def area():
 
 
 def sky_and_sun():
-    world = bpy.data.worlds.new("Sky")
-    bpy.context.scene.world = world
-    world.use_nodes = True
-    sky = world.node_tree.nodes.new("ShaderNodeTexSky")
-    sky.sky_type, sky.sun_disc, sky.sun_elevation = "NISHITA", False, math.radians(25)
-    background = world.node_tree.nodes["Background"]
-    background.inputs["Strength"].default_value = 0.5
-    world.node_tree.links.new(sky.outputs[0], background.inputs["Color"])
+    nodes, background = add_world(strength=0.5, name="Sky")
+    sky = nodes.add("TexSky", sky_type="NISHITA", sun_disc=False, sun_elevation=math.radians(25))
+    nodes.set(background.inputs["Color"], sky.outputs[0])
     add_sun(65, 30, strength=2.0)
     add_blocker(0.5)
 
@@ -59,29 +57,20 @@ def soft_point():
 
 
 def glowing_panel():
-    glow = bpy.data.materials.new("Glow")
-    glow.use_nodes = True
-    tree = glow.node_tree
-    emission = tree.nodes.new("ShaderNodeEmission")
-    emission.inputs["Color"].default_value, emission.inputs["Strength"].default_value = (0.3, 0.6, 1, 1), 4.0
-    tree.links.new(emission.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
-    add_plane("Panel", (0.7, 0.4), Matrix.Translation((0.1, 0.2, 0.6)) @ Matrix.Rotation(2.6, 4, "X"), material=glow)
+    matrix = Matrix.Translation((0.1, 0.2, 0.6)) @ Matrix.Rotation(2.6, 4, "X")
+    add_plane("Panel", (0.7, 0.4), matrix, material=glowing_material(4.0, (0.3, 0.6, 1, 1)))
 
 
 def leaf_card():
     """A card with stripes of alpha, which let the sun and a colourless part of it through."""
-    leaf = bpy.data.materials.new("Leaf")
-    leaf.use_nodes = True
-    tree = leaf.node_tree
+    nodes = Nodes(bpy.data.materials.new("Leaf"))
     image = bpy.data.images.new("Alpha", 8, 8, alpha=True)
     values = np.zeros((8, 8, 4), np.float32)
     values[:, :4, 3], values[:4, 4:, 3] = 1.0, 0.5
     image.pixels.foreach_set(values.ravel())
-    texture = tree.nodes.new("ShaderNodeTexImage")
-    texture.image, texture.interpolation = image, "Closest"
-    principled = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeBsdfPrincipled")
-    tree.links.new(texture.outputs["Alpha"], principled.inputs["Alpha"])
-    add_plane("Leaf", (1, 1), Matrix.Translation((0, 0, 0.4)), material=leaf)
+    texture = nodes.add("TexImage", image=image, interpolation="Closest")
+    nodes.set(nodes.of_type("BSDF_PRINCIPLED").inputs["Alpha"], texture.outputs["Alpha"])
+    add_plane("Leaf", (1, 1), Matrix.Translation((0, 0, 0.4)), material=nodes.owner)
     add_sun(20, 70, strength=2.0)
 
 
@@ -99,7 +88,7 @@ def compared(tmp_path):
     expected = cycles_irradiance(plane, image, SAMPLES)
     plane.data.materials[0] = add_material()
     arguments = ["--pass", "irradiance", "--no-indirect", "--resolution", str(TEXELS), "--output", str(tmp_path)]
-    (record,) = bake_all(batch_options.parse(arguments)).bakes
+    (record,) = run_batch(*arguments).bakes
     assert record.status == "written", record.message
     return record, native.read_exr(record.path)[0], expected
 
@@ -129,38 +118,28 @@ def test_a_light_linked_elsewhere_does_not_count(tmp_path):
     assert ours == pytest.approx(expected, rel=1e-3)
 
 
-def nodes_of(lamp):
-    lamp.data.use_nodes = True
-    tree = lamp.data.node_tree
-    return tree, next(node for node in tree.nodes if node.bl_idname == "ShaderNodeEmission")
+def blackbody(nodes, emission):
+    nodes.set(emission.inputs["Color"], nodes.add("Blackbody", {0: 2500.0}).outputs[0])
 
 
-def blackbody(tree, emission):
-    node = tree.nodes.new("ShaderNodeBlackbody")
-    node.inputs[0].default_value = 2500.0
-    tree.links.new(node.outputs[0], emission.inputs["Color"])
+def gobo(nodes, emission):
+    checker = nodes.add("TexChecker", {"Vector": nodes.add("TexCoord").outputs["Normal"]})
+    nodes.set(emission.inputs["Color"], checker.outputs["Color"])
 
 
-def gobo(tree, emission):
-    place, checker = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeTexChecker")
-    tree.links.new(place.outputs["Normal"], checker.inputs["Vector"])
-    tree.links.new(checker.outputs["Color"], emission.inputs["Color"])
-
-
-def ies(tree, emission):
+def ies(nodes, emission):
     text = bpy.data.texts.new("lamp.ies")
     angles = " ".join(str(10 * step) for step in range(10))
     candela = " ".join(str(1000 - 100 * step) for step in range(10))
     header = "IESNA:LM-63-1995\nTILT=NONE\n1 1000 1 10 1 1 2 0 0 0\n1 1 100\n"
     text.write(f"{header}{angles}\n0\n{candela}\n")
-    node = tree.nodes.new("ShaderNodeTexIES")
-    node.ies = text
-    tree.links.new(node.outputs[0], emission.inputs["Strength"])
+    nodes.set(emission.inputs["Strength"], nodes.add("TexIES", ies=text).outputs[0])
 
 
 @pytest.mark.parametrize("add", [blackbody, gobo, ies])
 def test_nodes_of_a_lamp_are_understood_or_named(add, tmp_path):
-    add(*nodes_of(add_light("SPOT", spot_size=1.2, shadow_soft_size=0.0, energy=100.0)))
+    nodes = Nodes(add_light("SPOT", spot_size=1.2, shadow_soft_size=0.0, energy=100.0).data)
+    add(nodes, nodes.of_type("EMISSION"))
     record, ours, expected = compared(tmp_path)
     assert expected.mean() > 0.01
     if record.left_out:

@@ -5,8 +5,10 @@ import subprocess
 
 import bpy
 import pytest
+import scenes
 from beamspread.blender.jobs.state import state
 from beamspread.blender.read.lights import read_illumination
+from nodes import Nodes
 from scenes import add_lamp, add_material, add_mesh, add_plane, add_sun, bake, batch_command, node_of, save_scene
 
 SIZE = 16
@@ -26,36 +28,21 @@ def missing(name="studio.hdr"):
     return image
 
 
-def tree_of(owner):
-    if bpy.app.version < (5, 0, 0):
-        owner.use_nodes = True
-    return owner.node_tree
-
-
-def texture(tree, image, kind="ShaderNodeTexImage"):
-    node = tree.nodes.new(kind)
-    node.image = image
-    return node.outputs["Color"]
+def texture(nodes, image, kind="TexImage"):
+    return nodes.add(kind, image=image).outputs["Color"]
 
 
 def add_world(image):
-    world = bpy.context.scene.world = bpy.data.worlds.new("Sky")
-    tree = tree_of(world)
-    background = next(node for node in tree.nodes if node.type == "BACKGROUND")
-    tree.links.new(background.inputs["Color"], texture(tree, image, "ShaderNodeTexEnvironment"))
-    return tree, background
+    nodes, background = scenes.add_world(name="Sky")
+    nodes.set(background.inputs["Color"], texture(nodes, image, "TexEnvironment"))
+    return nodes, background
 
 
 def add_panel(image):
     """A mesh that emits an image."""
-    material = bpy.data.materials.new("Screen")
-    tree = tree_of(material)
-    emission = tree.nodes.new("ShaderNodeEmission")
-    tree.links.new(emission.inputs["Color"], texture(tree, image))
-    tree.links.new(tree.get_output_node("CYCLES").inputs["Surface"], emission.outputs[0])
-    panel = add_mesh("Panel", [(0, 0, 1), (1, 0, 1), (0, 1, 1)], [(0, 1, 2)])
-    panel.data.materials.append(material)
-    return panel
+    nodes = Nodes(bpy.data.materials.new("Screen"))
+    nodes.show(nodes.add("Emission", {"Color": texture(nodes, image)}))
+    add_mesh("Panel", [(0, 0, 1), (1, 0, 1), (0, 1, 1)], [(0, 1, 2)]).data.materials.append(nodes.owner)
 
 
 def read():
@@ -95,24 +82,18 @@ def test_a_node_without_an_image_is_named():
 
 
 def test_a_missing_image_that_is_not_used_changes_nothing():
-    tree, background = add_world(missing())
-    plain = tree.nodes.new("ShaderNodeBackground")
-    mix = tree.nodes.new("ShaderNodeMixShader")
-    mix.inputs[0].default_value = 1.0
-    for socket, node in zip(mix.inputs[1:], (background, plain)):
-        tree.links.new(socket, node.outputs[0])
-    tree.links.new(tree.get_output_node("CYCLES").inputs["Surface"], mix.outputs[0])
+    nodes, background = add_world(missing())
+    nodes.show(nodes.add("MixShader", {0: 1.0, 1: background.outputs[0], 2: nodes.add("Background").outputs[0]}))
     illumination = read()
     assert len(illumination.lights) == 1
     assert texts(illumination) == []
 
 
 def test_a_world_that_cycles_evaluates_says_that_its_image_is_magenta():
-    tree, background = add_world(missing())
-    mix = tree.nodes.new("ShaderNodeMixRGB")
-    for socket, output in zip(mix.inputs[1:], (tree.nodes.new("ShaderNodeTexNoise").outputs[1], background.inputs[0])):
-        tree.links.new(socket, output.links[0].from_socket if output.is_linked else output)
-    tree.links.new(background.inputs["Color"], mix.outputs[0])
+    nodes, background = add_world(missing())
+    color = background.inputs["Color"]
+    mix = nodes.add("MixRGB", {1: nodes.add("TexNoise").outputs[1], 2: color.links[0].from_socket})
+    nodes.set(color, mix.outputs[0])
     illumination = read()
     assert list(illumination.by_cycles) == ["Sky"]
     expected = "The image 'studio.hdr' is missing. Cycles shows it in magenta, as light of 'Sky'."
@@ -128,10 +109,8 @@ def test_emission_is_left_out():
 
 
 def test_a_lamp_shines_as_without_nodes():
-    lamp = add_lamp((0, 0, 1))
-    tree = tree_of(lamp.data)
-    emission = next(node for node in tree.nodes if node.type == "EMISSION")
-    tree.links.new(emission.inputs["Color"], texture(tree, missing("gobo.png")))
+    nodes = Nodes(add_lamp((0, 0, 1)).data)
+    nodes.set(nodes.of_type("EMISSION").inputs["Color"], texture(nodes, missing("gobo.png")))
     illumination = read()
     assert (len(illumination.lights), illumination.by_cycles) == (1, {})
     (text,) = texts(illumination)
@@ -140,13 +119,10 @@ def test_a_lamp_shines_as_without_nodes():
 
 def test_transparency_is_left_out():
     wall = add_mesh("Leaf", [(0, 0, 1), (1, 0, 1), (0, 1, 1)], [(0, 1, 2)])
-    material = bpy.data.materials.new("Leaf")
-    tree = tree_of(material)
-    principled = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
-    node = tree.nodes.new("ShaderNodeTexImage")
-    node.image = missing("leaf.png")
-    tree.links.new(principled.inputs["Alpha"], node.outputs["Alpha"])
-    wall.data.materials.append(material)
+    nodes = Nodes(bpy.data.materials.new("Leaf"))
+    leaf = nodes.add("TexImage", image=missing("leaf.png"))
+    nodes.set(nodes.of_type("BSDF_PRINCIPLED").inputs["Alpha"], leaf.outputs["Alpha"])
+    wall.data.materials.append(nodes.owner)
     (text,) = texts(read())
     assert "The material 'Leaf' casts opaque shadows." in text
     assert "The image 'leaf.png' is missing." in text
@@ -157,8 +133,8 @@ def test_the_base_color_is_the_nodes_own():
     material = add_material(color_mode="BASE_COLOR", base_color=(0.5, 0.6, 0.4))
     plane = add_plane(material=material)
     plain = bake(plane)[0].copy()
-    link = texture(material.node_tree, missing("tiles.png"))
-    material.node_tree.links.new(node_of(material).inputs["Base Color"], link)
+    nodes = Nodes(material)
+    nodes.set(node_of(material).inputs["Base Color"], texture(nodes, missing("tiles.png")))
     assert bake(plane)[0] == pytest.approx(plain, rel=1e-5)
     (message,) = state.lines()
     assert "The Base Color of 'Plane' is left out: the node's own color is used." in str(message)
@@ -170,11 +146,9 @@ def test_bounced_light_of_other_materials_is_said_to_be_magenta():
     add_sun(30)
     add_world(missing())
     wall = add_mesh("Wall", [(0.2, -1, 0), (0.2, 1, 0), (0.2, 1, 1), (0.2, -1, 1)], [(0, 1, 2, 3)])
-    material = bpy.data.materials.new("Bricks")
-    tree = tree_of(material)
-    principled = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
-    tree.links.new(principled.inputs["Base Color"], texture(tree, missing("bricks.png")))
-    wall.data.materials.append(material)
+    nodes = Nodes(bpy.data.materials.new("Bricks"))
+    nodes.set(nodes.of_type("BSDF_PRINCIPLED").inputs["Base Color"], texture(nodes, missing("bricks.png")))
+    wall.data.materials.append(nodes.owner)
     plane = add_plane(material=add_material(albedo=(0.9, 0.9, 0.9)))
     found = bake(plane)[0]
     said = " ".join(map(str, state.lines()))

@@ -6,7 +6,7 @@ import sys
 import bpy
 import pytest
 from beamspread import presets
-from scenes import add_material, add_plane, node_of
+from scenes import add_material, add_plane, node_of, reopen
 
 
 def inner(node, name):
@@ -86,9 +86,7 @@ def test_removing_one_copy_keeps_the_other_through_a_save(tmp_path):
     second = first.copy()
     second.use_fake_user = True
     bpy.data.materials.remove(first)
-    path = str(tmp_path / "copies.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.open_mainfile(filepath=path)
+    reopen(tmp_path)
     node = node_of(bpy.data.materials["Medium.001"])
     assert inner(node, "Fresnel").inputs["IOR"].default_value == pytest.approx(1.3)
 
@@ -97,9 +95,7 @@ def test_inner_tree_of_a_removed_node_goes_with_the_file(tmp_path):
     material = add_material()
     material.use_fake_user = True
     material.node_tree.nodes.remove(node_of(material))
-    path = str(tmp_path / "removed.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.open_mainfile(filepath=path)
+    reopen(tmp_path)
     assert not bpy.data.node_groups
 
 

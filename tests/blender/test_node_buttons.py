@@ -13,7 +13,7 @@ from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.node import draw, principled
 from beamspread.blender.node.buttons import BEAMSPREAD_OT_from_principled
 from beamspread.core.material import ior_of_reflectance, transport_length
-from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
+from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, reopen, select
 
 IS_BEFORE_4 = bpy.app.version < (4, 0, 0)
 
@@ -65,9 +65,7 @@ class TestPreset:
         node.thickness, node.image = 0.1, bpy.data.images.new("Baked", 4, 4)
         node.preset = "cream"
         assert node.preset == "cream"
-        path = str(tmp_path / "preset.blend")
-        bpy.ops.wm.save_as_mainfile(filepath=path)
-        bpy.ops.wm.open_mainfile(filepath=path)
+        reopen(tmp_path)
         assert node_of(bpy.data.materials["Medium"]).preset == "cream"
 
     def test_comes_back_by_undo(self):
@@ -98,9 +96,7 @@ class TestFormerShader:
             stale.refresh(bpy.context)
             row = next(iter(state.rows.values()))
         assert surface_of(material) == node_of(material)
-        path = str(tmp_path / "swapped.blend")
-        bpy.ops.wm.save_as_mainfile(filepath=path)
-        bpy.ops.wm.open_mainfile(filepath=path)
+        reopen(tmp_path)
         plane, material = bpy.data.objects["Plane"], bpy.data.materials["Medium"]
         select(plane)
         assert bpy.ops.beamspread.toggle_result() == {"FINISHED"}

@@ -16,6 +16,7 @@ from beamspread.blender.read.scene_cache import SceneCache
 from beamspread.blender.read.shading import ShadingPoints
 from beamspread.blender.read.transparency import TexelEvaluator
 from beamspread.core.errors import NotSupportedError
+from nodes import add_sockets
 from scenes import add_material, add_plane, diffuse_material, node_of
 
 LONG = 400
@@ -137,12 +138,7 @@ def test_groups_used_twice_in_each_other(material):
     depth, inner = 24, None
     for _ in range(depth):
         tree = bpy.data.node_groups.new("Doubled", "ShaderNodeTree")
-        if hasattr(tree, "interface"):
-            for in_out in ("INPUT", "OUTPUT"):
-                tree.interface.new_socket("Value", in_out=in_out, socket_type="NodeSocketFloat")
-        else:
-            tree.inputs.new("NodeSocketFloat", "Value")
-            tree.outputs.new("NodeSocketFloat", "Value")
+        add_sockets(tree, "NodeSocketFloat", "Value", "Value")
         start, end = add(tree, "NodeGroupInput"), add(tree, "NodeGroupOutput")
         output = start.outputs[0]
         for _ in range(2 if inner else 0):

@@ -9,7 +9,7 @@ import pytest
 from beamspread.blender.jobs.out_of_date.pixels import images_of
 from beamspread.blender.node.node import upgrade_nodes
 from beamspread.blender.node.tree import BASE_COLOR, EMISSION, IMAGE, UNSEEN
-from scenes import add_material, add_plane, add_sun, bake, node_of, pixels, select
+from scenes import add_material, add_plane, add_sun, bake, node_of, pixels, reopen, select
 
 OLDER_FILE = str(Path(__file__).with_name("files") / "node_before_sockets.blend")
 INPUTS = ["Base Color", "Roughness", "Normal"]
@@ -135,9 +135,7 @@ def test_links_of_the_inputs_outlive_a_bake_and_a_save(tmp_path):
     tree.links.new(node_of(plane.data.materials[0]).inputs["Roughness"], value.outputs[0])
     bpy.context.scene.beamspread.resolution = 16
     bake(plane)
-    path = str(tmp_path / "linked.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.open_mainfile(filepath=path)
+    reopen(tmp_path)
     node = node_of(bpy.data.materials["Medium"])
     sources = [node.inputs[name].links[0].from_node.bl_idname for name in ("Roughness", "Normal")]
     assert sources == ["ShaderNodeValue", "ShaderNodeNormalMap"]

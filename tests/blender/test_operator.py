@@ -8,19 +8,30 @@ import beamspread
 import bpy
 import numpy as np
 import pytest
-from beamspread.blender.jobs.run.batch_run import bake_all
 from beamspread.blender.jobs.run.operator import BakeThread
 from beamspread.blender.settings import BeamspreadSettings
 from beamspread.core.bake.bake_settings import COMBINED
 from beamspread.core.bake.layers import LAYERS
 from beamspread.core.bake.runner import CANCELLED, Bake
-from beamspread.core.batch import batch_options
 from beamspread.core.native import native
 from beamspread.core.progress import Progress
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.target import Target
 from mathutils import Matrix
-from scenes import add_material, add_mesh, add_plane, add_sun, bake, messages_of, node_of, pixels, select
+from scenes import (
+    add_material,
+    add_mesh,
+    add_plane,
+    add_sun,
+    bake,
+    file_image,
+    messages_of,
+    node_of,
+    pixels,
+    reopen,
+    run_batch,
+    select,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -51,9 +62,7 @@ def test_image_survives_saving_with_all_its_range(tmp_path):
     add_sun(0, strength=50.0)
     (before,) = bake(plane)
     assert before.max() > 2.5
-    path = str(tmp_path / "baked.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.open_mainfile(filepath=path)
+    reopen(tmp_path)
     node = node_of(bpy.data.materials["Medium"])
     assert pixels(node.image) == pytest.approx(before, rel=1e-3, abs=1e-3)
     assert node.node_tree.nodes["Image"].image == node.image
@@ -83,8 +92,7 @@ def test_an_artists_own_use_of_the_node_is_kept():
 
 def test_file_image_is_written_to_its_file(tmp_path):
     path = tmp_path / "target.exr"
-    native.write_exr(str(path), np.zeros((20, 24, 3), np.float32), ["R", "G", "B"])
-    image = bpy.data.images.load(str(path))
+    image = file_image(path, 24, 20)
     plane = add_plane(material=add_material(image=image, albedo=(0.99, 0.9, 0.0)))
     add_sun(0, strength=20.0)
     (shown,) = bake(plane)
@@ -290,7 +298,7 @@ def test_targets_that_cannot_be_baked_are_reported_and_the_others_are_baked(spoi
     assert pixels(node_of(good.data.materials[0]).image).any()
 
 
-def file_image(folder):
+def png_image(folder):
     path = folder / "target.png"
     image = bpy.data.images.new("Target", 8, 8)
     image.filepath_raw, image.file_format = str(path), "PNG"
@@ -300,7 +308,7 @@ def file_image(folder):
 
 
 def test_image_whose_file_is_gone(tmp_path):
-    path, image = file_image(tmp_path)
+    path, image = png_image(tmp_path)
     plane = add_plane(material=add_material(image=image))
     add_sun(0)
     path.unlink()
@@ -309,7 +317,7 @@ def test_image_whose_file_is_gone(tmp_path):
 
 
 def test_image_whose_file_is_read_only_keeps_it(tmp_path):
-    path, image = file_image(tmp_path)
+    path, image = png_image(tmp_path)
     plane = add_plane(material=add_material(image=image))
     add_sun(0)
     path.chmod(stat.S_IRUSR)
@@ -357,7 +365,7 @@ def test_other_layers_have_images_and_files_beside_the_combined_one(monkeypatch,
     bake(plane)
     assert sorted(one.name for one in bpy.data.images) == ["Plane_Medium", "Plane_Medium Half"]
     assert pixels(image) == pytest.approx(combined)
-    report = bake_all(batch_options.parse(["--output", str(tmp_path)]))
+    report = run_batch("--output", tmp_path)
     assert [Path(one.path).name for one in report.bakes] == ["Plane_Medium_Half.exr"]
     assert native.read_exr(str(tmp_path / "Plane_Medium_Half.exr"))[0] == pytest.approx(combined / 2)
 

@@ -8,14 +8,6 @@ from beamspread.blender.cycles.scene_copy import SceneCopy
 from cycles_truth import cycles_bake, target_material
 
 
-def world_nodes():
-    world = bpy.data.worlds.new("World")
-    bpy.context.scene.world = world
-    if bpy.app.version < (5, 0, 0):
-        world.use_nodes = True
-    return world.node_tree, next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
-
-
 def panorama(width=256, height=128):
     with SceneCopy(bpy.context.scene, bpy.context.view_layer) as copy:
         return world_panorama(copy, width, height)
@@ -30,11 +22,9 @@ def directions(width, height):
 
 def test_panorama_shows_every_direction_in_its_place():
     """A world as bright as the direction's coordinates; within a texel they change by pi / 128, and it is jittered."""
-    tree, background = world_nodes()
-    place, add = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeVectorMath")
-    add.inputs[1].default_value = (2, 2, 2)
-    tree.links.new(add.inputs[0], place.outputs["Generated"])
-    tree.links.new(background.inputs["Color"], add.outputs[0])
+    nodes, background = scenes.add_world()
+    moved = nodes.add("VectorMath", {0: nodes.add("TexCoord").outputs["Generated"], 1: (2, 2, 2)})
+    nodes.set(background.inputs["Color"], moved.outputs[0])
     bpy.context.scene.render.film_transparent = True
     bpy.context.scene.cycles.film_exposure = 3.0
     scenes.add_plane("In the way", (50, 50))
@@ -43,37 +33,33 @@ def test_panorama_shows_every_direction_in_its_place():
 
 def test_panorama_keeps_images_in_memory():
     """An unsaved environment image comes back as it is, texel by texel; Cycles interpolates it linearly."""
-    tree, background = world_nodes()
+    nodes, background = scenes.add_world()
     image = bpy.data.images.new("Sky", 32, 16, float_buffer=True)
     image.colorspace_settings.name = "Non-Color"
     values = np.ones((16, 32, 4), np.float32)
     values[..., :3] = np.random.default_rng(1).random((16, 32, 3))
     image.pixels.foreach_set(values.ravel())
-    texture = tree.nodes.new("ShaderNodeTexEnvironment")
-    texture.image, texture.interpolation = image, "Closest"
-    tree.links.new(background.inputs["Color"], texture.outputs["Color"])
+    texture = nodes.add("TexEnvironment", image=image, interpolation="Closest")
+    nodes.set(background.inputs["Color"], texture.outputs["Color"])
     np.testing.assert_allclose(panorama(32, 16), values[..., :3], atol=1e-5)
 
 
 def test_panorama_answers_light_paths_as_to_a_diffuse_surface():
-    tree, background = world_nodes()
-    path, mix = tree.nodes.new("ShaderNodeLightPath"), tree.nodes.new("ShaderNodeMath")
-    mix.operation = "MULTIPLY_ADD"
-    mix.inputs[1].default_value, mix.inputs[2].default_value = 5.0, 1.0
-    tree.links.new(mix.inputs[0], path.outputs["Is Camera Ray"])
-    tree.links.new(background.inputs["Strength"], mix.outputs[0])
-    background.inputs["Color"].default_value = (0.1, 0.2, 0.3, 1)
+    nodes, background = scenes.add_world((0.1, 0.2, 0.3, 1))
+    is_camera = nodes.add("LightPath").outputs["Is Camera Ray"]
+    strength = nodes.add("Math", {0: is_camera, 1: 5.0, 2: 1.0}, operation="MULTIPLY_ADD")
+    nodes.set(background.inputs["Strength"], strength.outputs[0])
     np.testing.assert_allclose(panorama(16, 8), np.broadcast_to((0.1, 0.2, 0.3), (8, 16, 3)), rtol=1e-6)
 
 
 def test_panorama_has_all_of_a_sky_s_sun():
     """Its irradiance on a level plane against Cycles' bake, 1 %."""
-    tree, background = world_nodes()
-    sky = tree.nodes.new("ShaderNodeTexSky")
+    nodes, background = scenes.add_world()
+    sky = nodes.add("TexSky")
     kinds = {item.identifier for item in sky.bl_rna.properties["sky_type"].enum_items}
     sky.sky_type = "NISHITA" if "NISHITA" in kinds else "MULTIPLE_SCATTERING"
     sky.sun_elevation, sky.sun_rotation = 0.5, 1.0
-    tree.links.new(background.inputs["Color"], sky.outputs["Color"])
+    nodes.set(background.inputs["Color"], sky.outputs["Color"])
     seen = panorama(1024, 512)
     up = np.clip(directions(1024, 512)[..., 2], 0, None)
     solid = 2 * np.pi / 1024 * np.pi / 512 * np.sqrt(1 - directions(1024, 512)[..., 2] ** 2)

@@ -7,14 +7,12 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from beamspread.blender.jobs.run.batch_run import bake_all
 from beamspread.blender.jobs.state import state
 from beamspread.blender.ui import panels
-from beamspread.core.batch import batch_options
 from beamspread.core.native import native
 from cycles_truth import TEXELS, add_receiver, cycles_irradiance
 from mathutils import Matrix
-from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, select
+from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, run_batch, select
 
 SUN_ANGLE, SUN_AZIMUTH = 50, 35
 # Images of data are packed as half floats: 11 bits.
@@ -35,15 +33,6 @@ def settings():
     return settings
 
 
-def add_lamp(place, watts, color=(1, 1, 1)):
-    data = bpy.data.lights.new("Lamp", "POINT")
-    data.energy, data.color, data.shadow_soft_size = watts, color, 0.0
-    lamp = bpy.data.objects.new("Lamp", data)
-    lamp.location = place
-    bpy.context.collection.objects.link(lamp)
-    return lamp
-
-
 @pytest.mark.parametrize("uvs", ["square", "oblique"])
 def test_irradiance_is_pi_times_the_diffuse_bake_of_cycles(uvs, settings, tmp_path):
     """The whole way through the batch, a wall's shadow included, to the tolerances of test_cycles_irradiance.py.
@@ -61,9 +50,7 @@ def test_irradiance_is_pi_times_the_diffuse_bake_of_cycles(uvs, settings, tmp_pa
     expected = cycles_irradiance(plane, image)
     plane.data.materials[0] = add_material()
     settings.samples = 8
-    (record,) = bake_all(
-        batch_options.parse(["--pass", "irradiance", "--resolution", str(TEXELS), "--output", str(tmp_path)])
-    ).bakes
+    (record,) = run_batch("--pass", "irradiance", "--resolution", TEXELS, "--output", tmp_path).bakes
     assert (record.output, record.lights, record.left_out, record.dark) == ("IRRADIANCE", 1, [], False)
     assert record.path == str(tmp_path / "Receiver_Medium_Irradiance.exr")
     ours = native.read_exr(record.path)[0]
@@ -159,22 +146,20 @@ def test_a_batch_leaves_the_nodes_own_file_to_luminance(settings, tmp_path):
     add_plane(material=add_material(image=bpy.data.images.load(str(path))))
     add_sun(SUN_ANGLE, SUN_AZIMUTH)
     settings.output_dir, settings.output = str(tmp_path / "out"), "DIRECTION"
-    (record,) = bake_all(batch_options.parse([])).bakes
+    (record,) = run_batch().bakes
     assert (record.status, record.output) == ("written", "DIRECTION")
     assert record.path == str(tmp_path / "out" / "Plane_Medium_Direction.exr")
     stored = native.read_exr(record.path)[0]
     assert stored == pytest.approx(np.broadcast_to(sun_travel(SUN_ANGLE, SUN_AZIMUTH), stored.shape), abs=1e-6)
     assert (native.read_exr(str(path))[0] == 0.25).all()
-    (record,) = bake_all(batch_options.parse(["--pass", "luminance"])).bakes
+    (record,) = run_batch("--pass", "luminance").bakes
     assert (record.path, record.output) == (str(path), "LUMINANCE")
 
 
 def test_a_png_cant_hold_directions(tmp_path):
     add_plane(material=add_material())
     add_sun(0)
-    (record,) = bake_all(
-        batch_options.parse(["--pass", "DIRECTION", "--format", "PNG", "--output", str(tmp_path)])
-    ).bakes
+    (record,) = run_batch("--pass", "DIRECTION", "--format", "PNG", "--output", tmp_path).bakes
     assert record.status == "failed"
     assert "A PNG can't hold directions" in record.message
     assert list(tmp_path.iterdir()) == []

@@ -13,6 +13,7 @@ from beamspread.blender.read.lights import read_illumination
 from beamspread.core.scene.lights import MeshLight
 from cycles_truth import add_receiver, cycles_irradiance
 from mathutils import Euler, Matrix
+from nodes import Nodes
 
 ABOVE = Matrix.Translation((0.3, -0.2, 1.2)) @ Euler((0.5, -0.3, 0.2)).to_matrix().to_4x4()
 # Means over 64 texels of 512 samples each.
@@ -20,22 +21,15 @@ NOISE = {"rel": 0.006}
 COLOR = (1.0, 0.5, 0.25, 1.0)
 
 
-def glowing_material(strength=3.0, color=COLOR, kind="ShaderNodeEmission"):
+def glowing_material(strength=3.0, color=COLOR, kind="Emission"):
     """A material and the node that glows."""
-    material = bpy.data.materials.new("Glow")
-    if bpy.app.version < (5, 0, 0):
-        material.use_nodes = True
-    tree = material.node_tree
-    tree.nodes.clear()
-    node, output = tree.nodes.new(kind), tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(node.outputs[0], output.inputs["Surface"])
-    if kind == "ShaderNodeBsdfPrincipled":
-        name = "Emission Color" if "Emission Color" in node.inputs else "Emission"
-        node.inputs[name].default_value, node.inputs["Emission Strength"].default_value = color, strength
-        node.inputs["Base Color"].default_value = (0, 0, 0, 1)
-    else:
-        node.inputs["Color"].default_value, node.inputs["Strength"].default_value = color, strength
-    return material, node
+    nodes = Nodes(bpy.data.materials.new("Glow"), clear=True)
+    inputs = {"Color": color, "Strength": strength}
+    if kind == "BsdfPrincipled":
+        name = "Emission" if bpy.app.version < (4, 0, 0) else "Emission Color"
+        inputs = {name: color, "Emission Strength": strength, "Base Color": (0, 0, 0, 1)}
+    node = nodes.add(kind, inputs)
+    return nodes.finish(node), node
 
 
 def add_panel(matrix=ABOVE, size=(1.0, 0.6), material=None):
@@ -98,17 +92,14 @@ def test_both_sides_glow(matrix):
 
 @pytest.mark.parametrize("alpha", [1.0, 0.4])
 def test_principled_glows_by_its_alpha(alpha):
-    material, node = glowing_material(kind="ShaderNodeBsdfPrincipled")
+    material, node = glowing_material(kind="BsdfPrincipled")
     node.inputs["Alpha"].default_value = alpha
     add_panel(material=material)
     assert_agrees()
 
 
 def test_principled_is_dark_as_it_comes():
-    material = bpy.data.materials.new("Plain")
-    if bpy.app.version < (5, 0, 0):
-        material.use_nodes = True
-    add_panel(material=material)
+    add_panel(material=Nodes(bpy.data.materials.new("Plain")).owner)
     assert read().lights == ()
 
 
@@ -134,14 +125,9 @@ def test_materials_of_faces():
 
 def test_instances_are_one_light():
     panel = add_panel(Matrix.Translation((0, 0, 0.4)), size=(0.4, 0.3))
-    collection = bpy.data.collections.new("Lit")
-    collection.objects.link(panel)
-    bpy.context.scene.collection.objects.unlink(panel)
+    lit = scenes.new_collection("Lit", panel)
     for x, scale in ((-0.4, 1), (0.5, -1.5)):
-        holder = bpy.data.objects.new("Holder", None)
-        holder.instance_type, holder.instance_collection = "COLLECTION", collection
-        holder.matrix_world = Matrix.Translation((x, 0.1, 0.8)) @ Matrix.Diagonal((scale, 1, 1, 1))
-        bpy.context.scene.collection.objects.link(holder)
+        scenes.add_instancer(lit, Matrix.Translation((x, 0.1, 0.8)) @ Matrix.Diagonal((scale, 1, 1, 1)))
     assert_agrees()
 
 
@@ -176,18 +162,15 @@ def striped_image():
 @pytest.mark.parametrize("coordinates", ["default", "UV", "mapped"])
 def test_an_image_glows_by_its_uv_map(coordinates):
     material, emission = glowing_material()
-    tree = material.node_tree
-    texture = tree.nodes.new("ShaderNodeTexImage")
-    texture.image = striped_image()
-    tree.links.new(texture.outputs["Color"], emission.inputs["Color"])
+    nodes = Nodes(material)
+    texture = nodes.add("TexImage", image=striped_image())
+    nodes.set(emission.inputs["Color"], texture.outputs["Color"])
     if coordinates != "default":
-        source = tree.nodes.new("ShaderNodeTexCoord").outputs["UV"]
+        source = nodes.add("TexCoord").outputs["UV"]
         if coordinates == "mapped":
-            mapping = tree.nodes.new("ShaderNodeMapping")
-            mapping.inputs["Scale"].default_value, mapping.inputs["Location"].default_value = (2.5, 1, 1), (0.2, 0.3, 0)
-            tree.links.new(source, mapping.inputs["Vector"])
-            source = mapping.outputs["Vector"]
-        tree.links.new(source, texture.inputs["Vector"])
+            inputs = {"Vector": source, "Scale": (2.5, 1, 1), "Location": (0.2, 0.3, 0)}
+            source = nodes.add("Mapping", inputs).outputs["Vector"]
+        nodes.set(texture.inputs["Vector"], source)
     add_panel(Matrix.Translation((0, 0, 0.4)), (1.5, 1.5), material)
     light = read().lights[0]
     assert 4000 < len(light.triangles) < 20000
@@ -231,10 +214,7 @@ def test_flags_that_do_not_matter(flag):
 @pytest.mark.parametrize("flag", ["holdout", "indirect_only"])
 def test_collections_that_cameras_do_not_see_light_all_the_same(flag):
     panel = add_panel()
-    collection = bpy.data.collections.new("Away")
-    bpy.context.scene.collection.children.link(collection)
-    collection.objects.link(panel)
-    bpy.context.scene.collection.objects.unlink(panel)
+    bpy.context.scene.collection.children.link(scenes.new_collection("Away", panel))
     setattr(bpy.context.view_layer.layer_collection.children["Away"], flag, True)
     assert_agrees()
 
@@ -250,14 +230,12 @@ def test_a_baked_image_is_no_light_by_any_way():
     image.pixels.foreach_set(np.ones(64, np.float32))
     material = scenes.add_material(image=image)
     scenes.add_plane(material=material)
-    node, tree = scenes.node_of(material), material.node_tree
-    emission = tree.nodes.new("ShaderNodeEmission")
-    tree.links.new(emission.inputs["Color"], node.outputs["Color"])
-    tree.links.new(tree.get_output_node("CYCLES").inputs["Surface"], emission.outputs[0])
+    node, nodes = scenes.node_of(material), Nodes(material)
+    nodes.show(nodes.add("Emission", {"Color": node.outputs["Color"]}))
     assert (read().lights, read().by_cycles) == ((), {})
     make_plain(node)
     assert (read().lights, read().by_cycles) == ((), {})
-    tree.links.new(tree.get_output_node("CYCLES").inputs["Surface"], plain_of(node).outputs["BSDF"])
+    nodes.show(plain_of(node).outputs["BSDF"])
     assert (read().lights, read().by_cycles) == ((), {})
 
 
@@ -265,13 +243,9 @@ def test_a_baked_image_mixed_with_a_texture_is_no_light():
     """The texture is one that only Cycles evaluates."""
     material = scenes.add_material()
     scenes.add_plane(material=material)
-    node, tree = scenes.node_of(material), material.node_tree
-    emission, texture = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeTexNoise")
-    mix = tree.nodes.new("ShaderNodeMixRGB")
-    tree.links.new(mix.inputs["Color1"], node.outputs["Color"])
-    tree.links.new(mix.inputs["Color2"], texture.outputs["Color"])
-    tree.links.new(emission.inputs["Color"], mix.outputs["Color"])
-    tree.links.new(tree.get_output_node("CYCLES").inputs["Surface"], emission.outputs[0])
+    nodes = Nodes(material)
+    colors = {"Color1": scenes.node_of(material).outputs["Color"], "Color2": nodes.add("TexNoise").outputs["Color"]}
+    nodes.show(nodes.add("Emission", {"Color": nodes.add("MixRGB", colors).outputs["Color"]}))
     assert (read().lights, read().by_cycles, read().messages) == ((), {}, ())
 
 
@@ -288,11 +262,9 @@ def test_emission_beside_a_beamspread_node_is_light():
     material, emission = glowing_material()
     add_panel(material=material)
     (before,) = read().lights
-    tree = material.node_tree
-    node, total = tree.nodes.new("BeamspreadNode"), tree.nodes.new("ShaderNodeAddShader")
-    tree.links.new(total.inputs[0], emission.outputs[0])
-    tree.links.new(total.inputs[1], node.outputs["BSDF"])
-    tree.links.new(tree.get_output_node("CYCLES").inputs["Surface"], total.outputs[0])
+    nodes = Nodes(material)
+    node = nodes.tree.nodes.new("BeamspreadNode")
+    nodes.show(nodes.add("AddShader", {0: emission.outputs[0], 1: node.outputs["BSDF"]}))
     (light,) = read().lights
     assert np.array_equal(light.radiance, before.radiance)
 
@@ -322,8 +294,8 @@ def test_a_bake_of_all_keeps_the_light_of_a_material_with_an_unused_node():
 
 def test_unsupported_nodes_are_named():
     material, emission = glowing_material()
-    tree = material.node_tree
-    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs[0], emission.inputs["Strength"])
+    nodes = Nodes(material)
+    nodes.set(emission.inputs["Strength"], nodes.add("TexNoise").outputs[0])
     add_panel(material=material)
     assert read().lights == ()
     text = "The emission of 'Panel' is left out. The node 'Noise Texture' is not supported."

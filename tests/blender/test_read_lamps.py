@@ -11,6 +11,7 @@ from beamspread.blender.read.lights import read_illumination
 from beamspread.core.scene.lights import AreaLight, PointLight, SpotLight, SunLight
 from cycles_truth import add_receiver, cycles_irradiance, our_irradiance
 from mathutils import Euler, Matrix
+from nodes import Nodes
 
 ABOVE = Matrix.Translation((0.3, -0.2, 0.9)) @ Euler((0.35, 0.25, 0.4)).to_matrix().to_4x4()
 KINDS = {
@@ -25,15 +26,8 @@ KINDS = {
 needs_4_5 = pytest.mark.skipif(bpy.app.version < (4, 5, 0), reason="came in Blender 4.5")
 
 
-def add_lamp(kind, matrix=ABOVE, color=(1, 0.5, 0.25), name="Lamp", **options):
-    data = bpy.data.lights.new(name, kind)
-    data.color, data.energy = color, 20
-    for key, value in options.items():
-        setattr(data, key, value)
-    lamp = bpy.data.objects.new(name, data)
-    lamp.matrix_world = matrix
-    bpy.context.collection.objects.link(lamp)
-    return lamp
+def add_lamp(kind, matrix=ABOVE, name="Lamp", **options):
+    return scenes.add_lamp(None, 20, kind, name, matrix, radius=None, color=(1, 0.5, 0.25), **options)
 
 
 def read():
@@ -158,8 +152,7 @@ def hidden(lamp):
 
 
 def without_shader(lamp):
-    lamp.data.use_nodes = True
-    lamp.data.node_tree.nodes.clear()
+    Nodes(lamp.data, clear=True)
 
 
 DARK = [portal, no_power, black, not_for_diffuse, hidden, without_shader]
@@ -230,27 +223,22 @@ def test_normalize_without_size(kind):
     assert_agrees()
 
 
-def emission_of(lamp):
-    lamp.data.use_nodes = True
-    return lamp.data.node_tree, lamp.data.node_tree.nodes["Emission"]
+def link_emission(lamp, kind, output=0, inputs=(), socket="Color", **properties):
+    """Link a new node to an input of the lamp's emission."""
+    nodes = Nodes(lamp.data)
+    nodes.set(nodes.of_type("EMISSION").inputs[socket], nodes.add(kind, inputs, **properties).outputs[output])
 
 
 def test_nodes_that_fold():
     lamp = add_lamp("POINT", shadow_soft_size=0.2)
-    tree, emission = emission_of(lamp)
-    body, falloff = tree.nodes.new("ShaderNodeBlackbody"), tree.nodes.new("ShaderNodeLightFalloff")
-    body.inputs[0].default_value, falloff.inputs["Strength"].default_value = 2500, 3
-    tree.links.new(body.outputs[0], emission.inputs["Color"])
-    tree.links.new(falloff.outputs["Quadratic"], emission.inputs["Strength"])
+    link_emission(lamp, "Blackbody", 0, {0: 2500})
+    link_emission(lamp, "LightFalloff", "Quadratic", {"Strength": 3}, "Strength")
     assert_agrees()
 
 
 @pytest.mark.parametrize("output", ["Linear", "Constant", "Quadratic"])
 def test_a_falloff_of_another_kind_is_left_to_cycles(output):
-    tree, emission = emission_of(add_lamp("POINT"))
-    falloff = tree.nodes.new("ShaderNodeLightFalloff")
-    falloff.inputs["Smooth"].default_value = 1
-    tree.links.new(falloff.outputs[output], emission.inputs["Strength"])
+    link_emission(add_lamp("POINT"), "LightFalloff", output, {"Smooth": 1}, "Strength")
     illumination = read()
     text = "The light 'Lamp' is baked without its nodes. The node 'Light Falloff' is not supported."
     assert {name: str(message) for name, message in illumination.by_cycles.items()} == {"Lamp": text}
@@ -258,22 +246,16 @@ def test_a_falloff_of_another_kind_is_left_to_cycles(output):
     assert len(illumination.lights) == 1
 
 
-@pytest.mark.parametrize("node", ["ShaderNodeTexIES", "ShaderNodeTexImage", "ShaderNodeTexNoise"])
-def test_gobos_and_profiles_are_left_to_cycles(node):
-    tree, emission = emission_of(add_lamp("SPOT"))
-    texture = tree.nodes.new(node)
-    if node == "ShaderNodeTexImage":
-        texture.image = bpy.data.images.new("Gobo", 4, 4)
-    tree.links.new(texture.outputs[0], emission.inputs["Color"])
+@pytest.mark.parametrize("kind", ["TexIES", "TexImage", "TexNoise"])
+def test_gobos_and_profiles_are_left_to_cycles(kind):
+    image = {"image": bpy.data.images.new("Gobo", 4, 4)} if kind == "TexImage" else {}
+    link_emission(add_lamp("SPOT"), kind, **image)
     assert list(read().by_cycles) == ["Lamp"]
 
 
 def test_holdout_and_indirect_collections_light_all_the_same():
     lamp = add_lamp("AREA", size=0.5)
-    collection = bpy.data.collections.new("Away")
-    bpy.context.scene.collection.children.link(collection)
-    collection.objects.link(lamp)
-    bpy.context.scene.collection.objects.unlink(lamp)
+    bpy.context.scene.collection.children.link(scenes.new_collection("Away", lamp))
     layer = bpy.context.view_layer.layer_collection.children["Away"]
     layer.holdout = layer.indirect_only = True
     assert_agrees()
@@ -281,13 +263,7 @@ def test_holdout_and_indirect_collections_light_all_the_same():
 
 def test_instances_and_their_visibility():
     lamp = add_lamp("POINT", Matrix())
-    collection = bpy.data.collections.new("Instanced")
-    collection.objects.link(lamp)
-    bpy.context.scene.collection.objects.unlink(lamp)
-    holder = bpy.data.objects.new("Holder", None)
-    holder.instance_type, holder.instance_collection = "COLLECTION", collection
-    holder.location.z = 1
-    bpy.context.scene.collection.objects.link(holder)
+    holder = scenes.add_instancer(scenes.new_collection("Instanced", lamp), Matrix.Translation((0, 0, 1)))
     assert_agrees()
     holder.visible_diffuse = False
     plane, image = add_receiver(Matrix(), texels=4)

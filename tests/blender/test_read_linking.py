@@ -21,7 +21,7 @@ def add_planes():
     return planes
 
 
-def new_collection(name, *objects):
+def links_to(name, *objects):
     collection = bpy.data.collections.new(name)
     for obj in objects:
         collection.objects.link(obj)
@@ -33,29 +33,29 @@ def exclude(links, number=0):
 
 
 def empty(_here, _there):
-    return new_collection("Links")
+    return links_to("Links")
 
 
 def only_here(here, _there):
-    return new_collection("Links", here)
+    return links_to("Links", here)
 
 
 def not_here(here, _there):
-    links = new_collection("Links", here)
+    links = links_to("Links", here)
     exclude(links.collection_objects)
     return links
 
 
 def here_and_not_there(here, there):
-    links = new_collection("Links", here, there)
+    links = links_to("Links", here, there)
     exclude(links.collection_objects, [obj.name for obj in links.objects].index(there.name))
     return links
 
 
 def below(here, _there):
-    links = new_collection("Links")
-    links.children.link(new_collection("Middle"))
-    links.children[0].children.link(new_collection("Inner", here))
+    links = links_to("Links")
+    links.children.link(links_to("Middle"))
+    links.children[0].children.link(links_to("Inner", here))
     return links
 
 
@@ -79,14 +79,14 @@ def not_here_although_below(here, there):
 
 
 def states_below_do_not_count(here, _there):
-    links = new_collection("Links")
-    links.children.link(new_collection("Inner", here))
+    links = links_to("Links")
+    links.children.link(links_to("Inner", here))
     exclude(links.children[0].collection_objects)
     return links
 
 
 def something_else(_here, _there):
-    return new_collection("Links", bpy.data.objects.new("Other", None))
+    return links_to("Links", bpy.data.objects.new("Other", None))
 
 
 LINKS = [
@@ -122,13 +122,8 @@ def test_receivers(emitter, link):
     if emitter == "lamp":
         light = scenes.add_sun(0)
     else:
-        material = bpy.data.materials.new("Glow")
-        if bpy.app.version < (5, 0, 0):
-            material.use_nodes = True
-        tree = material.node_tree
-        glow = tree.nodes.new("ShaderNodeEmission")
-        tree.links.new(glow.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
-        light = scenes.add_plane("Panel", (3, 3), Matrix.Translation((2.5, 0, 2)), material=material)
+        place = Matrix.Translation((2.5, 0, 2))
+        light = scenes.add_plane("Panel", (3, 3), place, material=scenes.glowing_material(1.0))
     light.light_linking.receiver_collection = link(*(plane for plane, _ in planes))
     cycles, ours = lit(planes)
     assert ours == cycles
@@ -149,14 +144,10 @@ def test_blockers(link):
 def test_an_instancer_stands_for_its_objects():
     planes = add_planes()
     roof = scenes.add_plane("Roof", (3, 3), Matrix.Translation((0, 0, 1)))
-    shown = new_collection("Shown", roof)
-    bpy.context.scene.collection.objects.unlink(roof)
-    holder = bpy.data.objects.new("Holder", None)
-    holder.instance_type, holder.instance_collection = "COLLECTION", shown
-    bpy.context.scene.collection.objects.link(holder)
+    holder = scenes.add_instancer(scenes.new_collection("Shown", roof))
     sun = scenes.add_sun(0)
     for obj in (holder, roof):
-        links = new_collection("Links", obj)
+        links = links_to("Links", obj)
         exclude(links.collection_objects)
         sun.light_linking.blocker_collection = links
         assert cycles_irradiance(*planes[0], samples=16).any()

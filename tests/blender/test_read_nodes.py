@@ -11,6 +11,7 @@ from beamspread.blender.read.shading import ShadingPoints
 from beamspread.core.errors import NotSupportedError
 from cycles_truth import add_receiver, cycles_irradiance
 from mathutils import Matrix
+from nodes import Nodes, add_sockets
 
 # Cycles sums even light from everywhere exactly, but for single precision.
 EXACT = {"rel": 2e-5, "abs": 2e-6}
@@ -21,12 +22,8 @@ class World:
     """A world whose background has the colour that a test links to it."""
 
     def __init__(self):
-        world = bpy.data.worlds.new("World")
-        if bpy.app.version < (5, 0, 0):
-            world.use_nodes = True
-        bpy.context.scene.world = world
-        self.tree = world.node_tree
-        self.tree.nodes.clear()
+        bpy.context.scene.world = bpy.data.worlds.new("World")
+        self.tree = Nodes(bpy.context.scene.world, clear=True).tree
         self.background, self.output = self.add("ShaderNodeBackground"), self.add("ShaderNodeOutputWorld")
         self.link(self.background.outputs[0], self.output.inputs["Surface"])
         self.plane, self.image = add_receiver(Matrix(), texels=4)
@@ -190,11 +187,7 @@ def test_a_color_becomes_a_number_by_its_luminance_a_vector_by_its_mean(world):
 def new_group(world):
     """A group that multiplies its two inputs by 3 each, as a node of the world; in Blender 4.0 sockets moved."""
     tree = bpy.data.node_groups.new("Times", "ShaderNodeTree")
-    for name, in_out in (("A", "INPUT"), ("B", "INPUT"), ("C", "OUTPUT"), ("D", "OUTPUT")):
-        if hasattr(tree, "interface"):
-            tree.interface.new_socket(name, in_out=in_out, socket_type="NodeSocketFloat")
-        else:
-            (tree.inputs if in_out == "INPUT" else tree.outputs).new("NodeSocketFloat", name)
+    add_sockets(tree, "NodeSocketFloat", ("A", "B"), ("C", "D"))
     start, end = world.add("NodeGroupInput", tree), world.add("NodeGroupOutput", tree)
     for i in range(2):
         times = world.add("ShaderNodeMath", tree, operation="MULTIPLY")

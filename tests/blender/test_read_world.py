@@ -10,33 +10,23 @@ from beamspread.blender.read.lights import read_illumination
 from beamspread.blender.read.world_light import directions
 from cycles_truth import add_receiver, cycles_irradiance
 from mathutils import Euler, Matrix
+from nodes import Nodes
+from scenes import add_world
 
 TILTS = {"up": Matrix(), "tilted": Euler((0.9, -0.4, 0.8)).to_matrix().to_4x4(), "down": Matrix.Rotation(2.5, 4, "X")}
 STUDIO = ["forest", "interior", "sunset"]
 
 
-def add_world(strength=1.0, color=(1, 1, 1, 1)):
-    """A world with a background, and that node."""
-    world = bpy.data.worlds.new("World")
-    if bpy.app.version < (5, 0, 0):
-        world.use_nodes = True
-    bpy.context.scene.world = world
-    background = next(node for node in world.node_tree.nodes if node.bl_idname == "ShaderNodeBackground")
-    background.inputs["Color"].default_value, background.inputs["Strength"].default_value = color, strength
-    return world, background
-
-
 def add_environment(image, background, turn=None):
     """An environment texture behind the background, through a Mapping node with Euler angles if given."""
-    tree = background.id_data
-    texture = tree.nodes.new("ShaderNodeTexEnvironment")
-    texture.image = image
-    tree.links.new(texture.outputs["Color"], background.inputs["Color"])
+    nodes = Nodes(bpy.context.scene.world)
+    texture = nodes.add("TexEnvironment", image=image)
+    nodes.set(background.inputs["Color"], texture.outputs["Color"])
     if turn is not None:
-        mapping, coordinates = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
-        mapping.inputs["Rotation"].default_value = turn
-        tree.links.new(coordinates.outputs["Generated"], mapping.inputs["Vector"])
-        tree.links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
+        vector = nodes.add("TexCoord").outputs["Generated"]
+        nodes.set(
+            texture.inputs["Vector"], nodes.add("Mapping", {"Vector": vector, "Rotation": turn}).outputs["Vector"]
+        )
     return texture
 
 
@@ -77,7 +67,7 @@ def assert_agrees(light, tilt, samples=2048, rel=0.01):
 
 
 def test_an_even_world():
-    add_world(2, (1, 0.5, 0.25, 1))
+    add_world((1, 0.5, 0.25, 1), 2)
     light = the_world()
     assert light.rgb() == pytest.approx((2, 1, 0.5))
     assert not light.is_colored
@@ -88,7 +78,7 @@ def test_an_even_world():
 def test_a_world_without_nodes():
     if bpy.app.version >= (5, 0, 0):
         pytest.skip("all worlds have nodes")
-    world, _ = add_world()
+    world = add_world()[0].owner
     world.use_nodes, world.color = False, (0.2, 0.3, 0.4)
     assert the_world().rgb() == pytest.approx((0.2, 0.3, 0.4))
     assert_agrees(the_world(), TILTS["up"], 1, 1e-3)
@@ -116,8 +106,7 @@ def black(world):
 
 @pytest.mark.parametrize("darken", [no_diffuse, no_sky, none_at_all, no_output, black])
 def test_a_dark_world_is_no_light(darken):
-    world, _ = add_world()
-    darken(world)
+    darken(add_world()[0].owner)
     plane, image = add_receiver(Matrix(), texels=4)
     assert cycles_irradiance(plane, image, 4).max() == 0
     assert read().lights == ()
@@ -127,7 +116,7 @@ def test_a_dark_world_is_no_light(darken):
 @pytest.mark.parametrize("tilt", TILTS.values(), ids=TILTS.keys())
 @pytest.mark.parametrize("name", STUDIO)
 def test_studio_lights(name, tilt):
-    _, background = add_world(1.5)
+    _, background = add_world(strength=1.5)
     add_environment(studio(name), background)
     assert_agrees(the_world(), tilt)
 
@@ -172,29 +161,22 @@ def test_images_of_few_texels_are_smooth():
 
 
 def test_mixed_and_graded_environments():
-    _, background = add_world()
+    nodes, background = add_world()
     texture = add_environment(studio("forest"), background, (0, 0, 1.0))
-    tree = background.id_data
-    mix, hue = tree.nodes.new("ShaderNodeMix"), tree.nodes.new("ShaderNodeHueSaturation")
-    mix.data_type, mix.blend_type = "RGBA", "MULTIPLY"
-    colors = [socket for socket in mix.inputs if socket.enabled]
-    colors[0].default_value, colors[2].default_value = 0.7, (1, 0.4, 0.2, 1)
-    hue.inputs["Saturation"].default_value = 0.5
-    tree.links.new(texture.outputs["Color"], hue.inputs["Color"])
-    tree.links.new(hue.outputs["Color"], colors[1])
-    tree.links.new(next(one for one in mix.outputs if one.enabled), background.inputs["Color"])
+    hue = nodes.add("HueSaturation", {"Saturation": 0.5, "Color": texture.outputs["Color"]})
+    mix = nodes.add("Mix", data_type="RGBA", blend_type="MULTIPLY")
+    for socket, value in zip((one for one in mix.inputs if one.enabled), (0.7, hue.outputs["Color"], (1, 0.4, 0.2, 1))):
+        nodes.set(socket, value)
+    nodes.set(background.inputs["Color"], next(one for one in mix.outputs if one.enabled))
     assert_agrees(the_world(), TILTS["tilted"])
 
 
 def test_light_that_changes_with_the_direction():
-    _, background = add_world()
-    tree = background.id_data
-    coordinates, ramp = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeValToRGB")
-    split = tree.nodes.new("ShaderNodeSeparateXYZ")
+    nodes, background = add_world()
+    split = nodes.add("SeparateXYZ", {0: nodes.add("TexCoord").outputs["Generated"]})
+    ramp = nodes.add("ValToRGB", {0: split.outputs["Z"]})
     ramp.color_ramp.elements[0].color, ramp.color_ramp.elements[1].color = (1, 0.3, 0.1, 1), (0.1, 0.3, 2, 1)
-    tree.links.new(coordinates.outputs["Generated"], split.inputs[0])
-    tree.links.new(split.outputs["Z"], ramp.inputs[0])
-    tree.links.new(ramp.outputs["Color"], background.inputs["Color"])
+    nodes.set(background.inputs["Color"], ramp.outputs["Color"])
     for tilt in TILTS.values():
         assert_agrees(the_world(), tilt)
 
@@ -252,9 +234,8 @@ def test_huge_images_are_averaged_with_their_energy():
 
 
 def test_unsupported_nodes_are_left_to_cycles():
-    _, background = add_world()
-    tree = background.id_data
-    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], background.inputs["Color"])
+    nodes, background = add_world()
+    nodes.set(background.inputs["Color"], nodes.add("TexNoise").outputs["Color"])
     illumination = read()
     text = "The world 'World' is left out. The node 'Noise Texture' is not supported."
     assert illumination.lights == ()
@@ -263,6 +244,6 @@ def test_unsupported_nodes_are_left_to_cycles():
 
 
 def test_negative_light_is_named():
-    add_world(-1)
+    add_world(strength=-1)
     assert read().lights == ()
     assert "The light 'World' is left out. The color of 'World' is -1, -1, -1" in read().messages[0].text

@@ -3,27 +3,25 @@
 import bpy
 import numpy as np
 import pytest
+import scenes
 from beamspread.blender.images.facts import ATTRIBUTE, is_sequence
 from beamspread.blender.images.files import write_exr
 from beamspread.blender.jobs.out_of_date import stale
-from beamspread.blender.jobs.run import batch_run
 from beamspread.blender.jobs.state import Status, state
-from beamspread.core.batch import batch_options
 from beamspread.core.native import native
-from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, save_scene, select
 
 
 @pytest.fixture
 def plane(tmp_path):
     """Baked once, and at the frames 3 to 5 under a sun that grows stronger."""
-    plane = add_plane(material=add_material())
-    sun = add_sun(20)
+    plane = scenes.add_plane(material=scenes.add_material())
+    sun = scenes.add_sun(20)
     for frame in (1, 10):
         sun.data.energy = frame
         sun.data.keyframe_insert("energy", frame=frame)
-    save_scene(tmp_path)
-    bake(plane)
-    assert batch_run.bake_all(batch_options.parse(["--frames", "3-5"])).all_written()
+    scenes.save_scene(tmp_path)
+    scenes.bake(plane)
+    assert scenes.run_batch("--frames", "3-5").all_written()
     return plane
 
 
@@ -57,7 +55,7 @@ def test_the_row_names_changes_since_the_frame_that_is_shown(plane, tmp_path):
     row = row_at(3)
     assert [*map(str, row.messages)] == [f"{shown}. Changed since this frame was baked: lights."]
     assert not row.is_stale  # for a bake of this image
-    assert batch_run.bake_all(batch_options.parse(["--frames", "3-3"])).all_written()
+    assert scenes.run_batch("--frames", "3-3").all_written()
     assert row_at(3).status == Status.BAKED
     # Older files and PNG files have no record.
     write_exr(tmp_path / "beamspread" / "Plane_Medium_0003.exr", np.ones((32, 32, 3), np.float32), {ATTRIBUTE: ""})
@@ -65,7 +63,7 @@ def test_the_row_names_changes_since_the_frame_that_is_shown(plane, tmp_path):
 
 
 def test_the_node_follows_the_frame(plane, tmp_path):
-    node = node_of(plane.data.materials[0])
+    node = scenes.node_of(plane.data.materials[0])
     own = node.image
     assert bpy.ops.beamspread.show_frames() == {"FINISHED"}
     assert is_sequence(node.image)
@@ -77,13 +75,12 @@ def test_the_node_follows_the_frame(plane, tmp_path):
     assert np.divide(rendered, rendered[0]) == pytest.approx(np.divide(written, written[0]), rel=0.02)
     # After the file is opened again, with the former image, which nothing else shows.
     name = own.name
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
-    node = node_of(bpy.data.materials["Medium"])
+    scenes.reopen(tmp_path)
+    node = scenes.node_of(bpy.data.materials["Medium"])
     assert is_sequence(node.image)
     assert bpy.ops.beamspread.show_single() == {"FINISHED"}
     assert node.image.name == name
-    assert pixels(node.image).any()
+    assert scenes.pixels(node.image).any()
 
 
 def render_brightness(plane, frame, folder):
@@ -98,7 +95,7 @@ def render_brightness(plane, frame, folder):
         scene.render.resolution_x = scene.render.resolution_y = 8
         scene.cycles.samples, scene.cycles.use_denoising = 1, False
         scene.render.image_settings.file_format = "OPEN_EXR"
-        node_of(plane.data.materials[0]).ior = 1.0
+        scenes.node_of(plane.data.materials[0]).ior = 1.0
     scene.frame_set(frame)
     scene.render.filepath = str(folder / f"picture{frame}.exr")
     bpy.ops.render.render(write_still=True)
@@ -108,14 +105,14 @@ def render_brightness(plane, frame, folder):
 def test_a_sequence_is_not_baked_into_and_a_batch_writes_its_frames_again(plane, tmp_path):
     bpy.ops.beamspread.show_frames()
     before = {path: path.read_bytes() for path in (tmp_path / "beamspread").iterdir()}
-    select(plane)
-    assert "Show Single Images" in messages_of(bpy.ops.beamspread.bake)
+    scenes.select(plane)
+    assert "Show Single Images" in scenes.messages_of(bpy.ops.beamspread.bake)
     bpy.data.lights["Sun"].animation_data_clear()
     bpy.data.lights["Sun"].energy = 20
-    report = batch_run.bake_all(batch_options.parse([]))
+    report = scenes.run_batch()
     assert [one.path for one in report.bakes] == [str(tmp_path / "beamspread" / "Plane_Medium.exr")]
     assert before == {path: path.read_bytes() for path in before}
-    assert batch_run.bake_all(batch_options.parse(["--frames", "3-5"])).all_written()
+    assert scenes.run_batch("--frames", "3-5").all_written()
     assert all(path.read_bytes() != content for path, content in before.items())
 
 
@@ -126,4 +123,4 @@ def test_gaps_and_missing_frames_are_reported(plane, tmp_path, capfd):
     for path in (tmp_path / "beamspread").iterdir():
         path.unlink()
     bpy.ops.beamspread.show_single()
-    assert f"no frames of a batch in {tmp_path / 'beamspread'}" in messages_of(bpy.ops.beamspread.show_frames)
+    assert f"no frames of a batch in {tmp_path / 'beamspread'}" in scenes.messages_of(bpy.ops.beamspread.show_frames)

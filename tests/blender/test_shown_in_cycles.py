@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 from beamspread.core.native import native
-from scenes import add_blocker, add_material, add_plane, add_sun, bake, node_of
+from scenes import add_blocker, add_material, add_plane, add_sun, add_world, bake, node_of, reopen
 
 
 def render(path, size):
@@ -38,9 +38,7 @@ def test_render_shows_the_bake(tmp_path, reopened):
     # Light that Cycles would add: the wall in front of the camera, and the coat's reflection of the sun.
     wall.hide_render = sun.hide_render = True
     if reopened:
-        path = str(tmp_path / "scene.blend")
-        bpy.ops.wm.save_as_mainfile(filepath=path)
-        bpy.ops.wm.open_mainfile(filepath=path)
+        reopen(tmp_path)
     shown = render(tmp_path / "render.exr", 32)
     assert texture.max() > 0.3
     assert np.abs(shown - texture).mean() < 0.01 * texture.mean()
@@ -50,10 +48,7 @@ def test_render_shows_the_bake(tmp_path, reopened):
 def test_coat_reflects_only_with_an_ior_above_one(tmp_path):
     """A white world over a black medium: 0.04 at normal incidence for an ior of 1.5, nothing for 1."""
     bpy.context.scene.beamspread.resolution = 8
-    world = bpy.data.worlds.new("World")
-    world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (1, 1, 1, 1)
-    bpy.context.scene.world = world
+    add_world()
     material = add_material(albedo=(0, 0, 0))
     plane = add_plane(material=material)
     add_sun(0).hide_render = True

@@ -13,39 +13,18 @@ from beamspread.core.scene.receiver import build_receiver
 from beamspread.core.scene.uv_map import fit_uv_maps
 from cycles_truth import TEXELS, add_receiver, around, cycles_irradiance
 from mathutils import Matrix
+from nodes import Nodes, add_sockets
 
 FINE = 4
 TOLERANCE = 0.01
 ABOVE = Matrix.Translation((0, 0, 0.5))
 
 
-class Tree:
-    """A material whose nodes are made by kind, with inputs given as values or as sockets to link."""
+class Tree(Nodes):
+    """A material of its own."""
 
     def __init__(self, name="See-through"):
-        self.material = bpy.data.materials.new(name)
-        if bpy.app.version < (5, 0, 0):  # later ones always use nodes, and warn
-            self.material.use_nodes = True
-        self.tree = self.material.node_tree
-        self.tree.nodes.clear()
-
-    def add(self, kind, inputs=(), **properties):
-        node = self.tree.nodes.new(f"ShaderNode{kind}")
-        for name, value in properties.items():
-            setattr(node, name, value)
-        for key, value in dict(inputs).items():
-            self.set(node.inputs[key], value)
-        return node
-
-    def set(self, socket, value):
-        if isinstance(value, bpy.types.NodeSocket):
-            self.tree.links.new(value, socket)
-        else:
-            socket.default_value = value
-
-    def finish(self, shader, socket="Surface"):
-        self.add("OutputMaterial", {socket: shader.outputs[0]})
-        return self.material
+        super().__init__(bpy.data.materials.new(name), clear=True)
 
     def transparent(self, *color):
         return self.add("BsdfTransparent", {"Color": (*color, 1)})
@@ -181,12 +160,8 @@ def in_group(tree):
     """Transparency by a factor that comes through two groups and a reroute."""
     inner, outer = (bpy.data.node_groups.new(name, "ShaderNodeTree") for name in ("Inner", "Outer"))
     for group in (inner, outer):
-        if hasattr(group, "interface"):
-            group.interface.new_socket("Part", in_out="INPUT", socket_type="NodeSocketFloat")
-            group.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
-        else:
-            group.inputs.new("NodeSocketFloat", "Part")
-            group.outputs.new("NodeSocketShader", "Shader")
+        add_sockets(group, "NodeSocketFloat", "Part")
+        add_sockets(group, "NodeSocketShader", outputs="Shader")
     for group in (inner, outer):
         nodes, links = group.nodes, group.links
         entry, leave, bend = nodes.new("NodeGroupInput"), nodes.new("NodeGroupOutput"), nodes.new("NodeReroute")
@@ -347,10 +322,7 @@ def catch_shadows(card):
 
 
 def make_indirect(card):
-    collection = bpy.data.collections.new("Indirect")
-    bpy.context.scene.collection.children.link(collection)
-    bpy.context.collection.objects.unlink(card)
-    collection.objects.link(card)
+    bpy.context.scene.collection.children.link(scenes.new_collection("Indirect", card))
     bpy.context.view_layer.layer_collection.children["Indirect"].indirect_only = True
 
 
@@ -365,16 +337,9 @@ def test_visibility(change):
 def test_instances_of_a_collection(is_visible):
     tree = Tree()
     card = add_card(tree.finish(tree.transparent(0.5, 0.5, 0.5)), size=(0.5, 0.5), matrix=Matrix())
-    collection = bpy.data.collections.new("Cards")
-    bpy.context.collection.objects.unlink(card)
-    collection.objects.link(card)
+    cards, mirror = scenes.new_collection("Cards", card), Matrix.Diagonal((-1, 1.2, 1, 1))
     for i in range(3):
-        holder = bpy.data.objects.new(f"Holder {i}", None)
-        holder.instance_type, holder.instance_collection = "COLLECTION", collection
-        holder.matrix_world = Matrix.Translation((0.4 * i - 0.4, 0.1 * i, 0.4 + 0.1 * i)) @ Matrix.Diagonal(
-            (-1, 1.2, 1, 1)
-        )
-        holder.visible_shadow = is_visible
-        bpy.context.scene.collection.objects.link(holder)
+        place = Matrix.Translation((0.4 * i - 0.4, 0.1 * i, 0.4 + 0.1 * i))
+        scenes.add_instancer(cards, place @ mirror).visible_shadow = is_visible
     ours = assert_agree()
     assert (np.ptp(ours) > 0.5) == is_visible

@@ -7,6 +7,7 @@ import scenes
 from beamspread.blender.node.tree import make_inner_tree
 from cycles_truth import add_receiver, cycles_bake
 from mathutils import Euler, Matrix
+from nodes import Nodes
 
 COLOR = (0.7, 0.4, 0.2)
 WALL = Matrix.Translation((0.0, 0.0, 0.4)) @ Euler((0, np.pi / 2, 0)).to_matrix().to_4x4()
@@ -55,10 +56,8 @@ def test_an_albedo_shows_the_color_of_its_medium():
 
 def test_its_color_output_is_black_until_it_is_baked():
     material = unbaked()
-    tree = material.node_tree
-    emission = tree.nodes.new("ShaderNodeEmission")
-    tree.links.new(emission.inputs["Color"], scenes.node_of(material).outputs["Color"])
-    tree.links.new(tree.get_output_node("ALL").inputs["Surface"], emission.outputs[0])
+    nodes = Nodes(material)
+    nodes.show(nodes.add("Emission", {"Color": scenes.node_of(material).outputs["Color"]}))
     assert not light_from(material, with_sun=False).any()
 
 

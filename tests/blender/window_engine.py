@@ -5,6 +5,7 @@ from pathlib import Path
 
 import bpy
 import scenes
+from nodes import Nodes
 from scenario_player import in_window, is_over
 
 PATIENCE_SECONDS = 90
@@ -85,15 +86,10 @@ def blender_s_own_bake(plane):
 
 
 def add_checkered_lamp():
-    data = bpy.data.lights.new("Checkered", "POINT")
-    data.energy, data.use_nodes = 100, True
-    tree = data.node_tree
-    checker = tree.nodes.new("ShaderNodeTexChecker")
-    checker.inputs["Color1"].default_value, checker.inputs["Color2"].default_value = (1, 0, 0, 1), (0.5, 0, 0, 1)
-    tree.links.new(checker.outputs["Color"], tree.nodes["Emission"].inputs["Color"])
-    lamp = bpy.data.objects.new("Checkered", data)
-    lamp.location = 0, 0, 1
-    bpy.context.collection.objects.link(lamp)
+    lamp = scenes.add_lamp((0, 0, 1))
+    nodes = Nodes(lamp.data)
+    checker = nodes.add("TexChecker", {"Color1": (1, 0, 0, 1), "Color2": (0.5, 0, 0, 1)})
+    nodes.set(nodes.of_type("EMISSION").inputs["Color"], checker.outputs["Color"])
     return lamp
 
 
