@@ -84,11 +84,15 @@ def lamp_over(plane, kind, euler, place=(0.3, -0.2, 1.1), scale=(1, 1, 1), power
     return scenes.add_lamp(None, power, kind, kind, matrix, **({"color": (1, 0.5, 0.25)} | options))
 
 
+def read():
+    """All light of the scene."""
+    bpy.context.view_layer.update()
+    return read_illumination(bpy.context.evaluated_depsgraph_get())
+
+
 def our_irradiance(plane, texels=TEXELS):
     """The same by the add-on, and the coverage of the texels."""
-    bpy.context.view_layer.update()
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    illumination = read_illumination(depsgraph).lighting(plane.name)
+    illumination, depsgraph = read().lighting(plane.name), bpy.context.evaluated_depsgraph_get()
     polygons = read_polygons(plane.evaluated_get(depsgraph), plane.data.materials[0].name)
     receiver = build_receiver(fit_uv_maps(polygons), texels, texels)
     grid = receiver.charts[0].grid

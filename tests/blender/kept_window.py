@@ -2,10 +2,10 @@
 
 import bpy
 import scenes
+from beamspread.blender.images import icons
 from beamspread.blender.jobs.state import state
 from scenario_player import in_window, is_over
 
-PATIENCE_SECONDS = 60
 results = {}
 
 
@@ -18,6 +18,7 @@ def shown_and_packed():
     if image() is None:
         return [-1.0, -1.0]
     shown = float(scenes.pixels(image()).mean())
+    icons.stop_drawing()
     image().buffers_free()
     return [shown, float(scenes.pixels(image()).mean())]
 
@@ -59,7 +60,7 @@ def scenario():
     # Undo while a slow bake runs.
     settings = bpy.context.scene.beamspread
     settings.solver = "direct"
-    image().scale(256, 256)
+    icons.scale(image(), 256, 256)
     bpy.data.objects["Sun"].data.energy = 7.0
     bpy.ops.ed.undo_push(message="light and size")
     in_window(bpy.ops.beamspread.bake, "INVOKE_DEFAULT")

@@ -1,28 +1,19 @@
-"""Runs inside a Blender with a window for test_live_window.py: Live by its own timer, beside events and operators.
-
-xvfb-run blender --factory-startup --python THIS -- RESULTS.json
-"""
+"""Scenario of test_live_window.py: Live by its own timer, beside events and operators."""
 
 import math
-import sys
 import threading
 import time
-from pathlib import Path
 
+import beamspread
 import bpy
+import numpy as np
+import scenes
+from beamspread.blender.jobs.state import state
+from beamspread.blender.live import preview, timer
+from live_scenes import hidden_images, shown_image, shown_pixels, shows_own_image
+from scenario_player import in_window, is_over
 
-FOLDER = Path(__file__).resolve().parent
-sys.path[:0] = [str(FOLDER), str(FOLDER.parent.parent / "build" / "stage")]
-
-import beamspread  # noqa: E402
-import numpy as np  # noqa: E402
-import scenes  # noqa: E402
-from beamspread.blender.jobs.state import state  # noqa: E402
-from beamspread.blender.live import preview, timer  # noqa: E402
-from live_scenes import hidden_images, shown_image, shown_pixels, shows_own_image  # noqa: E402
-from scenario_player import play  # noqa: E402
-
-PATIENCE_SECONDS, DRAG_SECONDS = 60, 2.0
+DRAG_SECONDS = 2.0
 results = {"shown": 0, "shown during the bake": 0, "exact": 0}
 
 
@@ -49,24 +40,6 @@ def is_at_rest():
     return live is not None and not live.is_busy()
 
 
-def override():
-    return bpy.context.temp_override(window=bpy.context.window_manager.windows[0])
-
-
-def add_lamp(name, x):
-    data = bpy.data.lights.new(name, "POINT")
-    data.energy, data.shadow_soft_size = 50, 0
-    obj = bpy.data.objects.new(name, data)
-    obj.location = (x, 0.2, 0.5)
-    bpy.context.collection.objects.link(obj)
-    return obj
-
-
-def is_over(seconds):
-    end = time.monotonic() + seconds
-    return lambda: time.monotonic() > end
-
-
 def drawing_icons(material):
     """Have Blender draw the material's icon in a thread; True if it does."""
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], id=material):
@@ -83,7 +56,7 @@ def scenario():
     settings.quality, settings.resolution, settings.use_indirect, scene.world = "preview", 64, False, None
     material = scenes.add_material(ior=1.4, linked=True)
     plane = scenes.add_plane(material=material)
-    lamps = [add_lamp(f"Lamp {x}", x) for x in (-0.5, 0.0, 0.5)]
+    lamps = [scenes.add_lamp((x, 0.2, 0.5), 50, name=f"Lamp {x}") for x in (-0.5, 0.0, 0.5)]
     shade("SOLID")
     settings.use_live = True
     yield is_over(1.5)
@@ -91,8 +64,8 @@ def scenario():
 
     shade("MATERIAL")
     yield lambda: results["exact"] > 0
-    before, end = results["shown"], time.monotonic() + DRAG_SECONDS
-    while time.monotonic() < end:
+    before, end = results["shown"], is_over(DRAG_SECONDS)
+    while not end() or results["shown"] - before <= 3:
         for number, lamp in enumerate(lamps):
             lamp.location.y = 0.4 * math.sin(9 * time.monotonic() + number)
         yield lambda: True
@@ -108,9 +81,8 @@ def scenario():
     settings.solver = "direct"
     settings.resolution = 40
     yield is_at_rest
-    with override():
-        scenes.select(plane)
-        results["bake"] = sorted(bpy.ops.beamspread.bake("INVOKE_DEFAULT"))
+    scenes.select(plane)
+    results["bake"] = sorted(in_window(bpy.ops.beamspread.bake, "INVOKE_DEFAULT"))
     yield is_over(0.2)
     results["shown beside the bake"] = shown_image(material).name in hidden_images()
     lamps[0].data.energy = 49
@@ -121,8 +93,7 @@ def scenario():
     lamps[0].data.energy = 50
     settings.solver = "fft"
     yield is_at_rest
-    with override():
-        bpy.ops.beamspread.bake("INVOKE_DEFAULT")
+    in_window(bpy.ops.beamspread.bake, "INVOKE_DEFAULT")
     yield lambda: not state.is_running()
     image, shown = scenes.node_of(material).image, results["shown"]
     yield is_over(1.0)
@@ -133,12 +104,10 @@ def scenario():
     lamps[0].data.energy = 500
     yield is_at_rest
     yield lambda: shown_image(material).name in hidden_images()
-    with override():
-        bpy.ops.object.mode_set(mode="TEXTURE_PAINT")
+    in_window(bpy.ops.object.mode_set, mode="TEXTURE_PAINT")
     yield is_over(0.3)
     results["slots while painting"] = [image.name for image in material.texture_paint_images]
-    with override():
-        bpy.ops.object.mode_set(mode="OBJECT")
+    in_window(bpy.ops.object.mode_set, mode="OBJECT")
     yield lambda: shown_image(material).name in hidden_images()
 
     shade("RENDERED")
@@ -146,8 +115,7 @@ def scenario():
     bpy.data.lights["Lamp 0.0"].energy = 500
     bpy.ops.ed.undo_push(message="brighter")
     yield is_over(0.2)
-    with override():
-        bpy.ops.ed.undo()
+    in_window(bpy.ops.ed.undo)
     material = bpy.data.materials["Medium"]
     results["shown right after undo"] = shown_image(material).name in hidden_images() and bool(
         shown_pixels(material).any()
@@ -173,10 +141,4 @@ def scenario():
     results["threads"] = [thread.name for thread in threading.enumerate() if thread.name.startswith("Beamspread")]
 
 
-def main():
-    beamspread.register()
-    count_renderings()
-    play(scenario(), results, PATIENCE_SECONDS, pause=0.02)
-
-
-main()
+count_renderings()

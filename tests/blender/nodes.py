@@ -28,16 +28,16 @@ class Nodes:
     def of_type(self, kind):
         return next(node for node in self.tree.nodes if node.type == kind)
 
-    def show(self, shader):
+    def show(self, shader, socket="Surface"):
         """Link the shader, or a socket, to the output that Cycles renders, which may be new."""
         output = self.tree.get_output_node("CYCLES")
         if output is None:
             output = self.add(f"Output{type(self.owner).__name__}")
-        set_input(output.inputs["Surface"], getattr(shader, "outputs", [shader])[0])
+        set_input(output.inputs[socket], getattr(shader, "outputs", [shader])[0])
 
-    def finish(self, shader):
+    def finish(self, shader, socket="Surface"):
         """The owner, which shows the shader."""
-        self.show(shader)
+        self.show(shader, socket)
         return self.owner
 
 

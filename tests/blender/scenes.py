@@ -153,6 +153,41 @@ def add_blocker(height, matrix=None):
     return add_mesh("Wall", vertices, [(0, 1, 2, 3)], matrix)
 
 
+def add_camera(width=1.0, height=2.0):
+    """The scene's camera, which looks down on a square of the xy plane."""
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.type, camera.data.ortho_scale, camera.location.z = "ORTHO", width, height
+    bpy.context.scene.collection.objects.link(camera)
+    bpy.context.scene.camera = camera
+    return camera
+
+
+def render(path, size=8, samples=1):
+    """Linear pixels of the scene's render."""
+    scene = bpy.context.scene
+    scene.cycles.samples, scene.cycles.use_denoising = samples, False
+    scene.render.resolution_x = scene.render.resolution_y = size
+    scene.render.image_settings.file_format, scene.render.filepath = "OPEN_EXR", str(path)
+    bpy.ops.render.render(write_still=True)
+    return pixels(bpy.data.images.load(str(path)))
+
+
+def known_image(color=(0.25, 0.5, 0.75), name="Known"):
+    """An image of linear values in memory."""
+    image = bpy.data.images.new(name, 4, 4, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    image.pixels.foreach_set([*color, 1] * 16)
+    return image
+
+
+def load_data(path, link=False, **names):
+    """Append or link data-blocks of a file, given by kind: materials=["Medium"]; those of all kinds in a list."""
+    with bpy.data.libraries.load(str(path), link=link) as (_, wanted):
+        for kind, chosen in names.items():
+            setattr(wanted, kind, chosen)
+    return [block for kind in names for block in getattr(wanted, kind)]
+
+
 def pixels(image):
     """Float32 (height, width, 3), row 0 at the bottom."""
     values = np.empty(len(image.pixels), np.float32)

@@ -130,18 +130,12 @@ def test_viewport_hidden_caster_and_modifiers_render():
 
 @pytest.fixture
 def seen():
-    """A camera above a plane that shows a known image, 8 x 8 pixels of Cycles."""
+    """A camera above a plane that shows a known image, 8 x 6 pixels of Cycles."""
     scene = bpy.context.scene
-    image = bpy.data.images.new("Known", 4, 4, float_buffer=True)
-    image.colorspace_settings.name = "Non-Color"
-    image.pixels.foreach_set([0.25, 0.5, 0.75, 1] * 16)
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.type, camera.data.ortho_scale, camera.location.z = "ORTHO", 1.0, 2.0
-    scene.collection.objects.link(camera)
-    scene.camera = camera
+    scenes.add_camera()
     scene.render.resolution_x, scene.render.resolution_y = 8, 6
     scene.cycles.samples, scene.cycles.use_denoising = 4, False
-    return scenes.add_plane(material=scenes.add_material(image=image, linked=True))
+    return scenes.add_plane(material=scenes.add_material(image=scenes.known_image(), linked=True))
 
 
 def picture(tmp_path):

@@ -290,9 +290,7 @@ def link_tiles(tmp_path, has_image):
     path = str(tmp_path / "library.blend")
     bpy.data.libraries.write(path, {bpy.data.collections["Tiles"]})
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    with bpy.data.libraries.load(path, link=True) as (_, wanted):
-        wanted.collections = ["Tiles"]
-    return add_instancer(bpy.data.collections["Tiles"], SKEWED)
+    return add_instancer(scenes.load_data(path, link=True, collections=["Tiles"])[0], SKEWED)
 
 
 @pytest.mark.parametrize("has_image", [False, True])

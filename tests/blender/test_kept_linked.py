@@ -19,11 +19,10 @@ def link_from_library(folder):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.beamspread.quality, bpy.context.scene.beamspread.use_indirect = "preview", False
     bpy.context.scene.beamspread.resolution = 32
-    with bpy.data.libraries.load(str(path), link=True) as (_, wanted):
-        wanted.objects = ["Plane", "Sun"]
-    for obj in wanted.objects:
+    plane, sun = scenes.load_data(path, link=True, objects=["Plane", "Sun"])
+    for obj in (plane, sun):
         bpy.context.collection.objects.link(obj)
-    return wanted.objects[0]
+    return plane
 
 
 def test_a_linked_material_is_refused_before_the_bake(tmp_path):
@@ -89,9 +88,8 @@ def test_an_appended_image_is_no_ones(tmp_path):
     scenes.bake(plane)
     path = str(tmp_path / "copy.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
-    with bpy.data.libraries.load(path) as (_, wanted):
-        wanted.materials = ["Medium"]
-    other = scenes.add_plane("Other", matrix=Matrix.Translation((5, 0, 0)), material=wanted.materials[0])
+    (material,) = scenes.load_data(path, materials=["Medium"])
+    other = scenes.add_plane("Other", matrix=Matrix.Translation((5, 0, 0)), material=material)
     image = scenes.image_of(other)
     assert image != scenes.image_of(plane)
     assert [*facts_of(image).bakes] == [Target("Plane", "Medium")]

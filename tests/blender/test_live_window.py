@@ -1,31 +1,13 @@
 """Live in a window, by its own timer; see live_window.py."""
 
-import json
-import subprocess
-from pathlib import Path
-
-import bpy
 import pytest
+from scenario_player import results_of
 
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
     """Results of live_window.py."""
-    if not bpy.app.binary_path:
-        pytest.skip("the bpy module opens no window")
-    path = tmp_path_factory.mktemp("window") / "results.json"
-    screen = ["xvfb-run", "-a", "-s", "-screen 0 1600x1000x24 +extension GLX"]
-    options = ["--factory-startup", "--window-geometry", "0", "0", "640", "480"]
-    script = ["--python-exit-code", "1", "--python", str(Path(__file__).with_name("live_window.py")), "--", str(path)]
-    command = [*screen, bpy.app.binary_path, *options, *script]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
-    assert path.exists(), done.stdout + done.stderr
-    results = json.loads(path.read_text())
-    assert "error" not in results, results["error"]
-    assert results["complete"]
-    assert done.returncode == 0, done.stderr
-    assert "Traceback" not in done.stdout + done.stderr
-    return results
+    return results_of("live_window", tmp_path_factory.mktemp("window"), size=(640, 480))
 
 
 def test_previews_follow_lamps_that_are_dragged_where_a_view_shows_materials(seen):

@@ -7,7 +7,7 @@ import bpy
 import pytest
 import scenes
 from beamspread.blender.jobs.state import state
-from beamspread.blender.read.lights import read_illumination
+from cycles_truth import read
 from nodes import Nodes
 from scenes import add_lamp, add_material, add_mesh, add_plane, add_sun, bake, batch_command, node_of, save_scene
 
@@ -43,10 +43,6 @@ def add_panel(image):
     nodes = Nodes(bpy.data.materials.new("Screen"))
     nodes.show(nodes.add("Emission", {"Color": texture(nodes, image)}))
     add_mesh("Panel", [(0, 0, 1), (1, 0, 1), (0, 1, 1)], [(0, 1, 2)]).data.materials.append(nodes.owner)
-
-
-def read():
-    return read_illumination(bpy.context.evaluated_depsgraph_get())
 
 
 def texts(illumination):

@@ -13,7 +13,19 @@ from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.node import draw, principled
 from beamspread.blender.node.buttons import BEAMSPREAD_OT_from_principled
 from beamspread.core.material import ior_of_reflectance, transport_length
-from scenes import add_material, add_plane, add_sun, bake, messages_of, node_of, pixels, reopen, select
+from scenes import (
+    add_camera,
+    add_material,
+    add_plane,
+    add_sun,
+    bake,
+    known_image,
+    messages_of,
+    node_of,
+    pixels,
+    reopen,
+    select,
+)
 
 IS_BEFORE_4 = bpy.app.version < (4, 0, 0)
 
@@ -69,8 +81,6 @@ class TestPreset:
         assert node_of(bpy.data.materials["Medium"]).preset == "cream"
 
     def test_comes_back_by_undo(self):
-        if bpy.app.background and not bpy.context.preferences.edit.use_global_undo:
-            pytest.skip("no undo here")
         add_material().use_fake_user = True
         node_of(bpy.data.materials["Medium"]).preset = "marble"
         bpy.ops.ed.undo_push(message="preset")
@@ -258,14 +268,9 @@ class TestPlainNodes:
     def baked(self, plane):
         """Seen from above, with an image of a known colour that is packed."""
         node = node_of(plane.data.materials[0])
-        node.image = bpy.data.images.new("Baked", 4, 4, float_buffer=True)
-        node.image.colorspace_settings.name = "Non-Color"
-        node.image.pixels.foreach_set([0.25, 0.5, 0.75, 1] * 16)
+        node.image = known_image()
         node.image.pack()
-        camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-        camera.data.type, camera.data.ortho_scale, camera.location.z = "ORTHO", 1.0, 2.0
-        bpy.context.collection.objects.link(camera)
-        bpy.context.scene.camera = camera
+        add_camera()
         bpy.data.objects["Sun"].hide_render = True
         material = plane.data.materials[0]
         surface = material.node_tree.get_output_node("ALL").inputs["Surface"]

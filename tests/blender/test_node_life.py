@@ -9,7 +9,20 @@ import pytest
 from beamspread.blender.jobs.out_of_date.pixels import images_of
 from beamspread.blender.node.node import upgrade_nodes
 from beamspread.blender.node.tree import BASE_COLOR, EMISSION, IMAGE, UNSEEN
-from scenes import add_material, add_plane, add_sun, bake, node_of, pixels, reopen, select
+from nodes import Nodes
+from scenes import (
+    add_camera,
+    add_material,
+    add_plane,
+    add_sun,
+    bake,
+    load_data,
+    node_of,
+    pixels,
+    render,
+    reopen,
+    select,
+)
 
 OLDER_FILE = str(Path(__file__).with_name("files") / "node_before_sockets.blend")
 INPUTS = ["Base Color", "Roughness", "Normal"]
@@ -44,9 +57,7 @@ def test_an_older_file_that_was_open_before_the_add_on_was_switched_on():
 def test_an_older_linked_node_has_no_texture():
     """A node of another file keeps its inputs, which were none."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with bpy.data.libraries.load(OLDER_FILE, link=True) as (_, linked):
-        linked.materials = ["Marble"]
-    (material,) = linked.materials
+    (material,) = load_data(OLDER_FILE, link=True, materials=["Marble"])
     assert BASE_COLOR not in node_of(material).inputs
     assert images_of(material) == set()
 
@@ -107,9 +118,7 @@ def test_no_input_is_greyed_out_and_trees_without_that_get_it():
 
 
 def test_append_from_an_older_file():
-    with bpy.data.libraries.load(OLDER_FILE) as (_, target):
-        target.materials = ["Untouched"]
-    node = node_of(target.materials[0])
+    node = node_of(load_data(OLDER_FILE, materials=["Untouched"])[0])
     node.ior = 1.2
     assert [socket.name for socket in node.inputs] == INPUTS
     assert inner(node, "Image").image.name == "Baked"
@@ -146,9 +155,7 @@ def test_linked_and_overridden_materials(tmp_path):
     add_plane("Asset", material=add_material(ior=1.3))
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    with bpy.data.libraries.load(path, link=True) as (_, target):
-        target.objects = ["Asset"]
-    (asset,) = target.objects
+    (asset,) = load_data(path, link=True, objects=["Asset"])
     bpy.context.collection.objects.link(asset)
     node = node_of(asset.data.materials[0])
     assert node.ior == pytest.approx(1.3)
@@ -164,8 +171,6 @@ def test_linked_and_overridden_materials(tmp_path):
 
 
 def test_undo_of_a_first_bake_gives_the_shader_back():
-    if bpy.app.background and not bpy.context.preferences.edit.use_global_undo:
-        pytest.skip("no undo here")
     plane = add_plane(material=add_material(shader=True))
     add_sun(0)
     bpy.context.scene.beamspread.resolution = 16
@@ -184,19 +189,11 @@ def test_undo_of_a_first_bake_gives_the_shader_back():
 
 def rendered(material, tmp_path):
     """Pixels of a picture by Cycles of a plane in front of a bright world, seen at a slant."""
-    scene = bpy.context.scene
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.type, camera.data.ortho_scale = "ORTHO", 0.5
+    camera = add_camera(0.5)
     camera.location, camera.rotation_euler = (0, -2, 2), (0.7854, 0, 0)
-    scene.collection.objects.link(camera)
-    scene.camera, scene.world = camera, bpy.data.worlds.new("World")
-    scene.world.use_nodes = True
-    scene.cycles.samples, scene.cycles.use_denoising = 64, False
-    scene.render.resolution_x = scene.render.resolution_y = 8
-    path = tmp_path / f"{material.name}.exr"
-    scene.render.image_settings.file_format, scene.render.filepath = "OPEN_EXR", str(path)
-    bpy.ops.render.render(write_still=True)
-    return pixels(bpy.data.images.load(str(path)))
+    Nodes(bpy.data.worlds.new("World"))
+    bpy.context.scene.world = bpy.data.worlds["World"]
+    return render(tmp_path / f"{material.name}.exr", samples=64)
 
 
 def test_the_coat_is_that_of_glossy_without_a_normal_and_turns_with_one(tmp_path):

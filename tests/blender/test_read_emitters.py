@@ -9,9 +9,8 @@ import scenes
 from beamspread.blender.jobs.state import state
 from beamspread.blender.node.output import make_plain, plain_of
 from beamspread.blender.read.emitters import _pieces
-from beamspread.blender.read.lights import read_illumination
 from beamspread.core.scene.lights import MeshLight
-from cycles_truth import add_receiver, cycles_irradiance
+from cycles_truth import add_receiver, cycles_irradiance, read
 from mathutils import Euler, Matrix
 from nodes import Nodes
 
@@ -34,11 +33,6 @@ def glowing_material(strength=3.0, color=COLOR, kind="Emission"):
 
 def add_panel(matrix=ABOVE, size=(1.0, 0.6), material=None):
     return scenes.add_plane("Panel", size, matrix, material=material or glowing_material()[0])
-
-
-def read():
-    bpy.context.view_layer.update()
-    return read_illumination(bpy.context.evaluated_depsgraph_get())
 
 
 def irradiance(light, cuts=24, points=16):

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 import scenes
 from _native_test import is_delta
-from beamspread.blender.read.lights import read_illumination
 from beamspread.core.scene.lights import AreaLight, PointLight, SpotLight, SunLight
-from cycles_truth import add_receiver, cycles_irradiance, our_irradiance
+from cycles_truth import add_receiver, cycles_irradiance, our_irradiance, read
 from mathutils import Euler, Matrix
 from nodes import Nodes
 
@@ -28,11 +27,6 @@ needs_4_5 = pytest.mark.skipif(bpy.app.version < (4, 5, 0), reason="came in Blen
 
 def add_lamp(kind, matrix=ABOVE, name="Lamp", **options):
     return scenes.add_lamp(None, 20, kind, name, matrix, radius=None, color=(1, 0.5, 0.25), **options)
-
-
-def read():
-    bpy.context.view_layer.update()
-    return read_illumination(bpy.context.evaluated_depsgraph_get())
 
 
 def the_light():

@@ -3,8 +3,7 @@
 import bpy
 import pytest
 import scenes
-from beamspread.blender.read.lights import read_illumination
-from cycles_truth import add_receiver, cycles_irradiance
+from cycles_truth import add_receiver, cycles_irradiance, read
 from mathutils import Matrix
 
 pytestmark = pytest.mark.skipif(bpy.app.version < (4, 0, 0), reason="light linking came in Blender 4.0")
@@ -101,11 +100,6 @@ LINKS = [
     states_below_do_not_count,
     something_else,
 ]
-
-
-def read():
-    bpy.context.view_layer.update()
-    return read_illumination(bpy.context.evaluated_depsgraph_get())
 
 
 def lit(planes):

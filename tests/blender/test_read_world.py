@@ -6,9 +6,8 @@ import bpy
 import numpy as np
 import pytest
 from beamspread.blender.read.image_nodes import MAX_WIDTH, shrunk
-from beamspread.blender.read.lights import read_illumination
 from beamspread.blender.read.world_light import directions
-from cycles_truth import add_receiver, cycles_irradiance
+from cycles_truth import add_receiver, cycles_irradiance, read
 from mathutils import Euler, Matrix
 from nodes import Nodes
 from scenes import add_world
@@ -33,10 +32,6 @@ def add_environment(image, background, turn=None):
 def studio(name):
     folder = bpy.utils.system_resource("DATAFILES", path="studiolights/world")
     return bpy.data.images.load(f"{folder}/{name}.exr")
-
-
-def read():
-    return read_illumination(bpy.context.evaluated_depsgraph_get())
 
 
 def the_world():

@@ -85,21 +85,11 @@ def test_the_node_follows_the_frame(plane, tmp_path):
 
 def render_brightness(plane, frame, folder):
     """Mean of a picture of the plane from above by Cycles, linear."""
-    scene = bpy.context.scene
-    if scene.camera is None:
-        camera = bpy.data.cameras.new("Camera")
-        camera.type, camera.ortho_scale = "ORTHO", 1.0
-        scene.camera = bpy.data.objects.new("Camera", camera)
-        scene.camera.location.z = 3
-        bpy.context.collection.objects.link(scene.camera)
-        scene.render.resolution_x = scene.render.resolution_y = 8
-        scene.cycles.samples, scene.cycles.use_denoising = 1, False
-        scene.render.image_settings.file_format = "OPEN_EXR"
+    if bpy.context.scene.camera is None:
+        scenes.add_camera()
         scenes.node_of(plane.data.materials[0]).ior = 1.0
-    scene.frame_set(frame)
-    scene.render.filepath = str(folder / f"picture{frame}.exr")
-    bpy.ops.render.render(write_still=True)
-    return native.read_exr(scene.render.filepath)[0][..., :3].mean()
+    bpy.context.scene.frame_set(frame)
+    return scenes.render(folder / f"picture{frame}.exr").mean()
 
 
 def test_a_sequence_is_not_baked_into_and_a_batch_writes_its_frames_again(plane, tmp_path):

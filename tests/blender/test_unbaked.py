@@ -62,9 +62,7 @@ def test_its_color_output_is_black_until_it_is_baked():
 
 
 def test_an_image_replaces_the_base_color():
-    image = bpy.data.images.new("Baked", 4, 4, float_buffer=True)
-    image.colorspace_settings.name = "Non-Color"
-    image.pixels.foreach_set(np.tile(np.array((0.2, 0.3, 0.4, 1), np.float32), 16))
+    image = scenes.known_image((0.2, 0.3, 0.4))
     image.pack()
     material = unbaked()
     scenes.node_of(material).image = image

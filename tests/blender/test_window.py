@@ -37,7 +37,7 @@ def test_escape_ends_a_bake_of_minutes_and_keeps_the_images(seen):
     assert 0 < own < 1
     assert (stage, position) == ("Baking", "1 of 2")
     assert everything == pytest.approx(own / 2, rel=0.1)
-    # Drawn by software beside other processes, the window answers slowly; test_queue.py times the bake alone.
+    # CPU time. The window is drawn by software; test_queue.py times the bake alone.
     assert seen["seconds to cancel"] < 10
     assert seen["kept by cancel"]
     assert seen["standing after cancel"] == "Cancelled"
@@ -81,7 +81,6 @@ def test_an_error_ends_the_run_is_said_and_the_next_bake_works(seen):
 
 
 def test_disabling_the_add_on_ends_the_bake_and_its_timer(seen):
-    assert seen["ticks of a bake"] > 2
     assert seen["ticks when disabled"] == 0
     assert not seen["runs on when disabled"]
 
