@@ -30,10 +30,14 @@ LAMPS = {
 }
 
 
-def lamp(size, x, y, height):
-    """Irradiance and directions of a point lamp over a square of texels, lengths in widths of the plane."""
-    across = (np.arange(size) + 0.5) / size - 0.5
-    field = np.stack([*np.meshgrid(across - x, across - y), np.full((size, size), -height)], -1)
+def lamp(shape, x=0.0, y=0.0, height=0.3):
+    """Irradiance and directions of a point lamp over texels; lengths in widths of the plane, from its middle.
+
+    `shape` is the number of texels of a square's side, or height and width.
+    """
+    rows, columns = np.broadcast_to(shape, 2)
+    across, along = ((np.arange(count) + 0.5 - 0.5 * count) / columns for count in (columns, rows))
+    field = np.stack([*np.meshgrid(across - x, along - y), np.full((rows, columns), -height)], -1)
     distance = np.linalg.norm(field, axis=-1, keepdims=True)
     return (height / distance[..., 0] ** 3).astype(np.float32), (field / distance).astype(np.float32)
 

@@ -217,9 +217,9 @@ def save_scene(folder):
     return path
 
 
-def reopen(folder):
+def reopen(folder, name="scene.blend"):
     """Save the scene and open the file."""
-    path = str(folder / "scene.blend")
+    path = str(folder / name)
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
 

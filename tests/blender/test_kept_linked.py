@@ -42,7 +42,7 @@ def test_a_linked_material_is_refused_before_the_bake(tmp_path):
     bpy.ops.object.make_local(type="SELECT_OBDATA_MATERIAL")
     plane = bpy.data.objects["Plane"]
     scenes.bake(plane)
-    scenes.reopen(tmp_path)
+    scenes.reopen(tmp_path, "user.blend")
     assert scenes.pixels(scenes.image_of(bpy.data.objects["Plane"])).any()
 
 
@@ -64,7 +64,7 @@ def test_an_overridden_material_is_refused_and_the_sentence_helps(tmp_path):
     plane = next(obj for obj in bpy.context.scene.objects if obj.type == "MESH")
     assert not problems_of(plane, {plane.name: 1})
     scenes.bake(plane)
-    scenes.reopen(tmp_path)
+    scenes.reopen(tmp_path, "user.blend")
     plane = next(obj for obj in bpy.context.scene.objects if obj.type == "MESH")
     assert scenes.pixels(scenes.image_of(plane)).any()
 

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from beamspread import Cancelled, Medium, convolve, simulate
 
+from helpers import lamp
+
 # A lamp on a plane of 512 x 512 texels, stopped as soon as it adds beams up. Peak memory in MB.
 BIG_LAMP = """
 import resource
@@ -26,13 +28,6 @@ try:
 except Cancelled:
     print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024)
 """
-
-
-def lamp(size):
-    x, y = np.meshgrid(*[(np.arange(size) + 0.5) / size - 0.5] * 2)
-    field = np.stack([x, y, np.full_like(x, -0.3)], -1)
-    distance = np.linalg.norm(field, axis=-1, keepdims=True)
-    return (0.3 / distance[..., 0] ** 3).astype(np.float32), (field / distance).astype(np.float32)
 
 
 @pytest.fixture(scope="module")

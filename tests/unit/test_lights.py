@@ -6,6 +6,8 @@ from _native_test import light_from_point
 from beamspread import Cancelled, Medium, _native, convolve, convolve_lights, library
 from scipy.ndimage import uniform_filter
 
+import helpers
+
 SIZE = 200  # up to 192 x 192 texels all terms are kept
 PATHS = (4.0, 3.0, 2.0)
 ALBEDO = (0.99, 0.98, 0.95)
@@ -19,10 +21,7 @@ def ldf():
 
 def lamp(x, y, height, size=SIZE):
     """Irradiance and directions of a point lamp, lengths in texels."""
-    across = np.arange(size) + 0.5
-    field = np.stack([*np.meshgrid(across - x, across - y), np.full((size, size), -height)], -1)
-    distance = np.linalg.norm(field, axis=-1, keepdims=True)
-    return (height * size / distance[..., 0] ** 3).astype(np.float32), (field / distance).astype(np.float32)
+    return helpers.lamp(size, x / size - 0.5, y / size - 0.5, height / size)
 
 
 def lamps(count, size=SIZE):

@@ -10,6 +10,7 @@ import pytest
 from beamspread import Cancelled, Medium, _native, convolve, library
 from scipy.ndimage import uniform_filter
 
+import helpers
 from helpers import travel
 
 ALBEDO = (0.999, 0.9, 0.99)
@@ -26,9 +27,7 @@ def sun(height, width):
 
 
 def lamp(height, width):
-    x, y = np.meshgrid(np.arange(width) - width / 3, np.arange(height) - height / 2)
-    field = np.stack([x, y, np.full_like(x, -0.2 * max(width, height))], -1)
-    return (field / np.linalg.norm(field, axis=-1, keepdims=True)).astype(np.float32)
+    return helpers.lamp((height, width), x=-1 / 6, height=0.2 * max(width, height) / width)[1]
 
 
 def light(height, width):
