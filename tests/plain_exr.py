@@ -120,3 +120,16 @@ def unzip(packed, size):
     result = np.empty(size, np.uint8)
     result[0::2], result[1::2] = values[:half], values[half:]
     return result.view("<f4")
+
+
+def damaged_copies(whole, count, header):
+    """Cut off, or with four other bytes anywhere or within the header, one after the other."""
+    rng = np.random.default_rng(1)
+    for case in range(count):
+        if case % 3 == 0:
+            yield whole[: rng.integers(1, len(whole))]
+            continue
+        damaged = bytearray(whole)
+        for place in rng.integers(0, len(whole) if case % 3 == 1 else header, 4):
+            damaged[place] ^= int(rng.integers(1, 256))
+        yield bytes(damaged)
