@@ -23,6 +23,7 @@ from .jobs.out_of_date import stale
 from .jobs.run import engine, operator
 from .live import timer
 from .node import buttons, node
+from .read import scene_cache
 from .registration import all_or_nothing
 from .ui import panels
 
@@ -34,6 +35,7 @@ PARTS = (
     undo,
     node,
     buttons,
+    scene_cache,  # its listeners show the nodes that `node` has restored after undo
     state,
     stale,
     engine,

@@ -342,9 +342,7 @@ def test_a_texture_at_base_color_is_followed(monkeypatch):
     add_stripes(material, (0.3, 0.5))
     live_pixels(material)
     with monkeypatch.context() as patched:
-        patched.setattr(
-            "beamspread.blender.live.texture_cache.read_texture", lambda *_: pytest.fail("it was read again")
-        )
+        patched.setattr("beamspread.blender.live.reader.read_texture", lambda *_: pytest.fail("it was read again"))
         lamp.location.x = -0.4
         live = live_pixels(material).copy()
     np.testing.assert_allclose(live, baked_pixels(plane), rtol=1e-4, atol=1e-6)

@@ -21,6 +21,7 @@ from ...core.disk import text_of
 from ...core.messages import Level, Message, note, warning
 from ...core.target import Target
 from ..node.find import targets_of
+from ..read.digests import SCHEME
 from ..read.visibility import with_instanced
 from ..registration import all_or_nothing, handlers
 from . import icons
@@ -50,12 +51,18 @@ class Record:
     parts : digest of each part of the scene that the bake read; empty if unknown.
     warnings, notes : messages of the bake.
     is_dirty : True if the image had unsaved pixels right after the bake.
+    scheme : number of the way in which the digests were made; 1 in files of earlier versions.
     """
 
     parts: dict[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     is_dirty: bool = False
     notes: tuple[str, ...] = ()
+    scheme: int = SCHEME
+
+    def is_comparable(self) -> bool:
+        """True if the digests can be compared with present ones."""
+        return self.scheme == SCHEME
 
     def changed(self, now: dict[str, str]) -> list[str]:
         """Names of the parts whose digest differs. Parts that the record lacks count as unchanged."""
@@ -227,7 +234,8 @@ def _parsed(text: str) -> dict:
 
 def _record(entry: dict) -> Record:
     warnings, notes = entry.get("warnings", ()), entry.get("notes", ())
-    return Record(entry.get("parts", {}), tuple(warnings), entry.get("is_dirty", False), tuple(notes))
+    rest = tuple(warnings), entry.get("is_dirty", False), tuple(notes), entry.get("scheme", 1)
+    return Record(entry.get("parts", {}), *rest)
 
 
 @persistent

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -11,22 +12,31 @@ import numpy as np
 from ...core.errors import text_of
 from ...core.live.live_target import LiveTarget
 from ...core.live.renderer import for_live
-from ...core.messages import Message
+from ...core.messages import Message, note
 from ...core.scene.illumination import Illumination
+from ...core.scene.receiver import Receiver, build_receiver, texture_size
+from ...core.scene.texture import BaseColor
+from ...core.scene.uv_map import Polygons, fit_uv_maps
 from ...core.target import Target
 from ..images.files import check_image
 from ..images.results import check_editable
-from ..node.find import find_bakeable, find_node
-from ..read.geometry import read_polygons
+from ..node.find import find_bakeable, find_node, find_node_in_groups
+from ..read.base_color import read_texture
+from ..read.geometry import mesh_key, read_polygons
 from ..read.lights import read_illumination, with_lamps
-from ..read.scene_cache import SceneCache
+from ..read.scene_cache import scene_cache
+from ..read.scene_changes import SceneChanges
 from ..read.visibility import SURFACE_TYPES, ObjectInstance, check_instance, find_instances, render_visible_names
 from .preview import SINGLE
-from .scene_changes import SceneChanges
-from .texture_cache import TextureCache
 
 MAX_TARGETS = 16
 """Number of targets that follow, those nearest to the change; more follow with longer delays."""
+
+MAX_TEXELS = 1024
+"""Texels along the longer side at which textures are evaluated; more is finer and keeps the window waiting."""
+
+Size = tuple[int, int] | int
+"""Size of an image, or texels along its longer side."""
 
 INDIRECT = "indirect light"
 
@@ -37,7 +47,7 @@ READ_BY_BAKES = {"LIGHT", *SURFACE_TYPES}
 
 
 class Reader:
-    """Reads a scene again and again, and keeps the data that have not changed.
+    """Reads a scene again and again, from the cache where it has not changed.
 
     Attributes
     ----------
@@ -50,13 +60,12 @@ class Reader:
         self.targets: list[Target] = []
         self.errors: dict[Target, str] = {}
         self.left_out: list[str] = []
-        self._cache = SceneCache()
         self._illumination: Illumination | None = None
         self._lighting: dict[str, Illumination] = {}  # light on each object
-        self._polygons: dict[Target, object] = {}
+        self._polygons: dict[Target, Polygons] = {}
         self._unreadable: dict[Target, str] = {}  # errors of targets without polygons
+        self._colors: dict[Target, tuple[Size, BaseColor]] = {}  # those of textures, with the size of their image
         self._live_targets: dict[Target, LiveTarget] = {}
-        self._textures = TextureCache()
 
     def read(
         self, depsgraph, changes: SceneChanges, sizes: Mapping[str, tuple[int, int]] | None = None
@@ -65,18 +74,16 @@ class Reader:
 
         `sizes` has the image size of materials that several targets share and whose node has no image.
         """
-        scene = depsgraph.scene.original
-        if changes.images or changes.other or changes.materials:
-            self._textures.forget(None if changes.images or changes.other else changes.materials)
         if changes or self._illumination is None:
-            self._read_light(depsgraph, changes)
-            if self._illumination is None or not changes.is_lamps_alone() or not self.targets:
-                self._read_receivers(depsgraph, changes)
-            self._sort_by_distance(scene, changes)
+            are_lamps_alone = self._illumination is not None and changes.is_lamps_alone()
+            self._read_light(depsgraph, changes.lamps if are_lamps_alone else None)
+            if not are_lamps_alone or not self.targets:
+                self._read_receivers(depsgraph)
+            self._sort_by_distance(depsgraph.scene.original, changes)
             self._note_left_out(depsgraph)
         users = Counter(target.material_name for target in self.targets)
         shared = {name: size for name, size in (sizes or {}).items() if users[name] > 1}
-        targets, self.errors = {}, dict(self._unreadable)
+        self.errors, self._colors, targets = dict(self._unreadable), {}, {}
         for target in self.targets[:MAX_TARGETS]:
             live_target = self._live_target(depsgraph, target, shared)
             if live_target is not None:
@@ -86,56 +93,42 @@ class Reader:
 
     def messages(self) -> list[Message]:
         """Messages about textures."""
-        return self._textures.messages()
+        messages = [message for _, color in self._colors.values() for message in color.warnings]
+        for target, (size, color) in self._colors.items():
+            if color.unknown:
+                shown = f"Live can't evaluate the Base Color of '{target.object_name}' and shows the node's own color"
+                messages.append(note("", f"{shown}; bakes have Cycles evaluate it. {color.unknown}"))
+            if color.texture is not None and (size if isinstance(size, int) else max(size)) > MAX_TEXELS:
+                text = f"Live has the texture of '{target.material_name}' with {MAX_TEXELS} texels along a side."
+                messages.append(note("", text))
+        return messages
 
-    def _read_light(self, depsgraph, changes: SceneChanges) -> None:
-        light = self._illumination
-        if light is not None and changes.is_lamps_alone():
-            light = with_lamps(depsgraph, light, changes.lamps)
-        else:
-            light = None
+    def _read_light(self, depsgraph, lamps: Collection[str] | None) -> None:
+        """Read all light, or only these lamps if they alone have changed."""
+        former = self._illumination
+        light = None if lamps is None else with_lamps(depsgraph, former, lamps)
         if light is None:
-            if changes.images:
-                self._cache.forget_images()
-            self._cache.forget_materials([name for name in changes.materials if not shows_medium_alone(name)])
-            if changes.world:
-                self._cache.world = None
-            self._cache.forget(changes.shaped)
-            light = read_illumination(depsgraph, self._cache)
-            if self._illumination is not None and light.shadow_key() == self._illumination.shadow_key():
-                light = self._illumination.with_light_of(light)
+            light = read_illumination(depsgraph, scene_cache)
+            if former is not None and light.shadow_key() == former.shadow_key():
+                light = former.with_light_of(light)
         self._illumination = light
         self._lighting.clear()
 
-    def _read_receivers(self, depsgraph, changes: SceneChanges) -> None:
+    def _read_receivers(self, depsgraph) -> None:
         layer = depsgraph.view_layer
         rendered = render_visible_names(layer)
         visible = [obj for obj in layer.objects if obj.visible_get(view_layer=layer) and obj.name in rendered]
         self.targets = find_bakeable(layer, visible)
-        self._unreadable = {target: why for target, why in self._unreadable.items() if target in self.targets}
-        changed, due = changes.moved | changes.shaped, []
+        instances = find_instances(depsgraph, {target.object_name for target in self.targets})
+        self._polygons, self._unreadable = {}, {}
         for target in self.targets:
-            obj = layer.objects.get(target.object_name)  # None if it is an instance, which other objects move, too
-            is_known = target in self._polygons and obj is not None and not changes.other
-            if not is_known or obj.name in changed or obj.data.name in changed:
-                due.append(target)
-        instances = find_instances(depsgraph, {target.object_name for target in due})
-        for target in due:
-            self._read_polygons(target, instances.get(target.object_name), layer)
-        self._polygons = {target: self._polygons[target] for target in self.targets if target in self._polygons}
-
-    def _read_polygons(self, target: Target, instance: ObjectInstance | None, view_layer) -> None:
-        self._unreadable.pop(target, None)
-        former = self._polygons.pop(target, None)
-        if instance is None:
-            return
-        try:
-            check_instance(target.object_name, instance, view_layer)
-            polygons = read_polygons(instance.obj, target.material_name, instance.matrix)
-        except Exception as error:  # noqa: BLE001 - the other targets are still to be read
-            self._unreadable[target] = text_of(error)
-            return
-        self._polygons[target] = former if former is not None and _are_equal(former, polygons) else polygons
+            instance = instances.get(target.object_name)
+            try:
+                if instance is not None:
+                    check_instance(target.object_name, instance, layer)
+                    self._polygons[target] = _polygons(target, instance)
+            except Exception as error:  # noqa: BLE001 - the other targets are still to be read
+                self._unreadable[target] = text_of(error)
 
     def _sort_by_distance(self, scene, changes: SceneChanges) -> None:
         """Put the targets nearest to the changed objects first."""
@@ -171,7 +164,7 @@ class Reader:
             self._lighting[target.object_name] = self._illumination.lighting(target.object_name)
         try:
             size = _image_size(material, node.image) or sizes.get(target.material_name)
-            color = self._textures.read(depsgraph, target, self._polygons[target], size or settings.resolution)
+            color = self._base_color(depsgraph, target, size or settings.resolution)
         except Exception as error:  # noqa: BLE001 - the other targets are still to be read
             self.errors[target] = text_of(error)
             return None
@@ -188,6 +181,44 @@ class Reader:
         if former is not None and all(_is_same(getattr(former, name), value) for name, value in parts.items()):
             return former
         return LiveTarget(target, **parts)
+
+    def _base_color(self, depsgraph, target: Target, size: Size) -> BaseColor | None:
+        """The texture that is linked to the target's node; None without a link."""
+        material, polygons = bpy.data.materials[target.material_name], self._polygons[target]
+        node, groups = find_node_in_groups(material)
+        if not node.has_texture():
+            return None
+
+        def read() -> BaseColor:
+            instance = find_instances(depsgraph, {target.object_name})[target.object_name]
+            return read_texture(node.color_input(groups), node.texture_blur, instance, _receiver(polygons, size))
+
+        tree = scene_cache.texture(material, node.color_input(groups))
+        color = scene_cache.get(("texture", target), [material], read, tree.images, (tree.text, polygons, size))
+        blur = node.texture_blur
+        color = scene_cache.get(("blurred", target), [], lambda: _blurred(color, blur), state=(color, blur))
+        self._colors[target] = size, color
+        return color
+
+
+def _polygons(target: Target, instance: ObjectInstance) -> Polygons:
+    obj, matrix = instance.obj, instance.matrix
+    state = mesh_key(obj), *(tuple(row) for row in matrix)
+    key = "polygons", obj.original, target.material_name
+    return scene_cache.get(key, [obj.original], lambda: read_polygons(obj, target.material_name, matrix), state=state)
+
+
+def _blurred(color: BaseColor, blur: float) -> BaseColor:
+    if color.texture is None or color.texture.blur == blur:
+        return color
+    return replace(color, texture=replace(color.texture, blur=blur))
+
+
+def _receiver(polygons: Polygons, size: Size) -> Receiver:
+    maps = fit_uv_maps(polygons)
+    width, height = texture_size(maps, size) if isinstance(size, int) else size
+    shrink = min(1.0, MAX_TEXELS / max(width, height))
+    return build_receiver(maps, max(1, round(width * shrink)), max(1, round(height * shrink)))
 
 
 def _image_size(material, image) -> tuple[int, int] | None:
@@ -217,9 +248,3 @@ def shows_medium_alone(material_name: str) -> bool:
 def _is_same(first, second) -> bool:
     """True if two parts of targets are equal; light is only equal to itself."""
     return first is second or (not isinstance(first, Illumination) and type(first) is type(second) and first == second)
-
-
-def _are_equal(first, second) -> bool:
-    """True if polygons have equal arrays."""
-    arrays = ((getattr(first, name), getattr(second, name)) for name in ("corners", "uvs", "starts", "normals"))
-    return all((a is None) == (b is None) and (a is None or np.array_equal(a, b)) for a, b in arrays)

@@ -14,9 +14,10 @@ from ...core.target import Target
 from ..images.facts import ImageFacts, facts_of, owners_of
 from ..jobs.state import redraw, state
 from ..node.find import find_node
+from ..read.scene_cache import scene_cache
+from ..read.scene_changes import SceneChanges
 from .preview import Preview
 from .reader import Reader, shows_medium_alone
-from .scene_changes import SceneChanges
 
 END_SECONDS = 10.0
 """Seconds that threads may take to end; a single transform, which can't be stopped, is shorter."""
@@ -43,32 +44,32 @@ class Session:
     """
 
     def __init__(self) -> None:
-        self._thread = RenderThread()
+        self._thread, self._reader = RenderThread(), Reader()
+        self._time: int | None = None  # of the last scan, as the cache counts it
         self._targets: list[LiveTarget] = []
         self._previews: dict[str, Preview] = {}  # by material
         self._errors: dict[Target, str] = {}
         self._facts: dict[str, tuple[int, ImageFacts]] = {}  # address and facts of the image in each material's node
         self._sizes: dict[tuple, tuple[int, int]] = {}  # of previews without an image, by material and resolution
         self._targets_at_bake: list[LiveTarget] | None = None
-        self._is_resting = False
+        self._is_resting = self._was_changed = False
         self._scan_seconds = 1.0  # of the last scan of more than lamps
         self._changed_at = self._renewed_at = time.perf_counter()
         self._is_new_to_cycles = False
         self.seconds = 0.0
-        self._read_anew()
+        scene_cache.log.shown_by_live = self._names_shown
 
     # Events
 
     def note(self, depsgraph) -> None:
-        """Take the updates of a depsgraph."""
-        was_calm = not self._changes
-        self._changes.note(list(depsgraph.updates), self._names_shown())
-        if was_calm and self._changes:
+        """Take note of an update of the depsgraph, which the cache has noted already."""
+        changes = self._changes()
+        if changes and not self._was_changed:
             self._changed_at = time.perf_counter()
-        is_small = self._scan_seconds < SMALL_SCAN_SECONDS or self._changes.is_lamps_alone()
-        is_simple = self._changes.is_movement_alone() and all(map(shows_medium_alone, self._changes.materials))
-        has_changed = self._changes or self._changes.nodes
-        if has_changed and is_simple and is_small and not self._is_resting and not is_occupied():
+        self._was_changed = bool(changes)
+        is_small = self._scan_seconds < SMALL_SCAN_SECONDS or changes.is_lamps_alone()
+        is_simple = changes.is_movement_alone() and all(map(shows_medium_alone, changes.materials))
+        if (changes or changes.nodes) and is_simple and is_small and not self._is_resting and not is_occupied():
             # Now, so that it is rendered while the window is drawn.
             self._scan(depsgraph)
 
@@ -77,7 +78,7 @@ class Session:
         undone = {name for name, (_address, facts) in self._facts.items() if _facts_of(name)[1] != facts}
         self._thread.forget([target for target in self._reader.targets if target.material_name in undone])
         self._facts.clear()
-        self._read_anew()
+        self._reader, self._time = Reader(), None
         for preview in self._previews.values():
             if not self._is_resting and preview.fits():
                 preview.refresh()
@@ -102,13 +103,15 @@ class Session:
             else:
                 preview.hide()
         self._previews.clear()
+        scene_cache.log.shown_by_live = tuple
+        scene_cache.drop_arrays()
         self._thread.join(END_SECONDS)
 
     # State for panels and the timer
 
     def is_busy(self) -> bool:
         """True while renderings are still to come."""
-        return bool(self._changes) or self._thread.is_busy()
+        return bool(self._changes()) or self._thread.is_busy()
 
     def names(self) -> set[str]:
         """Names of all hidden images."""
@@ -151,7 +154,7 @@ class Session:
             return False
         had_rest, self._is_resting = self._is_resting, False
         self._adopt_bakes(context)
-        has_changed, changed_at = bool(self._changes), self._changed_at
+        has_changed, changed_at = bool(self._changes()), self._changed_at
         self._scan(context.evaluated_depsgraph_get())
         self._keep_previews(had_rest)
         shown = self._show_renderings(context)
@@ -170,27 +173,29 @@ class Session:
         if shown:
             settings.mode = settings.mode  # has Blender collect the slots again
 
+    def _changes(self) -> SceneChanges:
+        """Changes since the last scan; at first, and after undo, anything may have changed."""
+        return SceneChanges(other={""}) if self._time is None else scene_cache.log.since(self._time)
+
     def _scan(self, depsgraph) -> None:
         start = time.perf_counter()
-        changes, self._changes = self._changes, SceneChanges()
+        changes = self._changes()
         resolution = depsgraph.scene.original.beamspread.resolution
         sizes = {name: size for (name, wanted), size in self._sizes.items() if wanted == resolution}
-        targets = self._reader.read(depsgraph, changes, sizes)
+        targets = self._read(depsgraph, changes, sizes)
         if changes and not changes.is_lamps_alone():
             self._scan_seconds = time.perf_counter() - start
         if [*map(id, targets)] != [*map(id, self._targets)]:
             self._targets = targets
             self._thread.show(targets)
 
-    def _read_anew(self) -> None:
-        self._reader, self._changes = Reader(), SceneChanges()
-        self._changes.other = True
+    def _read(self, depsgraph, changes: SceneChanges, sizes: dict | None = None) -> list[LiveTarget]:
+        self._time, self._was_changed = scene_cache.time, False
+        return self._reader.read(depsgraph, changes, sizes)
 
     def _read_all(self, depsgraph) -> list[LiveTarget]:
         """All targets as the scene is now."""
-        changes, self._changes = self._changes, SceneChanges()  # after the depsgraph has told of changes that wait
-        changes.other = True
-        return self._reader.read(depsgraph, changes)
+        return self._read(depsgraph, SceneChanges(other={""}))
 
     def _adopt_bakes(self, context) -> None:
         """Leave nodes that show a new bake alone until the scene changes from that which the bake has read."""
@@ -292,7 +297,7 @@ class Session:
             return
         now = time.perf_counter()
         self._is_new_to_cycles |= has_new
-        is_calm = not self._changes and now - self._changed_at >= CALM_SECONDS
+        is_calm = not self._changes() and now - self._changed_at >= CALM_SECONDS
         if (
             self._is_new_to_cycles
             and is_calm

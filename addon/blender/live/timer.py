@@ -8,6 +8,7 @@ from bpy.app.handlers import persistent
 from ...core import native
 from ...core.errors import text_of
 from ...core.messages import Messages, note
+from ..read.scene_cache import listeners
 from ..registration import all_or_nothing, handlers
 from .preview import remove_strays
 from .session import Session
@@ -91,18 +92,14 @@ def _tick() -> float:
         return OFF_SECONDS
 
 
-@persistent
-def _changed(_scene, depsgraph) -> None:
-    is_shown = depsgraph.mode == "VIEWPORT" and depsgraph.scene.name == live.scene_name
-    if live.session is not None and is_shown:
+def _changed(depsgraph) -> None:
+    """Take note of a change, of any change after undo and loading."""
+    if depsgraph is None:
+        if live.session is not None:
+            live.session.recover()
+        _remove_strays()
+    elif live.session is not None and depsgraph.mode == "VIEWPORT" and depsgraph.scene.name == live.scene_name:
         live.session.note(depsgraph)
-
-
-@persistent
-def _undone(*_arguments) -> None:
-    if live.session is not None:
-        live.session.recover()
-    _remove_strays()
 
 
 @persistent
@@ -125,11 +122,6 @@ def _leave_file(*_arguments) -> None:
     live.image_count = -1  # where the next file can't be opened, this one stays, and hidden images go in the next step
 
 
-@persistent
-def _enter_file(*_arguments) -> None:
-    _remove_strays()
-
-
 def _start() -> None:
     if not bpy.app.background:
         bpy.app.timers.register(_tick, first_interval=OFF_SECONDS, persistent=True)
@@ -143,15 +135,11 @@ def _stop() -> None:
 
 register, unregister = all_or_nothing(
     *handlers(
-        depsgraph_update_post=_changed,
-        frame_change_post=_changed,
-        undo_post=_undone,
-        redo_post=_undone,
         save_pre=hide_previews,
         save_post=show_previews,
         object_bake_pre=hide_previews,
         load_pre=_leave_file,
-        load_post=_enter_file,
     ),
+    (lambda: listeners.append(_changed), lambda: listeners.remove(_changed)),
     (_start, _stop),
 )

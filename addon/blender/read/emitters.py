@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from copy import copy
 
 import numpy as np
 
-from ...core.errors import NotSupportedError
+from ...core.errors import MissingImageError, NotSupportedError
 from ...core.scene.lights import MeshLight
 from .. import compat
-from .image_nodes import Images
-from .nodes import InputSocket, surface_of
+from .image_nodes import missing_images
+from .nodes import InputSocket, Links, surface_of
+from .scene_cache import SceneCache
 from .shading import ON_NO_PATH, ShadingPoints
 
 # Number of triangles that a mesh with an emissive image is cut into, at least; each has the mean of the image over it.
@@ -22,48 +22,46 @@ MAX_CUTS = 64
 POSITIONS = 6
 
 
-class Materials:
-    """Radiance of materials, each evaluated once."""
+VARYING = "varying"
+"""Radiance that differs from point to point, or that only Cycles can evaluate."""
 
-    def __init__(self, check: Callable[[], None] | None = None) -> None:
-        self.images, self.check = Images(), check
-        self._known: dict[str | None, np.ndarray | InputSocket | None] = {None: None}
 
-    def read(self, material) -> np.ndarray | InputSocket | None:
-        """Radiance (3,), W/(m^2 sr); the surface input if radiance differs from point to point; None if it is dark."""
-        name = material and material.name_full
-        if name not in self._known:
-            self._known[name] = self._read(material)
-        return self._known[name]
+def radiance_of(material, cache: SceneCache) -> np.ndarray | str | None:
+    """Radiance (3,) of a material, W/(m^2 sr); None if it is dark; `VARYING`."""
+    if material is None:
+        return None
+    return cache.of_nodes("radiance", material, lambda: _read(material, cache))
 
-    def forget(self, name: str) -> None:
-        """Evaluate a material of that full name again."""
-        self._known.pop(name, None)
 
-    def _read(self, material) -> np.ndarray | InputSocket | None:
-        surface = surface_of(material.node_tree) if compat.uses_nodes(material) else None
-        if surface is None:
-            return None
-        try:
-            light = ShadingPoints(images=self.images, check=self.check).value(surface)
-        except NotSupportedError:
-            return surface
-        return light if light.any() else None
+def _read(material, cache: SceneCache) -> np.ndarray | str | None:
+    surface = surface_of(material.node_tree) if compat.uses_nodes(material) else None
+    if surface is None:
+        return None
+    try:
+        light = ShadingPoints(images=cache.images, check=cache.check).value(surface)
+    except NotSupportedError:
+        return VARYING
+    return light if light.any() else None
 
 
 class EmissiveMesh:
-    """Radiance of the triangles of an evaluated object, and the matrices of its instances."""
+    """Radiance of the triangles of an evaluated object, and the matrices of its instances.
 
-    def __init__(self, obj, materials: Materials) -> None:
-        self._images, self._check = materials.images, materials.check
+    Attributes
+    ----------
+    reason : why the emission of a material is left out; None if it is not.
+    missing : errors for the images of that material that no renderer can load.
+    """
+
+    def __init__(self, obj, cache: SceneCache) -> None:
         self._parts: list[tuple[np.ndarray, np.ndarray]] = []
         self._matrices: list[np.ndarray] = []
         self.reason: NotSupportedError | None = None
-        self.surface: InputSocket | None = None  # of the material that `reason` is about
-        radiance = {index: materials.read(slot.material) for index, slot in enumerate(obj.material_slots)}
+        self.missing: list[MissingImageError] = []
+        radiance = {index: radiance_of(slot.material, cache) for index, slot in enumerate(obj.material_slots)}
         radiance = {index: light for index, light in radiance.items() if light is not None}
         if radiance:
-            self._add(obj, radiance)
+            self._add(obj, radiance, cache)
 
     def without_instances(self) -> EmissiveMesh:
         """The mesh without its instances."""
@@ -85,7 +83,7 @@ class EmissiveMesh:
         light = np.concatenate([light for _, light in self._parts] * len(self._matrices))
         return MeshLight(*common, vertices, np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3), light)
 
-    def _add(self, obj, radiance: dict) -> None:
+    def _add(self, obj, radiance: dict, cache: SceneCache) -> None:
         mesh = obj.to_mesh()
         if mesh is None:
             return
@@ -100,23 +98,28 @@ class EmissiveMesh:
             if isinstance(light, np.ndarray):
                 self._parts.append((corners[chosen], np.tile(np.float32(light), (chosen.sum(), 1))))
                 continue
+            surface = surface_of(obj.material_slots[index].material.node_tree)
             try:
-                self._parts.append(self._textured(light, corners[chosen], None if uvs is None else uvs[chosen]))
+                self._parts.append(_textured(surface, corners[chosen], None if uvs is None else uvs[chosen], cache))
             except NotSupportedError as error:
-                self.reason, self.surface = error, light
+                self.reason, self.missing = error.with_traceback(None), missing_images(Links(), surface)
 
-    def _textured(self, surface, corners: np.ndarray, uvs: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-        cuts = int(np.clip(np.ceil(np.sqrt(TEXTURED_TRIANGLES / len(corners))), 1, MAX_CUTS))
-        pieces = _pieces(cuts)
-        corners = (pieces @ corners[:, None]).reshape(-1, 3, 3)
-        outputs = dict(ON_NO_PATH)
-        if uvs is not None:
-            positions = _middles(POSITIONS) @ (pieces @ uvs[:, None]).reshape(-1, 3, 2)
-            flat = np.concatenate([positions.reshape(-1, 2), np.zeros((positions[..., 0].size, 1))], axis=1)
-            outputs["ShaderNodeTexCoord", "UV"] = flat
-        light = ShadingPoints(outputs, self._images, check=self._check).value(surface)
-        light = np.broadcast_to(light, (len(corners) * POSITIONS**2, 3)).reshape(len(corners), -1, 3).mean(axis=1)
-        return corners, light.astype(np.float32)
+
+def _textured(
+    surface: InputSocket, corners: np.ndarray, uvs: np.ndarray | None, cache: SceneCache
+) -> tuple[np.ndarray, np.ndarray]:
+    """Corners (N, 3, 3) of pieces of the triangles, and the mean radiance (N, 3) of each piece."""
+    cuts = int(np.clip(np.ceil(np.sqrt(TEXTURED_TRIANGLES / len(corners))), 1, MAX_CUTS))
+    pieces = _pieces(cuts)
+    corners = (pieces @ corners[:, None]).reshape(-1, 3, 3)
+    outputs = dict(ON_NO_PATH)
+    if uvs is not None:
+        positions = _middles(POSITIONS) @ (pieces @ uvs[:, None]).reshape(-1, 3, 2)
+        flat = np.concatenate([positions.reshape(-1, 2), np.zeros((positions[..., 0].size, 1))], axis=1)
+        outputs["ShaderNodeTexCoord", "UV"] = flat
+    light = ShadingPoints(outputs, cache.images, check=cache.check).value(surface)
+    light = np.broadcast_to(light, (len(corners) * POSITIONS**2, 3)).reshape(len(corners), -1, 3).mean(axis=1)
+    return corners, light.astype(np.float32)
 
 
 def _triangles(mesh, slot_count: int) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...core.errors import ReceiverError
+from ...core.messages import Message
 from ...core.scene.occluders import Mesh, Occluder
 from ...core.scene.uv_map import Polygons
 from .scene_cache import SceneCache
+from .transparency import MaterialTransmittance, transmittance_of
 
 # A depsgraph holds curves, text and metaballs also as meshes, which are instances of themselves: only these are read.
 GEOMETRY_TYPES = {"MESH"}
@@ -18,45 +22,52 @@ class OccluderReader:
 
     def __init__(self, cache: SceneCache) -> None:
         self._cache = cache
+        self._meshes: dict[tuple, Mesh | None] = {}
         self._matrices: dict[tuple, list] = {}  # of the instances, by object name and key of the mesh
+        self.messages: list[Message] = []
 
     def add(self, instance) -> None:
         """Add an entry of `depsgraph.object_instances` that renders, of any type, if it casts shadows."""
-        obj, meshes = instance.object, self._cache.meshes
+        obj = instance.object
         owners = (obj, instance.parent) if instance.is_instance else (obj,)
         if obj.type not in GEOMETRY_TYPES or not all(getattr(owner, "visible_shadow", True) for owner in owners):
             return
-        data = obj if obj.data is None else obj.data
-        key = (
-            data.as_pointer(),
-            data.name,
-            *(slot.material.name_full if slot.material else None for slot in obj.material_slots),
-        )
-        if key not in meshes:
-            meshes[key] = local_mesh(obj, self._cache.transparency)
-            self._cache.note(meshes, key, instance)
-        if meshes[key] is not None:
+        key = mesh_key(obj)
+        if key not in self._meshes:
+            self._meshes[key] = self._read(instance, key)
+        if self._meshes[key] is not None:
             matrix = instance.matrix_world
             self._matrices.setdefault((obj.name, key), []).append((*matrix[0], *matrix[1], *matrix[2]))
 
-    @property
-    def warnings(self) -> list[str]:
-        return self._cache.transparency.warnings
+    def _read(self, instance, key: tuple) -> Mesh | None:
+        obj = instance.object
+        slots = [transmittance_of(slot.material, self._cache) for slot in obj.material_slots]
+        self.messages += [message for slot in slots for message in slot.messages]
+        state = tuple((slot.transmittance, slot.uv_transform) for slot in slots)
+        return self._cache.get(("mesh", *key), shapes_of(instance), lambda: local_mesh(obj, slots), state=state)
 
     def occluders(self) -> list[Occluder]:
         return [
-            Occluder(name, self._cache.meshes[key], np.array(matrices, float).reshape(-1, 3, 4))
+            Occluder(name, self._meshes[key], np.array(matrices, float).reshape(-1, 3, 4))
             for (name, key), matrices in self._matrices.items()
         ]
 
 
-def local_mesh(obj, materials) -> Mesh | None:
-    """Triangles of an evaluated object in its own frame, None without any.
+def mesh_key(obj) -> tuple:
+    """Key of an evaluated object's mesh with its materials; geometry nodes may give an object several meshes."""
+    data = obj if obj.data is None else obj.data
+    names = (slot.material.name_full if slot.material else None for slot in obj.material_slots)
+    return data.as_pointer(), data.name, *names
 
-    Parameters
-    ----------
-    materials : `transparency.Materials`, which gives the transmittance of each slot.
-    """
+
+def shapes_of(instance) -> set:
+    """Original objects whose changes of geometry may change the mesh of an entry of `depsgraph.object_instances`."""
+    parent = instance.parent if instance.is_instance else None
+    return {instance.object.original, *([] if parent is None else [parent.original])}
+
+
+def local_mesh(obj, slots: Sequence[MaterialTransmittance]) -> Mesh | None:
+    """Triangles of an evaluated object in its own frame, None without any. `slots` are those of its materials."""
     mesh = obj.to_mesh()
     if mesh is None:
         return None
@@ -69,7 +80,6 @@ def local_mesh(obj, materials) -> Mesh | None:
         mesh.loop_triangles.foreach_get("vertices", triangles)
         vertices = _vertices(mesh).astype(float)
         triangles = triangles.astype(np.uint32).reshape(-1, 3)
-        slots = [materials.read(slot.material) for slot in obj.material_slots]
         if all(slot.transmittance.is_opaque for slot in slots):
             return Mesh(vertices, triangles)
         numbers = np.empty(count, np.int32)
@@ -83,7 +93,9 @@ def local_mesh(obj, materials) -> Mesh | None:
         obj.to_mesh_clear()
 
 
-def _image_uvs(mesh, slots: list, numbers: np.ndarray, corners: np.ndarray) -> np.ndarray | None:
+def _image_uvs(
+    mesh, slots: Sequence[MaterialTransmittance], numbers: np.ndarray, corners: np.ndarray
+) -> np.ndarray | None:
     """UVs of each triangle's corners in its material's image, float32 (M, 3, 2)."""
     if all(slot.uv_transform is None for slot in slots):
         return None

@@ -2,32 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import bpy
+import numpy as np
 
 from ...core.errors import MissingImageError, NotSupportedError
 from ...core.messages import Message, Messages, warning
 from ...core.scene.illumination import Illumination
 from ...core.scene.lights import Light
 from .. import compat
-from .emitters import EmissiveMesh
-from .geometry import GEOMETRY_TYPES, OccluderReader
+from .emitters import VARYING, EmissiveMesh, radiance_of
+from .geometry import GEOMETRY_TYPES, OccluderReader, shapes_of
 from .image_nodes import missing_images
 from .lamps import fault, is_portal, read_lamp
-from .nodes import InputSocket, Links, surface_of
+from .nodes import Links, surface_of
 from .scene_cache import SceneCache
 from .visibility import left_out, left_out_of_world, render_visible_names, renders, with_instanced
 from .world_light import read_world
 
 
-def read_illumination(depsgraph, cache: SceneCache | None = None) -> Illumination:
-    """Lights and occluders of all objects and instances that render; entries of the cache are not read again.
+def read_illumination(
+    depsgraph, cache: SceneCache | None = None, check: Callable[[], None] | None = None
+) -> Illumination:
+    """Lights and occluders of all objects and instances that render.
 
-    The cache's `check` can cancel the evaluation of nodes.
+    Parameters
+    ----------
+    cache : results of earlier reads, for a depsgraph of the viewport; None: everything is read.
+    check : called while nodes are evaluated, and raises an exception to cancel that.
     """
-    cache = cache or SceneCache()
+    cache = SceneCache() if cache is None else cache
+    with cache.reading(depsgraph, check):
+        return _read(depsgraph, cache)
+
+
+def _read(depsgraph, cache: SceneCache) -> Illumination:
     visible = render_visible_names(depsgraph.view_layer)
     lights, occluders = _Lights(depsgraph, cache), OccluderReader(cache)
     for instance in depsgraph.object_instances:
@@ -35,12 +46,11 @@ def read_illumination(depsgraph, cache: SceneCache | None = None) -> Illuminatio
             continue
         obj = instance.object
         lights.warn(left_out(obj))
-        asks_instancer = instance.is_instance and (obj.type != "LIGHT" or compat.instancer_hides_lamps())
-        lights_surfaces = obj.visible_diffuse and (not asks_instancer or instance.parent.visible_diffuse)
-        if obj.type == "LIGHT" and lights_surfaces:
-            lights.add_lamp(obj, instance.matrix_world)
-        elif obj.type in GEOMETRY_TYPES and lights_surfaces:
-            lights.add_mesh(instance)
+        if lights_surfaces(obj, instance.parent if instance.is_instance else None):
+            if obj.type == "LIGHT":
+                lights.add_lamp(obj, instance.matrix_world)
+            elif obj.type in GEOMETRY_TYPES:
+                lights.add_mesh(instance)
         occluders.add(instance)
     world = compat.world_of(depsgraph)
     lights.add_world(depsgraph.view_layer, world)
@@ -48,11 +58,17 @@ def read_illumination(depsgraph, cache: SceneCache | None = None) -> Illuminatio
     return Illumination(
         lights.all(),
         occluders.occluders(),
-        Messages([*lights.messages, *occluders.warnings]),
+        Messages([*lights.messages, *occluders.messages]),
         compat.transparent_bounces(depsgraph.scene),
         lights.by_cycles,
         lights.receivers,
     )
+
+
+def lights_surfaces(obj, instancer) -> bool:
+    """True if the light of an object falls on surfaces; `instancer` is the object that instances it, or None."""
+    asks_instancer = instancer is not None and (obj.type != "LIGHT" or compat.instancer_hides_lamps())
+    return obj.visible_diffuse and (not asks_instancer or instancer.visible_diffuse)
 
 
 def with_lamps(depsgraph, illumination: Illumination, names: Collection[str]) -> Illumination | None:
@@ -103,44 +119,55 @@ class _Lights:
         links = links_of(obj, self._names)
         if reason:
             text = f"The light '{obj.name}' is baked without its nodes."
-            self._warn_of(obj.name, text, reason, surface_of(obj.data.node_tree), links)
+            self._warn_of(obj.name, text, reason, missing_images(Links(), surface_of(obj.data.node_tree)), links)
         if light is not None:
             self._add(light, links)
 
     def add_mesh(self, instance) -> None:
         """Add an instance of a mesh; all instances of a mesh become one light."""
-        obj, meshes = instance.object, self._cache.emissive
+        obj = instance.object
         key = obj.name, obj.data.as_pointer()
         if key not in self._emissive:
-            if key not in meshes:
-                meshes[key] = EmissiveMesh(obj, self._cache.emission)
-                self._cache.note(meshes, key, instance)
-            self._emissive[key] = mesh = meshes[key].without_instances()
+            self._emissive[key] = mesh = self._emissive_mesh(instance, key).without_instances()
             self._links[obj.name] = links_of(obj, self._names)
             if mesh.reason:
                 text = f"The emission of '{obj.name}' is left out."
-                self._warn_of(obj.name, text, mesh.reason, mesh.surface, self._links[obj.name])
+                self._warn_of(obj.name, text, mesh.reason, mesh.missing, self._links[obj.name])
         self._emissive[key].add_instance(instance.matrix_world)
 
+    def _emissive_mesh(self, instance, key: tuple) -> EmissiveMesh:
+        obj, cache = instance.object, self._cache
+        radiance = [(slot.material, radiance_of(slot.material, cache)) for slot in obj.material_slots]
+        state = tuple(light.tobytes() if isinstance(light, np.ndarray) else light for _, light in radiance)
+        varying = [material for material, light in radiance if light is VARYING]
+        blocks = {*shapes_of(instance), *(material.original for material in varying)}
+        images = tuple(dict.fromkeys(image for material in varying for image in cache.tree(material).images))
+        names = tuple(material and material.name_full for material, _ in radiance)
+        return cache.get(("emission", *key, *names), blocks, lambda: EmissiveMesh(obj, cache), images, state)
+
     def add_world(self, view_layer, world) -> None:
-        key = world and (world.name, view_layer.use_sky)
-        if self._cache.world is None or self._cache.world[0] != key:
-            self._cache.world = key, read_world(view_layer, world, self._cache.emission.images, self._cache.check)
-        light, reason = self._cache.world[1]
+        light, reason = (None, None) if world is None else self._read_world(view_layer, world)
         if reason:
             text = f"The world '{world.name}' is left out."
-            self._warn_of(world.name, text, reason, surface_of(world.node_tree), {})
+            self._warn_of(world.name, text, reason, missing_images(Links(), surface_of(world.node_tree)), {})
         if light is not None:
             self._add(light, {})
 
-    def _warn_of(self, name: str, text: str, reason: NotSupportedError, surface: InputSocket, links: dict) -> None:
+    def _read_world(self, view_layer, world) -> tuple[Light | None, NotSupportedError | None]:
+        cache, block = self._cache, world.original
+        key, images = ("world", block, view_layer.use_sky), cache.tree(world).images
+        return cache.get(key, [block], lambda: read_world(view_layer, world, cache.images, cache.check), images)
+
+    def _warn_of(
+        self, name: str, text: str, reason: NotSupportedError, missing: list[MissingImageError], links: dict
+    ) -> None:
         """Add a warning, and leave the light to Cycles if Cycles can evaluate its nodes."""
         message = warning(name, f"{text} {reason.text}", reason.remedy)
         if isinstance(reason, MissingImageError):
             self.warn(message)
             return
         self.by_cycles[name] = message
-        for error in missing_images(Links(), surface):
+        for error in missing:
             self.warn(warning(name, f"{error.text} Cycles shows it in magenta, as light of '{name}'.", error.remedy))
         if links.get("receivers") is not None:
             self.receivers[name] = links["receivers"]

@@ -90,7 +90,7 @@ class Links:
 
     def _follow(self, socket, groups: tuple) -> Source:
         while True:
-            link = self._link_into(socket)
+            link = self.link_into(socket)
             if link is None:
                 return Source(socket, groups)
             socket, node = link.from_socket, link.from_node
@@ -112,7 +112,8 @@ class Links:
             else:
                 return Source(socket, groups)
 
-    def _link_into(self, socket):
+    def link_into(self, socket):
+        """The link into an input, or None; muted links don't count."""
         tree = socket.id_data
         if tree not in self._into:
             valid = [link for link in tree.links if link.is_valid and not link.is_muted]

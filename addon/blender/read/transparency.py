@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from ...core.scene.sampling import resized
 from .. import compat
 from .image_nodes import Pixels, UVTransform, alpha_of, color_of, uv_transform_of
 from .nodes import Evaluator, InputSocket, Links, Source, converted, shows_bake, surface_of
+from .scene_cache import SceneCache
 
 # Size of the first evaluation, which tells images from constants.
 PROBE = (2, 2)
@@ -139,73 +140,71 @@ class TexelEvaluator(Evaluator):
 
 @dataclass(frozen=True, eq=False)
 class MaterialTransmittance:
-    """A native `Transmittance`, and the UV transform of its image if it has one."""
+    """A native `Transmittance`, and messages about the material.
+
+    Attributes
+    ----------
+    color : RGB that is let through everywhere, or None for an image.
+    uv_transform : UV transform of the image.
+    """
 
     transmittance: object
+    color: tuple[float, ...] | None = None
     uv_transform: UVTransform | None = None
+    messages: tuple[Message, ...] = ()
 
 
-@functools.cache
-def constant(value: int) -> MaterialTransmittance:
-    """Transmittance 1 (everything) or 0 (nothing)."""
-    return MaterialTransmittance(native.Transmittance((value, value, value)))
+@functools.lru_cache(256)
+def constant(*color: float) -> MaterialTransmittance:
+    """Transmittance of one RGB color, the same object for the same color."""
+    return MaterialTransmittance(native.Transmittance(color), color)
 
 
-class Materials:
-    """Transmittances of materials, each evaluated once; `warnings` are about those that only Cycles can evaluate."""
+OPAQUE_MATERIAL, CLEAR_MATERIAL = constant(0.0, 0.0, 0.0), constant(1.0, 1.0, 1.0)
 
-    def __init__(self, check: Callable[[], None] | None = None) -> None:
-        self._check = check
-        self.warnings: list[Message] = []
-        self._known: dict[str | None, MaterialTransmittance] = {None: constant(0)}
 
-    def read(self, material) -> MaterialTransmittance:
-        """Transmittance of a material; None stands for Cycles' default, which is opaque."""
-        name = material and material.name_full
-        if name not in self._known:
-            self._known[name] = self._read(material)
-        return self._known[name]
+def transmittance_of(material, cache: SceneCache) -> MaterialTransmittance:
+    """Transmittance of a material; None stands for Cycles' default, which is opaque."""
+    if material is None:
+        return OPAQUE_MATERIAL
+    return cache.of_nodes("transmittance", material, lambda: _read(material, cache.check))
 
-    def forget(self, name: str) -> None:
-        """Evaluate a material of that full name again."""
-        self._known.pop(name, None)
 
-    def _read(self, material) -> MaterialTransmittance:
-        if not (compat.uses_nodes(material) and compat.has_transparent_shadow(material)):
-            return constant(0)
-        surface = surface_of(material.node_tree)
-        if surface is None:
-            return constant(0)
-        if not surface.socket.is_linked:
-            if not surface.socket.node.inputs["Volume"].is_linked:
-                return constant(0)
-            text = f"The material '{material.name}' has a volume and no surface: it casts no shadow."
-            self.warnings.append(warning(material.name, text))
-            return constant(1)
-        try:
-            return self._evaluate(surface)
-        except NotSupportedError as error:
-            text = f"The material '{material.name}' casts opaque shadows. {error}"
-            self.warnings.append(warning(material.name, text))
-            return constant(0)
+def _read(material, check: Callable[[], None] | None) -> MaterialTransmittance:
+    if not (compat.uses_nodes(material) and compat.has_transparent_shadow(material)):
+        return OPAQUE_MATERIAL
+    surface = surface_of(material.node_tree)
+    if surface is None:
+        return OPAQUE_MATERIAL
+    if not surface.socket.is_linked:
+        if not surface.socket.node.inputs["Volume"].is_linked:
+            return OPAQUE_MATERIAL
+        text = f"The material '{material.name}' has a volume and no surface: it casts no shadow."
+        return replace(CLEAR_MATERIAL, messages=(warning(material.name, text),))
+    try:
+        return _evaluate(surface, check)
+    except NotSupportedError as error:
+        text = f"The material '{material.name}' casts opaque shadows. {error}"
+        return replace(OPAQUE_MATERIAL, messages=(warning(material.name, text),))
 
-    def _evaluate(self, surface: InputSocket) -> MaterialTransmittance:
-        # Pixels of this material alone: they may take gigabytes.
-        pixels, links = Pixels(), Links()
-        probe = TexelEvaluator(pixels, PROBE, links=links, check=self._check)
-        weight, transform = probe.value(surface), probe.transform
-        if transform is None:
-            return MaterialTransmittance(native.Transmittance(_color(weight)))
-        # At the texels of the largest image, or between them.
-        finer = max(1, FINE_SIDE // max(probe.largest)) if probe.is_bent else 1
-        size = tuple(side * finer for side in probe.largest)
-        texels = _in_range(TexelEvaluator(pixels, size, links=links, check=self._check).value(surface))
-        if (texels[..., :1] == texels).all():
-            texels = texels[..., :1]
-        texels = np.ascontiguousarray(texels, np.float32)
-        outside = _color(TexelEvaluator(pixels, is_outside=True, links=links).value(surface))
-        image = native.Transmittance.from_image(texels, transform.extension, transform.is_smooth, outside)
-        return MaterialTransmittance(image, transform)
+
+def _evaluate(surface: InputSocket, check: Callable[[], None] | None) -> MaterialTransmittance:
+    # Pixels of this material alone: they may take gigabytes.
+    pixels, links = Pixels(), Links()
+    probe = TexelEvaluator(pixels, PROBE, links=links, check=check)
+    weight, transform = probe.value(surface), probe.transform
+    if transform is None:
+        return constant(*_color(weight))
+    # At the texels of the largest image, or between them.
+    finer = max(1, FINE_SIDE // max(probe.largest)) if probe.is_bent else 1
+    size = tuple(side * finer for side in probe.largest)
+    texels = _in_range(TexelEvaluator(pixels, size, links=links, check=check).value(surface))
+    if (texels[..., :1] == texels).all():
+        texels = texels[..., :1]
+    texels = np.ascontiguousarray(texels, np.float32)
+    outside = _color(TexelEvaluator(pixels, is_outside=True, links=links).value(surface))
+    image = native.Transmittance.from_image(texels, transform.extension, transform.is_smooth, outside)
+    return MaterialTransmittance(image, uv_transform=transform)
 
 
 def _in_range(transmittance: np.ndarray) -> np.ndarray:

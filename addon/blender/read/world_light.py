@@ -33,7 +33,7 @@ def read_world(
     try:
         return _panorama(world.name, surface, images, check), None
     except NotSupportedError as error:
-        return None, error
+        return None, error.with_traceback(None)
 
 
 def _even(name: str, color: np.ndarray) -> WorldLight | None:

@@ -1,6 +1,6 @@
 """Keeps the rows of `state` up to date: compares bakes with the scene once changes to it have come to rest.
 
-Handlers only note changes; a timer of the window scans the scene. In background no timer runs: call `refresh`.
+The scene's cache notes changes; a timer of the window scans the scene. In background no timer runs: call `refresh`.
 """
 
 from __future__ import annotations
@@ -18,10 +18,11 @@ from ...images.facts import Record, facts_of, file_at, is_sequence, note_bake, r
 from ...images.files import file_of
 from ...images.undo import is_undone
 from ...node.find import find_bakeable, find_misplaced, image_of
+from ...read.scene_cache import listeners
 from ...read.visibility import by_name
 from ...registration import all_or_nothing, handlers
 from ..state import Row, Status, redraw, state
-from .fingerprint import IMAGE, QUALITY, Fingerprints, Parts, image_part
+from .fingerprint import IMAGE, QUALITY, Parts, fingerprints, image_part
 
 REST_SECONDS = 0.3
 """Seconds without changes before a scan."""
@@ -34,7 +35,11 @@ The first scan of a file or after undo does not count: it reads all meshes, and 
 
 QUICK_PREVIEW = "first look"  # as files of earlier versions have it
 
-fingerprints = Fingerprints()
+UNKNOWN = (
+    "Changes since its bake are not known: an earlier version of the add-on made it.",
+    "Bake it again to be told of later ones.",
+)
+
 _waiting: list[tuple[Bake, Parts | None]] = []
 _last = {"change": 0.0, "took": 0.0, "next": 0.0, "is scanning": False}
 
@@ -45,7 +50,7 @@ def refresh(context) -> None:
     context.view_layer.update()  # in 3.4 it has None in place of removed objects
     targets = find_bakeable(context.view_layer, context.scene.objects)
     recorded = {target: record for target in targets if (record := _record(target, context.scene)) is not None}
-    now = fingerprints.of(context, recorded) if recorded else {}
+    now = fingerprints(context, recorded) if recorded else {}
     state.rows = {target: _row(target, recorded.get(target), now.get(target)) for target in targets}
     state.rows |= {row.target: row for row in _failures_of_others(context.scene, targets)}
 
@@ -65,7 +70,7 @@ def _failures_of_others(scene, targets: list[Target]) -> list[Row]:
 
 def parts_of(context, targets: list[Target]) -> dict[Target, Parts]:
     """Digests of the parts of the scene that bakes of the targets read now, for `keep`."""
-    return fingerprints.of(context, targets)
+    return fingerprints(context, targets, is_for_bake=True)
 
 
 def keep(bake: Bake, parts: Parts | None, is_preview: bool = False) -> None:
@@ -100,7 +105,7 @@ def _record(target: Target, scene) -> Record | None:
 def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
     if is_sequence(image_of(target)):
         return _row_of_frames(target, record, now)
-    changed = [] if record is None or now is None else record.changed(now)
+    changed = [] if record is None or now is None else _changed(record, now)
     if record is not None and not record.is_dirty and image_of(target).is_dirty:
         changed.append("pixels of the image")
     if record is not None and _has_lost_its_file(image_of(target)):
@@ -110,8 +115,8 @@ def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
         return replace(said, is_stale=bool(changed))
     if record is None:
         return Row(target, Status.NEVER)
-    earlier = (*_why_later(image_of(target)), *record.messages())
-    subject = str(target)
+    subject, unknown = str(target), () if record.is_comparable() else (note(str(target), *UNKNOWN),)
+    earlier = (*_why_later(image_of(target)), *record.messages(), *unknown)
     if changed and changed != [QUALITY]:
         why = warning(subject, f"Changed since its bake: {', '.join(changed)}.")
         return Row(target, Status.STALE, (why, *earlier), True)
@@ -120,11 +125,16 @@ def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
     return Row(target, status, (*again, *earlier), bool(changed))
 
 
+def _changed(record: Record, now: Parts) -> list[str]:
+    """Parts that have changed since a bake; of a record that has other digests, the quality alone is known."""
+    return record.changed(now if record.is_comparable() else {QUALITY: now[QUALITY]})
+
+
 def _row_of_frames(target: Target, record: Record | None, now: Parts | None) -> Row:
     """The row of an image sequence, by the frame that is shown. A bake does not renew it, so it is not up for one."""
     first, last, *_ = facts_of(image_of(target)).frames
     subject, shown = str(target), f"Shows the frames {first} to {last} of a batch."
-    if record is None or now is None:
+    if record is None or now is None or not record.is_comparable():
         return Row(target, Status.BAKED, (note(subject, f"{shown} Changes since then are not known."),))
     warnings, changed = record.messages(), record.changed(now)
     if changed:
@@ -178,16 +188,7 @@ def _scan() -> float | None:
     return None
 
 
-@persistent
-def _on_update(_scene, depsgraph) -> None:
-    changed = [
-        update.id.original.as_pointer()
-        for update in depsgraph.updates
-        if update.is_updated_geometry or not isinstance(update.id, bpy.types.Object)
-    ]
-    fingerprints.forget(changed)
-    if any(update.is_updated_geometry and isinstance(update.id, bpy.types.Object) for update in depsgraph.updates):
-        fingerprints.forget_scatter()
+def _on_change(_depsgraph) -> None:
     if not _last["is scanning"]:
         scan_soon()  # even without updates: Blender 3.4 reports none for strokes on images
 
@@ -202,28 +203,16 @@ def _before_loading(*_arguments) -> None:
     _waiting.clear()
 
 
-@persistent
-def _on_all(*_arguments) -> None:
-    """Undo and loading replace data-blocks: nothing is known about the new ones."""
-    fingerprints.forget()
-    scan_soon()
-
-
 def _stop_scanning() -> None:
     if bpy.app.timers.is_registered(_scan):
         bpy.app.timers.unregister(_scan)
-    fingerprints.forget()
 
 
 register, unregister = all_or_nothing(
     *handlers(
-        depsgraph_update_post=_on_update,
-        frame_change_post=_on_update,
-        undo_post=_on_all,
-        redo_post=_on_all,
         save_pre=_before_saving,
         load_pre=_before_loading,
-        load_post=_on_all,
     ),
+    (lambda: listeners.append(_on_change), lambda: listeners.remove(_on_change)),
     (scan_soon, _stop_scanning),
 )

@@ -5,7 +5,7 @@ Jobs are large, so a plan makes its job when its turn comes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -17,6 +17,7 @@ from ....core.bake.job import BakeJob
 from ....core.bake.runner import Bake
 from ....core.bake.steps import BAKE_STEPS, needs_medium, to_simulate
 from ....core.bake.surface import Surface
+from ....core.native import native
 from ....core.scene.illumination import Illumination
 from ....core.scene.receiver import build_receiver, texture_size
 from ....core.scene.texture import BaseColor
@@ -32,7 +33,11 @@ from ...node.node import BeamspreadNode
 from ...read.base_color import read_texture
 from ...read.geometry import read_polygons
 from ...read.lights import read_illumination
+from ...read.scene_cache import SceneCache, scene_cache
 from ...read.visibility import ObjectInstance, as_rendered, check_instance, find_instances, render_visible_names
+
+CANCELLING = KeyboardInterrupt, native.Cancelled
+"""Exceptions that cancel bakes."""
 
 PLACEHOLDER_COLOR = (0.5, 0.5, 0.5)
 """Base color until Cycles has evaluated it."""
@@ -109,30 +114,38 @@ class BakePlan:
 
 @dataclass(frozen=True, eq=False)
 class FailedPlan:
-    """A target that could not be read."""
+    """A target that could not be read, or whose reading was cancelled."""
 
     target: Target
-    error: Exception
+    error: BaseException
     image = ""
 
     def to_simulate(self, _settings: BakeSettings) -> list:
         return []
 
     def bake(self, _settings: BakeSettings) -> Bake:
-        return Bake(self.target, error=self.error)
+        if not isinstance(self.error, CANCELLING):
+            return Bake(self.target, error=self.error)
+        bake = Bake(self.target)
+        bake.cancel()
+        return bake
 
 
 Plan = BakePlan | FailedPlan
 
 
+Check = Callable[[], None]
+"""Called while nodes are evaluated; raises Cancelled to cancel all bakes."""
+
+
 def prepare_scene(
-    context, targets: list[Target], settings: BakeSettings, resolution: int | None = None
+    context, targets: list[Target], settings: BakeSettings, resolution: int | None = None, check: Check | None = None
 ) -> Iterator[Bake]:
     """Read the scene as it would render at its current frame; makes a bake for each target when it is asked for."""
-    return (plan.bake(settings) for plan in read_scene(context, targets, resolution))
+    return (plan.bake(settings) for plan in read_scene(context, targets, resolution, check))
 
 
-def read_scene(context, targets: list[Target], resolution: int | None = None) -> list[Plan]:
+def read_scene(context, targets: list[Target], resolution: int | None = None, check: Check | None = None) -> list[Plan]:
     """Read the targets in the scene as it would render at its current frame.
 
     Parameters
@@ -143,8 +156,12 @@ def read_scene(context, targets: list[Target], resolution: int | None = None) ->
     view_layer = context.view_layer
     _update_nodes(context.evaluated_depsgraph_get())
     with as_rendered(view_layer):
-        visible = render_visible_names(view_layer)
-        return read_plans(context.evaluated_depsgraph_get(), targets, visible, resolution)
+        visible, depsgraph = render_visible_names(view_layer), context.evaluated_depsgraph_get()
+        scene_cache.check_images()
+        plans = read_plans(depsgraph, targets, visible, resolution, cache=scene_cache, check=check)
+    if not context.scene.beamspread.use_live:
+        scene_cache.drop_arrays()
+    return plans
 
 
 def _update_nodes(depsgraph) -> None:
@@ -178,6 +195,8 @@ def read_plans(
     resolution: int | None = None,
     size: tuple[int, int] | None = None,
     copy: CopyForCycles | None = None,
+    cache: SceneCache | None = None,
+    check: Check | None = None,
 ) -> list[Plan]:
     """Read the targets and the light of a depsgraph, which is not needed afterwards.
 
@@ -187,18 +206,21 @@ def read_plans(
     resolution : as for `read_scene`.
     size : width and height of the texture, overrides all other sizes.
     copy : copy of the scene for Cycles, if there is one already. Else the first job that needs one makes it.
+    cache : results of earlier reads, for a depsgraph of the viewport; None: everything is read.
     """
     try:
         instances = find_instances(depsgraph, {target.object_name for target in targets}, visible)
-        light = read_illumination(depsgraph), CyclesLight(depsgraph, copy)
-    except Exception as error:  # noqa: BLE001 - each bake asked for needs an answer
+        light = read_illumination(depsgraph, cache, check), CyclesLight(depsgraph, copy)
+    except (Exception, *CANCELLING) as error:  # noqa: BLE001 - each bake asked for needs an answer
         return [FailedPlan(target, error) for target in targets]
     plans: list[Plan] = []
     for target in targets:
         try:
             instance = instances.get(target.object_name)
             check_instance(target.object_name, instance, depsgraph.view_layer)
-            plans.append(_read_target(depsgraph, target, instance, resolution, size, light))
+            plans.append(_read_target(depsgraph, target, instance, resolution, size, light, check))
+        except CANCELLING as error:
+            return [FailedPlan(target, error) for target in targets]
         except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
             plans.append(FailedPlan(target, error))
     return plans
@@ -211,6 +233,7 @@ def _read_target(
     resolution: int | None,
     size: tuple[int, int] | None,
     light: tuple[Illumination, CyclesLight],
+    check: Check | None,
 ) -> BakePlan:
     evaluated: BakeTarget = next(evaluated for evaluated in targets_of(instance.obj) if evaluated.name == target)
     node, image = evaluated.node, evaluated.image
@@ -228,7 +251,7 @@ def _read_target(
     if not node.has_texture():
         return plan
     receiver, blur = build_receiver(maps, *size), node.texture_blur
-    color = read_texture(node.color_input(evaluated.groups), blur, instance, receiver)
+    color = read_texture(node.color_input(evaluated.groups), blur, instance, receiver, check)
     matrix = np.array(instance.matrix).tolist() if instance.is_instance else None
     return replace(plan, color=color, blur=blur, matrix=matrix)
 

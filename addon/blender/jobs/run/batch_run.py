@@ -6,6 +6,7 @@ import logging
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -175,7 +176,8 @@ class _Batch(Sink):
         prepared, inventory = iter(()), Inventory()
         if not self._stop:
             with timed("scene"):
-                prepared = iter(prepare_scene(bpy.context, targets, self._settings, self._options.resolution))
+                check = partial(Progress(lambda _: not self._stop).check, 0.0)
+                prepared = prepare_scene(bpy.context, targets, self._settings, self._options.resolution, check)
         for target in targets:
             bake = _cancelled(target) if self._stop else next(prepared)
             if self._options.verbose:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import uuid
 from collections.abc import Iterator
+from functools import partial
 
 import bpy
 import numpy as np
@@ -54,7 +55,7 @@ def bake_active_image(engine, depsgraph, obj, width: int, height: int) -> None:
     result = engine.begin_result(0, 0, width, height, layer=f"Beamspread {uuid.uuid4()}")
     passes, filled = result.layers[0].passes, False
     try:
-        bakes = _prepare(depsgraph, obj, passes, (width, height))
+        bakes = _prepare(engine, depsgraph, obj, passes, (width, height))
         sink = _ActiveImage(engine, len(bakes), (width, height))
         run_bakes(bakes, sink)
         for bake in bakes:
@@ -90,13 +91,14 @@ class _ActiveImage(Sink):
         state.note(bake)
 
 
-def _prepare(depsgraph, obj, passes, size: tuple[int, int]) -> list[Bake]:
+def _prepare(engine, depsgraph, obj, passes, size: tuple[int, int]) -> list[Bake]:
     """A bake for each material of the object that has its node and that the image shows."""
     try:
         settings, targets = depsgraph.scene.beamspread.for_bake(), _targets_in(obj, passes, *size)
         for target in targets:
             _check_active_image(target, settings)
-        plans = read_plans(depsgraph, [target.name for target in targets], size=size, copy=fillings.copy)
+        check = partial(Progress(lambda _: not engine.test_break()).check, 0.0)
+        plans = read_plans(depsgraph, [target.name for target in targets], None, None, size, fillings.copy, None, check)
         bakes = [plan.bake(settings) for plan in plans] or find_misplaced([obj])
     except Exception as error:  # noqa: BLE001 - Blender would swallow it
         return [Bake(Target(obj.name), error=error)]

@@ -1,0 +1,212 @@
+"""Digests of the objects that bakes read: lamps, and solids, which block, emit and reflect light."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ... import compat
+from ...node.find import find_node_in_groups
+from ...read.digests import TreeDigest, digest, digest_of_mesh, values_of
+from ...read.emitters import VARYING, radiance_of
+from ...read.lamps import is_portal, read_lamp
+from ...read.lights import lights_surfaces, links_of
+from ...read.scene_cache import scene_cache
+from ...read.transparency import transmittance_of
+from ...read.visibility import SOLID_TYPES, SURFACE_TYPES, collection_of, render_visible_names, rendered_in, renders
+
+# Blender changes the number of trails on loading.
+_PARTICLE_LOOKS = set(bpy.types.ID.bl_rna.properties.keys()) | {"animation_data", "trail_count"}
+_MODIFIER_LOOKS = {
+    "execution_time",
+    "show_viewport",
+    "levels",
+    "persistent_uid",
+    "object",
+    "is_active",
+    "particle_system",
+}
+
+
+class ObjectDigests:
+    """Hashes of the objects of a scene that render, and of instances: numbers, so that their sum has no order.
+
+    Objects that the window hides are read without modifiers; the values of modifiers always count.
+
+    Attributes
+    ----------
+    lamps : sum of the hashes of all lamps.
+    solids : sum of the hashes of all instances of each other object, by name.
+    images : images that the nodes of lamps and materials show, in the order in which they were found.
+    """
+
+    def __init__(self, depsgraph, is_for_bake: bool) -> None:
+        """`is_for_bake`: as for `fingerprints`."""
+        scene = depsgraph.scene.original
+        self._depsgraph, self._is_for_bake, self._bounces = depsgraph, is_for_bake, scene.beamspread.use_indirect
+        self._visible = render_visible_names(depsgraph.view_layer)
+        self.lamps, self.solids, self.images = 0, Counter(), {}
+        placed = [*_placed(depsgraph, (obj for obj in scene.objects if obj.name in self._visible))]
+        self._names = {obj.name for obj, *_ in placed if obj.type in SOLID_TYPES}
+        for obj, matrix, instancer in placed:
+            if not obj.is_instancer or obj.show_instancer_for_render:
+                self._add(obj, matrix, instancer)
+        scatterers = [(instancer or obj).original for obj, _, instancer in placed if _scatters(obj)]
+        if scatterers:
+            self._add_scattered([*dict.fromkeys(scatterers)])
+
+    def _add(self, obj, matrix: Matrix, instancer) -> None:
+        """Add an evaluated object; `instancer` has an instance of it, or is None."""
+        is_lit = lights_surfaces(obj, instancer)
+        if obj.type == "LIGHT" and is_lit and not is_portal(obj.data):
+            self.lamps += self._lamp(obj, matrix)
+        elif obj.type in (SOLID_TYPES if self._bounces else SURFACE_TYPES):
+            casts = all(owner.visible_shadow for owner in (obj, instancer) if owner is not None)
+            materials = self._materials(slot.material for slot in obj.material_slots)
+            links = self._links(obj) if is_lit and materials else []
+            self.solids[obj.name] += _number(self._shape(obj), _rows(matrix), casts, materials, links)
+
+    def _lamp(self, obj, matrix: Matrix) -> int:
+        light, reason = read_lamp(obj, matrix)
+        tree = self._noted(scene_cache.tree(obj.data)) if obj.data.use_nodes else TreeDigest()
+        return _number(light and replace(light, name=""), reason and tree.text, self._links(obj))
+
+    def _links(self, obj) -> list:
+        """Names of the objects that the object's light is linked to."""
+        links = links_of(obj, self._names).values()
+        return [names if names is None else sorted(names & self._names) for names in links]
+
+    def _shape(self, obj) -> str:
+        """Digest of a mesh, modifiers and particles; of a name where there is no mesh."""
+        if obj.type not in SURFACE_TYPES:
+            return obj.data.name_full if obj.data else ""
+
+        block = obj.original
+
+        def read() -> str:
+            # The originals' settings: Blender 3.4 crashes when evaluated particles are read.
+            modifiers = [(item.show_render, item.type, values_of(item, _MODIFIER_LOOKS)) for item in block.modifiers]
+            particles = [
+                (system.seed, values_of(system.settings, _PARTICLE_LOOKS)) for system in block.particle_systems
+            ]
+            return digest(digest_of_mesh(obj), modifiers, particles)
+
+        return scene_cache.get(("shape", block, self._is_for_bake and not obj.is_evaluated), [block], read)
+
+    def _materials(self, materials: Iterable) -> list[str]:
+        """Digests of the light that materials let through and emit, of all of them if light bounces; [] for none."""
+        texts = [self._whole(material) if self._bounces else self._light_of(material) for material in materials]
+        return texts if any(texts) else []
+
+    def _light_of(self, material) -> str:
+        """Digest of the light that a material emits and lets through; "" for none."""
+        if material is None:
+            return ""
+        tree = self._noted(scene_cache.tree(material))
+        if not tree.images:
+            color, radiance = transmittance_of(material, scene_cache).color, radiance_of(material, scene_cache)
+            if radiance is None and not any(color):
+                return ""
+            if radiance is not VARYING:
+                return digest(color, radiance is not None and radiance.tolist())
+        return digest(tree.text, compat.has_transparent_shadow(material))
+
+    def _whole(self, material) -> str:
+        """Digest of all of a material; one with a Beamspread node counts by its medium, not by its baked image."""
+        place = None if material is None else find_node_in_groups(material.original)
+        if place is not None:
+            return digest(surface_values(*place), self._noted(texture_tree(material, *place)).text)
+        tree = TreeDigest() if material is None else self._noted(scene_cache.tree(material, is_whole=True))
+        return digest(tree.text, material and compat.has_transparent_shadow(material))
+
+    def _noted(self, tree: TreeDigest) -> TreeDigest:
+        self.images |= dict.fromkeys(tree.images)
+        return tree
+
+    def _add_scattered(self, scatterers: list) -> None:
+        """Add instances from geometry nodes, particles, vertices and faces, as parts of the object that has them."""
+        transforms = tuple((obj.name, repr(_rows(obj.matrix_world))) for obj in scatterers)
+        state = scene_cache.geometry_time, frozenset(self._visible), transforms
+
+        def read() -> dict:
+            return _scattered(self._depsgraph, scatterers, self._visible)
+
+        for name, (number, names) in scene_cache.get(("scattered",), [], read, state=state).items():
+            self.solids[name] += _number(number, self._materials(map(bpy.data.materials.get, names)))
+
+
+def texture_tree(material, node, groups: tuple) -> TreeDigest:
+    """Digest of the nodes before the Base Color of a material's node."""
+    return scene_cache.texture(material, node.color_input(groups)) if node.has_texture() else TreeDigest()
+
+
+def surface_values(node, _groups: tuple = ()) -> list:
+    """Values of a Beamspread node that bakes read, without those that are linked to it."""
+    return [repr(node.surface()), getattr(node, "side", ""), node.has_texture() and node.texture_blur]
+
+
+def _placed(depsgraph, objects: Iterable, matrix: Matrix | None = None, instancer=None) -> Iterator[tuple]:
+    """Evaluated objects, their transforms and instancers, and after them those of collections that they instance."""
+    for original in objects:
+        obj = original.evaluated_get(depsgraph)
+        world = _transform(obj) if matrix is None else matrix @ _transform(obj)
+        yield obj, world, instancer
+        collection = collection_of(original)
+        if collection is not None:
+            inner = world @ Matrix.Translation(-collection.instance_offset)
+            yield from _placed(depsgraph, rendered_in(collection), inner, instancer or obj)
+
+
+def _transform(obj) -> Matrix:
+    """Transform of an evaluated object to the world. Blender updates no hidden ones: these lack their constraints."""
+    if obj.is_evaluated:
+        return obj.matrix_world
+    around = Matrix() if obj.parent is None else _transform(obj.parent) @ obj.matrix_parent_inverse
+    return around @ obj.matrix_basis
+
+
+def _scatters(obj) -> bool:
+    """True if the object may have instances that are no objects of the scene."""
+    if obj.instance_type in ("VERTS", "FACES") or any(modifier.type == "NODES" for modifier in obj.modifiers):
+        return True
+    return any(system.settings.render_type in ("OBJECT", "COLLECTION") for system in obj.particle_systems)
+
+
+def _scattered(depsgraph, scatterers: list, visible: set[str]) -> dict[str, tuple[int, list[str]]]:
+    """By name of an object that has instances: a hash of these, and the names of their materials."""
+    seen = {obj: ({}, []) for obj in scatterers}
+    for instance in depsgraph.object_instances:
+        parent = instance.parent.original if instance.is_instance and instance.parent is not None else None
+        if parent in seen and renders(instance, visible):
+            obj, (shapes, matrices) = instance.object, seen[parent]
+            key = obj.data.as_pointer() if obj.data is not None else 0
+            if key not in shapes:
+                materials = [slot.material.name for slot in obj.material_slots if slot.material is not None]
+                shapes[key] = _content(obj), materials
+            # Hashes of matrices: an array of these takes ten times as long.
+            matrices.append((key, hash(instance.matrix_world.copy().freeze())))
+    scattered = {}
+    for obj, (shapes, matrices) in seen.items():
+        number = _number([(shapes[key][0], matrix) for key, matrix in matrices])
+        scattered[obj.name] = number, [name for _, names in shapes.values() for name in names]
+    return scattered
+
+
+def _content(obj) -> str:
+    """Digest of a scattered object."""
+    if obj.type == "LIGHT":
+        return digest(read_lamp(obj, Matrix()))
+    return digest(obj.type, digest_of_mesh(obj) if obj.type == "MESH" else "")
+
+
+def _number(*values) -> int:
+    return int(digest(*values), 16)
+
+
+def _rows(matrix: Matrix) -> list:
+    return np.array(matrix, np.float32).tolist()
