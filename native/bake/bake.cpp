@@ -1,12 +1,10 @@
 #include "bake/bake.h"
 
 #include <algorithm>
-#include <cmath>
-#include <functional>
 #include <numeric>
 #include <utility>
 
-#include "base/constants.h"
+#include "bake/field_bake.h"
 #include "simd/loops.h"
 #include "solve/solve.h"
 
@@ -14,304 +12,60 @@ namespace beamspread {
 
 namespace {
 
-// Suns with an exact kernel of their own beside light that is not stored. Larger: more transforms.
-constexpr std::size_t max_suns = 4;
-
-// Lights that terms are chosen for where light is not stored: the brightest. Larger: slower choice.
-constexpr std::size_t max_examples = 4;
-
-// Rays from each texel to an example that has a size. Larger: slower choice, less noise in it.
-constexpr int example_rays = 8;
-
-// Texels along a side and rays of the survey, which finds the angles and the mean irradiance of lights that nothing
-// blocks.
-constexpr std::size_t survey_texels = 96;
-constexpr int survey_rays = 4;
-
-// Rays of the first pass over those of a texel, and their bounds, see `RaySettings::even_rays`.
+// Rays of a texel for each ray of its first pass (`RaySettings::even_rays`), and bounds of the latter. More rays of the
+// first pass are slower and miss fewer shadows.
 constexpr int rays_per_even_ray = 8;
 constexpr int min_even_rays = 4;
 constexpr int max_even_rays = 16;
 
-// Units of progress: light without a size, per ray and texel of light with a size relative to that, and the solver's
-// choice of terms and its transforms. Measured for 512 x 512 texels.
-constexpr double light_work = 1.0;
-constexpr double ray_work = 0.4;
-constexpr double solver_work = 3.0;
-
-// Angles, and irradiance in W/m^2, of the light that stands for any light.
-constexpr std::size_t any_light_angles = 256;
-constexpr float any_light_irradiance = 1e3f;
-
-RaySettings ray_settings(const Surface& surface, const BakeOptions& options, int rays)
-{
-    return {.samples = options.samples,
-            .rays = rays,
-            .even_rays = std::clamp(rays / rays_per_even_ray, min_even_rays, max_even_rays),
-            .seed = options.seed,
-            .clearance = surface.clearance,
-            .threads = options.threads};
-}
-
-// Calls `step` with a progress of its own, which is `work` of the whole.
-void advance_by(Progress& whole, double work, const std::function<void(Progress&)>& step)
-{
-    double done = 0.0;
-    Progress part([&](double fraction) {
-        whole.advance(work * std::max(fraction - done, 0.0));
-        done = std::max(done, fraction);
-        return true;
-    });
-    step(part);
-    whole.advance(work * (1.0 - done));
-}
-
-// Adds rays to a field.
-class FieldSink final : public RaySink {
-public:
-    // `directions`: those of all rays; none if each ray has its own.
-    FieldSink(LightField& field, const std::vector<double>& color, bool is_colored,
-              const std::optional<Directions>& directions)
-        : m_field(field), m_color(color), m_is_colored(is_colored), m_directions(directions)
-    {
-    }
-
-    void add(const RayRun& run) override
-    {
-        const std::size_t y = run.sample / m_field.plane().width;
-        const std::size_t x = run.sample % m_field.plane().width;
-        const Vec3f* travel = run.travel;
-        if (m_directions) {
-            std::vector<Vec3f>& texels = m_scratch.local();
-            texels.resize(run.count);
-            for (std::size_t i = 0; i < run.count; ++i)
-                texels[i] = Vec3f(travel_at(m_field.plane(), *m_directions, y, x + i));
-            travel = texels.data();
-        }
-        m_field.add({y, x, run.count, &travel->x, &run.irradiance->x}, m_color, m_is_colored);
-    }
-
-private:
-    LightField& m_field;
-    const std::vector<double>& m_color;
-    bool m_is_colored;
-    std::optional<Directions> m_directions;
-    PerThread<std::vector<Vec3f>> m_scratch;
-};
-
-// Adds all rays of a light to a field.
-void add_light(const Surface& surface, const SurfaceLight& light, RaySettings settings, LightField& field,
-               Progress& progress)
-{
-    const std::optional<Directions> directions = light.directions(surface.grid);
-    settings.with_travel = !directions;
-    FieldSink sink(field, light.color, light.is_colored(surface), directions);
-    light.gather(surface, settings, sink, progress);
-}
-
-// The same plane with few texels, wholly covered.
-Surface survey_surface(const Surface& surface)
-{
-    Surface coarse{.grid = surface.grid, .clearance = surface.clearance};
-    coarse.grid.width = std::min(surface.grid.width, survey_texels);
-    coarse.grid.height = std::min(surface.grid.height, survey_texels);
-    coarse.grid.pitch_x *= static_cast<double>(surface.grid.width) / static_cast<double>(coarse.grid.width);
-    coarse.grid.pitch_y *= static_cast<double>(surface.grid.height) / static_cast<double>(coarse.grid.height);
-    return coarse;
-}
-
-// Each light as one for each channel, so that no channel counts as a multiple of another.
-std::vector<PlaneLight> by_channel(const std::vector<PlaneLight>& lights)
-{
-    std::vector<PlaneLight> apart;
-    for (const PlaneLight& light : lights)
-        for (std::size_t c = 0; c < light.color.size(); ++c) {
-            apart.push_back(light);
-            apart.back().color.assign(light.color.size(), 0.0);
-            apart.back().color[c] = light.color[c];
-        }
-    return apart;
-}
-
-void scale_by_color_out(const Surface& surface, std::size_t channels, float* luminance)
-{
-    for (std::size_t i = 0; i < surface.samples() * channels && surface.color_out; ++i)
-        luminance[i] *= surface.color_out[i];
-}
-
 // Luminance of lights whose irradiance is stored before the solver begins. Lights of many rays, which `direct` and
 // `adaptive` solve ray by ray, are stored one after the other.
-class StoredBake {
-public:
-    StoredBake(const Surface& surface, const std::vector<SurfaceLight>& lights, const BakeOptions& options)
-        : m_surface(surface), m_lights(lights), m_options(options)
-    {
+void bake_stored(const Surface& surface, const std::vector<SurfaceLight>& lights, const BakeOptions& options,
+                 Problem problem, Progress& progress, float* luminance)
+{
+    const auto has_one_direction = [&](const SurfaceLight& light) {
+        return light.directions(surface.grid).has_value();
+    };
+    const std::size_t group_size =
+        std::ranges::all_of(lights, has_one_direction) ? std::max<std::size_t>(lights.size(), 1) : 1;
+    const std::size_t groups = lights.size() / group_size;
+    const std::size_t values = problem.plane.texels() * problem.channels.size();
+    progress.set_total(light_work * static_cast<double>(lights.size()) + solver_work);
+    std::fill_n(luminance, values, 0.0f);
+    std::vector<float> part_of_sum;  // luminance of a group beside the first
+    for (std::size_t group = 0; group < groups; ++group) {
+        StoredLight stored;
+        for (std::size_t i = group * group_size; i < (group + 1) * group_size; ++i)
+            progress.advance_by(light_work, [&](Progress& part) {
+                RaySettings settings = options.ray_settings(surface, options.rays);
+                if (has_one_direction(lights[i])) {
+                    stored.add_one_direction(surface, lights[i], settings, part);
+                } else {
+                    settings.even_rays = 0;
+                    stored.add_rays(surface, lights[i], settings, part);
+                }
+            });
+        if (stored.lights.empty())
+            continue;
+        problem.lights = stored.lights;
+        part_of_sum.resize(group == 0 ? 0 : values);
+        progress.advance_by(solver_work / static_cast<double>(groups),
+                            [&](Progress& part) { solve(problem, part, group == 0 ? luminance : part_of_sum.data()); });
+        add_scaled(luminance, part_of_sum.data(), 1.0f, part_of_sum.size());
     }
-
-    void run(Problem problem, Progress& progress, float* luminance) const
-    {
-        const bool is_one_group = std::ranges::all_of(
-            m_lights, [&](const SurfaceLight& light) { return light.directions(m_surface.grid).has_value(); });
-        const std::size_t group_size = is_one_group ? std::max<std::size_t>(m_lights.size(), 1) : 1;
-        const std::size_t groups = m_lights.size() / group_size;
-        const std::size_t values = problem.plane.texels() * problem.channels.size();
-        progress.set_total(light_work * static_cast<double>(m_lights.size()) + solver_work);
-        std::fill_n(luminance, values, 0.0f);
-        std::vector<float> part_of_sum;  // luminance of a group beside the first
-        for (std::size_t group = 0; group < groups; ++group) {
-            StoredLight stored;
-            for (std::size_t i = group * group_size; i < (group + 1) * group_size; ++i)
-                advance_by(progress, light_work, [&](Progress& part) { store(m_lights[i], stored, part); });
-            if (stored.lights.empty())
-                continue;
-            problem.lights = stored.lights;
-            part_of_sum.resize(group == 0 ? 0 : values);
-            advance_by(progress, solver_work / static_cast<double>(groups),
-                       [&](Progress& part) { solve(problem, part, group == 0 ? luminance : part_of_sum.data()); });
-            add_scaled(luminance, part_of_sum.data(), 1.0f, part_of_sum.size());
-        }
-    }
-
-private:
-    void store(const SurfaceLight& light, StoredLight& stored, Progress& progress) const
-    {
-        RaySettings settings = ray_settings(m_surface, m_options, m_options.rays);
-        if (light.directions(m_surface.grid)) {
-            stored.add_one_direction(m_surface, light, settings, progress);
-        } else {
-            settings.even_rays = 0;
-            stored.add_rays(m_surface, light, settings, progress);
-        }
-    }
-
-    const Surface& m_surface;
-    const std::vector<SurfaceLight>& m_lights;
-    const BakeOptions& m_options;
-};
-
-// Luminance of lights of any number and size by a light field, in memory that does not grow with them.
-class FieldBake {
-public:
-    FieldBake(const Surface& surface, const std::vector<SurfaceLight>& lights, const BakeOptions& options)
-        : m_surface(surface), m_lights(lights), m_options(options)
-    {
-    }
-
-    void run(Problem problem, Progress& progress, float* luminance)
-    {
-        survey(problem.coming);
-        sort_lights();
-        set_total(progress);
-        StoredLight kept;
-        for (const std::size_t i : m_suns)
-            advance_by(progress, light_work,
-                       [&](Progress& part) { kept.add_one_direction(m_surface, m_lights[i], settings_for(i), part); });
-        problem.lights = kept.lights;
-        std::unique_ptr<LightField> field;
-        {
-            StoredLight examples;
-            // The mean direction of each texel: harmonics of all its directions together are weaker.
-            for (const std::size_t i : m_examples)
-                advance_by(progress, light_work, [&](Progress& part) {
-                    examples.add_mean_direction(m_surface, m_lights[i],
-                                                ray_settings(m_surface, m_options, example_rays), part);
-                });
-            problem.coming.examples = examples.lights;
-            if (problem.lights.empty() && examples.lights.empty() && m_mean == 0.0) {
-                std::fill_n(luminance, problem.plane.texels() * problem.channels.size(), 0.0f);
-                return;
-            }
-            advance_by(progress, solver_work,
-                       [&](Progress& part) { field = std::make_unique<LightField>(problem, part); });
-        }
-        m_survey = {};
-        for (const std::size_t i : m_later)
-            advance_by(progress, gather_work(i),
-                       [&](Progress& part) { add_light(m_surface, m_lights[i], settings_for(i), *field, part); });
-        advance_by(progress, solver_work, [&](Progress& part) { field->solve(part, luminance); });
-    }
-
-private:
-    // Finds the angles, colors and mean irradiance of lights where nothing blocks them.
-    void survey(ComingLight& coming)
-    {
-        const Surface coarse = survey_surface(m_surface);
-        coming.plane = coarse.plane();
-        BakeOptions options = m_options;
-        options.samples = 1;
-        RaySettings settings = ray_settings(coarse, options, survey_rays);
-        settings.even_rays = 0;
-        Progress unseen;
-        for (const SurfaceLight& light : m_lights) {
-            SurfaceLight open = light;
-            open.occluders = nullptr;
-            StoredLight& stored = m_survey.emplace_back();
-            if (open.directions(coarse.grid) && !open.field)
-                stored.add_one_direction(coarse, open, settings, unseen);
-            else
-                stored.add_rays(coarse, open, settings, unseen);
-            m_means.push_back(stored.mean());
-            const std::vector<PlaneLight>& lights =
-                light.is_colored(m_surface) ? by_channel(stored.lights) : stored.lights;
-            coming.survey.insert(coming.survey.end(), lights.begin(), lights.end());
-        }
-        m_mean = std::accumulate(m_means.begin(), m_means.end(), 0.0);
-    }
-
-    // Decides which lights are kept as suns, which are added as rays, and which of these terms are chosen for.
-    void sort_lights()
-    {
-        std::vector<std::size_t> brightest(m_lights.size());
-        std::iota(brightest.begin(), brightest.end(), std::size_t{0});
-        std::ranges::stable_sort(brightest, std::greater{}, [&](std::size_t i) { return m_means[i]; });
-        std::ranges::copy_if(brightest, std::back_inserter(m_suns), [&](std::size_t i) {
-            const auto directions = m_lights[i].field ? std::nullopt : m_lights[i].directions(m_surface.grid);
-            return directions && std::holds_alternative<OneDirection>(*directions);
-        });
-        if (m_suns.size() > max_suns)
-            m_suns.clear();
-        for (const std::size_t i : brightest)
-            if (std::ranges::find(m_suns, i) == m_suns.end())
-                m_later.push_back(i);
-        // A light that the survey missed shines on few texels.
-        for (std::size_t k = 0; k < m_later.size(); ++k)
-            if (k < max_examples || m_means[m_later[k]] == 0.0)
-                m_examples.push_back(m_later[k]);
-    }
-
-    // Rays are shared among lights by their mean irradiance.
-    RaySettings settings_for(std::size_t i) const
-    {
-        const bool is_sun = std::ranges::find(m_suns, i) != m_suns.end();
-        const double share = m_mean > 0.0 ? m_means[i] / m_mean : 0.0;
-        const int rays = static_cast<int>(std::nearbyint(m_options.rays * share));
-        return ray_settings(m_surface, m_options, is_sun ? m_options.rays : std::max(m_options.min_rays, rays));
-    }
-
-    double gather_work(std::size_t i) const
-    {
-        const bool is_traced = m_lights[i].light && m_lights[i].has_size() && !m_lights[i].directions(m_surface.grid);
-        return light_work + (is_traced ? ray_work * settings_for(i).rays : 0.0);
-    }
-
-    void set_total(Progress& progress) const
-    {
-        double total = light_work * static_cast<double>(m_suns.size() + m_examples.size()) + 2.0 * solver_work;
-        for (const std::size_t i : m_later)
-            total += gather_work(i);
-        progress.set_total(total);
-    }
-
-    const Surface& m_surface;
-    const std::vector<SurfaceLight>& m_lights;
-    const BakeOptions& m_options;
-    std::vector<StoredLight> m_survey;  // [light]
-    std::vector<double> m_means;        // [light] mean irradiance of the survey, W/m^2
-    double m_mean = 0.0;                // sum of these
-    std::vector<std::size_t> m_suns, m_later, m_examples;  // lights, the brightest first
-};
+}
 
 }  // namespace
+
+RaySettings BakeOptions::ray_settings(const Surface& surface, int ray_count) const
+{
+    return {.samples = samples,
+            .rays = ray_count,
+            .even_rays = std::clamp(ray_count / rays_per_even_ray, min_even_rays, max_even_rays),
+            .seed = seed,
+            .clearance = surface.clearance,
+            .threads = threads};
+}
 
 void bake_luminance(const Surface& surface, const std::vector<SurfaceLight>& lights,
                     const std::vector<ChannelMedium>& channels, const BakeOptions& options, Progress& progress,
@@ -328,51 +82,11 @@ void bake_luminance(const Surface& surface, const std::vector<SurfaceLight>& lig
         lights, [&](const SurfaceLight& light) { return light.directions(surface.grid).has_value(); });
     const bool fits = lights.size() * surface.samples() * sizeof(float) <= options.max_stored_bytes;
     if (options.solver != Solver::fft || (has_one_direction_each && fits))
-        StoredBake(surface, lights, options).run(std::move(problem), progress, luminance);
+        bake_stored(surface, lights, options, std::move(problem), progress, luminance);
     else
-        FieldBake(surface, lights, options).run(std::move(problem), progress, luminance);
-    scale_by_color_out(surface, channels.size(), luminance);
+        bake_by_field(surface, lights, options, std::move(problem), progress, luminance);
+    surface.scale_by_color_out(channels.size(), luminance);
     progress.finish();
-}
-
-void bake_luminance(const Surface& surface, const std::vector<SurfaceLight>& lights, LightField& field,
-                    const BakeOptions& options, Progress& progress, float* luminance)
-{
-    progress.set_total(light_work * static_cast<double>(lights.size()) + solver_work);
-    field.clear();
-    for (const SurfaceLight& light : lights)
-        advance_by(progress, light_work, [&](Progress& part) {
-            add_light(surface, light, ray_settings(surface, options, options.rays), field, part);
-        });
-    advance_by(progress, solver_work, [&](Progress& part) { field.solve(part, luminance); });
-    scale_by_color_out(surface, field.channels(), luminance);
-    progress.finish();
-}
-
-std::unique_ptr<LightField> any_light_field(const Plane& plane, const std::vector<ChannelMedium>& channels,
-                                            double max_angle, double tolerance, bool is_colored, int threads)
-{
-    // Angles of incidence are even in tan(theta / 2); the azimuth does not matter.
-    std::vector<float> travel;
-    const double max_half_tangent = std::tan(0.5 * max_angle * radians_per_degree);
-    for (std::size_t i = 0; i < any_light_angles; ++i) {
-        const double theta = 2.0 * std::atan(max_half_tangent * static_cast<double>(i) / (any_light_angles - 1));
-        travel.insert(travel.end(), {static_cast<float>(std::sin(theta)), 0.0f, static_cast<float>(-std::cos(theta))});
-    }
-    const std::vector<float> irradiance(any_light_angles, any_light_irradiance);
-    const PlaneLight light{{irradiance.data(), 1, any_light_angles, any_light_angles},
-                           PerTexel{travel.data()},
-                           std::vector<double>(channels.size(), 1.0)};
-    Problem problem;
-    problem.plane = plane;
-    problem.channels = channels;
-    problem.tolerance = tolerance;
-    problem.threads = threads;
-    problem.coming.plane = {any_light_angles, 1, plane.pitch_x * static_cast<double>(plane.width) / any_light_angles,
-                            plane.pitch_y * static_cast<double>(plane.height)};
-    problem.coming.survey = is_colored ? by_channel({light}) : std::vector{light};
-    Progress unseen;
-    return std::make_unique<LightField>(problem, unseen);
 }
 
 void bake_arrival(const Surface& surface, const std::vector<SurfaceLight>& lights, const BakeOptions& options,
@@ -384,8 +98,8 @@ void bake_arrival(const Surface& surface, const std::vector<SurfaceLight>& light
     progress.set_total(std::max<double>(1.0, static_cast<double>(lights.size())));
     for (const SurfaceLight& light : lights) {
         RaySum sum(whole.grid, 3, true);
-        advance_by(progress, 1.0,
-                   [&](Progress& part) { light.gather(whole, ray_settings(whole, options, options.rays), sum, part); });
+        progress.advance_by(
+            1.0, [&](Progress& part) { light.gather(whole, options.ray_settings(whole, options.rays), sum, part); });
         const double mean_color = std::accumulate(light.color.begin(), light.color.end(), 0.0) / 3.0;
         for (std::size_t i = 0; i < whole.samples(); ++i)
             for (std::size_t c = 0; c < 3; ++c) {

@@ -25,6 +25,9 @@ struct BakeOptions {
     // Beyond, light is added as moments, and terms are chosen for the brightest lights.
     std::size_t max_stored_bytes = std::size_t{512} << 20;
     std::size_t max_moment_bytes = 0;  // bytes of moments; 0: any
+
+    // Settings for a light of so many rays from each texel.
+    RaySettings ray_settings(const Surface& surface, int ray_count) const;
 };
 
 // Writes (height, width, channels), exitance / pi in W/(m^2 sr) (Manabe et al. 2012, Eq. 2). The result is the same for

@@ -15,6 +15,13 @@ struct Surface {
 
     std::size_t samples() const { return grid.width * grid.height; }
     Plane plane() const { return {grid.width, grid.height, grid.pitch_x, grid.pitch_y}; }
+
+    // Multiplies luminance [sample][channel] by the color of light that leaves.
+    void scale_by_color_out(std::size_t channels, float* luminance) const
+    {
+        for (std::size_t i = 0; i < samples() * channels && color_out; ++i)
+            luminance[i] *= color_out[i];
+    }
 };
 
 }  // namespace beamspread

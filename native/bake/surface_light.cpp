@@ -119,8 +119,11 @@ void RaySum::add(const RayRun& run)
     for (std::size_t i = 0; i < run.count; ++i) {
         const Vec3f& light = run.irradiance[i];
         float* sum = irradiance.data() + channels * (run.sample + i);
-        for (std::size_t c = 0; c < channels; ++c)
-            sum[c] += light[static_cast<int>(c)];
+        sum[0] += light.x;
+        if (channels == 3) {
+            sum[1] += light.y;
+            sum[2] += light.z;
+        }
         if (!flow.empty())
             flow[run.sample + i] += (light.x + light.y + light.z) / 3.0f * run.travel[i];
     }

@@ -32,6 +32,18 @@ void Progress::advance(double work)
         report(std::clamp(done / m_total, 0.0, 1.0));
 }
 
+void Progress::advance_by(double work, const std::function<void(Progress&)>& step)
+{
+    double done = 0.0;
+    Progress part([&](double fraction) {
+        advance(work * std::max(fraction - done, 0.0));
+        done = std::max(done, fraction);
+        return true;
+    });
+    step(part);
+    advance(work * (1.0 - done));
+}
+
 void Progress::finish()
 {
     report(1.0);

@@ -26,6 +26,9 @@ public:
     // Adds finished work; throws Cancelled.
     void advance(double work);
 
+    // Calls `step` with a progress of its own, which is `work` of this one.
+    void advance_by(double work, const std::function<void(Progress&)>& step);
+
     // Reports 1; throws Cancelled.
     void finish();
 

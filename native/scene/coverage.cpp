@@ -12,7 +12,7 @@ namespace beamspread {
 
 namespace {
 
-// Rows that one thread fills at a time.
+// Texel rows that a thread fills at a time. More: fewer tests of polygons, less parallel.
 constexpr std::size_t rows_per_band = 64;
 
 // Units of height and area per texel, counted in whole numbers: heights of edges that meet add up exactly, so that no

@@ -1,5 +1,4 @@
-#include "scene/delta_gather.h"
-
+// Rays of lights without a size: one for each texel.
 #include <algorithm>
 #include <array>
 #include <numbers>
@@ -7,6 +6,7 @@
 #include <vector>
 
 #include "base/threads.h"
+#include "scene/ray_gather.h"
 #include "scene/shadow_ray.h"
 #include "scene/shadows.h"
 
@@ -54,10 +54,11 @@ public:
           m_smooth_points(gauss_points(grid)),
           m_smooth_from(texels_to_smooth_lamp * std::max(grid.pitch_x, grid.pitch_y)),
           m_rays(grid, occluders, settings.clearance),
-          m_shadows(grid, m_source, occluders, m_rays.start(), settings.find_shadows),
-          m_open_texel(gather_texel(0.0, 0.0, m_points, nullptr)),
-          m_far_travel(mean_direction(m_open_texel.flow))
+          m_shadows(grid, m_source, occluders, m_rays.start(), settings.find_shadows)
     {
+        const Texel open = gather_texel(0.0, 0.0, m_points, nullptr);
+        m_open_irradiance = Vec3f(open.irradiance);
+        m_far_travel = mean_direction(open.flow);
     }
 
     std::size_t bands() const { return m_shadows.bands(); }
@@ -92,10 +93,14 @@ private:
     {
         const bool travel_varies = m_with_travel && !m_source.is_far;
         for (std::size_t x = 0; x < m_grid.width; ++x) {
-            const Texel found = texel(static_cast<double>(x), static_cast<double>(y), shades[x]);
-            work.irradiance[x] = Vec3f(found.irradiance);
+            if (m_source.is_far && shades[x] == Shade::none) {
+                work.irradiance[x] = m_open_irradiance;
+                continue;
+            }
+            const Texel gathered = texel(static_cast<double>(x), static_cast<double>(y), shades[x]);
+            work.irradiance[x] = Vec3f(gathered.irradiance);
             if (travel_varies)
-                work.travel[x] = mean_direction(found.flow);
+                work.travel[x] = mean_direction(gathered.flow);
         }
         sink.add({.sample = y * m_grid.width,
                   .count = m_grid.width,
@@ -112,8 +117,6 @@ private:
             const Texel traced = gather_texel(x, y, m_points, m_occluders);
             return traced.is_shaded || !is_smooth(x, y) ? traced : gather_texel(x, y, m_smooth_points, nullptr);
         }
-        if (m_source.is_far)
-            return m_open_texel;
         return gather_texel(x, y, is_smooth(x, y) ? m_smooth_points : m_points, nullptr);
     }
 
@@ -222,15 +225,15 @@ private:
     double m_smooth_from;  // distance to a lamp, metres
     ReceiverRays m_rays;
     Shadows m_shadows;
-    Texel m_open_texel;  // texel (0, 0) where nothing blocks the light
-    Vec3f m_far_travel;  // at all texels, if the light is infinitely far away
+    // Of texel (0, 0) where nothing blocks the light; of all, if the light is infinitely far away.
+    Vec3f m_open_irradiance, m_far_travel;
     PerThread<Work> m_work;
 };
 
 }  // namespace
 
-void gather_delta_rays(const ReceiverGrid& grid, const Light& light, const Occluders* occluders,
-                       const RaySettings& settings, RaySink& sink, Progress& progress)
+void detail::gather_delta_rays(const ReceiverGrid& grid, const Light& light, const Occluders* occluders,
+                               const RaySettings& settings, RaySink& sink, Progress& progress)
 {
     progress.set_total(static_cast<double>(grid.height));
     DeltaGatherer gatherer(grid, light, occluders, settings);

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "scene/checks.h"
-#include "scene/embree.h"
 #include "scene/triangle_set.h"
 
 namespace beamspread {

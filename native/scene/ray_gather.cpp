@@ -9,7 +9,6 @@
 #include "base/sobol.h"
 #include "base/threads.h"
 #include "scene/checks.h"
-#include "scene/delta_gather.h"
 #include "scene/open_irradiance.h"
 #include "scene/shadow_ray.h"
 
@@ -17,7 +16,7 @@ namespace beamspread {
 
 namespace {
 
-// Texels of a row, and rays of each, that are gathered at once. More need more of the processor's cache, 400 kB here.
+// Texels of a row, and rays of each, that are gathered at once. More need more of the processor's cache: 400 kB here.
 constexpr std::size_t texels_at_once = 64;
 constexpr std::size_t max_rays_at_once = 256;
 
@@ -102,7 +101,7 @@ private:
         std::array<ShadowRay, Occluders::packet_size> packet;
         std::array<std::size_t, Occluders::packet_size> carried;
         std::size_t waiting = 0;
-        std::vector<Vec2> on_light, in_texel, unsorted;
+        std::vector<Vec2> on_light, in_texel;
         std::vector<Vec3> points, weights;
         std::vector<LightRay> rays;
 
@@ -122,35 +121,6 @@ private:
             points.resize(count);
             weights.resize(count);
             rays.resize(count);
-        }
-
-        // Sorts rays by their part of the light along a Morton curve: a packet of neighbors meets the same triangles.
-        void sort()
-        {
-            constexpr std::size_t side = 8;
-            constexpr std::array<std::uint8_t, side> spread = {0, 1, 4, 5, 16, 17, 20, 21};
-            const auto part = [&](std::size_t i) {
-                const auto x = static_cast<std::size_t>(on_light[i].x * side);
-                const auto y = static_cast<std::size_t>(on_light[i].y * side);
-                return static_cast<std::size_t>(spread[x] + 2 * spread[y]);
-            };
-            if (on_light.size() < 2 * Occluders::packet_size)
-                return;
-            std::array<std::size_t, side * side + 1> end{};
-            for (std::size_t i = 0; i < on_light.size(); ++i)
-                ++end[part(i) + 1];
-            for (std::size_t i = 1; i < end.size(); ++i)
-                end[i] += end[i - 1];
-            unsorted.resize(2 * on_light.size());
-            for (std::size_t i = 0; i < on_light.size(); ++i) {
-                const std::size_t to = end[part(i)]++;
-                unsorted[2 * to] = on_light[i];
-                unsorted[2 * to + 1] = in_texel[i];
-            }
-            for (std::size_t i = 0; i < on_light.size(); ++i) {
-                on_light[i] = unsorted[2 * i];
-                in_texel[i] = unsorted[2 * i + 1];
-            }
         }
     };
 
@@ -212,8 +182,6 @@ private:
             return;
         work.resize(count);
         part.sobol.points(x, y, part.first, count, work.on_light.data(), work.in_texel.data());
-        if (part.is_traced)
-            work.sort();
         Vec3 sum = sample(x, y, work);
         for (int i = 0; i < max_trials && sum == Vec3(0.0); ++i) {
             for (std::size_t k = 0; k < count; ++k) {
@@ -321,7 +289,7 @@ void gather_rays(const ReceiverGrid& grid, const Light& light, const Occluders* 
         reject("even_rays", settings.even_rays, "0 or more");
     detail::check_length("clearance", settings.clearance);
     with_threads(settings.threads, [&] {
-        const auto gather = light.is_delta() ? gather_delta_rays : gather_sized_rays;
+        const auto gather = light.is_delta() ? detail::gather_delta_rays : gather_sized_rays;
         gather(grid, light, occluders, settings, sink, progress);
     });
     progress.finish();

@@ -62,4 +62,12 @@ struct RaySettings {
 void gather_rays(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, const RaySettings& settings,
                  RaySink& sink, Progress& progress);
 
+namespace detail {
+
+// `gather_rays` of a light without a size, on the threads of the caller; arguments are checked.
+void gather_delta_rays(const ReceiverGrid& grid, const Light& light, const Occluders* occluders,
+                       const RaySettings& settings, RaySink& sink, Progress& progress);
+
+}  // namespace detail
+
 }  // namespace beamspread

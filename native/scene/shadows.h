@@ -27,6 +27,7 @@ enum class Shade : std::uint8_t {
 // every texel gives the same result.
 class Shadows {
 public:
+    // Texel rows of a band. More: fewer searches of triangles, less parallel.
     static constexpr std::size_t rows_per_band = 8;
 
     // `occluders` may be null: nothing is shaded. Without `find` no texel's shade is known.

@@ -1,12 +1,33 @@
-// Triangles in one frame in Embree's form, opaque and see-through ones, and light that crosses see-through triangles.
+// Embree behind one header: handles that release themselves, triangles in one frame in its form, and light that crosses
+// see-through triangles. Only occluders.cpp and triangle_set.cpp include it.
 #pragma once
+
+#include <embree3/rtcore.h>
 
 #include <array>
 #include <cstdint>
+#include <memory>
+#include <type_traits>
 #include <vector>
 
-#include "scene/embree.h"
 #include "scene/occluder_mesh.h"
+
+namespace beamspread::embree {
+
+struct Release {
+    void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+    void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+    void operator()(RTCGeometry geometry) const { rtcReleaseGeometry(geometry); }
+};
+
+using Device = std::unique_ptr<std::remove_pointer_t<RTCDevice>, Release>;
+using Scene = std::unique_ptr<std::remove_pointer_t<RTCScene>, Release>;
+using Geometry = std::unique_ptr<std::remove_pointer_t<RTCGeometry>, Release>;
+
+// Throws std::runtime_error if the device has a pending error.
+void check(RTCDevice device);
+
+}  // namespace beamspread::embree
 
 namespace beamspread {
 
@@ -69,7 +90,7 @@ private:
     std::vector<Triangle> m_opaque;
     std::vector<Triangle> m_see_through;
     std::vector<const Transmittance*> m_transmittances;  // of see-through triangles
-    std::vector<std::array<Vec2f, 3>> m_uvs;             // of see-through triangles; empty without images
+    std::vector<std::array<Vec2f, 3>> m_uvs;  // of see-through triangles; empty without images
 };
 
 }  // namespace beamspread

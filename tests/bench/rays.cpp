@@ -16,7 +16,7 @@
 #include "base/random.h"
 #include "base/threads.h"
 #include "scene/area_light.h"
-#include "scene/embree.h"
+#include "scene/triangle_set.h"
 #include "scene/environment_light.h"
 #include "scene/occluders.h"
 #include "scene/ray_gather.h"

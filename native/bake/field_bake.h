@@ -1,0 +1,19 @@
+// Luminance by a light field, of lights of any number and size in memory that does not grow with them.
+#pragma once
+
+#include <vector>
+
+#include "bake/bake.h"
+
+namespace beamspread {
+
+// Units of progress: gathering a light without a size, and the solver's choice of terms or its transforms. Measured for
+// 512 x 512 texels.
+inline constexpr double light_work = 1.0;
+inline constexpr double solver_work = 3.0;
+
+// Writes the luminance without the color of light that leaves the surface. `problem` has no lights yet.
+void bake_by_field(const Surface& surface, const std::vector<SurfaceLight>& lights, const BakeOptions& options,
+                   Problem problem, Progress& progress, float* luminance);
+
+}  // namespace beamspread
