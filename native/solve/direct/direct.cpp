@@ -160,12 +160,11 @@ private:
 };
 
 // Number of row offsets with kernels in memory. The limit on bytes keeps memory from growing with the square of the
-// plane's size; neighbouring rows share the borders of their texels. Larger limits: less time, more memory.
+// plane's size; neighbouring rows share the borders of their texels. Larger limit: less time, more memory.
 std::size_t rows_at_once(std::size_t terms, std::size_t width)
 {
     constexpr std::size_t max_bytes = std::size_t{1} << 26;
-    constexpr std::size_t max_rows = 16;
-    return std::clamp<std::size_t>(max_bytes / (2 * terms * 2 * width * sizeof(double)), 1, max_rows);
+    return std::max<std::size_t>(max_bytes / (2 * terms * 2 * width * sizeof(double)), 1);
 }
 
 }  // namespace

@@ -12,9 +12,6 @@ namespace beamspread {
 
 namespace {
 
-// Rows of a quadrant up to which its spectrum is summed; more rows are transformed, which takes less time then.
-constexpr std::size_t max_summed_rows = 40;
-
 // Phase 2 pi steps / size, without whole turns, which would lose digits.
 double phase_of(std::size_t steps, std::size_t size)
 {
@@ -69,19 +66,6 @@ CentreSpectrum::CentreSpectrum(const PaddedPlane& plane, const KernelCentre& hal
     m_texels.resize(profiles.size() * per_profile);
     for (std::size_t p = 0; p < profiles.size(); ++p)
         integrate(profiles[p], plane, outside, m_texels.data() + p * per_profile);
-    if (m_height > max_summed_rows)
-        return;
-    m_trig.resize(2 * m_height * m_frequencies);
-    for (std::size_t y = 0; y < m_height; ++y) {
-        float* cosine = m_trig.data() + y * m_frequencies;
-        float* sine = cosine + m_height * m_frequencies;
-        const double twice = y == 0 ? 1.0 : 2.0;
-        for (std::size_t f = 0; f < m_frequencies; ++f) {
-            const double angle = phase_of(y * f, m_padded_height);
-            cosine[f] = static_cast<float>(twice * std::cos(angle));
-            sine[f] = static_cast<float>(twice * std::sin(angle));
-        }
-    }
 }
 
 void CentreSpectrum::integrate(const ScaledProfile& scaled, const PaddedPlane& plane,
@@ -146,15 +130,6 @@ void CentreSpectrum::start(std::size_t first_frequency, std::size_t count, Colum
         multiply_rows(columns.rows.data() + i * count * m_stride, along_x.data(), sum.texels.data(), count, m_width,
                       m_stride);
     }
-}
-
-void CentreSpectrum::spectrum(const Columns& columns, std::size_t column, std::size_t sum, float* values) const
-{
-    const float* rows = columns.rows.data() + (sum * columns.count + column) * m_stride;
-    const float* trig = m_trig.data() + (columns.sums[sum]->sine ? m_height * m_frequencies : 0);
-    scale(values, trig, rows[0], m_frequencies);
-    for (std::size_t y = 1; y < m_height; ++y)
-        add_scaled(values, trig + y * m_frequencies, rows[y], m_frequencies);
 }
 
 void CentreSpectrum::spectra(Columns& columns, std::size_t column, std::size_t first, std::size_t count,

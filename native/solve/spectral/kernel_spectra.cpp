@@ -126,9 +126,8 @@ void KernelSpectra::start(std::size_t first_frequency, std::size_t count, std::s
 
 void KernelSpectra::select(std::size_t column, std::size_t first, std::size_t count, Centres& centres) const
 {
-    centres.column = column;
     centres.first = first;
-    if (!m_centre || !m_centre->is_wide())
+    if (!m_centre)
         return;
     centres.spectra.resize(count * (m_plane.padded_height / 2 + 1));
     m_centre->spectra(centres.columns, column, first, count, centres.spectra.data());
@@ -139,9 +138,7 @@ void KernelSpectra::spectrum(const Column& column, const Centres& centres, std::
 {
     const std::size_t frequencies = m_plane.padded_height / 2 + 1;
     const bool sine = part.sine();
-    if (m_centre && !m_centre->is_wide())
-        m_centre->spectrum(centres.columns, centres.column, i, values);
-    else if (m_centre)
+    if (m_centre)
         std::copy_n(centres.spectra.data() + (i - centres.first) * frequencies, frequencies, values);
     else
         std::fill_n(values, frequencies, 0.0f);

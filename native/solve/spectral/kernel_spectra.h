@@ -70,13 +70,9 @@ public:
     // Prepares the columns kx = 2 pi frequency / padded_width of `count` frequencies, for the sums in `columns`.
     void start(std::size_t first_frequency, std::size_t count, Columns& columns) const;
 
-    // Spectrum of a sum in one of the columns, up to the Nyquist frequency of ky (see `KernelSpectra::spectrum`). Not
-    // for wide centres.
-    void spectrum(const Columns& columns, std::size_t column, std::size_t sum, float* values) const;
-
-    // Spectra of sums [first, first + count), [sum][frequency], by transforms of rows: for wide centres.
+    // Spectra of sums [first, first + count) in one of the columns, up to the Nyquist frequency of ky, [sum][frequency]
+    // (see `KernelSpectra::spectrum`).
     void spectra(Columns& columns, std::size_t column, std::size_t first, std::size_t count, float* values) const;
-    bool is_wide() const { return m_trig.empty(); }
 
 private:
     void integrate(const ScaledProfile& scaled, const PaddedPlane& plane, const std::optional<RadialWindow>& outside,
@@ -89,7 +85,6 @@ private:
     std::size_t m_padded_height;
     std::size_t m_frequencies;
     std::vector<float> m_texels;  // [profile][m][phase][x][y], quadrant
-    std::vector<float> m_trig;    // [cos, sin][y][frequency]; empty: wide
 };
 
 // The spectra of texel integrals of c_m(r) cos(m phi) and c_m(r) sin(m phi).
@@ -138,9 +133,8 @@ public:
     // Centres of some parts: values shared by several columns, and spectra of several parts in one column.
     struct Centres {
         CentreSpectrum::Columns columns;
-        std::size_t column = 0;
         std::size_t first = 0;  // part
-        std::vector<float> spectra;  // [part - first][frequency], of wide centres
+        std::vector<float> spectra;  // [part - first][frequency]
     };
     // Prepares the columns of `count` frequencies kx from the first.
     void start(std::size_t first_frequency, std::size_t count, std::span<const Part* const> parts,

@@ -31,10 +31,6 @@ constexpr std::size_t worst_count = 12;
 // Error relative to the brightest texel that is always allowed: rounding of transforms in single precision.
 constexpr double rounding = 5e-6;
 
-// Smallest mean radiance of a site, over the radiance by harmonic 0 alone: where light travels away from the site, sums
-// of harmonics are small and off by about this.
-constexpr double min_asymmetry = 0.01;
-
 // Number of lights that are probed, the brightest, which change most between texels. More: smaller errors, more time.
 constexpr std::size_t max_probed_lights = 4;
 
@@ -56,25 +52,19 @@ std::vector<std::size_t> representatives(const Incidence& incidence)
 
 // Each candidate's part of the radiance at the probed texels, [texel and result][candidate], in units of the allowed
 // error.
-Eigen::ArrayXXf relative_parts(const Readings& readings, const std::vector<KernelDecomposition::Term>& terms,
-                               double tolerance)
+Eigen::ArrayXXf relative_parts(const Readings& readings, std::size_t candidates, double tolerance)
 {
-    const std::size_t candidates = terms.size();
     const std::size_t results = readings.front().size() / candidates;
     const std::size_t sites = readings.size() / texels_per_site;
     Eigen::ArrayXXf parts = Eigen::ArrayXXf::Zero(index(readings.size() * results), index(candidates));
     for (std::size_t r = 0; r < results; ++r) {
         std::vector<double> nearby(sites);
         for (std::size_t s = 0; s < sites; ++s) {
-            double all = 0.0;
-            double by_harmonic_0 = 0.0;
+            double sum = 0.0;
             for (std::size_t i = s * texels_per_site; i < (s + 1) * texels_per_site; ++i)
-                for (std::size_t c = 0; c < candidates; ++c) {
-                    const auto part = static_cast<double>(readings[i][r * candidates + c]);
-                    all += part;
-                    by_harmonic_0 += terms[c].m == 0 ? part : 0.0;
-                }
-            nearby[s] = std::max(all, min_asymmetry * by_harmonic_0) / static_cast<double>(texels_per_site);
+                for (std::size_t c = 0; c < candidates; ++c)
+                    sum += static_cast<double>(readings[i][r * candidates + c]);
+            nearby[s] = std::max(sum, 0.0) / static_cast<double>(texels_per_site);
         }
         const double brightest = *std::max_element(nearby.begin(), nearby.end());
         for (std::size_t i = 0; i < readings.size(); ++i) {
@@ -156,7 +146,7 @@ std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const 
                               readings.begin() + static_cast<std::ptrdiff_t>(first));
             progress.advance(part);
         });
-        auto [chosen, error] = drop_terms(relative_parts(readings, kernels.terms(), tolerance), kernels.terms());
+        auto [chosen, error] = drop_terms(relative_parts(readings, candidates.size(), tolerance), kernels.terms());
         if (round == refinements)
             return chosen;
         const std::vector<Texel> more = sites_around(worst_sites(texels, error), light.plane, round);
