@@ -81,16 +81,17 @@ class _Batch(Sink):
 
     def _bake_frame(self) -> None:
         targets, impossible = self._find()
+        images = {target: self._outputs.own_image(target, self._settings.layer) for target in targets}
         for bake in impossible:
             self.end(bake)
         left = []
         for target in targets:
-            record = self._skipped(target)
+            record = self._skipped(target, images[target])
             if record is None:
                 left.append(target)
             else:
                 self._note(record)
-        self._parts = self._parts_of(left)
+        self._parts = self._parts_of([target for target in left if self._options.frames or images[target]])
         run_bakes(self._prepared(left), self)
 
     def run(self, bake: Bake) -> Iterator[None]:
@@ -131,12 +132,11 @@ class _Batch(Sink):
             targets += bakeable
         return list(dict.fromkeys(targets)), impossible
 
-    def _skipped(self, target: Target) -> BakeRecord | None:
-        """The record of a file that an earlier run has written."""
+    def _skipped(self, target: Target, image) -> BakeRecord | None:
+        """The record of a file that an earlier run has written; `image` is the node's if its file is the target."""
         if self._earlier is None or self._stop:
             return None
         settings, resolution = self._settings, self._options.resolution
-        image = self._outputs.own_image(target, settings.layer)
         try:
             path = self._outputs.path(target, settings.layer, self._frame) if image is None else file_of(image)
         except BakeError:
@@ -150,22 +150,15 @@ class _Batch(Sink):
 
     def _parts_of(self, targets: list[Target]) -> dict[Target, Parts]:
         """Digests for bakes whose results go to images that nodes show, or to frames."""
-        shown = [target for target in targets if self._options.frames or self._own_image(target) is not None]
-        if not shown or self._stop:
+        if not targets or self._stop:
             return {}
         settings = settings_part(self._scene, self._options.solver, self._options.indirect)
-        parts_of = stale.parts_of(bpy.context, shown)
+        parts_of = stale.parts_of(bpy.context, targets)
         return {target: parts | {SETTINGS: settings} for target, parts in parts_of.items()}
-
-    def _own_image(self, target: Target):
-        try:
-            return self._outputs.own_image(target, self._settings.layer)
-        except BakeError:
-            return None
 
     def _remember(self, bake: Bake) -> None:
         """Record the digests of the bake in the node's image, for a scene that is saved afterwards."""
-        image = self._own_image(bake.target) if bake.status == WRITTEN else None
+        image = self._outputs.own_image(bake.target, self._settings.layer) if bake.status == WRITTEN else None
         if image is not None and bake.path == str(file_of(image)):
             stale.keep(bake, self._parts.get(bake.target))
 
