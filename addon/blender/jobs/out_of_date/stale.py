@@ -14,7 +14,17 @@ from bpy.app.handlers import persistent
 from ....core.bake.runner import Bake
 from ....core.messages import Level, Message, note, warning
 from ....core.target import Target
-from ...images.facts import Record, facts_of, file_at, is_sequence, note_bake, record_in, record_of, record_of_bake
+from ...images.facts import (
+    Frames,
+    Record,
+    facts_of,
+    file_at,
+    is_sequence,
+    note_bake,
+    record_in,
+    record_of,
+    record_of_bake,
+)
 from ...images.files import file_of
 from ...images.undo import is_undone
 from ...node.find import find_bakeable, find_misplaced, image_of
@@ -48,11 +58,12 @@ def refresh(context) -> None:
     """Bring the rows of all targets of the context's scene up to date."""
     _keep_waiting()
     context.view_layer.update()  # in 3.4 it has None in place of removed objects
-    targets = find_bakeable(context.view_layer, context.scene.objects)
-    recorded = {target: record for target in targets if (record := _record(target, context.scene)) is not None}
+    images = {target: image_of(target) for target in find_bakeable(context.view_layer, context.scene.objects)}
+    records = {target: _record(target, image, context.scene) for target, image in images.items()}
+    recorded = [target for target, record in records.items() if record is not None]
     now = fingerprints(context, recorded) if recorded else {}
-    state.rows = {target: _row(target, recorded.get(target), now.get(target)) for target in targets}
-    state.rows |= {row.target: row for row in _failures_of_others(context.scene, targets)}
+    state.rows = {target: _row(target, image, records[target], now.get(target)) for target, image in images.items()}
+    state.rows |= {row.target: row for row in _failures_of_others(context.scene, list(images))}
 
 
 def _failures_of_others(scene, targets: list[Target]) -> list[Row]:
@@ -94,34 +105,33 @@ def _keep_waiting() -> None:
         keep(*_waiting.pop(0))
 
 
-def _record(target: Target, scene) -> Record | None:
-    image = image_of(target)
+def _record(target: Target, image, scene) -> Record | None:
     if is_sequence(image):
         path = file_at(image, scene.frame_current)
         return path and record_in(path)
     return None if image is None else record_of(image, target)
 
 
-def _row(target: Target, record: Record | None, now: Parts | None) -> Row:
-    if is_sequence(image_of(target)):
-        return _row_of_frames(target, record, now)
+def _row(target: Target, image, record: Record | None, now: Parts | None) -> Row:
+    if is_sequence(image):
+        return _row_of_frames(target, facts_of(image).frames, record, now)
     changed = [] if record is None or now is None else _changed(record, now)
-    if record is not None and not record.is_dirty and image_of(target).is_dirty:
+    if record is not None and not record.is_dirty and image.is_dirty:
         changed.append("pixels of the image")
-    if record is not None and _has_lost_its_file(image_of(target)):
+    if record is not None and _has_lost_its_file(image):
         changed = [*(name for name in changed if name != IMAGE), "image file (missing)"]
-    said = state.status_of(target)
-    if said is not None and said.status in (Status.FAILED, Status.CANCELLED):
-        return replace(said, is_stale=bool(changed))
+    last = state.status_of(target)
+    if last is not None and last.status in (Status.FAILED, Status.CANCELLED):
+        return replace(last, is_stale=bool(changed))
     if record is None:
         return Row(target, Status.NEVER)
     subject, unknown = str(target), () if record.is_comparable() else (note(str(target), *UNKNOWN),)
-    earlier = (*_why_later(image_of(target)), *record.messages(), *unknown)
+    earlier = (*_why_later(image), *record.messages(), *unknown)
     if changed and changed != [QUALITY]:
         why = warning(subject, f"Changed since its bake: {', '.join(changed)}.")
         return Row(target, Status.STALE, (why, *earlier), True)
     again = [warning(subject, _why_again(record.parts[QUALITY], now[QUALITY]))] if changed else []
-    status = Status.WARNED if any(one.level == Level.WARNING for one in (*again, *earlier)) else Status.BAKED
+    status = Status.WARNED if any(message.level == Level.WARNING for message in (*again, *earlier)) else Status.BAKED
     return Row(target, status, (*again, *earlier), bool(changed))
 
 
@@ -130,10 +140,9 @@ def _changed(record: Record, now: Parts) -> list[str]:
     return record.changed(now if record.is_comparable() else {QUALITY: now[QUALITY]})
 
 
-def _row_of_frames(target: Target, record: Record | None, now: Parts | None) -> Row:
+def _row_of_frames(target: Target, frames: Frames, record: Record | None, now: Parts | None) -> Row:
     """The row of an image sequence, by the frame that is shown. A bake does not renew it, so it is not up for one."""
-    first, last, *_ = facts_of(image_of(target)).frames
-    subject, shown = str(target), f"Shows the frames {first} to {last} of a batch."
+    subject, shown = str(target), f"Shows the frames {frames.first} to {frames.last} of a batch."
     if record is None or now is None or not record.is_comparable():
         return Row(target, Status.BAKED, (note(subject, f"{shown} Changes since then are not known."),))
     warnings, changed = record.messages(), record.changed(now)
