@@ -10,8 +10,8 @@ from beamspread.blender import popup, preferences
 from beamspread.blender.images.results import Results
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.run import bake_plan, operator
-from beamspread.blender.jobs.run.bake_plan import Pass, read_scene, steps_of
-from beamspread.blender.jobs.run.bake_run import BakeThread
+from beamspread.blender.jobs.run.bake_plan import read_scene
+from beamspread.blender.jobs.run.bake_run import BakeThread, Pass, steps_of
 from beamspread.blender.jobs.state import Run, Status, duration, state
 from beamspread.blender.node.draw import draw_node
 from beamspread.blender.node.find import find_targets

@@ -81,8 +81,8 @@ class CyclesLight:
         world = self._world if self._world in illumination.by_cycles else ""
         bounced = job.settings.indirect and bool(illumination.lights or illumination.by_cycles)
         bounced = bounced and self._is_below_something(job.receiver)
-        others = [name for name in illumination.by_cycles if name != world and name in scene.objects]
-        if not (world or bounced or others):
+        objects = [name for name in illumination.by_cycles if name != world and name in scene.objects]
+        if not (world or bounced or objects):
             return job
         # A world without its images is left out; Cycles would show it in magenta.
         is_lit = bool(world) or any(light.name == self._world for light in illumination.lights)
@@ -91,9 +91,9 @@ class CyclesLight:
             text = "Blender's own Bake could not ask Cycles for light that only Cycles can evaluate."
             missing = warning("", text, "Use Bake Beamspread.")
             return replace(job, illumination=illumination.with_messages(missing))
-        illumination = illumination.found({world, *others} - {""}).with_messages(*self._copy.scene.warnings)
+        illumination = illumination.without({world, *objects} - {""}).with_messages(*self._copy.scene.warnings)
         illumination = illumination.with_messages(*self._missing) if bounced else illumination
-        step = LightByCycles(self._copy, world, {name: self._lamps.get(name) for name in others}, bounced, has_world)
+        step = LightByCycles(self._copy, world, {name: self._lamps.get(name) for name in objects}, bounced, has_world)
         return replace(job, illumination=illumination, steps=(step, *job.steps))
 
     def copy(self) -> CopyForCycles | None:

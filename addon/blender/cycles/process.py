@@ -73,8 +73,8 @@ def run(
     finally:
         child.end()
     if child.code != 0 or not output.exists():
-        said = " | ".join(child.last_lines)
-        raise BakeError(f"Cycles failed on a copy of the scene (exit code {child.code}). It said last: {said}")
+        lines = " | ".join(child.last_lines)
+        raise BakeError(f"Cycles failed on a copy of the scene (exit code {child.code}). It said last: {lines}")
     with np.load(output) as arrays:
         return dict(arrays)
 

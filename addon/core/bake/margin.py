@@ -32,11 +32,11 @@ def extend_margin(texture: np.ndarray, coverage: np.ndarray, margin: int) -> np.
     if margin < 0:
         raise ValueError(f"margin is {margin}; it must be 0 or more")
     baked, whole = coverage > 0, coverage > WHOLE
-    kept = baked[..., None]
+    baked_texels = baked[..., None]
     continued = texture
     if not np.array_equal(baked, whole):
-        continued = np.where(kept, _add_rings(texture, whole, BORDER_RINGS), texture)
-    return np.where(kept, texture, _add_rings(continued, baked, margin)).astype(np.float32, copy=False)
+        continued = np.where(baked_texels, _add_rings(texture, whole, BORDER_RINGS), texture)
+    return np.where(baked_texels, texture, _add_rings(continued, baked, margin)).astype(np.float32, copy=False)
 
 
 def _add_rings(texture: np.ndarray, known: np.ndarray, count: int) -> np.ndarray:
@@ -71,8 +71,8 @@ def _touched(filled: np.ndarray) -> np.ndarray:
 def _around(filled: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The unknown texels beside the given ones, without the frame."""
     height, width = filled.shape
-    places = np.unique(np.concatenate([(rows + dy) * width + columns + dx for dy, dx in NEIGHBOURS]))
-    rows, columns = np.divmod(places, width)
+    numbers = np.unique(np.concatenate([(rows + dy) * width + columns + dx for dy, dx in NEIGHBOURS]))
+    rows, columns = np.divmod(numbers, width)
     inside = (rows > 0) & (rows < height - 1) & (columns > 0) & (columns < width - 1)
     wanted = inside & ~filled[rows, columns]
     return rows[wanted], columns[wanted]

@@ -56,9 +56,9 @@ class Illumination:
         linked = copy(self)
         linked.lights = tuple(light for light in self.lights if light.receivers is None or receiver in light.receivers)
         beyond = {name for name, names in self.receivers.items() if receiver not in names}
-        return linked.found(beyond & set(self.by_cycles))
+        return linked.without(beyond & set(self.by_cycles))
 
-    def found(self, names: Collection[str]) -> Illumination:
+    def without(self, names: Collection[str]) -> Illumination:
         """A copy without these lights of `by_cycles`, which Cycles takes over, and without their messages."""
         rest = copy(self)
         rest.by_cycles = {name: message for name, message in self.by_cycles.items() if name not in names}
@@ -96,9 +96,9 @@ class Illumination:
         relit.lights = tuple(lights)
         return relit
 
-    def with_light_of(self, other: Illumination) -> Illumination:
+    def with_light_of(self, relit: Illumination) -> Illumination:
         """A copy of another illumination of the same occluders, with the hierarchies of this one."""
-        same = copy(other)
+        same = copy(relit)
         same._occluders, same._casters = self._occluders, self._casters
         return same
 

@@ -1,4 +1,4 @@
-"""Plans of bakes: targets as the scene has them at one time, and the steps of a run; for operator, engine and batch.
+"""Plans of bakes: targets as the scene has them at one time, from which jobs are made; for operator, engine and batch.
 
 Jobs are large, so a plan makes its job when its turn comes.
 """
@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from enum import Enum
 
 import bpy
 import numpy as np
 
-from ....core.bake.bake_settings import FINAL, PREVIEW, BakeSettings
+from ....core.bake.bake_settings import BakeSettings
 from ....core.bake.job import BakeJob
 from ....core.bake.runner import Bake
 from ....core.bake.steps import BAKE_STEPS, needs_medium, to_simulate
@@ -254,48 +253,3 @@ def _read_target(
     color = read_texture(node.color_input(evaluated.groups), blur, instance, receiver, check)
     matrix = np.array(instance.matrix).tolist() if instance.is_instance else None
     return replace(plan, color=color, blur=blur, matrix=matrix)
-
-
-class Pass(Enum):
-    """Purpose of a bake in its run: the only one of its target, its quick preview, or the bake after that preview."""
-
-    SINGLE = 1
-    PREVIEW = 2
-    FINAL = 3
-
-
-@dataclass(frozen=True)
-class BakeStep:
-    """One bake of a target in a run."""
-
-    plan: Plan
-    settings: BakeSettings
-    purpose: Pass = Pass.SINGLE
-
-    def bake(self) -> Bake:
-        """The bake; call it in the main thread."""
-        return self.plan.bake(self.settings)
-
-
-def steps_of(plans: list[Plan], settings: BakeSettings, preview_first: bool) -> list[BakeStep]:
-    """The steps of a run in their order.
-
-    With `preview_first`, targets whose medium is not simulated yet get a quick preview: a quick simulation and direct
-    light alone. They are baked once all targets have something to show. Targets that share an image with them take
-    part in this, since a run fills each image as a whole.
-    """
-    quick = [plan for plan in plans if preview_first and settings.quality == FINAL and plan.to_simulate(settings)]
-    images = {_image_key(plan) for plan in quick}
-    twice = [plan for plan in plans if _image_key(plan) in images]
-    first = []
-    for plan in plans:
-        changes = {"quality": PREVIEW} if plan in quick else {}
-        changes |= {"indirect": False} if plan in twice else {}
-        purpose = Pass.PREVIEW if plan in twice else Pass.SINGLE
-        first.append(BakeStep(plan, replace(settings, **changes), purpose))
-    return first + [BakeStep(plan, settings, Pass.FINAL) for plan in twice]
-
-
-def _image_key(plan: Plan) -> str:
-    """Equal for targets that fill the same image."""
-    return f"image {plan.image}" if plan.image else f"material {plan.target.material_name}"

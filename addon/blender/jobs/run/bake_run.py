@@ -1,11 +1,13 @@
-"""The bakes of one call of the operator: run in a thread or at once, stored, and told to the artist."""
+"""The bakes of one call of the operator: their steps, run in a thread or at once, stored, and told to the artist."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from enum import Enum
 
-from ....core.bake.bake_settings import COMBINED
+from ....core.bake.bake_settings import COMBINED, FINAL, PREVIEW, BakeSettings
 from ....core.bake.runner import CANCELLED, WRITTEN, Bake, Sink
 from ....core.messages import Level, Message, Messages, warning
 from ....core.progress import Progress
@@ -14,7 +16,52 @@ from ...images.results import Results
 from ..out_of_date import stale
 from ..out_of_date.fingerprint import Parts
 from ..state import state
-from .bake_plan import BakeStep, Pass
+from .bake_plan import Plan
+
+
+class Pass(Enum):
+    """Purpose of a bake in its run: the only one of its target, its quick preview, or the bake after that preview."""
+
+    SINGLE = 1
+    PREVIEW = 2
+    FINAL = 3
+
+
+@dataclass(frozen=True)
+class BakeStep:
+    """One bake of a target in a run."""
+
+    plan: Plan
+    settings: BakeSettings
+    purpose: Pass = Pass.SINGLE
+
+    def bake(self) -> Bake:
+        """The bake; call it in the main thread."""
+        return self.plan.bake(self.settings)
+
+
+def steps_of(plans: list[Plan], settings: BakeSettings, preview_first: bool) -> list[BakeStep]:
+    """The steps of a run in their order.
+
+    With `preview_first`, targets whose medium is not simulated yet get a quick preview: a quick simulation and direct
+    light alone. They are baked once all targets have something to show. Targets that share an image with them take
+    part in this, since a run fills each image as a whole.
+    """
+    quick = [plan for plan in plans if preview_first and settings.quality == FINAL and plan.to_simulate(settings)]
+    images = {_image_key(plan) for plan in quick}
+    twice = [plan for plan in plans if _image_key(plan) in images]
+    first = []
+    for plan in plans:
+        changes = {"quality": PREVIEW} if plan in quick else {}
+        changes |= {"indirect": False} if plan in twice else {}
+        purpose = Pass.PREVIEW if plan in twice else Pass.SINGLE
+        first.append(BakeStep(plan, replace(settings, **changes), purpose))
+    return first + [BakeStep(plan, settings, Pass.FINAL) for plan in twice]
+
+
+def _image_key(plan: Plan) -> str:
+    """Equal for targets that fill the same image."""
+    return f"image {plan.image}" if plan.image else f"material {plan.target.material_name}"
 
 
 class BakeThread(threading.Thread):

@@ -17,8 +17,8 @@ from ...node.find import NOTHING_FOUND, find_bakeable, find_misplaced
 from ...registration import all_or_nothing, classes
 from ..out_of_date import stale
 from ..state import redraw, state
-from .bake_plan import read_scene, steps_of
-from .bake_run import BakeRun, BakeThread
+from .bake_plan import read_scene
+from .bake_run import BakeRun, BakeThread, steps_of
 
 TIMER_SECONDS = 0.1
 """Seconds between two looks at the thread of a bake."""
