@@ -225,7 +225,7 @@ private:
     double m_smooth_from;  // distance to a lamp, metres
     ReceiverRays m_rays;
     Shadows m_shadows;
-    // Of texel (0, 0) where nothing blocks the light; of all, if the light is infinitely far away.
+    // Irradiance and travel at texel (0, 0) where nothing blocks the light: those of all texels, if it is infinitely far.
     Vec3f m_open_irradiance, m_far_travel;
     PerThread<Work> m_work;
 };

@@ -17,6 +17,7 @@ import numpy as np
 from beamspread.core.native import native
 from beamspread.core.scene.lights import STRATA, WEIGHTS
 
+sys.path.insert(0, str(Path(beamspread.__file__).with_name("blender")))
 sys.path.insert(0, str(Path(beamspread.__file__).with_name("blender") / "cycles"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blender"))
 import child_fields
@@ -104,9 +105,9 @@ def main():
     child_fields.set_up(scene, "INDIRECT")
     ghost, image = add_ghost(REQUEST["charts"], REQUEST["strata"])
     scene.collection.objects.link(ghost)
-    baker = child_fields.Baker(scene, ghost, image, "INDIRECT", "GLOSSY")
+    baker = child_fields.Baker(scene, ghost, image, "GLOSSY", "INDIRECT")
     start = time.process_time()
-    looks = [irradiance(baker.bake(child_fields.LOOK)) for _ in range(LOOKS)]
+    looks = [irradiance(baker.bake(child_fields.FIRST_SAMPLES)) for _ in range(LOOKS)]
     seconds = (time.process_time() - start) / LOOKS
     references = [irradiance(baker.bake(samples)) for _ in range(2)]
     denoise = Denoiser()
@@ -122,7 +123,11 @@ def main():
             for view in (lambda values: values, between_nodes, in_blocks):
                 found = [math.sqrt(np.mean([error(one, references, view) ** 2 for one in some])) for some in pair]
                 cells.append(", ".join(f"{part:.2%}" for part in found))
-            print(f"| {child_fields.LOOK * together} {kind} | {seconds * together:.1f} s |", " | ".join(cells), "|")
+            print(
+                f"| {child_fields.FIRST_SAMPLES * together} {kind} | {seconds * together:.1f} s |",
+                " | ".join(cells),
+                "|",
+            )
     sys.stdout.flush()
     os._exit(0)
 
