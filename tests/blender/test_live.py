@@ -67,7 +67,15 @@ CHANGES = {
     "another lamp": lambda plane, lamp, material: scenes.add_sun(30),
     "lamp hidden": lambda plane, lamp, material: setattr(lamp, "hide_render", True),
     "mesh": lambda plane, lamp, material: widen(plane.data),
+    "nodes of the lamp": lambda plane, lamp, material: dim(lamp.data),
 }
+
+
+def dim(light):
+    """Change nodes alone, which Blender reports otherwise than a lamp that gets nodes."""
+    light.use_nodes = True
+    settle()
+    next(node for node in light.node_tree.nodes if node.type == "EMISSION").inputs["Strength"].default_value = 0.5
 
 
 def widen(mesh):

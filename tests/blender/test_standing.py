@@ -69,7 +69,7 @@ def test_a_script_that_removes_objects_is_no_obstacle(plane):
 def remove_inputs(tree):
     """Nodes of the first version."""
     if hasattr(tree, "interface"):
-        for item in [one for one in tree.interface.items_tree if getattr(one, "in_out", "") == "INPUT"]:
+        for item in [item for item in tree.interface.items_tree if getattr(item, "in_out", "") == "INPUT"]:
             tree.interface.remove(item)
     else:
         tree.inputs.clear()
@@ -155,7 +155,7 @@ def test_only_stale_targets_are_baked_again(plane):
     bake(plane, other)
     assert "Nothing is out of date" in messages_of(lambda: bpy.ops.beamspread.bake(objects="STALE"))
     node_of(other.data.materials[0]).albedo = (0.2, 0.2, 0.2)
-    images = [node_of(one.data.materials[0]).image for one in (plane, other)]
+    images = [node_of(obj.data.materials[0]).image for obj in (plane, other)]
     for image in images:
         values = [0.5] * len(image.pixels)
         image.pixels.foreach_set(values)

@@ -23,8 +23,8 @@ def standings():
 @pytest.mark.parametrize("rename", ["objects", "materials", "images"])
 def test_a_bake_is_known_under_a_new_name(rename):
     plane = make_baked()
-    for one in getattr(bpy.data, rename):
-        one.name = f"New {rename}"
+    for block in getattr(bpy.data, rename):
+        block.name = f"New {rename}"
     assert standings() == [Status.BAKED]
     plane.location.z = 1
     bpy.context.view_layer.update()

@@ -175,7 +175,7 @@ class Session:
 
     def _changes(self) -> SceneChanges:
         """Changes since the last scan; at first, and after undo, anything may have changed."""
-        return SceneChanges(other={""}) if self._time is None else scene_cache.log.since(self._time)
+        return SceneChanges(rest={""}) if self._time is None else scene_cache.log.since(self._time)
 
     def _scan(self, depsgraph) -> None:
         start = time.perf_counter()
@@ -195,7 +195,7 @@ class Session:
 
     def _read_all(self, depsgraph) -> list[LiveTarget]:
         """All targets as the scene is now."""
-        return self._read(depsgraph, SceneChanges(other={""}))
+        return self._read(depsgraph, SceneChanges(rest={""}))
 
     def _adopt_bakes(self, context) -> None:
         """Leave nodes that show a new bake alone until the scene changes from that which the bake has read."""
@@ -254,10 +254,10 @@ class Session:
             preview = Preview(target.material_name, size)
         if not preview.fits():
             return False
-        other = self._covered_by(rendering)
-        if other is not None:
+        covering = self._covered_by(rendering)
+        if covering is not None:
             self._errors[target] = (
-                f"Live shows '{other.object_name}', which has the same material and UVs: "
+                f"Live shows '{covering.object_name}', which has the same material and UVs: "
                 "give this object a material of its own."
             )
             return False
@@ -281,11 +281,11 @@ class Session:
         def rank(candidate: Target) -> tuple:
             return candidate not in owners, str(candidate)
 
-        for other, region in preview.regions.items():
-            if other == target or region.shape != rendering.region.shape or rank(other) >= rank(target):
+        for neighbor, region in preview.regions.items():
+            if neighbor == target or region.shape != rendering.region.shape or rank(neighbor) >= rank(target):
                 continue
             if (region & rendering.region).sum() > MAX_OVERLAP * rendering.region.sum():
-                return other
+                return neighbor
         return None
 
     def _follow_cycles(self, context, has_new: bool) -> None:

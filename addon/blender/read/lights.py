@@ -96,14 +96,15 @@ class _Lights:
         self._names = {data.name for data in depsgraph.ids if isinstance(data, bpy.types.Object)}
         self._lights: list[Light] = []
         # By object name and mesh: geometry nodes may give an object several meshes.
-        self._emissive: dict[tuple[str, int], EmissiveMesh] = {}
+        self._emissive: dict[tuple[str, int], EmissiveMesh | None] = {}
         self._links: dict[str, dict] = {}
         self.messages: list[Message] = []
         self.by_cycles: dict[str, Message] = {}  # see Illumination
         self.receivers: dict[str, frozenset[str]] = {}
 
     def all(self) -> list[Light]:
-        meshes = [mesh.light((name, 1.0, (1.0, 1.0, 1.0), True)) for (name, _), mesh in self._emissive.items()]
+        emissive = ((name, mesh) for (name, _), mesh in self._emissive.items() if mesh is not None)
+        meshes = [mesh.light((name, 1.0, (1.0, 1.0, 1.0), True)) for name, mesh in emissive]
         for light in filter(None, meshes):
             self._add(light, self._links[light.name])
         return self._lights
@@ -128,22 +129,28 @@ class _Lights:
         obj = instance.object
         key = obj.name, obj.data.as_pointer()
         if key not in self._emissive:
-            self._emissive[key] = mesh = self._emissive_mesh(instance, key).without_instances()
-            self._links[obj.name] = links_of(obj, self._names)
-            if mesh.reason:
+            self._emissive[key] = mesh = self._emissive_mesh(instance, key)
+            if mesh is not None:
+                self._links[obj.name] = links_of(obj, self._names)
+            if mesh is not None and mesh.reason:
                 text = f"The emission of '{obj.name}' is left out."
                 self._warn_of(obj.name, text, mesh.reason, mesh.missing, self._links[obj.name])
-        self._emissive[key].add_instance(instance.matrix_world)
+        if self._emissive[key] is not None:
+            self._emissive[key].add_instance(instance.matrix_world)
 
-    def _emissive_mesh(self, instance, key: tuple) -> EmissiveMesh:
+    def _emissive_mesh(self, instance, key: tuple) -> EmissiveMesh | None:
+        """The mesh without its instances; None if all of its materials are dark."""
         obj, cache = instance.object, self._cache
         radiance = [(slot.material, radiance_of(slot.material, cache)) for slot in obj.material_slots]
+        if all(light is None for _, light in radiance):
+            return None
         state = tuple(light.tobytes() if isinstance(light, np.ndarray) else light for _, light in radiance)
         varying = [material for material, light in radiance if light is VARYING]
         blocks = {*shapes_of(instance), *(material.original for material in varying)}
         images = tuple(dict.fromkeys(image for material in varying for image in cache.tree(material).images))
         names = tuple(material and material.name_full for material, _ in radiance)
-        return cache.get(("emission", *key, *names), blocks, lambda: EmissiveMesh(obj, cache), images, state)
+        mesh = cache.get(("emission", *key, *names), blocks, lambda: EmissiveMesh(obj, cache), images, state)
+        return mesh.without_instances()
 
     def add_world(self, view_layer, world) -> None:
         light, reason = (None, None) if world is None else self._read_world(view_layer, world)

@@ -74,9 +74,10 @@ class SceneCache:
         """
         self._used.add(key)
         entry = self._entries.get(key)
-        changed = max((self._changed.get(block, 0) for block in (*blocks, *images)), default=0)
-        if entry is not None and changed <= entry.time and entry.state == (state, *map(self.image_digest, images)):
-            return entry.value
+        if entry is not None and entry.state == (state, *map(self.image_digest, images)):
+            is_new = entry.time == self.time
+            if is_new or not any(self._changed.get(block, 0) > entry.time for block in (*blocks, *images)):
+                return entry.value
         for image in images:
             self._known_images.pop(image, None)
         state = state, *map(self.image_digest, images)

@@ -7,6 +7,16 @@ from dataclasses import dataclass, field
 
 import bpy
 
+KINDS = {
+    "materials": bpy.types.Material,
+    "nodes": bpy.types.ShaderNodeTree,
+    "rest": bpy.types.Image | bpy.types.World | bpy.types.Scene | bpy.types.Collection,
+}
+"""Names of groups, and the data-blocks in them."""
+
+SHOWN_BY_LIVE = bpy.types.Image | bpy.types.ShaderNodeTree
+"""Data-blocks that Live itself changes."""
+
 USED_BY_OTHERS = bpy.types.Light | bpy.types.NodeTree | bpy.types.Action | bpy.types.Texture
 """Data-blocks whose users are among the same updates, so that nothing is noted for them."""
 
@@ -21,8 +31,7 @@ class SceneChanges:
     moved : other objects with another transform.
     shaped : objects and data with another shape.
     nodes : trees with other values. Every scan of Live reads these, so that they are no reason for one.
-    images : images that materials may show.
-    other : all other changes, such as the visibility of an object.
+    rest : all other data, as for another world, another image or another visibility of an object.
     """
 
     lamps: set[str] = field(default_factory=set)
@@ -30,9 +39,7 @@ class SceneChanges:
     shaped: set[str] = field(default_factory=set)
     materials: set[str] = field(default_factory=set)
     nodes: set[str] = field(default_factory=set)
-    images: set[str] = field(default_factory=set)
-    worlds: set[str] = field(default_factory=set)
-    other: set[str] = field(default_factory=set)
+    rest: set[str] = field(default_factory=set)
 
     def __bool__(self) -> bool:
         return bool(self.lamps) or not self.is_lamps_alone()
@@ -43,7 +50,7 @@ class SceneChanges:
 
     def is_movement_alone(self) -> bool:
         """True if nothing has changed but the transforms of objects, the light of lamps and `materials`."""
-        return not (self.shaped or self.images or self.worlds or self.other)
+        return not (self.shaped or self.rest)
 
     def positions(self, scene) -> list:
         """Positions of the changed objects in the world."""
@@ -75,12 +82,12 @@ class ChangeLog:
 
     def note_all(self, time: int) -> None:
         """Note that anything may have changed."""
-        self._times = {("other", ""): time}
+        self._times = {("rest", ""): time}
 
     def note(self, depsgraph, time: int) -> None:
         """Add the updates of a depsgraph."""
         names, changed = self.shown_by_live(), [(_kind_of(update), update.id) for update in depsgraph.updates]
-        ours = [block for kind, block in changed if kind in ("images", "nodes") and block.name in names]
+        ours = [block for _, block in changed if isinstance(block, SHOWN_BY_LIVE) and block.name in names]
         for kind, block in changed:
             if kind is not None and block not in ours and not (ours and kind == "materials"):
                 self._note(kind, block.name_full if kind == "materials" else block.name, time)
@@ -109,15 +116,6 @@ def _kind_of(update) -> str | None:
     return "shaped" if update.is_updated_geometry and not isinstance(block, USED_BY_OTHERS) else None
 
 
-KINDS = {
-    "images": bpy.types.Image,
-    "materials": bpy.types.Material,
-    "worlds": bpy.types.World,
-    "other": bpy.types.Scene | bpy.types.Collection,
-    "nodes": bpy.types.ShaderNodeTree,
-}
-
-
 def _kind_of_object(update) -> str | None:
     is_lamp = update.id.type == "LIGHT"
     if is_lamp and (update.is_updated_transform or update.is_updated_geometry):
@@ -126,4 +124,4 @@ def _kind_of_object(update) -> str | None:
         return "shaped"
     if update.is_updated_transform:
         return "moved"
-    return "other" if is_lamp or not update.is_updated_shading else None
+    return "rest" if is_lamp or not update.is_updated_shading else None
