@@ -49,10 +49,10 @@ const Knots& knots(RadialDetail detail)
 {
     static const auto tables = [] {
         std::array<Knots, 2> all;
-        for (const RadialDetail detail : {RadialDetail::bins, RadialDetail::all}) {
-            auto& [edge, stencil] = all[static_cast<std::size_t>(detail)];
+        for (const RadialDetail fineness : {RadialDetail::bins, RadialDetail::all}) {
+            auto& [edge, stencil] = all[static_cast<std::size_t>(fineness)];
             for (std::size_t k = 0; k < edge_count; ++k)
-                if (detail == RadialDetail::all || is_bin_edge(k))
+                if (fineness == RadialDetail::all || is_bin_edge(k))
                     edge.push_back(k);
             for (std::size_t i = 0; i < edge.size(); ++i)
                 stencil.push_back(derivative_stencil(edge, i));
