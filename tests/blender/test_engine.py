@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 import scenes
 from beamspread.blender.jobs.out_of_date import stale
+from beamspread.blender.jobs.run import engine
 from beamspread.blender.jobs.run.render_copy import render_picture
 from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.ui.panels import target_of_blender
+from beamspread.core.bake.job import BakeJob
 from beamspread.core.target import Target
 from mathutils import Matrix
 
@@ -43,6 +45,31 @@ def test_same_as_the_operator():
     filled = scenes.pixels(image)
     assert (filled > 0).all()
     assert filled == pytest.approx(scenes.bake(plane)[0], abs=1e-6)
+
+
+class Stopping:
+    """An engine whose user presses Esc."""
+
+    def __init__(self, real):
+        self._real = real
+
+    def __getattr__(self, name):
+        return getattr(self._real, name)
+
+    def test_break(self):
+        return True
+
+
+def test_esc_reaches_the_evaluation_of_nodes(monkeypatch):
+    plane = scenes.add_plane(material=scenes.add_material(shader=True))
+    scenes.add_sun()
+    add_active_image(plane.data.materials[0])
+    scenes.select(plane)
+    bake = engine.bake_active_image
+    monkeypatch.setattr(engine, "bake_active_image", lambda real, *rest: bake(Stopping(real), *rest))
+    monkeypatch.setattr(BakeJob, "run", lambda *_: pytest.fail("a job has run"))
+    scenes.messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
+    assert state.status_of(Target("Plane", "Medium")).status == Status.CANCELLED
 
 
 def test_two_objects_with_an_image_each():
