@@ -222,7 +222,7 @@ def upgrade(tree) -> None:
 
 @persistent
 def show_own_images(*_arguments) -> None:
-    """Have trees show the images of their nodes: undo, and files saved by Blender itself, restore Live's images."""
+    """Have trees show the images of their nodes: files that Blender saved by itself have images of Live."""
     for node in all_nodes():
         tree = node.node_tree
         if tree is not None and tree.library is None and IMAGE in tree.nodes:
