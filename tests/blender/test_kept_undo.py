@@ -32,8 +32,8 @@ def test_a_running_bake_survives_undo_and_keeps_its_result(seen):
     assert seen["still runs"]
     # This bake has more texels, which sample the border a little differently.
     assert seen["baked across undo"] == pytest.approx([7 * seen["baked 1"][0]] * 2, rel=0.05)
-    # Undo takes the size back, too. Blender may keep the larger pixels all the same, or free them, as for a redraw: then
-    # the bake says that it made the image larger again.
+    # Undo takes the size back, too. Blender may keep the larger pixels all the same, or free them, as for a redraw:
+    # then the bake says that it made the image larger again.
     assert all("was resized during the bake" in line for line in seen["said"])
     assert seen["undone at last"] == seen["baked 3"]
 
