@@ -17,6 +17,11 @@ SHADER_MENUS = ("NODE_MT_category_shader_shader", "NODE_MT_category_SH_NEW_SHADE
 """Names of the menu Add > Shader: of the Shader Editor in newer versions, and in Blender 3.4."""
 
 
+def session_id(block) -> int:
+    """A number that no other data-block of the session has (Blender 4.1 on); before, its address."""
+    return getattr(block, "session_uid", 0) or block.as_pointer()
+
+
 def engine_id(name: str) -> str:
     """Identifier of the engine CYCLES or EEVEE."""
     if name == "EEVEE":

@@ -200,6 +200,29 @@ def test_undo_and_redo_bring_no_preview_back_after_live(step):
 
 
 @pytest.mark.parametrize("is_on", [True, False])
+def test_trees_show_no_image_while_undo_works(is_on):
+    """Undo may free images of Live and keep the trees that show them, which crashes Blender 5.2."""
+    make_baked_scene()
+    seen = []
+
+    def look(*_arguments):
+        seen.append(shown_image(bpy.data.materials["Medium"]))
+
+    for message in ("before", "after"):
+        bpy.ops.ed.undo_push(message=message)
+        settle()
+    if not is_on:
+        switch_off()
+    bpy.app.handlers.undo_pre.append(look)
+    try:
+        bpy.ops.ed.undo()
+    finally:
+        bpy.app.handlers.undo_pre.remove(look)
+    assert seen == [None]
+    assert shown_image(bpy.data.materials["Medium"]) is not None
+
+
+@pytest.mark.parametrize("is_on", [True, False])
 def test_previews_in_files_that_blender_saves_by_itself_go(tmp_path, is_on):
     """Handlers are not told of automatic saving, copied objects and written libraries."""
     _plane, lamp, material, _baked = make_baked_scene()

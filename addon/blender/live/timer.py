@@ -8,6 +8,7 @@ from bpy.app.handlers import persistent
 from ...core import native
 from ...core.errors import text_of
 from ...core.messages import Messages, note
+from ..node.tree import release_images
 from ..read.scene_cache import listeners
 from ..registration import all_or_nothing, handlers
 from .preview import remove_strays
@@ -26,12 +27,14 @@ class _Live:
     ----------
     session : None while Live is off.
     failure : reason why Live was switched off; "" if the user did so.
+    was_on : True if Live was on since the file was opened.
     """
 
     def __init__(self) -> None:
         self.session: Session | None = None
         self.scene_name = ""
         self.failure = ""
+        self.was_on = False
         self.image_count = 0  # number of images at the last search for strays
 
 
@@ -60,7 +63,7 @@ def step(context) -> float:
     if not bpy.app.background and not is_looked_at(context):
         return IDLE_SECONDS
     if live.session is None:
-        live.session, live.scene_name, live.failure = Session(), scene.name, ""
+        live.session, live.scene_name, live.failure, live.was_on = Session(), scene.name, "", True
     return BUSY_SECONDS if live.session.step(context) else IDLE_SECONDS
 
 
@@ -103,6 +106,13 @@ def _changed(depsgraph) -> None:
 
 
 @persistent
+def before_undo(*_arguments) -> None:
+    """Take Live's images out of all trees: undo knows nothing of them."""
+    if live.was_on:
+        release_images()
+
+
+@persistent
 def hide_previews(*_arguments) -> None:
     """Show own images before saves and exports, which keep them, and Blender's Bake, which may fill a plain group's."""
     if live.session is not None:
@@ -119,6 +129,7 @@ def show_previews(*_arguments) -> None:
 @persistent
 def _leave_file(*_arguments) -> None:
     end(can_remove=False)
+    live.was_on = False
     live.image_count = -1  # where the next file can't be opened, this one stays, and hidden images go in the next step
 
 
@@ -138,6 +149,8 @@ register, unregister = all_or_nothing(
         save_pre=hide_previews,
         save_post=show_previews,
         object_bake_pre=hide_previews,
+        undo_pre=before_undo,
+        redo_pre=before_undo,
         load_pre=_leave_file,
     ),
     (lambda: listeners.append(_changed), lambda: listeners.remove(_changed)),

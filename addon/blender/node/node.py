@@ -295,5 +295,5 @@ def _remove_class() -> None:
 register, unregister = all_or_nothing(
     (_add_class, _remove_class),
     *handlers(load_post=upgrade_nodes, save_pre=release_unused_trees),
-    *handlers(load_post=show_own_images),
+    *handlers(load_post=show_own_images, undo_post=show_own_images, redo_post=show_own_images),
 )

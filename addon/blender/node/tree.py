@@ -220,9 +220,21 @@ def upgrade(tree) -> None:
             node.inputs[ROUGHNESS].default_value = ROUGHNESS_BEFORE
 
 
+def release_images() -> None:
+    """Have trees show no image until `show_own_images`.
+
+    Undo keeps trees that are equal in both of its steps as they are in memory. It frees images that the other step does
+    not have, as one of Live or of a bake, even if such a tree shows them: Blender 5.2 crashes then.
+    """
+    for node in all_nodes():
+        tree = node.node_tree
+        if tree is not None and tree.library is None and IMAGE in tree.nodes:
+            show_image(tree, None)
+
+
 @persistent
 def show_own_images(*_arguments) -> None:
-    """Have trees show the images of their nodes: files that Blender saved by itself have images of Live."""
+    """Have trees show the images of their nodes: undo, and files saved by Blender itself, restore Live's images."""
     for node in all_nodes():
         tree = node.node_tree
         if tree is not None and tree.library is None and IMAGE in tree.nodes:

@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import text_of
+from .. import compat
 from .nodes import Links, shows_bake
 
 SCHEME = 2
@@ -64,11 +65,17 @@ def values_of(struct, skipped: Iterable[str] = (), depth: int = 0) -> list:
 
 
 class TreeDigest(NamedTuple):
-    """Digest of the nodes before some inputs, the images of these nodes, whose pixels it does not cover, and groups."""
+    """Digest of the nodes before some inputs.
+
+    Attributes
+    ----------
+    images : full names of the images of these nodes, whose pixels the digest does not cover.
+    groups : session ids of the trees of groups among them.
+    """
 
     text: str = ""
-    images: tuple = ()
-    groups: tuple = ()
+    images: tuple[str, ...] = ()
+    groups: tuple[int, ...] = ()
 
 
 def digest_of_tree(inputs: Iterable) -> TreeDigest:
@@ -81,7 +88,7 @@ def digest_of_tree(inputs: Iterable) -> TreeDigest:
     while queue < len(groups):
         rows.append([*_rows(links, _outputs_of([*groups][queue]), groups, images)])
         queue += 1
-    return TreeDigest(digest(rows), tuple(images), tuple(groups))
+    return TreeDigest(digest(rows), tuple(images), tuple(map(compat.session_id, groups)))
 
 
 def _rows(links: Links, inputs: Iterable, groups: dict, images: dict) -> Iterator:
@@ -104,7 +111,7 @@ def _node_values(node, groups: dict, images: dict) -> list:
     if shows_bake(node):
         return []  # no bake reads the result of another
     if getattr(node, "image", None) is not None:
-        images[node.image] = None
+        images[node.image.name_full] = None
     inner = getattr(node, "node_tree", None)
     number = None if inner is None else groups.setdefault(inner, len(groups))
     return [node.bl_idname, number, values_of(node, _NODE_LOOKS)]

@@ -42,8 +42,8 @@ class _Entry(NamedTuple):
 class SceneCache:
     """Results of reading data-blocks.
 
-    Entries belong to one view layer, as the depsgraph of the viewport evaluates it. Data-blocks are recognized by their
-    Python objects, which become invalid when Blender frees them.
+    Entries belong to one view layer, as the depsgraph of the viewport evaluates it. They hold no Python objects of
+    data-blocks: Blender 5.2 crashes when one of a freed data-block is compared.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class SceneCache:
         self.images, self.check = Images(), None
         self._entries: dict[tuple, _Entry] = {}
         self._used: set[tuple] = set()
-        self._changed: dict[object, int] = {}  # time of the last change of each data-block
+        self._changed: dict[Hashable, int] = {}  # time of the last change of each data-block
         self._image_digests, self._known_images = ImageDigests(), {}
         self._view_layer: tuple[str, str] | None = None
         self.log = ChangeLog()
@@ -69,14 +69,17 @@ class SceneCache:
         Parameters
         ----------
         key : kind of the entry, and the data-blocks and names that it is about.
-        blocks, images : original data-blocks that the result depends on.
+        blocks : original data-blocks that the result depends on, or their identities.
+        images : full names of images that it depends on.
         state : everything else that it depends on.
         """
+        key = tuple(map(identity, key))
         self._used.add(key)
         entry = self._entries.get(key)
         if entry is not None and entry.state == (state, *map(self.image_digest, images)):
             is_new = entry.time == self.time
-            if is_new or not any(self._changed.get(block, 0) > entry.time for block in (*blocks, *images)):
+            parts = () if is_new else map(identity, (*blocks, *images))
+            if not any(self._changed.get(part, 0) > entry.time for part in parts):
                 return entry.value
         for image in images:
             self._known_images.pop(image, None)
@@ -99,19 +102,17 @@ class SceneCache:
         return self._tree(material.original, "texture", lambda: [wanted.socket, *around])
 
     def _tree(self, block, part: bool | str, inputs: Callable[[], list]) -> TreeDigest:
-        key = "tree", block, part
+        key = "tree", identity(block), part
         known = self._entries.get(key)
         blocks = [block, block.node_tree, *(() if known is None else known.value.groups)]
         return self.get(key, blocks, lambda: digest_of_tree(inputs()))
 
-    def image_digest(self, image) -> str:
-        """Digest of an image as it was when images were checked last."""
-        if image not in self._known_images:
-            try:
-                self._known_images[image] = self._image_digests.of(image)
-            except ReferenceError:
-                return "removed"
-        return self._known_images[image]
+    def image_digest(self, name: str) -> str:
+        """Digest of the image of that full name as it was when images were checked last."""
+        if name not in self._known_images:
+            image = next((image for image in bpy.data.images if image.name_full == name), None)
+            self._known_images[name] = "removed" if image is None else self._image_digests.of(image)
+        return self._known_images[name]
 
     def check_images(self) -> None:
         """Look for other pixels, as of files from other programs and of strokes, which Blender 3.4 does not report."""
@@ -158,11 +159,19 @@ class SceneCache:
         self.time += 1
         for update in depsgraph.updates:
             if update.is_updated_geometry or not isinstance(update.id, GEOMETRY):
-                self._changed[update.id.original] = self.time
-                self._known_images.pop(update.id.original, None)
+                block = identity(update.id.original)
+                self._changed[block] = self.time
+                self._known_images.pop(block, None)
                 if isinstance(update.id, bpy.types.Object):
                     self.geometry_time = self.time
         self.log.note(depsgraph, self.time)
+
+
+def identity(part: Hashable) -> Hashable:
+    """A plain value in place of an original data-block: the full name of an image; any other part unchanged."""
+    if isinstance(part, bpy.types.Image):
+        return part.name_full
+    return compat.session_id(part) if isinstance(part, bpy.types.ID) else part
 
 
 def _inputs_of(owner, is_whole: bool) -> list:

@@ -160,32 +160,32 @@ def constant(*color: float) -> MaterialTransmittance:
     return MaterialTransmittance(native.Transmittance(color), color)
 
 
-OPAQUE_MATERIAL, CLEAR_MATERIAL = constant(0.0, 0.0, 0.0), constant(1.0, 1.0, 1.0)
+BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 
 
 def transmittance_of(material, cache: SceneCache) -> MaterialTransmittance:
     """Transmittance of a material; None stands for Cycles' default, which is opaque."""
     if material is None:
-        return OPAQUE_MATERIAL
+        return constant(*BLACK)
     return cache.of_nodes("transmittance", material, lambda: _read(material, cache.check))
 
 
 def _read(material, check: Callable[[], None] | None) -> MaterialTransmittance:
     if not (compat.uses_nodes(material) and compat.has_transparent_shadow(material)):
-        return OPAQUE_MATERIAL
+        return constant(*BLACK)
     surface = surface_of(material.node_tree)
     if surface is None:
-        return OPAQUE_MATERIAL
+        return constant(*BLACK)
     if not surface.socket.is_linked:
         if not surface.socket.node.inputs["Volume"].is_linked:
-            return OPAQUE_MATERIAL
+            return constant(*BLACK)
         text = f"The material '{material.name}' has a volume and no surface: it casts no shadow."
-        return replace(CLEAR_MATERIAL, messages=(warning(material.name, text),))
+        return replace(constant(*WHITE), messages=(warning(material.name, text),))
     try:
         return _evaluate(surface, check)
     except NotSupportedError as error:
         text = f"The material '{material.name}' casts opaque shadows. {error}"
-        return replace(OPAQUE_MATERIAL, messages=(warning(material.name, text),))
+        return replace(constant(*BLACK), messages=(warning(material.name, text),))
 
 
 def _evaluate(surface: InputSocket, check: Callable[[], None] | None) -> MaterialTransmittance:

@@ -40,7 +40,7 @@ def fingerprints(context, targets: Iterable[Target], is_for_bake: bool = False) 
     scene_cache.enter(depsgraph)
     scene_cache.check_images()
     objects, known, parts = ObjectDigests(depsgraph, is_for_bake), by_name(scene), {}
-    results = {node.image for node in map(find_node, bpy.data.materials) if node is not None}
+    results = {node.image.name_full for node in map(find_node, bpy.data.materials) if node is not None and node.image}
     world = _world(compat.original_world(view_layer, scene), view_layer, objects.images)
     for target in targets:
         obj, material = known.get(target.object_name), bpy.data.materials.get(target.material_name)
@@ -66,9 +66,9 @@ def _text(total: int) -> str:
     return f"{total % 2**64:x}"
 
 
-def _digest_of(images: Iterable) -> str:
+def _digest_of(images: Iterable[str]) -> str:
     """Digest of the pixels of textures."""
-    return digest(sorted((image.name_full, scene_cache.image_digest(image)) for image in images))
+    return digest(sorted((name, scene_cache.image_digest(name)) for name in images))
 
 
 def _world(world, view_layer, images: dict) -> str:

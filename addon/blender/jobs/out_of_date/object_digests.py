@@ -42,7 +42,7 @@ class ObjectDigests:
     ----------
     lamps : sum of the hashes of all lamps.
     solids : sum of the hashes of all instances of each other object, by name.
-    images : images that the nodes of lamps and materials show, in the order in which they were found.
+    images : full names of the images that the nodes of lamps and materials show, in the order in which they are met.
     """
 
     def __init__(self, depsgraph, is_for_bake: bool) -> None:

@@ -35,9 +35,6 @@ from ...read.lights import read_illumination
 from ...read.scene_cache import SceneCache, scene_cache
 from ...read.visibility import ObjectInstance, as_rendered, check_instance, find_instances, render_visible_names
 
-CANCELLING = KeyboardInterrupt, native.Cancelled
-"""Exceptions that cancel bakes."""
-
 PLACEHOLDER_COLOR = (0.5, 0.5, 0.5)
 """Base color until Cycles has evaluated it."""
 
@@ -123,7 +120,7 @@ class FailedPlan:
         return []
 
     def bake(self, _settings: BakeSettings) -> Bake:
-        if not isinstance(self.error, CANCELLING):
+        if not isinstance(self.error, (KeyboardInterrupt, native.Cancelled)):
             return Bake(self.target, error=self.error)
         bake = Bake(self.target)
         bake.cancel()
@@ -210,7 +207,7 @@ def read_plans(
     try:
         instances = find_instances(depsgraph, {target.object_name for target in targets}, visible)
         light = read_illumination(depsgraph, cache, check), CyclesLight(depsgraph, copy)
-    except (Exception, *CANCELLING) as error:  # noqa: BLE001 - each bake asked for needs an answer
+    except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - each bake asked for needs an answer
         return [FailedPlan(target, error) for target in targets]
     plans: list[Plan] = []
     for target in targets:
@@ -218,7 +215,7 @@ def read_plans(
             instance = instances.get(target.object_name)
             check_instance(target.object_name, instance, depsgraph.view_layer)
             plans.append(_read_target(depsgraph, target, instance, resolution, size, light, check))
-        except CANCELLING as error:
+        except (KeyboardInterrupt, native.Cancelled) as error:
             return [FailedPlan(target, error) for target in targets]
         except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
             plans.append(FailedPlan(target, error))
