@@ -76,7 +76,11 @@ def play(steps: Iterator, results: dict, path: Path) -> None:
                 # By the clock, too: a process that only waits computes nothing.
                 if computed < PATIENCE_SECONDS and passed < 5 * PATIENCE_SECONDS:
                     return PAUSE_SECONDS
-                raise TimeoutError(f"line {steps.gi_frame.f_lineno} waited in vain")
+                stacks = "".join(
+                    line for frame in sys._current_frames().values() for line in traceback.format_stack(frame)
+                )
+                spent = f"{computed:.0f} s of CPU time, {passed:.0f} s by the clock"
+                raise TimeoutError(f"line {steps.gi_frame.f_lineno} waited in vain ({spent}); threads:\n{stacks}")
             waiting.update({"for": next(steps), "since": clocks()})
             return PAUSE_SECONDS
         except StopIteration:

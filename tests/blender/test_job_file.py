@@ -1,10 +1,13 @@
 """A job in a file: another process without Blender computes the same from it."""
 
+import os
 import pickle
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
+import beamspread
 import bpy
 import numpy as np
 import pytest
@@ -106,7 +109,9 @@ def test_a_process_without_blender_gets_the_same_bits(output, tmp_path):
     file, result = tmp_path / "bake.job", tmp_path / "texture.npy"
     file.write_bytes(pickle.dumps(bake.job))
     python = sys.executable if not bpy.app.binary_path else shutil.which("python3")
-    done = subprocess.run([python, "-c", RUN, str(file), str(result)], capture_output=True, text=True, timeout=300)
+    environment = os.environ | {"PYTHONPATH": str(Path(beamspread.__file__).parent.parent)}
+    command = [python, "-c", RUN, str(file), str(result)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment)
     assert done.returncode == 0, done.stderr
     assert here.texture.std() > 0.1 * here.texture.mean() > 0
     np.testing.assert_array_equal(np.load(result), here.texture)

@@ -111,7 +111,6 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         if self._step():
             self._show_progress(context)
             return {"PASS_THROUGH"}
-        _leave_window()
         return self._finish(context)
 
     def _step(self) -> bool:
@@ -159,6 +158,7 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         redraw(context)
 
     def _finish(self, context):
+        _leave_window()  # also of a run whose bakes ended before its timer began
         stale.scan_soon()
         redraw(context)
         written, problems = self._run.written, self._run.problems
