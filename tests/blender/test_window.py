@@ -80,8 +80,8 @@ def test_an_error_ends_the_run_is_said_and_the_next_bake_works(seen):
     assert seen["after errors"] == [["RUNNING_MODAL"], []]
 
 
-def test_a_bake_that_ends_at_once_leaves_no_run_behind(seen):
-    assert seen["ends at once"] == [["FINISHED"], False]
+def test_a_bake_that_ends_at_once_ends_its_run(seen):
+    assert seen["ends at once"] == ["RUNNING_MODAL"]
 
 
 def test_disabling_the_add_on_ends_the_bake_and_its_timer(seen):

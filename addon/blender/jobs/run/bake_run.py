@@ -119,6 +119,7 @@ class BakeRun(Sink):
         state.start(self._progress, bake.target, f"{self._number} of {count}" if count > 1 else "")
         thread = BakeThread(bake, progress)
         thread.start()
+        yield  # also if it has ended: only the modal part of an operator makes an undo step for scripts
         while thread.is_alive():
             yield
 

@@ -158,7 +158,7 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         redraw(context)
 
     def _finish(self, context):
-        _leave_window()  # also of a run whose bakes ended before its timer began
+        _leave_window()
         stale.scan_soon()
         redraw(context)
         written, problems = self._run.written, self._run.problems
