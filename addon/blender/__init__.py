@@ -17,6 +17,7 @@ Each part imports only core and those above it (tests/unit/test_layers.py reads 
 """
 
 from . import preferences, settings
+from .cycles import process
 from .images import facts, image_operators, undo
 from .jobs import state
 from .jobs.out_of_date import stale
@@ -36,6 +37,7 @@ PARTS = (
     node,
     buttons,
     scene_cache,  # its listeners show the nodes that `node` has restored after undo
+    process,
     state,
     stale,
     engine,

@@ -247,6 +247,7 @@ def test_a_child_that_fails_is_said_and_the_own_color_counts(plane, monkeypatch,
     broken = tmp_path / "broken.py"
     broken.write_text("import os\nprint('what went wrong', flush=True)\nos._exit(5)\n")
     monkeypatch.setattr(process, "CHILD", broken)
+    process.end()
     assert bake(plane)[0] == pytest.approx(own, rel=1e-6)
     (message,) = state.lines()
     assert "could not evaluate the Base Color of 'Plane'" in message

@@ -13,7 +13,8 @@ import pytest
 import scenes
 from beamspread.blender.compat import has_denoiser
 from beamspread.blender.cycles import cycles_light, process
-from beamspread.blender.cycles.scene_copy import PREFIX, SceneCopy, remove_leftovers
+from beamspread.blender.cycles.folders import PREFIX, remove_leftovers
+from beamspread.blender.cycles.scene_copy import SceneCopy
 from beamspread.blender.jobs.run.bake_plan import prepare_scene
 from beamspread.blender.node.find import find_node
 from beamspread.core.bake.runner import CANCELLED, FAILED
@@ -408,6 +409,7 @@ def test_the_scene_stays_as_it_is(monkeypatch, tmp_path):
         broken = tmp_path / "broken.py"
         broken.write_text("import os\nprint('what went wrong', flush=True)\nos._exit(5)\n")
         monkeypatch.setattr(process, "CHILD", broken)
+        process.end()
         bake.run()
         assert bake.status == FAILED
         assert "exit code 5" in bake.error
@@ -432,6 +434,7 @@ def test_cancelling_kills_the_process(monkeypatch):
             super().__init__(*arguments, **options)
             children.append(self)
 
+    process.end()
     monkeypatch.setattr(process.subprocess, "Popen", Popen)
     before, there = state(), folders()
     (bake,) = jobs_of(floor)

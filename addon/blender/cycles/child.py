@@ -1,14 +1,24 @@
-"""Program of the child process, in Blender or with Blender as a module: child.py -- FILE.blend REQUEST.json
+"""Program of the child process, in Blender or with Blender as a module: child.py -- MARK IDLE_SECONDS
 
-Each process does one task, and may change the copy of the scene, which no other process sees. The arrays that the task
-returns, by name, are written to the file that the request names.
+Each line of its input is the path of a request (JSON), until the input ends. The process opens the copy of the scene
+that the request names, does the task, which may change anything in memory, and writes the arrays that the task returns,
+by name, to the file that the request names. Opening a copy resets all data, so requests don't depend on earlier ones.
+
+The process ends at the first error, without requests for some time, and when its parent ends in any way.
 """
 
 import json
 import os
+import queue
 import re
+import shutil
+import signal
 import sys
+import tempfile
+import threading
+import time
 import traceback
+from contextlib import suppress
 from pathlib import Path
 
 import bpy
@@ -20,6 +30,12 @@ import child_colors
 import child_fields
 import child_world
 import compat
+
+# Exit codes after an error, and after a time without requests.
+FAILED, IDLE = 1, 4
+
+# Seconds until a process whose parent was killed has another parent, at most.
+ORPHANED_SECONDS = 2.0
 
 # Progress in the status text of engines, which Blender 5.0 and later give only to handlers.
 SAMPLES = re.compile(r"\bSample (\d+)/(\d+)")
@@ -81,13 +97,42 @@ def restore_images(file: Path) -> None:
             old.user_remap(image)
 
 
-def main() -> None:
-    """Do the task of the request."""
-    blend, request_file = map(Path, sys.argv[sys.argv.index("--") + 1 :])
-    request = json.loads(request_file.read_text())
-    if not bpy.app.binary_path:
-        bpy.ops.wm.read_factory_settings(use_empty=True)
-        bpy.ops.wm.open_mainfile(filepath=str(blend), use_scripts=request["scripts"])
+class Requests(threading.Thread):
+    """Reads paths of requests, also while Cycles renders, and ends the process with the input."""
+
+    def __init__(self) -> None:
+        super().__init__(daemon=True)
+        self.paths, self._parent = queue.SimpleQueue(), os.getppid()
+        _wake_at_input()
+        self.start()
+
+    def run(self) -> None:
+        for line in sys.stdin:
+            self.paths.put(Path(line.strip()))
+        began = time.monotonic()
+        while time.monotonic() - began < ORPHANED_SECONDS and os.name == "posix":
+            if os.getppid() != self._parent:  # it was killed, and has left its folders
+                for folder in Path(tempfile.gettempdir()).parent.glob(f"beamspread-cycles-{self._parent}-*"):
+                    shutil.rmtree(folder, ignore_errors=True)
+                break
+            time.sleep(0.05)
+        os._exit(0)
+
+
+def _wake_at_input() -> None:
+    """Have Linux continue this process, if it is stopped, at each request and when the parent ends."""
+    with suppress(ImportError, AttributeError):
+        import fcntl
+
+        fcntl.fcntl(0, fcntl.F_SETOWN, os.getpid())
+        fcntl.fcntl(0, fcntl.F_SETSIG, signal.SIGCONT)
+        fcntl.fcntl(0, fcntl.F_SETFL, fcntl.fcntl(0, fcntl.F_GETFL) | os.O_ASYNC)
+
+
+def answer(request: dict, say) -> None:
+    """Do the task of a request."""
+    blend = Path(request["copy"])
+    bpy.ops.wm.open_mainfile(filepath=str(blend), load_ui=False, use_scripts=request["scripts"])
     restore_images(blend.with_name("images.npz"))
     scene = bpy.data.scenes[request["scene"]]
     window = bpy.context.window
@@ -95,24 +140,39 @@ def main() -> None:
         window.scene = scene
         window.view_layer = scene.view_layers[request["view_layer"]]
 
-    def progress(fraction: float) -> None:
-        # The process ends here if its parent is gone: writing fails.
-        sys.stdout.write(f"\n{request['mark']} {fraction:.4f}\n")
-        sys.stdout.flush()
-
-    progress(0.0)
-    arrays = TASKS[request["task"]](request, scene, progress)
+    say(0.0)
+    arrays = TASKS[request["task"]](request, scene, say)
     np.savez(request["output"], **arrays)
 
 
+def main() -> int:
+    """Answer requests; the exit code."""
+    mark, idle_seconds = sys.argv[sys.argv.index("--") + 1 :]
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
+
+    def say(news) -> None:
+        sys.stdout.write(f"\n{mark} {news}\n")
+        sys.stdout.flush()
+
+    requests = Requests()
+    if not bpy.app.binary_path:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+    while True:
+        try:
+            path = requests.paths.get(timeout=float(idle_seconds))
+        except queue.Empty:
+            return IDLE
+        try:
+            answer(json.loads(path.read_text()), say)
+        except BaseException:  # noqa: BLE001 - the parent shows every error
+            traceback.print_exc()
+            return FAILED
+        say("done")
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)  # frees the scene
+
+
 if __name__ == "__main__":
-    try:
-        main()
-    except BaseException:  # noqa: BLE001 - the parent shows every error
-        traceback.print_exc()
-        code = 1
-    else:
-        code = 0
+    code = main()
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)  # some versions hang while they clean up

@@ -21,7 +21,7 @@ from .. import compat
 from ..read.image_nodes import missing_images
 from ..read.nodes import Links, surface_of
 from ..read.visibility import SOLID_TYPES, render_visible_names, renders
-from .process import run
+from .process import run, start
 from .scene_copy import CopyForCycles, SceneCopy
 
 # Nodes along the longest side of a receiver; more resolve bounced light more finely and take longer.
@@ -50,6 +50,22 @@ LIFT = 1e-3
 
 # Samples of each texel of the world's panorama, and of texels in tiles around a sun; more reduce noise.
 WORLD_SAMPLES, SUN_SAMPLES = 2, 256
+
+REQUEST = {
+    "strata": STRATA.tolist(),
+    "light": "INDIRECT",
+    "with_world": True,
+    "only": [],
+    "by_lamps": False,
+    "reflectances": {},
+    "textures": {},
+    "noise": (MIN_NOISE, MAX_NOISE),
+    "noise_of_all": NOISE_OF_ALL,
+    "direct": 0.0,
+    "negligible": NEGLIGIBLE,
+    "most_samples": MAX_SAMPLES,
+}
+"""Input of the task `fields` (child_fields.py) without the charts."""
 
 WHITE = 1.0, (1.0, 1.0, 1.0)
 UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -91,6 +107,7 @@ class CyclesLight:
             text = "Blender's own Bake could not ask Cycles for light that only Cycles can evaluate."
             missing = warning("", text, "Use Bake Beamspread.")
             return replace(job, illumination=illumination.with_messages(missing))
+        start(self._copy.scene)
         illumination = illumination.without({world, *objects} - {""}).with_messages(*self._copy.scene.warnings)
         illumination = illumination.with_messages(*self._missing) if bounced else illumination
         step = LightByCycles(self._copy, world, {name: self._lamps.get(name) for name in objects}, bounced, has_world)
@@ -169,22 +186,15 @@ class LightByCycles(Step):
 
     def _fields(self, receiver: Receiver, progress: Progress, doing: str, **options) -> tuple[tuple[Field, ...], float]:
         """Bounced light, or light as the options ask for, and an estimate of its mean irradiance, W/m^2."""
-        request = {
+        request = REQUEST | {
             "charts": charts_of(receiver, NODES),
-            "strata": STRATA.tolist(),
-            "light": "INDIRECT",
             "with_world": self.has_world,
-            "only": [],
-            "by_lamps": False,
             "reflectances": self.copy.reflectances,
             "textures": self.copy.textures,
             "noise": (MIN_NOISE, MAX_NOISE),
-            "noise_of_all": NOISE_OF_ALL,
-            "direct": 0.0,
-            "negligible": NEGLIGIBLE,
             "most_samples": MAX_SAMPLES,
         }
-        arrays = run(self.copy.scene, "fields", {**request, **options}, progress, doing)
+        arrays = run(self.copy.scene, "fields", request | options, progress, doing)
         grids = (chart.grid for chart in receiver.charts)
         fields = tuple(Field(grid.origin, grid.normal, arrays[f"radiance_{n}"]) for n, grid in enumerate(grids))
         return fields, float(arrays["irradiance"])

@@ -2,12 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import tempfile
-import time
-import weakref
-from contextlib import suppress
 from pathlib import Path
 
 import bpy
@@ -22,17 +16,9 @@ from ..node.tree import BASE_COLOR
 from ..read.image_nodes import missing_images
 from ..read.nodes import Links
 from ..read.visibility import with_instanced
+from .folders import Folder
 
-try:
-    import fcntl
-except ImportError:  # Windows: folders of killed processes stay
-    fcntl = None
-
-PREFIX = "beamspread-cycles-"
 FILE, IMAGES = "scene.blend", "images.npz"
-
-# Age from which an unlocked folder counts as a leftover; a younger one may not be locked yet.
-MIN_AGE_SECONDS = 60.0
 
 
 class SceneCopy:
@@ -48,9 +34,7 @@ class SceneCopy:
     """
 
     def __init__(self, scene, view_layer) -> None:
-        remove_leftovers()
-        self.folder = Path(tempfile.mkdtemp(prefix=f"{PREFIX}{os.getpid()}-"))
-        self._remover = weakref.finalize(self, _remove, self.folder, _lock(self.folder))
+        self._folder = Folder()
         self.warnings: list[Message] = []
         self.binary = bpy.app.binary_path
         self.request = {
@@ -70,17 +54,16 @@ class SceneCopy:
             raise
 
     @property
+    def folder(self) -> Path:
+        return self._folder.path
+
+    @property
     def file(self) -> Path:
         return self.folder / FILE
 
-    def __getstate__(self) -> dict:
-        """State for a process that uses the folder and does not own it."""
-        return {**self.__dict__, "_remover": None}
-
     def remove(self) -> None:
         """Remove the folder."""
-        if self._remover is not None:
-            self._remover()
+        self._folder.remove()
 
     def __enter__(self) -> SceneCopy:
         return self
@@ -138,30 +121,3 @@ def _reflectance(surface) -> list[float]:
         return surface.reflectance()
     except MaterialError:  # of another object, whose own bake reports it
         return [0.0, 0.0, 0.0]
-
-
-def remove_leftovers() -> None:
-    """Remove folders that no process has locked: those of processes that were killed."""
-    for folder in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
-        with suppress(OSError):  # another user's, or removed meanwhile
-            if fcntl is not None and time.time() - folder.stat().st_mtime > MIN_AGE_SECONDS:
-                _remove(folder, _lock(folder))
-
-
-def _lock(folder: Path) -> int | None:
-    """Descriptor that holds a lock on a folder, None on systems without locks; OSError if another holds it."""
-    if fcntl is None:
-        return None
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        os.close(descriptor)
-        raise
-    return descriptor
-
-
-def _remove(folder: Path, lock: int | None) -> None:
-    shutil.rmtree(folder, ignore_errors=True)
-    if lock is not None:
-        os.close(lock)

@@ -36,7 +36,8 @@ def render_picture(engine, depsgraph) -> None:
                 "subframe": scene.frame_subframe,
                 "picture": str(picture),
             }
-            run(copy, "render", request, lambda fraction: _step(engine, fraction))
+            # A process of its own: classes of nodes stay registered, and memory for pictures may be large.
+            run(copy, "render", request, lambda fraction: _step(engine, fraction), keeps=False)
             result.load_from_file(str(picture))
             filled = True
     except native.Cancelled:
