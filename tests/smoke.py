@@ -107,7 +107,7 @@ def rays(library):
     corners = np.array([[0, -1, 0.5], [0.5, -1, 0.5], [0.5, 1, 0.5], [0, 1, 0.5]])
     faces = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
     tinted = native.OccluderMesh(
-        corners, faces, None, [native.Transmittance((0.5, 0.2, 0.1))], np.zeros((2, 1), np.uint32), None
+        corners, faces, None, [native.ColorTexture((0.5, 0.2, 0.1))], np.zeros((2, 1), np.uint32), None
     )
     occluders = native.Occluders([tinted], (0, 0, 0))
     image = np.random.default_rng(0).random((8, 16, 3)).astype(np.float32)

@@ -1,9 +1,10 @@
-// Python names of receivers and the tracer in native/scene: ReceiverGrid, coverage, gather_rays.
+// Python names of receivers and tracers in native/scene: ReceiverGrid, coverage, gather_rays, bounced_light.
 #include <algorithm>
 #include <memory>
 
 #include "bake/surface_light.h"
 #include "python/casters.h"
+#include "scene/bounced_light.h"
 #include "scene/coverage.h"
 #include "scene/ray_gather.h"
 
@@ -67,6 +68,61 @@ py::tuple gather(const ReceiverGrid& grid, const Light& light, const Occluders* 
         return to_array<float>(std::move(values), {grid.height, grid.width, 3});
     };
     return py::make_tuple(to_vectors(std::move(sum.irradiance)), to_vectors(std::move(sum.flow)));
+}
+
+NodeGrid node_grid(const py::dict& grid)
+{
+    const auto vector = [&grid](const char* name) { return to_vec3(name, py::cast<Numbers>(grid[name])); };
+    const auto size = py::cast<std::array<double, 2>>(grid["size"]);
+    const auto nodes = py::cast<std::array<std::size_t, 2>>(grid["nodes"]);
+    return {.corner = vector("corner"),
+            .x_axis = vector("x_axis"),
+            .y_axis = vector("y_axis"),
+            .normal = vector("normal"),
+            .size = {size[0], size[1]},
+            .columns = nodes[0],
+            .rows = nodes[1]};
+}
+
+py::dict bounced_light(const std::vector<py::dict>& grids, const Numbers& strata,
+                       const std::vector<std::tuple<const Light*, Numbers, const Occluders*>>& lights,
+                       const Occluders* occluders, double direct, double tolerance, int max_bounces, std::uint32_t seed,
+                       int threads, const py::object& callback, double spread, int max_samples)
+{
+    std::vector<NodeGrid> node_grids;
+    for (const py::dict& grid : grids)
+        node_grids.push_back(node_grid(grid));
+    if (strata.ndim() != 2 || strata.shape(1) != 4 || strata.shape(0) < 1)
+        reject("strata", shape_text(strata), "(K, 4) numbers");
+    std::vector<Stratum> parts;
+    for (py::ssize_t k = 0; k < strata.shape(0); ++k)
+        parts.push_back({strata.at(k, 0), strata.at(k, 1), strata.at(k, 2), strata.at(k, 3)});
+    std::vector<SceneLight> scene_lights;
+    for (const auto& [light, color, blockers] : lights)
+        scene_lights.push_back({light, Vec3f(to_vec3("color", color)), blockers});
+    const BouncedSettings settings{.direct = direct,
+                                   .tolerance = tolerance,
+                                   .spread = spread,
+                                   .max_bounces = max_bounces,
+                                   .max_samples = max_samples,
+                                   .seed = seed,
+                                   .threads = threads};
+    Progress progress(progress_callback(callback));
+    BouncedLight light;
+    {
+        const py::gil_scoped_release released;
+        light = trace_bounced_light(node_grids, parts, scene_lights, occluders, settings, progress);
+    }
+    py::list radiance;
+    for (std::size_t n = 0; n < node_grids.size(); ++n)
+        radiance.append(to_array<float>(std::move(light.radiance[n]),
+                                        {parts.size(), node_grids[n].rows, node_grids[n].columns, std::size_t{3}}));
+    py::dict result;
+    result["radiance"] = radiance;
+    result["irradiance"] = light.irradiance;
+    result["noise"] = light.noise;
+    result["paths"] = light.paths;
+    return result;
 }
 
 }  // namespace
@@ -168,6 +224,51 @@ ValueError
     An argument is out of range; the message names it.
 Cancelled
     `progress` returned False.
+)");
+    m.def("bounced_light", &bounced_light, py::arg("grids"), py::arg("strata"), py::arg("lights"), py::arg("occluders"),
+          py::arg("direct"), py::arg("tolerance") = 0.01, py::arg("max_bounces") = 12, py::arg("seed") = 0,
+          py::arg("threads") = 0, py::arg("progress") = py::none(), py::arg("spread") = 0.0,
+          py::arg("max_samples") = BouncedSettings{}.max_samples,
+          R"(Light that surfaces reflect to receivers, by path tracing with next-event estimation.
+
+Parameters
+----------
+grids : list of dict
+    Rectangles of nodes above the receivers: 'corner', 'x_axis', 'y_axis', 'normal' (3 floats each, world, metres), 'size'
+    (2 floats, metres) and 'nodes' (columns, rows).
+strata : array of float, shape (K, 4)
+    Parts of the hemisphere: begin and extent of the squared sine, and of the azimuth over 2 pi.
+lights : list of (Light, 3 floats, Occluders or None)
+    All lights of the scene, their colored strengths, and the triangles that block each.
+occluders : Occluders or None
+    Triangles that reflect light.
+direct : float
+    Mean irradiance of direct light, W/m^2.
+tolerance : float
+    Allowed noise, relative to direct and bounced irradiance.
+max_bounces : int
+    Largest number of surfaces that reflect light on its way to a receiver; Cycles' number of diffuse bounces.
+seed : int
+threads : int
+    0: all. The result is the same, bit for bit, for any number.
+progress : callable, optional
+    progress(fraction) returns False to stop.
+spread : float
+    Radius, metres, over which the medium averages light: noise counts as its mean over that distance.
+max_samples : int
+    Largest number of paths from each node in each part of the hemisphere.
+
+Returns
+-------
+dict
+    'radiance': float32 (K, rows, columns, 3) for each grid, mean over each part weighted by the cosine, W/(m^2 sr);
+    'irradiance': its mean, W/m^2; 'noise': root mean square error of the irradiance after that averaging and the spline
+    between nodes, relative to direct and bounced irradiance; 'paths': number of paths.
+
+Raises
+------
+ValueError
+    An argument is out of range; the message names it.
 )");
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -91,14 +92,16 @@ private:
     std::vector<std::uint32_t> m_guide;
 };
 
-// An environment whose cells are drawn with probabilities proportional to their light on a plane.
+// An environment whose cells are drawn with probabilities proportional to their light on a plane, or, without a normal, to
+// their light on surfaces that face them.
 class FacingEnvironment final : public Light {
 public:
-    FacingEnvironment(const EnvironmentMap& map, const Vec3& normal)
+    FacingEnvironment(const EnvironmentMap& map, const std::optional<Vec3>& normal)
         : m_map(map),
           m_width(map.width * map.cells_x),
           m_height(map.height * map.cells_y),
-          m_normal(glm::transpose(map.to_world) * normal),
+          m_faces_all(!normal),
+          m_normal(glm::transpose(map.to_world) * normal.value_or(Vec3(0.0))),
           m_columns(m_width, pi, -pi),
           m_rows(m_height, -0.5 * pi, 0.5 * pi),
           m_cumulated(m_height * (m_width + 1)),
@@ -185,7 +188,7 @@ private:
     {
         Vec3 sum(0.0);
         for (std::size_t x = 0; x < m_width; ++x) {
-            const Vec3 light = Vec3(m_map.of_cell(x, y)) * projected_solid_angle(x, y);
+            const Vec3 light = Vec3(m_map.of_cell(x, y)) * (m_faces_all ? solid_angle(y) : projected_solid_angle(x, y));
             sum += light;
             double* const cumulated = &m_cumulated[y * (m_width + 1) + x];
             cumulated[1] = cumulated[0] + (light.x + light.y + light.z) / 3.0;
@@ -231,6 +234,7 @@ private:
 
     const EnvironmentMap& m_map;
     std::size_t m_width, m_height;  // cells
+    bool m_faces_all;
     Vec3 m_normal;                  // in the image's space
     Lines m_columns, m_rows;
     std::vector<double> m_cumulated;  // along each row, one more than cells
@@ -272,6 +276,11 @@ EnvironmentLight::EnvironmentLight(const View2D<const Vec3f>& radiance, const Ma
 std::unique_ptr<const Light> EnvironmentLight::facing(const Vec3& normal) const
 {
     return std::make_unique<FacingEnvironment>(m_map, normal);
+}
+
+std::unique_ptr<const Light> EnvironmentLight::facing_all() const
+{
+    return std::make_unique<FacingEnvironment>(m_map, std::nullopt);
 }
 
 void EnvironmentLight::sample(std::span<const Vec3> points, const Vec3& normal, std::span<const Vec2> square,

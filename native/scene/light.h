@@ -59,6 +59,9 @@ public:
     // The same light prepared for surfaces with that normal; null if preparation does not pay.
     virtual std::unique_ptr<const Light> facing(const Vec3& /*normal*/) const { return nullptr; }
 
+    // The same light prepared to be sampled at points of any normal; null if preparation does not pay.
+    virtual std::unique_ptr<const Light> facing_all() const { return nullptr; }
+
     // The one point or direction that stands for the light inside a medium; none if its rays differ too much. Delta
     // lights and narrow suns have one.
     virtual std::optional<LightSource> source() const { return std::nullopt; }

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "scene/checks.h"
+#include "scene/shadow_ray.h"
 #include "scene/triangle_set.h"
 
 namespace beamspread {
@@ -53,21 +54,20 @@ bool is_regular(const Placement& placement)
 // An empty set with memory for these meshes.
 std::unique_ptr<TriangleSet> set_for(std::span<const OccluderMesh> meshes)
 {
-    std::size_t opaque = 0;
-    std::size_t see_through = 0;
-    std::size_t vertices = 0;
-    bool has_uvs = false;
+    SetSize size;
     for (const OccluderMesh& mesh : meshes) {
         const std::size_t copies = mesh.placements.size();
         std::size_t mesh_opaque = 0;
         for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
             mesh_opaque += mesh.transmittance(i) ? 0 : 1;
-        opaque += copies * mesh_opaque;
-        see_through += copies * (mesh.triangles.size() - mesh_opaque);
-        vertices += copies * mesh.vertices.size();
-        has_uvs |= !mesh.uvs.empty() && mesh_opaque < mesh.triangles.size();
+        size.opaque += copies * mesh_opaque;
+        size.see_through += copies * (mesh.triangles.size() - mesh_opaque);
+        size.vertices += copies * mesh.vertices.size();
+        size.has_uvs |= !mesh.uvs.empty() && mesh_opaque < mesh.triangles.size();
+        size.reflects |= !mesh.reflectors.empty();
+        size.has_reflector_uvs |= !mesh.reflectors.empty() && !mesh.reflector_uvs.empty();
     }
-    return std::make_unique<TriangleSet>(opaque, see_through, vertices, has_uvs);
+    return std::make_unique<TriangleSet>(size);
 }
 
 embree::Scene new_scene(RTCDevice device)
@@ -96,7 +96,7 @@ struct Extent {
     }
 };
 
-void attach_instance(RTCDevice device, RTCScene top, RTCScene part, const Mat3& linear, const Vec3& translation)
+unsigned attach_instance(RTCDevice device, RTCScene top, RTCScene part, const Mat3& linear, const Vec3& translation)
 {
     const embree::Geometry owner(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE));
     RTCGeometry geometry = owner.get();
@@ -105,13 +105,37 @@ void attach_instance(RTCDevice device, RTCScene top, RTCScene part, const Mat3& 
     const std::array<Vec3f, 4> columns = {Vec3f(linear[0]), Vec3f(linear[1]), Vec3f(linear[2]), Vec3f(translation)};
     rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns.data());
     rtcCommitGeometry(geometry);
-    rtcAttachGeometry(top, geometry);
+    return rtcAttachGeometry(top, geometry);
+}
+
+void set_ray(RTCRay16& packet, std::size_t i, const ShadowRay& ray, const Vec3& origin)
+{
+    const Vec3f from(ray.origin - origin);
+    const Vec3f along(ray.direction);
+    packet.org_x[i] = from.x;
+    packet.org_y[i] = from.y;
+    packet.org_z[i] = from.z;
+    packet.dir_x[i] = along.x;
+    packet.dir_y[i] = along.y;
+    packet.dir_z[i] = along.z;
+    packet.tfar[i] = static_cast<float>(ray.distance);
+    packet.mask[i] = ~0u;
+    packet.id[i] = static_cast<unsigned>(i);
 }
 
 }  // namespace
 
 struct Occluders::Hierarchy {
-    std::vector<std::shared_ptr<const Transmittance>> transmittances;
+    // An instance of a set, by its placement relative to the origin.
+    struct Instance {
+        const TriangleSet* set;
+        Placement placement;
+        double rounding;  // metres
+    };
+
+    std::vector<std::shared_ptr<const ColorTexture>> transmittances;
+    std::vector<std::shared_ptr<const Reflector>> reflectors;
+    std::vector<Instance> instances;  // [Embree's number of the geometry]
     std::vector<std::unique_ptr<TriangleSet>> sets;  // the first holds triangles outside of instances
     embree::Device device;
     std::vector<embree::Scene> parts;  // one for each instanced mesh
@@ -156,13 +180,17 @@ void Occluders::build(std::span<const OccluderMesh> meshes, std::size_t max_copi
         if (copied[i].placements.size() < meshes[i].placements.size())
             add_instances(meshes[i]);
         for (std::size_t j = 0; j < meshes[i].triangles.size(); ++j) {
-            const Transmittance* const transmittance = meshes[i].transmittance(j);
-            m_is_opaque &= !transmittance || transmittance->is_clear();
+            const ColorTexture* const transmittance = meshes[i].transmittance(j);
+            m_is_opaque &= !transmittance || transmittance->is_white();
             m_is_colored |= transmittance && transmittance->is_colored();
         }
         m_hierarchy->transmittances.insert(m_hierarchy->transmittances.end(), meshes[i].transmittances.begin(),
                                            meshes[i].transmittances.end());
+        m_hierarchy->reflectors.insert(m_hierarchy->reflectors.end(), meshes[i].reflectors.begin(),
+                                       meshes[i].reflectors.end());
     }
+    m_is_reflecting =
+        std::ranges::any_of(m_hierarchy->reflectors, [](const auto& reflector) { return reflector != nullptr; });
     own.attach(device, m_hierarchy->top.get());
     rtcCommitScene(m_hierarchy->top.get());
     embree::check(device);
@@ -185,11 +213,13 @@ void Occluders::add_instances(const OccluderMesh& mesh)
             continue;
         const Mat3& linear = placement.linear;
         const Vec3 middle = placement(extent.middle);
-        attach_instance(device, m_hierarchy->top.get(), part, linear, middle - m_origin);
+        const unsigned id = attach_instance(device, m_hierarchy->top.get(), part, linear, middle - m_origin);
         const Mat3 half_axes(linear[0] * extent.half.x, linear[1] * extent.half.y, linear[2] * extent.half.z);
         const Vec3 reach =
             glm::abs(middle - m_origin) + glm::abs(half_axes[0]) + glm::abs(half_axes[1]) + glm::abs(half_axes[2]);
         m_hulls.push_back({middle, half_axes, std::max({reach.x, reach.y, reach.z}) * condition(linear)});
+        m_hierarchy->instances.resize(id + 1);
+        m_hierarchy->instances[id] = {&set, {linear, middle - m_origin}, rounding_of(m_hulls.back())};
     }
 }
 
@@ -223,6 +253,58 @@ void Occluders::transmit(std::span<const ShadowRay> rays, Vec3f* transmittance, 
         transmittance[i] = bits >> i & 1u ? Vec3f(0.0f) : passages[i].transmittance();
 }
 
+SurfaceHit Occluders::hit_on(unsigned instance, unsigned geometry, unsigned primitive, const Vec2f& barycentric,
+                             const Vec3& direction) const
+{
+    const bool is_own = instance == RTC_INVALID_GEOMETRY_ID;
+    const TriangleSet& set = is_own ? *m_hierarchy->sets.front() : *m_hierarchy->instances[instance].set;
+    const std::size_t index = set.index(geometry, primitive);
+    const auto local = set.corners(index);
+    std::array<Vec3, 3> corners;
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+        const Vec3 corner(local[i]);
+        corners[i] = m_origin + (is_own ? corner : m_hierarchy->instances[instance].placement(corner));
+    }
+    const auto& [a, b, c] = corners;
+    SurfaceHit hit;
+    hit.normal = glm::cross(b - a, c - a);
+    const double area = glm::length(hit.normal);
+    if (!(area > 0.0))
+        return hit;
+    hit.is_hit = true;
+    hit.position = a + (b - a) * static_cast<double>(barycentric.x) + (c - a) * static_cast<double>(barycentric.y);
+    hit.normal *= (glm::dot(hit.normal, direction) > 0.0 ? -1.0 : 1.0) / area;
+    hit.rounding = is_own ? rounding_of(corners, m_origin) : m_hierarchy->instances[instance].rounding;
+    hit.transmittance = set.transmittance_at(index, barycentric);
+    hit.reflector = set.reflector(index);
+    hit.uv = set.reflector_uv(index, barycentric);
+    return hit;
+}
+
+void Occluders::find_surfaces(std::span<const ShadowRay> rays, SurfaceHit* hits, bool is_coherent) const
+{
+    std::fill_n(hits, rays.size(), SurfaceHit{});
+    if (!m_hierarchy || rays.empty())
+        return;
+    alignas(64) std::array<int, packet_size> valid{};
+    RTCRayHit16 packet{};
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        set_ray(packet.ray, i, rays[i], m_origin);
+        packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+        packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+        valid[i] = -1;
+    }
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    context.flags =
+        m_hulls.empty() && is_coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+    rtcIntersect16(valid.data(), m_hierarchy->top.get(), &context, &packet);
+    for (std::size_t i = 0; i < rays.size(); ++i)
+        if (packet.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID)
+            hits[i] = hit_on(packet.hit.instID[0][i], packet.hit.geomID[i], packet.hit.primID[i],
+                             {packet.hit.u[i], packet.hit.v[i]}, rays[i].direction);
+}
+
 std::uint32_t Occluders::trace(std::span<const ShadowRay> rays, Passage* passages, bool is_coherent) const
 {
     if (!m_hierarchy || rays.empty())
@@ -232,18 +314,8 @@ std::uint32_t Occluders::trace(std::span<const ShadowRay> rays, Passage* passage
     for (std::size_t i = 0; i < rays.size(); ++i) {
         if (!(rays[i].distance > 0.0))
             continue;
-        const Vec3f from(rays[i].origin - m_origin);
-        const Vec3f along(rays[i].direction);
+        set_ray(packet, i, rays[i], m_origin);
         valid[i] = -1;
-        packet.org_x[i] = from.x;
-        packet.org_y[i] = from.y;
-        packet.org_z[i] = from.z;
-        packet.dir_x[i] = along.x;
-        packet.dir_y[i] = along.y;
-        packet.dir_z[i] = along.z;
-        packet.tfar[i] = static_cast<float>(rays[i].distance);
-        packet.mask[i] = ~0u;
-        packet.id[i] = static_cast<unsigned>(i);
     }
     PassageContext context;
     context.passages = passages;

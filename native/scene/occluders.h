@@ -14,6 +14,7 @@
 namespace beamspread {
 
 class Passage;
+class Reflector;
 
 // A ray toward a light: triangles at (0, distance) from `origin` along the unit vector `direction` shade `origin`. The
 // distance may be infinite; a ray whose distance is not > 0 meets nothing.
@@ -21,6 +22,17 @@ struct ShadowRay {
     Vec3 origin;
     Vec3 direction;
     double distance;
+};
+
+// The nearest point of a surface on a ray.
+struct SurfaceHit {
+    bool is_hit = false;
+    Vec3 position;  // world, on the triangle
+    Vec3 normal;    // unit vector on the side that the ray comes from
+    double rounding = 0.0;  // metres; rays that start nearer may meet the triangle itself
+    Vec3f transmittance;
+    const Reflector* reflector = nullptr;  // null: black
+    Vec2f uv;  // in the image of the reflector
 };
 
 // A box that holds an instance of a mesh, in the world.
@@ -64,6 +76,15 @@ public:
     // `is_coherent` says that they run much the same way; it only changes the speed.
     void transmit(std::span<const ShadowRay> rays, Vec3f* transmittance, bool is_coherent = true) const;
 
+    // Finds the nearest surface along at most `packet_size` rays.
+    void find_surfaces(std::span<const ShadowRay> rays, SurfaceHit* hits, bool is_coherent) const;
+
+    // Number of see-through triangles that a ray crosses; it ends at the next.
+    int max_crossings() const { return m_max_crossings; }
+
+    // True if some triangles reflect light.
+    bool is_reflecting() const { return m_is_reflecting; }
+
     // True if all triangles block all light.
     bool is_opaque() const { return m_is_opaque; }
     // True if some triangles let one channel through more than another.
@@ -88,6 +109,8 @@ private:
     std::uint32_t trace(std::span<const ShadowRay> rays, Passage* passages, bool is_coherent = true) const;
     void build(std::span<const OccluderMesh> meshes, std::size_t max_copied);
     void add_instances(const OccluderMesh& mesh);
+    SurfaceHit hit_on(unsigned instance, unsigned geometry, unsigned primitive, const Vec2f& barycentric,
+                      const Vec3& direction) const;
 
     std::unique_ptr<Hierarchy> m_hierarchy;  // null without triangles
     std::vector<Hull> m_hulls;
@@ -95,6 +118,7 @@ private:
     int m_max_crossings;
     bool m_is_opaque = true;
     bool m_is_colored = false;
+    bool m_is_reflecting = false;
     Vec3 m_origin;
 };
 

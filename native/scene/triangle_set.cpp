@@ -38,6 +38,12 @@ constexpr float edge_width = 16.0f * std::numeric_limits<float>::epsilon();
 // Elements that must be readable after the last one, because Embree loads 16 bytes at a time.
 constexpr std::size_t padding = 1;
 
+Vec2f mix(const std::array<Vec2f, 3>& corners, const Vec2f& barycentric)
+{
+    const auto& [a, b, c] = corners;
+    return a + (b - a) * barycentric.x + (c - a) * barycentric.y;
+}
+
 }  // namespace
 
 bool Passage::cross(const Vec3f& transmittance, float distance, bool at_edge)
@@ -73,14 +79,30 @@ Vec3f Passage::transmittance() const
     return {left(m_depth[0]), left(m_depth[1]), left(m_depth[2])};
 }
 
-TriangleSet::TriangleSet(std::size_t opaque, std::size_t see_through, std::size_t vertices, bool has_uvs)
+TriangleSet::TriangleSet(const SetSize& size) : m_reserved(size)
 {
-    m_vertices.reserve(vertices + padding);
-    m_opaque.reserve(opaque + padding);
-    m_see_through.reserve(see_through + padding);
-    m_transmittances.reserve(see_through);
-    if (has_uvs)
-        m_uvs.reserve(see_through);
+    m_vertices.reserve(size.vertices + padding);
+    m_opaque.reserve(size.opaque + padding);
+    m_see_through.reserve(size.see_through + padding);
+    m_transmittances.reserve(size.see_through);
+    if (size.has_uvs)
+        m_uvs.reserve(size.see_through);
+    m_opaque_reflection.reserve(size.opaque, size);
+    m_see_through_reflection.reserve(size.see_through, size);
+}
+
+void TriangleSet::Reflection::reserve(std::size_t count, const SetSize& size)
+{
+    reflectors.reserve(size.reflects ? count : 0);
+    uvs.reserve(size.has_reflector_uvs ? count : 0);
+}
+
+void TriangleSet::Reflection::add(const OccluderMesh& mesh, std::size_t triangle, const SetSize& size)
+{
+    if (size.reflects)
+        reflectors.push_back(mesh.reflector(triangle));
+    if (size.has_reflector_uvs)
+        uvs.push_back(mesh.reflector_uvs.empty() ? std::array<Vec2f, 3>{} : mesh.reflector_uvs[triangle]);
 }
 
 void TriangleSet::add(const OccluderMesh& mesh, const Placement& placement, const Vec3& origin)
@@ -96,14 +118,16 @@ void TriangleSet::add(const OccluderMesh& mesh, const Placement& placement, cons
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
         const auto [a, b, c] = mesh.triangles[i];
         const Triangle triangle = {first + a, first + b, first + c};
-        const Transmittance* const transmittance = mesh.transmittance(i);
+        const ColorTexture* const transmittance = mesh.transmittance(i);
         if (!transmittance) {
             m_opaque.push_back(triangle);
-        } else if (!transmittance->is_clear()) {
+            m_opaque_reflection.add(mesh, i, m_reserved);
+        } else if (!transmittance->is_white()) {
             m_see_through.push_back(triangle);
             m_transmittances.push_back(transmittance);
-            if (m_uvs.capacity() > 0)
+            if (m_reserved.has_uvs)
                 m_uvs.push_back(mesh.uvs.empty() ? std::array<Vec2f, 3>{} : mesh.uvs[i]);
+            m_see_through_reflection.add(mesh, i, m_reserved);
         }
     }
 }
@@ -111,14 +135,14 @@ void TriangleSet::add(const OccluderMesh& mesh, const Placement& placement, cons
 void TriangleSet::attach(RTCDevice device, RTCScene scene)
 {
     m_vertices.reserve(m_vertices.size() + padding);
-    attach(device, scene, m_opaque, true);
+    m_opaque_id = attach(device, scene, m_opaque, true);
     attach(device, scene, m_see_through, false);
 }
 
-void TriangleSet::attach(RTCDevice device, RTCScene scene, std::vector<Triangle>& triangles, bool is_opaque)
+unsigned TriangleSet::attach(RTCDevice device, RTCScene scene, std::vector<Triangle>& triangles, bool is_opaque)
 {
     if (triangles.empty())
-        return;
+        return no_geometry;
     triangles.reserve(triangles.size() + padding);
     static_assert(sizeof(Vec3f) == 3 * sizeof(float) && sizeof(Triangle) == 3 * sizeof(std::uint32_t));
     const embree::Geometry owner(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
@@ -132,7 +156,7 @@ void TriangleSet::attach(RTCDevice device, RTCScene scene, std::vector<Triangle>
         rtcSetGeometryOccludedFilterFunction(geometry, &TriangleSet::filter);
     }
     rtcCommitGeometry(geometry);
-    rtcAttachGeometry(scene, geometry);
+    return rtcAttachGeometry(scene, geometry);
 }
 
 std::array<Vec3f, 3> TriangleSet::corners(std::size_t index) const
@@ -143,12 +167,31 @@ std::array<Vec3f, 3> TriangleSet::corners(std::size_t index) const
 
 Vec3f TriangleSet::transmittance(std::uint32_t see_through, const Vec2f& barycentric) const
 {
-    Vec2f uv(0.0f);
-    if (!m_uvs.empty()) {
-        const auto& [a, b, c] = m_uvs[see_through];
-        uv = a + (b - a) * barycentric.x + (c - a) * barycentric.y;
-    }
-    return m_transmittances[see_through]->at(uv);
+    return m_transmittances[see_through]->at(m_uvs.empty() ? Vec2f(0.0f) : mix(m_uvs[see_through], barycentric));
+}
+
+Vec3f TriangleSet::transmittance_at(std::size_t index, const Vec2f& barycentric) const
+{
+    if (index < m_opaque.size())
+        return Vec3f(0.0f);
+    return transmittance(static_cast<std::uint32_t>(index - m_opaque.size()), barycentric);
+}
+
+const Reflector* TriangleSet::reflector(std::size_t index) const
+{
+    if (!m_reserved.reflects)
+        return nullptr;
+    return index < m_opaque.size() ? m_opaque_reflection.reflectors[index]
+                                   : m_see_through_reflection.reflectors[index - m_opaque.size()];
+}
+
+Vec2f TriangleSet::reflector_uv(std::size_t index, const Vec2f& barycentric) const
+{
+    if (!m_reserved.has_reflector_uvs)
+        return Vec2f(0.0f);
+    return mix(index < m_opaque.size() ? m_opaque_reflection.uvs[index]
+                                       : m_see_through_reflection.uvs[index - m_opaque.size()],
+               barycentric);
 }
 
 // A hit that stays valid blocks its ray.

@@ -63,10 +63,20 @@ struct PassageContext : RTCIntersectContext {
     int max_crossings;
 };
 
+// Numbers of triangles and vertices that a set holds, and of the parts that only some sets need.
+struct SetSize {
+    std::size_t opaque = 0;
+    std::size_t see_through = 0;
+    std::size_t vertices = 0;
+    bool has_uvs = false;
+    bool reflects = false;
+    bool has_reflector_uvs = false;
+};
+
 class TriangleSet {
 public:
-    // Reserves memory for so many triangles and vertices.
-    TriangleSet(std::size_t opaque, std::size_t see_through, std::size_t vertices, bool has_uvs);
+    // Reserves memory.
+    explicit TriangleSet(const SetSize& size);
     TriangleSet(const TriangleSet&) = delete;
     TriangleSet& operator=(const TriangleSet&) = delete;
 
@@ -81,16 +91,41 @@ public:
     std::size_t opaque_count() const { return m_opaque.size(); }
     std::array<Vec3f, 3> corners(std::size_t index) const;
 
+    // Index of a triangle by Embree's numbers.
+    std::size_t index(unsigned geometry, unsigned primitive) const
+    {
+        return (geometry == m_opaque_id ? 0 : m_opaque.size()) + primitive;
+    }
+
+    // The part of light that a triangle lets through at a point.
+    Vec3f transmittance_at(std::size_t index, const Vec2f& barycentric) const;
+    // The reflection of a triangle, null if it is black, and the UV of a point in its image.
+    const Reflector* reflector(std::size_t index) const;
+    Vec2f reflector_uv(std::size_t index, const Vec2f& barycentric) const;
+
 private:
-    void attach(RTCDevice device, RTCScene scene, std::vector<Triangle>& triangles, bool is_opaque);
+    struct Reflection {
+        std::vector<const Reflector*> reflectors;  // empty if nothing reflects
+        std::vector<std::array<Vec2f, 3>> uvs;  // empty without images
+
+        void reserve(std::size_t count, const SetSize& size);
+        void add(const OccluderMesh& mesh, std::size_t triangle, const SetSize& size);
+    };
+
+    static constexpr unsigned no_geometry = ~0u;
+
+    unsigned attach(RTCDevice device, RTCScene scene, std::vector<Triangle>& triangles, bool is_opaque);
     static void filter(const RTCFilterFunctionNArguments* hits);
     Vec3f transmittance(std::uint32_t see_through, const Vec2f& barycentric) const;
 
     std::vector<Vec3f> m_vertices;
     std::vector<Triangle> m_opaque;
     std::vector<Triangle> m_see_through;
-    std::vector<const Transmittance*> m_transmittances;  // of see-through triangles
+    std::vector<const ColorTexture*> m_transmittances;  // of see-through triangles
     std::vector<std::array<Vec2f, 3>> m_uvs;  // of see-through triangles; empty without images
+    Reflection m_opaque_reflection, m_see_through_reflection;
+    SetSize m_reserved;
+    unsigned m_opaque_id = no_geometry;  // number in the scene
 };
 
 }  // namespace beamspread

@@ -41,13 +41,13 @@ def spheres(count, triangles, transmittances=()):
 
 
 def grey(level):
-    return native.Transmittance((level,) * 3)
+    return native.ColorTexture((level,) * 3)
 
 
 def leaf():
     """Four tenths of an image of 1024 x 1024 are opaque."""
     texels = (np.random.default_rng(2).random((1024, 1024, 1)) > 0.4).astype(np.float32)
-    return native.Transmittance.from_image(texels)
+    return native.ColorTexture.from_image(texels)
 
 
 COPIES, INSTANCES = 1 << 62, 0

@@ -204,7 +204,7 @@ def test_colored_glass_colors_light_of_a_size():
     """A pane above the whole plane: each channel has its part of the light without the pane, but for noise of rays."""
     pane = np.array([(-3, -3, 0.2), (3, -3, 0.2), (3, 3, 0.2), (-3, 3, 0.2)], float)
     color, faces = (0.8, 0.4, 0.1), np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
-    glass = Mesh(pane, faces, (native.Transmittance(color),), np.zeros(2, np.uint32))
+    glass = Mesh(pane, faces, (native.ColorTexture(color),), np.zeros(2, np.uint32))
     for light in (panel(0.3, (0.4, 0.0, 0.6)), sky()):
         dimmed, whole = (
             bake(square(24), Illumination([light], mesh), MATERIAL, 0.0, replace(SETTINGS, samples=4))

@@ -38,9 +38,9 @@ def see_through(kind):
         return [], None
     rng = np.random.default_rng(1)
     if kind == "color":
-        return [native.Transmittance((0.9, 0.5, 0.2)), native.Transmittance((0, 0, 0))], [0, 1]
+        return [native.ColorTexture((0.9, 0.5, 0.2)), native.ColorTexture((0, 0, 0))], [0, 1]
     texels = np.round(rng.random((8, 8, 1))).astype(np.float32)
-    return [native.Transmittance.from_image(texels, is_smooth=False)], [0]
+    return [native.ColorTexture.from_image(texels, is_smooth=False)], [0]
 
 
 @settings(max_examples=40, deadline=None)

@@ -31,7 +31,7 @@ def card(transmittance, height=1.0, scale=1.0, uvs=None):
 
 def image(texels, **options):
     texels = np.ascontiguousarray(texels, np.float32)
-    return native.Transmittance.from_image(texels if texels.ndim == 3 else texels[..., None], **options)
+    return native.ColorTexture.from_image(texels if texels.ndim == 3 else texels[..., None], **options)
 
 
 def light_past(meshes, light=DOWN, samples=4, max_crossings=None, on=None, **options):
@@ -41,18 +41,18 @@ def light_past(meshes, light=DOWN, samples=4, max_crossings=None, on=None, **opt
 
 def test_grey_cards_multiply_and_stay_scalar():
     colors = (0.3, 0.7, 0.45)
-    cards = [card(native.Transmittance((t, t, t)), 1 + i) for i, t in enumerate(colors)]
+    cards = [card(native.ColorTexture((t, t, t)), 1 + i) for i, t in enumerate(colors)]
     lit = light_past(cards)
     assert lit.shape == (16, 16)
     # Rays pass the diagonal, which both triangles of a card report: its transmittance counts once there, too. Single
     # precision of the sum of 16 rays.
     np.testing.assert_allclose(lit, np.prod(np.float32(colors)), rtol=3e-7)
-    assert not light_past([*cards, card(native.Transmittance((0, 0, 0)), 5)]).any()
+    assert not light_past([*cards, card(native.ColorTexture((0, 0, 0)), 5)]).any()
 
 
 def test_color_gives_three_channels():
     red, blue = (0.8, 0.25, 0.0), (0.5, 0.25, 1.0)
-    lit = light_past([card(native.Transmittance(red), 1), card(native.Transmittance(blue), 2)])
+    lit = light_past([card(native.ColorTexture(red), 1), card(native.ColorTexture(blue), 2)])
     assert lit.shape == (16, 16, 3)
     np.testing.assert_allclose(lit, np.broadcast_to(np.float32(red) * np.float32(blue), lit.shape), rtol=3e-7)
 
@@ -61,7 +61,7 @@ def test_the_direction_is_weighed_by_irradiance():
     """A lamp past a card that dims one half: the mean direction of the texels below its border leans to the other."""
     lamp = native.PointLight((0.0, 0.0, 2.0))
     half = SQUARE * (0.5, 1, 0) - (0.5, 0, -1e-3)
-    one = native.OccluderMesh(half, FACES, None, [native.Transmittance((0.25,) * 3)], np.zeros((2, 1), np.uint32))
+    one = native.OccluderMesh(half, FACES, None, [native.ColorTexture((0.25,) * 3)], np.zeros((2, 1), np.uint32))
     wide = grid(1, 1)
     plain = gather_beams(wide, lamp, None, 8)
     dimmed = gather_beams(wide, lamp, native.Occluders([one]), 8)
@@ -83,7 +83,7 @@ def test_every_crossing_counts_once(seed, count, height):
     corners = rng.uniform((-1, -1, 0.05), (1, 1, 0.6), (count, 1, 3)) + rng.normal(0, 0.5, (count, 3, 3))
     corners[..., 2] = np.abs(corners[..., 2])
     left = rng.uniform(0.2, 0.95, count).astype(np.float32)
-    grey = [native.Transmittance((t,) * 3) for t in left]
+    grey = [native.ColorTexture((t,) * 3) for t in left]
     mesh = native.OccluderMesh(*soup(corners), None, grey, np.arange(count, dtype=np.uint32)[:, None])
     lamp = np.array([0.1, 0.05, height])
     got = light_past([mesh], native.PointLight(lamp), samples=1) / light_past([], native.PointLight(lamp), samples=1)
@@ -153,7 +153,7 @@ def test_the_order_of_triangles_does_not_change_a_bit():
     rng = np.random.default_rng(8)
     corners = rng.uniform(-1.5, 1.5, (60, 3, 3)) * (1, 1, 0.3) + (0, 0, 1)
     materials = rng.integers(0, 5, (60, 1)).astype(np.uint32)
-    see_through = [native.Transmittance(rng.uniform(0.5, 1, 3)) for _ in range(5)]
+    see_through = [native.ColorTexture(rng.uniform(0.5, 1, 3)) for _ in range(5)]
 
     def lit(order):
         triangles = np.ascontiguousarray(np.arange(180, dtype=np.uint32).reshape(-1, 3)[order])
@@ -165,7 +165,7 @@ def test_the_order_of_triangles_does_not_change_a_bit():
 
 
 def test_a_ray_ends_after_so_many_crossings():
-    cards = [card(native.Transmittance((0.9,) * 3), 1 + 0.1 * i) for i in range(5)]
+    cards = [card(native.ColorTexture((0.9,) * 3), 1 + 0.1 * i) for i in range(5)]
     np.testing.assert_allclose(light_past(cards, max_crossings=5), 0.9**5, rtol=1e-6)
     assert not light_past(cards, max_crossings=4).any()
 
@@ -181,7 +181,7 @@ def test_a_pickle_of_an_image_lets_the_same_light_through(extension, channels, i
 
 
 def test_a_pickle_of_a_color_lets_the_same_light_through():
-    before = native.Transmittance((0.3, 0.7, 0.1))
+    before = native.ColorTexture((0.3, 0.7, 0.1))
     lit, again = (light_past([card(item)]) for item in (before, pickle.loads(pickle.dumps(before))))
     np.testing.assert_array_equal(lit, again)
 
@@ -191,11 +191,11 @@ def test_occluders_know_whether_they_are_opaque_and_colored():
         occluders = native.Occluders([card(transmittance) for transmittance in transmittances])
         return occluders.is_opaque, occluders.is_colored
 
-    opaque, clear = native.Transmittance((0, 0, 0)), native.Transmittance((1, 1, 1))
-    assert opaque.is_opaque
+    opaque, clear = native.ColorTexture((0, 0, 0)), native.ColorTexture((1, 1, 1))
+    assert opaque.is_black
     assert facts(opaque) == facts(clear) == facts(opaque, clear) == (True, False)
     assert facts(opaque, image(np.full((2, 2), 0.5))) == (False, False)
-    assert facts(native.Transmittance((0.5, 0.5, 0.4))) == (False, True)
+    assert facts(native.ColorTexture((0.5, 0.5, 0.4))) == (False, True)
     assert facts(image(np.full((2, 2), 0.5), extension="clip", outside=(1, 0, 0))) == (False, True)
     assert (light_past([card(clear)]) == 1).all()
 
@@ -203,16 +203,16 @@ def test_occluders_know_whether_they_are_opaque_and_colored():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: native.Transmittance((0.5, 1.5, 0)), r"color.*1\.5.*0 to 1"),
-        (lambda: native.Transmittance((0.5, math.nan, 0)), "color.*nan"),
+        (lambda: native.ColorTexture((0.5, 1.5, 0)), r"color.*1\.5.*0 to 1"),
+        (lambda: native.ColorTexture((0.5, math.nan, 0)), "color.*nan"),
         (lambda: image(np.full((2, 2), -0.1)), r"texels.*-0\.1.*0 to 1"),
         (lambda: image(np.zeros((0, 2))), "texels.*empty"),
         (lambda: image(np.zeros((2, 2, 4))), r"texels.*\(2, 2, 4\)"),
-        (lambda: native.Transmittance.from_image(np.zeros((2, 2, 1))), "texels.*float64.*float32"),
+        (lambda: native.ColorTexture.from_image(np.zeros((2, 2, 1))), "texels.*float64.*float32"),
         (lambda: image(np.zeros((2, 2)), extension="wrap"), "extension.*'wrap'.*'repeat'"),
         (lambda: image(np.zeros((2, 2)), outside=(2, 0, 0)), r"outside.*2.*0 to 1"),
-        (lambda: light_past([card(native.Transmittance((1, 0, 0)), uvs=UVS * math.nan)]), "uvs.*nan"),
-        (lambda: light_past([card(native.Transmittance((1, 0, 0)), uvs=UVS * 1e7)]), "uvs.*-1e6 to 1e6"),
+        (lambda: light_past([card(native.ColorTexture((1, 0, 0)), uvs=UVS * math.nan)]), "uvs.*nan"),
+        (lambda: light_past([card(native.ColorTexture((1, 0, 0)), uvs=UVS * 1e7)]), "uvs.*-1e6 to 1e6"),
         (
             lambda: light_past([native.OccluderMesh(SQUARE, FACES, None, [], np.zeros((2, 1), np.uint32))]),
             "materials.*0.*below the number of transmittances, 0",

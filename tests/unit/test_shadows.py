@@ -26,7 +26,7 @@ def placements(rng, count, stretch, size=1.0):
 
 def see_through(rng):
     """Opaque, grey and colored."""
-    return [native.Transmittance(color) for color in ((0, 0, 0), (rng.random(),) * 3, rng.random(3), rng.random(3))]
+    return [native.ColorTexture(color) for color in ((0, 0, 0), (rng.random(),) * 3, rng.random(3), rng.random(3))]
 
 
 def random_mesh(rng, kind, count, size, slant, axes, centre):

@@ -80,7 +80,7 @@ def local_mesh(obj, slots: Sequence[MaterialTransmittance]) -> Mesh | None:
         mesh.loop_triangles.foreach_get("vertices", triangles)
         vertices = _vertices(mesh).astype(float)
         triangles = triangles.astype(np.uint32).reshape(-1, 3)
-        if all(slot.transmittance.is_opaque for slot in slots):
+        if all(slot.transmittance.is_black for slot in slots):
             return Mesh(vertices, triangles)
         numbers = np.empty(count, np.int32)
         mesh.loop_triangles.foreach_get("material_index", numbers)

@@ -28,7 +28,7 @@ class UVTransform:
     ----------
     uv_map : name of the UV map; empty for the one that renders.
     matrix : rows of the 2 x 3 matrix from the map's UVs to those of the image.
-    extension : as native `Transmittance.from_image` takes it.
+    extension : as native `ColorTexture.from_image` takes it.
     is_smooth : True if texels are interpolated.
     """
 

@@ -140,7 +140,7 @@ class TexelEvaluator(Evaluator):
 
 @dataclass(frozen=True, eq=False)
 class MaterialTransmittance:
-    """A native `Transmittance`, and messages about the material.
+    """A native `ColorTexture`, and messages about the material.
 
     Attributes
     ----------
@@ -157,7 +157,7 @@ class MaterialTransmittance:
 @functools.lru_cache(256)
 def constant(*color: float) -> MaterialTransmittance:
     """Transmittance of one RGB color, the same object for the same color."""
-    return MaterialTransmittance(native.Transmittance(color), color)
+    return MaterialTransmittance(native.ColorTexture(color), color)
 
 
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
@@ -203,7 +203,7 @@ def _evaluate(surface: InputSocket, check: Callable[[], None] | None) -> Materia
         texels = texels[..., :1]
     texels = np.ascontiguousarray(texels, np.float32)
     outside = _color(TexelEvaluator(pixels, is_outside=True, links=links).value(surface))
-    image = native.Transmittance.from_image(texels, transform.extension, transform.is_smooth, outside)
+    image = native.ColorTexture.from_image(texels, transform.extension, transform.is_smooth, outside)
     return MaterialTransmittance(image, uv_transform=transform)
 
 

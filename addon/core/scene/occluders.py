@@ -21,7 +21,7 @@ class Mesh:
     ----------
     vertices : float64 (N, 3).
     triangles : uint32 (M, 3).
-    transmittances : a native `Transmittance` for each material.
+    transmittances : a native `ColorTexture` for each material.
     materials : uint32 (M,), the material of each triangle; None: all are opaque.
     uvs : float32 (M, 3, 2), UVs of each triangle's corners in its material's image; None: no material has one.
     """

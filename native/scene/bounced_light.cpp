@@ -1,0 +1,267 @@
+#include "scene/bounced_light.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "base/constants.h"
+#include "base/error.h"
+#include "base/sobol.h"
+#include "base/threads.h"
+#include "scene/checks.h"
+#include "scene/node_noise.h"
+#include "scene/path_wave.h"
+
+namespace beamspread {
+
+namespace {
+
+// Paths that find points from which the choice among many lights is learned. More make it more even and take time.
+constexpr std::size_t pilot_paths = 256;
+
+// Largest number of samples of a round: it bounds the work between two estimates of the noise.
+constexpr std::size_t max_round = 64;
+
+// Number of points in a block of the sequence of each node.
+constexpr std::size_t block = 1024;
+
+class Tracer {
+public:
+    Tracer(std::span<const NodeGrid> grids, std::span<const Stratum> strata, LightChoice& lights,
+           const Occluders& surfaces, const BouncedSettings& settings)
+        : m_grids(grids), m_strata(strata), m_lights(lights), m_surfaces(surfaces), m_settings(settings)
+    {
+        for (std::size_t half = 0; half < 2; ++half) {
+            for (const NodeGrid& grid : grids)
+                m_sums[half].emplace_back(grid.nodes() * strata.size(), Vec3f(0.0f));
+            for (std::size_t k = 0; k < strata.size(); ++k) {
+                std::uint64_t key = settings.seed * std::uint64_t{2} + half + (std::uint64_t{k} << 33);
+                m_sobol[half].emplace_back(block, static_cast<std::uint32_t>(split_mix(key) >> 32));
+            }
+        }
+        for (std::size_t n = 0; n < grids.size(); ++n)
+            for (std::size_t row = 0; row < grids[n].rows; ++row)
+                m_rows.push_back({n, row});
+    }
+
+    std::size_t samples() const { return m_samples; }
+    std::size_t row_count() const { return m_rows.size(); }
+
+    void learn_lights()
+    {
+        PathWave wave(m_surfaces, m_lights, 1);
+        Random random(m_settings.seed, pilot_stream, 0);
+        for (std::size_t i = 0; i < pilot_paths; ++i) {
+            const NodeGrid& grid = m_grids[i % m_grids.size()];
+            const Vec2 place(random.uniform(), random.uniform());
+            const Vec2 at(random.uniform(), random.uniform());
+            wave.start(grid.corner + grid.x_axis * (place.x * grid.size.x) + grid.y_axis * (place.y * grid.size.y),
+                       to_world(grid, cosine_hemisphere(at)), 0, random);
+        }
+        std::vector<ShadingPoint> points;
+        wave.find_first(points);
+        m_lights.learn(points, random);
+    }
+
+    // Traces samples of one of the two estimates in all strata of all nodes.
+    void trace(std::size_t half, std::size_t count, Progress& progress, double work)
+    {
+        parallel_for(m_rows.size(), [&](std::size_t i) {
+            trace_row(half, m_rows[i], count);
+            progress.advance(work / static_cast<double>(m_rows.size()));
+        });
+    }
+
+    void count(std::size_t samples) { m_samples += samples; }
+
+    // Mean radiance of a stratum at a node by one estimate.
+    const std::vector<Vec3f>& sums(std::size_t half, std::size_t grid) const { return m_sums[half][grid]; }
+
+private:
+    struct Row {
+        std::size_t grid;
+        std::size_t row;
+    };
+
+    // Streams of random numbers: those of paths are the numbers of their samples.
+    static constexpr std::uint64_t pilot_stream = ~std::uint64_t{0};
+
+    static Vec3 to_world(const NodeGrid& grid, const Vec3& local)
+    {
+        return grid.x_axis * local.x + grid.y_axis * local.y + grid.normal * local.z;
+    }
+
+    void trace_row(std::size_t half, const Row& at, std::size_t count)
+    {
+        const NodeGrid& grid = m_grids[at.grid];
+        PathWave wave(m_surfaces, m_lights, m_settings.max_bounces);
+        std::vector<Vec3f> radiance(m_strata.size() * grid.columns, Vec3f(0.0f));
+        std::vector<Vec2> front(count), back(count);
+        const Vec2 pitch = grid.size / Vec2(grid.columns, grid.rows);
+        // All samples of a node and stratum follow one low-discrepancy sequence; a wave holds one sample of each.
+        std::vector<Vec2> places(count * radiance.size()), positions(places.size());
+        for (std::size_t k = 0; k < m_strata.size(); ++k)
+            for (std::size_t x = 0; x < grid.columns; ++x) {
+                m_sobol[half][k].points(x, at.row, m_samples % block, count, front.data(), back.data());
+                for (std::size_t i = 0; i < count; ++i) {
+                    places[i * radiance.size() + k * grid.columns + x] = front[i];
+                    positions[i * radiance.size() + k * grid.columns + x] = back[i];
+                }
+            }
+        for (std::size_t i = 0; i < count; ++i) {
+            for (std::size_t slot = 0; slot < radiance.size(); ++slot) {
+                const Stratum& stratum = m_strata[slot / grid.columns];
+                const Vec2& place = places[i * radiance.size() + slot];
+                const Vec3 local = cosine_hemisphere(
+                    {stratum.begin + place.x * stratum.extent, stratum.turn + place.y * stratum.part});
+                const Vec2 within = (Vec2(slot % grid.columns, at.row) + positions[i * radiance.size() + slot]) * pitch;
+                const std::uint64_t stream = (m_samples + i) * 2 + half;
+                const std::uint64_t item = (std::uint64_t{at.grid} << 48) + at.row * radiance.size() + slot;
+                wave.start(grid.corner + grid.x_axis * within.x + grid.y_axis * within.y, to_world(grid, local),
+                           static_cast<std::uint32_t>(slot), Random(m_settings.seed, stream, item));
+            }
+            wave.trace(radiance);
+        }
+        std::vector<Vec3f>& sums = m_sums[half][at.grid];
+        for (std::size_t slot = 0; slot < radiance.size(); ++slot)
+            sums[slot / grid.columns * grid.nodes() + at.row * grid.columns + slot % grid.columns] += radiance[slot];
+    }
+
+    std::span<const NodeGrid> m_grids;
+    std::span<const Stratum> m_strata;
+    LightChoice& m_lights;
+    const Occluders& m_surfaces;
+    const BouncedSettings& m_settings;
+    std::array<std::vector<GridSobol>, 2> m_sobol;               // [half][stratum]
+    std::array<std::vector<std::vector<Vec3f>>, 2> m_sums;  // [half][grid][stratum][row][column]
+    std::vector<Row> m_rows;
+    std::size_t m_samples = 0;  // of each half
+};
+
+// Irradiance of a grid's nodes, the mean of the channels, W/m^2.
+std::vector<double> irradiance_of(const std::vector<Vec3f>& sums, std::span<const Stratum> strata, std::size_t nodes,
+                                  std::size_t samples)
+{
+    std::vector<double> irradiance(nodes);
+    for (std::size_t i = 0; i < sums.size(); ++i)
+        irradiance[i % nodes] += strata[i / nodes].weight() * static_cast<double>(sums[i].x + sums[i].y + sums[i].z);
+    for (double& value : irradiance)
+        value *= pi / 3.0 / static_cast<double>(samples);
+    return irradiance;
+}
+
+struct Estimate {
+    double irradiance = 0.0;
+    double error = 0.0;  // root mean square, W/m^2
+};
+
+Estimate estimate(const Tracer& tracer, std::span<const NodeGrid> grids, std::span<const Stratum> strata, double spread)
+{
+    Estimate result;
+    double nodes = 0.0;
+    for (std::size_t n = 0; n < grids.size(); ++n) {
+        const NodeGrid& grid = grids[n];
+        const std::vector<double> first = irradiance_of(tracer.sums(0, n), strata, grid.nodes(), tracer.samples());
+        const std::vector<double> second = irradiance_of(tracer.sums(1, n), strata, grid.nodes(), tracer.samples());
+        std::vector<double> error(grid.nodes());
+        for (std::size_t i = 0; i < error.size(); ++i) {
+            result.irradiance += 0.5 * (first[i] + second[i]);
+            // The variance of the mean of both is a quarter of that of their difference.
+            error[i] = 0.5 * (first[i] - second[i]);
+        }
+        const Vec2 pitch = grid.size / Vec2(grid.columns, grid.rows);
+        for (const double value : smoothed(error, grid.columns, spread / pitch.x, spread / pitch.y))
+            result.error += value * value;
+        nodes += static_cast<double>(grid.nodes());
+    }
+    result.irradiance /= nodes;
+    result.error = std::sqrt(result.error / nodes);
+    return result;
+}
+
+void check(std::span<const NodeGrid> grids, std::span<const Stratum> strata, const BouncedSettings& settings)
+{
+    for (const NodeGrid& grid : grids)
+        grid.check();
+    for (const Stratum& stratum : strata)
+        if (!(stratum.begin >= 0.0 && stratum.extent > 0.0 && stratum.begin + stratum.extent <= 1.0 + 1e-9 &&
+              stratum.part > 0.0 && stratum.part <= 1.0) ||
+            !std::isfinite(stratum.turn))
+            reject("strata", stratum.begin, "parts of the squared sine and of the turn, within 0 to 1");
+    detail::check_length("direct", settings.direct, "a finite irradiance >= 0");
+    detail::check_length("spread", settings.spread);
+    if (!(settings.tolerance > 0.0))
+        reject("tolerance", settings.tolerance, "above 0");
+    if (settings.max_bounces < 0)
+        reject("max_bounces", settings.max_bounces, "0 or more");
+    if (settings.max_samples < 2)
+        reject("max_samples", settings.max_samples, "2 or more");
+}
+
+}  // namespace
+
+void NodeGrid::check() const
+{
+    detail::check_finite("corner", corner);
+    for (const Vec3& axis : {x_axis, y_axis, normal})
+        if (!(std::abs(glm::length(axis) - 1.0) <= 1e-4))
+            reject("axes", detail::to_text(axis), "unit vectors");
+    if (!(size.x > 0.0 && size.y > 0.0) || !std::isfinite(size.x + size.y))
+        reject("size", "(" + std::to_string(size.x) + ", " + std::to_string(size.y) + ")", "finite lengths > 0");
+    if (columns < 1 || rows < 1 || columns > 4096 || rows > 4096)
+        reject("nodes", std::to_string(columns) + " x " + std::to_string(rows), "1 to 4096 along a side");
+}
+
+BouncedLight trace_bounced_light(std::span<const NodeGrid> grids, std::span<const Stratum> strata,
+                                 std::span<const SceneLight> lights, const Occluders* surfaces,
+                                 const BouncedSettings& settings, Progress& progress)
+{
+    check(grids, strata, settings);
+    BouncedLight result;
+    for (const NodeGrid& grid : grids)
+        result.radiance.emplace_back(grid.nodes() * strata.size(), Vec3f(0.0f));
+    LightChoice choice(lights);
+    if (!surfaces || !surfaces->is_reflecting() || choice.is_empty() || grids.empty() || settings.max_bounces == 0) {
+        progress.finish();
+        return result;
+    }
+    std::size_t paths_per_sample = 0;
+    for (const NodeGrid& grid : grids)
+        paths_per_sample += grid.nodes() * strata.size();
+    with_threads(settings.threads, [&] {
+        Tracer tracer(grids, strata, choice, *surfaces, settings);
+        tracer.learn_lights();
+        progress.set_total(1.0);
+        const std::size_t most = static_cast<std::size_t>(settings.max_samples) / 2;
+        double left = 1.0;  // of the progress
+        std::size_t wanted = 2;
+        while (tracer.samples() < wanted) {
+            const std::size_t done = tracer.samples();
+            const std::size_t count =
+                std::min({std::max<std::size_t>(done, 1), wanted - done, max_round, block - done % block});
+            const double work = left * static_cast<double>(count) / static_cast<double>(wanted - done);
+            for (std::size_t half = 0; half < 2; ++half)
+                tracer.trace(half, count, progress, 0.5 * work);
+            left -= work;
+            tracer.count(count);
+            const Estimate found = estimate(tracer, grids, strata, settings.spread);
+            const double all = settings.direct + found.irradiance;
+            result.irradiance = found.irradiance;
+            result.noise = all > 0.0 ? found.error / all : 0.0;
+            // The variance falls in proportion to the number of samples.
+            const double ratio = result.noise / settings.tolerance;
+            const double needed = std::ceil(static_cast<double>(tracer.samples()) * ratio * ratio);
+            wanted = static_cast<std::size_t>(std::min(needed, static_cast<double>(most)));
+        }
+        for (std::size_t n = 0; n < grids.size(); ++n)
+            for (std::size_t i = 0; i < result.radiance[n].size(); ++i)
+                result.radiance[n][i] =
+                    (tracer.sums(0, n)[i] + tracer.sums(1, n)[i]) / static_cast<float>(2 * tracer.samples());
+        result.paths = 2 * tracer.samples() * paths_per_sample;
+    });
+    progress.finish();
+    return result;
+}
+
+}  // namespace beamspread

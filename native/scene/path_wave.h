@@ -1,0 +1,68 @@
+// Light paths that are traced together, from nodes to the surfaces that they meet.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "base/random.h"
+#include "scene/light_choice.h"
+#include "scene/occluders.h"
+
+namespace beamspread {
+
+// Path tracing with next-event estimation (Kajiya 1986, doi:10.1145/15922.15902): at each surface one shadow ray adds
+// light, then the path goes on by the BSDF. Light that paths meet directly does not count. Russian roulette ends paths that
+// carry little light, without bias.
+class PathWave {
+public:
+    // `surfaces` and `lights` must outlive the object. Light is reflected by at most `max_bounces` surfaces on its way.
+    PathWave(const Occluders& surfaces, const LightChoice& lights, int max_bounces)
+        : m_surfaces(surfaces), m_lights(lights), m_max_bounces(max_bounces)
+    {
+    }
+
+    // Starts a path along a unit vector; the radiance that it finds is added to that slot.
+    void start(const Vec3& origin, const Vec3& direction, std::uint32_t slot, const Random& random);
+
+    // Traces all paths and adds radiance, W/(m^2 sr), to the slots; paths that follow each other should run alike.
+    void trace(std::vector<Vec3f>& radiance);
+
+    // Traces only the first part of all paths and writes the surfaces that they meet.
+    void find_first(std::vector<ShadingPoint>& points);
+
+private:
+    struct Path {
+        Vec3 origin;
+        Vec3 direction;
+        Vec3f throughput;
+        std::uint32_t slot;
+        std::int32_t bounces;
+        std::int32_t crossings;
+        Random random;
+    };
+
+    // Shadow rays that wait for a packet, all toward lights with the same occluders.
+    struct Waiting {
+        std::array<ShadowRay, Occluders::packet_size> rays;
+        std::array<Vec3f, Occluders::packet_size> radiance;
+        std::array<std::uint32_t, Occluders::packet_size> slots;
+        std::size_t count = 0;
+    };
+
+    // Finds the surface of each of a few paths.
+    void find(std::size_t first, std::size_t count, bool is_coherent, SurfaceHit* hits);
+    // Adds light at a surface and turns the path; returns false at its end.
+    bool reflect(Path& path, const SurfaceHit& hit, std::vector<Vec3f>& radiance);
+    void add(const LitRay& ray, std::uint32_t slot, std::vector<Vec3f>& radiance);
+    static void flush(const Occluders& occluders, Waiting& waiting, std::vector<Vec3f>& radiance);
+
+    const Occluders& m_surfaces;
+    const LightChoice& m_lights;
+    int m_max_bounces;
+    std::vector<Path> m_paths;
+    std::vector<std::pair<const Occluders*, Waiting>> m_waiting;
+};
+
+}  // namespace beamspread
