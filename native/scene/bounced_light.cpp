@@ -12,6 +12,7 @@
 #include "scene/checks.h"
 #include "scene/node_noise.h"
 #include "scene/path_wave.h"
+#include "scene/spherical_shapes.h"
 
 namespace beamspread {
 

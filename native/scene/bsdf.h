@@ -1,31 +1,40 @@
 // Reflection at one point of a surface.
 #pragma once
 
-#include "base/constants.h"
+#include <optional>
+
 #include "base/random.h"
 #include "base/vec.h"
+#include "scene/ggx.h"
 #include "scene/reflector.h"
-#include "scene/spherical_shapes.h"
 
 namespace beamspread {
 
+// Lambert's law and a GGX lobe over it. A layered lobe also reflects the light that single scattering between its facets
+// loses (Turquin 2019, "Practical multiple scattering compensation for microfacet models", eq. 16), as in Cycles from
+// Blender 4.0 on.
 class Bsdf {
 public:
-    // A black surface.
-    Bsdf() = default;
-
     // `normal` and `view` are unit vectors on the same side; `view` points to where light goes.
     Bsdf(const Reflector& reflector, const Vec2f& uv, const Vec3& normal, const Vec3& view);
 
-    // Radiance toward the viewer over irradiance from `direction`, times pi.
-    Vec3f value(const Vec3& direction) const;
+    // pi times the BSDF, for a unit vector on the side of the normal.
+    Vec3f value(const Vec3& direction) const { return m_lobe ? mixed_value(direction) : m_diffuse; }
 
-    // Draws a direction from which light comes; returns the BSDF times the cosine over the density, 0 if none.
+    // Draws a direction from which light comes; returns the BSDF times the cosine over the density, 0 if none comes.
     Vec3f sample(Random& random, Vec3& direction) const;
 
 private:
-    Vec3 m_normal{0.0, 0.0, 1.0};
-    Vec3f m_albedo{0.0f};
+    Vec3f mixed_value(const Vec3& direction) const;
+    Vec3f lobe_value(const Vec3& local) const;
+    Vec3 to_local(const Vec3& direction) const;
+
+    Frame m_frame;
+    Vec3f m_diffuse;
+    std::optional<GgxLobe> m_lobe;
+    Vec3f m_f0{0.0f};
+    Vec3f m_lobe_scale{1.0f};
+    double m_lobe_part = 0.0;  // probability of directions from the lobe
 };
 
 }  // namespace beamspread

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/constants.h"
 #include "scene/shadow_ray.h"
 
 namespace beamspread {

@@ -64,6 +64,75 @@ def test_black_surfaces_and_open_scenes_need_no_paths():
     assert found["paths"] == 2 * 64 * len(STRATA)
 
 
+# Rays straight up, and within a degree of 60 degrees from the normal.
+UPRIGHT = np.array([(0.0, 1e-6, 0.0, 1.0)])
+OBLIQUE = np.array([(0.735, 0.03, 0.0, 1.0)])
+
+
+def reflectance(reflector, strata, **options):
+    """Reflectance of a ceiling under even light from below, toward the directions of the strata."""
+    scene = native.Occluders([mesh(SQUARE * 1e3 + (0, 0, 1), FACES, reflector)])
+    sky = native.EnvironmentLight(np.ones((4, 8, 3), np.float32), np.eye(3))
+    lights = [(sky, UNIT, None)]
+    found = native.bounced_light([grid()], strata, lights, scene, 0.0, max_bounces=1, tolerance=4e-3, **options)
+    return found["radiance"][0].mean((0, 1, 2)), 3 * found["noise"]
+
+
+def ggx_albedo(cosine, f0, alpha, steps=400):
+    """Directional albedo of a GGX lobe with Schlick's term, by midpoints over the hemisphere."""
+    mu, phi = np.meshgrid((np.arange(steps) + 0.5) / steps, (np.arange(steps) + 0.5) / steps * 2 * np.pi)
+    light = np.stack([np.sqrt(1 - mu**2) * np.cos(phi), np.sqrt(1 - mu**2) * np.sin(phi), mu], -1)
+    view = np.array([np.sqrt(1 - cosine**2), 0, cosine])
+    half = (light + view) / np.linalg.norm(light + view, axis=-1, keepdims=True)
+    density = alpha**2 / (np.pi * ((alpha**2 - 1) * half[..., 2] ** 2 + 1) ** 2)
+
+    def masked(c):
+        return (np.sqrt(1 + alpha**2 * (1 / c**2 - 1)) - 1) / 2
+
+    fresnel = f0 + (1 - f0) * (1 - half @ view) ** 5
+    return (2 * np.pi * fresnel * density / (1 + masked(cosine) + masked(mu)) / (4 * cosine)).mean()
+
+
+def lobe(f0, roughness, albedo=0.0, is_layered=False):
+    return native.Reflector(native.ColorTexture((albedo,) * 3), (f0,) * 3, roughness, is_layered)
+
+
+def test_a_rough_lobe_has_its_closed_form():
+    """For alpha 1 at normal incidence D = 1 / pi and G = 2 c / (1 + c), so that the albedo is 1 - ln 2."""
+    found, error = reflectance(lobe(1.0, 1.0), UPRIGHT)
+    np.testing.assert_allclose(found, 1 - np.log(2), rtol=error)
+
+
+@pytest.mark.parametrize(("strata", "cosine"), [(UPRIGHT, 1.0), (OBLIQUE, 0.5)])
+@pytest.mark.parametrize(("f0", "roughness"), [(0.04, 0.5), (0.6, 0.8)])
+def test_lobes_reflect_their_directional_albedo(strata, cosine, f0, roughness):
+    alone, error = reflectance(lobe(f0, roughness), strata)
+    wanted = ggx_albedo(cosine, f0, roughness**2)
+    np.testing.assert_allclose(alone, wanted, rtol=error)
+    added, error = reflectance(lobe(f0, roughness, 0.3), strata)
+    np.testing.assert_allclose(added, wanted + 0.3, rtol=error)
+    layered, error = reflectance(lobe(f0, roughness, 0.3, True), strata)
+    whole = ggx_albedo(cosine, 1.0, roughness**2)
+    kept = wanted * (1 + f0 * (1 / whole - 1))  # Turquin 2019
+    # The table of albedos is right within 2e-3.
+    np.testing.assert_allclose(layered, kept + 0.3 * (1 - kept), rtol=error + 2e-3)
+
+
+@pytest.mark.parametrize("roughness", [0.1, 0.5, 1.0])
+def test_a_layered_white_metal_loses_nothing(roughness):
+    found, error = reflectance(lobe(1.0, roughness, is_layered=True), OBLIQUE)
+    np.testing.assert_allclose(found, 1.0, rtol=error + 2e-3)
+
+
+def test_several_reflections_by_lobes_keep_energy():
+    """White furnace: in a closed sphere of layered white metal all light stays, here of 12 reflections by .5."""
+    scene = native.Occluders([mesh(*sphere(32)[:2], lobe(0.5, 0.6, 1.0, True))])
+    lamp = [(native.PointLight((0, 0, 0)), 4 * np.pi)]
+    found = bounced(scene, lamp, [grid((0, 0, -0.9), (0.2, 0.2))], max_bounces=12, tolerance=0.01)
+    # A layer takes from the white below it as much as it reflects: each reflection keeps all light.
+    assert found["irradiance"] == pytest.approx(12, rel=0.02)
+
+
 def polygon_irradiance(points, corners, normal):
     """Irradiance by polygons of radiance 1 above the horizon (Lambert 1760), (...)."""
     to = corners - points[..., None, :]
