@@ -77,7 +77,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     samples: IntProperty(
         name="Samples",
         description="Quality of soft shadows. Doubling the value takes four times as long: 4 casts 16 rays per pixel "
-        "to each lamp without a size, and up to 1024 to all other lights together",
+        "to each lamp without a size, and up to 1024 (4096 from 8 on) to all other lights together",
         default=4,
         min=1,
         soft_max=16,

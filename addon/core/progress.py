@@ -99,8 +99,13 @@ class Progress:
 @contextmanager
 def timed(stage: str) -> Iterator[None]:
     """Log the seconds that a stage takes (`batch.py --verbose` shows them)."""
-    import logging  # it takes time, and only this needs it
-
     start = time.monotonic()
     yield
-    logging.getLogger(__name__).info("%s: %.2f s", stage, time.monotonic() - start)
+    log(f"{stage}: {time.monotonic() - start:.2f} s")
+
+
+def log(line: str) -> None:
+    """Log a line about a bake."""
+    import logging  # it takes time, and only this needs it
+
+    logging.getLogger(__name__).info(line)

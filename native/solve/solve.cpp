@@ -49,6 +49,7 @@ void solve(const Problem& problem, Progress& progress, float* luminance)
             add_unscattered(problem, luminance);
         });
     }
+    clip_negative(luminance, problem.plane.texels() * problem.channels.size());
     progress.finish();
 }
 

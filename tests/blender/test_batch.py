@@ -16,6 +16,7 @@ from scenes import (
     add_material,
     add_plane,
     add_sun,
+    add_world,
     bake,
     batch_command,
     file_image,
@@ -335,3 +336,16 @@ def test_verbose_prints_the_scene_and_the_stages(tmp_path):
         assert f"Beamspread: {words}" in verbose.replace("'Plane': ", "")
         assert words not in quiet
     assert [f"{stage}: " in verbose for stage in ("scene", "'Plane': Baking")] == [True, True]
+
+
+def test_a_sky_by_cycles_is_a_light_of_the_report(tmp_path):
+    """Its line and its time stand in the log under its own name, and nothing is said of bounced light."""
+    nodes, background = add_world(name="Sky")
+    nodes.set(background.inputs["Color"], nodes.add("TexChecker").outputs["Color"])
+    add_plane("Floor", material=add_material())
+    scene = save_scene(tmp_path)
+    _, (bake,), verbose = run_batch(scene, "--output", tmp_path, "--no-indirect", "--verbose")
+    assert (bake["status"], bake["lights"], bake["left_out"]) == ("written", 1, [])
+    assert "'Floor': World 'Sky': strength 1, color 1 1 1" in verbose
+    assert "'Floor': Finding light with Cycles: Sky: " in verbose
+    assert "ounced" not in verbose

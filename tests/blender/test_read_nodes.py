@@ -9,9 +9,10 @@ from beamspread.blender.read.node_math import BLENDS, LUMINANCE, MATH, VECTOR_MA
 from beamspread.blender.read.nodes import surface_of
 from beamspread.blender.read.shading import ShadingPoints
 from beamspread.core.errors import NotSupportedError
-from cycles_truth import add_receiver, cycles_irradiance
+from cycles_truth import add_receiver, cycles_irradiance, our_irradiance
 from mathutils import Matrix
 from nodes import Nodes, add_sockets
+from scenes import add_lamp, add_plane
 
 # Cycles sums even light from everywhere exactly, but for single precision.
 EXACT = {"rel": 2e-5, "abs": 2e-6}
@@ -282,3 +283,48 @@ def test_unsupported_nodes_are_named(world):
     world.show(curves.outputs[0])
     with pytest.raises(NotSupportedError, match="The node 'Math' is not supported"):
         world.ours()
+
+
+def in_group(nodes, default=COLORS[0]):
+    """Output of a group whose color is the default value of its own input."""
+    inside = bpy.data.node_groups.new("Group", "ShaderNodeTree")
+    ends = inside.nodes.new("NodeGroupInput"), inside.nodes.new("NodeGroupOutput")
+    add_sockets(inside, "NodeSocketColor", "Color")
+    add_sockets(inside, "NodeSocketShader", (), "Shader")
+    inside.links.new(ends[1].inputs[0], ends[0].outputs[0])
+    group = nodes.add("Group", node_tree=inside)
+    group.inputs[0].default_value = default
+    return group.outputs[0]
+
+
+def unlinked_in_group(nodes):
+    """Output of a group whose color is the default value of the group's output, which has no link."""
+    inside = bpy.data.node_groups.new("Group", "ShaderNodeTree")
+    end = inside.nodes.new("NodeGroupOutput")
+    add_sockets(inside, "NodeSocketColor", (), "Color")
+    end.inputs[0].default_value = COLORS[0]
+    return nodes.add("Group", node_tree=inside).outputs[0]
+
+
+def straight(nodes):
+    return nodes.add("HueSaturation", {"Color": COLORS[0]}).outputs[0]
+
+
+@pytest.mark.parametrize("color", [straight, in_group, unlinked_in_group])
+@pytest.mark.parametrize("kind", ["world", "material", "lamp"])
+def test_a_color_in_a_shaders_place_emits(kind, color):
+    """Cycles makes an emission of a color that is linked to Surface, in groups as well."""
+    if kind == "world":
+        owner = bpy.context.scene.world = bpy.data.worlds.new("World")
+    elif kind == "material":
+        owner = bpy.data.materials.new("Glow")
+        add_plane("Panel", matrix=Matrix.Translation((0, 0, 1)), material=owner)
+    else:
+        owner = add_lamp((0, 0, 1)).data
+        owner.use_nodes = True
+    nodes = Nodes(owner)
+    nodes.show(color(nodes))
+    plane, image = add_receiver(Matrix(), texels=4)
+    (ours, _), cycles = our_irradiance(plane, 4), cycles_irradiance(plane, image, 256)
+    assert cycles.max() > 0.1
+    assert ours.mean((0, 1)) == pytest.approx(cycles.mean((0, 1)), rel=0.02)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from beamspread.core.bake.bake_settings import COMBINED
 from beamspread.core.bake.job import BakeJob
-from beamspread.core.bake.layers import LAYERS, arrive, bake, mean_direction
+from beamspread.core.bake.layers import LAYERS, arrive, bake, mean_direction, rays_per_texel
 from beamspread.core.bake.steps import BAKE_STEPS
 from beamspread.core.bake.surface import Surface
 from beamspread.core.errors import MaterialError
@@ -349,3 +349,19 @@ def test_charts_are_baked_apart_on_planes_of_their_own():
 def test_albedo_from_color_is_public():
     medium = beamspread.Medium(g=0.0, ior=1.0)
     assert 0 < beamspread.albedo_from_color((0.2, 0.3, 0.4), medium, quality="preview")[0] < 1
+
+
+@pytest.mark.parametrize("path", [0.01, 0.5], ids=["coarse", "fine"])
+def test_every_value_of_the_samples_slider_works(path):
+    """Rays to lights of a size follow from the samples, and a surface whose texels are coarse asks for the most."""
+    area = AreaLight("Area", 10.0, (1.0, 1.0, 1.0), True, (0.0, 0.0, 0.5), np.eye(3), 0.3, 0.3, False, np.pi)
+    lamp = PointLight("Lamp", 10.0, (1.0, 1.0, 1.0), True, (0.1, 0.0, 0.5))
+    material, grid = replace(MATERIAL, mean_free_path=(path,) * 3), square(3)
+    counts = [rays_per_texel(grid, material, replace(SETTINGS, samples=samples)) for samples in range(1, 65)]
+    assert counts == sorted(counts)
+    results = []
+    for samples in (1, 2, 4, 8, 9, 16, 33, 64):
+        changed = replace(SETTINGS, samples=samples)
+        results.append(bake(grid, Illumination([area, lamp]), material, 0.0, changed))
+        arrive(grid, Illumination([area, lamp]), changed)
+    np.testing.assert_allclose(results, [results[-1]] * len(results), rtol=0.1)

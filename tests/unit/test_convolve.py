@@ -234,7 +234,8 @@ def test_texels_need_not_be_square(library):
     coarse[5, 5] = fine[16, 5] = 1
     expected = convolve(coarse, travel(50, 33), library, ALBEDO, 1.0, 1.0)
     merged = convolve(fine, travel(50, 33), library, ALBEDO, 1.0, (1.0, 1 / 3)).reshape(11, 3, 11, 3).sum(1)
-    assert merged == pytest.approx(expected, rel=3e-3, abs=1e-6 * expected.max())
+    # Values below 0, which the noise of this library leaves in the dark, count as 0 in either.
+    assert merged == pytest.approx(expected, rel=3e-3, abs=3e-5 * expected.max())
 
 
 def test_light_that_leaves_the_plane_does_not_come_back(library):
@@ -359,3 +360,15 @@ def test_light_that_grazes(library):
     direction = np.array([[[1, 0, -1e-9], [0, 1, -1e-6], [0, 0, -1]]], np.float32)
     arguments = (np.ones((1, 3), np.float32), direction, library, ALBEDO, 0.5, 1.0)
     assert convolve(*arguments) == pytest.approx(convolve(*arguments, solver="direct"), rel=1e-3)
+
+
+@pytest.mark.parametrize("solver", ["fft", "adaptive", "direct"])
+def test_luminance_is_never_negative(library, solver):
+    """Transforms and interpolation leave values of either sign where it is dark."""
+    light = np.zeros((96, 96, 3), np.float32)
+    light[:3, :3] = 1, 0.5, 0.2
+    for path in (0.5, 1.0, 4.0):
+        for way in (travel(50), lamp_directions(96, 96)):
+            luminance = convolve(light, way, library, ALBEDO, path, 1.0, solver=solver)
+            assert luminance.min() >= 0
+            assert luminance.max() > 0

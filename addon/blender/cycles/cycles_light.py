@@ -151,6 +151,10 @@ class LightByCycles(Step):
     name = "Finding light with Cycles"
     finds_light = True
 
+    def stage(self, _job: BakeJob) -> str:
+        bounced = ["bounced light"] * self.bounced
+        return f"{self.name}: {', '.join([*filter(None, [self.world]), *bounced, *self.lamps])}"
+
     def weight(self, _job: BakeJob) -> float:
         return 2.0
 

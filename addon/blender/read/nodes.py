@@ -160,17 +160,22 @@ class Evaluator:
         source, is_shader = self.links.source(wanted), wanted.socket.type == "SHADER"
         if source.socket.is_output and not source.node.mute:
             value = self._outcome(wanted, (source, is_shader))
-        elif is_shader:
+        elif is_shader and (source.socket.is_output or source.socket.type == "SHADER"):
             value = self.NO_SHADER
         elif source.socket.is_output:
             value = np.zeros(1)
         else:
             value = np.atleast_1d(np.asarray(getattr(source.socket, "default_value", 0.0), float))[:3]
+            value = self.emission(value, source.socket.type) if is_shader else value
         return value if is_shader else converted(value, source.socket.type, wanted.socket.type)
 
     def shader(self, source: Source) -> np.ndarray:
         """The quantity of a shader that the subclass evaluates, of any output that is linked to a shader's input."""
         raise NotImplementedError
+
+    def emission(self, _value: np.ndarray, _kind: str) -> np.ndarray:
+        """The quantity of the emission that Cycles makes of a value in a shader's place; `_kind` is a socket's type."""
+        return self.NO_SHADER
 
     def own_value(self, source: Source) -> np.ndarray | None:
         """Value of a node that depends on more than its inputs, or None."""

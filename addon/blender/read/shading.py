@@ -72,12 +72,15 @@ class ShadingPoints(Evaluator):
         return None
 
     def shader(self, source: Source) -> np.ndarray:
-        if source.socket.type != "SHADER":  # Cycles makes an emission of it
-            return converted(self._value_of(source), source.socket.type, "RGBA")
+        if source.socket.type != "SHADER":
+            return self.emission(self._value_of(source), source.socket.type)
         if shows_bake(source.node):
             return DARK
         emits = EMITTERS.get(source.node.bl_idname)
         return DARK if emits is None else emits(self, source)
+
+    def emission(self, value: np.ndarray, kind: str) -> np.ndarray:
+        return converted(value, kind, "RGBA")
 
     def _falloff(self, source: Source) -> np.ndarray | None:
         """Strength of a falloff by the square; a smoothed or another one depends on the distance."""

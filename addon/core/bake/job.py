@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import BakeError
 from ..messages import Message, warning
-from ..progress import Callback, Progress, timed
+from ..progress import Callback, Progress, log, timed
 from ..scene.illumination import Illumination
 from ..scene.receiver import Receiver
 from ..scene.texture import BaseColor, textured
@@ -80,8 +80,10 @@ class BakeJob:
             step, *rest = job.steps
             if weight:
                 part.begin(step.stage(job))
-            with timed(f"'{self.name}': {step.name}"):
-                job = replace(step.run(job, part), steps=tuple(rest))
+            with timed(f"'{self.name}': {step.stage(job)}"):
+                done = step.run(job, part)
+            _log_new_lights(done, job)
+            job = replace(done, steps=tuple(rest))
         return job
 
     def colored(self, color: BaseColor) -> BakeJob:
@@ -166,6 +168,14 @@ class BakeJob:
             return []
         text = f"No light reaches '{self.name}', so it is black."
         return [warning(self.name, text, "Look for objects that block the light.")]
+
+
+def _log_new_lights(job: BakeJob, before: BakeJob) -> None:
+    """Log the lights that a step has added (`batch.py --verbose` shows them)."""
+    known = {id(light) for light in before.illumination.lights}
+    for light in job.illumination.lights:
+        if id(light) not in known:
+            log(f"'{job.name}': {light.line()}")
 
 
 def machine_bytes() -> int:

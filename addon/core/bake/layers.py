@@ -25,16 +25,16 @@ LIBRARY_PART = 0.05
 # Largest relative error of a texel by the solver, see `convolve`. Larger: faster. Half a per cent is invisible.
 TOLERANCE = 5e-3
 
-# Rays from each texel to a light of a size at least, and to all of them together at 4 x 4 samples at most. More: less
-# noise, longer bakes.
-MIN_RAYS, MAX_RAYS = 8, 1024
+# Rays from each texel to a light of a size at least, to all of them together at 4 x 4 samples at most, and with any
+# number of samples at most. More: less noise, longer bakes. 1024 rays leave .9 % of noise in a texel, 4096 .4 %.
+MIN_RAYS, MAX_RAYS, MOST_RAYS = 8, 1024, 4096
 
 # Bytes of irradiance that are stored until the solver sees all lights, see `bake_luminance`.
 MAX_STORED_BYTES = 512 << 20
 
-# Rays of irradiance and direction to a light of a size, for each sample of a texel and for a texel at most. More: less
-# noise in penumbras, which no medium blurs.
-RAYS_PER_SAMPLE, MAX_PASS_RAYS = 4, 4096
+# Rays of irradiance and direction to a light of a size, for each sample of a texel. More: less noise in penumbras,
+# which no medium blurs.
+RAYS_PER_SAMPLE = 4
 
 # Texels along a side, and rays from each, where nothing blocks the light.
 OPEN_TEXELS, OPEN_RAYS = 96, 4
@@ -132,7 +132,8 @@ def rays_per_texel(grid: Grid, material: Material, settings: BakeSettings) -> in
     path = min(material.mean_free_path) / max(grid.pitch_x, grid.pitch_y)
     texels = 1.0 + 4.0 * math.pi * path**2
     wanted = (69.0 / math.sqrt(texels)) ** (8.0 / 5.0)
-    return round(min(max(wanted, MIN_RAYS), MAX_RAYS) * (settings.samples / 4) ** 2) or 1
+    at_four = min(max(wanted, MIN_RAYS), MAX_RAYS)
+    return min(round(at_four * (settings.samples / 4) ** 2) or 1, MOST_RAYS)
 
 
 def _libraries(material: Material, thickness: float, settings: BakeSettings, progress: Progress) -> list:
@@ -159,7 +160,7 @@ def arrive(
         grid.surface(),
         illumination.native_lights(grid),
         samples=settings.samples,
-        rays=min(RAYS_PER_SAMPLE * settings.samples**2, MAX_PASS_RAYS),
+        rays=min(RAYS_PER_SAMPLE * settings.samples**2, MOST_RAYS),
         threads=settings.threads,
         progress=progress,
     )

@@ -27,6 +27,7 @@ class Bake:
     status : one of the constants above; FAILED until `keep` has stored the result.
     messages : all messages for the artist; an error among them unless the status is WRITTEN.
     texture : result of the job, see `BakeJob`; None before it has run and once it is stored.
+    lights : number of lights of the job; once it has run, with those that its steps have found.
     path : file that `keep` has written, if any.
     seconds : wall-clock time of `run` and `keep`.
     is_dark : True if the job has run and no light arrived.
@@ -37,6 +38,7 @@ class Bake:
         self.status = FAILED
         self.messages = Messages(job.messages() if job else ())
         self.texture: np.ndarray | None = None
+        self.lights = len(job.illumination.lights) if job else 0
         self.path = ""
         self.is_dark = False
         self.seconds = 0.0
@@ -67,6 +69,7 @@ class Bake:
             done = self.job.run(progress)
             self.texture, self.is_dark = done.texture, done.is_dark()
             self.messages.add(*done.messages(), *done.messages_after())
+            self.lights = len(done.illumination.lights)
             # The lights that steps have found are large, and no longer needed.
             lights = self.job.illumination.lights
             self.job = replace(done, illumination=done.illumination.with_lights(lights), texture=None)

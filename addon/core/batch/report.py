@@ -10,7 +10,6 @@ from pathlib import Path
 from ..bake.runner import FAILED, SKIPPED, WRITTEN, Bake
 from ..disk import whole_file
 from ..scene.illumination import Illumination
-from ..scene.lights import Light
 
 
 @dataclass
@@ -22,7 +21,7 @@ class BakeRecord:
     path : the file that was written.
     seconds : wall-clock time.
     output : the requested pass, LUMINANCE, IRRADIANCE or DIRECTION.
-    lights : number of lights that were baked.
+    lights : number of lights that were baked, those that steps of the job found among them.
     left_out : messages about light that is missing.
     indirect : True if light that other objects return was requested.
     dark : True if no light arrived; the file is written all the same.
@@ -50,7 +49,7 @@ class BakeRecord:
         outcome = round(bake.seconds, 3), bake.status, " ".join(map(str, bake.messages))
         if job is None:
             return cls(*subject, 0, 0, *outcome)
-        lights = len(job.illumination.lights), [str(message) for message in job.left_out()], job.settings.indirect
+        lights = bake.lights, [str(message) for message in job.left_out()], job.settings.indirect
         size = job.receiver.width, job.receiver.height
         return cls(*subject, *size, *outcome, job.settings.output, *lights, bake.is_dark)
 
@@ -161,12 +160,5 @@ class Inventory:
 
 def _light(illumination: Illumination) -> Iterator[str]:
     yield f"{len(illumination.lights)} lights; {illumination.triangle_count} triangles in the light's way"
-    yield from map(_line_of, illumination.lights)
+    yield from (light.line() for light in illumination.lights)
     yield from map(str, illumination.messages)
-
-
-def _line_of(light: Light) -> str:
-    kind = type(light).__name__.removesuffix("Light")
-    color = " ".join(f"{value:.4g}" for value in light.color)
-    shadow = "" if light.cast_shadow else ", throws no shadow"
-    return f"{kind} '{light.name}': strength {light.strength:.6g}, color {color}{shadow}"

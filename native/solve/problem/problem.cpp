@@ -145,4 +145,11 @@ ChannelSets::ChannelSets(const Problem& problem)
     }
 }
 
+void clip_negative(float* values, std::size_t count)
+{
+    // NaN stays: it is an error that callers find.
+    for (std::size_t i = 0; i < count; ++i)
+        values[i] = values[i] < 0.0f ? 0.0f : values[i];
+}
+
 }  // namespace beamspread

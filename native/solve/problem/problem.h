@@ -129,6 +129,9 @@ struct Problem {
 // Throws InvalidArgument for a plane, media, light or options that solvers don't cover.
 void validate(const Problem& problem);
 
+// Sets values below 0 to 0: rounding of sums, above all of transforms, leaves such values where it is dark.
+void clip_negative(float* values, std::size_t count);
+
 // Sets of channels with proportional light: each channel's light is a factor times that of its set. Lights of one
 // colour make one set, lights of different colours at most one per channel. Channels of one set and medium share a
 // result.

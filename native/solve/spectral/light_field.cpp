@@ -88,6 +88,7 @@ void LightField::solve(Progress& progress, float* luminance)
     });
     if (m_unscattered)
         m_unscattered->add_to(luminance);
+    clip_negative(luminance, m_problem.plane.texels() * m_problem.channels.size());
 }
 
 void LightField::spread(Progress& progress, float* luminance)

@@ -61,6 +61,13 @@ class Light(ABC):
     def rgb(self) -> np.ndarray:
         return np.asarray(self.color, np.float32) * np.float32(self.strength)
 
+    def line(self) -> str:
+        """The light in a line: kind, name, strength, color and shadow."""
+        kind = type(self).__name__.removesuffix("Light")
+        color = " ".join(f"{value:.4g}" for value in self.color)
+        shadow = "" if self.cast_shadow else ", throws no shadow"
+        return f"{kind} '{self.name}': strength {self.strength:.6g}, color {color}{shadow}"
+
     def fault(self) -> str:
         """The sentence that says why the light cannot be baked; "" if it can."""
         if not np.isfinite(self.strength):
