@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <string>
 
 #include "base/constants.h"
 #include "base/error.h"
 #include "base/sobol.h"
 #include "base/threads.h"
+#include "scene/bounce_guide.h"
 #include "scene/checks.h"
 #include "scene/node_noise.h"
 #include "scene/path_wave.h"
@@ -20,6 +22,14 @@ namespace {
 
 // Paths that find points from which the choice among many lights is learned. More make it more even and take time.
 constexpr std::size_t pilot_paths = 256;
+
+// Paths of a lesson of the guide, and lessons, each of which uses the ones before. More find smaller windows.
+constexpr std::size_t lesson_paths = 16384;
+constexpr std::size_t lesson_waves = 64;
+constexpr int lessons = 4;
+
+// Part of the rays that arrive above which a light needs no guide.
+constexpr float mostly_visible = 0.5f;
 
 // Largest number of samples of a round: it bounds the work between two estimates of the noise.
 constexpr std::size_t max_round = 64;
@@ -49,19 +59,34 @@ public:
     std::size_t samples() const { return m_samples; }
     std::size_t row_count() const { return m_rows.size(); }
 
+    // Learns which lights matter, and how their light comes in if something blocks most of it.
     void learn_lights()
     {
-        PathWave wave(m_surfaces, m_lights, 1);
         Random random(m_settings.seed, pilot_stream, 0);
-        for (std::size_t i = 0; i < pilot_paths; ++i) {
-            const NodeGrid& grid = m_grids[i % m_grids.size()];
-            const Vec2 place(random.uniform(), random.uniform());
-            const Vec2 at(random.uniform(), random.uniform());
-            wave.start(grid.corner + grid.x_axis * (place.x * grid.size.x) + grid.y_axis * (place.y * grid.size.y),
-                       to_world(grid, cosine_hemisphere(at)), 0, random);
-        }
+        PathWave wave(m_surfaces, m_lights, 1);
+        for (std::size_t i = 0; i < pilot_paths; ++i)
+            start_anywhere(i, wave, random);
         std::vector<ShadingPoint> points;
         wave.find_first(points);
+        if (points.empty())
+            return;
+        m_lights.learn(points, random);
+        std::vector<Vec3> positions;
+        for (const ShadingPoint& point : points)
+            positions.push_back(point.position);
+        m_guide = BounceGuide(positions, m_lights.count());
+        m_lights.set_guide(&m_guide);
+        for (int lesson = 0; lesson < lessons; ++lesson) {
+            parallel_ordered(lesson_waves, [&](std::size_t i) {
+                auto records = std::make_shared<std::vector<GuideRecord>>(learn_by_paths(lesson, i));
+                return [this, records] { m_guide.add(*records); };
+            });
+            if (is_open()) {
+                m_lights.set_guide(nullptr);
+                return;
+            }
+            m_guide.update();
+        }
         m_lights.learn(points, random);
     }
 
@@ -87,6 +112,43 @@ private:
 
     // Streams of random numbers: those of paths are the numbers of their samples.
     static constexpr std::uint64_t pilot_stream = ~std::uint64_t{0};
+
+    // Starts a path from a random place in a random direction of a grid.
+    void start_anywhere(std::size_t item, PathWave& wave, Random& random) const
+    {
+        const NodeGrid& grid = m_grids[item % m_grids.size()];
+        Vec2 place(random.uniform(), 0.0);
+        place.y = random.uniform();
+        Vec2 at(random.uniform(), 0.0);
+        at.y = random.uniform();
+        wave.start(point(grid, place * grid.size), to_world(grid, cosine_hemisphere(at)), 0, random);
+    }
+
+    std::vector<GuideRecord> learn_by_paths(int lesson, std::size_t item) const
+    {
+        std::vector<GuideRecord> records;
+        std::vector<Vec3f> radiance(1, Vec3f(0.0f));
+        PathWave wave(m_surfaces, m_lights, m_settings.max_bounces);
+        wave.record(&records);
+        Random random(m_settings.seed, pilot_stream - 1 - static_cast<std::uint64_t>(lesson), item);
+        for (std::size_t i = 0; i < lesson_paths / lesson_waves; ++i)
+            start_anywhere(i, wave, random);
+        wave.trace(radiance);
+        return records;
+    }
+
+    bool is_open() const
+    {
+        for (std::uint32_t light = 0; light < m_lights.count(); ++light)
+            if (m_guide.mean_visibility(light) < mostly_visible)
+                return false;
+        return true;
+    }
+
+    static Vec3 point(const NodeGrid& grid, const Vec2& at)
+    {
+        return grid.corner + grid.x_axis * at.x + grid.y_axis * at.y;
+    }
 
     static Vec3 to_world(const NodeGrid& grid, const Vec3& local)
     {
@@ -119,8 +181,8 @@ private:
                 const Vec2 within = (Vec2(slot % grid.columns, at.row) + positions[i * radiance.size() + slot]) * pitch;
                 const std::uint64_t stream = (m_samples + i) * 2 + half;
                 const std::uint64_t item = (std::uint64_t{at.grid} << 48) + at.row * radiance.size() + slot;
-                wave.start(grid.corner + grid.x_axis * within.x + grid.y_axis * within.y, to_world(grid, local),
-                           static_cast<std::uint32_t>(slot), Random(m_settings.seed, stream, item));
+                wave.start(point(grid, within), to_world(grid, local), static_cast<std::uint32_t>(slot),
+                           Random(m_settings.seed, stream, item));
             }
             wave.trace(radiance);
         }
@@ -132,6 +194,7 @@ private:
     std::span<const NodeGrid> m_grids;
     std::span<const Stratum> m_strata;
     LightChoice& m_lights;
+    BounceGuide m_guide;
     const Occluders& m_surfaces;
     const BouncedSettings& m_settings;
     std::array<std::vector<GridSobol>, 2> m_sobol;               // [half][stratum]

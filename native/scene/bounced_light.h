@@ -47,7 +47,7 @@ struct BouncedSettings {
     // Radius, metres, over which the medium averages light: noise counts as its mean over that distance.
     double spread = 0.0;
     int max_bounces = 12;  // surfaces that reflect light on its way
-    int max_samples = 1024;  // paths for each stratum of a node
+    int max_samples = 128;   // paths for each stratum of a node
     std::uint32_t seed = 0;
     int threads = 0;  // 0: all
 };

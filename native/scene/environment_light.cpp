@@ -8,6 +8,7 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "base/constants.h"
@@ -94,7 +95,7 @@ private:
 
 // An environment whose cells are drawn with probabilities proportional to their light on a plane, or, without a normal, to
 // their light on surfaces that face them.
-class FacingEnvironment final : public Light {
+class FacingEnvironment final : public DistantLight {
 public:
     FacingEnvironment(const EnvironmentMap& map, const std::optional<Vec3>& normal)
         : m_map(map),
@@ -135,6 +136,19 @@ public:
 
     Vec3 irradiance(const Vec3& /*point*/, const Vec3& /*normal*/) const override { return m_irradiance; }
 
+    Vec3f radiance(const Vec3& direction) const override
+    {
+        const auto [x, y] = cell_of(direction);
+        return m_map.of_cell(x, y);
+    }
+
+    double density(const Vec3& direction) const override
+    {
+        const auto [x, y] = cell_of(direction);
+        const double total = m_cumulated_rows.back();
+        return total > 0.0 ? m_in_row[y].weight(x) / total / solid_angle(y) : 0.0;
+    }
+
 private:
     // Rays that are drawn together: their memory lies far apart and is prefetched some steps ahead.
     static constexpr std::size_t at_once = 16;
@@ -173,6 +187,17 @@ private:
             ray.travel = -glm::normalize(m_map.to_world * direction);
             ray.flux = m_map.of_cell(x, y) * static_cast<float>(solid_angle(y) / probability);
         }
+    }
+
+    std::pair<std::size_t, std::size_t> cell_of(const Vec3& direction) const
+    {
+        const Vec3 local = glm::transpose(m_map.to_world) * direction;
+        const auto of = [](double place, std::size_t count) {
+            const double last = static_cast<double>(count) - 1.0;
+            return static_cast<std::size_t>(std::clamp(place * static_cast<double>(count), 0.0, last));
+        };
+        return {of(0.5 - std::atan2(local.y, local.x) * 0.5 * inv_pi, m_width),
+                of(0.5 + std::asin(std::clamp(local.z, -1.0, 1.0)) * inv_pi, m_height)};
     }
 
     // The chord of an arc of width w lies at the radius sqrt(1 - 4 t (1 - t) sin^2(w / 2)), here to first order.
@@ -278,7 +303,7 @@ std::unique_ptr<const Light> EnvironmentLight::facing(const Vec3& normal) const
     return std::make_unique<FacingEnvironment>(m_map, normal);
 }
 
-std::unique_ptr<const Light> EnvironmentLight::facing_all() const
+std::unique_ptr<const DistantLight> EnvironmentLight::facing_all() const
 {
     return std::make_unique<FacingEnvironment>(m_map, std::nullopt);
 }

@@ -31,6 +31,8 @@ struct LightSource {
     bool is_smooth = false;
 };
 
+class DistantLight;
+
 class Light {
 public:
     Light() = default;
@@ -59,12 +61,20 @@ public:
     // The same light prepared for surfaces with that normal; null if preparation does not pay.
     virtual std::unique_ptr<const Light> facing(const Vec3& /*normal*/) const { return nullptr; }
 
-    // The same light prepared to be sampled at points of any normal; null if preparation does not pay.
-    virtual std::unique_ptr<const Light> facing_all() const { return nullptr; }
+    // The same light prepared for surfaces of any normal; null for lights that are not `DistantLight`s.
+    virtual std::unique_ptr<const DistantLight> facing_all() const { return nullptr; }
 
     // The one point or direction that stands for the light inside a medium; none if its rays differ too much. Delta
     // lights and narrow suns have one.
     virtual std::optional<LightSource> source() const { return std::nullopt; }
+};
+
+// A light infinitely far away with a radiance in each direction.
+class DistantLight : public Light {
+public:
+    // Radiance from the direction of a unit vector, W/(m^2 sr), and the density of the rays of `sample`, 1/sr.
+    virtual Vec3f radiance(const Vec3& direction) const = 0;
+    virtual double density(const Vec3& direction) const = 0;
 };
 
 }  // namespace beamspread

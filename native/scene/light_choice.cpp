@@ -1,8 +1,8 @@
 #include "scene/light_choice.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <limits>
 
 #include "base/constants.h"
 #include "scene/shadow_ray.h"
@@ -14,8 +14,18 @@ namespace {
 // Number of candidates among which a shadow ray is chosen. More make better choices and take time.
 constexpr std::size_t max_candidates = 8;
 
+// Candidates of each of few lights of a size, if there are not more than `max_candidates` in all.
+constexpr std::size_t max_of_each = 4;
+
+// Of the candidates of the sky, those that the guide chooses; the others find light that it does not know.
+constexpr std::size_t guided = 3;
+constexpr std::size_t unguided = 1;
+
 // Part of the probability that lights share evenly, so that none is excluded.
 constexpr double even_share = 0.1;
+
+// Factor of the chance of directions from which the guide has found no light.
+constexpr float unknown_factor = 0.1f;
 
 float mean(const Vec3f& color)
 {
@@ -34,16 +44,42 @@ ShadowRay shadow_ray(const ShadingPoint& point, const LightRay& ray)
 
 }  // namespace
 
+// Keeps one of the candidates in proportion to its weight.
+class LightChoice::Reservoir {
+public:
+    // `samples` is the expected number of such candidates, `factor` > 0 an estimate of visibility.
+    void offer(const Candidate& next, float samples, float factor, Random& random)
+    {
+        const float weight = mean(next.radiance) / samples * factor;
+        if (!(weight > 0.0f))
+            return;
+        m_sum += weight;
+        if (m_sum == weight || random.uniform() * static_cast<double>(m_sum) < static_cast<double>(weight)) {
+            m_kept = next;
+            m_scale = 1.0f / (samples * weight);
+        }
+    }
+
+    bool is_empty() const { return !(m_sum > 0.0f); }
+    const Candidate& kept() const { return m_kept; }
+    // Factor of the light of the one that was kept.
+    float scale() const { return m_scale * m_sum; }
+
+private:
+    Candidate m_kept;
+    float m_scale = 0.0f;
+    float m_sum = 0.0f;
+};
+
 LightChoice::LightChoice(std::span<const SceneLight> lights)
 {
     for (const SceneLight& light : lights) {
         if (light.color == Vec3f(0.0f))
             continue;
         m_lights.push_back(light);
-        if (auto prepared = light.light->facing_all()) {
-            m_lights.back().light = prepared.get();
-            m_prepared.push_back(std::move(prepared));
-        }
+        m_distant.push_back(light.light->facing_all());
+        if (m_distant.back())
+            m_lights.back().light = m_distant.back().get();
     }
     const auto count = static_cast<double>(m_lights.size());
     for (std::size_t i = 0; i <= m_lights.size(); ++i)
@@ -57,8 +93,10 @@ void LightChoice::learn(std::span<const ShadingPoint> points, Random& random)
     std::vector<double> light(m_lights.size());
     double all = 0.0;
     for (std::size_t i = 0; i < m_lights.size(); ++i) {
-        for (const ShadingPoint& point : points)
-            light[i] += static_cast<double>(mean(candidate(i, point, random).radiance));
+        for (const ShadingPoint& point : points) {
+            const float seen = m_guide ? visibility(m_guide->cell(point.position), i) : 1.0f;
+            light[i] += static_cast<double>(mean(candidate(i, point, random).radiance) * seen);
+        }
         all += light[i];
     }
     if (!(all > 0.0))
@@ -68,72 +106,119 @@ void LightChoice::learn(std::span<const ShadingPoint> points, Random& random)
         m_cumulated[i + 1] = m_cumulated[i] + (1.0 - even_share) * light[i] / all + even;
 }
 
-LightChoice::Candidate LightChoice::candidate(std::size_t index, const ShadingPoint& point, Random& random) const
+float LightChoice::visibility(std::uint32_t cell, std::size_t light) const
 {
-    const SceneLight& light = m_lights[index];
-    Candidate result;
+    return m_guide ? m_guide->visibility(cell, static_cast<std::uint32_t>(light)) : 1.0f;
+}
+
+LightChoice::Candidate LightChoice::with_radiance(std::size_t light, const ShadingPoint& point,
+                                                  const LightRay& ray) const
+{
+    Candidate result{.ray = ray, .light = light};
+    const double cosine = -glm::dot(ray.travel, point.normal);
+    if (!(cosine > min_cos_theta && ray.distance > 0.0))
+        return result;
+    const Vec3f irradiance = m_lights[light].color * ray.flux * static_cast<float>(cosine);
+    const Vec3f radiance = irradiance * point.bsdf.value(-ray.travel) * static_cast<float>(inv_pi);
+    // A point inside a lamp without a size has no direction to it.
+    if (std::isfinite(mean(radiance))) {
+        result.radiance = radiance;
+        result.glow = mean(m_lights[light].color * ray.flux);
+    }
+    return result;
+}
+
+LightChoice::Candidate LightChoice::candidate(std::size_t light, const ShadingPoint& point, Random& random) const
+{
     Vec2 place(0.5);
-    if (!light.light->is_delta()) {
+    if (!m_lights[light].light->is_delta()) {
         place.x = random.uniform();
         place.y = random.uniform();
     }
-    light.light->sample({&point.position, 1}, point.normal, {&place, 1}, &result.ray);
-    const double cosine = -glm::dot(result.ray.travel, point.normal);
-    if (!(cosine > min_cos_theta && result.ray.distance > 0.0))
-        return result;
-    const Vec3f irradiance = light.color * result.ray.flux * static_cast<float>(cosine);
-    const Vec3f radiance = irradiance * point.bsdf.value(-result.ray.travel) * static_cast<float>(inv_pi);
-    // A point inside a lamp without a size has no direction to it.
-    if (std::isfinite(mean(radiance)))
-        result.radiance = radiance;
-    return result;
+    LightRay ray;
+    m_lights[light].light->sample({&point.position, 1}, point.normal, {&place, 1}, &ray);
+    return with_radiance(light, point, ray);
+}
+
+void LightChoice::offer_guided(std::size_t light, const ShadingPoint& point, std::uint32_t cell, Reservoir& reservoir,
+                               Random& random) const
+{
+    // Multiple importance sampling by the balance heuristic (Veach 1997, section 9.2.2).
+    const DistantLight& sky = *m_distant[light];
+    for (std::size_t i = 0; i < guided + unguided; ++i) {
+        const double x = random.uniform();
+        const Vec2 place(x, random.uniform());
+        Vec3 direction;
+        if (i < guided) {
+            direction = m_guide->sample(cell, place);
+        } else {
+            LightRay ray;
+            sky.sample({&point.position, 1}, point.normal, {&place, 1}, &ray);
+            direction = -ray.travel;
+        }
+        const double density = guided * m_guide->density(cell, direction) + unguided * sky.density(direction);
+        if (!(density > 0.0))
+            continue;
+        const LightRay ray{.travel = -direction,
+                           .distance = std::numeric_limits<double>::infinity(),
+                           .flux = sky.radiance(direction) / static_cast<float>(density)};
+        const bool is_known = m_guide->probability(cell, BounceGuide::bin(direction)) > 0.0f;
+        reservoir.offer(with_radiance(light, point, ray), 1.0f, is_known ? 1.0f : unknown_factor, random);
+    }
+}
+
+void LightChoice::offer_few(const ShadingPoint& point, std::uint32_t cell, Reservoir& reservoir, Random& random) const
+{
+    const std::size_t most = std::clamp<std::size_t>(max_candidates / m_lights.size(), 1, max_of_each);
+    for (std::size_t light = 0; light < m_lights.size(); ++light) {
+        if (m_distant[light] && m_guide && m_guide->knows(cell)) {
+            offer_guided(light, point, cell, reservoir, random);
+            continue;
+        }
+        const std::size_t rays = m_lights[light].light->is_delta() ? 1 : most;
+        for (std::size_t k = 0; k < rays; ++k)
+            reservoir.offer(candidate(light, point, random), static_cast<float>(rays), visibility(cell, light), random);
+    }
+}
+
+void LightChoice::offer_many(const ShadingPoint& point, std::uint32_t cell, Reservoir& reservoir, Random& random) const
+{
+    // The sky is no matter of choice; other lights are drawn in strata of their distribution.
+    for (std::size_t light = 0; light < m_lights.size(); ++light)
+        if (m_distant[light] && m_guide && m_guide->knows(cell))
+            offer_guided(light, point, cell, reservoir, random);
+    for (std::size_t k = 0; k < max_candidates; ++k) {
+        const double at =
+            (static_cast<double>(k) + random.uniform()) / static_cast<double>(max_candidates) * m_cumulated.back();
+        const auto above = std::upper_bound(m_cumulated.begin() + 1, m_cumulated.end() - 1, at);
+        const auto light = static_cast<std::size_t>(above - m_cumulated.begin()) - 1;
+        if (m_distant[light] && m_guide && m_guide->knows(cell))
+            continue;
+        const double part = (m_cumulated[light + 1] - m_cumulated[light]) / m_cumulated.back();
+        reservoir.offer(candidate(light, point, random), static_cast<float>(part * static_cast<double>(max_candidates)),
+                        visibility(cell, light), random);
+    }
 }
 
 LitRay LightChoice::choose(const ShadingPoint& point, Random& random) const
 {
-    const std::size_t count = m_lights.size();
-    const bool is_few = count <= max_candidates;
-    // Each of few lights gives as many candidates.
-    const std::size_t of_each =
-        is_few ? std::max<std::size_t>(max_candidates / 2 / std::max<std::size_t>(count, 1), 1) : 1;
-    LitRay chosen;
-    Candidate kept;
-    float kept_weight = 0.0f;
-    float sum = 0.0f;
-    const auto offer = [&](std::size_t light, double probability) {
-        const Candidate next = candidate(light, point, random);
-        const float weight = mean(next.radiance) / static_cast<float>(probability);
-        if (!(weight > 0.0f))
-            return;
-        sum += weight;
-        // Reservoir sampling keeps one candidate in proportion to its weight.
-        if (sum == weight || random.uniform() * static_cast<double>(sum) < static_cast<double>(weight)) {
-            kept = next;
-            kept_weight = mean(next.radiance);
-            chosen.occluders = m_lights[light].occluders;
-        }
-    };
-    if (is_few) {
-        for (std::size_t i = 0; i < count; ++i) {
-            const std::size_t rays = m_lights[i].light->is_delta() ? 1 : of_each;
-            for (std::size_t k = 0; k < rays; ++k)
-                offer(i, static_cast<double>(rays));
-        }
-    } else {
-        // Stratified draws from the distribution.
-        for (std::size_t k = 0; k < max_candidates; ++k) {
-            const double at =
-                (static_cast<double>(k) + random.uniform()) / static_cast<double>(max_candidates) * m_cumulated.back();
-            const auto above = std::upper_bound(m_cumulated.begin() + 1, m_cumulated.end() - 1, at);
-            const auto light = static_cast<std::size_t>(above - m_cumulated.begin()) - 1;
-            const double part = (m_cumulated[light + 1] - m_cumulated[light]) / m_cumulated.back();
-            offer(light, part * static_cast<double>(max_candidates));
-        }
-    }
-    if (kept_weight > 0.0f) {
-        chosen.radiance = kept.radiance * (sum / kept_weight);
-        chosen.shadow_ray = shadow_ray(point, kept.ray);
-    }
+    const std::uint32_t cell = m_guide ? m_guide->cell(point.position) : 0;
+    Reservoir reservoir;
+    if (m_lights.size() <= max_candidates)
+        offer_few(point, cell, reservoir, random);
+    else
+        offer_many(point, cell, reservoir, random);
+    if (reservoir.is_empty())
+        return {};
+    const Candidate& kept = reservoir.kept();
+    LitRay chosen{.shadow_ray = shadow_ray(point, kept.ray),
+                  .radiance = kept.radiance * reservoir.scale(),
+                  .occluders = m_lights[kept.light].occluders};
+    if (m_guide)
+        chosen.record = {.cell = cell,
+                         .light = static_cast<std::uint32_t>(kept.light),
+                         .bin = BounceGuide::bin(chosen.shadow_ray.direction),
+                         .radiance = m_distant[kept.light] ? kept.glow * reservoir.scale() : 0.0f};
     return chosen;
 }
 

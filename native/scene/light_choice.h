@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/random.h"
+#include "scene/bounce_guide.h"
 #include "scene/bsdf.h"
 #include "scene/light.h"
 #include "scene/occluders.h"
@@ -32,6 +33,7 @@ struct LitRay {
     ShadowRay shadow_ray;
     Vec3f radiance{0.0f};  // W/(m^2 sr); 0: no ray
     const Occluders* occluders = nullptr;
+    GuideRecord record{};
 };
 
 // Resampled importance sampling (Talbot, Cline, Egbert 2005, "Importance resampling for global illumination"): several
@@ -45,22 +47,37 @@ public:
     // Chooses among many lights by the light that they bring to such points on the mean.
     void learn(std::span<const ShadingPoint> points, Random& random);
 
+    // Chooses lights and directions of the sky by their visibility. The guide must outlive the object; null: none.
+    void set_guide(const BounceGuide* guide) { m_guide = guide; }
+
     LitRay choose(const ShadingPoint& point, Random& random) const;
 
+    std::size_t count() const { return m_lights.size(); }
     bool is_empty() const { return m_lights.empty(); }
 
 private:
     struct Candidate {
         LightRay ray;
-        Vec3f radiance{0.0f};
+        Vec3f radiance{0.0f};  // that it brings to the viewer
+        float glow = 0.0f;     // flux of the ray, mean of the channels
+        std::size_t light = 0;
     };
+    class Reservoir;
 
-    // A ray of a light and the radiance that it brings to the viewer.
+    // A ray of a light.
     Candidate candidate(std::size_t light, const ShadingPoint& point, Random& random) const;
+    // Rays of a distant light, some of which the guide has chosen.
+    void offer_guided(std::size_t light, const ShadingPoint& point, std::uint32_t cell, Reservoir& reservoir,
+                      Random& random) const;
+    void offer_few(const ShadingPoint& point, std::uint32_t cell, Reservoir& reservoir, Random& random) const;
+    void offer_many(const ShadingPoint& point, std::uint32_t cell, Reservoir& reservoir, Random& random) const;
+    Candidate with_radiance(std::size_t light, const ShadingPoint& point, const LightRay& ray) const;
+    float visibility(std::uint32_t cell, std::size_t light) const;
 
     std::vector<SceneLight> m_lights;
-    std::vector<std::unique_ptr<const Light>> m_prepared;
+    std::vector<std::unique_ptr<const DistantLight>> m_distant;  // [light] null for others
     std::vector<double> m_cumulated;  // probabilities of many lights; one more than lights
+    const BounceGuide* m_guide = nullptr;
 };
 
 }  // namespace beamspread

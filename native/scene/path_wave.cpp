@@ -122,6 +122,7 @@ void PathWave::add(const LitRay& ray, std::uint32_t slot, std::vector<Vec3f>& ra
     packet.rays[packet.count] = ray.shadow_ray;
     packet.radiance[packet.count] = ray.radiance;
     packet.slots[packet.count] = slot;
+    packet.records[packet.count] = ray.record;
     if (++packet.count == Occluders::packet_size)
         flush(*ray.occluders, packet, radiance);
 }
@@ -130,8 +131,13 @@ void PathWave::flush(const Occluders& occluders, Waiting& waiting, std::vector<V
 {
     std::array<Vec3f, Occluders::packet_size> transmittance;
     occluders.transmit(std::span(waiting.rays).first(waiting.count), transmittance.data(), false);
-    for (std::size_t i = 0; i < waiting.count; ++i)
+    for (std::size_t i = 0; i < waiting.count; ++i) {
         radiance[waiting.slots[i]] += waiting.radiance[i] * transmittance[i];
+        if (!m_records)
+            continue;
+        m_records->push_back(waiting.records[i]);
+        m_records->back().transmittance = (transmittance[i].x + transmittance[i].y + transmittance[i].z) / 3.0f;
+    }
     waiting.count = 0;
 }
 

@@ -3,7 +3,7 @@
 
 #include <array>
 #include <cstdint>
-#include <map>
+#include <utility>
 #include <vector>
 
 #include "base/random.h"
@@ -29,6 +29,9 @@ public:
     // Traces all paths and adds radiance, W/(m^2 sr), to the slots; paths that follow each other should run alike.
     void trace(std::vector<Vec3f>& radiance);
 
+    // Keeps records of shadow rays for a guide; it must outlive the paths.
+    void record(std::vector<GuideRecord>* records) { m_records = records; }
+
     // Traces only the first part of all paths and writes the surfaces that they meet.
     void find_first(std::vector<ShadingPoint>& points);
 
@@ -48,6 +51,7 @@ private:
         std::array<ShadowRay, Occluders::packet_size> rays;
         std::array<Vec3f, Occluders::packet_size> radiance;
         std::array<std::uint32_t, Occluders::packet_size> slots;
+        std::array<GuideRecord, Occluders::packet_size> records;
         std::size_t count = 0;
     };
 
@@ -56,13 +60,14 @@ private:
     // Adds light at a surface and turns the path; returns false at its end.
     bool reflect(Path& path, const SurfaceHit& hit, std::vector<Vec3f>& radiance);
     void add(const LitRay& ray, std::uint32_t slot, std::vector<Vec3f>& radiance);
-    static void flush(const Occluders& occluders, Waiting& waiting, std::vector<Vec3f>& radiance);
+    void flush(const Occluders& occluders, Waiting& waiting, std::vector<Vec3f>& radiance);
 
     const Occluders& m_surfaces;
     const LightChoice& m_lights;
     int m_max_bounces;
     std::vector<Path> m_paths;
     std::vector<std::pair<const Occluders*, Waiting>> m_waiting;
+    std::vector<GuideRecord>* m_records = nullptr;
 };
 
 }  // namespace beamspread

@@ -26,7 +26,7 @@ def grid(centre=(0.0, 0.0, 1e-4), size=(1.0, 1.0), nodes=(8, 8)):
 
 
 def bounced(scene, lights, grids=None, **options):
-    options = {"direct": 1.0, "max_bounces": 200, **options}
+    options = {"direct": 1.0, "max_bounces": 200, "max_samples": 1024, **options}
     lit = [(light, strength if np.ndim(strength) else (strength,) * 3, scene) for light, strength in lights]
     return native.bounced_light(grids or [grid()], STRATA, lit, scene, **options)
 
@@ -69,12 +69,12 @@ UPRIGHT = np.array([(0.0, 1e-6, 0.0, 1.0)])
 OBLIQUE = np.array([(0.735, 0.03, 0.0, 1.0)])
 
 
-def reflectance(reflector, strata, **options):
+def reflectance(reflector, strata):
     """Reflectance of a ceiling under even light from below, toward the directions of the strata."""
     scene = native.Occluders([mesh(SQUARE * 1e3 + (0, 0, 1), FACES, reflector)])
     sky = native.EnvironmentLight(np.ones((4, 8, 3), np.float32), np.eye(3))
     lights = [(sky, UNIT, None)]
-    found = native.bounced_light([grid()], strata, lights, scene, 0.0, max_bounces=1, tolerance=4e-3, **options)
+    found = native.bounced_light([grid()], strata, lights, scene, 0.0, max_bounces=1, tolerance=4e-3, max_samples=1024)
     return found["radiance"][0].mean((0, 1, 2)), 3 * found["noise"]
 
 
@@ -188,7 +188,7 @@ def test_two_plates_exchange_light():
     scene = native.Occluders([mesh(SQUARE, FACES, grey(0.9)), mesh(SQUARE + (0, 0, 1), FACES, grey(0.7))])
     lights = [(native.SunLight((0, 0, -1)), UNIT, None)]
     floor = grid(size=(2.0, 2.0))
-    found = native.bounced_light([floor], STRATA, lights, scene, 0.0, tolerance=1e-3, max_bounces=60)
+    found = native.bounced_light([floor], STRATA, lights, scene, 0.0, max_samples=1024, tolerance=1e-3, max_bounces=60)
     _, factors = plates(32, 1.0)
     back_and_forth = 0.7 * factors @ (0.9 * factors)
     wanted = np.linalg.solve(np.eye(len(factors)) - back_and_forth, back_and_forth @ np.ones(len(factors)))
@@ -200,7 +200,7 @@ def test_two_plates_exchange_light():
     # Light that only one surface reflects does not get there: the upper plate is lit from above.
     once = native.bounced_light([floor], STRATA, lights, scene, 0.0, max_bounces=1)
     assert once["irradiance"] == 0
-    twice = native.bounced_light([floor], STRATA, lights, scene, 0.0, tolerance=2e-3, max_bounces=2)
+    twice = native.bounced_light([floor], STRATA, lights, scene, 0.0, max_samples=1024, tolerance=2e-3, max_bounces=2)
     wanted = (back_and_forth @ np.ones(len(factors))).mean()
     assert twice["irradiance"] == pytest.approx(wanted, rel=1e-3 + 3 * twice["noise"])
 
@@ -261,7 +261,7 @@ def test_see_through_surfaces_share_light():
     black = native.Reflector(native.ColorTexture((0.0, 0.0, 0.0)))
     below = grid((0, 0, 1e-3), (0.2, 0.2), (4, 4))
     sun = [(native.SunLight((1, 0, 0)), UNIT, None)]  # no shadows
-    options = {"tolerance": 2e-3, "max_bounces": 1}
+    options = {"tolerance": 2e-3, "max_bounces": 1, "max_samples": 1024}
     materials = np.zeros((2, 1), np.uint32)
     cards = [
         mesh(card, FACES, reflector, transmittances=[leaves], materials=materials) for reflector in (black, grey(0.4))
@@ -294,3 +294,23 @@ def test_the_noise_is_the_error_over_seeds():
     # The border's nodes are averaged less, and are counted in the noise: a quarter of all with up to twice the error.
     assert noise / 1.5 < error < noise * 1.1
     assert noise < 0.031
+
+
+def test_a_sky_behind_a_window_is_a_glowing_pane():
+    """Most rays to the sky end at walls, so that the guide chooses them; a pane of the same radiance needs no guide."""
+    walls, faces = box((-1, -1, -1e-3), (1, 1, 1))
+    side = SQUARE @ np.array([(0, 1, 0), (0, 0, 1), (1, 0, 0)]) * (1, 0.3, 0.2) + (1, 0, 0.5)
+    is_wall = ~(walls[faces][..., 0] > 0).all(1)
+    frame = [
+        SQUARE @ np.array([(0, 1, 0), (0, 0, 1), (1, 0, 0)]) * (1, y, z) + (1, *middle)
+        for y, z, middle in [(0.35, 1, (-0.65, 0)), (0.35, 1, (0.65, 0)), (0.3, 0.3, (0, 0)), (0.3, 0.3, (0, 1))]
+    ]
+    parts = [mesh(walls, faces[is_wall], grey(0.6)), *(mesh(part, FACES, grey(0.6)) for part in frame)]
+    room = native.Occluders(parts)
+    sky = native.EnvironmentLight(np.ones((4, 8, 3), np.float32), np.eye(3))
+    pane = native.MeshLight(side + (1e-6, 0, 0), FACES, np.ones((2, 3), np.float32))
+    below = [grid((-0.2, 0, 1e-3), (1.4, 1.4))]
+    found = [bounced(room, [(light, UNIT)], below, max_bounces=4, tolerance=2e-3) for light in (sky, pane)]
+    assert found[0]["irradiance"] > 0.05
+    error = 3 * np.hypot(found[0]["noise"], found[1]["noise"]) * (1 + found[0]["irradiance"])
+    assert found[0]["irradiance"] == pytest.approx(found[1]["irradiance"], abs=error)
