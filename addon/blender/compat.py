@@ -157,30 +157,11 @@ def save_as_multilayer_exr(scene) -> None:
     settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
 
 
-def compositor_of(scene):
-    """Empty compositor tree of a scene, and its output node (Blender 5.0 uses a node group)."""
-    if hasattr(scene, "compositing_node_group"):
-        tree = scene.compositing_node_group = bpy.data.node_groups.new("Compositor", "CompositorNodeTree")
-        add_output_socket(tree, "NodeSocketColor", "Image")
-        return tree, tree.nodes.new("NodeGroupOutput")
-    scene.use_nodes = True
-    tree = scene.node_tree
-    tree.nodes.clear()
-    return tree, tree.nodes.new("CompositorNodeComposite")
-
-
 def set_panorama(camera) -> None:
     """Make a camera show an equirectangular panorama in Cycles (newer versions have the setting on the camera)."""
     camera.type = "PANO"
     owner = camera if hasattr(camera, "panorama_type") else camera.cycles
     owner.panorama_type = "EQUIRECTANGULAR"
-
-
-def has_denoiser() -> bool:
-    """True if Blender was built with OpenImageDenoise, which Debian's is not."""
-    import _cycles  # Blender's own module, which exists only while Blender runs
-
-    return bool(getattr(_cycles, "with_openimagedenoise", False))
 
 
 def light_linking(obj):

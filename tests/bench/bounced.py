@@ -1,4 +1,4 @@
-"""Errors of bounced light with and without a denoiser, by samples: in Blender 4.5, which has one.
+"""Errors of bounced light that Cycles finds, with and without the filter, by samples: in Blender 4.5.
 
 PYTHONPATH=build/stage build/venv/bin/python tests/bench/bounced.py [REFERENCE_SAMPLES]
 """

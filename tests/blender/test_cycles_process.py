@@ -45,7 +45,7 @@ def is_there(number):
         return False
 
 
-def ends(number, seconds=5.0):
+def ends(number, seconds=20.0):
     until = time.monotonic() + seconds
     while is_there(number) and time.monotonic() < until:
         time.sleep(0.05)
@@ -216,7 +216,7 @@ def test_an_orphan_without_work_ends():
     child = subprocess.Popen([*program, str(process.CHILD), "--", "mark", "60"], stdin=subprocess.PIPE)
     time.sleep(0.2)
     child.stdin.close()
-    assert child.wait(5) == 0
+    assert child.wait(30) == 0
 
 
 def test_without_requests_it_ends_and_the_next_one_starts_another(monkeypatch):

@@ -3,100 +3,110 @@
 Part of the child process (child.py).
 """
 
-import traceback
+import math
 
 import bpy
 import compat
 import numpy as np
-from child_denoise import Denoiser
+from child_filter import filter_map, insides, smooth
 from child_ghost import add_ghost, draw_anew
 
-# Samples per node and stratum of each of the first two rounds, which measure the noise. Later rounds take twice as many
-# as the round before. The number of rounds does not depend on time, so that every run gives the same result.
-FIRST_SAMPLES = 4
+# Samples of each half, node and stratum in the first round, which shows how much there is to find. More take longer
+# where there is little; the first of a round lies in the middle of its node, so that a single one shows no difference.
+FIRST_SAMPLES = 2
 
-# Factor by which a denoiser reduces noise (docs/tuning.md); sampling stops that much earlier.
-DENOISED = 2.0
+# Most samples of a round, relative to all before. Larger values take fewer rounds, each of which builds up the scene
+# anew, and overshoot where the first rounds have overestimated the noise.
+MAX_GROWTH = 7
+
+# Most samples of a bake, after which there is progress.
+MAX_ROUND = 16
+
+# Fraction of the unoccluded light below which a surface counts as dim: the number of samples falls in proportion.
+# Larger values leave dark surfaces noisier.
+DIM = 0.01
 
 
 def fields(request, scene, progress) -> dict:
     """Task `fields`: radiance_0, radiance_1, ... of the charts, float32 (K, rows, columns, 3), and noise.
 
     `light` is "INDIRECT" or "DIRECT". `only` names the objects whose light counts; none: all. With `by_lamps` a white
-    diffuse surface of one stratum replaces the mirrors, so that Cycles samples lamps of any size. The mean
-    `irradiance`, W/m^2, is that of the first two rounds. There are no more rounds if it is below the fraction
-    `negligible` of `direct`.
+    diffuse surface of one stratum replaces the mirrors, so that Cycles samples lamps of any size. Light below the
+    fraction `negligible` of the unoccluded light `open`, W/m^2, is not refined.
 
     Radiance is the cosine-weighted mean of each stratum. The noise is the root mean square error of the irradiance over
-    all nodes, relative to its mean. Bounced light is smooth: a denoiser removes noise from its irradiance, and the
-    strata follow in proportion.
+    the result, which smooths by a Gaussian of `variance` (squared nodes) or as much as one, relative to the mean of all
+    irradiance: this one and `direct`, W/m^2. Rounds go on until it is below
+    `tolerance`, or until each node and stratum has `most_samples`; their number does not depend on time, so that every
+    run gives the same result. The irradiance is filtered, and the strata follow in proportion.
     """
     for name, color in request["reflectances"].items():
         material = bpy.data.materials.get(name)
         if material is not None:  # the copy has only materials that the scene uses
             make_diffuse(material, color, request["textures"].get(name))
-    if not request.get("with_world", True):
+    if not request["with_world"]:
         scene.world = None
     set_up(scene, request["light"])
     if request["only"]:
         shine_alone(scene, request["only"])
-    ghost, image = add_ghost(request["charts"], request["strata"], request["by_lamps"])
+    strata = [*request["strata"], *request["strata"]]  # two tiles for each: halves of the samples
+    ghost, image = add_ghost(request["charts"], strata, request["by_lamps"])
     scene.collection.objects.link(ghost)
     baker = Baker(scene, ghost, image, "DIFFUSE" if request["by_lamps"] else "GLOSSY", request["light"])
-    rounds = [baker.bake(FIRST_SAMPLES), baker.bake(FIRST_SAMPLES)]
-    mean, samples, count = Mean(), 2 * FIRST_SAMPLES, 2 * FIRST_SAMPLES
-    for pixels in rounds:
-        mean.add(pixels, FIRST_SAMPLES)
-    rounds = [np.nan_to_num(pixels) for pixels in rounds]
-    irradiance = np.pi * float(np.mean([mean_radiance(request, pixels) for pixels in rounds]))
-    # The mean of both rounds has noise / sqrt(2), which falls by the root of the samples.
-    noise = noise_of(request, *rounds) / np.sqrt(2)
-    denoise = working_denoiser(request, mean) if request["light"] == "INDIRECT" else None
-    gain = DENOISED if denoise else 1.0
-    allowed = gain * allowed_noise(request, irradiance)
-    most = samples if irradiance < request["negligible"] * request["direct"] else request["most_samples"]
-    wanted = int(min(np.ceil(samples * (noise / allowed) ** 2), most))
-    progress(samples / max(wanted, samples))
-    while samples < wanted:
-        count = min(count, wanted - samples)
-        mean.add(baker.bake(count), count)
-        samples, count = samples + count, 2 * count
-        progress(samples / wanted)
-    parts = split(request, np.maximum(mean.values(), 0))
-    if denoise:
-        parts = with_irradiance(request, parts, denoise(irradiances(request, parts)))
-    result = {f"radiance_{n}": part for n, part in enumerate(parts)}
-    result["noise"] = np.array(noise * np.sqrt(2 * FIRST_SAMPLES / samples) / gain)
-    result["samples"], result["irradiance"] = np.array(samples), np.array(irradiance)
-    return result
+    mean, samples, count, wanted = Mean(), 0, FIRST_SAMPLES, math.inf
+    while True:
+        for part in [MAX_ROUND] * (count // MAX_ROUND) + [count % MAX_ROUND] * (count % MAX_ROUND > 0):
+            mean.add(baker.bake(part), part)
+            samples += part
+            progress(samples / max(wanted, samples))
+        charts = [Chart(request, *halves) for halves in halves_of(request, np.maximum(mean.values(), 0))]
+        nodes = np.array([chart.clean[..., 0].size for chart in charts])
+        irradiance, noise, blur = (
+            float(nodes @ values / nodes.sum())
+            for values in zip(*((chart.clean.mean(), chart.noise, chart.blur) for chart in charts))
+        )
+        irradiance *= np.pi
+        total = max(irradiance + request["direct"], 1e-30)
+        error = np.pi * np.sqrt(noise + blur) / total
+        limit = request["most_samples"] / 2 * min(1.0, total / (DIM * request["open"] + 1e-30))
+        wanted = min(samples * (error / request["tolerance"]) ** 2, limit)
+        if irradiance < request["negligible"] * request["open"] or samples >= wanted:
+            break
+        count = int(min(np.ceil(wanted) - samples, MAX_GROWTH * samples))
+    result = {f"radiance_{n}": chart.radiance() for n, chart in enumerate(charts)}
+    result |= {"noise": error, "samples": 2 * samples, "irradiance": irradiance}
+    return {name: np.asarray(value) for name, value in result.items()}
 
 
-def working_denoiser(request, mean):
-    """Denoiser of this Blender, None if it has none or it fails."""
-    if not compat.has_denoiser():
-        return None
-    try:
-        denoise = Denoiser()
-        denoise(irradiances(request, split(request, np.maximum(mean.values(), 0))))
-    except Exception:  # noqa: BLE001 - more samples replace it
-        traceback.print_exc()
-        return None
-    return denoise
+class Chart:
+    """Light on one chart.
 
+    Attributes
+    ----------
+    clean : irradiance over pi, without noise as far as possible, float32 (rows, columns, 3).
+    noise, blur : mean squares of its errors.
+    """
 
-def irradiances(request, parts) -> list:
-    """Irradiance over pi of each chart, from the radiance of its strata."""
-    _, reach, _, part = np.transpose(request["strata"])
-    return [np.tensordot(np.float32(reach * part), values, 1) for values in parts]
+    def __init__(self, request, first, second) -> None:
+        _, reach, _, part = np.transpose(request["strata"])
+        halves = [np.tensordot(np.float32(reach * part), values, 1) for values in (first, second)]
+        self._radiance = (first + second) / 2
+        self._inside = insides(self._radiance)
+        self._noisy = (halves[0] + halves[1]) / 2
+        self.clean, self.noise, self.blur = filter_map(*halves, self._inside, request["variance"])
 
-
-def with_irradiance(request, parts, wanted) -> list:
-    """Strata scaled to the wanted irradiance, in each node and channel."""
-    ratios = [
-        np.divide(new, old, out=np.zeros_like(old), where=old > 0)
-        for new, old in zip(wanted, irradiances(request, parts))
-    ]
-    return [values * ratio for values, ratio in zip(parts, ratios)]
+    def radiance(self):
+        """Radiance of the strata, in proportion to the clean irradiance; dark nodes have their neighbors' mean."""
+        weights = (~self._inside).astype(np.float32)
+        radiance, noisy, lit = self._radiance, self._noisy, self._noisy > 0
+        for passes in (1, 4, 16, 64):
+            if lit[~self._inside].all():
+                break
+            wide = np.stack([smooth(values, weights, passes) for values in self._radiance])
+            wide_noisy = smooth(self._noisy, weights, passes)
+            radiance, noisy = np.where(lit, radiance, wide), np.where(lit, noisy, wide_noisy)
+            lit = noisy > 0
+        return radiance * np.divide(self.clean, noisy, out=np.zeros_like(noisy), where=noisy > 0)
 
 
 def make_diffuse(material, color, texture) -> None:
@@ -181,6 +191,30 @@ def shine_alone(scene, names) -> None:
                     socket.default_value = 0.0
 
 
+def may_glow() -> bool:
+    """True if any surface or volume may emit light."""
+    waiting = [material.node_tree for material in bpy.data.materials if material.node_tree]
+    trees = []
+    for tree in waiting:
+        trees.append(tree)
+        inner = (getattr(node, "node_tree", None) for node in tree.nodes)
+        waiting += [group for group in inner if group is not None and group not in waiting]
+    return any(_glows(node) for tree in trees for node in tree.nodes)
+
+
+def _glows(node) -> bool:
+    if node.type == "BSDF_PRINCIPLED":
+        color = next(node.inputs[name] for name in ("Emission Color", "Emission") if name in node.inputs)
+        strength = node.inputs["Emission Strength"]
+        is_dark = not color.is_linked and not any(color.default_value[:3])
+        return not is_dark and (strength.is_linked or strength.default_value != 0)
+    linked = node.type == "OUTPUT_MATERIAL" and node.inputs["Surface"].is_linked
+    source = node.inputs["Surface"].links[0].from_socket if linked else None
+    return node.type in {"EMISSION", "VOLUME_PRINCIPLED", "SCRIPT", "EEVEE_SPECULAR"} or (
+        source is not None and source.type != "SHADER"
+    )
+
+
 def without_limits(scene) -> None:
     """Set Cycles to use neither clamps and exposure nor anything that stops early."""
     scene.render.engine = "CYCLES"
@@ -224,7 +258,7 @@ class Baker:
 
     def __init__(self, scene, ghost, image, kind, light="") -> None:
         self.scene, self.ghost, self.image, self.kind, self.light = scene, ghost, image, kind, light
-        self.rounds = 0
+        self.rounds, self.may_glow = 0, may_glow()
         view_layer = bpy.context.view_layer
         view_layer.update()  # else the ghost can't be selected
         for obj in view_layer.objects:
@@ -239,6 +273,8 @@ class Baker:
         self.rounds += 1
         draw_anew(self.ghost, self.rounds)
         self.scene.cycles.seed, self.scene.cycles.samples = self.rounds, samples
+        if self.light == "INDIRECT" and compat.indirect_bakes_lack_lamps() and not self.may_glow:
+            return self.bake_passes({"DIRECT", "INDIRECT"})  # mirrors see no other direct light
         if self.light == "INDIRECT" and compat.indirect_bakes_lack_lamps():
             # With the same seed both bakes follow the same paths, so direct light cancels without noise.
             return self.bake_passes({"DIRECT", "INDIRECT"}) - self.bake_passes({"DIRECT"})
@@ -253,35 +289,12 @@ class Baker:
         return np.where(np.isfinite(pixels), pixels, np.nan)
 
 
-def split(request, pixels) -> list:
-    """Parts (K, rows, columns, 3) of the image, for each chart."""
-    parts, row, count = [], 0, len(request["strata"])
+def halves_of(request, pixels) -> list:
+    """Both halves of the samples of each chart, (K, rows, columns, 3), from the pixels of the image."""
+    halves, row, count = [], 0, len(request["strata"])
     for chart in request["charts"]:
         columns, rows = chart["nodes"]
-        block = pixels[row : row + rows, : count * columns].reshape(rows, count, columns, 3)
-        parts.append(np.ascontiguousarray(block.transpose(1, 0, 2, 3)))
+        block = pixels[row : row + rows, : 2 * count * columns].reshape(rows, 2, count, columns, 3)
+        halves.append(np.ascontiguousarray(block.transpose(1, 2, 0, 3, 4)))
         row += rows
-    return parts
-
-
-def mean_radiance(request, pixels) -> np.ndarray:
-    """Cosine-weighted mean radiance over the hemisphere, for each node."""
-    _, reach, _, part = np.transpose(request["strata"])
-    return np.concatenate(
-        [np.tensordot(reach * part, values.mean(axis=3), 1).ravel() for values in split(request, pixels)]
-    )
-
-
-def allowed_noise(request, irradiance: float) -> float:
-    """Allowed noise of the irradiance, relative to it; it grows with the direct light beside it."""
-    low, high = request["noise"]
-    if irradiance <= 0:
-        return high
-    return float(np.clip(request["noise_of_all"] * (1 + request["direct"] / irradiance), low, high))
-
-
-def noise_of(request, first, second) -> float:
-    """Relative noise of the irradiance in one round, from the difference of two."""
-    first, second = mean_radiance(request, first), mean_radiance(request, second)
-    total = (first + second).mean() / 2
-    return float(np.sqrt(((first - second) ** 2 / 2).mean()) / total) if total > 0 else 0.0
+    return halves

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
 from ...core.bake.job import BakeJob, Step
-from ...core.bake.layers import mean_open_irradiance
+from ...core.bake.layers import mean_irradiance, mean_open_irradiance
+from ...core.bake.smoothing import SPLINE_VARIANCE, smoothing_variance
 from ...core.errors import MissingImageError
-from ...core.messages import Message, warning
+from ...core.messages import Message, note, warning
 from ...core.progress import Callback, Progress
 from ...core.scene.lights import STRATA, Field, FieldLight, Light, WorldLight
-from ...core.scene.receiver import Receiver
+from ...core.scene.receiver import Grid, Receiver
 from .. import compat
 from ..read.image_nodes import missing_images
 from ..read.nodes import Links, surface_of
@@ -29,10 +30,10 @@ NODES = 64
 # Most squares of that side that the nodes of all charts fill.
 MAX_SQUARES = 2.0
 
-# Allowed noise of bounced light at a node, relative to all irradiance; interpolation about halves it.
-NOISE_OF_ALL = 0.01
-# Limits of that noise, relative to the bounced irradiance.
-MIN_NOISE, MAX_NOISE = 0.03, 0.1
+# Allowed noise of the irradiance that Cycles finds, relative to all irradiance, as texels get it.
+NOISE = 0.01
+# Multiple of that noise from which a message names it.
+NOISY = 1.2
 # Most samples of each direction at a node.
 MAX_SAMPLES = 128
 
@@ -42,8 +43,8 @@ NOTHING_BOUNCES = warning(
     "", "Indirect light is left out: it is less than a millionth of what the lights send without obstacles."
 )
 
-# Nodes along the longest side, and noise, of direct light whose nodes only Cycles can evaluate.
-DIRECT_NODES, DIRECT_NOISE = 256, 0.02
+# Nodes along the longest side for direct light of lamps whose nodes only Cycles can evaluate.
+DIRECT_NODES = 256
 
 # Height above the receiver at which light is gathered, in nodes; objects below it cast no shadow.
 LIFT = 1e-3
@@ -59,9 +60,10 @@ REQUEST = {
     "by_lamps": False,
     "reflectances": {},
     "textures": {},
-    "noise": (MIN_NOISE, MAX_NOISE),
-    "noise_of_all": NOISE_OF_ALL,
+    "tolerance": NOISE,
+    "variance": SPLINE_VARIANCE,
     "direct": 0.0,
+    "open": 0.0,
     "negligible": NEGLIGIBLE,
     "most_samples": MAX_SAMPLES,
 }
@@ -160,56 +162,87 @@ class LightByCycles(Step):
 
     def run(self, job: BakeJob, progress: Progress) -> BakeJob:
         renders_world = bool(self.world) and self.copy.panorama is None
-        first, second, *rest = progress.split([1.0 * renders_world, 2.0 * self.bounced, *(1.0 for _ in self.lamps)])
-        illumination, receiver = job.illumination, job.receiver
+        lamps = [[name] for name, lamp in self.lamps.items() if lamp is not None]
+        meshes = [name for name, lamp in self.lamps.items() if lamp is None]
+        groups = [*lamps, *([meshes] if meshes else [])]
+        first, *rest, last = progress.split([1.0 * renders_world, *(1.0 for _ in groups), 2.0 * self.bounced])
         if renders_world:
             radiance = world_panorama(self.copy.scene, progress=first)
             self.copy.panorama = WorldLight(self.world, *WHITE, True, radiance, UPRIGHT)
         if self.world:
-            illumination = illumination.lit_by([self.copy.panorama])
-        if self.bounced:
-            direct = _irradiance_in_the_open(receiver, illumination.lights)
-            fields, irradiance = self._fields(receiver, second, "Finding indirect light", direct=direct)
-            if irradiance >= NEGLIGIBLE * direct:
-                illumination = illumination.lit_by([FieldLight("Bounced light", *WHITE, False, fields)])
-            elif irradiance > 0:
-                illumination = illumination.with_messages(NOTHING_BOUNCES)
-        lights = [self._direct(receiver, name, part) for name, part in zip(self.lamps, rest)]
-        return replace(job, illumination=illumination.lit_by(lights))
+            job = replace(job, illumination=job.illumination.lit_by([self.copy.panorama]))
+        for names, part in zip(groups, rest):
+            job = self._with_direct(job, names, part)
+        return self._with_bounced(job, last) if self.bounced else job
 
-    def _direct(self, receiver: Receiver, name: str, progress: Progress) -> Light:
-        """Light of one object on the receiver."""
-        lamp = self.lamps[name]
-        doing = f"Finding the light of '{name}'"
-        options = {"light": "DIRECT", "only": [name], "noise": (DIRECT_NOISE, DIRECT_NOISE)}
-        if lamp is None:
-            return FieldLight(name, *WHITE, False, self._fields(receiver, progress, doing, **options)[0])
-        whole = {"by_lamps": True, "strata": [[0.0, 1.0, 0.0, 1.0]], "charts": charts_of(receiver, DIRECT_NODES)}
-        fields, _ = self._fields(receiver, progress, doing, **options, **whole)
-        return FieldLight(name, *WHITE, False, fields, **lamp)
+    def _with_direct(self, job: BakeJob, names: list[str], progress: Progress) -> BakeJob:
+        """The job with the light of one lamp, or of all meshes together."""
+        lamp, doing = self.lamps[names[0]], f"Finding the light of {_listed(names)}"
+        options = {"light": "DIRECT", "only": names}
+        if lamp is not None:
+            options |= {"nodes": DIRECT_NODES, "by_lamps": True, "strata": [[0.0, 1.0, 0.0, 1.0]]}
+        job, fields, _ = self._with_fields(job, progress, doing, **options)
+        light = FieldLight(", ".join(names), *WHITE, False, fields, **(lamp or {}))
+        return replace(job, illumination=job.illumination.lit_by([light]))
 
-    def _fields(self, receiver: Receiver, progress: Progress, doing: str, **options) -> tuple[tuple[Field, ...], float]:
-        """Bounced light, or light as the options ask for, and an estimate of its mean irradiance, W/m^2."""
+    def _with_bounced(self, job: BakeJob, progress: Progress) -> BakeJob:
+        job, fields, fraction = self._with_fields(job, progress, "Finding indirect light")
+        illumination = job.illumination
+        if fraction >= NEGLIGIBLE:
+            illumination = illumination.lit_by([FieldLight("Bounced light", *WHITE, False, fields)])
+        elif fraction > 0:
+            illumination = illumination.with_messages(NOTHING_BOUNCES)
+        return replace(job, illumination=illumination)
+
+    def _with_fields(
+        self, job: BakeJob, progress: Progress, doing: str, nodes: int = 0, **options
+    ) -> tuple[BakeJob, tuple[Field, ...], float]:
+        """Bounced light, or light as the options ask for: the job with messages, the light, its fraction of all.
+
+        The fraction is that of the irradiance without obstacles on both sides; infinite if there is no other light.
+        """
+        receiver, lights = job.receiver, job.illumination.lights
+        without_obstacles = _mean(receiver, lambda grid: _open_irradiance_of_both_sides(grid, lights))
+        nodes = nodes or NODES
         request = REQUEST | {
-            "charts": charts_of(receiver, NODES),
+            "charts": charts_of(receiver, nodes),
             "with_world": self.has_world,
             "reflectances": self.copy.reflectances,
             "textures": self.copy.textures,
-            "noise": (MIN_NOISE, MAX_NOISE),
+            "tolerance": NOISE,
+            "direct": _mean(receiver, lambda grid: mean_irradiance(grid, job.illumination)),
+            "open": without_obstacles,
+            "variance": smoothing_variance(receiver, job.surface, job.settings, nodes),
             "most_samples": MAX_SAMPLES,
         }
         arrays = run(self.copy.scene, "fields", request | options, progress, doing)
         grids = (chart.grid for chart in receiver.charts)
         fields = tuple(Field(grid.origin, grid.normal, arrays[f"radiance_{n}"]) for n, grid in enumerate(grids))
-        return fields, float(arrays["irradiance"])
+        noise, irradiance = float(arrays["noise"]), float(arrays["irradiance"])
+        fraction = irradiance / without_obstacles if without_obstacles > 0 else math.inf * (irradiance > 0)
+        if fraction >= NEGLIGIBLE and noise > NOISY * NOISE:
+            text = f"{doing} on '{job.name}' ended with {noise:.1%} of noise, relative to all light there."
+            job = replace(job, illumination=job.illumination.with_messages(note(job.name, text)))
+        return job, fields, fraction
 
 
-def _irradiance_in_the_open(receiver: Receiver, lights: Sequence[Light]) -> float:
-    """Mean irradiance, W/m^2, of the lights without occluders."""
+def _listed(names: Sequence[str]) -> str:
+    """The first names, and the number of others."""
+    shown = ", ".join(f"'{name}'" for name in names[:3])
+    return shown if len(names) <= 3 else f"{shown} and {len(names) - 3} more"
+
+
+def _open_irradiance_of_both_sides(grid: Grid, lights: Sequence[Light]) -> float:
+    """Mean irradiance without obstacles, W/m^2: light from behind may come back as well."""
+    back = replace(grid, normal=tuple(-value for value in grid.normal))
+    return mean_open_irradiance(grid, lights) + mean_open_irradiance(back, lights)
+
+
+def _mean(receiver: Receiver, value_of: Callable[[Grid], float]) -> float:
+    """Mean of a value of each grid, weighted by area."""
     grids = [chart.grid for chart in receiver.charts]
-    means = [mean_open_irradiance(grid, lights) for grid in grids]
     areas = [grid.width * grid.pitch_x * grid.height * grid.pitch_y for grid in grids]
-    return float(np.average(means, weights=areas))
+    return float(np.average([value_of(grid) for grid in grids], weights=areas))
 
 
 def charts_of(receiver: Receiver, nodes: int) -> list[dict]:

@@ -38,6 +38,8 @@ RAYS_PER_SAMPLE = 4
 
 # Texels along a side, and rays from each, where nothing blocks the light.
 OPEN_TEXELS, OPEN_RAYS = 96, 4
+# The same with shadows, for means that are right to some percent.
+SHADOW_TEXELS, SHADOW_RAYS = 48, 16
 
 
 def bake(
@@ -174,12 +176,25 @@ def mean_direction(flow: np.ndarray) -> np.ndarray:
 
 def mean_open_irradiance(grid: Grid, lights: Sequence[Light]) -> float:
     """Mean irradiance of lights that nothing blocks, W/m^2."""
-    width, height = min(grid.width, OPEN_TEXELS), min(grid.height, OPEN_TEXELS)
+    return _mean_irradiance(grid, Illumination(lights), OPEN_TEXELS, OPEN_RAYS)
+
+
+def mean_irradiance(grid: Grid, illumination: Illumination) -> float:
+    """Mean irradiance with shadows, W/m^2."""
+    return _mean_irradiance(grid, illumination, SHADOW_TEXELS, SHADOW_RAYS)
+
+
+def _mean_irradiance(grid: Grid, illumination: Illumination, texels: int, rays: int) -> float:
+    width, height = min(grid.width, texels), min(grid.height, texels)
     pitch = {"pitch_x": grid.pitch_x * grid.width / width, "pitch_y": grid.pitch_y * grid.height / height}
     whole = np.ones((height, width), np.float32)
     coarse = replace(grid, width=width, height=height, coverage=whole, color_in=None, color_out=None, **pitch)
-    open_lights = Illumination(lights).native_lights(coarse)
-    irradiance, _ = native.bake_arrival(coarse.surface(), open_lights, samples=1, rays=OPEN_RAYS)
+    arriving = [  # the occluders are those of the grid itself, which the bake needs as well
+        (light.at(coarse), light.rgb().tolist(), illumination.caster(grid, light) if light.cast_shadow else None)
+        for light in illumination.lights
+        if not light.is_behind(coarse)
+    ]
+    irradiance, _ = native.bake_arrival(coarse.surface(), arriving, samples=1, rays=rays)
     return float(irradiance.mean())
 
 

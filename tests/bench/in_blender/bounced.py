@@ -14,6 +14,7 @@ from pathlib import Path
 import beamspread
 import bpy
 import numpy as np
+from beamspread.core.bake.smoothing import SPLINE_VARIANCE
 from beamspread.core.native import native
 from beamspread.core.scene.lights import STRATA, WEIGHTS
 
@@ -22,10 +23,10 @@ sys.path.insert(0, str(Path(beamspread.__file__).with_name("blender") / "cycles"
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blender"))
 import child_fields
 import scenes
-from child_denoise import Denoiser
+from child_filter import filter_map, insides
 from child_ghost import add_ghost
 
-NODES, LOOKS, TEXELS = 64, 8, 256
+NODES, LOOKS, TEXELS = 64, 3, 256
 CHART = {
     "corner": [-1, -1, 1e-4],
     "x_axis": [1, 0, 0],
@@ -75,9 +76,10 @@ def add_scene(name):
     add_lamp("AREA", 30.0, (0, 0.2, 1.9))
 
 
-def irradiance(pixels):
-    (part,) = child_fields.split(REQUEST, np.nan_to_num(pixels))
-    return np.pi * np.tensordot(np.float32(WEIGHTS), part, 1)
+def irradiances(pixels):
+    """Irradiance of both halves of the samples, (2, rows, columns, 3)."""
+    (halves,) = child_fields.halves_of(REQUEST, np.nan_to_num(pixels))
+    return np.pi * np.tensordot(halves, np.float32(WEIGHTS), (1, 0))
 
 
 def between_nodes(values):
@@ -103,31 +105,24 @@ def main():
     add_scene(name)
     scene = bpy.context.scene
     child_fields.set_up(scene, "INDIRECT")
-    ghost, image = add_ghost(REQUEST["charts"], REQUEST["strata"])
+    ghost, image = add_ghost(REQUEST["charts"], [*REQUEST["strata"]] * 2)
     scene.collection.objects.link(ghost)
     baker = child_fields.Baker(scene, ghost, image, "GLOSSY", "INDIRECT")
-    start = time.process_time()
-    looks = [irradiance(baker.bake(child_fields.FIRST_SAMPLES)) for _ in range(LOOKS)]
-    seconds = (time.process_time() - start) / LOOKS
-    references = [irradiance(baker.bake(samples)) for _ in range(2)]
-    denoise = Denoiser()
-    print(f"| {name}: samples | CPU time | at nodes, denoised | between, denoised | of 4 x 4, denoised |")
-    for together in (1, 2, 4, 8):
-        noisy = [np.mean(looks[i : i + together], axis=0) for i in range(0, LOOKS, together)]
-        clean = [denoise([one])[0] for one in noisy]
-        sets = {"single": (noisy, clean)}
-        if len(noisy) > 1:
-            sets[f"mean of {len(noisy)}"] = [np.mean(noisy, axis=0)], [np.mean(clean, axis=0)]
-        for kind, pair in sets.items():
-            cells = []
-            for view in (lambda values: values, between_nodes, in_blocks):
-                found = [math.sqrt(np.mean([error(one, references, view) ** 2 for one in some])) for some in pair]
-                cells.append(", ".join(f"{part:.2%}" for part in found))
-            print(
-                f"| {child_fields.FIRST_SAMPLES * together} {kind} | {seconds * together:.1f} s |",
-                " | ".join(cells),
-                "|",
-            )
+    references = [irradiances(baker.bake(samples)).mean(axis=0) for _ in range(2)]
+    mean = np.mean(references)
+    print(f"| {name}: samples | CPU time | at nodes, filtered | between, filtered, as estimated | of 4 x 4, filtered |")
+    for count in (1, 2, 4, 8, 16):
+        start = time.process_time()
+        halves = [irradiances(baker.bake(count)) for _ in range(LOOKS)]
+        seconds = (time.process_time() - start) / LOOKS
+        clean = [filter_map(*pair, insides(np.ones((1, NODES, NODES, 3))), SPLINE_VARIANCE) for pair in halves]
+        estimate = math.sqrt(np.mean([noise + blur for _, noise, blur in clean])) / mean
+        pair, cells = ([one.mean(axis=0) for one in halves], [one for one, _, _ in clean]), []
+        for view in (lambda values: values, between_nodes, in_blocks):
+            found = [math.sqrt(np.mean([error(one, references, view) ** 2 for one in some])) for some in pair]
+            cells.append(", ".join(f"{part:.2%}" for part in found))
+        cells[1] += f", {estimate:.2%}"
+        print(f"| {2 * count} | {seconds:.1f} s |", " | ".join(cells), "|")
     sys.stdout.flush()
     os._exit(0)
 
