@@ -33,7 +33,8 @@ std::unique_ptr<HeldMesh> make_mesh(const py::array& vertices, const py::array& 
                                     std::vector<std::shared_ptr<ColorTexture>> transmittances,
                                     const std::optional<py::array>& materials, const std::optional<py::array>& uvs,
                                     std::vector<std::shared_ptr<Reflector>> reflectors,
-                                    const std::optional<py::array>& reflector_uvs)
+                                    const std::optional<py::array>& reflector_uvs,
+                                    const std::vector<std::uint32_t>& owners)
 {
     auto held =
         std::make_unique<HeldMesh>(HeldMesh{vertices, triangles, placements, materials, uvs, reflector_uvs, {}});
@@ -41,6 +42,10 @@ std::unique_ptr<HeldMesh> make_mesh(const py::array& vertices, const py::array& 
     held->mesh.triangles = to_triangles(triangles);
     if (placements)
         held->mesh.placements = to_placements(*placements);
+    if (!owners.empty() && owners.size() != held->mesh.placements.size())
+        reject("owners", static_cast<double>(owners.size()), "one number for each placement");
+    for (std::size_t i = 0; i < owners.size(); ++i)
+        held->mesh.placements[i].owner = owners[i];
     held->mesh.transmittances.assign(transmittances.begin(), transmittances.end());
     if (materials)
         held->mesh.materials =
@@ -220,6 +225,8 @@ reflectors : list of Reflector or None
     triangles have the first.
 reflector_uvs : ndarray, float32, shape (M, 6), C-contiguous, optional
     (u, v) of each triangle's corners in the images of albedo; None: all are (0, 0).
+owners : list of int
+    Number of the object that each placement belongs to, 0 to 2^32 - 1; empty: all are 0.
 
 Raises
 ------
@@ -228,7 +235,7 @@ ValueError
 )")
         .def(py::init(&make_mesh), py::arg("vertices"), py::arg("triangles"), py::arg("placements") = py::none(),
              py::arg("transmittances") = py::list(), py::arg("materials") = py::none(), py::arg("uvs") = py::none(),
-             py::arg("reflectors") = py::list(), py::arg("reflector_uvs") = py::none());
+             py::arg("reflectors") = py::list(), py::arg("reflector_uvs") = py::none(), py::arg("owners") = py::list());
 
     py::class_<Occluders>(m, "Occluders", R"(Triangles of meshes that block light, or a part of it, from both sides.
 

@@ -14,7 +14,7 @@ namespace {
 
 std::unique_ptr<ReceiverGrid> make_grid(const Numbers& origin, const Numbers& x_axis, const Numbers& y_axis,
                                         const Numbers& normal, double pitch_x, double pitch_y, py::ssize_t width,
-                                        py::ssize_t height)
+                                        py::ssize_t height, std::uint32_t owner)
 {
     // Negative sizes become huge ones, which the check rejects.
     const ReceiverGrid grid{.origin = to_vec3("origin", origin),
@@ -24,7 +24,8 @@ std::unique_ptr<ReceiverGrid> make_grid(const Numbers& origin, const Numbers& x_
                             .pitch_x = pitch_x,
                             .pitch_y = pitch_y,
                             .width = static_cast<std::size_t>(width),
-                            .height = static_cast<std::size_t>(height)};
+                            .height = static_cast<std::size_t>(height),
+                            .owner = owner};
     grid.check();
     return std::make_unique<ReceiverGrid>(grid);
 }
@@ -143,6 +144,9 @@ pitch_x, pitch_y : float
     Size of a texel in metres.
 width, height : int
     Texels, 1 to 65536.
+owner : int
+    Number of the object that the plane belongs to, as in `OccluderMesh`. Faces of other objects that lie on the plane
+    block its light.
 
 Raises
 ------
@@ -150,7 +154,7 @@ ValueError
     An argument is out of range; the message names it.
 )")
         .def(py::init(&make_grid), py::arg("origin"), py::arg("x_axis"), py::arg("y_axis"), py::arg("normal"),
-             py::arg("pitch_x"), py::arg("pitch_y"), py::arg("width"), py::arg("height"));
+             py::arg("pitch_x"), py::arg("pitch_y"), py::arg("width"), py::arg("height"), py::arg("owner") = 0);
 
     bind_lights(m);
     m.def("coverage", &coverage, py::arg("corners"), py::arg("corner_counts"), py::arg("width"), py::arg("height"),

@@ -21,6 +21,7 @@ using Triangle = std::array<std::uint32_t, 3>;
 struct Placement {
     Mat3 linear{1.0};
     Vec3 translation{};
+    std::uint32_t owner = 0;  // number of the object that has the mesh here
 
     Vec3 operator()(const Vec3& point) const { return linear * point + translation; }
 };

@@ -126,6 +126,16 @@ void set_ray(RTCRay16& packet, std::size_t i, const ShadowRay& ray, const Vec3& 
 }  // namespace
 
 struct Occluders::Hierarchy {
+    // Opaque triangles outside of instances up to `end` that no earlier entry has.
+    struct Owner {
+        std::size_t end;
+        std::uint32_t number;
+        bool is_mirrored;  // true if the placement is
+    };
+
+    const Owner& owner(std::size_t index) const { return *std::ranges::upper_bound(owners, index, {}, &Owner::end); }
+
+    std::vector<Owner> owners;
     // An instance of a set, by its placement relative to the origin.
     struct Instance {
         const TriangleSet* set;
@@ -175,8 +185,11 @@ void Occluders::build(std::span<const OccluderMesh> meshes, std::size_t max_copi
     m_hierarchy->sets.push_back(set_for(copied));
     TriangleSet& own = *m_hierarchy->sets.front();
     for (std::size_t i = 0; i < meshes.size(); ++i) {
-        for (const Placement& placement : copied[i].placements)
+        for (const Placement& placement : copied[i].placements) {
             own.add(meshes[i], placement, m_origin);
+            m_hierarchy->owners.push_back(
+                {own.opaque_count(), placement.owner, glm::determinant(placement.linear) < 0.0});
+        }
         if (copied[i].placements.size() < meshes[i].placements.size())
             add_instances(meshes[i]);
         for (std::size_t j = 0; j < meshes[i].triangles.size(); ++j) {
@@ -237,6 +250,17 @@ std::array<Vec3, 3> Occluders::triangle(std::size_t index) const
 {
     const auto [a, b, c] = m_hierarchy->sets.front()->corners(index);
     return {m_origin + Vec3(a), m_origin + Vec3(b), m_origin + Vec3(c)};
+}
+
+std::uint32_t Occluders::owner(std::size_t index) const
+{
+    return m_hierarchy->owner(index).number;
+}
+
+Vec3 Occluders::normal(std::size_t index) const
+{
+    const auto [a, b, c] = triangle(index);
+    return glm::cross(b - a, c - a) * (m_hierarchy->owner(index).is_mirrored ? -1.0 : 1.0);
 }
 
 void Occluders::transmit(std::span<const ShadowRay> rays, Vec3f* transmittance, bool is_coherent) const

@@ -98,6 +98,9 @@ public:
     std::size_t own_opaque_count() const;
     // World corners of such a triangle, rounded as rays meet them.
     std::array<Vec3, 3> triangle(std::size_t index) const;
+    // Number of the object that such an opaque triangle belongs to, and a vector along the normal of its front.
+    std::uint32_t owner(std::size_t index) const;
+    Vec3 normal(std::size_t index) const;
 
     std::span<const Hull> hulls() const { return m_hulls; }
 

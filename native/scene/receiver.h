@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "base/vec.h"
 
@@ -18,6 +19,7 @@ struct ReceiverGrid {
     double pitch_y = 0.0;
     std::size_t width = 0;
     std::size_t height = 0;
+    std::uint32_t owner = 0;  // number of the object that the plane belongs to (`Placement::owner`)
 
     // The step from texel (0, 0) to (x, y) in the world, and the world position there; x and y in texels.
     Vec3 step(double x, double y) const { return x_axis * (x * pitch_x) + y_axis * (y * pitch_y); }

@@ -79,13 +79,15 @@ double rounding_of(const Hull& hull)
 ReceiverRays::ReceiverRays(const ReceiverGrid& grid, const Occluders* occluders, double clearance)
     : m_grid(grid),
       m_start(ray_start(grid, occluders, clearance)),
+      m_contacts(grid, occluders, m_start),
       m_position_rounding(std::numeric_limits<double>::epsilon() * grid.reach(Vec3(0.0)))
 {
 }
 
 ShadowRay ReceiverRays::shadow_ray(const Vec3& point, const LightRay& ray) const
 {
-    const Vec3 lift = m_grid.normal * m_start.height();
+    // Below a triangle that lies on the plane, the ray starts behind both, and meets it.
+    const Vec3 lift = m_grid.normal * (m_contacts.cover(point) ? -m_start.height() : m_start.height());
     if (std::isinf(ray.distance))
         return {.origin = point + lift, .direction = -ray.travel, .distance = ray.distance};
     const Vec3 way = -ray.travel * ray.distance - lift;

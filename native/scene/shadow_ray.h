@@ -4,6 +4,7 @@
 #include <array>
 #include <limits>
 
+#include "scene/contacts.h"
 #include "scene/light.h"
 #include "scene/occluders.h"
 #include "scene/receiver.h"
@@ -48,6 +49,7 @@ public:
 private:
     const ReceiverGrid& m_grid;
     RayStart m_start;
+    Contacts m_contacts;
     double m_position_rounding;  // metres
 };
 

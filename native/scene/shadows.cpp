@@ -206,7 +206,7 @@ Shadows::Shadows(const ReceiverGrid& grid, const LightSource& source, const Occl
     for (std::size_t i = 0; i < facet_count(); ++i) {
         const Facet item = facet(i);
         const Projection::Heights heights = projection.heights(item.corners, item.rounding);
-        if (projection.is_off_the_way(heights))
+        if (projection.is_off_the_way(heights) && !(item.is_opaque && is_contact(grid, *occluders, i, start)))
             continue;
         // A box that holds the lamp has such sides; rays that end in the box need not cross them.
         if (!projection.has_shadow(heights)) {

@@ -94,7 +94,7 @@ def our_irradiance(plane, texels=TEXELS):
     """The same by the add-on, and the coverage of the texels."""
     illumination, depsgraph = read().lighting(plane.name), bpy.context.evaluated_depsgraph_get()
     polygons = read_polygons(plane.evaluated_get(depsgraph), plane.data.materials[0].name)
-    receiver = build_receiver(fit_uv_maps(polygons), texels, texels)
+    receiver = build_receiver(fit_uv_maps(polygons), texels, texels, plane.name)
     grid = receiver.charts[0].grid
     total, _ = native.bake_arrival(grid.surface(), illumination.native_lights(grid), samples=8, rays=RAYS)
     return receiver.to_texture([total * grid.coverage[..., None]]), receiver.coverage

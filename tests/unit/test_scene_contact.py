@@ -1,6 +1,7 @@
 """Things that touch or cross the receiver leave neither gaps nor acne, here and 10 km from the world's origin."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -129,3 +130,75 @@ def test_a_bare_floor_has_no_acne(angle, is_instanced, turn, shift):
     """The floor itself is among the occluders, as two instances of a mesh below the size that is shared, too."""
     sun = math.sin(math.radians(angle)), 0.0, -math.cos(math.radians(angle))
     assert (light_past(sun=sun, turn=turn, shift=shift, is_instanced=is_instanced) == 1).all()
+
+
+def openness(grid, *occluders):
+    """Part of an even sky's light that reaches each texel, and the same of a sun that falls in at 30 degrees."""
+    caster = Illumination([], occluders).caster(grid)
+    sky = native.EnvironmentLight(np.ones((2, 4, 3), np.float32), np.eye(3))
+    travel = np.array(grid.normal) * -math.cos(0.5) + np.array(grid.x_axis) * math.sin(0.5)
+    parts = []
+    for light in (sky, native.SunLight(travel)):
+        lit, bare = (native.gather_rays(grid.native(), light, blockers, rays=16)[0] for blockers in (caster, None))
+        parts.append(lit[..., 0] / bare[..., 0])
+    return parts
+
+
+def underside(axes, shift):
+    """The lit side of a box's bottom, 0.5 m wide, which is the receiver."""
+    corner = tuple(shift - 0.25 * axes[0] + 0.25 * axes[1])
+    frame = map(tuple, (axes[0], -axes[1], -axes[2]))
+    return Grid(corner, *frame, 0.5 / 20, 0.5 / 20, 20, 20, np.ones((20, 20), np.float32), owner="Box")
+
+
+def object_at(name, axes, shift, vertices, triangles, is_mirrored=False):
+    """An occluder in the floor's frame; a mirrored one is the same shape by a mirrored mesh and placement."""
+    mirror = np.diag([-1.0, 1, 1]) if is_mirrored else np.eye(3)
+    placement = np.column_stack([axes.T @ mirror, shift])[None]
+    return Occluder(name, Mesh(vertices @ mirror, triangles[:, ::-1] if is_mirrored else triangles), placement)
+
+
+@pytest.mark.parametrize("is_mirrored", [False, True])
+@pytest.mark.parametrize("gap", [0.0, 1e-7, 1e-6, 1e-5, 1e-4])
+def test_the_underside_of_a_box_on_a_floor_is_dark(gap, is_mirrored):
+    """Rays start 2e-6 m off the box and would miss a floor that is nearer."""
+    axes, shift = np.eye(3), np.array([0, 0, gap])
+    standing = object_at("Box", axes, shift, *box((-0.25, -0.25, 0), (0.25, 0.25, 0.4)), is_mirrored)
+    ground = object_at("Floor", axes, np.zeros(3), *GROUND, is_mirrored)
+    grid = underside(axes, shift)
+    for lit in openness(grid, standing):
+        assert (lit == 1).all()
+    for lit in openness(grid, standing, ground):
+        assert not lit.any()
+
+
+@pytest.mark.parametrize("turn", TURNS)
+def test_a_tilted_box_that_touches_its_floor_is_dark_below(turn):
+    axes = frame(turn)
+    standing = object_at("Box", axes, np.zeros(3), *box((-0.25, -0.25, 0), (0.25, 0.25, 0.4)))
+    for lit in openness(underside(axes, np.zeros(3)), standing, object_at("Floor", axes, np.zeros(3), *GROUND)):
+        assert not lit.any()
+
+
+@pytest.mark.parametrize("height", [-1e-6, -1e-7, 0.0, 1e-7, 1e-6, 1e-5])
+def test_paper_shades_the_floor_that_it_lies_on(height):
+    """Below the plane, and in it, it shades nothing: a decal is lit on its floor, and either may be the receiver.
+
+    The paper has borders within texels.
+    """
+    grid = replace(floor(np.eye(3), np.zeros(3)), owner="Floor")
+    ground = object_at("Floor", np.eye(3), np.zeros(3), *GROUND)
+    paper = object_at("Paper", np.eye(3), np.array([0, 0, height]), 0.51 * SQUARE, FACES)
+    covered = np.clip((0.51 - (np.abs(np.arange(SIZE) + 0.5 - SIZE / 2) - 0.5) * TEXEL) / TEXEL, 0, 1)
+    expected = 1 - covered[:, None] * covered * (height > 0)
+    for lit in openness(grid, ground, paper):
+        np.testing.assert_allclose(lit, expected, atol=0.13)
+        assert lit.mean() == pytest.approx(expected.mean(), abs=2e-3)
+
+
+def test_a_surface_of_two_sheets_is_lit_on_both():
+    """Flat text has each face twice, one for each side, in the same place."""
+    grid = replace(floor(np.eye(3), np.zeros(3)), owner="Text")
+    sheets = Mesh(SQUARE, np.concatenate([FACES, FACES[:, ::-1]]))
+    for lit in openness(grid, Occluder("Text", sheets)):
+        assert (lit == 1).all()

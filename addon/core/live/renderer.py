@@ -181,7 +181,7 @@ class LiveRenderer:
     def _receiver(self, target: LiveTarget, size: tuple[int, int]) -> FramedReceiver:
         key = id(target.polygons), id(target.texture), size, target.settings.margin
         if key not in self._receivers:
-            receiver = build_receiver(self._uv_maps(target), *size)
+            receiver = build_receiver(self._uv_maps(target), *size, target.target.object_name)
             if target.texture is not None:
                 receiver = target.texture.on(receiver)
             framed = FramedReceiver(receiver, target.settings.margin)

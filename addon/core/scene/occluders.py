@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from ..native import native
-from .receiver import Vector
+from .receiver import Vector, owner_number
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +38,11 @@ class Mesh:
         arrays = (self.vertices, self.triangles, self.materials, self.uvs)
         return zlib.crc32(b"".join(np.ascontiguousarray(array).tobytes() for array in arrays if array is not None))
 
-    def native(self, placements: np.ndarray | None):
-        """The native `OccluderMesh`; `placements` are matrices (K, 3, 4), None for a mesh in the world."""
+    def native(self, placements: np.ndarray | None, owners: Sequence[int] = ()):
+        """The native `OccluderMesh`.
+
+        `placements` are matrices (K, 3, 4), None for a mesh in the world; `owners` the number of the object of each.
+        """
         return native.OccluderMesh(
             np.ascontiguousarray(self.vertices, float),
             np.ascontiguousarray(self.triangles, np.uint32),
@@ -47,6 +50,7 @@ class Mesh:
             list(self.transmittances),
             None if self.materials is None else np.ascontiguousarray(self.materials, np.uint32).reshape(-1, 1),
             None if self.uvs is None else np.ascontiguousarray(self.uvs, np.float32).reshape(-1, 6),
+            owners=owners,
         )
 
 
@@ -75,5 +79,6 @@ def build(occluders: Sequence[Occluder], origin: Vector, max_crossings: int | No
     meshes = []
     for same in by_mesh.values():
         matrices = [np.eye(4)[None, :3] if item.placements is None else item.placements for item in same]
-        meshes.append(same[0].mesh.native(np.concatenate(matrices)))
+        owners = [owner_number(item.name) for item, places in zip(same, matrices) for _ in places]
+        meshes.append(same[0].mesh.native(np.concatenate(matrices), owners))
     return native.Occluders(meshes, origin, max_crossings) if meshes else None

@@ -7,8 +7,9 @@ texture's texels. Otherwise it is a rectangular grid of the same density, and `C
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,6 +35,7 @@ class Grid:
     width, height : number of texels.
     coverage : float32 (height, width), fraction of each texel inside the mesh, 0..1.
     clearance : largest distance of the mesh from the plane, scene units; shadow rays start above it.
+    owner : name of the object that the plane belongs to; faces of other objects that lie on the plane cover it.
     color_in, color_out : float32 (height, width, 3), factors of entering and leaving light by the surface's texture;
         None without a texture.
     """
@@ -50,6 +52,7 @@ class Grid:
     clearance: float = 0.0
     color_in: np.ndarray | None = None
     color_out: np.ndarray | None = None
+    owner: str = ""
 
     @property
     def centre(self) -> np.ndarray:
@@ -70,11 +73,17 @@ class Grid:
     def native(self):
         """The native `ReceiverGrid`."""
         axes = self.x_axis, self.y_axis, self.normal
-        return native.ReceiverGrid(self.origin, *axes, self.pitch_x, self.pitch_y, self.width, self.height)
+        size = self.pitch_x, self.pitch_y, self.width, self.height
+        return native.ReceiverGrid(self.origin, *axes, *size, owner_number(self.owner))
 
     def surface(self):
         """The native `Surface`, which views the arrays of the grid."""
         return native.Surface(self.native(), self.coverage, self.clearance, self.color_in, self.color_out)
+
+
+def owner_number(name: str) -> int:
+    """Number that stands for an object in native code."""
+    return zlib.crc32(name.encode())
 
 
 # Overlap with a chart, in texels, below which texels at its border are not part of the grid: rounding of float32 UVs.
@@ -188,15 +197,16 @@ def texture_size(maps: Sequence[UvMap], resolution: int) -> tuple[int, int]:
     return tuple(max(1, round(resolution * length / max(lengths))) for length in lengths)
 
 
-def build_receiver(maps: Sequence[UvMap], width: int, height: int) -> Receiver:
-    """Make the charts of flat parts for a texture of `width` x `height` texels.
+def build_receiver(maps: Sequence[UvMap], width: int, height: int, owner: str = "") -> Receiver:
+    """Make the charts of flat parts of an object, `owner`, for a texture of `width` x `height` texels.
 
     Raises
     ------
     ReceiverError
         The parts cover no texel.
     """
-    charts = tuple(_chart(uv_map, width, height) for uv_map in maps)
+    charts = (_chart(uv_map, width, height) for uv_map in maps)
+    charts = tuple(replace(chart, grid=replace(chart.grid, owner=owner)) for chart in charts)
     coverage = charts[0].coverage
     if len(charts) > 1 or coverage.shape != (height, width):
         coverage = np.zeros((height, width), np.float32)

@@ -80,7 +80,7 @@ class BakePlan:
     def bake(self, settings: BakeSettings) -> Bake:
         """The bake, with its job or the error; call it in the main thread."""
         try:
-            receiver = build_receiver(self.maps, *self.size)
+            receiver = build_receiver(self.maps, *self.size, self.target.object_name)
             illumination = self.illumination.lighting(self.target.object_name)
             job = BakeJob(
                 self.target.object_name, receiver, illumination, self.surface_with_color(), settings, BAKE_STEPS

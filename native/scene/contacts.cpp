@@ -1,0 +1,113 @@
+#include "scene/contacts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "scene/shadow_ray.h"
+
+namespace beamspread {
+
+namespace {
+
+// Error of a corner's height, in halves of a unit in the last place of its coordinates along the normal: two meshes and
+// two matrices in single precision. Larger: decals have to lie higher above their floor to shade it.
+constexpr double height_error = 4.0;
+
+double height_rounding(const Vec3& corner, const Vec3& origin, const Vec3& normal)
+{
+    const double half_ulp = 0.5 * static_cast<double>(std::numeric_limits<float>::epsilon());
+    return height_error * half_ulp * glm::dot(glm::abs(normal), glm::abs(corner - origin));
+}
+
+}  // namespace
+
+bool is_contact(const ReceiverGrid& grid, const Occluders& occluders, std::size_t triangle, const RayStart& start)
+{
+    if (occluders.owner(triangle) == grid.owner)
+        return false;
+    const std::array<Vec3, 3> corners = occluders.triangle(triangle);
+    double lowest = std::numeric_limits<double>::infinity();
+    double rounding = 0.0;
+    for (const Vec3& corner : corners) {
+        const double height = glm::dot(corner - grid.origin, grid.normal);
+        if (height > start.height())
+            return false;
+        lowest = std::min(lowest, height);
+        rounding = std::max(rounding, height_rounding(corner, occluders.origin(), grid.normal));
+    }
+    const bool faces_plane = glm::dot(occluders.normal(triangle), grid.normal) < 0.0;
+    return faces_plane ? lowest >= -rounding : lowest > start.clearance + rounding;
+}
+
+Contacts::Contacts(const ReceiverGrid& grid, const Occluders* occluders, const RayStart& start) : m_grid(grid)
+{
+    for (std::size_t i = 0; occluders && i < occluders->own_opaque_count(); ++i)
+        if (is_contact(grid, *occluders, i, start))
+            add(occluders->triangle(i));
+    std::ranges::stable_sort(m_parts, {}, &Part::texel);
+}
+
+Vec2 Contacts::in_texels(const Vec3& point) const
+{
+    const Vec3 offset = point - m_grid.origin;
+    return {glm::dot(offset, m_grid.x_axis) / m_grid.pitch_x, glm::dot(offset, m_grid.y_axis) / m_grid.pitch_y};
+}
+
+void Contacts::add(const std::array<Vec3, 3>& triangle)
+{
+    const std::array<Vec2, 3> corners = {in_texels(triangle[0]), in_texels(triangle[1]), in_texels(triangle[2])};
+    Sides sides;
+    for (std::size_t i = 0; i < 3; ++i) {
+        const Vec2& a = corners[i];
+        const Vec2& b = corners[(i + 1) % 3];
+        sides[i] = {a.y - b.y, b.x - a.x, a.x * b.y - a.y * b.x};
+        const Vec2& inside = corners[(i + 2) % 3];
+        if (glm::dot(sides[i], Vec3(inside, 1.0)) < 0.0)
+            sides[i] = -sides[i];
+    }
+    const Vec2 low = glm::min(glm::min(corners[0], corners[1]), corners[2]);
+    const Vec2 high = glm::max(glm::max(corners[0], corners[1]), corners[2]);
+    const auto clamped = [](double texel, std::size_t count) {
+        return static_cast<std::size_t>(std::clamp(texel, 0.0, static_cast<double>(count)));
+    };
+    const std::size_t end_x = clamped(std::ceil(high.x), m_grid.width);
+    const std::size_t end_y = clamped(std::ceil(high.y), m_grid.height);
+    for (std::size_t y = clamped(std::floor(low.y), m_grid.height); y < end_y; ++y)
+        for (std::size_t x = clamped(std::floor(low.x), m_grid.width); x < end_x; ++x) {
+            const Vec3 middle(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5, 1.0);
+            bool is_whole = true;
+            bool is_outside = false;
+            for (const Vec3& side : sides) {
+                const double at_middle = glm::dot(side, middle);
+                const double change = 0.5 * (std::abs(side.x) + std::abs(side.y));  // up to a corner of the texel
+                is_whole &= at_middle >= change;
+                is_outside |= at_middle <= -change;
+            }
+            if (is_outside)
+                continue;
+            m_texels.resize(m_grid.width * m_grid.height, Cover::none);
+            const std::size_t texel = y * m_grid.width + x;
+            m_texels[texel] = std::max(m_texels[texel], is_whole ? Cover::whole : Cover::part);
+            if (!is_whole)
+                m_parts.push_back({texel, sides});
+        }
+}
+
+bool Contacts::cover_in_texel(const Vec3& point) const
+{
+    const Vec2 position = in_texels(point);
+    const auto index = [](double texel, std::size_t count) {
+        return static_cast<std::size_t>(std::clamp(texel, 0.0, static_cast<double>(count) - 1.0));
+    };
+    const std::size_t texel = index(position.y, m_grid.height) * m_grid.width + index(position.x, m_grid.width);
+    if (m_texels[texel] != Cover::part)
+        return m_texels[texel] == Cover::whole;
+    const auto parts = std::ranges::equal_range(m_parts, texel, {}, &Part::texel);
+    return std::ranges::any_of(parts, [&](const Part& part) {
+        return std::ranges::all_of(part.sides,
+                                   [&](const Vec3& side) { return glm::dot(side, Vec3(position, 1.0)) >= 0.0; });
+    });
+}
+
+}  // namespace beamspread
