@@ -303,7 +303,7 @@ std::unique_ptr<const Light> EnvironmentLight::facing(const Vec3& normal) const
     return std::make_unique<FacingEnvironment>(m_map, normal);
 }
 
-std::unique_ptr<const DistantLight> EnvironmentLight::facing_all() const
+std::unique_ptr<const Light> EnvironmentLight::facing_all() const
 {
     return std::make_unique<FacingEnvironment>(m_map, std::nullopt);
 }

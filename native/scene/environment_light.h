@@ -32,7 +32,7 @@ public:
                 LightRay* rays) const override;
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
     std::unique_ptr<const Light> facing(const Vec3& normal) const override;
-    std::unique_ptr<const DistantLight> facing_all() const override;
+    std::unique_ptr<const Light> facing_all() const override;
     bool is_colored() const override { return m_is_colored; }
 
 private:

@@ -61,8 +61,11 @@ public:
     // The same light prepared for surfaces with that normal; null if preparation does not pay.
     virtual std::unique_ptr<const Light> facing(const Vec3& /*normal*/) const { return nullptr; }
 
-    // The same light prepared for surfaces of any normal; null for lights that are not `DistantLight`s.
-    virtual std::unique_ptr<const DistantLight> facing_all() const { return nullptr; }
+    // The same light prepared for points anywhere with any normal; null if preparation does not pay.
+    virtual std::unique_ptr<const Light> facing_all() const { return nullptr; }
+
+    // The light if its radiance is known in each direction; null for others.
+    virtual const DistantLight* as_distant() const { return nullptr; }
 
     // The one point or direction that stands for the light inside a medium; none if its rays differ too much. Delta
     // lights and narrow suns have one.
@@ -72,6 +75,8 @@ public:
 // A light infinitely far away with a radiance in each direction.
 class DistantLight : public Light {
 public:
+    const DistantLight* as_distant() const override { return this; }
+
     // Radiance from the direction of a unit vector, W/(m^2 sr), and the density of the rays of `sample`, 1/sr.
     virtual Vec3f radiance(const Vec3& direction) const = 0;
     virtual double density(const Vec3& direction) const = 0;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "base/constants.h"
 #include "scene/shadow_ray.h"
@@ -77,9 +78,11 @@ LightChoice::LightChoice(std::span<const SceneLight> lights)
         if (light.color == Vec3f(0.0f))
             continue;
         m_lights.push_back(light);
-        m_distant.push_back(light.light->facing_all());
-        if (m_distant.back())
-            m_lights.back().light = m_distant.back().get();
+        if (auto prepared = light.light->facing_all()) {
+            m_lights.back().light = prepared.get();
+            m_prepared.push_back(std::move(prepared));
+        }
+        m_distant.push_back(m_lights.back().light->as_distant());
     }
     const auto count = static_cast<double>(m_lights.size());
     for (std::size_t i = 0; i <= m_lights.size(); ++i)

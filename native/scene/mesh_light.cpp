@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <string>
 
 #include "base/error.h"
@@ -18,6 +19,10 @@ constexpr double short_of_face = 1.0 - 1e-5;
 
 // Squared distance over squared size above which a face counts as a point. The error is 2e-3, in inverse proportion.
 constexpr double sizes_to_small = 20.0 * 20.0;
+
+// Squared distance over squared size below which a face is sampled by its solid angle. Larger values take time and lower
+// noise little: over the face irradiance then hardly changes.
+constexpr double near_in_squared_sizes = 4.0;
 
 }  // namespace
 
@@ -61,6 +66,37 @@ double MeshLight::distance_from(const Vec3& point) const
     return glm::distance(point, glm::clamp(point, m_low, m_high));
 }
 
+std::unique_ptr<const Light> MeshLight::facing_all() const
+{
+    // make_unique can't reach the private constructor.
+    std::unique_ptr<MeshLight> light(new MeshLight());
+    light->m_low = m_low;
+    light->m_high = m_high;
+    light->m_faces = m_faces;
+    light->m_cumulated = m_cumulated;
+    light->m_is_colored = m_is_colored;
+    light->m_by_solid_angle = true;
+    return light;
+}
+
+LightRay MeshLight::near_ray(const Vec3& point, const Face& face, const Vec2& place, double probability)
+{
+    const std::array<Vec3, 3> corners = {face.corners[0] - point, face.corners[1] - point, face.corners[2] - point};
+    const SphericalTriangle seen(corners);
+    if (!(seen.solid_angle() > 0.0))
+        return {.travel = {0.0, 0.0, 1.0}, .distance = 1.0, .flux = Vec3f(0.0f)};
+    const Vec3 direction = seen.direction(place);
+    const double distance = glm::dot(face.normal, corners[0]) / glm::dot(face.normal, direction);
+    // Along the plane of the face rounding decides the distance.
+    const double longest = std::sqrt(std::max(
+        {glm::dot(corners[0], corners[0]), glm::dot(corners[1], corners[1]), glm::dot(corners[2], corners[2])}));
+    if (!(distance > 0.0 && distance <= longest * (1.0 + 1e-6)))
+        return {.travel = -direction, .distance = 1.0, .flux = Vec3f(0.0f)};
+    return {.travel = -direction,
+            .distance = distance * short_of_face,
+            .flux = Vec3f(face.radiance * (seen.solid_angle() / probability))};
+}
+
 void MeshLight::sample(std::span<const Vec3> points, const Vec3& normal, std::span<const Vec2> square,
                        LightRay* rays) const
 {
@@ -76,7 +112,13 @@ void MeshLight::sample(std::span<const Vec3> points, const Vec3& normal, std::sp
         const auto index = static_cast<std::size_t>(above - m_cumulated.begin()) - 1;
         const double power = m_cumulated[index + 1] - m_cumulated[index];
         const Face& face = m_faces[index];
-        const double root = std::sqrt(std::clamp((wanted - m_cumulated[index]) / power, 0.0, 1.0));
+        const double part = std::clamp((wanted - m_cumulated[index]) / power, 0.0, 1.0);
+        const Vec3 to_middle = (face.corners[0] + face.corners[1] + face.corners[2]) / 3.0 - points[i];
+        if (m_by_solid_angle && glm::dot(to_middle, to_middle) < near_in_squared_sizes * face.squared_size) {
+            rays[i] = near_ray(points[i], face, {part, place.y}, power / total);
+            continue;
+        }
+        const double root = std::sqrt(part);
         const auto& [a, b, c] = face.corners;
         const Vec3 way = a + root * ((b - a) + place.y * (c - b)) - points[i];
         const double squared = glm::dot(way, way);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <vector>
 
 #include "scene/light.h"
@@ -18,6 +19,8 @@ public:
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
     double distance_from(const Vec3& point) const override;
     bool is_colored() const override { return m_is_colored; }
+    // A copy whose near faces are sampled by solid angle, so that rays from points beside them have bounded flux.
+    std::unique_ptr<const Light> facing_all() const override;
 
 private:
     struct Face {
@@ -27,10 +30,15 @@ private:
         Vec3 radiance;
     };
 
+    MeshLight() = default;
+    // A ray to a near face, evenly over its solid angle; `probability` is that of the face.
+    static LightRay near_ray(const Vec3& point, const Face& face, const Vec2& place, double probability);
+
     Vec3 m_low{0.0}, m_high{0.0};  // bounds of the glowing faces
     std::vector<Face> m_faces;
     std::vector<double> m_cumulated;  // sums of the faces' power, the mean of the channels; one more than faces
     bool m_is_colored = false;
+    bool m_by_solid_angle = false;
 };
 
 }  // namespace beamspread

@@ -146,4 +146,36 @@ Vec3 SphericalRectangle::point(const Vec2& place) const
     return xu * m_x + yv * m_y + m_z0 * m_z;
 }
 
+SphericalTriangle::SphericalTriangle(const std::array<Vec3, 3>& corners)
+    : m_a(glm::normalize(corners[0])), m_b(glm::normalize(corners[1])), m_c(glm::normalize(corners[2]))
+{
+    const Vec3 ab = glm::cross(m_a, m_b);
+    const Vec3 ca = glm::cross(m_c, m_a);
+    // Van Oosterom and Strackee 1983, "The solid angle of a plane triangle", doi:10.1109/TBME.1983.325207.
+    const double volume = std::abs(glm::dot(ab, m_c));
+    const double angle = 2.0 * std::atan2(volume, 1.0 + glm::dot(m_a, m_b) + glm::dot(m_b, m_c) + glm::dot(m_c, m_a));
+    const double lengths = glm::length(ab) * glm::length(ca);
+    if (!(lengths > 0.0 && volume > 0.0))
+        return;
+    m_cos_alpha = std::clamp(-glm::dot(ab, ca) / lengths, -1.0, 1.0);
+    m_sin_alpha = std::sqrt(1.0 - m_cos_alpha * m_cos_alpha);
+    m_solid_angle = m_sin_alpha > 0.0 ? angle : 0.0;
+}
+
+Vec3 SphericalTriangle::direction(const Vec2& place) const
+{
+    const auto beside = [](const Vec3& v, const Vec3& axis) { return glm::normalize(v - axis * glm::dot(v, axis)); };
+    // The part of the triangle between a, b and a point on the side a c has the area place.x; s and t as in the paper.
+    const double area = place.x * m_solid_angle;
+    const double s = std::sin(area) * m_cos_alpha - std::cos(area) * m_sin_alpha;
+    const double t = std::cos(area) * m_cos_alpha + std::sin(area) * m_sin_alpha;
+    const double u = t - m_cos_alpha;
+    const double v = s + m_sin_alpha * glm::dot(m_a, m_b);
+    const double below = (v * s + u * t) * m_sin_alpha;
+    const double cosine = below != 0.0 ? std::clamp(((v * t - u * s) * m_cos_alpha - v) / below, -1.0, 1.0) : 1.0;
+    const Vec3 on_side = m_a * cosine + beside(m_c, m_a) * std::sqrt(1.0 - cosine * cosine);
+    const double z = 1.0 - place.y * (1.0 - glm::dot(on_side, m_b));
+    return glm::normalize(m_b * z + beside(on_side, m_b) * std::sqrt(std::max(1.0 - z * z, 0.0)));
+}
+
 }  // namespace beamspread

@@ -1,6 +1,7 @@
 // Cones, polygons and rectangles as seen from a point: their irradiance in closed form, and their directions.
 #pragma once
 
+#include <array>
 #include <span>
 
 #include "base/vec.h"
@@ -57,6 +58,25 @@ private:
     double m_x0, m_x1, m_y0, m_y1, m_z0;  // extent of the rectangle in that frame
     double m_b0, m_b1, m_k;               // as in the paper
     double m_solid_angle;
+};
+
+// A triangle as seen from the origin, sampled evenly over its solid angle (Arvo 1995, "Stratified sampling of spherical
+// triangles", doi:10.1145/218380.218500).
+class SphericalTriangle {
+public:
+    // Corners, none of them at the origin.
+    explicit SphericalTriangle(const std::array<Vec3, 3>& corners);
+
+    // Solid angle, steradians; 0 if the triangle is seen along its plane.
+    double solid_angle() const { return m_solid_angle; }
+
+    // The unit vector to the point of the triangle for a place of the unit square; the solid angle is above 0.
+    Vec3 direction(const Vec2& place) const;
+
+private:
+    Vec3 m_a, m_b, m_c;  // unit vectors
+    double m_cos_alpha = 1.0, m_sin_alpha = 0.0;  // angle at a
+    double m_solid_angle = 0.0;
 };
 
 }  // namespace beamspread

@@ -1,5 +1,9 @@
 """Bounced light against closed forms. Tolerances are three times the noise where the comment names no other reason."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from beamspread.core.native import native
@@ -314,3 +318,28 @@ def test_a_sky_behind_a_window_is_a_glowing_pane():
     assert found[0]["irradiance"] > 0.05
     error = 3 * np.hypot(found[0]["noise"], found[1]["noise"]) * (1 + found[0]["irradiance"])
     assert found[0]["irradiance"] == pytest.approx(found[1]["irradiance"], abs=error)
+
+
+def test_a_glowing_panel_close_to_a_wall():
+    """Rays over the solid angle of near faces: the panel is right and has no more noise than area lamps of its size."""
+    room = native.Occluders([mesh(*box((-1, -1, -1e-3), (1, 1, 1)), grey(0.7))])
+    turned = np.array([(0, 1, 0), (0, 0, 1), (1, 0, 0)])  # z along +x
+    panel = native.MeshLight(SQUARE @ turned * 0.3 + (0.99, 0, 0.5), FACES, np.ones((2, 3), np.float32))
+    power = 4 * 0.6 * 0.6  # of radiance 1
+    lamps = [
+        native.AreaLight((0.99, 0, 0.5), axes, 0.6, 0.6, False, np.pi) for axes in (turned, turned * [[1], [1], [-1]])
+    ]
+    below = [grid((-0.2, 0, 1e-3), (1.4, 1.4))]
+    found = [
+        bounced(room, lights, below, max_bounces=4, tolerance=4e-3)
+        for lights in ([(panel, 1.0)], [(lamp, power) for lamp in lamps])
+    ]
+    error = 3 * np.hypot(found[0]["noise"], found[1]["noise"]) * (1 + found[0]["irradiance"])
+    assert found[0]["irradiance"] == pytest.approx(found[1]["irradiance"], abs=error)
+    assert found[0]["paths"] < 3 * found[1]["paths"]
+
+
+def test_the_bench_runs_in_small():
+    bench = Path(__file__).resolve().parents[1] / "bench" / "bounces.py"
+    done = subprocess.run([sys.executable, str(bench), "2"], capture_output=True, text=True, check=True)
+    assert len(done.stdout.splitlines()) == 6
