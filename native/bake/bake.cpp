@@ -64,7 +64,8 @@ RaySettings BakeOptions::ray_settings(const Surface& surface, int ray_count) con
             .even_rays = std::clamp(ray_count / rays_per_even_ray, min_even_rays, max_even_rays),
             .seed = seed,
             .clearance = surface.clearance,
-            .threads = threads};
+            .threads = threads,
+            .noise = noise};
 }
 
 void bake_luminance(const Surface& surface, const std::vector<SurfaceLight>& lights,

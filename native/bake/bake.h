@@ -25,6 +25,7 @@ struct BakeOptions {
     // Beyond, light is added as moments, and terms are chosen for the brightest lights.
     std::size_t max_stored_bytes = std::size_t{512} << 20;
     std::size_t max_moment_bytes = 0;  // bytes of moments; 0: any
+    RayNoise* noise = nullptr;  // takes the noise of all lights by rays; may be null
 
     // Settings for a light of so many rays from each texel.
     RaySettings ray_settings(const Surface& surface, int ray_count) const;

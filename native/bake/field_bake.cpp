@@ -124,10 +124,11 @@ public:
         {
             StoredLight examples;
             // The mean direction of each texel: harmonics of all its directions together are weaker.
+            RaySettings few = m_options.ray_settings(m_surface, example_rays);
+            few.noise = nullptr;
             for (const std::size_t i : m_examples)
                 progress.advance_by(light_work, [&](Progress& part) {
-                    examples.add_mean_direction(m_surface, m_lights[i], m_options.ray_settings(m_surface, example_rays),
-                                                part);
+                    examples.add_mean_direction(m_surface, m_lights[i], few, part);
                 });
             problem.coming.examples = examples.lights;
             if (problem.lights.empty() && examples.lights.empty() && m_mean == 0.0) {
@@ -153,6 +154,7 @@ private:
         coming.plane = coarse.plane();
         BakeOptions options = m_options;
         options.samples = 1;
+        options.noise = nullptr;
         RaySettings settings = options.ray_settings(coarse, survey_rays);
         settings.even_rays = 0;
         Progress unseen;

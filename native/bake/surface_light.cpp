@@ -104,7 +104,18 @@ void SurfaceLight::gather(const Surface& surface, const RaySettings& settings, R
     if (field)
         field->gather(surface.grid, settings.threads, received, progress);
     else
-        gather_rays(surface.grid, *light, occluders, settings, received, progress);
+        gather_lamp(surface, settings, received, progress);
+}
+
+void SurfaceLight::gather_lamp(const Surface& surface, RaySettings settings, RaySink& sink, Progress& progress) const
+{
+    RayNoise* const sum = std::exchange(settings.noise, nullptr);
+    RayNoise noise;
+    if (sum)
+        settings.noise = &noise;
+    gather_rays(surface.grid, *light, occluders, settings, sink, progress);
+    if (sum)
+        sum->add(noise, std::accumulate(color.begin(), color.end(), 0.0) / static_cast<double>(color.size()));
 }
 
 RaySum::RaySum(const ReceiverGrid& grid, std::size_t channel_count, bool with_flow)

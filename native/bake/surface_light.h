@@ -33,6 +33,9 @@ struct SurfaceLight {
     // Hands the rays of strength 1 to the sink, of the covered part of each texel and of the color that the surface
     // lets in.
     void gather(const Surface& surface, const RaySettings& settings, RaySink& sink, Progress& progress) const;
+
+private:
+    void gather_lamp(const Surface& surface, RaySettings settings, RaySink& sink, Progress& progress) const;
 };
 
 // Sum of the rays of each texel.

@@ -123,17 +123,22 @@ Array<float> luminance(const HeldSurface& held, const LightTuples& light_tuples,
                        const std::vector<double>& albedo, const std::vector<double>& mean_free_path,
                        const std::string& solver, double tolerance, int samples, int rays, int min_rays,
                        std::uint32_t seed, int threads, std::size_t max_stored_bytes, std::size_t memory_limit,
-                       const py::object& progress)
+                       const py::object& progress, const py::object& report_noise)
 {
     const std::vector<ChannelMedium> media = media_of(ldf, albedo, mean_free_path);
     const std::vector<SurfaceLight> lights = lights_of(light_tuples);
-    const BakeOptions options{named_solver(solver), tolerance,   samples, rays, min_rays, seed, threads,
-                              max_stored_bytes,     memory_limit};
+    RayNoise noise;
+    const BakeOptions options{named_solver(solver), tolerance,    samples, rays, min_rays, seed, threads,
+                              max_stored_bytes,     memory_limit, &noise};
     Progress report(progress_callback(progress));
     Array<float> result({held.surface.grid.height, held.surface.grid.width, media.size()});
     float* data = result.mutable_data();
-    const py::gil_scoped_release release;
-    bake_luminance(held.surface, lights, media, options, report, data);
+    {
+        const py::gil_scoped_release release;
+        bake_luminance(held.surface, lights, media, options, report, data);
+    }
+    if (!report_noise.is_none())
+        report_noise(noise.relative());
     return result;
 }
 
@@ -154,10 +159,12 @@ Array<float> field_luminance(HeldField& held, const HeldSurface& surface, const 
 }
 
 py::tuple arrival(const HeldSurface& held, const LightTuples& light_tuples, int samples, int rays, std::uint32_t seed,
-                  int threads, const py::object& progress)
+                  int threads, const py::object& progress, const py::object& report_noise)
 {
     const std::vector<SurfaceLight> lights = lights_of(light_tuples);
-    const BakeOptions options = options_of(samples, rays, seed, threads);
+    RayNoise noise;
+    BakeOptions options = options_of(samples, rays, seed, threads);
+    options.noise = &noise;
     Progress report(progress_callback(progress));
     Array<float> irradiance = new_vectors(held.surface.grid);
     Array<float> flow = new_vectors(held.surface.grid);
@@ -167,6 +174,8 @@ py::tuple arrival(const HeldSurface& held, const LightTuples& light_tuples, int 
         const py::gil_scoped_release release;
         bake_arrival(held.surface, lights, options, report, irradiance_data, flow_data);
     }
+    if (!report_noise.is_none())
+        report_noise(noise.relative());
     return py::make_tuple(irradiance, flow);
 }
 
@@ -210,7 +219,7 @@ position : 3 floats, optional
           py::arg("mean_free_path"), py::arg("solver") = "fft", py::arg("tolerance") = 5e-3, py::arg("samples") = 4,
           py::arg("rays") = 256, py::arg("min_rays") = BakeOptions().min_rays, py::arg("seed") = 0,
           py::arg("threads") = 0, py::arg("max_stored_bytes") = BakeOptions().max_stored_bytes,
-          py::arg("memory_limit") = 0, py::arg("progress") = py::none(),
+          py::arg("memory_limit") = 0, py::arg("progress") = py::none(), py::arg("report_noise") = py::none(),
           R"(Luminance of a translucent surface: the engine behind `beamspread.core.bake`.
 
 Parameters
@@ -237,6 +246,9 @@ memory_limit : int
     Bytes of moments that the solver 'fft' may make of many or wide lights; 0: any.
 progress : callable, optional
     progress(fraction) returns False to stop.
+report_noise : callable, optional
+    report_noise(error) takes the standard error of the irradiance of a texel, root mean square over the texels and
+    relative to the mean irradiance. It counts rays to lights of a size as independent, and their noise is less.
 
 Returns
 -------
@@ -282,6 +294,7 @@ threads : int
 
     m.def("bake_arrival", &arrival, py::arg("surface"), py::arg("lights"), py::arg("samples") = 4,
           py::arg("rays") = 256, py::arg("seed") = 0, py::arg("threads") = 0, py::arg("progress") = py::none(),
+          py::arg("report_noise") = py::none(),
           R"(Light on the whole of each texel, without a medium; arguments as for `bake_luminance`.
 
 `rays` are those to each light of a size.

@@ -72,8 +72,7 @@ void BounceGuide::add(std::span<const GuideRecord> records)
         const std::size_t place = record.cell * m_lights + record.light;
         m_rays[place] += 1.0f;
         m_passed[place] += record.transmittance;
-        if (record.radiance > 0.0f)
-            m_found[record.cell * bins + bin(Vec3(record.direction))] += record.transmittance * record.radiance;
+        m_found[record.cell * bins + record.bin] += record.transmittance * record.radiance;
     }
 }
 
@@ -134,11 +133,15 @@ float BounceGuide::mean_visibility(std::uint32_t light) const
     return rays > 0.0f ? passed / rays : 1.0f;
 }
 
-double BounceGuide::density(std::uint32_t cell, std::uint32_t bin) const
+float BounceGuide::probability(std::uint32_t cell, std::uint32_t bin) const
 {
     const float* const values = &m_cumulated[cell * bins];
-    const float probability = values[bin] - (bin > 0 ? values[bin - 1] : 0.0f);
-    return static_cast<double>(probability) * bins * 0.25 * inv_pi;
+    return values[bin] - (bin > 0 ? values[bin - 1] : 0.0f);
+}
+
+double BounceGuide::density(std::uint32_t cell, const Vec3& direction) const
+{
+    return static_cast<double>(probability(cell, bin(direction))) * bins * 0.25 * inv_pi;
 }
 
 Vec3 BounceGuide::sample(std::uint32_t cell, const Vec2& place) const

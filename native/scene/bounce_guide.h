@@ -15,7 +15,7 @@ namespace beamspread {
 struct GuideRecord {
     std::uint32_t cell = 0;
     std::uint32_t light = 0;
-    Vec3f direction{0.0f, 0.0f, 1.0f};
+    std::uint32_t bin = 0;  // of the direction
     float transmittance = 0.0f;
     float radiance = 0.0f;  // of a light in all directions, over the density of rays
 };
@@ -45,8 +45,9 @@ public:
 
     // True if light of the sky was found from a cell or its neighbors.
     bool knows(std::uint32_t cell) const { return m_cumulated[(cell + 1) * bins - 1] > 0.0f; }
-    // Density, 1/sr, in a bin of the directions that `sample` draws.
-    double density(std::uint32_t cell, std::uint32_t bin) const;
+    // Probability of a bin, and density, 1/sr, of the directions that `sample` draws.
+    float probability(std::uint32_t cell, std::uint32_t bin) const;
+    double density(std::uint32_t cell, const Vec3& direction) const;
     Vec3 sample(std::uint32_t cell, const Vec2& place) const;
 
 private:

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <numbers>
+#include <numeric>
 #include <span>
 #include <vector>
 
@@ -54,7 +55,8 @@ public:
           m_smooth_points(gauss_points(grid)),
           m_smooth_from(texels_to_smooth_lamp * std::max(grid.pitch_x, grid.pitch_y)),
           m_rays(grid, occluders, settings.clearance),
-          m_shadows(grid, m_source, occluders, m_rays.start(), settings.find_shadows)
+          m_shadows(grid, m_source, occluders, m_rays.start(), settings.find_shadows),
+          m_sums(grid.height)
     {
         const Texel open = gather_texel(0.0, 0.0, m_points, nullptr);
         m_open_irradiance = Vec3f(open.irradiance);
@@ -62,6 +64,13 @@ public:
     }
 
     std::size_t bands() const { return m_shadows.bands(); }
+
+    // Mean irradiance of all texels and channels, W/m^2.
+    double mean() const
+    {
+        return std::accumulate(m_sums.begin(), m_sums.end(), 0.0) /
+               (3.0 * static_cast<double>(m_grid.width * m_grid.height));
+    }
 
     // Hands the rays of a band of rows to the sink; returns their number.
     std::size_t gather_band(std::size_t band, RaySink& sink)
@@ -89,7 +98,7 @@ private:
         std::vector<Vec3f> travel, irradiance;
     };
 
-    void gather_row(std::size_t y, const Shade* shades, Work& work, RaySink& sink) const
+    void gather_row(std::size_t y, const Shade* shades, Work& work, RaySink& sink)
     {
         const bool travel_varies = m_with_travel && !m_source.is_far;
         for (std::size_t x = 0; x < m_grid.width; ++x) {
@@ -102,6 +111,8 @@ private:
             if (travel_varies)
                 work.travel[x] = mean_direction(gathered.flow);
         }
+        for (const Vec3f& light : work.irradiance)
+            m_sums[y] += static_cast<double>(light.x + light.y + light.z);
         sink.add({.sample = y * m_grid.width,
                   .count = m_grid.width,
                   .ray = 0,
@@ -227,6 +238,7 @@ private:
     Shadows m_shadows;
     // Irradiance and travel at texel (0, 0) where nothing blocks the light: those of all texels, if it is infinitely far.
     Vec3f m_open_irradiance, m_far_travel;
+    std::vector<double> m_sums;  // [row] irradiance of texels and channels
     PerThread<Work> m_work;
 };
 
@@ -239,6 +251,8 @@ void detail::gather_delta_rays(const ReceiverGrid& grid, const Light& light, con
     DeltaGatherer gatherer(grid, light, occluders, settings);
     parallel_for(gatherer.bands(),
                  [&](std::size_t band) { progress.advance(static_cast<double>(gatherer.gather_band(band, sink))); });
+    if (settings.noise)
+        settings.noise->add({.irradiance = gatherer.mean()}, 1.0);
 }
 
 }  // namespace beamspread

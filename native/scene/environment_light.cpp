@@ -136,11 +136,17 @@ public:
 
     Vec3 irradiance(const Vec3& /*point*/, const Vec3& /*normal*/) const override { return m_irradiance; }
 
-    Look look(const Vec3& direction) const override
+    Vec3f radiance(const Vec3& direction) const override
+    {
+        const auto [x, y] = cell_of(direction);
+        return m_map.of_cell(x, y);
+    }
+
+    double density(const Vec3& direction) const override
     {
         const auto [x, y] = cell_of(direction);
         const double total = m_cumulated_rows.back();
-        return {m_map.of_cell(x, y), total > 0.0 ? m_in_row[y].weight(x) / total / solid_angle(y) : 0.0};
+        return total > 0.0 ? m_in_row[y].weight(x) / total / solid_angle(y) : 0.0;
     }
 
 private:

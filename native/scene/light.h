@@ -77,13 +77,9 @@ class DistantLight : public Light {
 public:
     const DistantLight* as_distant() const override { return this; }
 
-    struct Look {
-        Vec3f radiance;  // W/(m^2 sr)
-        double density;  // of the rays of `sample`, 1/sr
-    };
-
-    // Light from the direction of a unit vector.
-    virtual Look look(const Vec3& direction) const = 0;
+    // Radiance from the direction of a unit vector, W/(m^2 sr), and the density of the rays of `sample`, 1/sr.
+    virtual Vec3f radiance(const Vec3& direction) const = 0;
+    virtual double density(const Vec3& direction) const = 0;
 };
 
 }  // namespace beamspread

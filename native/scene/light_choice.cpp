@@ -159,16 +159,14 @@ void LightChoice::offer_guided(std::size_t light, const ShadingPoint& point, std
             sky.sample({&point.position, 1}, point.normal, {&place, 1}, &ray);
             direction = -ray.travel;
         }
-        const DistantLight::Look look = sky.look(direction);
-        const std::uint32_t bin = BounceGuide::bin(direction);
-        const double density = guided * m_guide->density(cell, bin) + unguided * look.density;
+        const double density = guided * m_guide->density(cell, direction) + unguided * sky.density(direction);
         if (!(density > 0.0))
             continue;
         const LightRay ray{.travel = -direction,
                            .distance = std::numeric_limits<double>::infinity(),
-                           .flux = look.radiance / static_cast<float>(density)};
-        reservoir.offer(with_radiance(light, point, ray), 1.0f,
-                        m_guide->density(cell, bin) > 0.0 ? 1.0f : unknown_factor, random);
+                           .flux = sky.radiance(direction) / static_cast<float>(density)};
+        const bool is_known = m_guide->probability(cell, BounceGuide::bin(direction)) > 0.0f;
+        reservoir.offer(with_radiance(light, point, ray), 1.0f, is_known ? 1.0f : unknown_factor, random);
     }
 }
 
@@ -222,7 +220,7 @@ LitRay LightChoice::choose(const ShadingPoint& point, Random& random) const
     if (m_guide)
         chosen.record = {.cell = cell,
                          .light = static_cast<std::uint32_t>(kept.light),
-                         .direction = Vec3f(chosen.shadow_ray.direction),
+                         .bin = BounceGuide::bin(chosen.shadow_ray.direction),
                          .radiance = m_distant[kept.light] ? kept.glow * reservoir.scale() : 0.0f};
     return chosen;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "base/sobol.h"
 #include "base/threads.h"
 #include "scene/checks.h"
+#include "scene/first_pass.h"
 #include "scene/open_irradiance.h"
 #include "scene/shadow_ray.h"
 
@@ -28,9 +30,6 @@ constexpr int max_trials = 64;
 constexpr Vec2 step_on_light(0.8566748838545029, 0.7338918566271259);
 constexpr Vec2 step_in_texel(0.6287067210378086, 0.5385972572236101);
 
-// Obstacles and light that the rays of a texel met.
-enum Met : std::uint8_t { nothing = 0, light = 1, obstacle = 2, both = light | obstacle };
-
 // Rays of one light with a size, from the texels of one grid.
 class SizedGatherer {
 public:
@@ -47,40 +46,52 @@ public:
           m_even_sobol(std::max<std::size_t>(m_even_rays, 1), settings.seed),
           m_rays(grid, occluders, settings.clearance)
     {
-        if (has_first_pass())
-            m_met.resize(grid.width * grid.height);
+        if (m_even_rays > 0 && m_even_rays < m_ray_count)
+            m_first_pass.emplace(grid.width, grid.height, m_ray_count, settings.seed);
+        m_noise.resize(grid.height);
     }
 
-    bool has_first_pass() const { return m_even_rays > 0 && m_even_rays < m_ray_count; }
+    bool has_first_pass() const { return m_first_pass.has_value(); }
 
-    // Traces few rays from a row, to find where it and its neighbors need more.
-    void trace_first(std::size_t y)
+    // Traces few rays from all texels, to find where they and their neighbors need more.
+    void trace_first(Progress& progress)
     {
-        Work& work = m_work.local();
-        for (std::size_t x = 0; x < m_grid.width; x += texels_at_once) {
-            const Span span{y, x, std::min(texels_at_once, m_grid.width - x)};
-            work.start(m_even_rays, span);
-            for (std::size_t i = 0; i < span.width; ++i)
-                gather_texel(i, {m_even_sobol, 0, m_even_rays, m_even_rays, true}, work);
-            trace(work);
-            std::copy(work.met.begin(), work.met.end(), met_in(y) + static_cast<std::ptrdiff_t>(x));
-        }
+        constexpr std::size_t rows = FirstPass::rows_of_tile;
+        parallel_for((m_grid.height + rows - 1) / rows, [&](std::size_t i) {
+            const std::size_t end = std::min((i + 1) * rows, m_grid.height);
+            for (std::size_t y = i * rows; y < end; ++y)
+                trace_first(y);
+            progress.advance(static_cast<double>(end - i * rows));
+        });
+        m_first_pass->search([this](std::span<const Vec2> positions, std::span<const Vec2> places,
+                                    std::uint8_t* arrives) { probe(positions, places, arrives); });
     }
 
     void gather_row(std::size_t y, RaySink& sink)
     {
         Work& work = m_work.local();
-        work.met_around.assign(m_grid.width, Met::both);
         if (has_first_pass())
-            find_met_around(y, work.met_around);
+            work.row.find(*m_first_pass, y);
         for (std::size_t x = 0; x < m_grid.width; x += texels_at_once) {
             const Span span{y, x, std::min(texels_at_once, m_grid.width - x)};
-            const auto begin = work.met_around.begin() + static_cast<std::ptrdiff_t>(x);
-            const auto end = begin + static_cast<std::ptrdiff_t>(span.width);
-            const std::size_t ray_count = std::find(begin, end, Met::both) == end ? m_even_rays : m_ray_count;
-            for (std::size_t first = 0; first < ray_count; first += max_rays_at_once)
-                gather_span(span, first, std::min(ray_count - first, max_rays_at_once), work, sink);
+            std::size_t most = 0;
+            for (std::size_t i = 0; i < span.width; ++i)
+                most = std::max(most, rays_of(method(work, x + i)));
+            work.sums.assign(span.width, {});
+            for (std::size_t first = 0; first < most; first += max_rays_at_once)
+                gather_span(span, first, std::min(most - first, max_rays_at_once), work, sink);
+            m_noise[y].add(noise_of(work), 1.0);
         }
+    }
+
+    // Noise of all texels.
+    RayNoise noise() const
+    {
+        RayNoise sum;
+        for (const RayNoise& row : m_noise)
+            sum.add(row, 1.0);
+        const auto texels = static_cast<double>(m_grid.width * m_grid.height);
+        return {sum.irradiance / texels, sum.variance / texels};
     }
 
 private:
@@ -91,17 +102,26 @@ private:
         std::size_t width;
     };
 
+    // Sums over the rays of a texel, of the mean of their channels, W/m^2.
+    struct TexelSum {
+        double irradiance = 0.0;
+        double square = 0.0;
+    };
+
     // Working memory of a thread: first the rays of a span, then those of one texel.
     struct Work {
         Span span{};
         std::vector<Vec3f> travel, irradiance;  // [ray * width + texel]
-        std::vector<std::uint8_t> met;          // [texel]
-        std::vector<std::uint8_t> met_around;   // [texel of the row] by its rays and those of its neighbors
+        std::vector<LightHit> hits;             // [ray * width + texel] of the first pass alone
+        std::vector<TexelSum> sums;             // [texel]
+        FirstPass::Row row;
         // A packet of rays that is being filled, and the index of each in `irradiance`.
         std::array<ShadowRay, Occluders::packet_size> packet;
         std::array<std::size_t, Occluders::packet_size> carried;
         std::size_t waiting = 0;
+        bool is_first = false;
         std::vector<Vec2> on_light, in_texel;
+        std::vector<double> densities;
         std::vector<Vec3> points, weights;
         std::vector<LightRay> rays;
 
@@ -110,7 +130,7 @@ private:
             span = new_span;
             travel.assign(count * span.width, Vec3f(0.0f, 0.0f, -1.0f));
             irradiance.assign(count * span.width, Vec3f(0.0f));
-            met.assign(span.width, Met::nothing);
+            is_first = false;
             resize(count);
         }
 
@@ -118,6 +138,7 @@ private:
         {
             on_light.resize(count);
             in_texel.resize(count);
+            densities.resize(count);
             points.resize(count);
             weights.resize(count);
             rays.resize(count);
@@ -126,41 +147,91 @@ private:
 
     // Rays [first, first + count) of the `all` rays of a texel.
     struct Part {
-        const GridSobol& sobol;
+        const GridSobol* sobol;
         std::size_t first;
         std::size_t count;
         std::size_t all;
         bool is_traced;
+        const LightGuide* guide = nullptr;
+        // True if the rays of the texel are scaled to the open irradiance, which is known. It takes the noise of rays that
+        // nothing blocks, and is wrong for few rays.
+        bool is_scaled = true;
     };
 
-    std::vector<std::uint8_t>::iterator met_in(std::size_t y)
+    RayMethod method(const Work& work, std::size_t x) const
     {
-        return m_met.begin() + static_cast<std::ptrdiff_t>(y * m_grid.width);
+        return has_first_pass() ? work.row.method(x) : RayMethod::even;
     }
 
-    // Finds for each texel of a row the obstacles and light that the first pass met in it and its neighbors.
-    void find_met_around(std::size_t y, std::vector<std::uint8_t>& around)
+    std::size_t rays_of(RayMethod method) const
     {
-        std::fill(around.begin(), around.end(), Met::nothing);
-        for (std::size_t row = y > 0 ? y - 1 : 0; row <= std::min(y + 1, m_grid.height - 1); ++row) {
-            const auto met = met_in(row);
-            for (std::size_t x = 0; x < m_grid.width; ++x)
-                for (std::size_t beside = x > 0 ? x - 1 : 0; beside <= std::min(x + 1, m_grid.width - 1); ++beside)
-                    around[x] |= met[static_cast<std::ptrdiff_t>(beside)];
+        switch (method) {
+            case RayMethod::none:
+                return 0;
+            case RayMethod::single:
+                return 1;
+            case RayMethod::open:
+            case RayMethod::few_guided:
+                return m_even_rays;
+            default:
+                return m_ray_count;
         }
     }
 
-    void gather_span(const Span& span, std::size_t first, std::size_t count, Work& work, RaySink& sink) const
+    // Traces few rays from a row.
+    void trace_first(std::size_t y)
+    {
+        Work& work = m_work.local();
+        for (std::size_t x = 0; x < m_grid.width; x += texels_at_once) {
+            const Span span{y, x, std::min(texels_at_once, m_grid.width - x)};
+            work.start(m_even_rays, span);
+            work.is_first = true;
+            work.hits.resize(m_even_rays * span.width);
+            for (std::size_t i = 0; i < span.width; ++i)
+                gather_texel(i, {&m_even_sobol, 0, m_even_rays, m_even_rays, true}, work);
+            trace(work);
+        }
+    }
+
+    // Sums of the noise of a span, of a row's part.
+    RayNoise noise_of(const Work& work) const
+    {
+        RayNoise noise;
+        for (std::size_t i = 0; i < work.span.width; ++i) {
+            const RayMethod method_here = method(work, work.span.x + i);
+            if (method_here <= RayMethod::open) {
+                const Vec3& open = m_open.at(work.span.x + i, work.span.y);
+                noise.irradiance += method_here == RayMethod::open ? (open.x + open.y + open.z) / 3.0 : 0.0;
+                continue;
+            }
+            const TexelSum& sum = work.sums[i];
+            noise.irradiance += sum.irradiance;
+            // Rays are taken as independent; low-discrepancy ones have less noise.
+            const auto rays = static_cast<double>(rays_of(method_here));
+            const double spread = sum.square - sum.irradiance * sum.irradiance / rays;
+            noise.variance += rays > 1.0 ? std::max(spread, 0.0) * rays / (rays - 1.0) : sum.square;
+        }
+        return noise;
+    }
+
+    void gather_span(const Span& span, std::size_t first, std::size_t count, Work& work, RaySink& sink)
     {
         work.start(count, span);
         for (std::size_t i = 0; i < span.width; ++i) {
-            const std::uint8_t around = work.met_around[span.x + i];
-            if (around == Met::both)
-                gather_texel(i, {m_sobol, first, count, m_ray_count, m_occluders != nullptr}, work);
-            else if (around == Met::light && first < m_even_rays)
-                gather_texel(i, {m_even_sobol, first, std::min(count, m_even_rays - first), m_even_rays, false}, work);
+            const RayMethod method_here = method(work, span.x + i);
+            const std::size_t all = rays_of(method_here);
+            if (first >= all)
+                continue;
+            Part part{&m_sobol, first, std::min(count, all - first), all, m_occluders != nullptr};
+            if (method_here == RayMethod::open)
+                part = {&m_even_sobol, first, part.count, all, false};
+            else if (method_here == RayMethod::guided || method_here == RayMethod::few_guided)
+                part.guide = &work.row.guide(span.x + i);
+            part.is_scaled = method_here == RayMethod::even || method_here == RayMethod::open;
+            gather_texel(i, part, work);
         }
         trace(work);
+        add_sums(count, work);
         for (std::size_t i = 0; i < count; ++i) {
             const std::size_t begin = i * span.width;
             sink.add({.sample = span.y * m_grid.width + span.x,
@@ -171,7 +242,24 @@ private:
         }
     }
 
-    void gather_texel(std::size_t texel, const Part& part, Work& work) const
+    // Adds the rays of a span to its sums, unless all of them are open.
+    void add_sums(std::size_t count, Work& work) const
+    {
+        bool is_open = has_first_pass();
+        for (std::size_t k = 0; k < work.span.width && is_open; ++k)
+            is_open = work.row.method(work.span.x + k) <= RayMethod::open;
+        if (is_open)
+            return;
+        for (std::size_t i = 0; i < count; ++i)
+            for (std::size_t k = 0; k < work.span.width; ++k) {
+                const Vec3f& light = work.irradiance[i * work.span.width + k];
+                const double mean = static_cast<double>(light.x + light.y + light.z) / 3.0;
+                work.sums[k].irradiance += mean;
+                work.sums[k].square += mean * mean;
+            }
+    }
+
+    void gather_texel(std::size_t texel, const Part& part, Work& work)
     {
         const std::size_t count = part.count;
         const std::size_t x = work.span.x + texel;
@@ -181,9 +269,13 @@ private:
         if (open == Vec3(0.0))
             return;
         work.resize(count);
-        part.sobol.points(x, y, part.first, count, work.on_light.data(), work.in_texel.data());
+        part.sobol->points(x, y, part.first, count, work.on_light.data(), work.in_texel.data());
+        if (part.guide)
+            for (std::size_t i = 0; i < count; ++i)
+                work.densities[i] = part.guide->guide(
+                    Vec2(static_cast<double>(x), static_cast<double>(y)) + work.in_texel[i], work.on_light[i]);
         Vec3 sum = sample(x, y, work);
-        for (int i = 0; i < max_trials && sum == Vec3(0.0); ++i) {
+        for (int i = 0; i < max_trials && sum == Vec3(0.0) && part.is_scaled; ++i) {
             for (std::size_t k = 0; k < count; ++k) {
                 work.on_light[k] = glm::fract(work.on_light[k] + step_on_light);
                 work.in_texel[k] = glm::fract(work.in_texel[k] + step_in_texel);
@@ -192,10 +284,15 @@ private:
         }
         // Open rays are scaled to the open irradiance, which is known; blocked rays then take their part of it. A channel
         // in which all rays happen to be dark follows the mean of the channels.
-        const auto lit = [is_dark = glm::equal(sum, Vec3(0.0))](const Vec3& weight) {
+        const glm::bvec3 is_dark(part.is_scaled && sum.x == 0.0, part.is_scaled && sum.y == 0.0,
+                                 part.is_scaled && sum.z == 0.0);
+        const auto lit = [is_dark](const Vec3& weight) {
             return glm::mix(weight, Vec3((weight.x + weight.y + weight.z) / 3.0), is_dark);
         };
-        const Vec3 scale = open / lit(sum);
+        const Vec3 scale = part.is_scaled ? open / lit(sum) : Vec3(1.0 / static_cast<double>(part.all));
+        if (part.guide)
+            for (std::size_t i = 0; i < count; ++i)
+                work.weights[i] /= work.densities[i];
         for (std::size_t i = 0; i < count; ++i) {
             if (work.weights[i] == Vec3(0.0))
                 continue;
@@ -206,6 +303,9 @@ private:
             work.irradiance[index] = Vec3f(scale * lit(work.weights[i]));
             if (!part.is_traced)
                 continue;
+            if (work.is_first)
+                work.hits[index] = {Vec2f(work.on_light[i]),
+                                    Vec2f(Vec2(static_cast<double>(x), static_cast<double>(y)) + work.in_texel[i])};
             work.packet[work.waiting] = m_rays.shadow_ray(work.points[i], ray);
             work.carried[work.waiting] = index;
             if (++work.waiting == Occluders::packet_size)
@@ -228,7 +328,27 @@ private:
         return sum;
     }
 
-    void trace(Work& work) const
+    void probe(std::span<const Vec2> positions, std::span<const Vec2> places, std::uint8_t* arrives) const
+    {
+        std::array<Vec3, Occluders::packet_size> points;
+        std::array<LightRay, Occluders::packet_size> rays;
+        std::array<ShadowRay, Occluders::packet_size> shadow_rays;
+        std::array<Vec3f, Occluders::packet_size> transmittance;
+        for (std::size_t first = 0; first < positions.size(); first += Occluders::packet_size) {
+            const std::size_t count = std::min(positions.size() - first, Occluders::packet_size);
+            for (std::size_t i = 0; i < count; ++i)
+                points[i] = m_grid.point(positions[first + i].x, positions[first + i].y);
+            m_light.sample(std::span(points).first(count), m_grid.normal, places.subspan(first, count), rays.data());
+            for (std::size_t i = 0; i < count; ++i)
+                shadow_rays[i] = m_rays.shadow_ray(points[i], rays[i]);
+            m_occluders->transmit(std::span(shadow_rays).first(count), transmittance.data(), false);
+            for (std::size_t i = 0; i < count; ++i)
+                arrives[first + i] = rays[i].flux != Vec3f(0.0f) && transmittance[i] != Vec3f(0.0f) &&
+                                     m_rays.arriving_cosine(rays[i]) > 0.0;
+        }
+    }
+
+    void trace(Work& work)
     {
         std::array<Vec3f, Occluders::packet_size> transmittance;
         if (work.waiting > 0)
@@ -237,9 +357,9 @@ private:
         for (std::size_t i = 0; i < work.waiting; ++i) {
             const std::size_t index = work.carried[i];
             work.irradiance[index] *= transmittance[i];
-            work.met[index % work.span.width] |= transmittance[i] == Vec3f(1.0f)   ? Met::light
-                                                 : transmittance[i] == Vec3f(0.0f) ? Met::obstacle
-                                                                                   : Met::both;
+            if (work.is_first)
+                m_first_pass->note(work.span.x + index % work.span.width, work.span.y, work.hits[index],
+                                   transmittance[i]);
         }
         work.waiting = 0;
     }
@@ -255,7 +375,8 @@ private:
     GridSobol m_sobol;
     GridSobol m_even_sobol;
     ReceiverRays m_rays;
-    std::vector<std::uint8_t> m_met;  // [texel] in the first pass
+    std::optional<FirstPass> m_first_pass;
+    std::vector<RayNoise> m_noise;  // [row] sums over its texels
     PerThread<Work> m_work;
 };
 
@@ -265,14 +386,13 @@ void gather_sized_rays(const ReceiverGrid& grid, const Light& light, const Occlu
     SizedGatherer gatherer(grid, light, occluders, settings);
     progress.set_total(static_cast<double>(grid.height) * (gatherer.has_first_pass() ? 2.0 : 1.0));
     if (gatherer.has_first_pass())
-        parallel_for(grid.height, [&](std::size_t y) {
-            gatherer.trace_first(y);
-            progress.advance(1.0);
-        });
+        gatherer.trace_first(progress);
     parallel_for(grid.height, [&](std::size_t y) {
         gatherer.gather_row(y, sink);
         progress.advance(1.0);
     });
+    if (settings.noise)
+        settings.noise->add(gatherer.noise(), 1.0);
 }
 
 }  // namespace

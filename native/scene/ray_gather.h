@@ -1,6 +1,7 @@
 // The one tracer: lights and occluders to rays that arrive at the samples of a receiver.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -34,6 +35,22 @@ public:
 inline constexpr int max_samples = 64;
 inline constexpr int max_rays = 4096;
 
+// Noise of light by rays, on average over texels.
+struct RayNoise {
+    double irradiance = 0.0;  // mean of texels and channels, W/m^2
+    double variance = 0.0;  // mean variance of a texel's irradiance, (W/m^2)^2
+
+    // Adds light of another strength.
+    void add(const RayNoise& light, double strength)
+    {
+        irradiance += strength * light.irradiance;
+        variance += strength * strength * light.variance;
+    }
+
+    // Standard error of a texel, relative to the mean irradiance.
+    double relative() const { return variance > 0.0 ? std::sqrt(variance) / irradiance : 0.0; }
+};
+
 struct RaySettings {
     // Delta lights: the ray of a texel is the mean over samples x samples points in it, each with its own visibility and
     // falloff.
@@ -51,6 +68,8 @@ struct RaySettings {
     bool with_travel = true;
     // False traces rays from every texel; the result is the same.
     bool find_shadows = true;
+    // Takes the noise of the light besides; may be null.
+    RayNoise* noise = nullptr;
 };
 
 // Hands all rays of a light to the sink; the rays of a texel add up to its light. The result is the same for any number

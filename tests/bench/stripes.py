@@ -30,10 +30,9 @@ def scattered(way, random):
 def simulated(period, photons):
     """Exitance (BINS,) across a period, per unit of irradiance; lengths in mean free paths."""
     random, left = np.random.default_rng(1), np.zeros(BINS)
-    at_once = min(AT_ONCE, photons)
-    for _ in range(photons // at_once):
-        x, z, power = random.random(at_once) * period, np.zeros(at_once), np.ones(at_once)
-        way = np.tile((0.0, 0.0, -1.0), (at_once, 1))
+    for _ in range(photons // AT_ONCE):
+        x, z, power = random.random(AT_ONCE) * period, np.zeros(AT_ONCE), np.ones(AT_ONCE)
+        way = np.tile((0.0, 0.0, -1.0), (AT_ONCE, 1))
         while len(x):
             length = random.exponential(size=len(x))
             out = z + way[:, 2] * length > 0
@@ -44,7 +43,7 @@ def simulated(period, photons):
             survives = (power >= FAINT) | (random.random(len(power)) < power / FAINT)
             x, z, power = x[survives], z[survives], np.maximum(power, FAINT)[survives]
             way = scattered(way[~out][survives], random)
-    return left / (photons // at_once * at_once) * BINS
+    return left / (photons // AT_ONCE * AT_ONCE) * BINS
 
 
 def by_convention(period, blur):

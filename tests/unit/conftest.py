@@ -14,7 +14,6 @@ os.environ.setdefault("PYTHONPATH", str(HERE.parents[1] / "build" / "stage"))
 SLOW = {
     "test_adaptive",
     "test_beam_diameter",
-    "test_benches",
     "test_cli",
     "test_convolve",
     "test_library",

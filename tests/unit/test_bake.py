@@ -319,7 +319,7 @@ def test_a_new_kind_of_light_and_a_new_layer_need_nothing_but_themselves(monkeyp
         def is_behind(self, target):
             return False
 
-    def irradiance(target, illumination, _material, _thickness, settings, _progress, _bytes_for_light):
+    def irradiance(target, illumination, _material, _thickness, settings, _progress, _bytes_for_light, _report):
         return arrive(target, illumination, settings)[0]
 
     monkeypatch.setitem(LAYERS, "Own", irradiance)

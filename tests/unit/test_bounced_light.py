@@ -339,51 +339,6 @@ def test_a_glowing_panel_close_to_a_wall():
     assert found[0]["paths"] < 3 * found[1]["paths"]
 
 
-def test_no_light_is_infinite():
-    """Lamps on surfaces, around them and in flat triangles; the latter meet no ray."""
-    flat = np.array([(0.0, 0, 0.5), (0.3, 0, 0.5), (0.6, 0, 0.5), (0.0, 0, 0.5)])
-    scene = native.Occluders(
-        [mesh(*sphere(6)[:2], grey(0.9)), mesh(flat, FACES, grey(0.9)), mesh(SQUARE, FACES, grey(0.9))]
-    )
-    lamps = [
-        native.PointLight((0, 0, 0)),
-        native.PointLight((0, 0, 0), 2.0),
-        native.AreaLight((0, 0, 0), np.eye(3), 1, 1, False, np.pi),
-        native.MeshLight(SQUARE, FACES, np.ones((2, 3), np.float32)),
-        native.MeshLight(flat, FACES, np.ones((2, 3), np.float32)),
-    ]
-    for lamp in lamps:
-        found = bounced(scene, [(lamp, 1.0)], [grid((0, 0, 0.1), nodes=(2, 2))], max_bounces=6, max_samples=16)
-        assert np.isfinite(found["radiance"][0]).all()
-        assert np.isfinite(found["noise"])
-        assert (found["radiance"][0] >= 0).all()
-
-
-@pytest.mark.parametrize("after", [0.0, 0.3])
-def test_bounces_are_cancelled(after):
-    scene = native.Occluders([mesh(*sphere(12)[:2], grey(0.9))])
-    lamps = [(native.PointLight((0, 0, 0)), 1.0)]
-    with pytest.raises(native.Cancelled):
-        bounced(scene, lamps, tolerance=1e-4, progress=lambda fraction: fraction < after)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "name"),
-    [
-        ({"direct": -1.0}, "direct"),
-        ({"tolerance": 0.0}, "tolerance"),
-        ({"max_bounces": -1}, "max_bounces"),
-        ({"max_samples": 1}, "max_samples"),
-        ({"grids": [{**grid(), "nodes": (0, 1)}]}, "nodes"),
-        ({"grids": [{**grid(), "size": (0.0, 1.0)}]}, "size"),
-    ],
-)
-def test_arguments_out_of_range_are_named(wrong, name):
-    scene = native.Occluders([mesh(SQUARE, FACES, grey(0.9))])
-    with pytest.raises(ValueError, match=f"'{name}'"):
-        bounced(scene, [(native.SunLight((0, 0, -1)), 1.0)], **wrong)
-
-
 def test_the_bench_runs_in_small():
     bench = Path(__file__).resolve().parents[1] / "bench" / "bounces.py"
     done = subprocess.run([sys.executable, str(bench), "2"], capture_output=True, text=True, check=True)

@@ -41,6 +41,9 @@ OPEN_TEXELS, OPEN_RAYS = 96, 4
 # The same with shadows, for means that are right to some percent.
 SHADOW_TEXELS, SHADOW_RAYS = 48, 16
 
+Report = Callable[[float], None]
+"""Takes the noise of light, relative to its mean."""
+
 
 def bake(
     grid: Grid,
@@ -50,6 +53,7 @@ def bake(
     settings: BakeSettings,
     progress: Callback | None = None,
     bytes_for_light: int = 0,
+    report_noise: Report | None = None,
 ) -> np.ndarray:
     """Luminance of a translucent plane.
 
@@ -60,6 +64,8 @@ def bake(
     thickness : in the units of the grid, 0 for a half-space.
     progress : called with 0..1, returns False to stop.
     bytes_for_light : largest memory, bytes, of the moments that the fft solver makes of light; 0: any.
+    report_noise : takes the noise of the light, relative to its mean and averaged over the area in which the medium
+        spreads it.
 
     Returns
     -------
@@ -82,7 +88,9 @@ def bake(
         sources = _libraries(material, thickness, settings, media_progress)
     else:
         sources = [load_source(settings.sample_folder, settings.distributions)] * 3
-    return spread(grid, illumination, material, sources, settings, light_progress, bytes_for_light)
+    return spread(
+        grid, illumination, material, sources, settings, light_progress, bytes_for_light, report_noise=report_noise
+    )
 
 
 def spread(
@@ -94,8 +102,14 @@ def spread(
     progress: Callback | None = None,
     bytes_for_light: int = 0,
     seed: int = 0,
+    report_noise: Report | None = None,
 ) -> np.ndarray:
     """`bake` with the LDF of each channel given; the material is checked, and `settings.quality` does not count."""
+
+    def report_spread(noise: float) -> None:
+        if report_noise:
+            report_noise(noise / math.sqrt(spread_texels(grid, material)))
+
     try:
         return native.bake_luminance(
             grid.surface(),
@@ -113,6 +127,7 @@ def spread(
             max_stored_bytes=MAX_STORED_BYTES,
             memory_limit=bytes_for_light,
             progress=progress,
+            report_noise=report_spread,
         )
     except native.MemoryLimit as error:
         raise BakeError(
@@ -128,14 +143,18 @@ def spread(
 def rays_per_texel(grid: Grid, material: Material, settings: BakeSettings) -> int:
     """How many rays of each texel leave noise of a hundredth, in a penumbra, of what the medium spreads.
 
-    Light from a point fills some 4 pi l^2 texels, l the mean free path, over whose rays its noise is averaged; that of
-    n low-discrepancy rays falls about as n^-5/8, from .69 for one (tests/bench/room.py).
+    The noise of n low-discrepancy rays falls about as n^-5/8, from .69 for one (tests/bench/room.py). It is averaged
+    over `spread_texels`.
     """
-    path = min(material.mean_free_path) / max(grid.pitch_x, grid.pitch_y)
-    texels = 1.0 + 4.0 * math.pi * path**2
-    wanted = (69.0 / math.sqrt(texels)) ** (8.0 / 5.0)
+    wanted = (69.0 / math.sqrt(spread_texels(grid, material))) ** (8.0 / 5.0)
     at_four = min(max(wanted, MIN_RAYS), MAX_RAYS)
     return min(round(at_four * (settings.samples / 4) ** 2) or 1, MOST_RAYS)
+
+
+def spread_texels(grid: Grid, material: Material) -> float:
+    """Number of texels that the light from a point fills, about: 4 pi l^2, l the mean free path, and its own."""
+    path = min(material.mean_free_path) / max(grid.pitch_x, grid.pitch_y)
+    return 1.0 + 4.0 * math.pi * path**2
 
 
 def _libraries(material: Material, thickness: float, settings: BakeSettings, progress: Progress) -> list:
@@ -148,7 +167,11 @@ def _libraries(material: Material, thickness: float, settings: BakeSettings, pro
 
 
 def arrive(
-    grid: Grid, illumination: Illumination, settings: BakeSettings, progress: Progress | None = None
+    grid: Grid,
+    illumination: Illumination,
+    settings: BakeSettings,
+    progress: Progress | None = None,
+    report_noise: Report | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Light of all lights on the whole of each texel, whatever part of it lies inside the mesh.
 
@@ -165,6 +188,7 @@ def arrive(
         rays=min(RAYS_PER_SAMPLE * settings.samples**2, MOST_RAYS),
         threads=settings.threads,
         progress=progress,
+        report_noise=report_noise,
     )
 
 
@@ -198,16 +222,16 @@ def _mean_irradiance(grid: Grid, illumination: Illumination, texels: int, rays: 
     return float(irradiance.mean())
 
 
-Layer = Callable[[Grid, Illumination, Material, float, BakeSettings, Progress, int], np.ndarray]
+Layer = Callable[[Grid, Illumination, Material, float, BakeSettings, Progress, int, Report], np.ndarray]
 """Takes the arguments of `luminance.bake`; float32 (grid height, grid width, 3), row 0 at the bottom."""
 
 
-def irradiance(grid, illumination, _material, _thickness, settings, progress, _bytes_for_light) -> np.ndarray:
-    return arrive(grid, illumination, settings, progress)[0]
+def irradiance(grid, illumination, _material, _thickness, settings, progress, _bytes_for_light, report) -> np.ndarray:
+    return arrive(grid, illumination, settings, progress, report)[0]
 
 
-def direction(grid, illumination, _material, _thickness, settings, progress, _bytes_for_light) -> np.ndarray:
-    return mean_direction(arrive(grid, illumination, settings, progress)[1])
+def direction(grid, illumination, _material, _thickness, settings, progress, _bytes_for_light, report) -> np.ndarray:
+    return mean_direction(arrive(grid, illumination, settings, progress, report)[1])
 
 
 LAYERS: dict[str, Layer] = {COMBINED: bake, IRRADIANCE: irradiance, DIRECTION: direction}

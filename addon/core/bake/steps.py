@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import BakeError
 from ..ldf.library import SIMULATING, is_known, library
+from ..messages import Message, note
 from ..progress import Progress
 from .bake_settings import BakeSettings
 from .job import BakeJob, Step
@@ -37,6 +38,10 @@ PASS_BYTES = 50e6, 120
 
 NARROW_SLAB, WIDE_SLAB = (200e6, 300), (800e6, 300)
 """Additional bytes of slabs with an ior above 1, for one mean free path or less; they fall as 1 / thickness."""
+
+
+MAX_NOISE = 0.03
+"""Noise of the light, relative to its mean, above which a bake names it. More: fewer notes."""
 
 
 @dataclass(frozen=True)
@@ -70,10 +75,13 @@ class Solve(Step):
             material = job.surface.resolve(settings.quality, None, settings.threads)
         rest = material, job.surface.thickness, settings
         charts = job.receiver.charts
+        noises: list[float] = []
         values = [
-            LAYERS[settings.layer](chart.grid, job.illumination, *rest, part, self._bytes_for_light(job))
+            LAYERS[settings.layer](chart.grid, job.illumination, *rest, part, self._bytes_for_light(job), noises.append)
             for chart, part in zip(charts, progress.split([1.0] * len(charts)))
         ]
+        if max(noises, default=0.0) > MAX_NOISE:
+            job = replace(job, illumination=job.illumination.with_messages(_noisy(job.name, max(noises))))
         if not all(np.isfinite(on_grid).all() for on_grid in values):
             text = "The bake produced values that are not numbers."
             raise BakeError(text, "Check the strengths of the lights.")
@@ -98,6 +106,11 @@ class Solve(Step):
 
 BAKE_STEPS = (Simulate(), Solve())
 """Steps of a job whose light and colors are known."""
+
+
+def _noisy(name: str, noise: float) -> Message:
+    text = f"The light on '{name}' has a noise of {100 * noise:.0f} %, since few rays find it."
+    return note(name, text, "Raise Samples.")
 
 
 def needs_medium(settings: BakeSettings) -> bool:

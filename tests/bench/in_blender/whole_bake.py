@@ -64,18 +64,16 @@ def phases(folder):
 
     def import_all():
         from beamspread import batch, blender
-        from beamspread.blender.cycles import cycles_light
         from beamspread.blender.images import files
         from beamspread.blender.jobs.run import batch_run as bakes
         from beamspread.core.bake import layers, steps
 
-        return batch, blender, cycles_light, files, bakes, layers, steps
+        return batch, blender, files, bakes, layers, steps
 
-    batch, blender, cycles_light, files, bakes, layers, steps = timed("import", import_all)()
+    batch, blender, files, bakes, layers, steps = timed("import", import_all)()
     time_calls("register", blender, "register")
     time_calls("extract", bakes, "prepare_scene")
     time_calls("library from the cache", layers, "_libraries")
-    time_calls("light by Cycles", cycles_light.LightByCycles, "run")
     time_calls("light and solution", layers, "spread")
     time_calls("margin", steps, "extend_margin")
     time_calls("image file", files, "write_file")

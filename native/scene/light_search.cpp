@@ -1,0 +1,200 @@
+#include "scene/light_search.h"
+
+#include <algorithm>
+
+#include "base/threads.h"
+
+namespace beamspread {
+
+namespace {
+
+// Rays of a search from a tile for each ray of a texel, and bounds of their number. More: light that is harder to find.
+constexpr std::size_t search_rays_per_ray = 4;
+constexpr std::size_t min_search_rays = 64;
+constexpr std::size_t max_search_rays = 1024;
+
+// Searches of a tile at most, and if the last one has found many hits. More: guides that fit better, in a longer time.
+constexpr int max_searches = 4;
+constexpr int max_full_searches = 2;
+
+// Hits that a tile keeps of the first pass and in all, and that it takes from each neighbor. More: guides that fit better,
+// and take longer.
+constexpr std::size_t first_hits = 32;
+constexpr std::size_t max_hits = 128;
+constexpr std::size_t hits_of_neighbor = 16;
+
+// Fraction of rays of the first pass that get through, above which even rays have less noise than guided ones.
+constexpr double max_rare_share = 0.2;
+
+// Separates the random numbers of a search from those of other rays.
+constexpr std::uint32_t search_seed = 0x9e3779b9u;
+
+}  // namespace
+
+bool LightSearch::Tile::is_rare() const
+{
+    return static_cast<double>(arrived) < max_rare_share * static_cast<double>(traced);
+}
+
+// Keeps some of the hits, evenly.
+void LightSearch::Tile::keep(std::span<const LightHit> new_hits)
+{
+    const std::size_t kept = std::min(new_hits.size(), max_hits);
+    if (kept == max_hits)
+        hits.clear();
+    for (std::size_t i = 0; i < kept; ++i) {
+        const LightHit& hit = new_hits[i * new_hits.size() / kept];
+        if (hits.size() < max_hits)
+            hits.push_back(hit);
+        else
+            hits[i] = hit;
+    }
+}
+
+LightSearch::LightSearch(std::size_t width, std::size_t height, std::size_t rays, std::uint32_t seed)
+    : m_width(width),
+      m_height(height),
+      m_columns((width + tile_side - 1) / tile_side),
+      m_rows((height + tile_side - 1) / tile_side),
+      m_search_rays(std::clamp(search_rays_per_ray * rays, min_search_rays, max_search_rays)),
+      m_sobol(m_search_rays * max_searches, seed ^ search_seed),
+      m_tiles(m_columns * m_rows)
+{
+}
+
+void LightSearch::note(std::size_t x, std::size_t y, const LightHit& hit, bool is_blocked)
+{
+    Tile& tile = m_tiles[y / tile_side * m_columns + x / tile_side];
+    ++tile.traced;
+    if (is_blocked)
+        return;
+    if (tile.hits.size() < first_hits)
+        tile.hits.push_back(hit);
+    else
+        tile.hits[tile.arrived % first_hits] = hit;
+    ++tile.arrived;
+    tile.has_news = true;
+}
+
+template <class Visit>
+void LightSearch::visit_around(std::size_t tile, const Visit& visit) const
+{
+    const std::size_t x = tile % m_columns;
+    const std::size_t y = tile / m_columns;
+    for (std::size_t row = y > 0 ? y - 1 : 0; row <= std::min(y + 1, m_rows - 1); ++row)
+        for (std::size_t column = x > 0 ? x - 1 : 0; column <= std::min(x + 1, m_columns - 1); ++column)
+            visit(row * m_columns + column);
+}
+
+std::vector<LightHit> LightSearch::hits_around(std::size_t tile) const
+{
+    std::vector<LightHit> hits = m_tiles[tile].hits;
+    const Vec2f center = static_cast<float>(tile_side) * Vec2f(static_cast<float>(tile % m_columns) + 0.5f,
+                                                               static_cast<float>(tile / m_columns) + 0.5f);
+    const auto distance = [&center](const LightHit& hit) {
+        const Vec2f step = glm::abs(hit.position - center);
+        return std::max(step.x, step.y);
+    };
+    std::vector<LightHit> nearest;
+    visit_around(tile, [&](std::size_t i) {
+        if (i == tile)
+            return;
+        nearest = m_tiles[i].hits;
+        const std::size_t count = std::min(nearest.size(), hits_of_neighbor);
+        const auto end = nearest.begin() + static_cast<std::ptrdiff_t>(count);
+        std::ranges::partial_sort(nearest, end, {}, distance);
+        hits.insert(hits.end(), nearest.begin(), end);
+    });
+    return hits;
+}
+
+bool LightSearch::is_due(std::size_t tile) const
+{
+    const bool is_full = m_tiles[tile].hits.size() == max_hits;
+    if (!m_tiles[tile].is_rare() || m_tiles[tile].searches >= (is_full ? max_full_searches : max_searches))
+        return false;
+    bool has_news = false;
+    visit_around(tile, [&](std::size_t i) { has_news |= m_tiles[i].has_news; });
+    return has_news;
+}
+
+std::vector<LightHit> LightSearch::search(std::size_t tile, const ProbeLight& probe) const
+{
+    LightGuide guide;
+    std::vector<LightHit> hits = hits_around(tile);
+    guide.assign(hits);
+    std::vector<Vec2> places(m_search_rays), positions(m_search_rays);
+    std::vector<double> densities(m_search_rays);
+    const std::size_t x = tile % m_columns;
+    const std::size_t y = tile / m_columns;
+    const std::size_t first = m_search_rays * static_cast<std::size_t>(m_tiles[tile].searches);
+    m_sobol.points(x, y, first, m_search_rays, places.data(), positions.data());
+    const Vec2 begin(static_cast<double>(x * tile_side), static_cast<double>(y * tile_side));
+    const Vec2 end(static_cast<double>(std::min((x + 1) * tile_side, m_width)),
+                   static_cast<double>(std::min((y + 1) * tile_side, m_height)));
+    for (std::size_t i = 0; i < m_search_rays; ++i) {
+        // Every other ray starts as near to a hit as the tile allows: from farther away a narrow gap may lie in another
+        // direction.
+        const Vec2 beside = Vec2(hits[i / 2 % hits.size()].position) + 2.0 * positions[i] - 1.0;
+        positions[i] = i % 2 == 1 ? glm::clamp(beside, begin, end) : glm::mix(begin, end, positions[i]);
+        densities[i] = guide.guide(positions[i], places[i]);
+    }
+    std::vector<std::uint8_t> arrives(m_search_rays);
+    probe(positions, places, arrives.data());
+    hits.clear();
+    std::vector<double> ends;
+    double total = 0.0;
+    for (std::size_t i = 0; i < m_search_rays; ++i)
+        if (arrives[i]) {
+            hits.push_back({Vec2f(places[i]), Vec2f(positions[i])});
+            ends.push_back(total += 1.0 / densities[i]);
+        }
+    if (hits.size() <= max_hits)
+        return hits;
+    std::vector<LightHit> kept;
+    for (std::size_t i = 0, k = 0; i < max_hits; ++i) {
+        const double at = (static_cast<double>(i) + 0.5) / max_hits * total;
+        while (ends[k] < at)
+            ++k;
+        kept.push_back(hits[k]);
+    }
+    return kept;
+}
+
+void LightSearch::spread(const ProbeLight& probe)
+{
+    while (true) {
+        std::vector<std::size_t> due;
+        for (std::size_t i = 0; i < m_tiles.size(); ++i)
+            if (is_due(i))
+                due.push_back(i);
+        if (due.empty())
+            return;
+        std::vector<std::vector<LightHit>> hits(due.size());
+        parallel_for(due.size(), [&](std::size_t k) { hits[k] = search(due[k], probe); });
+        for (Tile& tile : m_tiles)
+            tile.has_news = false;
+        for (std::size_t k = 0; k < due.size(); ++k) {
+            Tile& tile = m_tiles[due[k]];
+            ++tile.searches;
+            tile.has_news = !hits[k].empty();
+            tile.keep(hits[k]);
+        }
+    }
+}
+
+bool LightSearch::has_hits_around(std::size_t x, std::size_t y) const
+{
+    bool has_hits = false;
+    visit_around(y / tile_side * m_columns + x / tile_side,
+                 [&](std::size_t i) { has_hits |= !m_tiles[i].hits.empty(); });
+    return has_hits;
+}
+
+void LightSearch::find_guide(std::size_t x, std::size_t y, LightGuide& guide) const
+{
+    std::vector<LightHit> hits = hits_around(y / tile_side * m_columns + x / tile_side);
+    guide.assign(hits);
+}
+
+}  // namespace beamspread
