@@ -123,6 +123,26 @@ def has_transparent_shadow(material) -> bool:
     return bool(getattr(owner, "use_transparent_shadow", True))
 
 
+def principled_has_layers() -> bool:
+    """True if the lobe of a Principled BSDF takes its light from the diffuse part below it (Blender 4.0 on)."""
+    return bpy.app.version >= (4, 0, 0)
+
+
+def filtered_roughness(scene) -> float:
+    """Least roughness of glossy lobes for light that bounced diffusely before, by Cycles' Filter Glossy.
+
+    The alpha there is .5 sqrt(1 - p / filter), with the density p of the bounce; its mean is 2 / (3 pi).
+    """
+    blur = getattr(getattr(scene, "cycles", None), "blur_glossy", 0.0)
+    return math.sqrt(0.5 * math.sqrt(1 - 2 / (3 * math.pi) / blur)) if blur > 2 / (3 * math.pi) else 0.0
+
+
+def diffuse_bounces(scene) -> int:
+    """Number of diffuse surfaces that light bounces from in Cycles; Cycles' default if Blender has no Cycles."""
+    cycles = getattr(scene, "cycles", None)
+    return min(getattr(cycles, "diffuse_bounces", 4), getattr(cycles, "max_bounces", 12))
+
+
 def transparent_bounces(scene) -> int | None:
     """Number of transparent surfaces that a shadow ray of Cycles crosses; None if Blender has no Cycles."""
     return getattr(getattr(scene, "cycles", None), "transparent_max_bounces", None)

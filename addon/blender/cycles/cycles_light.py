@@ -4,18 +4,30 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
+from ...core.bake.bounced import (
+    BY_OWN_RAYS,
+    NEGLIGIBLE,
+    NODES,
+    NOISE,
+    NOISY,
+    NOTHING_BOUNCES,
+    BouncedLight,
+    charts_of,
+    mean_over,
+)
 from ...core.bake.job import BakeJob, Step
 from ...core.bake.layers import mean_irradiance, mean_open_irradiance
 from ...core.bake.smoothing import SPLINE_VARIANCE, smoothing_variance
 from ...core.errors import MissingImageError
 from ...core.messages import Message, note, warning
 from ...core.progress import Callback, Progress
+from ...core.scene.illumination import Illumination
 from ...core.scene.lights import STRATA, Field, FieldLight, Light, WorldLight
 from ...core.scene.receiver import Grid, Receiver
 from .. import compat
@@ -25,29 +37,11 @@ from ..read.visibility import SOLID_TYPES, render_visible_names, renders
 from .process import run, start
 from .scene_copy import CopyForCycles, SceneCopy
 
-# Nodes along the longest side of a receiver; more resolve bounced light more finely and take longer.
-NODES = 64
-# Most squares of that side that the nodes of all charts fill.
-MAX_SQUARES = 2.0
-
-# Allowed noise of the irradiance that Cycles finds, relative to all irradiance, as texels get it.
-NOISE = 0.01
-# Multiple of that noise from which a message names it.
-NOISY = 1.2
 # Most samples of each direction at a node.
 MAX_SAMPLES = 128
 
-# Fraction of the unoccluded direct light below which bounced light is ignored. Leaks into a closed box are 1.3e-7.
-NEGLIGIBLE = 1e-6
-NOTHING_BOUNCES = warning(
-    "", "Indirect light is left out: it is less than a millionth of what the lights send without obstacles."
-)
-
 # Nodes along the longest side for direct light of lamps whose nodes only Cycles can evaluate.
 DIRECT_NODES = 256
-
-# Height above the receiver at which light is gathered, in nodes; objects below it cast no shadow.
-LIFT = 1e-3
 
 # Samples of each texel of the world's panorama, and of texels in tiles around a sun; more reduce noise.
 WORLD_SAMPLES, SUN_SAMPLES = 2, 256
@@ -88,6 +82,7 @@ class CyclesLight:
         self._lamps = {
             obj.name: _position_of(obj) for obj in bpy.data.scenes[self._names[0]].objects if obj.type == "LIGHT"
         }
+        self._max_bounces = compat.diffuse_bounces(depsgraph.scene)
         self._copy = copy
         self._lacks_world_images = world is not None and bool(_missing_images_of(world))
         materials = (data for data in depsgraph.ids if isinstance(data, bpy.types.Material))
@@ -100,6 +95,13 @@ class CyclesLight:
         bounced = job.settings.indirect and bool(illumination.lights or illumination.by_cycles)
         bounced = bounced and self._is_below_something(job.receiver)
         objects = [name for name in illumination.by_cycles if name != world and name in scene.objects]
+        if bounced:
+            illumination = illumination.with_messages(*self._missing)
+            why_not_own = self._why_not_own_rays(illumination, world)
+            if not why_not_own:
+                job = replace(job, steps=(BouncedLight(self._max_bounces), *job.steps))
+                illumination, bounced = illumination.with_messages(BY_OWN_RAYS), False
+        job = replace(job, illumination=illumination)
         if not (world or bounced or objects):
             return job
         # A world without its images is left out; Cycles would show it in magenta.
@@ -111,9 +113,23 @@ class CyclesLight:
             return replace(job, illumination=illumination.with_messages(missing))
         start(self._copy.scene)
         illumination = illumination.without({world, *objects} - {""}).with_messages(*self._copy.scene.warnings)
-        illumination = illumination.with_messages(*self._missing) if bounced else illumination
+        names = ", ".join(f"'{name}'" for name in [world, *objects] if name)
+        found = [f"Cycles finds the light of {names}."] if names else []
+        if bounced:
+            found.append(f"Cycles finds the bounced light, since Beamspread's own rays can't. {why_not_own}")
+        illumination = illumination.with_messages(*(note("", text) for text in found))
         step = LightByCycles(self._copy, world, {name: self._lamps.get(name) for name in objects}, bounced, has_world)
         return replace(job, illumination=illumination, steps=(step, *job.steps))
+
+    def _why_not_own_rays(self, illumination: Illumination, world: str) -> str:
+        """Sentence that says why only Cycles can find bounced light; "" if our own rays can.
+
+        They need a world as a panorama, which Cycles may render, and lights that our readers have read.
+        """
+        for name in illumination.by_cycles:
+            if name != world:
+                return f"Only Cycles knows the light of '{name}'."
+        return illumination.untraceable
 
     def copy(self) -> CopyForCycles | None:
         """Copy of the scene; None if there is none and this is not the main thread."""
@@ -202,7 +218,7 @@ class LightByCycles(Step):
         The fraction is that of the irradiance without obstacles on both sides; infinite if there is no other light.
         """
         receiver, lights = job.receiver, job.illumination.lights
-        without_obstacles = _mean(receiver, lambda grid: _open_irradiance_of_both_sides(grid, lights))
+        without_obstacles = mean_over(receiver, lambda grid: _open_irradiance_of_both_sides(grid, lights))
         nodes = nodes or NODES
         request = REQUEST | {
             "charts": charts_of(receiver, nodes),
@@ -210,7 +226,7 @@ class LightByCycles(Step):
             "reflectances": self.copy.reflectances,
             "textures": self.copy.textures,
             "tolerance": NOISE,
-            "direct": _mean(receiver, lambda grid: mean_irradiance(grid, job.illumination)),
+            "direct": mean_over(receiver, lambda grid: mean_irradiance(grid, job.illumination)),
             "open": without_obstacles,
             "variance": smoothing_variance(receiver, job.surface, job.settings, nodes),
             "most_samples": MAX_SAMPLES,
@@ -236,33 +252,6 @@ def _open_irradiance_of_both_sides(grid: Grid, lights: Sequence[Light]) -> float
     """Mean irradiance without obstacles, W/m^2: light from behind may come back as well."""
     back = replace(grid, normal=tuple(-value for value in grid.normal))
     return mean_open_irradiance(grid, lights) + mean_open_irradiance(back, lights)
-
-
-def _mean(receiver: Receiver, value_of: Callable[[Grid], float]) -> float:
-    """Mean of a value of each grid, weighted by area."""
-    grids = [chart.grid for chart in receiver.charts]
-    areas = [grid.width * grid.pitch_x * grid.height * grid.pitch_y for grid in grids]
-    return float(np.average([value_of(grid) for grid in grids], weights=areas))
-
-
-def charts_of(receiver: Receiver, nodes: int) -> list[dict]:
-    """Charts as child_fields.py takes them: rectangles of nodes slightly above the receiver."""
-    sizes = [(c.grid.width * c.grid.pitch_x, c.grid.height * c.grid.pitch_y) for c in receiver.charts]
-    cell = max(*map(max, sizes), math.sqrt(sum(x * y for x, y in sizes) / MAX_SQUARES)) / nodes
-    charts = []
-    for grid, size in zip((chart.grid for chart in receiver.charts), sizes):
-        lift = grid.clearance + LIFT * cell + 1e-6 * float(np.abs(grid.origin).max())
-        charts.append(
-            {
-                "corner": (np.array(grid.origin) + lift * np.array(grid.normal)).tolist(),
-                "x_axis": list(map(float, grid.x_axis)),
-                "y_axis": list(map(float, grid.y_axis)),
-                "normal": list(map(float, grid.normal)),
-                "size": size,
-                "nodes": [max(1, round(length / cell)) for length in size],
-            }
-        )
-    return charts
 
 
 def _corners_of_solids(depsgraph) -> np.ndarray:

@@ -7,7 +7,6 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core.errors import MaterialError
 from ...core.messages import Message, warning
 from ...core.scene.lights import WorldLight
 from ...core.target import Target
@@ -15,6 +14,7 @@ from ..node.find import find_node_in_groups
 from ..node.tree import BASE_COLOR
 from ..read.image_nodes import missing_images
 from ..read.nodes import Links
+from ..read.reflection import reflectance_of
 from ..read.visibility import with_instanced
 from .folders import Folder
 
@@ -108,16 +108,9 @@ class CopyForCycles:
         self.base_colors: dict[Target, object] = {}
         nodes = {material.name: find_node_in_groups(material) for material in bpy.data.materials}
         nodes = {name: node for name, node in nodes.items() if node is not None}
-        self.reflectances = {name: _reflectance(node.surface()) for name, (node, _) in nodes.items()}
+        self.reflectances = {name: reflectance_of(node.surface()) for name, (node, _) in nodes.items()}
         self.textures = {
             name: ([group.name for group in groups], node.name, BASE_COLOR)
             for name, (node, groups) in nodes.items()
             if node.has_texture() and not missing_images(Links(), node.color_input(groups))
         }
-
-
-def _reflectance(surface) -> list[float]:
-    try:
-        return surface.reflectance()
-    except MaterialError:  # of another object, whose own bake reports it
-        return [0.0, 0.0, 0.0]

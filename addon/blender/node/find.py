@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import bpy
 
 from ...core.bake.runner import Bake
+from ...core.bake.surface import Surface
 from ...core.errors import BakeError
 from ...core.target import Target
 from .. import compat
+from ..read.nodes import InputSocket
 from ..read.visibility import count_instances, render_visible_names, with_instanced
 from .node import BeamspreadNode
 from .output import is_linked
@@ -71,6 +73,15 @@ def find_node_in_groups(material) -> tuple | None:
         return None
     nodes = [(node, groups) for node, groups in _nodes_in(material.node_tree) if all(map(_has_one_user, groups))]
     return min(nodes, key=lambda pair: (len(pair[1]) > 0, not is_linked(pair[0])), default=None)
+
+
+def medium_of(material) -> tuple[Surface, InputSocket | None] | None:
+    """Medium of a material with a Beamspread node, and the input that a texture of its color is linked to, if any."""
+    place = find_node_in_groups(material)
+    if place is None:
+        return None
+    node, groups = place
+    return node.surface(), node.color_input(groups) if node.has_texture() else None
 
 
 def _nodes_in(tree) -> Iterator[tuple]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from ...core.errors import ReceiverError
 from ...core.messages import Message
 from ...core.scene.occluders import Mesh, Occluder
 from ...core.scene.uv_map import Polygons
+from .image_nodes import UVTransform
+from .reflection import MaterialReflection, MediumOf, reflection_of
 from .scene_cache import SceneCache
 from .transparency import MaterialTransmittance, transmittance_of
 
@@ -17,11 +20,25 @@ from .transparency import MaterialTransmittance, transmittance_of
 GEOMETRY_TYPES = {"MESH"}
 
 
-class OccluderReader:
-    """Collects occluders from the instances of a depsgraph; each mesh and each material is read once."""
+class Slot(NamedTuple):
+    """A material of a mesh; `reflection` is None if no light bounces."""
 
-    def __init__(self, cache: SceneCache) -> None:
-        self._cache = cache
+    transmittance: MaterialTransmittance
+    reflection: MaterialReflection | None = None
+
+
+class OccluderReader:
+    """Collects occluders from the instances of a depsgraph; each mesh and each material is read once.
+
+    Attributes
+    ----------
+    untraceable : as of an `Illumination`.
+    """
+
+    def __init__(self, cache: SceneCache, medium_of: MediumOf | None = None, min_roughness: float = 0.0) -> None:
+        """`medium_of`: the medium of a material that is baked; None: reflections are not read."""
+        self._cache, self._medium_of, self._min_roughness = cache, medium_of, min_roughness
+        self.untraceable = ""
         self._meshes: dict[tuple, Mesh | None] = {}
         self._matrices: dict[tuple, list] = {}  # of the instances, by object name and key of the mesh
         self.messages: list[Message] = []
@@ -29,8 +46,7 @@ class OccluderReader:
     def add(self, instance) -> None:
         """Add an entry of `depsgraph.object_instances` that renders, of any type, if it casts shadows."""
         obj = instance.object
-        owners = (obj, instance.parent) if instance.is_instance else (obj,)
-        if obj.type not in GEOMETRY_TYPES or not all(getattr(owner, "visible_shadow", True) for owner in owners):
+        if obj.type not in GEOMETRY_TYPES or not casts_shadows(obj, instance.parent if instance.is_instance else None):
             return
         key = mesh_key(obj)
         if key not in self._meshes:
@@ -41,16 +57,32 @@ class OccluderReader:
 
     def _read(self, instance, key: tuple) -> Mesh | None:
         obj = instance.object
-        slots = [transmittance_of(slot.material, self._cache) for slot in obj.material_slots]
-        self.messages += [message for slot in slots for message in slot.messages]
-        state = tuple((slot.transmittance, slot.uv_transform) for slot in slots)
+        slots = [self._slot(slot.material) for slot in obj.material_slots] or [self._slot(None)]
+        self.messages += [message for slot in slots for message in slot.transmittance.messages]
+        state = tuple(
+            (slot.transmittance.transmittance, slot.transmittance.uv_transform, slot.reflection) for slot in slots
+        )
         return self._cache.get(("mesh", *key), shapes_of(instance), lambda: local_mesh(obj, slots), state=state)
+
+    def _slot(self, material) -> Slot:
+        transmittance = transmittance_of(material, self._cache)
+        if self._medium_of is None:
+            return Slot(transmittance)
+        reflection = reflection_of(material, self._cache, self._medium_of, self._min_roughness)
+        if reflection.problem and not self.untraceable:
+            self.untraceable = f"They can't trace the material '{material.name}'. {reflection.problem}"
+        return Slot(transmittance, reflection)
 
     def occluders(self) -> list[Occluder]:
         return [
             Occluder(name, self._meshes[key], np.array(matrices, float).reshape(-1, 3, 4))
             for (name, key), matrices in self._matrices.items()
         ]
+
+
+def casts_shadows(obj, instancer) -> bool:
+    """True if an object casts shadows; `instancer` is the object that instances it, or None."""
+    return all(getattr(owner, "visible_shadow", True) for owner in (obj, instancer) if owner is not None)
 
 
 def mesh_key(obj) -> tuple:
@@ -66,8 +98,8 @@ def shapes_of(instance) -> set:
     return {instance.object.original, *([] if parent is None else [parent.original])}
 
 
-def local_mesh(obj, slots: Sequence[MaterialTransmittance]) -> Mesh | None:
-    """Triangles of an evaluated object in its own frame, None without any. `slots` are those of its materials."""
+def local_mesh(obj, slots: Sequence[Slot]) -> Mesh | None:
+    """Triangles of an evaluated object in its own frame, None without any. `slots` has one material at least."""
     mesh = obj.to_mesh()
     if mesh is None:
         return None
@@ -80,32 +112,44 @@ def local_mesh(obj, slots: Sequence[MaterialTransmittance]) -> Mesh | None:
         mesh.loop_triangles.foreach_get("vertices", triangles)
         vertices = _vertices(mesh).astype(float)
         triangles = triangles.astype(np.uint32).reshape(-1, 3)
-        if all(slot.transmittance.is_black for slot in slots):
-            return Mesh(vertices, triangles)
+        reflections = [slot.reflection or MaterialReflection() for slot in slots]
+        transmittances = tuple(slot.transmittance.transmittance for slot in slots)
+        transmittances = () if all(item.is_black for item in transmittances) else transmittances
+        is_even = not transmittances and all(item is reflections[0] for item in reflections)
+        if is_even and reflections[0].uv_transform is None:
+            reflector = reflections[0].reflector
+            return Mesh(vertices, triangles, reflectors=(reflector,) if reflector else ())
         numbers = np.empty(count, np.int32)
         mesh.loop_triangles.foreach_get("material_index", numbers)
         numbers = np.clip(numbers, 0, len(slots) - 1)
         mesh.loop_triangles.foreach_get("loops", corners)
-        uvs = _image_uvs(mesh, slots, numbers, corners.reshape(-1, 3))
-        transmittances = tuple(slot.transmittance for slot in slots)
-        return Mesh(vertices, triangles, transmittances, numbers.astype(np.uint32), uvs)
+        uvs, reflector_uvs = (
+            _image_uvs(mesh, transforms, numbers, corners.reshape(-1, 3))
+            for transforms in (
+                [slot.transmittance.uv_transform for slot in slots],
+                [reflection.uv_transform for reflection in reflections],
+            )
+        )
+        reflectors = tuple(item.reflector for item in reflections)
+        reflectors = reflectors if any(reflectors) else ()
+        return Mesh(vertices, triangles, transmittances, numbers.astype(np.uint32), uvs, reflectors, reflector_uvs)
     finally:
         obj.to_mesh_clear()
 
 
 def _image_uvs(
-    mesh, slots: Sequence[MaterialTransmittance], numbers: np.ndarray, corners: np.ndarray
+    mesh, transforms: Sequence[UVTransform | None], numbers: np.ndarray, corners: np.ndarray
 ) -> np.ndarray | None:
     """UVs of each triangle's corners in its material's image, float32 (M, 3, 2)."""
-    if all(slot.uv_transform is None for slot in slots):
+    if not any(transforms):
         return None
     image_uvs = np.zeros((*corners.shape, 2), np.float32)
-    for number, slot in enumerate(slots):
+    for number, transform in enumerate(transforms):
         chosen = numbers == number
-        if slot.uv_transform is not None and chosen.any():
-            uvs = _uvs(mesh, slot.uv_transform.uv_map)
+        if transform is not None and chosen.any():
+            uvs = _uvs(mesh, transform.uv_map)
             at = np.zeros((chosen.sum(), 3, 2)) if uvs is None else uvs[corners[chosen]]
-            matrix = np.array(slot.uv_transform.matrix)
+            matrix = np.array(transform.matrix)
             image_uvs[chosen] = at @ matrix[:, :2].T + matrix[:, 2]
     return np.clip(np.nan_to_num(image_uvs), -1e6, 1e6)  # larger UVs have no texels in single precision
 

@@ -14,17 +14,21 @@ from ...core.scene.illumination import Illumination
 from ...core.scene.lights import Light
 from .. import compat
 from .emitters import VARYING, EmissiveMesh, radiance_of
-from .geometry import GEOMETRY_TYPES, OccluderReader, shapes_of
+from .geometry import GEOMETRY_TYPES, OccluderReader, casts_shadows, shapes_of
 from .image_nodes import missing_images
 from .lamps import fault, is_portal, read_lamp
 from .nodes import Links, surface_of
+from .reflection import MediumOf
 from .scene_cache import SceneCache
 from .visibility import left_out, left_out_of_world, render_visible_names, renders, with_instanced
 from .world_light import read_world
 
 
 def read_illumination(
-    depsgraph, cache: SceneCache | None = None, check: Callable[[], None] | None = None
+    depsgraph,
+    cache: SceneCache | None = None,
+    check: Callable[[], None] | None = None,
+    medium_of: MediumOf | None = None,
 ) -> Illumination:
     """Lights and occluders of all objects and instances that render.
 
@@ -32,29 +36,38 @@ def read_illumination(
     ----------
     cache : results of earlier reads, for a depsgraph of the viewport; None: everything is read.
     check : called while nodes are evaluated, and raises an exception to cancel that.
+    medium_of : gives the medium of a material that is baked; None: reflections are not read.
     """
     cache = SceneCache() if cache is None else cache
     with cache.reading(depsgraph, check):
-        return _read(depsgraph, cache)
+        return _read(depsgraph, cache, medium_of)
 
 
-def _read(depsgraph, cache: SceneCache) -> Illumination:
+def _read(depsgraph, cache: SceneCache, medium_of: MediumOf | None) -> Illumination:
     visible = render_visible_names(depsgraph.view_layer)
-    lights, occluders = _Lights(depsgraph, cache), OccluderReader(cache)
+    lights, occluders = (
+        _Lights(depsgraph, cache),
+        OccluderReader(cache, medium_of, compat.filtered_roughness(depsgraph.scene)),
+    )
+    hidden: list[str] = []
     for instance in depsgraph.object_instances:
         if not renders(instance, visible):
             continue
-        obj = instance.object
-        lights.warn(left_out(obj))
-        if lights_surfaces(obj, instance.parent if instance.is_instance else None):
+        obj, instancer = instance.object, instance.parent if instance.is_instance else None
+        lights.warn_of_solid(left_out(obj))
+        is_solid = obj.type in GEOMETRY_TYPES
+        if is_solid and not (lights_surfaces(obj, instancer) and casts_shadows(obj, instancer)):
+            hidden.append(f"'{obj.name}' is hidden from some of the light.")
+        if lights_surfaces(obj, instancer):
             if obj.type == "LIGHT":
                 lights.add_lamp(obj, instance.matrix_world)
-            elif obj.type in GEOMETRY_TYPES:
+            elif is_solid:
                 lights.add_mesh(instance)
         occluders.add(instance)
     world = compat.world_of(depsgraph)
     lights.add_world(depsgraph.view_layer, world)
-    lights.warn(left_out_of_world(world))
+    lights.warn_of_solid(left_out_of_world(world))
+    reasons = [lights.untraceable, occluders.untraceable, *hidden, "" if medium_of else UNREAD]
     return Illumination(
         lights.all(),
         occluders.occluders(),
@@ -62,7 +75,11 @@ def _read(depsgraph, cache: SceneCache) -> Illumination:
         compat.transparent_bounces(depsgraph.scene),
         lights.by_cycles,
         lights.receivers,
+        next(filter(None, reasons), ""),
     )
+
+
+UNREAD = "Reflections were not read."
 
 
 def lights_surfaces(obj, instancer) -> bool:
@@ -101,6 +118,7 @@ class _Lights:
         self.messages: list[Message] = []
         self.by_cycles: dict[str, Message] = {}  # see Illumination
         self.receivers: dict[str, frozenset[str]] = {}
+        self.untraceable = ""  # see Illumination
 
     def all(self) -> list[Light]:
         emissive = ((name, mesh) for (name, _), mesh in self._emissive.items() if mesh is not None)
@@ -110,8 +128,15 @@ class _Lights:
         return self._lights
 
     def warn(self, message: Message | None) -> None:
+        """Add a message about an object or world, if there is one, whose light is left out in part."""
         if message is not None:
             self.messages.append(message)
+
+    def warn_of_solid(self, message: Message | None) -> None:
+        """The same, of an object that reflects light in ways of its own."""
+        if message is not None:
+            self.warn(message)
+            self.untraceable = self.untraceable or f"They can't trace '{message.subject}'."
 
     def add_lamp(self, obj, matrix) -> None:
         if is_portal(obj.data):
@@ -178,12 +203,18 @@ class _Lights:
             self.warn(warning(name, f"{error.text} Cycles shows it in magenta, as light of '{name}'.", error.remedy))
         if links.get("receivers") is not None:
             self.receivers[name] = links["receivers"]
+        self._note_links(name, links)
 
     def _add(self, light: Light, links: dict) -> None:
         if why := fault(light):
             self.warn(warning(light.name, f"The light '{light.name}' is left out. {why}"))
         else:
             self._lights.append(replace(light, **links))
+            self._note_links(light.name, links)
+
+    def _note_links(self, name: str, links: dict) -> None:
+        if any(names is not None for names in links.values()):
+            self.untraceable = self.untraceable or f"The light of '{name}' is linked to some objects alone."
 
 
 def links_of(obj, names: set[str]) -> dict[str, frozenset[str] | None]:

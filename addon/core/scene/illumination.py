@@ -27,6 +27,7 @@ class Illumination:
     lights : lights that can be baked.
     by_cycles : names of the lights that only Cycles can evaluate, each with the message for a bake without Cycles.
     receivers : names of the objects that each light of `by_cycles` is linked to, if it is not linked to all.
+    untraceable : sentence that says why only Cycles can trace the light that bounces; "" if our own rays can.
     """
 
     def __init__(
@@ -37,10 +38,12 @@ class Illumination:
         max_crossings: int | None = None,
         by_cycles: Mapping[str, Message] | None = None,
         receivers: Mapping[str, Collection[str]] | None = None,
+        untraceable: str = "",
     ) -> None:
         """`max_crossings`: number of see-through surfaces that light crosses before it ends at the next; None: any."""
         self.lights = tuple(lights)
         self.by_cycles, self.receivers = dict(by_cycles or {}), dict(receivers or {})
+        self.untraceable = untraceable
         self._messages = tuple(messages)
         self._occluders = (Occluder("", occluders),) if isinstance(occluders, Mesh) else tuple(occluders or ())
         self._max_crossings = max_crossings
@@ -108,7 +111,7 @@ class Illumination:
             (
                 occluder.name,
                 occluder.mesh.content,
-                tuple(map(id, occluder.mesh.transmittances)),
+                tuple(map(id, (*occluder.mesh.transmittances, *occluder.mesh.reflectors))),
                 None if occluder.placements is None else occluder.placements.tobytes(),
             )
             for occluder in self._occluders

@@ -24,6 +24,9 @@ class Mesh:
     transmittances : a native `ColorTexture` for each material.
     materials : uint32 (M,), the material of each triangle; None: all are opaque.
     uvs : float32 (M, 3, 2), UVs of each triangle's corners in its material's image; None: no material has one.
+    reflectors : a native `Reflector` for each material, None for a black one; without `materials` one for all. Empty:
+        the mesh reflects nothing.
+    reflector_uvs : as `uvs`, in the images of the reflectors.
     """
 
     vertices: np.ndarray
@@ -31,11 +34,13 @@ class Mesh:
     transmittances: tuple = ()
     materials: np.ndarray | None = None
     uvs: np.ndarray | None = None
+    reflectors: tuple = ()
+    reflector_uvs: np.ndarray | None = None
 
     @cached_property
     def content(self) -> int:
-        """A digest of the mesh without its transmittances."""
-        arrays = (self.vertices, self.triangles, self.materials, self.uvs)
+        """A digest of the mesh without its transmittances and reflectors."""
+        arrays = (self.vertices, self.triangles, self.materials, self.uvs, self.reflector_uvs)
         return zlib.crc32(b"".join(np.ascontiguousarray(array).tobytes() for array in arrays if array is not None))
 
     def native(self, placements: np.ndarray | None, owners: Sequence[int] = ()):
@@ -49,9 +54,15 @@ class Mesh:
             None if placements is None else np.ascontiguousarray(placements, float).reshape(-1, 12),
             list(self.transmittances),
             None if self.materials is None else np.ascontiguousarray(self.materials, np.uint32).reshape(-1, 1),
-            None if self.uvs is None else np.ascontiguousarray(self.uvs, np.float32).reshape(-1, 6),
+            _uvs(self.uvs),
+            list(self.reflectors),
+            _uvs(self.reflector_uvs),
             owners=owners,
         )
+
+
+def _uvs(uvs: np.ndarray | None) -> np.ndarray | None:
+    return None if uvs is None else np.ascontiguousarray(uvs, np.float32).reshape(-1, 6)
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,7 @@ IMAGE, QUALITY, SETTINGS = "size of the image", "quality", "settings"
 # Cycles' settings for bounced light.
 BOUNCES = (
     *("max_bounces", "diffuse_bounces", "glossy_bounces", "transmission_bounces", "volume_bounces"),
-    *("transparent_max_bounces", "caustics_reflective", "caustics_refractive"),
+    *("transparent_max_bounces", "caustics_reflective", "caustics_refractive", "blur_glossy"),
 )
 
 

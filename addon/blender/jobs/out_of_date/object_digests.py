@@ -122,7 +122,8 @@ class ObjectDigests:
         if place is not None:
             return digest(surface_values(*place), self._noted(texture_tree(material, *place)).text)
         tree = TreeDigest() if material is None else self._noted(scene_cache.tree(material, is_whole=True))
-        return digest(tree.text, material and compat.has_transparent_shadow(material))
+        plain = None if material is None or compat.uses_nodes(material) else tuple(material.diffuse_color)
+        return digest(tree.text, material and compat.has_transparent_shadow(material), plain)
 
     def _noted(self, tree: TreeDigest) -> TreeDigest:
         self.images |= dict.fromkeys(tree.images)

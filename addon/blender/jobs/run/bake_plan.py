@@ -27,7 +27,7 @@ from ...cycles.cycles_light import CyclesLight
 from ...cycles.scene_copy import CopyForCycles
 from ...images.facts import is_sequence, size_of_frames
 from ...images.files import check_image
-from ...node.find import BakeTarget, find_node_in_groups, targets_of
+from ...node.find import BakeTarget, find_node_in_groups, medium_of, targets_of
 from ...node.node import BeamspreadNode
 from ...read.base_color import read_texture
 from ...read.geometry import read_polygons
@@ -138,23 +138,31 @@ def prepare_scene(
     context, targets: list[Target], settings: BakeSettings, resolution: int | None = None, check: Check | None = None
 ) -> Iterator[Bake]:
     """Read the scene as it would render at its current frame; makes a bake for each target when it is asked for."""
-    return (plan.bake(settings) for plan in read_scene(context, targets, resolution, check))
+    plans = read_scene(context, targets, resolution, check, settings.indirect)
+    return (plan.bake(settings) for plan in plans)
 
 
-def read_scene(context, targets: list[Target], resolution: int | None = None, check: Check | None = None) -> list[Plan]:
+def read_scene(
+    context,
+    targets: list[Target],
+    resolution: int | None = None,
+    check: Check | None = None,
+    indirect: bool | None = None,
+) -> list[Plan]:
     """Read the targets in the scene as it would render at its current frame.
 
     Parameters
     ----------
     resolution : texels along the longer side; None keeps the size of the node's image, or the scene's setting where
         there is none.
+    indirect : True if light may bounce; None: as the scene's settings say.
     """
     view_layer = context.view_layer
     _update_nodes(context.evaluated_depsgraph_get())
     with as_rendered(view_layer):
         visible, depsgraph = render_visible_names(view_layer), context.evaluated_depsgraph_get()
         scene_cache.check_images()
-        plans = read_plans(depsgraph, targets, visible, resolution, cache=scene_cache, check=check)
+        plans = read_plans(depsgraph, targets, visible, resolution, cache=scene_cache, check=check, indirect=indirect)
     if not context.scene.beamspread.use_live:
         scene_cache.drop_arrays()
     return plans
@@ -193,20 +201,23 @@ def read_plans(
     copy: CopyForCycles | None = None,
     cache: SceneCache | None = None,
     check: Check | None = None,
+    indirect: bool | None = None,
 ) -> list[Plan]:
     """Read the targets and the light of a depsgraph, which is not needed afterwards.
 
     Parameters
     ----------
     visible : names of the objects that render; None: all.
-    resolution : as for `read_scene`.
+    resolution, indirect : as for `read_scene`.
     size : width and height of the texture, overrides all other sizes.
     copy : copy of the scene for Cycles, if there is one already. Else the first job that needs one makes it.
     cache : results of earlier reads, for a depsgraph of the viewport; None: everything is read.
     """
+    indirect = depsgraph.scene.beamspread.use_indirect if indirect is None else indirect
     try:
         instances = find_instances(depsgraph, {target.object_name for target in targets}, visible)
-        light = read_illumination(depsgraph, cache, check), CyclesLight(depsgraph, copy)
+        illumination = read_illumination(depsgraph, cache, check, medium_of if indirect else None)
+        light = illumination, CyclesLight(depsgraph, copy)
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - each bake asked for needs an answer
         return [FailedPlan(target, error) for target in targets]
     plans: list[Plan] = []

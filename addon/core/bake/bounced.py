@@ -1,0 +1,113 @@
+"""Bounced light by our own rays, at coarse nodes above the receiver."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..messages import note, warning
+from ..native import native
+from ..progress import Progress
+from ..scene.lights import STRATA, Field, FieldLight
+from ..scene.receiver import Grid, Receiver
+from .job import BakeJob, Step
+from .layers import WITHOUT_MEDIUM, mean_irradiance, mean_open_irradiance
+
+# Nodes along the longest side of a receiver; more resolve bounced light more finely and take longer.
+NODES = 64
+# Most squares of that side that the nodes of all charts fill.
+MAX_SQUARES = 2.0
+
+# Height above the receiver at which light is gathered, in nodes; objects below it cast no shadow.
+LIFT = 1e-3
+
+# Allowed noise of bounced light, relative to all irradiance, and its multiple from which a message names it.
+NOISE, NOISY = 0.01, 1.2
+
+# Fraction of the unoccluded direct light below which bounced light is ignored. Leaks into a closed box are 1.3e-7.
+NEGLIGIBLE = 1e-6
+NOTHING_BOUNCES = warning(
+    "", "Indirect light is left out: it is less than a millionth of what the lights send without obstacles."
+)
+
+BY_OWN_RAYS = note("", "Beamspread's own rays find the bounced light.")
+
+
+@dataclass(frozen=True)
+class BouncedLight(Step):
+    """Adds the light that the scene's meshes return to the receiver.
+
+    Attributes
+    ----------
+    max_bounces : number of surfaces that return light on its way.
+    """
+
+    max_bounces: int
+
+    name = "Finding bounced light"
+    finds_light = True
+
+    def run(self, job: BakeJob, progress: Progress) -> BakeJob:
+        receiver, illumination, settings = job.receiver, job.illumination, job.settings
+        grid = receiver.charts[0].grid
+        surfaces = illumination.caster(grid)
+        lights = [
+            (light.at(grid), light.rgb().tolist(), surfaces if light.cast_shadow else None)
+            for light in illumination.lights
+        ]
+        found = native.bounced_light(
+            charts_of(receiver, NODES),
+            STRATA,
+            lights,
+            surfaces,
+            direct=mean_over(receiver, lambda grid: mean_irradiance(grid, illumination)),
+            tolerance=NOISE,
+            max_bounces=self.max_bounces,
+            threads=settings.threads,
+            spread=0.0 if settings.layer in WITHOUT_MEDIUM else min(job.surface.material.mean_free_path),
+            progress=progress,
+        )
+        if not found["irradiance"] > 0:
+            return job
+        in_the_open = mean_over(receiver, lambda grid: mean_open_irradiance(grid, illumination.lights))
+        if found["irradiance"] < NEGLIGIBLE * in_the_open:
+            return replace(job, illumination=illumination.with_messages(NOTHING_BOUNCES))
+        if found["noise"] > NOISY * NOISE:
+            text = f"Bounced light on '{job.name}' has {found['noise']:.1%} of noise, relative to all light there."
+            illumination = illumination.with_messages(note(job.name, text))
+        fields = tuple(
+            Field(chart.grid.origin, chart.grid.normal, radiance)
+            for chart, radiance in zip(receiver.charts, found["radiance"])
+        )
+        light = FieldLight("Bounced light", 1.0, (1.0, 1.0, 1.0), False, fields)
+        return replace(job, illumination=illumination.lit_by([light]))
+
+
+def mean_over(receiver: Receiver, value_of: Callable[[Grid], float]) -> float:
+    """Mean of a value of each grid, weighted by area."""
+    grids = [chart.grid for chart in receiver.charts]
+    areas = [grid.width * grid.pitch_x * grid.height * grid.pitch_y for grid in grids]
+    return float(np.average([value_of(grid) for grid in grids], weights=areas))
+
+
+def charts_of(receiver: Receiver, nodes: int) -> list[dict]:
+    """Rectangles of nodes slightly above the receiver, `nodes` along its longest side, for the native tracer."""
+    sizes = [(c.grid.width * c.grid.pitch_x, c.grid.height * c.grid.pitch_y) for c in receiver.charts]
+    cell = max(*map(max, sizes), math.sqrt(sum(x * y for x, y in sizes) / MAX_SQUARES)) / nodes
+    charts = []
+    for grid, size in zip((chart.grid for chart in receiver.charts), sizes):
+        lift = grid.clearance + LIFT * cell + 1e-6 * float(np.abs(grid.origin).max())
+        charts.append(
+            {
+                "corner": (np.array(grid.origin) + lift * np.array(grid.normal)).tolist(),
+                "x_axis": list(map(float, grid.x_axis)),
+                "y_axis": list(map(float, grid.y_axis)),
+                "normal": list(map(float, grid.normal)),
+                "size": size,
+                "nodes": [max(1, round(length / cell)) for length in size],
+            }
+        )
+    return charts
