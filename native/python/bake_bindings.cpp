@@ -248,7 +248,7 @@ progress : callable, optional
     progress(fraction) returns False to stop.
 report_noise : callable, optional
     report_noise(error) takes the standard error of the irradiance of a texel, root mean square over the texels and
-    relative to the mean irradiance. It counts rays to lights of a size as independent, and their noise is less.
+    relative to the mean irradiance. It comes from two halves of the rays to lights of a size.
 
 Returns
 -------

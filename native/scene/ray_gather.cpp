@@ -102,10 +102,10 @@ private:
         std::size_t width;
     };
 
-    // Sums over the rays of a texel, of the mean of their channels, W/m^2.
+    // Light of either half of the rays of a texel, the mean of their channels, W/m^2.
     struct TexelSum {
-        double irradiance = 0.0;
-        double square = 0.0;
+        double first = 0.0;
+        double second = 0.0;
     };
 
     // Working memory of a thread: first the rays of a span, then those of one texel.
@@ -205,11 +205,9 @@ private:
                 continue;
             }
             const TexelSum& sum = work.sums[i];
-            noise.irradiance += sum.irradiance;
-            // Rays are taken as independent; low-discrepancy ones have less noise.
-            const auto rays = static_cast<double>(rays_of(method_here));
-            const double spread = sum.square - sum.irradiance * sum.irradiance / rays;
-            noise.variance += rays > 1.0 ? std::max(spread, 0.0) * rays / (rays - 1.0) : sum.square;
+            noise.irradiance += sum.first + sum.second;
+            // The variance of the sum, if the halves are independent; that of low-discrepancy rays is less.
+            noise.variance += (sum.first - sum.second) * (sum.first - sum.second);
         }
         return noise;
     }
@@ -231,7 +229,7 @@ private:
             gather_texel(i, part, work);
         }
         trace(work);
-        add_sums(count, work);
+        add_sums(first, count, work);
         for (std::size_t i = 0; i < count; ++i) {
             const std::size_t begin = i * span.width;
             sink.add({.sample = span.y * m_grid.width + span.x,
@@ -242,21 +240,22 @@ private:
         }
     }
 
-    // Adds the rays of a span to its sums, unless all of them are open.
-    void add_sums(std::size_t count, Work& work) const
+    // Adds rays [first, first + count) of a span to its sums, unless all texels are open.
+    void add_sums(std::size_t first, std::size_t count, Work& work) const
     {
         bool is_open = has_first_pass();
         for (std::size_t k = 0; k < work.span.width && is_open; ++k)
             is_open = work.row.method(work.span.x + k) <= RayMethod::open;
         if (is_open)
             return;
-        for (std::size_t i = 0; i < count; ++i)
-            for (std::size_t k = 0; k < work.span.width; ++k) {
+        for (std::size_t k = 0; k < work.span.width; ++k) {
+            const std::size_t half = (rays_of(method(work, work.span.x + k)) + 1) / 2;
+            for (std::size_t i = 0; i < count; ++i) {
                 const Vec3f& light = work.irradiance[i * work.span.width + k];
-                const double mean = static_cast<double>(light.x + light.y + light.z) / 3.0;
-                work.sums[k].irradiance += mean;
-                work.sums[k].square += mean * mean;
+                double& sum = first + i < half ? work.sums[k].first : work.sums[k].second;
+                sum += static_cast<double>(light.x + light.y + light.z) / 3.0;
             }
+        }
     }
 
     void gather_texel(std::size_t texel, const Part& part, Work& work)
