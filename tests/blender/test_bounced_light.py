@@ -210,6 +210,8 @@ def test_objects_hidden_from_some_rays_are_cycles_part(name):
     assert BY_OWN_RAYS in bake_of(floor).messages
     setattr(card, name, False)
     assert BY_OWN_RAYS not in bake_of(floor).messages
+    card.data.materials.append(scenes.glowing_material(1.0))  # returns no light
+    assert BY_OWN_RAYS in bake_of(floor).messages
 
 
 def test_bounces_end_as_in_cycles():

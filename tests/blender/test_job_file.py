@@ -15,6 +15,7 @@ import scenes
 from beamspread.blender import compat
 from beamspread.blender.jobs.run.bake_plan import prepare_scene
 from beamspread.blender.node.find import find_targets
+from beamspread.core.bake.bounced import BouncedLight
 from instance_scenes import SKEWED, add_instancer
 from mathutils import Matrix
 
@@ -99,12 +100,13 @@ def test_a_process_without_blender_gets_the_same_bits(output, tmp_path):
     scenes.add_blocker(0.4)
     bpy.context.view_layer.update()
     settings = bpy.context.scene.beamspread
-    settings.output, settings.quality, settings.use_indirect = output, "preview", False
+    settings.output, settings.quality, settings.use_indirect = output, "preview", True
     (bake,) = prepare_scene(bpy.context, find_targets([plane]), settings.for_bake(), 48)
     assert not bake.error
     illumination = bake.job.illumination
     assert len(illumination.lights) == 4
     assert illumination.triangle_count == 2 + 2 * 2 + 2 + 2  # plane, leaves, wall, panel
+    assert any(isinstance(step, BouncedLight) for step in bake.job.steps)
     here = bake.job.run()  # its hierarchies stay in this process
     file, result = tmp_path / "bake.job", tmp_path / "texture.npy"
     file.write_bytes(pickle.dumps(bake.job))

@@ -64,6 +64,11 @@ class OccluderReader:
         )
         return self._cache.get(("mesh", *key), shapes_of(instance), lambda: local_mesh(obj, slots), state=state)
 
+    def reflects(self, obj) -> bool:
+        """True if an evaluated object returns light; False if reflections are not read."""
+        slots = [self._slot(slot.material) for slot in obj.material_slots] or [self._slot(None)]
+        return any(slot.reflection is not None and slot.reflection.reflector is not None for slot in slots)
+
     def _slot(self, material) -> Slot:
         transmittance = transmittance_of(material, self._cache)
         if self._medium_of is None:

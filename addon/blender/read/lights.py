@@ -56,7 +56,8 @@ def _read(depsgraph, cache: SceneCache, medium_of: MediumOf | None) -> Illuminat
         obj, instancer = instance.object, instance.parent if instance.is_instance else None
         lights.warn_of_solid(left_out(obj))
         is_solid = obj.type in GEOMETRY_TYPES
-        if is_solid and not (lights_surfaces(obj, instancer) and casts_shadows(obj, instancer)):
+        is_hidden = is_solid and not (lights_surfaces(obj, instancer) and casts_shadows(obj, instancer))
+        if is_hidden and occluders.reflects(obj):
             hidden.append(f"'{obj.name}' is hidden from some of the light.")
         if lights_surfaces(obj, instancer):
             if obj.type == "LIGHT":
