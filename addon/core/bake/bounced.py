@@ -15,6 +15,7 @@ from ..scene.lights import STRATA, Field, FieldLight
 from ..scene.receiver import Grid, Receiver
 from .job import BakeJob, Step
 from .layers import WITHOUT_MEDIUM, mean_irradiance, mean_open_irradiance
+from .smoothing import SPLINE_VARIANCE, smoothing_variance
 
 # Nodes along the longest side of a receiver; more resolve bounced light more finely and take longer.
 NODES = 64
@@ -67,7 +68,7 @@ class BouncedLight(Step):
             tolerance=NOISE,
             max_bounces=self.max_bounces,
             threads=settings.threads,
-            spread=0.0 if settings.layer in WITHOUT_MEDIUM else min(job.surface.material.mean_free_path),
+            spread=_spread(job),
             progress=progress,
         )
         if not found["irradiance"] > 0:
@@ -84,6 +85,16 @@ class BouncedLight(Step):
         )
         light = FieldLight("Bounced light", 1.0, (1.0, 1.0, 1.0), False, fields)
         return replace(job, illumination=illumination.lit_by([light]))
+
+
+def _spread(job: BakeJob) -> float:
+    """Half the side of a square, scene units, whose mean has as much noise as light after the medium's spread."""
+    if job.settings.layer in WITHOUT_MEDIUM:
+        return 0.0
+    variance = smoothing_variance(job.receiver, job.surface, job.settings, NODES) - SPLINE_VARIANCE
+    grids = [chart.grid for chart in job.receiver.charts]
+    pitch = max(max(grid.width * grid.pitch_x, grid.height * grid.pitch_y) for grid in grids) / NODES
+    return max(math.sqrt(math.pi * max(variance, 0.0)) * pitch, min(job.surface.material.mean_free_path))
 
 
 def mean_over(receiver: Receiver, value_of: Callable[[Grid], float]) -> float:
