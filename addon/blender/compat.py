@@ -137,10 +137,11 @@ def filtered_roughness(scene) -> float:
     return math.sqrt(0.5 * math.sqrt(1 - 2 / (3 * math.pi) / blur)) if blur > 2 / (3 * math.pi) else 0.0
 
 
-def diffuse_bounces(scene) -> int:
-    """Number of diffuse surfaces that light bounces from in Cycles; Cycles' default if Blender has no Cycles."""
+def max_bounces(scene) -> tuple[int, int, int]:
+    """Cycles' numbers of bounces, total, diffuse and glossy; its defaults if Blender has no Cycles."""
     cycles = getattr(scene, "cycles", None)
-    return min(getattr(cycles, "diffuse_bounces", 4), getattr(cycles, "max_bounces", 12))
+    names = {"max_bounces": 12, "diffuse_bounces": 4, "glossy_bounces": 4}
+    return tuple(getattr(cycles, name, value) for name, value in names.items())
 
 
 def transparent_bounces(scene) -> int | None:

@@ -1,6 +1,8 @@
 // Python names of receivers and tracers in native/scene: ReceiverGrid, coverage, gather_rays, bounced_light.
 #include <algorithm>
+#include <array>
 #include <memory>
+#include <variant>
 
 #include "bake/surface_light.h"
 #include "python/casters.h"
@@ -87,8 +89,9 @@ NodeGrid node_grid(const py::dict& grid)
 
 py::dict bounced_light(const std::vector<py::dict>& grids, const Numbers& strata,
                        const std::vector<std::tuple<const Light*, Numbers, const Occluders*>>& lights,
-                       const Occluders* occluders, double direct, double tolerance, int max_bounces, std::uint32_t seed,
-                       int threads, const py::object& callback, double spread, int max_samples)
+                       const Occluders* occluders, double direct, double tolerance,
+                       const std::variant<int, std::array<int, 3>>& max_bounces, std::uint32_t seed, int threads,
+                       const py::object& callback, double spread, int max_samples)
 {
     std::vector<NodeGrid> node_grids;
     for (const py::dict& grid : grids)
@@ -101,10 +104,12 @@ py::dict bounced_light(const std::vector<py::dict>& grids, const Numbers& strata
     std::vector<SceneLight> scene_lights;
     for (const auto& [light, color, blockers] : lights)
         scene_lights.push_back({light, Vec3f(to_vec3("color", color)), blockers});
+    const int* const same = std::get_if<int>(&max_bounces);
+    const auto [all, diffuse, glossy] = same ? std::array{*same, *same, *same} : std::get<1>(max_bounces);
     const BouncedSettings settings{.direct = direct,
                                    .tolerance = tolerance,
                                    .spread = spread,
-                                   .max_bounces = max_bounces,
+                                   .limits = {.all = all, .diffuse = diffuse, .glossy = glossy},
                                    .max_samples = max_samples,
                                    .seed = seed,
                                    .threads = threads};
@@ -250,8 +255,9 @@ direct : float
     Mean irradiance of direct light, W/m^2.
 tolerance : float
     Allowed noise, relative to direct and bounced irradiance.
-max_bounces : int
-    Largest number of surfaces that reflect light on its way to a receiver; Cycles' number of diffuse bounces.
+max_bounces : int or 3 ints
+    Largest number of surfaces that reflect light on its way to a receiver: in all, by Lambert's law, and by a lobe. These are
+    Cycles' numbers of bounces, total, diffuse and glossy.
 seed : int
 threads : int
     0: all. The result is the same, bit for bit, for any number.

@@ -63,7 +63,7 @@ public:
     void learn_lights()
     {
         Random random(m_settings.seed, pilot_stream, 0);
-        PathWave wave(m_surfaces, m_lights, 1);
+        PathWave wave(m_surfaces, m_lights, {.all = 1});
         for (std::size_t i = 0; i < pilot_paths; ++i)
             start_anywhere(i, wave, random);
         std::vector<ShadingPoint> points;
@@ -128,7 +128,7 @@ private:
     {
         std::vector<GuideRecord> records;
         std::vector<Vec3f> radiance(1, Vec3f(0.0f));
-        PathWave wave(m_surfaces, m_lights, m_settings.max_bounces);
+        PathWave wave(m_surfaces, m_lights, m_settings.limits);
         wave.record(&records);
         Random random(m_settings.seed, pilot_stream - 1 - static_cast<std::uint64_t>(lesson), item);
         for (std::size_t i = 0; i < lesson_paths / lesson_waves; ++i)
@@ -158,7 +158,7 @@ private:
     void trace_row(std::size_t half, const Row& at, std::size_t count)
     {
         const NodeGrid& grid = m_grids[at.grid];
-        PathWave wave(m_surfaces, m_lights, m_settings.max_bounces);
+        PathWave wave(m_surfaces, m_lights, m_settings.limits);
         std::vector<Vec3f> radiance(m_strata.size() * grid.columns, Vec3f(0.0f));
         std::vector<Vec2> front(count), back(count);
         const Vec2 pitch = grid.size / Vec2(grid.columns, grid.rows);
@@ -257,8 +257,9 @@ void check(std::span<const NodeGrid> grids, std::span<const Stratum> strata, con
     detail::check_length("spread", settings.spread);
     if (!(settings.tolerance > 0.0))
         reject("tolerance", settings.tolerance, "above 0");
-    if (settings.max_bounces < 0)
-        reject("max_bounces", settings.max_bounces, "0 or more");
+    for (const int limit : {settings.limits.all, settings.limits.diffuse, settings.limits.glossy})
+        if (limit < 0)
+            reject("max_bounces", limit, "0 or more");
     if (settings.max_samples < 2)
         reject("max_samples", settings.max_samples, "2 or more");
 }
@@ -286,7 +287,7 @@ BouncedLight trace_bounced_light(std::span<const NodeGrid> grids, std::span<cons
     for (const NodeGrid& grid : grids)
         result.radiance.emplace_back(grid.nodes() * strata.size(), Vec3f(0.0f));
     LightChoice choice(lights);
-    if (!surfaces || !surfaces->is_reflecting() || choice.is_empty() || grids.empty() || settings.max_bounces == 0) {
+    if (!surfaces || !surfaces->is_reflecting() || choice.is_empty() || grids.empty() || !settings.limits.allow(0, 0)) {
         progress.finish();
         return result;
     }

@@ -9,6 +9,7 @@
 #include "base/progress.h"
 #include "scene/light_choice.h"
 #include "scene/occluders.h"
+#include "scene/path_wave.h"
 
 namespace beamspread {
 
@@ -46,7 +47,7 @@ struct BouncedSettings {
     double tolerance = 0.01;
     // Radius, metres, over which the medium averages light: noise counts as its mean over that distance.
     double spread = 0.0;
-    int max_bounces = 12;  // surfaces that reflect light on its way
+    BounceLimits limits;
     int max_samples = 128;   // paths for each stratum of a node
     std::uint32_t seed = 0;
     int threads = 0;  // 0: all

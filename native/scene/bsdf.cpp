@@ -59,20 +59,22 @@ Vec3f Bsdf::mixed_value(const Vec3& direction) const
     return local.z > 0.0 ? m_diffuse + lobe_value(local) : Vec3f(0.0f);
 }
 
-Vec3f Bsdf::sample(Random& random, Vec3& direction) const
+Bsdf::Sample Bsdf::sample(Random& random) const
 {
     const bool from_lobe = m_lobe && random.uniform() < m_lobe_part;
     const double x = random.uniform();
     const Vec2 place(x, random.uniform());
     const Vec3 local = from_lobe ? m_lobe->sample(place) : cosine_hemisphere(place);
-    direction = m_frame.to_world(local);
+    Sample drawn{.direction = m_frame.to_world(local), .weight = m_diffuse, .is_glossy = from_lobe};
     if (!m_lobe)
-        return m_diffuse;
+        return drawn;
+    drawn.weight = Vec3f(0.0f);
     if (!(local.z > 0.0))
-        return Vec3f(0.0f);
+        return drawn;
     // One-sample multiple importance sampling with the balance heuristic (Veach 1997, section 9.2.4).
     const double density = m_lobe_part * m_lobe->density(local) + (1.0 - m_lobe_part) * inv_pi * local.z;
-    return (m_diffuse + lobe_value(local)) * static_cast<float>(inv_pi * local.z / density);
+    drawn.weight = (m_diffuse + lobe_value(local)) * static_cast<float>(inv_pi * local.z / density);
+    return drawn;
 }
 
 }  // namespace beamspread

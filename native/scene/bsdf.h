@@ -21,8 +21,13 @@ public:
     // pi times the BSDF, for a unit vector on the side of the normal.
     Vec3f value(const Vec3& direction) const { return m_lobe ? mixed_value(direction) : m_diffuse; }
 
-    // Draws a direction from which light comes; returns the BSDF times the cosine over the density, 0 if none comes.
-    Vec3f sample(Random& random, Vec3& direction) const;
+    // A direction from which light comes.
+    struct Sample {
+        Vec3 direction{};
+        Vec3f weight{};  // the BSDF times the cosine over the density, 0 if no light comes
+        bool is_glossy = false;  // drawn from the lobe
+    };
+    Sample sample(Random& random) const;
 
 private:
     Vec3f mixed_value(const Vec3& direction) const;

@@ -21,7 +21,8 @@ void PathWave::start(const Vec3& origin, const Vec3& direction, std::uint32_t sl
                        .direction = direction,
                        .throughput = Vec3f(1.0f),
                        .slot = slot,
-                       .bounces = 0,
+                       .diffuse_bounces = 0,
+                       .glossy_bounces = 0,
                        .crossings = 0,
                        .random = random});
 }
@@ -75,16 +76,18 @@ void PathWave::find_first(std::vector<ShadingPoint>& points)
 bool PathWave::reflect(Path& path, const SurfaceHit& hit, std::vector<Vec3f>& radiance)
 {
     Vec3f reflected(0.0f);
-    Vec3 direction(0.0);
-    if (hit.reflector && path.bounces < m_max_bounces) {
+    Bsdf::Sample drawn;
+    if (hit.reflector) {
         const ShadingPoint point{hit.position, hit.normal, hit.rounding,
                                  Bsdf(*hit.reflector, hit.uv, hit.normal, -path.direction)};
         LitRay ray = m_lights.choose(point, path.random);
         ray.radiance *= path.throughput;
         if (ray.radiance != Vec3f(0.0f))
             add(ray, path.slot, radiance);
-        if (path.bounces + 1 < m_max_bounces)
-            reflected = path.throughput * point.bsdf.sample(path.random, direction);
+        drawn = point.bsdf.sample(path.random);
+        if (m_limits.allow(path.diffuse_bounces + (drawn.is_glossy ? 0 : 1),
+                           path.glossy_bounces + (drawn.is_glossy ? 1 : 0)))
+            reflected = path.throughput * drawn.weight;
     }
     const Vec3f crossing =
         path.crossings < m_surfaces.max_crossings() ? path.throughput * hit.transmittance : Vec3f(0.0f);
@@ -103,8 +106,8 @@ bool PathWave::reflect(Path& path, const SurfaceHit& hit, std::vector<Vec3f>& ra
     if (is_crossing) {
         ++path.crossings;
     } else {
-        ++path.bounces;
-        path.direction = direction;
+        ++(drawn.is_glossy ? path.glossy_bounces : path.diffuse_bounces);
+        path.direction = drawn.direction;
     }
     return true;
 }

@@ -12,14 +12,27 @@
 
 namespace beamspread {
 
+// Largest numbers of surfaces that reflect light on its way to a receiver, as Cycles counts them: the last ray, to the
+// receiver, is the first diffuse one.
+struct BounceLimits {
+    int all = 12;
+    int diffuse = 12;
+    int glossy = 12;
+
+    bool allow(int diffuse_bounces, int glossy_bounces) const
+    {
+        return diffuse_bounces < diffuse && glossy_bounces <= glossy && diffuse_bounces + glossy_bounces < all;
+    }
+};
+
 // Path tracing with next-event estimation (Kajiya 1986, doi:10.1145/15922.15902): at each surface one shadow ray adds
 // light, then the path goes on by the BSDF. Light that paths meet directly does not count. Russian roulette ends paths that
 // carry little light, without bias.
 class PathWave {
 public:
-    // `surfaces` and `lights` must outlive the object. Light is reflected by at most `max_bounces` surfaces on its way.
-    PathWave(const Occluders& surfaces, const LightChoice& lights, int max_bounces)
-        : m_surfaces(surfaces), m_lights(lights), m_max_bounces(max_bounces)
+    // `surfaces` and `lights` must outlive the object.
+    PathWave(const Occluders& surfaces, const LightChoice& lights, const BounceLimits& limits)
+        : m_surfaces(surfaces), m_lights(lights), m_limits(limits)
     {
     }
 
@@ -41,7 +54,8 @@ private:
         Vec3 direction;
         Vec3f throughput;
         std::uint32_t slot;
-        std::int32_t bounces;
+        std::int32_t diffuse_bounces;
+        std::int32_t glossy_bounces;
         std::int32_t crossings;
         Random random;
     };
@@ -64,7 +78,7 @@ private:
 
     const Occluders& m_surfaces;
     const LightChoice& m_lights;
-    int m_max_bounces;
+    BounceLimits m_limits;
     std::vector<Path> m_paths;
     std::vector<std::pair<const Occluders*, Waiting>> m_waiting;
     std::vector<GuideRecord>* m_records = nullptr;

@@ -19,15 +19,13 @@ from cycles_truth import cycles_bake, target_material
 from mathutils import Matrix
 from nodes import Nodes
 
-TEXELS, GREY, SAMPLES = 16, 0.5, 400
+TEXELS, GREY, SAMPLES = 16, 0.5, 1000
 
 
 @pytest.fixture(autouse=True)
 def with_bounces():
     bpy.context.scene.beamspread.use_indirect = True
     bpy.context.scene.beamspread.margin = 0
-    for name in ("max_bounces", "diffuse_bounces", "glossy_bounces"):
-        setattr(bpy.context.scene.cycles, name, 16)
 
 
 def bake_of(obj, output="IRRADIANCE", indirect=True):
@@ -134,7 +132,7 @@ def add_checkered_image():
 
 
 def test_an_image_on_a_wall():
-    """Its colours are averaged as light; Cycles interpolates them as stored, which is darker: within 2 %, and 5 % in
+    """Its colours are averaged as light; Cycles interpolates them as stored, which is darker: within 2 %, and 7 % in
     blocks. Mirrored or turned ones would stand on other sides."""
 
     def textured(color, name):
@@ -142,17 +140,17 @@ def test_an_image_on_a_wall():
         texture = nodes.add("TexImage", image=bpy.data.images.get("Squares") or add_checkered_image())
         return nodes.finish(nodes.add("BsdfDiffuse", {"Color": texture.outputs["Color"]}))
 
-    compare(add_room(textured), mean=0.02, block=0.05)
+    compare(add_room(textured), mean=0.02, block=0.07)
 
 
 def test_a_ball_under_a_lamp(monkeypatch):
-    """Blocks within 20 % of the mean: much of the light falls below the ball, where Cycles' noise is largest."""
+    """Blocks within 15 % of the mean: much of the light falls below the ball, where Cycles' noise is largest."""
     floor = scenes.add_plane("Floor", material=scenes.add_material(color_mode="BASE_COLOR", base_color=(GREY,) * 3))
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.4, location=(0.1, 0, 0.5))
     bpy.context.object.data.materials.append(painted((0.8, 0.4, 0.2), "Ball"))
     scenes.add_lamp((0.9, -0.6, 1.2), 100.0, radius=0.1)
     monkeypatch.setattr(bounced, "NOISE", 1e-3)  # the ball returns a fiftieth of the light
-    compare(floor, mean=0.03, block=0.2)
+    compare(floor, samples=4 * SAMPLES, mean=0.02, block=0.15)
 
 
 def test_what_is_black_or_below_needs_no_paths():

@@ -18,6 +18,7 @@ from beamspread.blender.jobs.run.bake_plan import prepare_scene
 from beamspread.blender.node.find import find_node
 from beamspread.core.bake.runner import CANCELLED, FAILED
 from beamspread.core.bake.smoothing import SPLINE_VARIANCE
+from beamspread.core.messages import Level
 from beamspread.core.native import native
 from beamspread.core.scene.lights import DIRECTIONS, STRATA, WEIGHTS
 from beamspread.core.target import Target
@@ -283,7 +284,7 @@ def test_a_lamp_that_only_cycles_understands():
     scenes.add_gobo("POINT")
     scenes.add_sun(40, 60, 1.0)
     (bake,) = jobs_of(floor)
-    assert "Gobo" not in " ".join(map(str, bake.messages))
+    assert not bake.messages.of(Level.WARNING)
     bpy.context.scene.beamspread.use_indirect = False
     (bake,) = jobs_of(floor)
     assert "Gobo" not in bake.job.illumination.by_cycles

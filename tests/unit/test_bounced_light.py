@@ -343,3 +343,18 @@ def test_the_bench_runs_in_small():
     bench = Path(__file__).resolve().parents[1] / "bench" / "bounces.py"
     done = subprocess.run([sys.executable, str(bench), "2"], capture_output=True, text=True, check=True)
     assert len(done.stdout.splitlines()) == 6
+
+
+@pytest.mark.parametrize(
+    ("reflector", "limits", "same"),
+    [(grey(0.7), (200, 3, 0), 3), (lobe(0.9, 0.8), (200, 1, 2), 3), (lobe(0.9, 0.8, 0.5), (200, 200, 200), 200)],
+)
+def test_bounce_limits_count_lambert_and_lobe_apart(reflector, limits, same):
+    """Surfaces of one kind alone are limited by its own number; the ray to the receiver counts as diffuse."""
+    scene = native.Occluders([mesh(*sphere(12)[:2], reflector)])
+    lamp = [(native.PointLight((0.2, 0, 0.5), 0.1), 10.0)]
+    results = [bounced(scene, lamp, max_bounces=limit, max_samples=8)["radiance"][0] for limit in (limits, same)]
+    assert results[0].any()
+    np.testing.assert_array_equal(*results)
+    fewer = bounced(scene, lamp, max_bounces=(200, 1, 0), max_samples=8)["irradiance"]
+    assert fewer < 0.9 * np.pi * np.tensordot(WEIGHTS, results[0], 1).mean()

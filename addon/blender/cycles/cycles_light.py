@@ -82,7 +82,7 @@ class CyclesLight:
         self._lamps = {
             obj.name: _position_of(obj) for obj in bpy.data.scenes[self._names[0]].objects if obj.type == "LIGHT"
         }
-        self._max_bounces = compat.diffuse_bounces(depsgraph.scene)
+        self._max_bounces = compat.max_bounces(depsgraph.scene)
         self._copy = copy
         self._lacks_world_images = world is not None and bool(_missing_images_of(world))
         materials = (data for data in depsgraph.ids if isinstance(data, bpy.types.Material))

@@ -43,10 +43,10 @@ class BouncedLight(Step):
 
     Attributes
     ----------
-    max_bounces : number of surfaces that return light on its way.
+    max_bounces : largest number of surfaces that return light on its way, in all, diffusely and by a glossy lobe.
     """
 
-    max_bounces: int
+    max_bounces: tuple[int, int, int]
 
     name = "Finding bounced light"
     finds_light = True

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..bake.runner import FAILED, SKIPPED, WRITTEN, Bake
 from ..disk import whole_file
+from ..messages import Level
 from ..scene.illumination import Illumination
 
 
@@ -49,7 +50,11 @@ class BakeRecord:
         outcome = round(bake.seconds, 3), bake.status, " ".join(map(str, bake.messages))
         if job is None:
             return cls(*subject, 0, 0, *outcome)
-        lights = bake.lights, [str(message) for message in job.left_out()], job.settings.indirect
+        lights = (
+            bake.lights,
+            [str(message) for message in job.left_out() if message.level is not Level.INFO],
+            job.settings.indirect,
+        )
         size = job.receiver.width, job.receiver.height
         return cls(*subject, *size, *outcome, job.settings.output, *lights, bake.is_dark)
 
