@@ -4,7 +4,6 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from beamspread.blender.cycles import cycles_light
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.run.bake_plan import prepare_scene
 from beamspread.blender.jobs.state import Status, state
@@ -376,9 +375,7 @@ def test_light_is_linked_to_the_objects_of_the_instancer():
 
 def test_indirect_light_is_that_of_real_objects(monkeypatch):
     """Light of a bright wall of the collection and of a card of the scene, with the same random numbers."""
-    monkeypatch.setattr(cycles_light, "NODES", 16)
-    for name in ("MIN_NOISE", "MAX_NOISE"):
-        monkeypatch.setattr(cycles_light, name, 0.02)
+    monkeypatch.setattr("beamspread.core.bake.bounced.NODES", 16)
     holder, collection, matrix = nested()
     bpy.data.objects["Wall"].data.materials.append(scenes.diffuse_material((0.8, 0.1, 0.1)))
     card = scenes.add_plane(

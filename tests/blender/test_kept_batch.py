@@ -13,6 +13,7 @@ import pytest
 from beamspread.blender.images import files
 from beamspread.core.native import native
 from mathutils import Matrix
+from nodes import Nodes
 from scenes import add_lamp, add_material, add_plane, add_sun, batch_command, run_batch, save_scene
 
 SIGNALS = {signal.SIGINT: 130, signal.SIGTERM: 143}
@@ -86,7 +87,8 @@ def test_a_signal_ends_a_batch_soon_and_leaves_a_report(tmp_path, number):
 def test_cycles_ends_as_well(tmp_path, number):
     """A terminal's Ctrl-C goes to all processes at once: Cycles' own end must not count as its failure."""
     add_plane(material=add_material())
-    add_plane("Wall", matrix=Matrix.Translation((0, 0, 3)))
+    glass = Nodes(bpy.data.materials.new("Glass"), clear=True)
+    add_plane("Pane", matrix=Matrix.Translation((0, 0, 3)), material=glass.finish(glass.add("BsdfGlass")))
     add_lamp((0, 0, 1))
     bpy.context.scene.beamspread.use_indirect = True
     process, report, log = start(save_scene(tmp_path), "--resolution", 1024, "--output", tmp_path / "out")

@@ -6,6 +6,7 @@ from pathlib import Path
 import bpy
 import scenes
 from beamspread.blender.cycles import cycles_light
+from beamspread.core.bake import bounced
 from nodes import Nodes
 from scenario_player import in_window, is_over
 
@@ -49,7 +50,7 @@ def blender_s_own_bake(plane):
     """Irradiance baked into another image, before a white wall in the sun; sums with and without bounced light, and
     with a lamp that only Cycles can evaluate, at few nodes and with noise of 2 %.
     """
-    cycles_light.NODES, cycles_light.MIN_NOISE, cycles_light.MAX_NOISE = 16, 0.02, 0.02
+    cycles_light.NODES = bounced.NODES = 16
     settings = bpy.context.scene.beamspread
     settings.quality, settings.output = "preview", "IRRADIANCE"
     wall = scenes.add_mesh("Wall", [(-4, 2, 0), (4, 2, 0), (4, 2, 4), (-4, 2, 4)], [(0, 1, 2, 3)])

@@ -124,6 +124,8 @@ def local_mesh(obj, slots: Sequence[Slot]) -> Mesh | None:
         if is_even and reflections[0].uv_transform is None:
             reflector = reflections[0].reflector
             return Mesh(vertices, triangles, reflectors=(reflector,) if reflector else ())
+        if not transmittances and not any(item.reflector for item in reflections):
+            return Mesh(vertices, triangles)
         numbers = np.empty(count, np.int32)
         mesh.loop_triangles.foreach_get("material_index", numbers)
         numbers = np.clip(numbers, 0, len(slots) - 1)
