@@ -373,6 +373,8 @@ def test_other_layers_have_images_and_files_beside_the_combined_one(monkeypatch,
 class EndlessJob:
     """Goes on until it is told to stop; `BakeJob` in all that a thread asks of it."""
 
+    illumination = Illumination([])
+
     def messages(self):
         return []
 
@@ -394,7 +396,7 @@ def test_thread_stops_when_asked():
 class DeafJob(EndlessJob):
     """Ends without having asked whether to go on."""
 
-    texture, illumination = np.ones((2, 2, 3), np.float32), Illumination([])
+    texture = np.ones((2, 2, 3), np.float32)
 
     def run(self, progress):
         return self

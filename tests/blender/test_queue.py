@@ -20,6 +20,7 @@ from beamspread.core.ldf import library
 from beamspread.core.progress import Progress
 from beamspread.core.target import Target
 from mathutils import Matrix
+from nodes import Nodes
 from scenes import add_material, add_plane, add_sun, messages_of, node_of, pixels, select
 
 KNOWN, UNKNOWN = {"anisotropy": 0.8, "ior": 1.0}, {"anisotropy": 0.8, "ior": 1.37}
@@ -209,7 +210,10 @@ def test_the_search_for_indirect_light_stops_within_two_seconds():
     settings = bpy.context.scene.beamspread
     settings.quality, settings.use_indirect = "preview", True
     plane("Plane", **KNOWN)
-    plane("Roof", **KNOWN).location.z = 1.0
+    roof = plane("Roof", **KNOWN)
+    roof.location.z = 1.0
+    glass = Nodes(bpy.data.materials.new("Glass"), clear=True)
+    roof.data.materials[0] = glass.finish(glass.add("BsdfGlass"))  # only Cycles knows it
     bpy.context.view_layer.update()
     thread = BakeThread(first_bake(), Progress())
     thread.start()
