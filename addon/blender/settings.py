@@ -114,7 +114,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
     )
     use_indirect: BoolProperty(
         name="Indirect Light",
-        description="Include light that bounces from other objects, computed with Cycles",
+        description="Include light that bounces from other objects",
         default=True,
     )
     output_dir: StringProperty(
