@@ -8,7 +8,7 @@ Each package imports only those above it (tests/unit/test_layers.py reads this l
     target    one material of one object: a bake fills one image for it
     progress  progress of a job made of stages
     disk      files that are complete or unchanged, their names and headers
-    recent    least-recently-used cache
+    recent    caches
     arrays    array arguments, converted without loss
     scene     receivers (charts on planes), lights, triangles that cast shadows
     material  optical properties, measured presets

@@ -208,13 +208,6 @@ def test_objects_of_one_material_keep_to_their_parts():
     assert values[:32, :32].mean() > values[32:, 32:].mean() > 0
 
 
-def test_messages_name_the_light_that_live_leaves_out():
-    _plane, _lamp, material = make_scene()
-    bpy.context.scene.beamspread.use_indirect = True
-    live_pixels(material)
-    assert live_lines() == ["Live leaves out indirect light."]
-
-
 def test_messages_name_objects_that_cannot_follow_and_the_others_follow():
     _plane, _lamp, material = make_scene()
     bent = scenes.add_plane("Bent", material=scenes.add_material("Other"))

@@ -35,7 +35,7 @@ def test_the_obstacle_of_live_is_shown_once(monkeypatch):
     target = Target("First", "One")
     message = Message(Level.ERROR, str(target), why)
     state.rows = {target: Row(target, Status.FAILED, (message,))}
-    monkeypatch.setattr(timer, "messages", lambda: [message, note("", "Live leaves out indirect light.")])
+    monkeypatch.setattr(timer, "messages", lambda: [message, note("", "Live leaves out light of 'Lamp'.")])
     bake_panel.draw_bake(layout, context())
     assert layout.said.count(why) == 1
-    assert "indirect" in layout.said
+    assert "light of 'Lamp'" in layout.said

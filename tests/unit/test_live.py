@@ -13,10 +13,11 @@ from beamspread.core.bake.job import BakeJob
 from beamspread.core.bake.steps import BAKE_STEPS
 from beamspread.core.bake.surface import Surface
 from beamspread.core.live import library_service
+from beamspread.core.live.framed_receiver import FramedReceiver
 from beamspread.core.live.library_service import LibraryService
 from beamspread.core.live.live_target import LiveTarget
 from beamspread.core.live.render_thread import RenderThread
-from beamspread.core.live.renderer import SIDES, FramedReceiver, LiveRenderer, for_live, quick_side
+from beamspread.core.live.renderer import SIDES, LiveRenderer, for_live, quick_side
 from beamspread.core.material import Material
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import AreaLight, PointLight, SunLight

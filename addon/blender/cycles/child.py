@@ -129,14 +129,24 @@ def _wake_at_input() -> None:
         fcntl.fcntl(0, fcntl.F_SETFL, fcntl.fcntl(0, fcntl.F_GETFL) | os.O_ASYNC)
 
 
+def scene_of_world(request: dict):
+    """An empty scene with the world of a copy that has no scene."""
+    scene = bpy.data.scenes.new("Scene")
+    scene.world = bpy.data.worlds[request["world"]]
+    scene.frame_set(request["frame"], subframe=request["subframe"])
+    if bpy.context.window is not None:
+        bpy.context.window.scene = scene
+    return scene
+
+
 def answer(request: dict, say) -> None:
     """Do the task of a request."""
     blend = Path(request["copy"])
     bpy.ops.wm.open_mainfile(filepath=str(blend), load_ui=False, use_scripts=request["scripts"])
     restore_images(blend.with_name("images.npz"))
-    scene = bpy.data.scenes[request["scene"]]
+    scene = bpy.data.scenes[request["scene"]] if request["scene"] else scene_of_world(request)
     window = bpy.context.window
-    if window is not None:
+    if window is not None and request["scene"]:
         window.scene = scene
         window.view_layer = scene.view_layers[request["view_layer"]]
 

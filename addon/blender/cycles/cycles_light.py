@@ -12,6 +12,7 @@ import numpy as np
 
 from ...core.bake.bounced import (
     BY_OWN_RAYS,
+    MAX_SAMPLES,
     NEGLIGIBLE,
     NODES,
     NOISE,
@@ -27,7 +28,6 @@ from ...core.bake.smoothing import SPLINE_VARIANCE, smoothing_variance
 from ...core.errors import MissingImageError
 from ...core.messages import Message, note, warning
 from ...core.progress import Callback, Progress
-from ...core.scene.illumination import Illumination
 from ...core.scene.lights import STRATA, Field, FieldLight, Light, WorldLight
 from ...core.scene.receiver import Grid, Receiver
 from .. import compat
@@ -36,9 +36,6 @@ from ..read.nodes import Links, surface_of
 from ..read.visibility import SOLID_TYPES, render_visible_names, renders
 from .process import run, start
 from .scene_copy import CopyForCycles, SceneCopy
-
-# Most samples of each direction at a node.
-MAX_SAMPLES = 128
 
 # Nodes along the longest side for direct light of lamps whose nodes only Cycles can evaluate.
 DIRECT_NODES = 256
@@ -97,7 +94,8 @@ class CyclesLight:
         objects = [name for name in illumination.by_cycles if name != world and name in scene.objects]
         if bounced:
             illumination = illumination.with_messages(*self._missing)
-            why_not_own = self._why_not_own_rays(illumination, world)
+            # The world may be one that Cycles renders: our own rays need it as a panorama.
+            why_not_own = illumination.without({world}).bounce_problem
             if not why_not_own:
                 job = replace(job, steps=(BouncedLight(self._max_bounces), *job.steps))
                 illumination, bounced = illumination.with_messages(BY_OWN_RAYS), False
@@ -120,16 +118,6 @@ class CyclesLight:
         illumination = illumination.with_messages(*(note("", text) for text in found))
         step = LightByCycles(self._copy, world, {name: self._lamps.get(name) for name in objects}, bounced, has_world)
         return replace(job, illumination=illumination, steps=(step, *job.steps))
-
-    def _why_not_own_rays(self, illumination: Illumination, world: str) -> str:
-        """Sentence that says why only Cycles can find bounced light; "" if our own rays can.
-
-        They need a world as a panorama, which Cycles may render, and lights that our readers have read.
-        """
-        for name in illumination.by_cycles:
-            if name != world:
-                return f"Only Cycles knows the light of '{name}'."
-        return illumination.untraceable
 
     def copy(self) -> CopyForCycles | None:
         """Copy of the scene; None if there is none and this is not the main thread."""
@@ -283,7 +271,12 @@ def _position_of(lamp) -> dict:
 
 
 def world_panorama(
-    copy: SceneCopy, width: int = 4096, height: int = 2048, progress: Callback | None = None
+    copy: SceneCopy,
+    width: int = 4096,
+    height: int = 2048,
+    samples: int = WORLD_SAMPLES,
+    fine_samples: int = SUN_SAMPLES,
+    progress: Callback | None = None,
 ) -> np.ndarray:
     """Radiance of the world by direction, for light on a diffuse surface.
 
@@ -300,5 +293,5 @@ def world_panorama(
     Cancelled
         `progress` returned False.
     """
-    request = {"width": width, "height": height, "samples": WORLD_SAMPLES, "fine_samples": SUN_SAMPLES}
+    request = {"width": width, "height": height, "samples": samples, "fine_samples": fine_samples}
     return run(copy, "world", request, progress, "Rendering the world")["radiance"]

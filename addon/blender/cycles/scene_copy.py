@@ -22,7 +22,7 @@ FILE, IMAGES = "scene.blend", "images.npz"
 
 
 class SceneCopy:
-    """The scene as it is now, in a folder of its own. The data of this Blender stay as they are.
+    """A scene as it is now, in a folder of its own. The data of this Blender stay as they are.
 
     Make it in the main thread (it reads `bpy.data`), and use it in any thread. The folder is removed with the object,
     when the process ends, or by `remove()`. A copy from a pickle is of the same folder, which it leaves alone.
@@ -34,20 +34,20 @@ class SceneCopy:
     """
 
     def __init__(self, scene, view_layer) -> None:
+        for obj in with_instanced(scene.objects):
+            if obj.mode == "EDIT":
+                obj.update_from_editmode()
+        self._write(scene, {"scene": scene.name, "view_layer": view_layer.name})
+
+    def _write(self, block, request: dict) -> None:
+        """Write a data-block, and all that it uses, to the file."""
         self._folder = Folder()
         self.warnings: list[Message] = []
         self.binary = bpy.app.binary_path
-        self.request = {
-            "scene": scene.name,
-            "view_layer": view_layer.name,
-            "scripts": bpy.context.preferences.filepaths.use_scripts_auto_execute,
-        }
+        self.request = request | {"scripts": bpy.context.preferences.filepaths.use_scripts_auto_execute}
         try:
-            for obj in with_instanced(scene.objects):
-                if obj.mode == "EDIT":
-                    obj.update_from_editmode()
             # Unlike saving the file, this runs no handlers of other add-ons, packs nothing and makes no preview.
-            bpy.data.libraries.write(str(self.file), {scene}, path_remap="ABSOLUTE", compress=False)
+            bpy.data.libraries.write(str(self.file), {block}, path_remap="ABSOLUTE", compress=False)
             self._keep_unsaved_images()
         except BaseException:
             self.remove()
@@ -86,6 +86,15 @@ class SceneCopy:
             image.pixels.foreach_get(values)
             pixels[image.name] = values.reshape(image.size[1], image.size[0], image.channels)
         np.savez(self.folder / IMAGES, **pixels)
+
+
+class WorldCopy(SceneCopy):
+    """A world as it is now, without its scene."""
+
+    def __init__(self, world) -> None:
+        scene = bpy.context.scene
+        frame = {"frame": scene.frame_current, "subframe": scene.frame_subframe}
+        self._write(world, {"scene": "", "world": world.name} | frame)
 
 
 class CopyForCycles:

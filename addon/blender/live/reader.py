@@ -18,10 +18,13 @@ from ...core.scene.receiver import Receiver, build_receiver, texture_size
 from ...core.scene.texture import BaseColor
 from ...core.scene.uv_map import Polygons, fit_uv_maps
 from ...core.target import Target
+from .. import compat
+from ..cycles.sky import SkyService
 from ..images.files import check_image
 from ..images.results import check_editable
-from ..node.find import find_bakeable, find_node, find_node_in_groups
+from ..node.find import find_bakeable, find_node, find_node_in_groups, medium_of
 from ..read.base_color import read_texture
+from ..read.digests import digest
 from ..read.geometry import mesh_key, read_polygons
 from ..read.lights import read_illumination, with_lamps
 from ..read.scene_cache import scene_cache
@@ -37,8 +40,6 @@ MAX_TEXELS = 1024
 
 Size = tuple[int, int] | int
 """Size of an image, or texels along its longer side."""
-
-INDIRECT = "indirect light"
 
 OUTPUT = "ShaderNodeOutputMaterial"
 
@@ -56,11 +57,14 @@ class Reader:
     left_out : parts of the scene that bakes read and Live does not.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, sky: SkyService) -> None:
         self.targets: list[Target] = []
         self.errors: dict[Target, str] = {}
         self.left_out: list[str] = []
         self._illumination: Illumination | None = None
+        self._sky, self._sky_time = sky, -1
+        self._lit: Illumination | None = None  # with the sky
+        self._bounces = False  # True if bounced light is asked for
         self._lighting: dict[str, Illumination] = {}  # light on each object
         self._polygons: dict[Target, Polygons] = {}
         self._unreadable: dict[Target, str] = {}  # errors of targets without polygons
@@ -74,12 +78,17 @@ class Reader:
 
         `sizes` has the image size of materials that several targets share and whose node has no image.
         """
-        if changes or self._illumination is None:
-            are_lamps_alone = self._illumination is not None and changes.is_lamps_alone()
+        bounces = depsgraph.scene.original.beamspread.use_indirect
+        is_known = self._illumination is not None and bounces == self._bounces
+        self._bounces = bounces
+        if changes or not is_known:
+            are_lamps_alone = is_known and changes.is_lamps_alone()
             self._read_light(depsgraph, changes.lamps if are_lamps_alone else None)
             if not are_lamps_alone or not self.targets:
                 self._read_receivers(depsgraph)
             self._sort_by_distance(depsgraph.scene.original, changes)
+        if changes or not is_known or self._sky_time != self._sky.time:
+            self._light_sky(depsgraph)
             self._note_left_out(depsgraph)
         users = Counter(target.material_name for target in self.targets)
         shared = {name: size for name, size in (sizes or {}).items() if users[name] > 1}
@@ -108,10 +117,21 @@ class Reader:
         former = self._illumination
         light = None if lamps is None else with_lamps(depsgraph, former, lamps)
         if light is None:
-            light = read_illumination(depsgraph, scene_cache)
+            light = read_illumination(depsgraph, scene_cache, medium_of=medium_of if self._bounces else None)
             if former is not None and light.shadow_key() == former.shadow_key():
                 light = former.with_light_of(light)
         self._illumination = light
+
+    def _light_sky(self, depsgraph) -> None:
+        """Add the light of a sky that Cycles renders, as far as it is there."""
+        self._sky_time, light, world = self._sky.time, self._illumination, compat.world_of(depsgraph)
+        if world is not None and world.name in light.by_cycles:
+            tree = scene_cache.tree(world)
+            key = digest(tree.text, *map(scene_cache.image_digest, tree.images))
+            sky = self._sky.light(world.original, key)
+            if sky is not None:
+                light = light.without({world.name}).lit_by([sky])
+        self._lit = light
         self._lighting.clear()
 
     def _read_receivers(self, depsgraph) -> None:
@@ -145,9 +165,9 @@ class Reader:
             self.targets.sort(key=distance)
 
     def _note_left_out(self, depsgraph) -> None:
-        names = [f"light of '{name}' that only Cycles can evaluate" for name in self._illumination.by_cycles]
-        if depsgraph.scene.beamspread.use_indirect:
-            names.insert(0, INDIRECT)
+        names = [f"light of '{name}' that only Cycles can evaluate" for name in self._lit.by_cycles]
+        if self._bounces and (problem := self._lit.bounce_problem):
+            names.insert(0, f"bounced light, which only Cycles can find here ({problem.rstrip('.')})")
         names += _hidden(depsgraph.view_layer)
         if len(self.targets) > MAX_TARGETS:
             names.append(f"{len(self.targets) - MAX_TARGETS} objects farther away")
@@ -161,7 +181,7 @@ class Reader:
             return None
         settings = depsgraph.scene.original.beamspread
         if target.object_name not in self._lighting:
-            self._lighting[target.object_name] = self._illumination.lighting(target.object_name)
+            self._lighting[target.object_name] = self._lit.lighting(target.object_name)
         try:
             size = _image_size(material, node.image) or sizes.get(target.material_name)
             color = self._base_color(depsgraph, target, size or settings.resolution)
@@ -176,11 +196,18 @@ class Reader:
             "surface": node.surface() if color is None else node.surface().colored(color),
             "texture": None if color is None else color.texture,
             "settings": for_live(settings.for_bake()),
+            "max_bounces": self._max_bounces(depsgraph, self._lighting[target.object_name]),
+            "is_final": not self._sky.is_busy(),
         }
         former = self._live_targets.get(target)
         if former is not None and all(_is_same(getattr(former, name), value) for name, value in parts.items()):
             return former
         return LiveTarget(target, **parts)
+
+    def _max_bounces(self, depsgraph, illumination: Illumination) -> tuple[int, int, int] | None:
+        """Cycles' numbers of bounces; None where no light bounces, or only Cycles can find it."""
+        is_left_out = not self._bounces or illumination.bounce_problem
+        return None if is_left_out else compat.max_bounces(depsgraph.scene)
 
     def _base_color(self, depsgraph, target: Target, size: Size) -> BaseColor | None:
         """The texture that is linked to the target's node; None without a link."""

@@ -11,6 +11,7 @@ from ...core.live.render_thread import RenderThread
 from ...core.live.renderer import Rendering
 from ...core.messages import Level, Message, Messages, note
 from ...core.target import Target
+from ..cycles.sky import SkyService
 from ..images.facts import ImageFacts, facts_of, owners_of
 from ..jobs.state import redraw, state
 from ..node.find import find_node
@@ -44,7 +45,8 @@ class Session:
     """
 
     def __init__(self) -> None:
-        self._thread, self._reader = RenderThread(), Reader()
+        self._thread, self._sky = RenderThread(), SkyService()
+        self._reader = Reader(self._sky)
         self._time: int | None = None  # of the last scan, as the cache counts it
         self._targets: list[LiveTarget] = []
         self._previews: dict[str, Preview] = {}  # by material
@@ -78,7 +80,7 @@ class Session:
         undone = {name for name, (_address, facts) in self._facts.items() if _facts_of(name)[1] != facts}
         self._thread.forget([target for target in self._reader.targets if target.material_name in undone])
         self._facts.clear()
-        self._reader, self._time = Reader(), None
+        self._reader, self._time = Reader(self._sky), None
         for preview in self._previews.values():
             if not self._is_resting and preview.fits():
                 preview.refresh()
@@ -97,6 +99,7 @@ class Session:
     def end(self, can_remove: bool = True) -> None:
         """Stop, and have nodes show their own images. Where hidden images can't be removed they stay without users."""
         self._thread.end()
+        self._sky.end()
         for preview in self._previews.values():
             if can_remove:
                 preview.remove()
@@ -106,12 +109,13 @@ class Session:
         scene_cache.log.shown_by_live = tuple
         scene_cache.drop_arrays()
         self._thread.join(END_SECONDS)
+        self._sky.join(END_SECONDS)
 
     # State for panels and the timer
 
     def is_busy(self) -> bool:
         """True while renderings are still to come."""
-        return bool(self._changes()) or self._thread.is_busy()
+        return bool(self._changes()) or self._thread.is_busy() or self._sky.is_busy()
 
     def names(self) -> set[str]:
         """Names of all hidden images."""
@@ -122,6 +126,8 @@ class Session:
         errors = (self._reader.errors | self._errors).items()
         messages = Messages(Message(Level.ERROR, str(target), error) for target, error in errors)
         messages.add(*self._reader.messages())
+        if self._sky.problem:
+            messages.add(note("", f"Live has no light of the sky. {self._sky.problem}"))
         medium = self._thread.libraries.simulating
         if medium:
             messages.add(note("", f"Live first simulates the medium ({medium}), in preview quality."))

@@ -19,6 +19,8 @@ from .smoothing import SPLINE_VARIANCE, smoothing_variance
 
 # Nodes along the longest side of a receiver; more resolve bounced light more finely and take longer.
 NODES = 64
+# Most paths for each part of the hemisphere at a node; more leave less noise and take longer.
+MAX_SAMPLES = 128
 # Most squares of that side that the nodes of all charts fill.
 MAX_SQUARES = 2.0
 
@@ -44,9 +46,13 @@ class BouncedLight(Step):
     Attributes
     ----------
     max_bounces : largest number of surfaces that return light on its way, in all, diffusely and by a glossy lobe.
+    nodes, tolerance, max_samples : see `NODES`, `NOISE` and `MAX_SAMPLES`.
     """
 
     max_bounces: tuple[int, int, int]
+    nodes: int = NODES
+    tolerance: float = NOISE
+    max_samples: int = MAX_SAMPLES
 
     name = "Finding bounced light"
     finds_light = True
@@ -60,15 +66,16 @@ class BouncedLight(Step):
             for light in illumination.lights
         ]
         found = native.bounced_light(
-            charts_of(receiver, NODES),
+            charts_of(receiver, self.nodes),
             STRATA,
             lights,
             surfaces,
             direct=mean_over(receiver, lambda grid: mean_irradiance(grid, illumination)),
-            tolerance=NOISE,
+            tolerance=self.tolerance,
             max_bounces=self.max_bounces,
             threads=settings.threads,
             spread=_spread(job),
+            max_samples=self.max_samples,
             progress=progress,
         )
         if not found["irradiance"] > 0:
@@ -76,7 +83,7 @@ class BouncedLight(Step):
         in_the_open = mean_over(receiver, lambda grid: mean_open_irradiance(grid, illumination.lights))
         if found["irradiance"] < NEGLIGIBLE * in_the_open:
             return replace(job, illumination=illumination.with_messages(NOTHING_BOUNCES))
-        if found["noise"] > NOISY * NOISE:
+        if found["noise"] > NOISY * self.tolerance:
             text = f"Bounced light on '{job.name}' has {found['noise']:.1%} of noise, relative to all light there."
             illumination = illumination.with_messages(note(job.name, text))
         fields = tuple(

@@ -28,6 +28,8 @@ class LiveTarget:
     polygons : faces of the receiver, in the world.
     size : width and height of the image in texels; None: `resolution` texels along the longer side.
     texture : colors that light meets on its way in and out; the surface then has their mean.
+    max_bounces : see `BouncedLight`; None: no light bounces.
+    is_final : False while better light is on its way, so that an exact rendering would be in vain.
     """
 
     target: Target
@@ -38,6 +40,8 @@ class LiveTarget:
     surface: Surface
     settings: BakeSettings
     texture: Texture | None = None
+    max_bounces: tuple[int, int, int] | None = None
+    is_final: bool = True
 
     @cached_property
     def key(self) -> tuple:
@@ -46,7 +50,8 @@ class LiveTarget:
         shadows = self.illumination.shadow_key()
         arrays = self.polygons.corners, self.polygons.uvs, self.polygons.normals
         texture = () if self.texture is None else (self.texture.blur, *map(_key, self.texture.colors))
-        return lights, shadows, *map(_key, arrays), self.size or self.resolution, self.surface, self.settings, texture
+        rest = self.size or self.resolution, self.surface, self.settings, texture, self.max_bounces
+        return lights, shadows, *map(_key, arrays), *rest
 
 
 def _light_key(light) -> tuple:

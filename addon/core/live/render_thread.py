@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import queue
 import threading
+import time
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
@@ -19,6 +20,10 @@ REST_SECONDS = 0.4
 """Seconds without changes before targets are rendered exactly; more wastes less work on targets that still change."""
 
 
+MAX_WAIT_SECONDS = 0.25
+"""Seconds after which bounced light is found although a target still changes; more keeps direct light quicker."""
+
+
 @dataclass
 class Work:
     """Progress on one target.
@@ -27,11 +32,15 @@ class Work:
     ----------
     key : `LiveTarget.key` of the last rendering.
     has_libraries : True if that rendering used the libraries of its own media.
+    bounced_key : the same of the last rendering whose bounced light was up to date.
+    bounced_since : time since which bounced light is not up to date.
     """
 
     key: tuple | None = None
     has_libraries: bool = False
     is_exact: bool = False
+    bounced_key: tuple | None = None
+    bounced_since: float = 0.0
 
 
 class RenderThread:
@@ -63,7 +72,7 @@ class RenderThread:
     def adopt(self, targets: Collection[LiveTarget]) -> None:
         """Count these targets as rendered exactly; older renderings of them are dropped."""
         for target in targets:
-            self._work[target.target] = Work(target.key, has_libraries=True, is_exact=True)
+            self._work[target.target] = Work(target.key, True, is_exact=True, bounced_key=target.key)
 
     def forget(self, targets: Collection[Target]) -> None:
         """Render these targets anew when they are shown again."""
@@ -120,13 +129,15 @@ class RenderThread:
             if self._is_outdated(generation):
                 return False
             missing.update(dict.fromkeys(self._render_quickly(target)))
+        for target in targets:
+            self._add_bounced(target, generation)
         self.libraries.request(list(missing))
         with self._condition:
             if self._condition.wait_for(lambda: self._is_outdated(generation), self._rest_seconds):
                 return False
         for target in targets:
             work = self._work.get(target.target)
-            if work is not None and work.has_libraries and not work.is_exact:
+            if work is not None and work.has_libraries and target.is_final and not work.is_exact:
                 self._render_exactly(target, work, lambda _fraction: not self._is_outdated(generation))
         return True
 
@@ -138,11 +149,29 @@ class RenderThread:
             return missing
         if not self._renderer.has_libraries(target):
             return missing  # the service calls back once they are there
-        side = quick_side(target.illumination.lights)
+        side, was_current = quick_side(target.illumination.lights), work.bounced_key == work.key
         failed = not self._put(work, target, lambda: self._renderer.quick(target, side, lambda _: not self._is_ending))
         # An error would occur again in the exact rendering.
         work.key, work.has_libraries, work.is_exact = target.key, not missing, failed
+        if failed or target.max_bounces is None:
+            work.bounced_key = target.key
+        elif was_current:
+            work.bounced_since = time.monotonic()
         return missing
+
+    def _add_bounced(self, target: LiveTarget, generation: int) -> None:
+        """Add bounced light to the quick rendering of a target, unless it is up to date or the target changes."""
+        work = self._work.get(target.target)
+        if work is None or work.key is None or work.bounced_key == work.key:
+            return
+
+        def goes_on(_fraction: float) -> bool:
+            is_due = time.monotonic() > work.bounced_since + MAX_WAIT_SECONDS
+            return not self._is_ending and (is_due or not self._is_outdated(generation))
+
+        if goes_on(0.0):
+            self._put(work, target, lambda: self._renderer.quick_bounced(target, goes_on))
+            work.bounced_key = work.key
 
     def _render_exactly(self, target: LiveTarget, work: Work, progress: Progress) -> None:
         if quick_side(target.illumination.lights) < SIDES[-1] < max(self._renderer.size_of(target)):

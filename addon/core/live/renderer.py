@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
 from ..bake.bake_settings import COMBINED, BakeSettings
 from ..bake.layers import spread
-from ..bake.margin import WHOLE, extend_margin
+from ..bake.margin import extend_margin
 from ..bake.surface import channel_media
 from ..ldf.albedo import albedo_from_reflectance
 from ..ldf.library import load_source
@@ -18,11 +17,13 @@ from ..material import Material
 from ..progress import Progress
 from ..recent import keep_recent
 from ..scene.illumination import Illumination
-from ..scene.lights import Light
-from ..scene.receiver import Grid, Receiver, build_receiver, texture_size
+from ..scene.lights import Light, WorldLight
+from ..scene.receiver import Grid, build_receiver, texture_size
 from ..scene.sampling import resized
 from ..scene.uv_map import fit_uv_maps
 from ..target import Target
+from .bounced_layer import BOUNCED_SIDE, BouncedLayers, with_bounced, without_direct
+from .framed_receiver import FramedReceiver
 from .kernel_cache import KernelCache
 from .library_service import LibraryService
 from .live_target import LiveTarget
@@ -42,6 +43,9 @@ QUICK_RAYS = 4
 QUICK_SAMPLES = 2
 """Samples along each axis of a texel at borders of shadows in quick renderings; more is smoother and slower."""
 
+MAX_WORLD_ROWS = 512
+"""Rows of the world's image in quick renderings; more show finer suns and are slower."""
+
 MAX_EXACT_SUNS = 4
 """Number of suns that a quick rendering spreads with exact kernels of their own, as a `LightField` does."""
 
@@ -60,7 +64,7 @@ class Rendering:
     ----------
     texture : float32 (height, width, 3), luminance; None where `error` says why.
     region : bool (height, width), texels of the target, margin included.
-    is_exact : True if the values are those of a bake without indirect light.
+    is_exact : True if the values are those of a bake.
     """
 
     target: Target
@@ -85,34 +89,41 @@ class LiveRenderer:
         self._last_libraries: dict[Target, list] = {}  # of each channel
         self._receivers: dict = {}
         self._maps: dict = {}
+        self._direct: dict[Target, np.ndarray] = {}  # last quick luminance, at its few texels
+        self._bounced = BouncedLayers()
 
     def size_of(self, target: LiveTarget) -> tuple[int, int]:
         """Width and height of the target's image in texels."""
         return target.size or texture_size(self._uv_maps(target), target.resolution)
 
     def quick(self, target: LiveTarget, side: int, progress: Progress | None = None) -> Rendering:
-        """Render at most `side` texels along the longer side, interpolated to the size of the image."""
-        size = self.size_of(target)
-        shrink = min(1.0, side / max(size))
-        framed = self._receiver(target, tuple(max(1, round(length * shrink)) for length in size))
+        """Render at most `side` texels along the longer side, interpolated to the size of the image.
+
+        Light that bounces is the last known one.
+        """
+        framed = self._coarse_receiver(target, side)
         settings = replace(target.settings, samples=min(QUICK_SAMPLES, target.settings.samples))
-        material, sources = self._material(target)
-        values = [
-            self._quick_luminance(replace(chart.grid, color_out=None), target, material, sources, settings, progress)
-            for chart in framed.receiver.charts
-        ]
-        texture, whole = framed.continued(framed.receiver.to_texture(values)), self._receiver(target, size)
-        texture = resized(texture, size[1], size[0])
-        if whole.color_out is not None:
-            texture *= whole.color_out  # at all texels, so that the texture keeps its detail
-        return Rendering(target.target, texture, whole.region)
+        direct = self._quick_texture(target, _coarse(target.illumination), framed, settings, progress)
+        keep_recent(self._direct, target.target, direct, MAX_RECEIVERS)
+        return self._together(target)
+
+    def quick_bounced(self, target: LiveTarget, progress: Progress | None = None) -> Rendering:
+        """Find light that bounces, coarsely, and add it to the last quick rendering."""
+        framed = self._coarse_receiver(target, BOUNCED_SIDE)
+        coarse = replace(target, illumination=_coarse(target.illumination))
+        bounced = without_direct(with_bounced(coarse, framed.receiver, progress, is_quick=True), target)
+        if bounced is not None:
+            bounced = self._quick_texture(target, bounced, framed, target.settings, progress)
+        self._bounced.put(target.target, bounced)
+        return self._together(target)
 
     def exact(self, target: LiveTarget, progress: Progress | None = None) -> Rendering:
         """Render as a bake does, with the libraries at hand."""
         framed = self._receiver(target, self.size_of(target))
         material, sources = self._material(target)
+        illumination = with_bounced(target, framed.receiver, progress)
         rest = material, sources, target.settings, progress
-        values = [spread(chart.grid, target.illumination, *rest) for chart in framed.receiver.charts]
+        values = [spread(chart.grid, illumination, *rest) for chart in framed.receiver.charts]
         texture = framed.receiver.to_texture(values)
         texture = extend_margin(texture, framed.receiver.coverage, target.settings.margin)
         return Rendering(target.target, texture, framed.region, is_exact=True)
@@ -147,23 +158,57 @@ class LiveRenderer:
             sources = [load_source(settings.sample_folder, settings.distributions)] * 3
         return material, sources
 
-    def _quick_luminance(
-        self, grid: Grid, target: LiveTarget, material: Material, sources: list, settings: BakeSettings, progress
+    def _coarse_receiver(self, target: LiveTarget, side: int) -> FramedReceiver:
+        """The receiver with at most `side` texels along the longer side."""
+        size = self.size_of(target)
+        shrink = min(1.0, side / max(size))
+        return self._receiver(target, tuple(max(1, round(length * shrink)) for length in size))
+
+    def _quick_texture(
+        self, target: LiveTarget, illumination: Illumination, framed: FramedReceiver, settings: BakeSettings, progress
     ) -> np.ndarray:
-        lights = [light for light in target.illumination.lights if not light.is_behind(grid)]
+        """Luminance below the surface, float32 (height, width, 3), continued around the charts."""
+        rest = *self._material(target), settings, progress
+        grids = [replace(chart.grid, color_out=None) for chart in framed.receiver.charts]
+        values = [self._quick_luminance(grid, illumination, *rest) for grid in grids]
+        return framed.continued(framed.receiver.to_texture(values))
+
+    def _together(self, target: LiveTarget) -> Rendering:
+        """Direct and bounced light as they are known, at the size of the image."""
+        texture, bounced = self._direct[target.target], self._bounced.of(target)
+        if bounced is not None:
+            texture = texture + resized(bounced, *texture.shape[:2])
+        size = self.size_of(target)
+        whole = self._receiver(target, size)
+        resized_texture = resized(texture, size[1], size[0])
+        if whole.color_out is not None:
+            # At all texels, so that the texture keeps its detail.
+            resized_texture = resized_texture * whole.color_out
+        return Rendering(target.target, resized_texture, whole.region)
+
+    def _quick_luminance(
+        self,
+        grid: Grid,
+        illumination: Illumination,
+        material: Material,
+        sources: list,
+        settings: BakeSettings,
+        progress,
+    ) -> np.ndarray:
+        lights = [light for light in illumination.lights if not light.is_behind(grid)]
         if not lights:
             return np.zeros((grid.height, grid.width, 3), np.float32)
         if _are_few_suns(lights, grid) or settings.distributions != "library":
-            return spread(grid, target.illumination, material, sources, settings, progress)
+            return spread(grid, illumination, material, sources, settings, progress)
         medium = {
             "ldf": sources,
             "albedo": material.albedo,
             "mean_free_path": material.mean_free_path,
             "threads": settings.threads,
         }
-        color = _common_color(grid, target.illumination)
+        color = _common_color(grid, illumination)
         field = self.kernels.field(grid, medium, is_colored=color is None)
-        arriving = target.illumination.native_lights(grid)
+        arriving = illumination.native_lights(grid)
         if color is not None:
             arriving = [(light, [max(rgb)] * 3, caster) for light, rgb, caster in arriving]
         luminance = field.luminance(
@@ -189,62 +234,6 @@ class LiveRenderer:
         return self._receivers[key][0]
 
 
-class FramedReceiver:
-    """A receiver with the texels around its charts, which continue the charts' values.
-
-    Attributes
-    ----------
-    region : bool (height, width), texels of the charts and of their margin.
-    """
-
-    def __init__(self, receiver: Receiver, margin: int) -> None:
-        self.receiver = receiver
-        inside = receiver.inside()
-        whole = receiver.coverage > WHOLE
-        source = _nearest_texels(whole if whole.any() else inside, margin + 2)
-        self._source = None if whole.all() else source
-        self.region = _dilated(inside, margin)
-
-    @cached_property
-    def color_out(self) -> np.ndarray | None:
-        """Float32 (height, width, 3): factors of light that leaves, continued around the charts; None without any."""
-        factors = [chart.grid.color_out for chart in self.receiver.charts]
-        return None if factors[0] is None else self.continued(self.receiver.to_texture(factors))
-
-    def continued(self, texture: np.ndarray) -> np.ndarray:
-        """The texture with the values of texels wholly inside a chart at the texels around them."""
-        if self._source is None:
-            return texture
-        return texture.reshape(-1, 3)[self._source].reshape(texture.shape)
-
-
-def _nearest_texels(known: np.ndarray, rings: int) -> np.ndarray:
-    """Int (H, W): the index of a known texel near each texel of the next `rings`, its own index for all others."""
-    indices = np.arange(known.size).reshape(known.shape)
-    source = np.where(known, indices, -1)
-    for _ in range(rings):
-        if (source >= 0).all():
-            break
-        padded = np.pad(source, 1, constant_values=-1)
-        height, width = known.shape
-        for dy in (0, 1, 2):
-            for dx in (0, 1, 2):
-                neighbor = padded[dy : dy + height, dx : dx + width]
-                np.copyto(source, neighbor, where=(source < 0) & (neighbor >= 0))
-    return np.where(source < 0, indices, source)
-
-
-def _dilated(mask: np.ndarray, rings: int) -> np.ndarray:
-    """Bool (H, W): texels of the mask and of `rings` around it."""
-    for _ in range(rings):
-        if mask.all():
-            break
-        padded = np.pad(mask, 1)
-        up_down = padded[:-2] | padded[1:-1] | padded[2:]
-        mask = up_down[:, :-2] | up_down[:, 1:-1] | up_down[:, 2:]
-    return mask
-
-
 def _media(target: LiveTarget) -> list:
     """The medium of each channel."""
     return channel_media(target.surface.material, target.surface.thickness)
@@ -267,6 +256,13 @@ def _common_color(grid: Grid, illumination: Illumination) -> np.ndarray | None:
     return None if differ or any(is_colored) or grid.color_in is not None else colors[0]
 
 
+def _coarse(illumination: Illumination) -> Illumination:
+    """The illumination with a world of few texels: a fine one takes .3 s for each plane."""
+    return illumination.with_lights(
+        [light.coarse(MAX_WORLD_ROWS) if isinstance(light, WorldLight) else light for light in illumination.lights]
+    )
+
+
 def for_live(settings: BakeSettings) -> BakeSettings:
-    """The settings of a scene as Live uses them: the FFT solver, without indirect light."""
-    return replace(settings, solver="fft", indirect=False, layer=COMBINED)
+    """The settings of a scene as Live uses them: luminance by the FFT solver."""
+    return replace(settings, solver="fft", layer=COMBINED)

@@ -61,6 +61,13 @@ class Illumination:
         beyond = {name for name, names in self.receivers.items() if receiver not in names}
         return linked.without(beyond & set(self.by_cycles))
 
+    @property
+    def bounce_problem(self) -> str:
+        """Sentence that says why only Cycles can find bounced light; "" if our own rays can."""
+        for name in self.by_cycles:
+            return f"Only Cycles knows the light of '{name}'."
+        return self.untraceable
+
     def without(self, names: Collection[str]) -> Illumination:
         """A copy without these lights of `by_cycles`, which Cycles takes over, and without their messages."""
         rest = copy(self)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
 from ...native import native
+from ...recent import keep_with
 from ..receiver import Grid, Vector
 
 
@@ -233,17 +234,36 @@ class WorldLight(Light):
     to_world: tuple[tuple[float, float, float], ...]
 
     def native(self):
-        return native.EnvironmentLight(np.ascontiguousarray(self.radiance, np.float32), self.to_world)
+        def make():
+            return native.EnvironmentLight(np.ascontiguousarray(self.radiance, np.float32), self.to_world)
+
+        return keep_with(self.radiance, self.to_world, make)
 
     @property
     def is_colored(self):
-        return bool((self.radiance != self.radiance[..., :1]).any())
+        return keep_with(self.radiance, "color", lambda: bool((self.radiance != self.radiance[..., :1]).any()))
 
     def is_behind(self, _grid):
         return False
 
     def fault(self):
         return self._radiance_fault(self.radiance) or super().fault()
+
+    def coarse(self, max_rows: int) -> WorldLight:
+        """The light with means of texels, so that its image has at most this many rows."""
+        step = -(-len(self.radiance) // max_rows)
+        if step == 1:
+            return self
+
+        def means() -> np.ndarray:
+            radiance = np.ascontiguousarray(self.radiance, np.float32)
+            for axis in (0, 1):
+                edges = np.arange(0, radiance.shape[axis], step)
+                counts = np.diff([*edges, radiance.shape[axis]]).astype(np.float32)
+                radiance = np.add.reduceat(radiance, edges, axis) / np.expand_dims(counts, (1 - axis, 2))
+            return radiance
+
+        return replace(self, radiance=keep_with(self.radiance, max_rows, means))
 
 
 @dataclass(frozen=True, eq=False)
