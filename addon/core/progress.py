@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -13,8 +14,14 @@ from .native import native
 Callback = Callable[[float], object]
 """Takes the finished fraction, 0..1. The answer False (or NumPy's) cancels the work; any other lets it go on."""
 
-MIN_SECONDS = 3.0
-"""Seconds after which the time left is estimated; longer is steadier."""
+ROUNDING = 1e-9
+"""Fraction of a whole by which parts that follow each other may seem to overlap."""
+
+OVERRUN = 0.15
+"""Seconds that a stage is expected to go on for each second so far, once it takes longer than estimated."""
+
+FOLLOWING = 0.05
+"""Fraction of a run's time within which the time left that is shown follows a new estimate; longer is steadier."""
 
 
 class Progress:
@@ -35,24 +42,35 @@ class Progress:
         self.fraction, self.stage, self._is_cancelled = 0.0, "", False
         self._callback = callback
         self._whole, self._start, self._length = self, 0.0, 1.0
-        self._stage_part, self._stage_began = self, time.monotonic()
+        self._began = time.monotonic()
+        self._stage_part, self._stage_began = self, self._began
+        self._parts: list[Progress] = []
+        self._expected: Callable[[], float] | None = None
+        self._shown = _Shown()
 
     @staticmethod
     def of(progress: Progress | Callback | None) -> Progress:
         """The progress itself, or a new one for a callback of the caller."""
         return progress if isinstance(progress, Progress) else Progress(progress)
 
-    def split(self, weights: Iterable[float]) -> list[Progress]:
-        """Parts whose lengths are proportional to the weights; together they run from 0 to 1."""
-        weights = list(weights)
-        parts, done, total = [], 0.0, sum(weights) or 1.0
-        for weight in weights:
+    def split(self, lengths: Iterable[float]) -> list[Progress]:
+        """Parts whose lengths are proportional to these, as seconds; together they run from 0 to 1."""
+        lengths = list(lengths)
+        parts, done, total = [], 0.0, sum(lengths) or 1.0
+        for length in lengths:
             part = Progress()
             part._whole = self._whole
-            part._start, part._length = self._start + self._length * done / total, self._length * weight / total
+            part._start, part._length = self._start + self._length * done / total, self._length * length / total
+            if self._expected is not None:
+                part._expected = lambda share=length / total: self._expected() * share
             parts.append(part)
-            done += weight
+            done += length
+        self._parts = parts
         return parts
+
+    def expect(self, seconds: Callable[[], float]) -> None:
+        """Set the function that estimates the seconds of this part. It may change its mind until the part begins."""
+        self._expected = seconds
 
     def begin(self, stage: str) -> None:
         """Begin a stage with this part."""
@@ -91,17 +109,73 @@ class Progress:
         return min(max(done / part._length, 0.0), 1.0) if part._length else 1.0
 
     def seconds_left(self) -> float | None:
-        """Estimate of the seconds that the current stage still takes, at its speed so far; None if unknown."""
-        seconds, fraction = time.monotonic() - self._whole._stage_began, self.stage_fraction
-        return seconds * (1 - fraction) / fraction if seconds >= MIN_SECONDS and fraction > 0 else None
+        """Estimate of the seconds that the whole still takes; None if unknown."""
+        return self._whole._show()[0]
+
+    def time_fraction(self) -> float:
+        """Finished fraction of the time that the whole takes; it never falls. The finished work if that is unknown."""
+        return self._whole._show()[1]
+
+    def _show(self) -> tuple[float | None, float]:
+        expected = self._stage_part._seconds()
+        if expected is None:
+            return None, self.fraction
+        now, part = time.monotonic(), self._stage_part
+        left = stage_left(expected, now - self._stage_began, self.stage_fraction)
+        left += self._seconds_after(part._start + part._length, part)
+        return self._shown.update(now, now - self._began, left)
+
+    def _seconds(self) -> float | None:
+        """Estimate of the seconds that this part takes in all; None if unknown."""
+        if self._expected is None and self._parts:
+            seconds = [part._seconds() for part in self._parts]
+            return None if None in seconds else sum(seconds)
+        return None if self._expected is None else self._expected()
+
+    def _seconds_after(self, point: float, current: Progress) -> float:
+        """Estimate of the seconds of the parts of this one that begin at a point of the whole, or later."""
+        if self is current or self._start + self._length < point:
+            return 0.0
+        if self._parts:
+            return sum(part._seconds_after(point, current) for part in self._parts)
+        return (self._seconds() or 0.0) if self._start >= point - ROUNDING else 0.0
+
+
+def stage_left(expected: float, lasted: float, fraction: float) -> float:
+    """Estimate of the seconds that a stage still takes.
+
+    The less of it is finished, the more the expected length counts, and the less its speed so far.
+    """
+    by_plan = max(expected - lasted, OVERRUN * lasted)
+    by_speed = lasted * (1.0 - fraction) / fraction if fraction > 0 else 0.0
+    return (1.0 - fraction) * by_plan + fraction * by_speed
+
+
+class _Shown:
+    """The time left as it is shown: it follows estimates without jumps."""
+
+    def __init__(self) -> None:
+        self._left: float | None = None
+        self._fraction = self._time = 0.0
+
+    def update(self, now: float, lasted: float, left: float) -> tuple[float, float]:
+        """Seconds left and the finished fraction of the time, from the estimate of the seconds left."""
+        if self._left is not None:
+            passed = now - self._time
+            steady = max(self._left - passed, 0.0)
+            left = steady + (left - steady) * -math.expm1(-passed / (FOLLOWING * (lasted + max(left, steady, 1e-9))))
+        self._left, self._time = left, now
+        self._fraction = max(self._fraction, lasted / max(lasted + left, 1e-9))
+        return left, self._fraction
 
 
 @contextmanager
-def timed(stage: str) -> Iterator[None]:
-    """Log the seconds that a stage takes (`batch.py --verbose` shows them)."""
+def timed(stage: str, estimate: float = 0.0) -> Iterator[None]:
+    """Log the seconds that a stage takes, and their estimate if there is one (`batch.py --verbose` shows them)."""
     start = time.monotonic()
     yield
-    log(f"{stage}: {time.monotonic() - start:.2f} s")
+    estimated = f", estimated {estimate:.2f} s" if estimate else ""
+    log(f"{stage}: {time.monotonic() - start:.2f} s{estimated}")
 
 
 def log(line: str) -> None:

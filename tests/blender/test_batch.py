@@ -1,6 +1,7 @@
 """The batch as users run it: a process of its own, with exit code, files and report."""
 
 import json
+import re
 import stat
 import subprocess
 from pathlib import Path
@@ -26,7 +27,7 @@ from scenes import (
 )
 
 KEYS = {"object", "material", "frame", "path", "width", "height", "seconds", "status", "message"} | {
-    *("output", "lights", "left_out", "indirect", "dark"),
+    *("output", "lights", "left_out", "indirect", "dark", "estimated_seconds"),
 }
 
 
@@ -336,6 +337,7 @@ def test_verbose_prints_the_scene_and_the_stages(tmp_path):
         assert f"Beamspread: {words}" in verbose.replace("'Plane': ", "")
         assert words not in quiet
     assert [f"{stage}: " in verbose for stage in ("scene", "'Plane': Baking")] == [True, True]
+    assert re.search(r"'Plane / Medium': [\d.]+ s, estimated [\d.]+ s", verbose)
 
 
 def test_a_sky_by_cycles_is_a_light_of_the_report(tmp_path):

@@ -378,6 +378,9 @@ class EndlessJob:
     def messages(self):
         return []
 
+    def seconds(self):
+        return 1.0
+
     def run(self, progress):
         while progress(0.5):
             pass

@@ -168,21 +168,25 @@ def test_progress_names_the_stages():
     assert [*dict.fromkeys(stages)] == ["Simulating the material (quick preview)", "Baking"]
 
 
-def test_the_window_shows_the_step_and_the_remaining_time(monkeypatch):
+def test_the_window_shows_the_step_and_the_remaining_time_of_the_run(monkeypatch):
     now = [100.0]
     monkeypatch.setattr("time.monotonic", lambda: now[0])
     progress = Progress()
-    first, second = progress.split([1, 1])
+    first, second = progress.split([10, 30])
+    for part, seconds in ((first, 10.0), (second, 30.0)):
+        part.expect(lambda seconds=seconds: seconds)
     run = Run(progress, Target("Plane", "Stone"), "2 of 2")
+    first.begin("Simulating")
+    assert run.in_short() == "0%, about 40 s left"
+    now[0] += 10
     first(1.0)
     second.begin("Baking")
-    second(0.1)
-    assert run.line() == "Baking: Plane / Stone (2 of 2), 10% (Esc cancels)"
-    now[0] += 10
-    second(0.25)
-    assert run.in_short() == "25%, about 30 s left"
+    assert run.line() == "Baking: Plane / Stone (2 of 2), 25%, about 30 s left (Esc cancels)"
+    now[0] += 15
+    second(0.5)
+    assert run.in_short() == "62%, about 15 s left"
     progress.cancel()
-    assert run.line() == "Stopping: Plane / Stone (2 of 2), 25% (Esc cancels)"
+    assert run.line() == "Stopping: Plane / Stone (2 of 2), 62% (Esc cancels)"
 
 
 @pytest.mark.parametrize("solver", ["fft", "direct", "adaptive"])
@@ -250,9 +254,10 @@ def test_unregistering_ends_the_run_with_a_message(monkeypatch):
         operator.register()
 
 
-@pytest.mark.parametrize(
-    ("seconds", "words"), [(0.2, "1 s"), (59, "59 s"), (90, "2 min"), (7200, "2 h"), (259200, "3 days")]
-)
+TIMES = [(0.2, "1 s"), (59.4, "59 s"), (59.6, "1 min"), (90, "2 min"), (7200, "2 h"), (259200, "3 days")]
+
+
+@pytest.mark.parametrize(("seconds", "words"), TIMES)
 def test_times_in_words(seconds, words):
     assert duration(seconds) == words
 

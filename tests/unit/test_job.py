@@ -80,7 +80,7 @@ def test_a_job_runs_its_steps_in_order():
     class Color(Step):
         name = "Coloring"
 
-        def weight(self, _job):
+        def seconds(self, _job):
             return 1e6
 
         def run(self, job, progress):

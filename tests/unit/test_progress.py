@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from beamspread import Cancelled, Medium, simulate
-from beamspread.core.progress import Progress
+from beamspread.core.progress import FOLLOWING, Progress
 
 
 def test_parts_join_to_one_range():
@@ -71,19 +71,85 @@ def test_an_answer_cancels_the_other_parts_too():
     assert second.is_cancelled
 
 
-def test_stages_have_a_fraction_and_the_time_that_they_still_take(monkeypatch):
+@pytest.fixture
+def clock(monkeypatch):
+    """A list with the time in seconds, which the test moves on."""
     now = [100.0]
     monkeypatch.setattr("time.monotonic", lambda: now[0])
+    return now
+
+
+def test_stages_have_a_fraction():
     whole = Progress()
     first, second = whole.split([1, 3])
     first.begin("Simulating")
     first(1.0)
     second.begin("Baking")
     assert (whole.stage, whole.stage_fraction) == ("Baking", 0)
-    now[0] += 2
     second(0.25)
-    assert whole.seconds_left() is None  # too early to tell
-    now[0] += 8
     second.begin("Baking")  # goes on
     assert whole.stage_fraction == pytest.approx(0.25)
-    assert whole.seconds_left() == pytest.approx(30)
+
+
+def test_without_an_estimate_the_time_left_is_unknown():
+    whole = Progress()
+    whole.split([1, 1])[0](0.5)
+    assert whole.seconds_left() is None
+    assert whole.time_fraction() == pytest.approx(0.25)
+
+
+def played(clock, planned, lasting, progress_of=lambda fraction: fraction, tick=0.1):
+    """(time, seconds left, fraction of the time) of a run whose stages last other times than planned.
+
+    Later stages are expected at the pace of those before. `progress_of` gives what a stage reports at a fraction of its
+    time.
+    """
+    whole = Progress()
+    begin, shown, parts, pace = clock[0], [], whole.split(planned), [0.0, 0.0]
+    for part, seconds in zip(parts, planned):
+        part.expect(lambda seconds=seconds: seconds * (pace[0] + 1) / (pace[1] + 1))
+    for part, expected, seconds in zip(parts, planned, lasting):
+        part.begin(f"Stage of {seconds} s")
+        for step in range(round(seconds / tick)):
+            part(progress_of(step * tick / seconds))
+            shown.append((clock[0] - begin, whole.seconds_left(), whole.time_fraction()))
+            clock[0] += tick
+        part(1.0)
+        pace[0], pace[1] = pace[0] + seconds, pace[1] + expected
+    shown.append((clock[0] - begin, whole.seconds_left(), whole.time_fraction()))
+    return shown
+
+
+def test_the_time_left_is_exact_where_the_plan_is(clock):
+    for now, left, fraction in played(clock, [4, 1, 15], [4, 1, 15]):
+        assert left == pytest.approx(20 - now, abs=0.1)
+        assert fraction == pytest.approx(now / 20, abs=0.01)
+
+
+@pytest.mark.parametrize("uneven", [lambda f: f, lambda f: f**0.5, lambda f: f**2, lambda f: 0.0])
+@pytest.mark.parametrize(
+    ("planned", "lasting"), [([10, 10, 10], [20, 20, 20]), ([10, 10, 10], [5, 5, 5]), ([2, 20], [0.3, 30]), ([9], [27])]
+)
+def test_the_bar_never_falls_and_the_time_left_never_jumps(clock, planned, lasting, uneven):
+    shown = played(clock, planned, lasting, uneven)
+    fractions = [fraction for *_, fraction in shown]
+    assert fractions == sorted(fractions)
+    assert all(0 <= fraction <= 1 for fraction in fractions)
+    for (_, before, _), (_, after, _) in zip(shown, shown[1:]):
+        # A jump passes within `FOLLOWING` of the run's time, which it can't exceed by much.
+        assert abs(after - before) < 0.1 + 1.5 * 0.1 / FOLLOWING
+
+
+def test_a_run_that_is_slower_than_planned_says_so_after_its_first_stages(clock):
+    shown = played(clock, [5] * 8, [10] * 8)
+    for now, left, _ in shown:
+        if now > 20:
+            assert left == pytest.approx(80 - now, rel=0.35, abs=2)
+
+
+def test_an_early_end_of_a_stage_takes_its_time_away(clock):
+    """Cycles ends once its noise is low: the stage jumps to its end."""
+    shown = played(clock, [40, 10], [4, 10], lambda fraction: 0.1 * fraction)
+    left_at = {round(now, 1): left for now, left, _ in shown}
+    assert left_at[3.9] > 40
+    assert left_at[7.0] < 15

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...core.bake.estimate import cycles_color_seconds
 from ...core.bake.job import BakeJob, Step
 from ...core.bake.margin import extend_margin
 from ...core.bake.surface import Surface
@@ -52,8 +53,8 @@ class BaseColorByCycles(Step):
 
     name = "Evaluating the base color"
 
-    def weight(self, _job: BakeJob) -> float:
-        return 0.0 if self.target in self.copy.base_colors else 1.0
+    def seconds(self, job: BakeJob) -> float:
+        return 0.0 if self.target in self.copy.base_colors else cycles_color_seconds(job.receiver.coverage.size)
 
     def run(self, job: BakeJob, progress: Progress) -> BakeJob:
         known = self.copy.base_colors

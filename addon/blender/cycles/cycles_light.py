@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import bpy
@@ -22,6 +22,7 @@ from ...core.bake.bounced import (
     charts_of,
     mean_over,
 )
+from ...core.bake.estimate import cycles_light_seconds
 from ...core.bake.job import BakeJob, Step
 from ...core.bake.layers import mean_irradiance, mean_open_irradiance
 from ...core.bake.smoothing import SPLINE_VARIANCE, smoothing_variance
@@ -29,7 +30,7 @@ from ...core.errors import MissingImageError
 from ...core.messages import Message, note, warning
 from ...core.progress import Callback, Progress
 from ...core.scene.lights import STRATA, Field, FieldLight, Light, WorldLight
-from ...core.scene.receiver import Grid, Receiver
+from ...core.scene.receiver import Grid
 from .. import compat
 from ..read.image_nodes import missing_images
 from ..read.nodes import Links, surface_of
@@ -90,7 +91,7 @@ class CyclesLight:
         illumination, scene = job.illumination, bpy.data.scenes[self._names[0]]
         world = self._world if self._world in illumination.by_cycles else ""
         bounced = job.settings.indirect and bool(illumination.lights or illumination.by_cycles)
-        bounced = bounced and self._is_below_something(job.receiver)
+        bounced = bounced and self.is_below_something(chart.grid for chart in job.receiver.charts)
         objects = [name for name in illumination.by_cycles if name != world and name in scene.objects]
         if bounced:
             illumination = illumination.with_messages(*self._missing)
@@ -126,8 +127,9 @@ class CyclesLight:
             self._copy = CopyForCycles(scene, scene.view_layers[self._names[1]])
         return self._copy
 
-    def _is_below_something(self, receiver: Receiver) -> bool:
-        for grid in (chart.grid for chart in receiver.charts):
+    def is_below_something(self, grids: Iterable[Grid]) -> bool:
+        """True if light may bounce to planes: something that renders is above them."""
+        for grid in grids:
             heights = (self._corners - grid.origin) @ np.array(grid.normal)
             # The receiver's own corners lie in the plane up to rounding.
             size = max(grid.width * grid.pitch_x, grid.height * grid.pitch_y)
@@ -161,8 +163,13 @@ class LightByCycles(Step):
         bounced = ["bounced light"] * self.bounced
         return f"{self.name}: {', '.join([*filter(None, [self.world]), *bounced, *self.lamps])}"
 
-    def weight(self, _job: BakeJob) -> float:
-        return 2.0
+    @property
+    def finds_world(self) -> bool:
+        return bool(self.world)
+
+    def seconds(self, job: BakeJob) -> float:
+        renders_world = bool(self.world) and self.copy.panorama is None
+        return cycles_light_seconds(renders_world, len(self.lamps), self.bounced, job.illumination.triangle_count)
 
     def run(self, job: BakeJob, progress: Progress) -> BakeJob:
         renders_world = bool(self.world) and self.copy.panorama is None

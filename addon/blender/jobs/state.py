@@ -10,6 +10,7 @@ from enum import Enum
 
 from bpy.app.handlers import persistent
 
+from ...core.bake.pace import Estimate
 from ...core.bake.runner import CANCELLED, WRITTEN, Bake
 from ...core.messages import Level, Message
 from ...core.progress import Progress
@@ -40,6 +41,20 @@ class Row:
 
 
 @dataclass(frozen=True)
+class Announced:
+    """How long a bake will take.
+
+    Attributes
+    ----------
+    steps : estimates of its steps.
+    simulations : estimates of the simulations that it needs first, by medium and quality: bakes share them.
+    """
+
+    steps: tuple[Estimate, ...]
+    simulations: dict[object, Estimate]
+
+
+@dataclass(frozen=True)
 class Run:
     """The run in the window.
 
@@ -63,9 +78,9 @@ class Run:
         return f"{self.stage()}: {self.target}{f' ({self.position})' if self.position else ''}"
 
     def in_short(self) -> str:
-        """Finished part of the current stage, and the time that it still takes."""
+        """Finished part of the run, and the time that it still takes."""
         left = None if self.progress.is_cancelled else self.progress.seconds_left()
-        return f"{self.progress.stage_fraction:.0%}{'' if left is None else f', about {duration(left)} left'}"
+        return f"{self.progress.time_fraction():.0%}{'' if left is None else f', about {duration(left)} left'}"
 
     def line(self) -> str:
         return f"{self.title()}, {self.in_short()} (Esc cancels)"
@@ -73,7 +88,7 @@ class Run:
 
 def duration(seconds: float) -> str:
     """A length of time, rounded as one would say it."""
-    if seconds < 60:
+    if seconds < 59.5:
         return f"{max(1, round(seconds))} s"
     if seconds < 3600:
         return f"{round(seconds / 60)} min"
@@ -89,11 +104,13 @@ class State:
     ----------
     run : the run in the window, or None.
     rows : status of each target of the scene; `out_of_date.stale` keeps them up to date.
+    announced : how long bakes of targets will take; so does this.
     """
 
     def __init__(self) -> None:
         self.run: Run | None = None
         self.rows: dict[Target, Row] = {}
+        self.announced: dict[Target, Announced] = {}
         self._last: dict[Target, Row] = {}
 
     def is_running(self) -> bool:
@@ -146,6 +163,7 @@ class State:
     def forget(self) -> None:
         self._last.clear()
         self.rows.clear()
+        self.announced.clear()
 
 
 state = State()

@@ -21,7 +21,7 @@ from .image_nodes import Images
 from .nodes import InputSocket
 from .scene_changes import ChangeLog
 
-SMALL = {"tree", "shape", "scattered"}
+SMALL = {"tree", "shape", "scattered", "kinds"}
 """Kinds of entries without arrays."""
 
 BY_ADDRESS = {"mesh", "emission"}

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+
+from mathutils import Matrix
 
 from ...core.errors import BakeError
 from ...core.messages import Message, warning
@@ -55,6 +57,26 @@ def rendered_in(collection) -> list:
         for child in collection.children:
             objects |= dict.fromkeys(rendered_in(child))
     return list(objects)
+
+
+def placed(depsgraph, objects: Iterable, matrix: Matrix | None = None, instancer=None) -> Iterator[tuple]:
+    """Evaluated objects, their transforms and instancers, and after them those of collections that they instance."""
+    for original in objects:
+        obj = original.evaluated_get(depsgraph)
+        world = transform_of(obj) if matrix is None else matrix @ transform_of(obj)
+        yield obj, world, instancer
+        collection = collection_of(original)
+        if collection is not None:
+            inner = world @ Matrix.Translation(-collection.instance_offset)
+            yield from placed(depsgraph, rendered_in(collection), inner, instancer or obj)
+
+
+def transform_of(obj) -> Matrix:
+    """Transform of an evaluated object to the world. Blender updates no hidden ones: these lack their constraints."""
+    if obj.is_evaluated:
+        return obj.matrix_world
+    around = Matrix() if obj.parent is None else transform_of(obj.parent) @ obj.matrix_parent_inverse
+    return around @ obj.matrix_basis
 
 
 def count_instances(objects: Iterable, known: dict | None = None) -> Counter:

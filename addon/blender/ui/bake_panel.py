@@ -13,14 +13,18 @@ from ...core.scene.uv_map import check_uvs
 from .. import compat
 from ..images.files import check_image
 from ..images.results import check_editable
+from ..jobs.announced import line_of, simulation_line
 from ..jobs.state import Row, Status, state
 from ..live import timer
-from ..node.find import find_misplaced, rendered_counts, targets_of
+from ..node.find import find_misplaced, find_targets, rendered_counts, targets_of
 from ..popup import wrap
 from ..read.visibility import ObjectInstance, check_instance, with_instanced
 
 # Objects whose errors and rows a panel shows, and objects of collections that it checks; more slow the drawing down.
 MAX_OBJECTS, MAX_CHECKED = 8, 1000
+
+# Selected objects whose bakes are announced; more slow the drawing down.
+MAX_ANNOUNCED = 100
 
 ICONS = {
     Status.NEVER: "RADIOBUT_OFF",
@@ -87,6 +91,7 @@ def draw_bake(layout, context, material_name: str = "") -> None:
     else:
         shown = draw_problems(layout, context)
         draw_buttons(layout)
+        draw_announced(layout, context)
         row = layout.row()
         row.use_property_split = False  # as wide as the buttons above
         row.prop(context.scene.beamspread, "use_live", toggle=True, icon="PLAY")
@@ -126,11 +131,22 @@ def draw_buttons(layout) -> None:
         ).objects = "STALE"
 
 
+def draw_announced(layout, context) -> None:
+    """Draw how long bakes of the selected objects, and of all, will take."""
+    everything = list(state.announced)
+    chosen = find_targets(list(context.view_layer.objects.selected)[:MAX_ANNOUNCED]) or everything
+    line, line_of_all = line_of(state.announced, chosen), line_of(state.announced, everything)
+    if line and line_of_all and len(chosen) < len(everything):
+        line = f"{line}; all {line_of_all.lower()}"
+    simulation = simulation_line(state.announced, chosen) if line else ""
+    draw_lines(layout, context, filter(None, [line, simulation]), "TIME")
+
+
 def draw_progress(layout, context) -> None:
     """Draw the stage, its progress, and Cancel."""
     column = layout.column(align=True)
     draw_lines(column, context, [state.run.title()], "RENDER_STILL")
-    compat.draw_progress_bar(column, state.run.progress.stage_fraction, state.run.in_short())
+    compat.draw_progress_bar(column, state.run.progress.time_fraction(), state.run.in_short())
     column.operator("beamspread.cancel", icon="X")
 
 

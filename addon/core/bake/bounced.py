@@ -13,6 +13,7 @@ from ..native import native
 from ..progress import Progress
 from ..scene.lights import STRATA, Field, FieldLight
 from ..scene.receiver import Grid, Receiver
+from .estimate import bounced_seconds
 from .job import BakeJob, Step
 from .layers import WITHOUT_MEDIUM, mean_irradiance, mean_open_irradiance
 from .smoothing import SPLINE_VARIANCE, smoothing_variance
@@ -56,6 +57,9 @@ class BouncedLight(Step):
 
     name = "Finding bounced light"
     finds_light = True
+
+    def seconds(self, job: BakeJob) -> float:
+        return bounced_seconds(job.illumination.triangle_count, job.settings.threads)
 
     def run(self, job: BakeJob, progress: Progress) -> BakeJob:
         receiver, illumination, settings = job.receiver, job.illumination, job.settings

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
@@ -15,7 +16,9 @@ from ..scene.illumination import Illumination
 from ..scene.receiver import Receiver
 from ..scene.texture import BaseColor, textured
 from .bake_settings import COMBINED, BakeSettings
+from .estimate import OF_WORLD, Workload
 from .layers import WITHOUT_MEDIUM
+from .pace import Estimate
 from .surface import Surface
 
 
@@ -26,10 +29,12 @@ class Step(ABC):
     ----------
     name : for messages.
     finds_light : True if the step may add lights to the job.
+    finds_world : True if the step adds the light of the world.
     """
 
     name = ""
     finds_light = False
+    finds_world = False
 
     @abstractmethod
     def run(self, job: BakeJob, progress: Progress) -> BakeJob:
@@ -39,9 +44,13 @@ class Step(ABC):
         """Name of the step's first stage."""
         return self.name
 
-    def weight(self, _job: BakeJob) -> float:
-        """Length of the step in a progress bar, relative to other steps; 0 if it takes no time."""
+    def seconds(self, _job: BakeJob) -> float:
+        """Estimate of the seconds that the step takes; 0 if it takes no time."""
         return 1.0
+
+    def kind(self, _job: BakeJob) -> str:
+        """Name of the steps whose estimates are as right or wrong as that of this step, see `Pace`."""
+        return self.name
 
     def memory_bytes(self, _job: BakeJob) -> float:
         """Memory that the step takes at its peak, about, in bytes."""
@@ -72,19 +81,31 @@ class BakeJob:
     def run(self, progress: Callback | None = None) -> BakeJob:
         """The job after all its steps. It may have more messages than before."""
         self.surface.check()
-        job = self
-        weights = [step.weight(self) for step in self.steps]
-        for weight, part in zip(weights, Progress.of(progress).split(weights)):
+        job, expected = self, self.expected()
+        parts = Progress.of(progress).split([step.corrected() for step in expected])
+        for estimate, part in zip(expected, parts):
+            part.expect(estimate.corrected)
+        for estimate, part in zip(expected, parts):
             if job._surely_dark():  # before a simulation, which takes long
                 return replace(job, steps=(), texture=np.zeros((*job.receiver.coverage.shape, 3), np.float32))
             step, *rest = job.steps
-            if weight:
+            if estimate.seconds:
                 part.begin(step.stage(job))
-            with timed(f"'{self.name}': {step.stage(job)}"):
+            began = time.monotonic()
+            with timed(f"'{self.name}': {step.stage(job)}", estimate.corrected()):
                 done = step.run(job, part)
+            estimate.compare(time.monotonic() - began)
             _log_new_lights(done, job)
             job = replace(done, steps=tuple(rest))
         return job
+
+    def expected(self) -> list[Estimate]:
+        """Estimate of the seconds of each step."""
+        return [Estimate(step.kind(self), self.name, step.seconds(self)) for step in self.steps]
+
+    def seconds(self) -> float:
+        """Estimate of the seconds that the job takes, at the pace of this session."""
+        return sum(step.corrected() for step in self.expected())
 
     def colored(self, color: BaseColor) -> BakeJob:
         """The job with a base color and its messages: the surface has its mean, the receiver the rest."""
@@ -97,6 +118,12 @@ class BakeJob:
     def finds_light(self) -> bool:
         """True if a step that is left may add lights."""
         return any(step.finds_light for step in self.steps)
+
+    def workload(self) -> Workload:
+        """Facts that decide how long the solution takes."""
+        grids, light = [chart.grid for chart in self.receiver.charts], self.illumination
+        rest = light.triangle_count, self.surface, self.settings, self.finds_light
+        return Workload.of(grids, light.lights, *rest, OF_WORLD * any(step.finds_world for step in self.steps))
 
     @property
     def memory_limit(self) -> int:

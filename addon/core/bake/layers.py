@@ -198,9 +198,9 @@ def mean_direction(flow: np.ndarray) -> np.ndarray:
     return np.divide(flow, length, out=np.zeros_like(flow), where=length > 0)
 
 
-def mean_open_irradiance(grid: Grid, lights: Sequence[Light]) -> float:
-    """Mean irradiance of lights that nothing blocks, W/m^2."""
-    return _mean_irradiance(grid, Illumination(lights), OPEN_TEXELS, OPEN_RAYS)
+def mean_open_irradiance(grid: Grid, lights: Sequence[Light], texels: int = OPEN_TEXELS) -> float:
+    """Mean irradiance of lights that nothing blocks, W/m^2, by so many texels along a side."""
+    return _mean_irradiance(grid, Illumination(lights), texels, OPEN_RAYS)
 
 
 def mean_irradiance(grid: Grid, illumination: Illumination) -> float:

@@ -30,6 +30,7 @@ class Bake:
     lights : number of lights of the job; once it has run, with those that its steps have found.
     path : file that `keep` has written, if any.
     seconds : wall-clock time of `run` and `keep`.
+    estimated_seconds : estimate of the seconds of `run`, made before it ran; 0 until then.
     is_dark : True if the job has run and no light arrived.
     """
 
@@ -41,7 +42,7 @@ class Bake:
         self.lights = len(job.illumination.lights) if job else 0
         self.path = ""
         self.is_dark = False
-        self.seconds = 0.0
+        self.seconds = self.estimated_seconds = 0.0
         if error:
             self.fail(error)
 
@@ -66,6 +67,7 @@ class Bake:
             return
         start, progress = time.monotonic(), Progress.of(progress)
         try:
+            self.estimated_seconds = self.job.seconds()
             done = self.job.run(progress)
             self.texture, self.is_dark = done.texture, done.is_dark()
             self.messages.add(*done.messages(), *done.messages_after())

@@ -12,6 +12,7 @@ from ..ldf.library import SIMULATING, is_known, library
 from ..messages import Message, note
 from ..progress import Progress
 from .bake_settings import BakeSettings
+from .estimate import simulation_seconds
 from .job import BakeJob, Step
 from .layers import LAYERS, WITHOUT_MEDIUM
 from .margin import extend_margin
@@ -50,8 +51,11 @@ class Simulate(Step):
 
     name = "Simulating the material"
 
-    def weight(self, job: BakeJob) -> float:
-        return 4.0 if to_simulate(job.surface, job.settings) else 0.0
+    def seconds(self, job: BakeJob) -> float:
+        return simulation_seconds(to_simulate(job.surface, job.settings), job.settings)
+
+    def kind(self, job: BakeJob) -> str:
+        return self.stage(job)
 
     def stage(self, job: BakeJob) -> str:
         return SIMULATING[job.settings.quality]
@@ -68,6 +72,17 @@ class Solve(Step):
     """Computes the result from the light and the surface."""
 
     name = "Baking"
+
+    def seconds(self, job: BakeJob) -> float:
+        return job.workload().seconds(job.settings)
+
+    def kind(self, job: BakeJob) -> str:
+        return self.kind_for(job.settings)
+
+    @classmethod
+    def kind_for(cls, settings: BakeSettings) -> str:
+        """Name of solutions with these settings, see `Pace`."""
+        return f"{cls.name} {settings.layer} {settings.solver}"
 
     def run(self, job: BakeJob, progress: Progress) -> BakeJob:
         material, settings = job.surface.material, job.settings

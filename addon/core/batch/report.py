@@ -21,6 +21,7 @@ class BakeRecord:
     ----------
     path : the file that was written.
     seconds : wall-clock time.
+    estimated_seconds : the same, as estimated before the bake.
     output : the requested pass, LUMINANCE, IRRADIANCE or DIRECTION.
     lights : number of lights that were baked, those that steps of the job found among them.
     left_out : messages about light that is missing.
@@ -42,6 +43,7 @@ class BakeRecord:
     left_out: list[str] = field(default_factory=list)
     indirect: bool = False
     dark: bool = False
+    estimated_seconds: float = 0.0
 
     @classmethod
     def of(cls, bake: Bake, frame: int) -> BakeRecord:
@@ -56,7 +58,9 @@ class BakeRecord:
             job.settings.indirect,
         )
         size = job.receiver.width, job.receiver.height
-        return cls(*subject, *size, *outcome, job.settings.output, *lights, bake.is_dark)
+        return cls(
+            *subject, *size, *outcome, job.settings.output, *lights, bake.is_dark, round(bake.estimated_seconds, 3)
+        )
 
     def __str__(self) -> str:
         subject = f"{self.object} / {self.material}" if self.material else self.object
@@ -161,6 +165,7 @@ class Inventory:
         receiver, grids = job.receiver, [chart.grid for chart in job.receiver.charts]
         sizes = [f"{grid.width * grid.pitch_x:.4g} x {grid.height * grid.pitch_y:.4g}" for grid in grids]
         yield f"'{job.name}': {receiver.width} x {receiver.height} texels, {', '.join(sizes)} scene units"
+        yield f"'{job.name}': takes about {job.seconds():.1f} s"
 
 
 def _light(illumination: Illumination) -> Iterator[str]:

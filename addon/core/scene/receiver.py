@@ -218,6 +218,18 @@ def build_receiver(maps: Sequence[UvMap], width: int, height: int, owner: str = 
     return Receiver(coverage, charts)
 
 
+def outline(uv_map: UvMap, width: int, height: int) -> Grid:
+    """About the grid of a flat part of an object, in a texture of that size, as a rectangle; quickly made."""
+    uvs = np.clip(uv_map.polygons.uvs, 0, 1)
+    first, size = uvs.min(axis=0), np.ptp(uvs, axis=0)
+    lengths = [np.linalg.norm(vector) for vector in (uv_map.p_u, uv_map.p_v)]
+    frame = np.stack([uv_map.p_u / lengths[0], uv_map.p_v / lengths[1]])
+    columns, rows = np.maximum(np.rint(size * [width, height]), 1).astype(int).tolist()
+    origin = uv_map.p_0 + first[0] * uv_map.p_u + first[1] * uv_map.p_v
+    whole = np.broadcast_to(np.float32(1), (rows, columns))
+    return _grid(origin, frame, uv_map, np.array(lengths) / [width, height], whole)
+
+
 def _chart(uv_map: UvMap, width: int, height: int) -> Chart:
     p_u, p_v, polygons = uv_map.p_u, uv_map.p_v, uv_map.polygons
     x_axis = p_u / np.linalg.norm(p_u)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
 
 import bpy
@@ -18,7 +18,7 @@ from ...read.lamps import is_portal, read_lamp
 from ...read.lights import lights_surfaces, links_of
 from ...read.scene_cache import scene_cache
 from ...read.transparency import transmittance_of
-from ...read.visibility import SOLID_TYPES, SURFACE_TYPES, collection_of, render_visible_names, rendered_in, renders
+from ...read.visibility import SOLID_TYPES, SURFACE_TYPES, placed, render_visible_names, renders
 
 # Blender changes the number of trails on loading.
 _PARTICLE_LOOKS = set(bpy.types.ID.bl_rna.properties.keys()) | {"animation_data", "trail_count"}
@@ -51,12 +51,12 @@ class ObjectDigests:
         self._depsgraph, self._is_for_bake, self._bounces = depsgraph, is_for_bake, scene.beamspread.use_indirect
         self._visible = render_visible_names(depsgraph.view_layer)
         self.lamps, self.solids, self.images = 0, Counter(), {}
-        placed = [*_placed(depsgraph, (obj for obj in scene.objects if obj.name in self._visible))]
-        self._names = {obj.name for obj, *_ in placed if obj.type in SOLID_TYPES}
-        for obj, matrix, instancer in placed:
+        shown = [*placed(depsgraph, (obj for obj in scene.objects if obj.name in self._visible))]
+        self._names = {obj.name for obj, *_ in shown if obj.type in SOLID_TYPES}
+        for obj, matrix, instancer in shown:
             if not obj.is_instancer or obj.show_instancer_for_render:
                 self._add(obj, matrix, instancer)
-        scatterers = [(instancer or obj).original for obj, _, instancer in placed if _scatters(obj)]
+        scatterers = [(instancer or obj).original for obj, _, instancer in shown if _scatters(obj)]
         if scatterers:
             self._add_scattered([*dict.fromkeys(scatterers)])
 
@@ -149,26 +149,6 @@ def texture_tree(material, node, groups: tuple) -> TreeDigest:
 def surface_values(node, _groups: tuple = ()) -> list:
     """Values of a Beamspread node that bakes read, without those that are linked to it."""
     return [repr(node.surface()), getattr(node, "side", ""), node.has_texture() and node.texture_blur]
-
-
-def _placed(depsgraph, objects: Iterable, matrix: Matrix | None = None, instancer=None) -> Iterator[tuple]:
-    """Evaluated objects, their transforms and instancers, and after them those of collections that they instance."""
-    for original in objects:
-        obj = original.evaluated_get(depsgraph)
-        world = _transform(obj) if matrix is None else matrix @ _transform(obj)
-        yield obj, world, instancer
-        collection = collection_of(original)
-        if collection is not None:
-            inner = world @ Matrix.Translation(-collection.instance_offset)
-            yield from _placed(depsgraph, rendered_in(collection), inner, instancer or obj)
-
-
-def _transform(obj) -> Matrix:
-    """Transform of an evaluated object to the world. Blender updates no hidden ones: these lack their constraints."""
-    if obj.is_evaluated:
-        return obj.matrix_world
-    around = Matrix() if obj.parent is None else _transform(obj.parent) @ obj.matrix_parent_inverse
-    return around @ obj.matrix_basis
 
 
 def _scatters(obj) -> bool:

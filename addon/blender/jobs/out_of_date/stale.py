@@ -31,6 +31,7 @@ from ...node.find import find_bakeable, find_misplaced, image_of
 from ...read.scene_cache import listeners
 from ...read.visibility import by_name
 from ...registration import all_or_nothing, handlers
+from ..announced import announce
 from ..state import Row, Status, redraw, state
 from .fingerprint import IMAGE, QUALITY, Parts, fingerprints, image_part
 
@@ -64,6 +65,7 @@ def refresh(context) -> None:
     now = fingerprints(context, recorded) if recorded else {}
     state.rows = {target: _row(target, image, records[target], now.get(target)) for target, image in images.items()}
     state.rows |= {row.target: row for row in _failures_of_others(context.scene, list(images))}
+    state.announced = announce(context, list(images))
 
 
 def _failures_of_others(scene, targets: list[Target]) -> list[Row]:

@@ -12,13 +12,14 @@ import bpy
 import numpy as np
 
 from ....core.bake.bake_settings import BakeSettings
+from ....core.bake.forecast import Finders, Forecast
 from ....core.bake.job import BakeJob
 from ....core.bake.runner import Bake
 from ....core.bake.steps import BAKE_STEPS, needs_medium, to_simulate
 from ....core.bake.surface import Surface
 from ....core.native import native
 from ....core.scene.illumination import Illumination
-from ....core.scene.receiver import build_receiver, texture_size
+from ....core.scene.receiver import build_receiver, outline, texture_size
 from ....core.scene.texture import BaseColor
 from ....core.scene.uv_map import UvMap, fit_uv_maps
 from ....core.target import Target
@@ -77,6 +78,21 @@ class BakePlan:
         """Media that the bake would have to simulate first."""
         return to_simulate(self.surface_with_color(), settings)
 
+    def forecast(self) -> Forecast:
+        """Facts that tell how long the bake will take."""
+        name, grids = self.target.object_name, [outline(uv_map, *self.size) for uv_map in self.maps]
+        light = self.illumination.lighting(name)
+        lamps = sum(name in bpy.data.objects for name in light.by_cycles)
+        bounced = bool(light.lights or light.by_cycles) and self.by_cycles.is_below_something(grids)
+        finders = Finders(
+            bounced=bounced,
+            is_own=not (lamps or light.untraceable),
+            world=len(light.by_cycles) > lamps,
+            lamps=lamps,
+            colors=self.color is not None and bool(self.color.unknown),
+        )
+        return Forecast(name, grids, light.lights, light.triangle_count, self.surface_with_color(), finders)
+
     def bake(self, settings: BakeSettings) -> Bake:
         """The bake, with its job or the error; call it in the main thread."""
         try:
@@ -118,6 +134,9 @@ class FailedPlan:
 
     def to_simulate(self, _settings: BakeSettings) -> list:
         return []
+
+    def forecast(self) -> None:
+        return None
 
     def bake(self, _settings: BakeSettings) -> Bake:
         if not isinstance(self.error, (KeyboardInterrupt, native.Cancelled)):

@@ -6,8 +6,10 @@ import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import partial
 
 from ....core.bake.bake_settings import COMBINED, FINAL, PREVIEW, BakeSettings
+from ....core.bake.forecast import seconds_of, steps_of_bakes
 from ....core.bake.runner import CANCELLED, WRITTEN, Bake, Sink
 from ....core.messages import Level, Message, Messages, warning
 from ....core.progress import Progress
@@ -90,12 +92,18 @@ class BakeRun(Sink):
         self.written: list[Target] = []
         self._results, self._progress = Results(), Progress()
         self._steps: list[BakeStep] = []
+        self._shares: list[Progress] = []
         self._number, self._purpose = 0, Pass.SINGLE
         self._parts: dict[Target, Parts] = {}
 
     def take(self, steps: list[BakeStep], parts: dict[Target, Parts]) -> None:
         """Take the steps of the run, and the digests of all that they have read of each target."""
         self._steps, self._parts = steps, parts
+        expected = steps_of_bakes([(step.plan.forecast(), step.settings) for step in steps])
+        self._progress = Progress()
+        self._shares = self._progress.split(map(seconds_of, expected))
+        for share, estimates in zip(self._shares, expected):
+            share.expect(partial(seconds_of, estimates))
 
     def bakes(self) -> Iterator[Bake]:
         """The bakes in their order, until the run is cancelled."""
@@ -111,8 +119,7 @@ class BakeRun(Sink):
     def run(self, bake: Bake) -> Iterator[None]:
         if bake.job is None:
             return
-        count = len(self._steps)
-        progress = self._progress.split([1.0] * count)[self._number - 1]
+        count, progress = len(self._steps), self._shares[self._number - 1]
         if not self._in_window:
             bake.run(progress)
             return

@@ -16,7 +16,7 @@ from ....core.batch.batch_options import BatchOptions
 from ....core.batch.report import BakeRecord, Inventory, PreviousReport, Report
 from ....core.batch.stop import Stop
 from ....core.errors import BakeError
-from ....core.progress import Progress, timed
+from ....core.progress import Progress, log, timed
 from ....core.target import Target
 from ...images.facts import attributes_of, record_of_bake
 from ...images.files import file_of, size_of
@@ -96,6 +96,8 @@ class _Batch(Sink):
 
     def run(self, bake: Bake) -> Iterator[None]:
         bake.run(Progress(_Printer(bake.target, self._stop)))
+        if bake.job is not None:
+            log(f"'{bake.target}': {bake.seconds:.1f} s, estimated {bake.estimated_seconds:.1f} s")
         if self._stop and bake.job is not None and bake.texture is None:
             bake.cancel()  # even if it failed: a terminal's Ctrl-C also ends the Blender that Cycles runs in
         return iter(())

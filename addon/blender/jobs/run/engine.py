@@ -56,7 +56,7 @@ def bake_active_image(engine, depsgraph, obj, width: int, height: int) -> None:
     passes, filled = result.layers[0].passes, False
     try:
         bakes = _prepare(engine, depsgraph, obj, passes, (width, height))
-        sink = _ActiveImage(engine, len(bakes), (width, height))
+        sink = _ActiveImage(engine, bakes, (width, height))
         run_bakes(bakes, sink)
         for bake in bakes:
             for message in bake.messages:
@@ -74,8 +74,9 @@ def bake_active_image(engine, depsgraph, obj, width: int, height: int) -> None:
 class _ActiveImage(Sink):
     """Collects the results of bakes that share the active image; `pixels` are RGBA, float32 (height, width, 4)."""
 
-    def __init__(self, engine, count: int, size: tuple[int, int]) -> None:
-        self._parts = iter(Progress(lambda fraction: _step(engine, fraction)).split([1.0] * count))
+    def __init__(self, engine, bakes: list[Bake], size: tuple[int, int]) -> None:
+        seconds = [bake.job.seconds() if bake.job else 0.0 for bake in bakes]
+        self._parts = iter(Progress(lambda fraction: _step(engine, fraction)).split(seconds))
         self.pixels = np.zeros((*size[::-1], 4), np.float32)
 
     def run(self, bake: Bake) -> Iterator[None]:

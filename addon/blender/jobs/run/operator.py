@@ -152,7 +152,7 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         if line == self._shown:  # drawing takes time from the bake, and from the user
             return
         self._shown = line
-        context.window_manager.progress_update(int(100 * state.run.progress.fraction))
+        context.window_manager.progress_update(int(100 * state.run.progress.time_fraction()))
         if context.workspace is not None:
             context.workspace.status_text_set(line)
         redraw(context)

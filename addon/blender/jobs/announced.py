@@ -1,0 +1,187 @@
+"""How long bakes will take: facts about the scene that need no meshes, and the lines about them for panels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from ...core.bake.bake_settings import FINAL, PREVIEW, BakeSettings
+from ...core.bake.estimate import OF_MESHES, OF_WORLD
+from ...core.bake.forecast import Finders, Forecast, seconds_of
+from ...core.bake.pace import Estimate
+from ...core.scene.lights import Light, WorldLight
+from ...core.scene.receiver import Grid
+from ...core.target import Target
+from .. import compat
+from ..images.facts import is_sequence
+from ..node.find import BakeTarget, targets_of
+from ..read.lamps import fault, is_portal, read_lamp
+from ..read.lights import lights_surfaces
+from ..read.node_kinds import NodeKinds, all_known, kinds_of
+from ..read.scene_cache import scene_cache
+from ..read.visibility import SURFACE_TYPES, by_name, placed, render_visible_names
+from .state import Announced, duration
+
+PLACEHOLDER_COLOR = (0.5, 0.5, 0.5)
+
+# Most targets whose bakes are announced, since each takes time in scans.
+MAX_TARGETS = 200
+
+# Shortest simulation that a line names, seconds.
+MIN_SIMULATION = 1.0
+
+
+def announce(context, targets: list[Target]) -> dict[Target, Announced]:
+    """Estimates for bakes of these targets; those about which too little is known are left out."""
+    if len(targets) > MAX_TARGETS:
+        return {}
+    scene, view_layer, depsgraph = context.scene, context.view_layer, context.evaluated_depsgraph_get()
+    scene_cache.enter(depsgraph)
+    objects, settings = by_name(scene), scene.beamspread.for_bake()
+    facts = _SceneFacts(scene, view_layer, depsgraph)
+    announced = {}
+    for target in targets:
+        found = [item for item in targets_of(objects[target.object_name]) if item.name == target]
+        forecast = facts.forecast(found[0], scene.beamspread.resolution) if found else None
+        if forecast is not None:
+            announced[target] = _announced(forecast, settings)
+    return announced
+
+
+def _announced(forecast: Forecast, settings: BakeSettings) -> Announced:
+    steps, simulations = forecast.steps(settings), forecast.simulations(settings)
+    if simulations and settings.quality == FINAL and not bpy.app.background:
+        quick = replace(settings, quality=PREVIEW, indirect=False)  # the preview of `steps_of`
+        steps += forecast.steps(quick)
+        simulations |= forecast.simulations(quick)
+    return Announced(tuple(steps), simulations)
+
+
+class _SceneFacts:
+    """Facts about the light of a scene."""
+
+    def __init__(self, scene, view_layer, depsgraph) -> None:
+        self.lights: list[Light] = []
+        self.triangles, self.lamps_by_cycles, self.is_traceable = 0, 0, True
+        self._corners = [np.zeros((0, 3))]
+        visible = render_visible_names(view_layer)
+        shown = (obj for obj in scene.objects if obj.name in visible)
+        self._glowing = False
+        for obj, matrix, instancer in placed(depsgraph, shown):
+            if obj.type == "LIGHT" and lights_surfaces(obj, instancer) and not is_portal(obj.data):
+                self._add_lamp(obj, matrix)
+            elif obj.type in SURFACE_TYPES and obj.data is not None:
+                self._add_solid(obj, np.array(matrix))
+        self._add_world(compat.original_world(view_layer, scene), view_layer)
+        self._corners = np.concatenate(self._corners)
+
+    def _add_lamp(self, obj, matrix) -> None:
+        light, reason = read_lamp(obj, matrix)
+        if reason is not None:
+            self.lamps_by_cycles += 1
+        elif light is not None and not fault(light):
+            self.lights.append(light)
+
+    def _add_solid(self, obj, matrix: np.ndarray) -> None:
+        if obj.visible_shadow:
+            self.triangles += 2 * len(getattr(obj.data, "polygons", ()))
+        self._corners.append(np.array(obj.bound_box) @ matrix[:3, :3].T + matrix[:3, 3])
+        kinds = [_kinds(slot.material.original) for slot in obj.material_slots if slot.material is not None]
+        self._glowing |= any(kind.glows for kind in kinds)
+        self.is_traceable &= all(kind.is_known for kind in kinds)
+
+    def _add_world(self, world, view_layer) -> None:
+        is_lit = world is not None and view_layer.use_sky and world.cycles_visibility.diffuse
+        plain = is_lit and not compat.uses_nodes(world)
+        kinds = NodeKinds() if not is_lit or plain else _kinds(world)
+        self.world_by_cycles = not kinds.is_known
+        color = tuple(world.color) if plain else kinds.color
+        has_image = kinds.glows and kinds.is_known and color is None
+        self.unknown = OF_WORLD if has_image else OF_MESHES * self._glowing
+        if color is not None and any(color):
+            rows = tuple(map(tuple, np.eye(3).tolist()))
+            self.lights.append(WorldLight("World", 1.0, color, True, np.ones((1, 1, 3), np.float32), rows))
+
+    def forecast(self, target: BakeTarget, resolution: int) -> Forecast | None:
+        """The forecast for a target; None if it has no faces or no size."""
+        grid, obj = _grid(target, resolution), target.obj
+        if grid is None or not (self.lights or self.unknown or self.world_by_cycles or self.lamps_by_cycles):
+            return None
+        heights = (self._corners - grid.origin) @ np.array(grid.normal)
+        is_below = heights.max(initial=0.0) > 1e-4 * max(obj.dimensions)
+        surface = target.node.surface()
+        is_textured = target.node.has_texture()
+        finders = Finders(
+            bounced=is_below,
+            is_own=self.is_traceable and not self.lamps_by_cycles,
+            world=self.world_by_cycles,
+            lamps=self.lamps_by_cycles,
+            colors=is_textured and not all_known(target.node.color_input(target.groups)),
+        )
+        surface = replace(surface, base_color=PLACEHOLDER_COLOR) if is_textured else surface
+        return Forecast(obj.name, [grid], self.lights, self.triangles, surface, finders, self.unknown)
+
+
+def _kinds(owner) -> NodeKinds:
+    return scene_cache.get(("kinds", owner), [owner, owner.node_tree], lambda: kinds_of(owner))
+
+
+def _grid(target: BakeTarget, resolution: int) -> Grid | None:
+    """About the grid of a target: as if the texture covered the object's largest two sides."""
+    obj, image = target.obj, target.image
+    if not len(obj.data.polygons) or is_sequence(image):
+        return None
+    matrix, face = obj.matrix_world, obj.data.polygons[0]
+    normal = matrix.to_3x3().inverted_safe().transposed() @ face.normal
+    x_axis = matrix.to_3x3().col[0] if abs(face.normal.x) < 0.9 else matrix.to_3x3().col[1]
+    if not normal.length or not x_axis.length:
+        return None
+    normal.normalize()
+    x_axis = (x_axis - x_axis.dot(normal) * normal).normalized()
+    y_axis = normal.cross(x_axis)
+    corners = np.array(obj.bound_box) @ np.array(matrix)[:3, :3].T + np.array(matrix)[:3, 3]
+    along = corners @ np.array([x_axis, y_axis]).T
+    sides = np.ptp(along, axis=0)
+    if not sides.all():
+        return None
+    size = np.maximum(np.rint(resolution * sides / sides.max()), 1) if image is None else np.array(image.size)
+    if not size.all():
+        return None
+    if (size[0] < size[1]) != (sides[0] < sides[1]):
+        size = size[::-1]
+    columns, rows = map(int, size)
+    low, height = along.min(axis=0), (matrix @ face.center).dot(normal)
+    origin = low[0] * np.array(x_axis) + low[1] * np.array(y_axis) + height * np.array(normal)
+    whole = np.broadcast_to(np.float32(1), (rows, columns))
+    axes = tuple(x_axis), tuple(y_axis), tuple(normal)
+    return Grid(tuple(origin.tolist()), *axes, *map(float, sides / [columns, rows]), columns, rows, whole)
+
+
+def line_of(announced: dict[Target, Announced], targets: Iterable[Target]) -> str:
+    """How long bakes of the targets take, such as "About 4 s"; "" if that is not known of one of them."""
+    chosen = [announced.get(target) for target in targets]
+    return f"About {duration(_total(chosen))}" if chosen and None not in chosen else ""
+
+
+def simulation_line(announced: dict[Target, Announced], targets: Iterable[Target]) -> str:
+    """Part of that time in which materials are simulated, and their names; "" if there is none."""
+    simulations, names = {}, {}
+    for target in targets:
+        simulated = announced[target].simulations if target in announced else {}
+        names |= dict.fromkeys([f"'{target.material_name}'"] if simulated else [])
+        simulations |= simulated
+    seconds = seconds_of(simulations.values())
+    if seconds < MIN_SIMULATION:
+        return ""
+    first, *rest = names
+    return f"Of which {duration(seconds)} simulate {first}{f' and {len(rest)} more' if rest else ''} (once)"
+
+
+def _total(chosen: list[Announced]) -> float:
+    simulations: dict[object, Estimate] = {}
+    for bake in chosen:
+        simulations |= bake.simulations
+    return sum(seconds_of(bake.steps) for bake in chosen) + seconds_of(simulations.values())

@@ -1,0 +1,207 @@
+"""Estimates of the seconds that steps take, from facts that are known before anything is computed."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ..ldf.library import PHOTONS, angles_for
+from ..scene.lights import STRATA, AreaLight, Light, MeshLight, WorldLight
+from ..scene.receiver import Grid
+from .bake_settings import BakeSettings
+from .layers import MIN_RAYS, MOST_RAYS, RAYS_PER_SAMPLE, WITHOUT_MEDIUM, mean_open_irradiance, rays_per_texel
+from .surface import Surface
+
+# The rates are seconds of one thread, fitted to bakes by tests/bench/estimates.py. Larger: longer estimates.
+
+# Speed of n threads is this power of n.
+THREADS_POWER = 0.85
+
+# Seconds of any bake.
+ANY_BAKE = 0.05
+
+# Seconds per texel of the transforms for suns alone; for lamps of one direction at each texel, with an index of
+# refraction above 1 and without; and for any other light.
+SUNS, LAMPS, WIDE = 0.06e-6, (1.0e-6, 1.8e-6), (4e-6, 8e-6)
+# Seconds of the choice of terms for other light.
+CHOICE = 0.6, 1.6
+# Multiple of slabs of one mean free path with an index of refraction above 1; thicker ones come closer to 1.
+THIN_SLAB = 6.0
+
+# Seconds of a ray without obstacles; of a shadow ray towards lights all around, and towards others, where penumbras
+# are small.
+OPEN_RAY, BROAD_RAY, NARROW_RAY = 0.015e-6, 0.22e-6, 0.05e-6
+# Seconds per texel and lamp of the rays to a lamp without a size.
+LAMP_RAYS = 0.15e-6
+# Triangles from which on shadow rays take longer, by a tenth for each doubling.
+MANY_TRIANGLES = 1000
+
+# Seconds per texel and direction of the solver `adaptive`, and per pair of texels of `direct`; for suns and for others.
+ADAPTIVE, DIRECT = (1e-6, 3e-6), (0.2e-9, 30e-9)
+
+# Seconds of the simulation of an angle in final quality, in half-spaces and in slabs.
+HALF_SPACE_ANGLE, SLAB_ANGLE = 6.0, 2.5
+
+# Seconds of bounced light by rays of our own.
+BOUNCED = 0.8
+
+# Seconds until Cycles has started, and of each triangle; of the light of a lamp, of bounced light, of a panorama of the
+# world, and of a base color for each texel.
+CYCLES_START, CYCLES_TRIANGLE = 1.5, 5e-6
+CYCLES_LAMP, CYCLES_BOUNCED, CYCLES_WORLD, CYCLES_COLOR = 3.0, 6.0, 8.0, 5e-6
+
+
+# Fraction of the light that comes from a world, or from glowing meshes, whose light is not known, about.
+OF_WORLD, OF_MESHES = 0.5, 0.25
+
+# Texels along a side at which the brightness of lights is compared. More: slower estimates.
+SURVEY_TEXELS = 8
+
+CYCLES_LIGHT, CYCLES_COLORS = "Finding light with Cycles", "Evaluating the base color"
+"""Names of the steps by Cycles, see `Pace`."""
+
+
+@dataclass(frozen=True)
+class Workload:
+    """Facts about the light on a receiver and about its medium.
+
+    Attributes
+    ----------
+    texels : of all grids.
+    suns, lamps : numbers of lights of one direction, and of one direction at each texel.
+    broad_rays, narrow_rays : rays of each texel to lights from all around, and to other lights of a size.
+    bounced : True if bounced light may be added.
+    triangles : number of those that block light; 0 without shadows.
+    ior : index of refraction.
+    thickness : in mean free paths; infinite for a half-space.
+    """
+
+    texels: int
+    suns: int = 0
+    lamps: int = 0
+    broad_rays: float = 0.0
+    narrow_rays: float = 0.0
+    bounced: bool = False
+    triangles: int = 0
+    ior: float = 1.0
+    thickness: float = math.inf
+
+    @classmethod
+    def of(
+        cls,
+        grids: Sequence[Grid],
+        lights: Sequence[Light],
+        triangles: int,
+        surface: Surface,
+        settings: BakeSettings,
+        bounced: bool = False,
+        unknown: float = 0.0,
+    ) -> Workload:
+        """The workload of a bake.
+
+        `unknown`: fraction of all light, about, that comes from all around and is not among `lights`.
+        """
+        load = cls(sum(grid.width * grid.height for grid in grids), bounced=bounced, triangles=triangles)
+        largest = max(grids, key=lambda grid: grid.width * grid.height)
+        all_rays, shared = _rays(largest, lights, surface, settings, unknown)
+        load = replace(load, broad_rays=all_rays * (unknown if shared else math.ceil(unknown)))
+        for light, rays in shared:
+            if light.is_parallel:
+                load = replace(load, suns=load.suns + 1)
+            elif light.has_one_direction:
+                load = replace(load, lamps=load.lamps + 1)
+            elif isinstance(light, AreaLight | MeshLight | WorldLight):
+                load = replace(load, broad_rays=load.broad_rays + rays)
+            else:
+                load = replace(load, narrow_rays=load.narrow_rays + rays)
+        material = surface.material
+        paths = surface.thickness / max(material.mean_free_path) if surface.thickness else math.inf
+        return replace(load, ior=material.ior, thickness=paths)
+
+    def seconds(self, settings: BakeSettings) -> float:
+        """Seconds of the solution."""
+        tracing = self.texels * (self._rays_of_lamps(settings) + self._rays_of_sizes())
+        if settings.layer in WITHOUT_MEDIUM:
+            return ANY_BAKE + _parallel(tracing, settings.threads)
+        return ANY_BAKE + _parallel(tracing + self._spreading(settings), settings.threads)
+
+    def _rays_of_lamps(self, settings: BakeSettings) -> float:
+        return LAMP_RAYS * (self.suns + self.lamps) * (1 + self._shadows() * settings.samples**2 / 16)
+
+    def _rays_of_sizes(self) -> float:
+        rays, shadows = self.broad_rays + self.narrow_rays, self._shadows()
+        return OPEN_RAY * rays + shadows * (BROAD_RAY * self.broad_rays + NARROW_RAY * self.narrow_rays)
+
+    def _shadows(self) -> float:
+        """Time of a shadow ray, relative to that among few triangles."""
+        if self.triangles <= 2:  # the receiver itself
+            return 0.0
+        return 1 + 0.1 * max(math.log2(self.triangles / MANY_TRIANGLES), 0.0)
+
+    def _spreading(self, settings: BakeSettings) -> float:
+        """Seconds of the solver."""
+        is_wide = self.bounced or self.broad_rays + self.narrow_rays > 0
+        others = self.lamps + self.broad_rays + self.narrow_rays + len(STRATA) * self.bounced
+        if settings.solver != "fft":
+            sun, other = ADAPTIVE if settings.solver == "adaptive" else DIRECT
+            pairs = self.texels if settings.solver == "adaptive" else self.texels**2
+            return pairs * (sun * self.suns + other * others)
+        is_plain = self.ior <= 1
+        slab = 1 + (THIN_SLAB - 1) / max(self.thickness, 1.0) if self.ior > 1 else 1.0
+        if is_wide:
+            return CHOICE[is_plain] + slab * WIDE[is_plain] * self.texels
+        if self.lamps:
+            return slab * LAMPS[is_plain] * self.texels
+        return SUNS * self.texels
+
+
+def _rays(
+    grid: Grid, lights: Sequence[Light], surface: Surface, settings: BakeSettings, unknown: float
+) -> tuple[float, list[tuple[Light, float]]]:
+    """Rays of each texel, and those to each light that reaches the grid; lights share them by irradiance.
+
+    `unknown`: as for `Workload.of`.
+    """
+    lights = [light for light in lights if not light.is_behind(grid)]
+    if settings.layer in WITHOUT_MEDIUM:
+        rays = min(RAYS_PER_SAMPLE * settings.samples**2, MOST_RAYS)
+        return rays, [(light, rays) for light in lights]
+    rays = rays_per_texel(grid, surface.material, settings)
+    if len(lights) == 1 or not any(light.has_size for light in lights):
+        return rays, [(light, max(rays * (1 - unknown), MIN_RAYS)) for light in lights]
+    means = [mean_open_irradiance(grid, [light], SURVEY_TEXELS) for light in lights]
+    total = sum(means) / (1 - unknown) or 1.0
+    return rays, [(light, max(rays * mean / total, MIN_RAYS)) for light, mean in zip(lights, means)]
+
+
+def simulation_seconds(media: Sequence, settings: BakeSettings) -> float:
+    """Seconds in which media are simulated."""
+    return sum(_parallel(_simulation(medium, settings.quality), settings.threads) for medium in media)
+
+
+def _simulation(medium, quality: str) -> float:
+    per_angle = HALF_SPACE_ANGLE if math.isinf(medium.thickness) else SLAB_ANGLE
+    return per_angle * len(angles_for(medium)) * PHOTONS[quality] / PHOTONS["final"]
+
+
+def _parallel(seconds: float, threads: int) -> float:
+    """Seconds of work that takes one thread this long; `threads`: 0 for all."""
+    return seconds / (threads or os.cpu_count() or 1) ** THREADS_POWER
+
+
+def bounced_seconds(triangles: int, threads: int) -> float:
+    """Seconds in which our own rays find bounced light."""
+    return _parallel(BOUNCED * (1 + 0.1 * max(math.log2(max(triangles, 1) / MANY_TRIANGLES), 0.0)), threads)
+
+
+def cycles_light_seconds(world: bool, lamps: int, bounced: bool, triangles: int) -> float:
+    """Seconds in which Cycles renders the world, finds light of lamps, and bounced light."""
+    lights = CYCLES_WORLD * world + CYCLES_LAMP * lamps + CYCLES_BOUNCED * bounced
+    return CYCLES_START + _parallel(lights, 0) + CYCLES_TRIANGLE * triangles
+
+
+def cycles_color_seconds(texels: int) -> float:
+    """Seconds in which Cycles evaluates a base color."""
+    return CYCLES_START + _parallel(CYCLES_COLOR * texels, 0)

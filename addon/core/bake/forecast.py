@@ -1,0 +1,109 @@
+"""Forecast: the time that a bake will take, before there is a job."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from ..ldf.library import SIMULATING
+from ..scene.lights import Light
+from ..scene.receiver import Grid
+from .bake_settings import BakeSettings
+from .bounced import BouncedLight
+from .estimate import (
+    CYCLES_COLORS,
+    CYCLES_LIGHT,
+    OF_WORLD,
+    Workload,
+    bounced_seconds,
+    cycles_color_seconds,
+    cycles_light_seconds,
+    simulation_seconds,
+)
+from .pace import Estimate
+from .steps import Solve, needs_medium, to_simulate
+from .surface import Surface
+
+
+@dataclass(frozen=True)
+class Finders:
+    """What finds the light of a bake that lamps alone do not give.
+
+    Attributes
+    ----------
+    bounced : True if light may bounce.
+    is_own : True if rays of our own find that; else Cycles does.
+    world : True if Cycles renders the world.
+    lamps : number of lamps whose light Cycles finds.
+    colors : True if Cycles evaluates the base color.
+    """
+
+    bounced: bool = False
+    is_own: bool = True
+    world: bool = False
+    lamps: int = 0
+    colors: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """Facts about a bake to come.
+
+    Attributes
+    ----------
+    name : of the object.
+    grids : about those of the receiver, without their coverage.
+    triangles : number of those that block light.
+    unknown : fraction of all light, about, that is not among the lights, besides that which Cycles finds.
+    """
+
+    name: str
+    grids: Sequence[Grid]
+    lights: Sequence[Light]
+    triangles: int
+    surface: Surface
+    finders: Finders = Finders()
+    unknown: float = 0.0
+
+    def steps(self, settings: BakeSettings) -> list[Estimate]:
+        """Estimates of the steps, without the simulation of media."""
+        finders, threads, steps = self.finders, settings.threads, []
+        bounced = finders.bounced and settings.indirect
+        texels = sum(grid.width * grid.height for grid in self.grids)
+        if finders.colors and needs_medium(settings):
+            steps.append((CYCLES_COLORS, cycles_color_seconds(texels)))
+        by_cycles = bounced and not finders.is_own
+        if finders.world or finders.lamps or by_cycles:
+            lights = finders.world, finders.lamps, by_cycles
+            steps.append((CYCLES_LIGHT, cycles_light_seconds(*lights, self.triangles)))
+        if bounced and finders.is_own:
+            steps.append((BouncedLight.name, bounced_seconds(self.triangles, threads)))
+        unknown = max(self.unknown, OF_WORLD * finders.world)
+        load = Workload.of(self.grids, self.lights, self.triangles, self.surface, settings, bounced, unknown)
+        steps.append((Solve.kind_for(settings), load.seconds(settings)))
+        return [Estimate(kind, self.name, seconds) for kind, seconds in steps]
+
+    def simulations(self, settings: BakeSettings) -> dict:
+        """Estimates of the simulations of media that are not known yet, by medium and quality."""
+        return {
+            (medium, settings.quality): Estimate(
+                SIMULATING[settings.quality], self.name, simulation_seconds([medium], settings)
+            )
+            for medium in to_simulate(self.surface, settings)
+        }
+
+
+def steps_of_bakes(bakes: Iterable[tuple[Forecast | None, BakeSettings]]) -> list[list[Estimate]]:
+    """Estimates of the steps of each bake, one after the other: a medium is simulated once. No steps for None."""
+    bakes_steps, simulated = [], set()
+    for forecast, settings in bakes:
+        media = {} if forecast is None else forecast.simulations(settings)
+        steps = [] if forecast is None else forecast.steps(settings)
+        bakes_steps.append(steps + [estimate for medium, estimate in media.items() if medium not in simulated])
+        simulated |= media.keys()
+    return bakes_steps
+
+
+def seconds_of(estimates: Iterable[Estimate]) -> float:
+    """Sum of estimates, at the pace of this session."""
+    return sum(estimate.corrected() for estimate in estimates)

@@ -1,0 +1,62 @@
+"""Pace: seconds that steps of this session took, over their estimates. It corrects later estimates."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+class Pace:
+    """Ratios of measured to estimated seconds, in memory.
+
+    They are kept by kind of step and by subject, such as an object: its own last ratio counts for a subject, and the
+    mean of all others for one that was not measured yet.
+    """
+
+    MIN_SECONDS = 0.1
+    """Seconds that a step takes at least, or was estimated to take, to count; shorter ones tell little."""
+
+    LARGEST = 10.0
+    """Largest ratio, and the inverse of the smallest one."""
+
+    def __init__(self) -> None:
+        self._ratios: dict[str, dict[str, float]] = {}
+
+    def note(self, kind: str, subject: str, estimated: float, measured: float) -> None:
+        """Note how long a step took, and its estimate without this correction."""
+        if estimated > 0 and max(estimated, measured) >= self.MIN_SECONDS:
+            ratio = min(max(measured / estimated, 1 / self.LARGEST), self.LARGEST)
+            self._ratios.setdefault(kind, {})[subject] = ratio
+
+    def corrected(self, kind: str, subject: str, estimated: float) -> float:
+        """The estimate for a step at the pace of this session."""
+        ratios = self._ratios.get(kind, {})
+        if subject in ratios:
+            return estimated * ratios[subject]
+        # One more of ratio 1: few measurements of others say little about this one.
+        return estimated * math.exp(sum(map(math.log, list(ratios.values()))) / (len(ratios) + 1))
+
+    def forget(self) -> None:
+        """Forget all ratios."""
+        self._ratios.clear()
+
+
+pace = Pace()
+"""The pace of this process."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Seconds of a step, before they are corrected by the pace; see `Pace` for its kind and subject."""
+
+    kind: str
+    subject: str
+    seconds: float
+
+    def corrected(self) -> float:
+        """Seconds at the pace of this session."""
+        return pace.corrected(self.kind, self.subject, self.seconds)
+
+    def compare(self, measured: float) -> None:
+        """Note how many seconds the step took."""
+        pace.note(self.kind, self.subject, self.seconds, measured)

@@ -1,0 +1,196 @@
+"""Panels announce how long bakes will take, from facts that need no meshes."""
+
+import beamspread
+import bpy
+import pytest
+from beamspread.blender.jobs.announced import line_of, simulation_line
+from beamspread.blender.jobs.out_of_date import stale
+from beamspread.blender.jobs.run.bake_plan import read_scene
+from beamspread.blender.jobs.state import Run, state
+from beamspread.blender.live import timer
+from beamspread.blender.node.find import find_targets
+from beamspread.blender.ui import bake_panel
+from beamspread.core.bake.forecast import Finders, seconds_of
+from beamspread.core.bake.pace import pace
+from beamspread.core.ldf import library
+from beamspread.core.progress import Progress
+from beamspread.core.target import Target
+from mathutils import Matrix
+from nodes import Nodes
+from panel_layout import Layout, context
+from scenes import add_lamp, add_material, add_plane, add_sun, add_world, diffuse_material, glowing_material, select
+
+
+@pytest.fixture(autouse=True)
+def fresh(tmp_path, monkeypatch):
+    """No times of other tests, no simulated media."""
+    monkeypatch.setenv("BEAMSPREAD_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(timer, "messages", list)
+    pace.forget()
+    bpy.context.scene.beamspread.resolution = 256
+    yield
+    pace.forget()
+
+
+def plane(name="Plane", x=0.0, size=(2.0, 2.0), **properties):
+    values = {"anisotropy": 0.8, "ior": 1.0} | properties
+    material = add_material(f"Medium of {name}", **values)
+    made = add_plane(name, size, Matrix.Translation((x, 0, 0)), material=material)
+    bpy.context.view_layer.update()
+    return made
+
+
+def panel():
+    """The panel's text."""
+    bpy.context.view_layer.update()
+    stale.refresh(bpy.context)
+    layout = Layout()
+    bake_panel.draw_bake(layout, context())
+    return layout.said
+
+
+def announced(*objects):
+    """Seconds for objects, or for all, without the media's simulation."""
+    bpy.context.view_layer.update()
+    stale.refresh(bpy.context)
+    chosen = find_targets(objects or bpy.context.scene.objects)
+    return sum(seconds_of(state.announced[target].steps) for target in chosen)
+
+
+def forecasts():
+    """The same by bakes, which read meshes."""
+    targets = find_targets(bpy.context.scene.objects)
+    settings = bpy.context.scene.beamspread.for_bake()
+    return [plan.forecast().steps(settings) for plan in read_scene(bpy.context, targets)]
+
+
+def test_the_panel_announces_the_selected_objects_and_all():
+    add_lamp((0, 0, 1))
+    select(plane())
+    assert "About 1 s" in panel()
+    for number in range(40):
+        plane(f"Other {number}", 3.0 + 3.0 * number)
+    assert "About 1 s; all about" in panel()
+
+
+def test_nothing_is_announced_without_light_or_faces():
+    select(plane())
+    assert "About" not in panel()
+    add_sun()
+    bpy.data.meshes["Plane"].clear_geometry()
+    assert "About" not in panel()
+
+
+def test_the_time_follows_resolution_and_lights():
+    add_sun()
+    one = plane()
+    few = announced(one)
+    bpy.context.scene.beamspread.resolution = 2048
+    many = announced(one)
+    assert many > few
+    add_lamp((0, 0, 1), radius=0.2)
+    both = announced(one)
+    assert both > 2 * many
+    bpy.context.scene.beamspread.resolution = 256
+    assert announced(one) < 0.5 * both
+
+
+def test_an_image_has_its_own_size():
+    add_lamp((0, 0, 1))
+    small = announced(plane())
+    image = bpy.data.images.new("Large", 2048, 2048, float_buffer=True)
+    assert announced(plane("Large", 5.0, image=image)) > 10 * (small - 0.05)
+
+
+def test_a_medium_to_simulate_is_named_with_its_share():
+    add_sun()
+    bpy.context.scene.beamspread.quality = "final"
+    select(plane("Skin", ior=1.37))
+    assert "simulate 'Medium of Skin' (once)" in panel()
+    bpy.context.scene.beamspread.quality = "preview"
+    beamspread.library(beamspread.Medium(0.8, 1.37), quality="preview")
+    assert library.is_known(beamspread.Medium(0.8, 1.37), "preview")
+    assert "simulate" not in panel()
+
+
+def test_bakes_share_the_simulation_of_a_medium():
+    add_sun()
+    bpy.context.scene.beamspread.quality = "final"
+    both = [plane("First", ior=1.37), plane("Second", 5.0, ior=1.37)]
+    stale.refresh(bpy.context)
+    single, all_of_it = (simulation_line(state.announced, find_targets(some)) for some in (both[:1], both))
+    assert all_of_it == single.replace("'Medium of First'", "'Medium of First' and 1 more")
+
+
+def test_measured_times_correct_the_line():
+    add_lamp((0, 0, 1))
+    one = plane()
+    target = find_targets([one])[0]
+    before = announced(one)
+    for step in state.announced[target].steps:
+        step.compare(40 * before)  # ten times as long at most
+    assert announced(one) == pytest.approx(10 * before)
+    assert line_of(state.announced, [target, Target("Gone")]) == ""
+
+
+def light_of_all_kinds():
+    add_sun()
+    add_lamp((0, 0, 1), radius=0.1)
+    add_lamp((0.5, 0, 1), kind="AREA", name="Area")
+
+
+def glowing_wall():
+    wall = add_plane("Wall", matrix=Matrix.Translation((0, 0, 2)))
+    wall.data.materials.append(glowing_material())
+    add_sun()
+
+
+def wall():
+    made = add_plane("Wall", matrix=Matrix.Translation((0, 0, 2)))
+    made.data.materials.append(diffuse_material((0.5, 0.5, 0.5)))
+    add_sun()
+
+
+def glass():
+    wall()
+    nodes = Nodes(bpy.data.materials.new("Glass"), clear=True)
+    bpy.data.objects["Wall"].data.materials[0] = nodes.finish(nodes.add("BsdfGlass"))
+
+
+def sky():
+    nodes, background = add_world()
+    nodes.set(background.inputs["Color"], nodes.add("TexSky").outputs[0])
+    add_sun()
+
+
+@pytest.mark.parametrize("scene", [light_of_all_kinds, add_world, wall, glass, sky, glowing_wall])
+def test_facts_without_meshes_tell_what_a_bake_reads(scene):
+    """The same steps; their times agree where the scene tells all, and within a factor of 2 elsewhere."""
+    bpy.context.scene.beamspread.use_indirect = True
+    scene()
+    one = plane(size=(2.0, 1.0))
+    announced(one)
+    ours, read = state.announced[find_targets([one])[0]].steps, forecasts()[0]
+    assert [step.kind for step in ours] == [step.kind for step in read]
+    factor = 2.0 if scene in (sky, glowing_wall) else 1.05
+    assert 1 / factor < seconds_of(ours) / seconds_of(read) < factor
+
+
+def test_forecasts_know_who_finds_light():
+    bpy.context.scene.beamspread.use_indirect = True
+    glass()
+    plane()
+    targets = find_targets(bpy.context.scene.objects)
+    finders = read_scene(bpy.context, targets)[0].forecast().finders
+    assert finders == Finders(bounced=True, is_own=False)
+
+
+def test_the_bar_shows_the_whole_run():
+    progress = Progress()
+    first, second = progress.split([1, 1])
+    for part in (first, second):
+        part.expect(lambda: 30.0)
+    first.begin("Baking")
+    run = Run(progress, Target("Plane", "Stone"))
+    assert run.in_short() == "0%, about 1 min left"
+    assert run.line() == "Baking: Plane / Stone, 0%, about 1 min left (Esc cancels)"

@@ -1,0 +1,147 @@
+"""Estimates of the seconds that bakes take: what they grow with, and their correction by measured times."""
+
+from dataclasses import replace
+
+import pytest
+from beamspread import Medium
+from beamspread.core.bake import steps
+from beamspread.core.bake.estimate import Workload, bounced_seconds, simulation_seconds
+from beamspread.core.bake.forecast import Finders, Forecast, seconds_of, steps_of_bakes
+from beamspread.core.bake.layers import MIN_RAYS
+from beamspread.core.bake.pace import Estimate, Pace, pace
+from beamspread.core.bake.surface import Surface
+from beamspread.core.scene.lights import AreaLight, PointLight, SunLight
+
+from bakes import MATERIAL, SETTINGS, bake_job, square
+
+WHITE, FRAME = (1.0, 1.0, 1.0), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+SUN = SunLight("Sun", 2.0, WHITE, True, (0.0, 0.0, -1.0))
+POINT = PointLight("Point", 2.0, WHITE, True, (0.0, 0.0, 1.0))
+AREA = AreaLight("Area", 2.0, WHITE, True, (0.0, 0.0, 1.0), FRAME, 0.5, 0.5, False, 3.0)
+FINAL = replace(SETTINGS, quality="final")
+
+
+@pytest.fixture(autouse=True)
+def no_pace():
+    """No times of other tests count."""
+    pace.forget()
+    yield
+    pace.forget()
+
+
+def workload(lights, size=256, triangles=0, settings=SETTINGS, surface=None, bounced=False):
+    rest = triangles, surface or Surface(MATERIAL), settings, bounced
+    return Workload.of([square(size)], lights, *rest)
+
+
+def seconds(lights, settings=SETTINGS, **options):
+    return workload(lights, settings=settings, **options).seconds(settings)
+
+
+def test_more_texels_take_longer():
+    for lights in ([SUN], [POINT], [AREA]):
+        assert seconds(lights, size=64) < seconds(lights, size=256) < seconds(lights, size=1024)
+        # Four times the texels take at most about four times as long.
+        assert seconds(lights, size=1024) < 4.1 * seconds(lights, size=512)
+
+
+def test_more_lights_of_more_directions_take_longer():
+    assert seconds([SUN]) < seconds([SUN, POINT]) < seconds([SUN, POINT, AREA])
+    assert seconds([POINT]) < seconds([POINT] * 3)
+    assert seconds([SUN]) < seconds([SUN], bounced=True)
+
+
+def test_shadows_and_samples_take_longer():
+    assert seconds([AREA]) < seconds([AREA], triangles=500) < seconds([AREA], triangles=10**6)
+    assert seconds([AREA], triangles=500) < seconds([AREA], replace(SETTINGS, samples=8), triangles=500)
+
+
+def test_lights_of_a_size_share_rays_by_their_brightness():
+    bright = replace(AREA, strength=200.0)
+    # Each has `MIN_RAYS` at least, and the other one all the rays of a light that is alone.
+    alone, both = workload([AREA], size=16).broad_rays, workload([AREA, bright], size=16).broad_rays
+    assert alone > 10 * MIN_RAYS
+    assert both == pytest.approx(alone + MIN_RAYS, rel=0.01)
+
+
+def test_lights_behind_the_receiver_take_no_time():
+    assert workload([replace(POINT, position=(0.0, 0.0, -1.0))]).lamps == 0
+
+
+def test_slow_solvers_take_longer():
+    fft, adaptive, direct = (seconds([POINT], replace(SETTINGS, solver=name)) for name in ("fft", "adaptive", "direct"))
+    assert fft < adaptive < direct
+
+
+def test_each_medium_to_simulate_takes_its_time():
+    first, second = Medium(0.3, 1.31), Medium(0.4, 1.31)
+    assert simulation_seconds([], FINAL) == 0
+    assert simulation_seconds([first], FINAL) < simulation_seconds([first, second], FINAL)
+    assert simulation_seconds([first], SETTINGS) < 0.1 * simulation_seconds([first], FINAL)
+
+
+def test_more_triangles_make_bounced_light_slower():
+    assert bounced_seconds(100, 0) < bounced_seconds(10**6, 0)
+
+
+def test_more_threads_are_faster():
+    assert seconds([POINT], replace(SETTINGS, threads=8)) < seconds([POINT], replace(SETTINGS, threads=2))
+
+
+def test_a_corrected_estimate_approaches_measured_times():
+    pace = Pace()
+    assert pace.corrected("Baking", "Plane", 2.0) == 2.0
+    pace.note("Baking", "Plane", 2.0, 6.0)
+    assert pace.corrected("Baking", "Plane", 2.0) == pytest.approx(6.0)
+    assert pace.corrected("Simulating", "Plane", 2.0) == 2.0
+    # Others come closer with each measurement.
+    others = []
+    for name in "abcd":
+        others.append(pace.corrected("Baking", "Other", 1.0))
+        pace.note("Baking", name, 1.0, 3.0)
+    assert others == sorted(others)
+    assert 1.7 < others[0] < others[-1] < 3.0
+    pace.note("Baking", "Plane", 1e-3, 0.05)  # too short to tell
+    assert pace.corrected("Baking", "Plane", 2.0) == pytest.approx(6.0)
+
+
+def test_a_bake_teaches_the_next_one():
+    job = bake_job([SUN], grid=square(512))
+    announced = job.seconds()
+    pace.note(steps.Solve.kind_for(SETTINGS), "Plane", 1.0, 5.0)
+    assert job.seconds() == pytest.approx(5 * announced)
+    job.run()
+    assert pace.corrected(steps.Solve.kind_for(SETTINGS), "Plane", 1.0) != 5.0
+
+
+def forecast(**options):
+    return Forecast("Plane", [square(256)], [SUN], 0, Surface(MATERIAL), **options)
+
+
+def test_a_forecast_is_that_of_the_job():
+    job = bake_job([SUN], grid=square(256))
+    assert seconds_of(forecast().steps(SETTINGS)) == pytest.approx(job.seconds())
+
+
+def test_a_forecast_counts_who_finds_light():
+    settings = replace(SETTINGS, indirect=True)
+    ways = [Finders(), Finders(bounced=True), Finders(bounced=True, is_own=False), Finders(world=True, lamps=2)]
+    kinds = [[step.kind for step in forecast(finders=way).steps(settings)][:-1] for way in ways]
+    assert kinds == [[], ["Finding bounced light"], *[["Finding light with Cycles"]] * 2]
+    assert len(forecast(finders=Finders(bounced=True)).steps(replace(settings, indirect=False))) == 1
+    assert len(forecast(finders=Finders(colors=True)).steps(settings)) == 2
+
+
+def test_a_medium_is_simulated_once(monkeypatch):
+    monkeypatch.setattr(steps, "is_known", lambda medium, quality: False)
+    known = seconds_of(forecast().steps(FINAL))
+    bakes = [(forecast(), FINAL), (forecast(), FINAL), (None, FINAL)]
+    first, second, nothing = map(seconds_of, steps_of_bakes(bakes))
+    assert first > 10 * second
+    assert second == pytest.approx(known)
+    assert nothing == 0
+
+
+def test_estimates_have_a_subject():
+    Estimate("Baking", "Plane", 1.0).compare(3.0)
+    assert Estimate("Baking", "Plane", 2.0).corrected() == pytest.approx(6.0)
