@@ -67,14 +67,21 @@ private:
     PerThread<std::vector<Vec3f>> m_scratch;
 };
 
-// Adds all rays of a light to a field.
+// Adds all rays of a light to a field, or their moments.
 void add_light(const Surface& surface, const SurfaceLight& light, RaySettings settings, LightField& field,
                Progress& progress)
 {
     const std::optional<Directions> directions = light.directions(surface.grid);
     settings.with_travel = !directions;
     FieldSink sink(field, light.color, light.is_colored(surface), directions);
-    light.gather(surface, settings, sink, progress);
+    const bool by_moments = light.is_smooth() && field.counts_moments_alone();
+    progress.set_total(by_moments ? 2.0 : 1.0);
+    if (by_moments)
+        progress.advance_by(1.0, [&](Progress& part) {
+            light.field->add_inner_moments(surface, light.color, settings.threads, field, part);
+        });
+    progress.advance_by(1.0, [&](Progress& part) { light.gather(surface, settings, sink, part, !by_moments); });
+    progress.finish();
 }
 
 // The same plane with few texels, wholly covered.
@@ -131,6 +138,10 @@ public:
                     examples.add_mean_direction(m_surface, m_lights[i], few, part);
                 });
             problem.coming.examples = examples.lights;
+            problem.coming.irradiance = m_mean;
+            for (const std::size_t i : m_later)
+                if (m_lights[i].is_smooth())
+                    problem.coming.smooth.push_back(m_lights[i].field->smooth_light(m_lights[i].color));
             if (problem.lights.empty() && examples.lights.empty() && m_mean == 0.0) {
                 std::fill_n(luminance, problem.plane.texels() * problem.channels.size(), 0.0f);
                 return;
@@ -174,7 +185,7 @@ private:
         m_mean = std::accumulate(m_means.begin(), m_means.end(), 0.0);
     }
 
-    // Decides which lights are kept as suns, which are added as rays, and which of these terms are chosen for.
+    // Decides which lights are kept as suns, which are added as rays or moments, and which of these are examples.
     void sort_lights()
     {
         std::vector<std::size_t> brightest(m_lights.size());
@@ -191,7 +202,7 @@ private:
                 m_later.push_back(i);
         // A light that the survey missed shines on few texels.
         for (std::size_t k = 0; k < m_later.size(); ++k)
-            if (k < max_examples || m_means[m_later[k]] == 0.0)
+            if (!m_lights[m_later[k]].is_smooth() && (k < max_examples || m_means[m_later[k]] == 0.0))
                 m_examples.push_back(m_later[k]);
     }
 

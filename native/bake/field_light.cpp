@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/threads.h"
+#include "simd/loops.h"
 
 namespace beamspread {
 
@@ -14,93 +15,75 @@ namespace {
 // the plane.
 constexpr float min_lit_fraction = 0.5f;
 
-// Weights of the nodes along one axis at the center of a texel.
-struct NodeWeights {
-    std::size_t first = 0;
-    std::vector<float> weights;
-};
-
-// Weights of a uniform cubic B-spline with `nodes` coefficients evenly spread over `texels` texels. The spline averages
-// noise. Beyond the first and last node it goes on in a straight line, so that linear functions stay linear.
-std::vector<NodeWeights> spline_weights(std::size_t texels, std::size_t nodes)
-{
-    const auto last = static_cast<std::ptrdiff_t>(nodes) - 1;
-    const std::ptrdiff_t neighbor = std::min<std::ptrdiff_t>(1, last);
-    std::vector<NodeWeights> result(texels);
-    for (std::size_t i = 0; i < texels; ++i) {
-        const double position =
-            (static_cast<double>(i) + 0.5) * static_cast<double>(nodes) / static_cast<double>(texels) - 0.5;
-        const double below = std::floor(position);
-        const double t = position - below;
-        const std::array<double, 4> basis = {(1 - t) * (1 - t) * (1 - t) / 6, (3 * t * t * t - 6 * t * t + 4) / 6,
-                                             (-3 * t * t * t + 3 * t * t + 3 * t + 1) / 6, t * t * t / 6};
-        std::vector<double> weights(nodes);
-        const auto add = [&](std::ptrdiff_t node, double weight) { weights[static_cast<std::size_t>(node)] += weight; };
-        for (std::ptrdiff_t k = 0; k < 4; ++k) {
-            const std::ptrdiff_t node = static_cast<std::ptrdiff_t>(below) - 1 + k;
-            const double weight = basis[static_cast<std::size_t>(k)];
-            if (node < 0) {
-                const auto outside = static_cast<double>(-node);
-                add(0, (1 + outside) * weight);
-                add(neighbor, -outside * weight);
-            } else if (node > last) {
-                const auto outside = static_cast<double>(node - last);
-                add(last, (1 + outside) * weight);
-                add(last - neighbor, -outside * weight);
-            } else {
-                add(node, weight);
-            }
-        }
-        const auto is_used = [](double weight) { return weight != 0.0; };
-        const auto begin = std::ranges::find_if(weights, is_used);
-        const auto end = std::find_if(weights.rbegin(), weights.rend(), is_used).base();
-        result[i].first = static_cast<std::size_t>(begin - weights.begin());
-        result[i].weights.assign(begin, std::max(begin, end));
-    }
-    return result;
-}
-
 }  // namespace
 
-// One row of texels: nodes are interpolated along y first, then along x.
+// Part of a row of texels.
 class FieldLight::Row {
 public:
-    // `values` is [row][column][channel] at nodes. Writes [texel][channel].
-    void interpolate(const float* values, std::size_t columns, std::size_t channels, const NodeWeights& up,
-                     const std::vector<NodeWeights>& across, std::vector<float>& at_texels)
+    void start(const NodeSpline& spline, const RowSpan& span, const std::vector<float>& is_lit)
     {
-        m_nodes.assign(columns * channels, 0.0f);
-        for (std::size_t k = 0; k < up.weights.size(); ++k)
-            for (std::size_t i = 0; i < m_nodes.size(); ++i)
-                m_nodes[i] += up.weights[k] * values[(up.first + k) * m_nodes.size() + i];
-        at_texels.assign(across.size() * channels, 0.0f);
-        for (std::size_t x = 0; x < across.size(); ++x)
-            for (std::size_t k = 0; k < across[x].weights.size(); ++k)
-                for (std::size_t c = 0; c < channels; ++c)
-                    at_texels[x * channels + c] += across[x].weights[k] * m_nodes[(across[x].first + k) * channels + c];
+        m_spline = &spline;
+        m_span = span;
+        for (std::vector<float>* values : {&factor, &m_values[0], &m_values[1], &m_values[2]})
+            values->resize(span.width);
+        read(is_lit, factor);
+        for (float& value : factor)
+            value = 1.0f / std::max(value, min_lit_fraction);
     }
 
-    std::vector<float> lit_fraction, radiance;
+    const std::vector<float>& read(const std::vector<float>& coefficients)
+    {
+        read(coefficients, m_values[0]);
+        return m_values[0];
+    }
+
+    // Reads the irradiance of three channels. Beyond the outermost nodes the spline may fall below 0.
+    void read_irradiance(const std::vector<float>* coefficients)
+    {
+        for (std::size_t c = 0; c < 3; ++c)
+            read(coefficients[c], m_values[c]);
+        irradiance.resize(m_span.width);
+        for (std::size_t x = 0; x < m_span.width; ++x)
+            irradiance[x] = factor[x] * glm::max(Vec3f(m_values[0][x], m_values[1][x], m_values[2][x]), Vec3f(0.0f));
+    }
+
+    // Light of all surroundings over that of the part which any light reaches: nodes inside things that stand on the
+    // plane don't count.
+    std::vector<float> factor;
     std::vector<Vec3f> irradiance, travel;
+    std::array<std::vector<float>, 3> received;
 
 private:
-    std::vector<float> m_nodes;
+    void read(const std::vector<float>& coefficients, std::vector<float>& values)
+    {
+        m_spline->row(m_span.y, m_span.x, m_span.x + m_span.width, coefficients.data(), m_scratch, values.data());
+    }
+
+    const NodeSpline* m_spline = nullptr;
+    RowSpan m_span{};
+    std::array<std::vector<float>, 3> m_values;
+    std::vector<float> m_scratch;
 };
 
 FieldLight::FieldLight(const float* radiance, std::size_t rows, std::size_t columns, std::span<const Lobe> lobes)
-    : m_rows(rows), m_columns(columns), m_is_lit(rows * columns)
+    : m_rows(rows), m_columns(columns)
 {
     const std::size_t size = 3 * rows * columns;
+    std::vector<float> is_lit(rows * columns);
+    std::vector<float> irradiance(size);
     for (std::size_t i = 0; i < lobes.size(); ++i) {
         const float* values = radiance + i * size;
         if (std::all_of(values, values + size, [](float value) { return value == 0.0f; }))
             continue;
         m_lobes.push_back(lobes[i]);
-        m_radiance.insert(m_radiance.end(), values, values + size);
+        scale(irradiance.data(), values, lobes[i].solid_angle, size);
+        for (std::size_t c = 0; c < 3; ++c)
+            m_irradiance.push_back(NodeSpline::coefficients(irradiance.data() + c, 3, rows, columns));
         for (std::size_t k = 0; k < size; ++k)
             if (values[k] != 0.0f)
-                m_is_lit[k / 3] = 1.0f;
+                is_lit[k / 3] = 1.0f;
     }
+    m_is_lit = NodeSpline::coefficients(is_lit.data(), 1, rows, columns);
 }
 
 FieldLight::FieldLight(const float* radiance, std::size_t rows, std::size_t columns, float solid_angle,
@@ -117,39 +100,130 @@ Directions FieldLight::directions(std::size_t lobe) const
     return OneDirection{Vec3(m_lobes[lobe].travel)};
 }
 
-void FieldLight::gather(const ReceiverGrid& grid, int threads, RaySink& sink, Progress& progress) const
+void FieldLight::gather(const ReceiverGrid& grid, int threads, bool all, RaySink& sink, Progress& progress) const
 {
-    const Plane plane{grid.width, grid.height, grid.pitch_x, grid.pitch_y};
-    const std::vector<NodeWeights> up = spline_weights(grid.height, m_rows);
-    const std::vector<NodeWeights> across = spline_weights(grid.width, m_columns);
+    const NodeSpline nodes = spline(grid);
+    const auto [top, bottom] = all ? std::pair(grid.height, grid.height) : nodes.inner_rows();
+    const auto [left, right] = all ? std::pair(grid.width, grid.width) : nodes.inner_columns();
     PerThread<Row> rows;
     progress.set_total(static_cast<double>(grid.height));
-    const auto gather_row = [&](std::size_t y) {
-        Row& row = rows.local();
-        // Fraction of the surroundings that any light reaches: nodes inside things that stand on the plane don't count.
-        row.interpolate(m_is_lit.data(), m_columns, 1, up[y], across, row.lit_fraction);
-        row.irradiance.resize(grid.width);
-        row.travel.resize(grid.width);
-        for (std::size_t i = 0; i < m_lobes.size(); ++i) {
-            // Irradiance of the lobe.
-            row.interpolate(m_radiance.data() + i * 3 * m_rows * m_columns, m_columns, 3, up[y], across, row.radiance);
-            for (std::size_t x = 0; x < grid.width; ++x) {
-                const Vec3f radiance(row.radiance[3 * x], row.radiance[3 * x + 1], row.radiance[3 * x + 2]);
-                row.irradiance[x] = glm::max(radiance / std::max(row.lit_fraction[x], min_lit_fraction), Vec3f(0.0f)) *
-                                    m_lobes[i].solid_angle;
-                row.travel[x] =
-                    m_position ? Vec3f(glm::normalize(travel_at(plane, directions(i), y, x))) : m_lobes[i].travel;
-            }
-            sink.add({.sample = y * grid.width,
-                      .count = grid.width,
-                      .ray = i,
-                      .travel = row.travel.data(),
-                      .irradiance = row.irradiance.data()});
+    const auto gather_row = [&, top = top, bottom = bottom, left = left, right = right](std::size_t y) {
+        if (y < top || y >= bottom) {
+            gather_part(grid, nodes, {y, 0, grid.width}, rows.local(), sink);
+        } else {
+            gather_part(grid, nodes, {y, 0, left}, rows.local(), sink);
+            gather_part(grid, nodes, {y, right, grid.width - right}, rows.local(), sink);
         }
         progress.advance(1.0);
     };
     with_threads(threads, [&] { parallel_for(grid.height, gather_row); });
     progress.finish();
+}
+
+void FieldLight::gather_part(const ReceiverGrid& grid, const NodeSpline& nodes, const RowSpan& span, Row& row,
+                             RaySink& sink) const
+{
+    if (span.width == 0)
+        return;
+    const Plane plane{grid.width, grid.height, grid.pitch_x, grid.pitch_y};
+    row.start(nodes, span, m_is_lit);
+    row.travel.resize(span.width);
+    for (std::size_t i = 0; i < m_lobes.size(); ++i) {
+        row.read_irradiance(&irradiance(i, 0));
+        for (std::size_t x = 0; x < span.width; ++x)
+            row.travel[x] = m_position ? Vec3f(glm::normalize(travel_at(plane, directions(i), span.y, span.x + x)))
+                                       : m_lobes[i].travel;
+        sink.add({.sample = span.y * grid.width + span.x,
+                  .count = span.width,
+                  .ray = i,
+                  .travel = row.travel.data(),
+                  .irradiance = row.irradiance.data()});
+    }
+}
+
+void FieldLight::add_inner_moments(const Surface& surface, const std::vector<double>& color, int threads,
+                                   LightField& field, Progress& progress) const
+{
+    const std::size_t width = surface.grid.width;
+    const NodeSpline nodes = spline(surface.grid);
+    std::vector<Vec3f> travel;
+    for (const Lobe& lobe : m_lobes)
+        travel.push_back(lobe.travel);
+    const std::vector<float> factors = field.moment_factors(travel, color);
+    std::vector<std::vector<float>> moments(field.terms());  // coefficients; empty: none
+    const auto add_lobes = [&](std::size_t term) {
+        for (std::size_t i = 0; i < m_lobes.size(); ++i) {
+            const float factor = factors[term * m_lobes.size() + i];
+            if (factor == 0.0f)
+                continue;
+            moments[term].resize(m_is_lit.size());
+            add_scaled(moments[term].data(), irradiance(i, field.channel(term)).data(), factor, m_is_lit.size());
+        }
+    };
+    const auto [top, bottom] = nodes.inner_rows();
+    const auto [left, right] = nodes.inner_columns();
+    const RowSpan inner{0, left, right - left};
+    PerThread<Row> rows;
+    const auto add_row = [&, top = top](std::size_t i) {
+        Row& row = rows.local();
+        RowSpan span = inner;
+        span.y = top + i;
+        const std::size_t first = span.y * width + span.x;
+        row.start(nodes, span, m_is_lit);
+        if (surface.coverage)
+            multiply(row.factor.data(), row.factor.data(), surface.coverage + first, span.width);
+        std::array<std::vector<float>, 3>& received = row.received;  // [channel]
+        for (std::size_t c = 0; c < 3; ++c) {
+            received[c] = row.factor;
+            for (std::size_t x = 0; x < span.width && surface.color_in; ++x)
+                received[c][x] *= surface.color_in[3 * (first + x) + c];
+        }
+        for (std::size_t term = 0; term < moments.size(); ++term)
+            if (!moments[term].empty())
+                field.add_moments(term, span, received[field.channel(term)].data(), row.read(moments[term]).data());
+        progress.advance(1.0);
+    };
+    progress.set_total(static_cast<double>(bottom - top));
+    with_threads(threads, [&, top = top, bottom = bottom] {
+        parallel_for(moments.size(), add_lobes);
+        parallel_for(bottom - top, add_row);
+    });
+    progress.finish();
+}
+
+SmoothLight FieldLight::smooth_light(const std::vector<double>& color) const
+{
+    SmoothLight light;
+    const NodeSpline at_nodes(m_rows, m_columns, m_rows, m_columns);
+    const std::size_t nodes = m_rows * m_columns;
+    const std::size_t count = m_lobes.size();
+    light.products.resize(count * count);
+    std::vector<float> scratch;
+    std::vector<float> lit(nodes);
+    const auto read = [&](const std::vector<float>& coefficients, float* values) {
+        for (std::size_t y = 0; y < m_rows; ++y)
+            at_nodes.row(y, 0, m_columns, coefficients.data(), scratch, values + y * m_columns);
+    };
+    read(m_is_lit, lit.data());
+    std::vector<float> values(count * nodes);
+    for (std::size_t c = 0; c < 3; ++c) {
+        for (std::size_t i = 0; i < count; ++i) {
+            read(irradiance(i, c), values.data() + i * nodes);
+            for (std::size_t k = 0; k < nodes; ++k)
+                values[i * nodes + k] /= std::max(lit[k], min_lit_fraction);
+        }
+        for (std::size_t i = 0; i < count; ++i)
+            for (std::size_t j = 0; j <= i; ++j) {
+                double sum = 0.0;
+                for (std::size_t k = 0; k < nodes; ++k)
+                    sum += static_cast<double>(values[i * nodes + k]) * static_cast<double>(values[j * nodes + k]);
+                light.products[i * count + j] += color[c] * color[c] * sum / (3.0 * static_cast<double>(nodes));
+                light.products[j * count + i] = light.products[i * count + j];
+            }
+    }
+    for (const Lobe& lobe : m_lobes)
+        light.travel.push_back(lobe.travel);
+    return light;
 }
 
 }  // namespace beamspread

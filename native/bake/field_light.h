@@ -5,10 +5,12 @@
 #include <span>
 #include <vector>
 
+#include "bake/node_spline.h"
+#include "bake/surface.h"
 #include "base/progress.h"
-#include "base/view.h"
 #include "scene/ray_gather.h"
 #include "solve/problem/problem.h"
+#include "solve/spectral/light_field.h"
 
 namespace beamspread {
 
@@ -33,19 +35,36 @@ public:
     // Directions of the light of a lobe.
     Directions directions(std::size_t lobe) const;
 
-    // Hands one ray per lobe and texel to the sink; ray i belongs to lobe i. The result is the same for any number of
-    // threads. Throws Cancelled.
-    void gather(const ReceiverGrid& grid, int threads, RaySink& sink, Progress& progress) const;
+    // Hands one ray per lobe and texel to the sink; ray i belongs to lobe i. Not `all`: only texels that are no inner
+    // ones. The result is the same for any number of threads. Throws Cancelled.
+    void gather(const ReceiverGrid& grid, int threads, bool all, RaySink& sink, Progress& progress) const;
+
+    // Adds the light that inner texels of a surface receive, times `color`, to the moments of a field that counts
+    // moments alone. Inner texels lie between the outermost nodes. Light is linear in the nodes there, so that the sums
+    // over lobes are made at the nodes. Not for light from a point. Throws Cancelled.
+    void add_inner_moments(const Surface& surface, const std::vector<double>& color, int threads, LightField& field,
+                           Progress& progress) const;
+
+    // The light times `color` as the choice of terms needs it. Not for light from a point.
+    SmoothLight smooth_light(const std::vector<double>& color) const;
 
 private:
     class Row;
+
+    void gather_part(const ReceiverGrid& grid, const NodeSpline& nodes, const RowSpan& span, Row& row,
+                     RaySink& sink) const;
+    NodeSpline spline(const ReceiverGrid& grid) const { return {grid.height, grid.width, m_rows, m_columns}; }
+    const std::vector<float>& irradiance(std::size_t lobe, std::size_t channel) const
+    {
+        return m_irradiance[3 * lobe + channel];
+    }
 
     std::size_t m_rows;
     std::size_t m_columns;
     std::vector<Lobe> m_lobes;
     std::optional<Vec3> m_position;
-    std::vector<float> m_radiance;  // [lobe][row][column][channel], lobes with light alone
-    std::vector<float> m_is_lit;    // [row][column] 1: light from any direction reaches the node
+    std::vector<std::vector<float>> m_irradiance;  // [lobe and channel] coefficients, W/m^2; lobes with light alone
+    std::vector<float> m_is_lit;  // coefficients; 1: light from any direction reaches the node
 };
 
 }  // namespace beamspread

@@ -98,11 +98,12 @@ std::optional<Directions> SurfaceLight::directions(const ReceiverGrid& grid) con
     return FromPoint{grid.to_plane(source->position - grid.origin)};
 }
 
-void SurfaceLight::gather(const Surface& surface, const RaySettings& settings, RaySink& sink, Progress& progress) const
+void SurfaceLight::gather(const Surface& surface, const RaySettings& settings, RaySink& sink, Progress& progress,
+                          bool all) const
 {
     ReceivedRays received(surface, sink);
     if (field)
-        field->gather(surface.grid, settings.threads, received, progress);
+        field->gather(surface.grid, settings.threads, all, received, progress);
     else
         gather_lamp(surface, settings, received, progress);
 }

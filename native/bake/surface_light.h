@@ -24,6 +24,9 @@ struct SurfaceLight {
     // True if rays differ in color where they arrive on the surface.
     bool is_colored(const Surface& surface) const;
 
+    // True if directions are the same at all texels, and the light changes slowly.
+    bool is_smooth() const { return field && field->lobes() > 1; }
+
     // True if several rays reach a texel.
     bool has_size() const { return light ? !light->is_delta() : field->lobes() > 1; }
 
@@ -31,8 +34,9 @@ struct SurfaceLight {
     std::optional<Directions> directions(const ReceiverGrid& grid) const;
 
     // Hands the rays of strength 1 to the sink, of the covered part of each texel and of the color that the surface
-    // lets in.
-    void gather(const Surface& surface, const RaySettings& settings, RaySink& sink, Progress& progress) const;
+    // lets in. Not `all`: of a field, only at texels that are no inner ones.
+    void gather(const Surface& surface, const RaySettings& settings, RaySink& sink, Progress& progress,
+                bool all = true) const;
 
 private:
     void gather_lamp(const Surface& surface, RaySettings settings, RaySink& sink, Progress& progress) const;

@@ -339,10 +339,11 @@ def test_a_glowing_panel_close_to_a_wall():
     assert found[0]["paths"] < 3 * found[1]["paths"]
 
 
-def test_the_bench_runs_in_small():
-    bench = Path(__file__).resolve().parents[1] / "bench" / "bounces.py"
-    done = subprocess.run([sys.executable, str(bench), "2"], capture_output=True, text=True, check=True)
-    assert len(done.stdout.splitlines()) == 6
+@pytest.mark.parametrize(("name", "size", "lines"), [("bounces", "2", 6), ("indirect", "24", 7)])
+def test_the_benches_run_in_small(name, size, lines):
+    bench = Path(__file__).resolve().parents[1] / "bench" / f"{name}.py"
+    done = subprocess.run([sys.executable, str(bench), size], capture_output=True, text=True, check=True)
+    assert len(done.stdout.splitlines()) == lines
 
 
 @pytest.mark.parametrize(

@@ -207,3 +207,59 @@ def test_the_faintest_light_has_a_direction(faintest):
     baked = bake(grid, Illumination([field]), material, 0.0, BakeSettings(quality="preview"))
     assert np.isfinite(baked).all()
     assert baked[:, 0].min() > 0
+
+
+SLOPING = Material(albedo=(0.9, 0.8, 0.5), mean_free_path=(0.1, 0.2, 0.05), anisotropy=0.8, ior=1.0)
+
+
+def uneven(nodes, seed=3):
+    """Light of all parts, so noisy that straight lines beyond the border fall below 0, with an object's inside."""
+    radiance = 1e-3 + np.random.default_rng(seed).random((len(STRATA), nodes, nodes, 3)) ** 4
+    radiance[:, 3:5, 2:4] = 0.0
+    return radiance
+
+
+@pytest.mark.parametrize(("texels", "nodes"), [(48, 8), (30, 9), (6, 12)])
+def test_moments_at_nodes_are_those_of_all_rays(texels, nodes):
+    """All parts in one light are summed at the nodes; each in a light of its own is added ray by ray.
+
+    The same terms, hence the same luminance but for rounding of single precision, in sums of some hundred rays.
+    """
+    random = np.random.default_rng(4)
+    colors = random.random((2, texels, texels, 3)).astype(np.float32)
+    coverage = random.random((texels, texels)).astype(np.float32)
+    grid = replace(grid_of(texels, texels), coverage=coverage, color_in=colors[0], color_out=colors[1])
+    source = library(native.Medium(g=0.8, ior=1.0))
+    pitch = [grid.pitch_y, grid.pitch_x]
+    field = native.LightField(
+        (texels, texels), [source] * 3, SLOPING.albedo, SLOPING.mean_free_path, pitch, 88.0, 0.02, True
+    )
+    radiance = uneven(nodes).astype(np.float32)
+    solid, strength = (np.pi * WEIGHTS).astype(np.float32), [2.0, 0.5, 1.0]
+    together = [(native.FieldLight(radiance, solid, DIRECTIONS), strength, None)]
+    apart = [
+        (native.FieldLight(radiance[i : i + 1], solid[i : i + 1], DIRECTIONS[i : i + 1]), strength, None)
+        for i in range(len(STRATA))
+    ]
+    by_nodes, by_rays = (field.luminance(grid.surface(), lights) for lights in (together, apart))
+    assert by_rays.min() >= 0
+    assert by_rays.max() > 0
+    np.testing.assert_allclose(by_nodes, by_rays, atol=2e-6 * by_rays.max(), rtol=0)
+
+
+def test_terms_of_smooth_light_are_few_and_enough():
+    """Against a solver that adds all rays, within a thousandth of the mean; with all terms 2e-6 are left."""
+    grid = replace(grid_of(40, 40), coverage=np.tri(40, dtype=np.float32))
+    radiance = np.random.default_rng(5).random((len(STRATA), 4, 4, 3))
+    light = Illumination([light_of(grid, radiance)])
+    by_fft, by_direct = (
+        bake(grid, light, SLOPING, 0.0, BakeSettings(quality="preview", solver=solver)) for solver in ("fft", "direct")
+    )
+    np.testing.assert_allclose(by_fft, by_direct, atol=1e-3 * by_direct.mean(), rtol=0)
+
+
+def test_threads_change_no_bit():
+    grid = grid_of(40, 50)
+    light = Illumination([light_of(grid, uneven(8))])
+    results = [bake(grid, light, SLOPING, 0.0, BakeSettings(quality="preview", threads=n)) for n in (1, 3)]
+    np.testing.assert_array_equal(*results)

@@ -100,6 +100,12 @@ struct ChannelMedium {
     bool operator==(const ChannelMedium&) const = default;
 };
 
+// Light whose directions are the same at all texels and whose irradiance changes slowly.
+struct SmoothLight {
+    std::vector<Vec3f> travel;     // [direction] unit vectors of the plane frame, z < 0
+    std::vector<double> products;  // [direction][direction] mean over texels and channels, of irradiances, (W/m^2)^2
+};
+
 // Light that will be added to a light field later. It decides which terms the field keeps.
 struct ComingLight {
     // All of that light at few texels, spread over a plane of the same size: its angles and colors.
@@ -109,6 +115,11 @@ struct ComingLight {
     // Some of that light at all texels; terms are chosen for its luminance. Empty: for any light of the survey's
     // angles.
     std::vector<PlaneLight> examples;
+
+    // Some of that light, which needs terms besides.
+    std::vector<SmoothLight> smooth;
+
+    double irradiance = 0.0;  // mean of all light, over texels and channels, W/m^2
 };
 
 enum class Solver { fft, direct, adaptive };

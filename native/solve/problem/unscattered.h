@@ -22,6 +22,9 @@ public:
     UnscatteredRays(const UnscatteredRays&) = delete;
     UnscatteredRays& operator=(const UnscatteredRays&) = delete;
 
+    // True if nothing returns unscattered.
+    bool is_empty() const { return m_sums.empty(); }
+
     void add(const RayRow& rays, const std::vector<double>& color);
     void add_to(float* luminance) const;
     void clear();
@@ -32,7 +35,7 @@ private:
     Plane m_plane;
     std::unique_ptr<Exits> m_exits;
     double m_unit;                     // of the sums, W/(m^2 sr)
-    std::vector<std::int64_t> m_sums;  // [texel][channel]; empty: nothing returns unscattered
+    std::vector<std::int64_t> m_sums;  // [texel][channel]
 };
 
 }  // namespace beamspread

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "solve/problem/problem.h"
@@ -68,6 +69,10 @@ private:
     std::vector<float> m_u;
     std::vector<float> m_product;
 };
+
+// Moments of light of some directions, irradiance 1 in all channels and a color in each, [term][direction].
+std::vector<float> factors_of_directions(const LightTerms& terms, std::span<const Vec3f> travel,
+                                         const std::vector<double>& color);
 
 // The terms' light in one row of texels, from stored and added lights.
 class TermRow {

@@ -187,6 +187,20 @@ KernelDecomposition::KernelDecomposition(const Incidence& incidence, const std::
 
 KernelDecomposition::~KernelDecomposition() = default;
 
+double KernelDecomposition::function(std::size_t term, double half_tangent) const
+{
+    const double step = std::max(m_last - m_first, 1e-12) / static_cast<double>(angle_count - 1);
+    const double position = std::clamp((half_tangent - m_first) / step, 0.0, static_cast<double>(angle_count - 1));
+    const double below = std::min(std::floor(position), static_cast<double>(angle_count - 2));
+    const double size = std::sqrt(m_terms[term].gain) / (m_terms[term].m == 0 ? power_weight : 1.0);
+    const auto at = [&](Eigen::Index i) {
+        const double root = m_angular->root_share[i];
+        return root > 0.0 ? size * m_angular->direction[term][i] / root : 0.0;
+    };
+    const auto angle = static_cast<Eigen::Index>(below);
+    return at(angle) + (position - below) * (at(angle + 1) - at(angle));
+}
+
 std::vector<std::size_t> KernelDecomposition::within(double tolerance) const
 {
     std::vector<std::size_t> order(m_terms.size());

@@ -100,6 +100,10 @@ public:
     // All terms, by ascending m, then rank.
     const std::vector<Term>& terms() const { return m_terms; }
 
+    // Part of a kernel, relative to its power, that is lost without a term; of its sign, and linear between
+    // `Incidence::count` angles.
+    double function(std::size_t term, double half_tangent) const;
+
     // The cheapest terms with which kernels are off by at most `tolerance`.
     std::vector<std::size_t> within(double tolerance) const;
 

@@ -12,6 +12,14 @@ namespace {
 // Beams of a row that pass all steps together. More: more cache.
 constexpr std::size_t beams_at_once = 512;
 
+std::vector<float> set_colors(const LightTerms& terms, const std::vector<double>& color)
+{
+    std::vector<float> colors;
+    for (std::size_t set = 0; set < terms.sets.count(); ++set)
+        colors.push_back(static_cast<float>(color[terms.sets.channel(set)]));
+    return colors;
+}
+
 }  // namespace
 
 void BeamMoments::add(const LightTerms& terms, const BeamRow& beams, const std::vector<float>& colors,
@@ -58,6 +66,22 @@ void BeamMoments::add(const LightTerms& terms, const BeamRow& beams, const std::
     }
 }
 
+std::vector<float> factors_of_directions(const LightTerms& terms, std::span<const Vec3f> travel,
+                                         const std::vector<double>& color)
+{
+    const std::size_t count = travel.size();
+    BeamRow beams;
+    beams.irradiance.assign(count, 1.0f);
+    for (auto* values : {&beams.cos_beta, &beams.sin_beta, &beams.half_tangent})
+        values->resize(count);
+    find_angles(&travel.data()->x, beams.irradiance.data(), beams.cos_beta.data(), beams.sin_beta.data(),
+                beams.half_tangent.data(), count);
+    std::vector<float> factors(terms.terms.size() * count);
+    BeamMoments().add(terms, beams, set_colors(terms, color), 0, terms.terms.size(),
+                      [&](std::size_t t) { return factors.data() + t * count; });
+    return factors;
+}
+
 void TermRow::start(const LightTerms& terms, const RowSpan& span, std::size_t first, std::size_t count)
 {
     m_width = span.width;
@@ -90,9 +114,7 @@ void MomentSum::add(LightTerms& terms, const RayRow& rays, const std::vector<dou
 {
     const std::size_t channels = color.size();
     const std::size_t sets = terms.sets.count();
-    m_colors.resize(sets);
-    for (std::size_t set = 0; set < sets; ++set)
-        m_colors[set] = static_cast<float>(color[terms.sets.channel(set)]);
+    m_colors = set_colors(terms, color);
     for (std::size_t x = 0; x < rays.width; x += beams_at_once) {
         const RowSpan span{rays.y, rays.x + x, std::min(beams_at_once, rays.width - x)};
         const float* irradiance = rays.irradiance + x * channels;

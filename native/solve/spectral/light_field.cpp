@@ -36,7 +36,7 @@ MakeLightRow texel_rows(const LightTerms& terms)
 LightTerms chosen_terms(const Problem& problem, Progress& progress)
 {
     const auto choose = [&](const KernelDecomposition& kernels, const Incidence& incidence, const LightTerms& light) {
-        return choose_terms(kernels, incidence, light, problem.tolerance, progress, choice_work);
+        return choose_terms(kernels, incidence, light, problem.coming, problem.tolerance, progress, choice_work);
     };
     std::optional<LightTerms> result;
     with_threads(problem.threads, [&] {
@@ -70,6 +70,17 @@ void LightField::add(const RayRow& rays, const std::vector<double>& color, bool 
     m_sums.local().add(m_terms, rays, color, is_colored);
     if (m_unscattered)
         m_unscattered->add(rays, color);
+}
+
+std::vector<float> LightField::moment_factors(std::span<const Vec3f> travel, const std::vector<double>& color) const
+{
+    return factors_of_directions(m_terms, travel, color);
+}
+
+void LightField::add_moments(std::size_t term, const RowSpan& span, const float* factors, const float* values)
+{
+    float* sums = m_terms.moments[term].data() + span.y * m_problem.plane.width + span.x;
+    add_scaled_product(sums, factors, values, 1.0f, span.width);
 }
 
 void LightField::clear()

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "base/progress.h"
@@ -32,6 +33,19 @@ public:
     // Adds rays of the coming light of the problem: they are reduced to moments at once and not stored. `color` and
     // `is_colored` as for `MomentSum`. Several threads may add rays of different rows at once.
     void add(const RayRow& rays, const std::vector<double>& color, bool is_colored);
+
+    // False if rays count beside their moments, in light that returns unscattered.
+    bool counts_moments_alone() const { return !m_unscattered || m_unscattered->is_empty(); }
+
+    // Factors from irradiance to the moments of light of some directions, [term][direction]. `color` is a factor of each
+    // channel; the irradiance of `channel(term)` counts.
+    std::vector<float> moment_factors(std::span<const Vec3f> travel, const std::vector<double>& color) const;
+
+    // Adds values times factors to the moments of a term in part of a row. Several threads may add to different rows at
+    // once.
+    void add_moments(std::size_t term, const RowSpan& span, const float* factors, const float* values);
+
+    std::size_t channel(std::size_t term) const { return m_terms.sets.channel(m_terms.terms[term].set); }
 
     // Writes (height, width, channels), radiance in W/(m^2 sr): the sum over all lights and rays. Advances the progress
     // by `spread_work`. Throws Cancelled.

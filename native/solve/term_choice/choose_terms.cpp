@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <iterator>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -120,13 +121,17 @@ std::vector<Texel> worst_sites(const std::vector<Texel>& texels, const Eigen::Ar
 }  // namespace
 
 std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const Incidence& incidence,
-                                      const LightTerms& light, double tolerance, Progress& progress, double work)
+                                      const LightTerms& light, const ComingLight& coming, double tolerance,
+                                      Progress& progress, double work)
 {
     std::vector<std::size_t> candidates(kernels.terms().size());
     std::iota(candidates.begin(), candidates.end(), std::size_t{0});
+    std::vector<std::size_t> smooth;
+    if (!coming.smooth.empty())
+        smooth = smooth_terms(kernels, coming, tolerance);
     if (light.changing.empty()) {  // light is added later
         progress.advance(work);
-        return kernels.within(tolerance);
+        return coming.smooth.empty() ? kernels.within(tolerance) : smooth;
     }
     if (candidates.empty() || light.plane.texels() <= max_untruncated_side * max_untruncated_side)
         return candidates;
@@ -147,8 +152,11 @@ std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const 
             progress.advance(part);
         });
         auto [chosen, error] = drop_terms(relative_parts(readings, candidates.size(), tolerance), kernels.terms());
-        if (round == refinements)
-            return chosen;
+        if (round == refinements) {
+            std::vector<std::size_t> both;
+            std::ranges::set_union(chosen, smooth, std::back_inserter(both));
+            return both;
+        }
         const std::vector<Texel> more = sites_around(worst_sites(texels, error), light.plane, round);
         texels.insert(texels.end(), more.begin(), more.end());
     }

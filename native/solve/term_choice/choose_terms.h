@@ -15,9 +15,14 @@ namespace beamspread {
 //
 // Errors of kernels cancel over smooth light and add up in the dark beside it, hence the radiance at probed texels
 // decides: every term's part of it is computed, then terms are dropped while the sum of all dropped parts stays within
-// a fraction of the tolerance. Small planes keep all terms. Without light, the error of the kernels decides. Advances
-// the progress by `work`.
+// a fraction of the tolerance. Small planes keep all terms. Without light, the error of the kernels decides. Smooth light
+// adds terms of its own. Advances the progress by `work`.
 std::vector<std::size_t> choose_terms(const KernelDecomposition& kernels, const Incidence& incidence,
-                                      const LightTerms& light, double tolerance, Progress& progress, double work);
+                                      const LightTerms& light, const ComingLight& coming, double tolerance,
+                                      Progress& progress, double work);
+
+// Chooses few terms with which the radiance of smooth light is off by a fraction of `tolerance`, root mean square and
+// relative to all light. Its moments tell which terms it needs.
+std::vector<std::size_t> smooth_terms(const KernelDecomposition& kernels, const ComingLight& coming, double tolerance);
 
 }  // namespace beamspread
