@@ -6,8 +6,10 @@ from beamspread.core.bake.job import BakeJob
 from beamspread.core.bake.steps import BAKE_STEPS
 from beamspread.core.bake.surface import Surface
 from beamspread.core.material import Material
+from beamspread.core.scene.chart import Chart, ChartIsland
+from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
-from beamspread.core.scene.receiver import Chart, Grid, Receiver
+from beamspread.core.scene.receiver import Receiver
 
 SETTINGS = BakeSettings(quality="preview", samples=2, margin=0)
 MATERIAL = Material(albedo=(0.9, 0.9, 0.9), mean_free_path=(0.01, 0.01, 0.01), anisotropy=0.0)
@@ -24,7 +26,7 @@ def square(size=24, side=1.0, height=None, origin=None):
 def bake_job(lights, occluders=None, surface=None, settings=SETTINGS, grid=None):
     """A bake of one chart that is the whole texture."""
     grid = grid or square()
-    receiver = Receiver(grid.coverage, (Chart(grid, grid.coverage),))
+    receiver = Receiver(grid.coverage, (Chart(grid, (ChartIsland(grid.coverage, (0, 0)),)),))
     return BakeJob(
         "Plane", receiver, Illumination(lights, occluders), surface or Surface(MATERIAL), settings, BAKE_STEPS
     )

@@ -18,10 +18,10 @@ from beamspread import Medium, library, presets
 from beamspread.core.bake import layers as bakes
 from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.native import native
+from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import PointLight
 from beamspread.core.scene.occluders import Mesh
-from beamspread.core.scene.receiver import Grid
 from scipy.ndimage import uniform_filter
 
 SIDE = 1.0  # of the floor, metres

@@ -25,7 +25,7 @@ from beamspread.core.material import Material
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import PointLight, SunLight
 from beamspread.core.scene.occluders import Mesh
-from beamspread.core.scene.uv_map import Polygons
+from beamspread.core.scene.polygons import Polygons
 from beamspread.core.target import Target
 
 INSIDE = Path(__file__).resolve().parent / "in_blender" / "live.py"

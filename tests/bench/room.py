@@ -15,10 +15,10 @@ from beamspread import library, presets
 from beamspread.core.bake import layers as bakes
 from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.surface import channel_media
+from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import AreaLight, WorldLight
 from beamspread.core.scene.occluders import Mesh, Occluder
-from beamspread.core.scene.receiver import Grid
 from scipy.ndimage import uniform_filter
 
 SIDE = 4.0  # of the floor, metres

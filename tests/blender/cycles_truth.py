@@ -8,8 +8,8 @@ import scenes
 from beamspread.blender.read.geometry import read_polygons
 from beamspread.blender.read.lights import read_illumination
 from beamspread.core.native import native
+from beamspread.core.scene.flat_mesh import flatten
 from beamspread.core.scene.receiver import build_receiver
-from beamspread.core.scene.uv_map import fit_uv_maps
 from mathutils import Euler, Matrix
 
 TEXELS = 64
@@ -94,7 +94,7 @@ def our_irradiance(plane, texels=TEXELS):
     """The same by the add-on, and the coverage of the texels."""
     illumination, depsgraph = read().lighting(plane.name), bpy.context.evaluated_depsgraph_get()
     polygons = read_polygons(plane.evaluated_get(depsgraph), plane.data.materials[0].name)
-    receiver = build_receiver(fit_uv_maps(polygons), texels, texels, plane.name)
+    receiver = build_receiver(flatten(polygons), texels, texels, plane.name)
     grid = receiver.charts[0].grid
     total, _ = native.bake_arrival(grid.surface(), illumination.native_lights(grid), samples=8, rays=RAYS)
     return receiver.to_texture([total * grid.coverage[..., None]]), receiver.coverage

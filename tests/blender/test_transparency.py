@@ -9,8 +9,8 @@ import scenes
 from beamspread.blender.read.geometry import read_polygons
 from beamspread.blender.read.lights import read_illumination
 from beamspread.core.native import native
+from beamspread.core.scene.flat_mesh import flatten
 from beamspread.core.scene.receiver import build_receiver
-from beamspread.core.scene.uv_map import fit_uv_maps
 from cycles_truth import TEXELS, add_receiver, around, cycles_irradiance
 from mathutils import Matrix
 from nodes import Nodes, add_sockets
@@ -68,7 +68,7 @@ def our_irradiance(plane):
     """Transmittance by the add-on at FINE x FINE points of each texel (FINE H, FINE W, 3), and its warnings."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     illumination = read_illumination(depsgraph)
-    polygons = fit_uv_maps(read_polygons(plane.evaluated_get(depsgraph), "Target"))
+    polygons = flatten(read_polygons(plane.evaluated_get(depsgraph), "Target"))
     receiver = build_receiver(polygons, FINE * TEXELS, FINE * TEXELS)
     grid = receiver.charts[0].grid
     total = np.zeros((grid.height, grid.width, 3), np.float32)

@@ -13,11 +13,13 @@ from beamspread.core.bake.steps import BAKE_STEPS
 from beamspread.core.bake.surface import Surface
 from beamspread.core.errors import MaterialError
 from beamspread.core.native import native
+from beamspread.core.scene.chart import Chart, ChartIsland
+from beamspread.core.scene.flat_mesh import flatten
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import AreaLight, Light, PointLight, SpotLight, SunLight
 from beamspread.core.scene.occluders import Mesh, Occluder
-from beamspread.core.scene.receiver import Chart, Receiver, build_receiver
-from beamspread.core.scene.uv_map import Polygons, fit_uv_maps
+from beamspread.core.scene.polygons import Polygons
+from beamspread.core.scene.receiver import Receiver, build_receiver
 
 from bakes import MATERIAL, SETTINGS, bake_job, square
 
@@ -68,7 +70,7 @@ def test_an_uneven_receiver_does_not_shadow_itself():
     corners = np.array([(-0.5, -0.5, bump), (0.5, -0.5, -bump), (0.5, 0.5, bump), (-0.5, 0.5, -bump)])
     uvs = corners[:, :2] + 0.5
     polygons = Polygons(corners, uvs, np.array([0, 4]), np.array([(0.0, 0.0, 1.0)]))
-    target = build_receiver(fit_uv_maps(polygons), 32, 32).charts[0].grid
+    target = build_receiver(flatten(polygons), 32, 32).charts[0].grid
     mesh = Mesh(corners, np.array([(0, 1, 2), (0, 2, 3)], np.uint32))
     low_sun = replace(SUN, direction=(math.sin(1.5), 0.0, -math.cos(1.5)))
     irradiance, _ = light_beams(target, low_sun, mesh)
@@ -334,14 +336,14 @@ def test_charts_are_baked_apart_on_planes_of_their_own():
     turned = {"normal": (math.sin(math.pi / 3), 0.0, 0.5), "x_axis": (0.5, 0.0, -math.sin(math.pi / 3))}
     coverage = np.zeros((24, 60), np.float32)
     planes = [square(), replace(square(), **turned, coverage=square().coverage * np.float32(0.5))]
-    charts = tuple(Chart(plane, plane.coverage, (36 * place, 0)) for place, plane in enumerate(planes))
+    charts = tuple(Chart(plane, (ChartIsland(plane.coverage, (36 * place, 0)),)) for place, plane in enumerate(planes))
     for chart in charts:
-        chart.part_of(coverage)[:] = chart.coverage
+        chart.islands[0].part_of(coverage)[:] = chart.islands[0].coverage
     whole = BakeJob("Plane", Receiver(coverage, charts), Illumination([SUN]), Surface(MATERIAL), SETTINGS, BAKE_STEPS)
     texture = whole.run().texture
     for chart, plane in zip(charts, planes):
         alone = bake(plane, Illumination([SUN]), MATERIAL, 0.0, SETTINGS)
-        assert np.array_equal(chart.part_of(texture), alone)
+        assert np.array_equal(chart.islands[0].part_of(texture), alone)
     assert not texture[:, 24:36].any()
     assert texture[12, 48] == pytest.approx(0.25 * reflectance(60) * 2 / math.pi, rel=2e-3)
 

@@ -12,9 +12,10 @@ from beamspread.core.bake.surface import Surface
 from beamspread.core.ldf.library import library
 from beamspread.core.material import Material
 from beamspread.core.native import native
+from beamspread.core.scene.chart import Chart, ChartIsland
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight, WorldLight
-from beamspread.core.scene.receiver import Chart, Receiver
+from beamspread.core.scene.receiver import Receiver
 
 from bakes import square
 
@@ -164,7 +165,7 @@ def test_light_of_a_lamp_comes_from_its_position(is_sun):
 def test_a_job_bakes_the_light_that_it_finds():
     """Found once for the whole receiver, before anything says that the job is dark, and cancelled with it."""
     grid = grid_of(8, 8)
-    receiver = Receiver(grid.coverage, (Chart(grid, grid.coverage),))
+    receiver = Receiver(grid.coverage, (Chart(grid, (ChartIsland(grid.coverage, (0, 0)),)),))
     seen = []
 
     class FindLight(Step):

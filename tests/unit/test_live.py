@@ -19,11 +19,12 @@ from beamspread.core.live.live_target import LiveTarget
 from beamspread.core.live.render_thread import RenderThread
 from beamspread.core.live.renderer import SIDES, LiveRenderer, for_live, quick_side
 from beamspread.core.material import Material
+from beamspread.core.scene.flat_mesh import flatten
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import AreaLight, PointLight, SunLight
+from beamspread.core.scene.polygons import Polygons
 from beamspread.core.scene.receiver import Receiver, build_receiver
 from beamspread.core.scene.texture import Texture
-from beamspread.core.scene.uv_map import Polygons, fit_uv_maps
 from beamspread.core.target import Target
 
 CORNERS = np.array([(-1.0, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
@@ -248,7 +249,7 @@ def test_media_of_many_terms_are_quick_too(ior, total, worst, renderer):
 def test_quick_renderings_have_all_detail_of_a_texture(blur, renderer):
     """The texture has squares of 8 texels of 256; the quick rendering has 64 texels."""
     plain = live_target(LAMP)
-    receiver = build_receiver(fit_uv_maps(FLOOR), 256, 256)
+    receiver = build_receiver(flatten(FLOOR), 256, 256)
     bright = np.add.outer(np.arange(256) // 8, np.arange(256) // 8) % 2
     colors = np.repeat(np.where(bright, 0.7, 0.3)[..., None], 3, axis=2).astype(np.float32)
     texture = Texture(receiver, (colors,), blur)

@@ -19,11 +19,12 @@ from beamspread.core.live.renderer import LiveRenderer, for_live
 from beamspread.core.material import Material
 from beamspread.core.native import native
 from beamspread.core.recent import keep_with
+from beamspread.core.scene.flat_mesh import flatten
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import PointLight, WorldLight
 from beamspread.core.scene.occluders import Mesh, Occluder
+from beamspread.core.scene.polygons import Polygons
 from beamspread.core.scene.receiver import build_receiver
-from beamspread.core.scene.uv_map import Polygons, fit_uv_maps
 from beamspread.core.target import Target
 
 SIDE = 128
@@ -53,7 +54,7 @@ def target_by_wall(x=0.3, max_bounces=(4, 4, 4), albedo=(0.8, 0.1, 0.1)):
 
 def baked(target):
     """The texture of a bake of the target."""
-    receiver = build_receiver(fit_uv_maps(target.polygons), SIDE, SIDE)
+    receiver = build_receiver(flatten(target.polygons), SIDE, SIDE)
     steps = BouncedLight(target.max_bounces), Solve()
     return BakeJob("Floor", receiver, target.illumination, target.surface, target.settings, steps).run().texture
 

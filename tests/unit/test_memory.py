@@ -21,7 +21,8 @@ from beamspread.core.material import Material
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import PointLight, SunLight, WorldLight
 from beamspread.core.scene.receiver import build_receiver
-from beamspread.core.scene.uv_map import Polygons, fit_uv_maps
+from beamspread.core.scene.flat_mesh import flatten
+from beamspread.core.scene.polygons import Polygons
 
 allowed, size, solver, names, color, anisotropy, ior, path, thickness, layer = eval(sys.argv[1])
 noise = np.random.default_rng(0).random((64, 128, 3), np.float32)
@@ -34,7 +35,7 @@ made = {
     "world": WorldLight("World", 1.0, (1, 1, 1), True, noise, axes),
 }
 corners = np.array([(-0.5, -0.5, 0), (0.5, -0.5, 0), (0.5, 0.5, 0), (-0.5, 0.5, 0)])
-square = fit_uv_maps(Polygons(corners, corners[:, :2] + 0.5, np.array([0, 4]), np.array([axes[2]], float)))
+square = flatten(Polygons(corners, corners[:, :2] + 0.5, np.array([0, 4]), np.array([axes[2]], float)))
 material = Material(albedo=(0.95, 0.9, 0.8), mean_free_path=(path,) * 3, anisotropy=anisotropy, ior=ior)
 surface, settings = Surface(material, thickness), BakeSettings(solver=solver, quality="preview", layer=layer)
 for medium in surface.media():

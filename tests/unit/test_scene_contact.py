@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from beamspread.core.native import native
+from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import PointLight, SunLight
 from beamspread.core.scene.occluders import Mesh, Occluder
-from beamspread.core.scene.receiver import Grid
 
 from helpers import gather_beams
 from shapes import FACES, SQUARE, box, sphere

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from beamspread.core.bake.layers import arrive, bake
 from beamspread.core.material import Material
+from beamspread.core.scene.chart import Chart, ChartIsland
+from beamspread.core.scene.flat_mesh import flatten
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import AreaLight, PointLight, SunLight
-from beamspread.core.scene.receiver import Chart, Receiver, build_receiver
+from beamspread.core.scene.polygons import Polygons
+from beamspread.core.scene.receiver import Receiver, build_receiver
 from beamspread.core.scene.texture import mean_color, textured
-from beamspread.core.scene.uv_map import Polygons, fit_uv_maps
 
 from bakes import SETTINGS, square
 
@@ -72,7 +74,7 @@ class TestTextured:
     def receiver(self, grid):
         half = grid.coverage.copy()
         half[:, SIZE // 2 :] = 0
-        return Receiver(half, (Chart(replace(grid, coverage=half), half),))
+        return Receiver(half, (Chart(replace(grid, coverage=half), (ChartIsland(half, (0, 0)),)),))
 
     def colors(self):
         colors = np.full((SIZE, SIZE, 3), (0.2, 0.4, 0.0), np.float32)
@@ -103,8 +105,8 @@ def test_uvs_and_positions_of_a_grid_are_those_of_the_mesh(slant):
     uvs = np.array([(0, 0.1), (0.8, 0.1), (0.8, 0.9), (0, 0.9)])
     corners = np.stack([uvs[:, 0] + slant * uvs[:, 1], 2 * uvs[:, 1], np.full(4, 5.0)], axis=1)
     polygons = Polygons(corners, uvs, np.array([0, 4]), np.array([(0.0, 0.0, 1.0)]))
-    (chart,) = build_receiver(fit_uv_maps(polygons), 40, 30).charts
-    assert (chart.texel_to_grid is None) == (slant == 0)
+    (chart,) = build_receiver(flatten(polygons), 40, 30).charts
+    assert (chart.islands[0].texel_to_grid is None) == (slant == 0)
     for at in ((0.5, 0.5), (0.1, 0.7)):
         found, positions = chart.uvs(40, 30, at), chart.grid.positions(at)
         u, v = np.moveaxis(found, -1, 0)

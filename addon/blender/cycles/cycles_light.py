@@ -29,8 +29,8 @@ from ...core.bake.smoothing import SPLINE_VARIANCE, smoothing_variance
 from ...core.errors import MissingImageError
 from ...core.messages import Message, note, warning
 from ...core.progress import Callback, Progress
+from ...core.scene.grid import Grid
 from ...core.scene.lights import STRATA, Field, FieldLight, Light, WorldLight
-from ...core.scene.receiver import Grid
 from .. import compat
 from ..read.image_nodes import missing_images
 from ..read.nodes import Links, surface_of

@@ -9,8 +9,8 @@ from ...core.bake.bake_settings import COMBINED
 from ...core.bake.margin import WHOLE, extend_margin
 from ...core.bake.runner import Bake
 from ...core.errors import BakeError
+from ...core.scene.flat_mesh import flatten
 from ...core.scene.receiver import Receiver, build_receiver
-from ...core.scene.uv_map import fit_uv_maps
 from ...core.target import Target
 from ..node.find import find_node
 from ..node.node import link_result
@@ -203,16 +203,17 @@ def check_editable(material) -> None:
 
 
 def parts_of(receiver: Receiver) -> Parts:
-    """Charts of a receiver in its texture."""
-    return tuple((*chart.offset, chart.coverage) for chart in receiver.charts)
+    """Islands of a receiver in its texture."""
+    islands = (island for chart in receiver.charts for island in chart.islands)
+    return tuple((*island.offset, island.coverage) for island in islands)
 
 
 def read_parts(target: Target, width: int, height: int) -> Parts:
-    """Charts of a target in a texture of that size; the whole texture if they are unknown."""
+    """Islands of a target in a texture of that size; the whole texture if they are unknown."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     try:
         obj = bpy.data.objects[target.object_name].evaluated_get(depsgraph)
-        return parts_of(build_receiver(fit_uv_maps(read_polygons(obj, target.material_name)), width, height))
+        return parts_of(build_receiver(flatten(read_polygons(obj, target.material_name)), width, height))
     except BakeError:
         return ((0, 0, np.ones((height, width), np.float32)),)
 

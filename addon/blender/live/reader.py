@@ -13,10 +13,11 @@ from ...core.errors import text_of
 from ...core.live.live_target import LiveTarget
 from ...core.live.renderer import for_live
 from ...core.messages import Message, note
+from ...core.scene.flat_mesh import flatten
 from ...core.scene.illumination import Illumination
+from ...core.scene.polygons import Polygons
 from ...core.scene.receiver import Receiver, build_receiver, texture_size
 from ...core.scene.texture import BaseColor
-from ...core.scene.uv_map import Polygons, fit_uv_maps
 from ...core.target import Target
 from .. import compat
 from ..cycles.sky import SkyService
@@ -218,7 +219,8 @@ class Reader:
 
         def read() -> BaseColor:
             instance = find_instances(depsgraph, {target.object_name})[target.object_name]
-            return read_texture(node.color_input(groups), node.texture_blur, instance, _receiver(polygons, size))
+            receiver = _receiver(polygons, size, min(node.surface().material.mean_free_path))
+            return read_texture(node.color_input(groups), node.texture_blur, instance, receiver)
 
         tree = scene_cache.texture(material, node.color_input(groups))
         color = scene_cache.get(("texture", target), [material], read, tree.images, (tree.text, polygons, size))
@@ -241,11 +243,11 @@ def _blurred(color: BaseColor, blur: float) -> BaseColor:
     return replace(color, texture=replace(color.texture, blur=blur))
 
 
-def _receiver(polygons: Polygons, size: Size) -> Receiver:
-    maps = fit_uv_maps(polygons)
-    width, height = texture_size(maps, size) if isinstance(size, int) else size
+def _receiver(polygons: Polygons, size: Size, mean_free_path: float) -> Receiver:
+    mesh = flatten(polygons, mean_free_path)
+    width, height = texture_size(mesh, size) if isinstance(size, int) else size
     shrink = min(1.0, MAX_TEXELS / max(width, height))
-    return build_receiver(maps, max(1, round(width * shrink)), max(1, round(height * shrink)))
+    return build_receiver(mesh, max(1, round(width * shrink)), max(1, round(height * shrink)))
 
 
 def _image_size(material, image) -> tuple[int, int] | None:

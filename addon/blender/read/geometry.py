@@ -10,7 +10,7 @@ import numpy as np
 from ...core.errors import ReceiverError
 from ...core.messages import Message
 from ...core.scene.occluders import Mesh, Occluder
-from ...core.scene.uv_map import Polygons
+from ...core.scene.polygons import Polygons
 from .image_nodes import UVTransform
 from .reflection import MaterialReflection, MediumOf, reflection_of
 from .scene_cache import SceneCache

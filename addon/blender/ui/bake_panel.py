@@ -9,7 +9,7 @@ import bpy
 from ...core import native
 from ...core.errors import BakeError, message_of
 from ...core.messages import Messages
-from ...core.scene.uv_map import check_uvs
+from ...core.scene.islands import check_uvs
 from .. import compat
 from ..images.files import check_image
 from ..images.results import check_editable

@@ -11,8 +11,9 @@ import numpy as np
 from ..messages import note, warning
 from ..native import native
 from ..progress import Progress
+from ..scene.grid import Grid
 from ..scene.lights import STRATA, Field, FieldLight
-from ..scene.receiver import Grid, Receiver
+from ..scene.receiver import Receiver
 from .estimate import bounced_seconds
 from .job import BakeJob, Step
 from .layers import WITHOUT_MEDIUM, mean_irradiance, mean_open_irradiance

@@ -13,9 +13,9 @@ from ..ldf.library import library, load_source
 from ..material import Material, check_thickness
 from ..native import native
 from ..progress import Callback, Progress
+from ..scene.grid import Grid
 from ..scene.illumination import Illumination
 from ..scene.lights import Light
-from ..scene.receiver import Grid
 from .bake_settings import COMBINED, DIRECTION, IRRADIANCE, BakeSettings
 from .surface import channel_media
 

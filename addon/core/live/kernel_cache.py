@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..native import native
 from ..recent import keep_recent
-from ..scene.receiver import Grid
+from ..scene.grid import Grid
 
 # (Largest angle of incidence in degrees, error of the kernels), tried in order until a field has few terms. Refracted
 # light needs 17 terms for the first. Without refraction kernels change much toward grazing.

@@ -11,8 +11,8 @@ import numpy as np
 from ..bake.bake_settings import BakeSettings
 from ..bake.surface import Surface
 from ..scene.illumination import Illumination
+from ..scene.polygons import Polygons
 from ..scene.texture import Texture
-from ..scene.uv_map import Polygons
 from ..target import Target
 
 LARGE_ARRAY_BYTES = 1 << 20

@@ -16,11 +16,12 @@ from ..ldf.library import load_source
 from ..material import Material
 from ..progress import Progress
 from ..recent import keep_recent
+from ..scene.flat_mesh import FlatMesh, flatten
+from ..scene.grid import Grid
 from ..scene.illumination import Illumination
 from ..scene.lights import Light, WorldLight
-from ..scene.receiver import Grid, build_receiver, texture_size
+from ..scene.receiver import build_receiver, texture_size
 from ..scene.sampling import resized
-from ..scene.uv_map import fit_uv_maps
 from ..target import Target
 from .bounced_layer import BOUNCED_SIDE, BouncedLayers, with_bounced, without_direct
 from .framed_receiver import FramedReceiver
@@ -88,13 +89,13 @@ class LiveRenderer:
         self._libraries = libraries
         self._last_libraries: dict[Target, list] = {}  # of each channel
         self._receivers: dict = {}
-        self._maps: dict = {}
+        self._meshes: dict = {}
         self._direct: dict[Target, np.ndarray] = {}  # last quick luminance, at its few texels
         self._bounced = BouncedLayers()
 
     def size_of(self, target: LiveTarget) -> tuple[int, int]:
         """Width and height of the target's image in texels."""
-        return target.size or texture_size(self._uv_maps(target), target.resolution)
+        return target.size or texture_size(self._mesh(target), target.resolution)
 
     def quick(self, target: LiveTarget, side: int, progress: Progress | None = None) -> Rendering:
         """Render at most `side` texels along the longer side, interpolated to the size of the image.
@@ -216,21 +217,23 @@ class LiveRenderer:
         )
         return luminance if color is None else luminance * color
 
-    def _uv_maps(self, target: LiveTarget) -> list:
-        key = id(target.polygons)
-        if key not in self._maps:
+    def _mesh(self, target: LiveTarget) -> FlatMesh:
+        path = min(target.surface.material.mean_free_path)
+        key = id(target.polygons), path
+        if key not in self._meshes:
             # The entry holds the polygons, so that no others get their identity.
-            keep_recent(self._maps, key, (target.polygons, fit_uv_maps(target.polygons)), MAX_RECEIVERS)
-        return self._maps[key][1]
+            keep_recent(self._meshes, key, (target.polygons, flatten(target.polygons, path)), MAX_RECEIVERS)
+        return self._meshes[key][1]
 
     def _receiver(self, target: LiveTarget, size: tuple[int, int]) -> FramedReceiver:
-        key = id(target.polygons), id(target.texture), size, target.settings.margin
+        mesh = self._mesh(target)
+        key = id(mesh), id(target.texture), size, target.settings.margin
         if key not in self._receivers:
-            receiver = build_receiver(self._uv_maps(target), *size, target.target.object_name)
+            receiver = build_receiver(mesh, *size, target.target.object_name)
             if target.texture is not None:
                 receiver = target.texture.on(receiver)
             framed = FramedReceiver(receiver, target.settings.margin)
-            keep_recent(self._receivers, key, (framed, target.polygons, target.texture), MAX_RECEIVERS)
+            keep_recent(self._receivers, key, (framed, mesh, target.texture), MAX_RECEIVERS)
         return self._receivers[key][0]
 
 

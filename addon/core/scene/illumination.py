@@ -9,9 +9,9 @@ from copy import copy
 import numpy as np
 
 from ..messages import Message, Messages
+from .grid import Grid
 from .lights import Light
 from .occluders import Mesh, Occluder, build
-from .receiver import Grid
 
 # Distance of the origins that shadows are traced relative to, texels; up to twice as far. Larger values let more
 # receivers share a hierarchy, and round more: vertices by up to 2^-24 of it, and rays start 16 times 2^-23 of it off

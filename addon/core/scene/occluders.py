@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from ..native import native
-from .receiver import Vector, owner_number
+from .grid import Vector, owner_number
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 
 from ..messages import Message, warning
-from .receiver import Chart, Receiver
+from .chart import Chart
+from .receiver import Receiver
 from .sampling import bilinear, sample_positions
 
 # Largest number of samples of a finer texture along each side of a texel. More: less aliasing, more time.
@@ -76,8 +77,7 @@ class Texture:
         count = int(np.clip(np.ceil(finer - 0.01), 1, MAX_SAMPLES))
         total = np.zeros((target.grid.height * target.grid.width, 3), np.float32)
         for at in sample_positions(count):
-            x, y = chart.grid_positions(target.uvs(receiver.width, receiver.height, at), self.receiver)
-            total += bilinear(color, x, y)
+            total += bilinear(color, *chart.grid.columns_and_rows(target.grid.positions(at)))
         return (total / count**2).reshape(target.grid.height, target.grid.width, 3)
 
 

@@ -18,10 +18,10 @@ from ....core.bake.runner import Bake
 from ....core.bake.steps import BAKE_STEPS, needs_medium, to_simulate
 from ....core.bake.surface import Surface
 from ....core.native import native
+from ....core.scene.flat_mesh import FlatMesh, flatten
 from ....core.scene.illumination import Illumination
 from ....core.scene.receiver import build_receiver, outline, texture_size
 from ....core.scene.texture import BaseColor
-from ....core.scene.uv_map import UvMap, fit_uv_maps
 from ....core.target import Target
 from ...cycles.colors import BaseColorByCycles, not_evaluated
 from ...cycles.cycles_light import CyclesLight
@@ -47,7 +47,7 @@ class BakePlan:
     Attributes
     ----------
     image : full name of the node's image; "" if it has none.
-    maps, size : UV map of each chart; width and height of the texture.
+    mesh, size : flat parts of the object; width and height of the texture.
     surface : values of the node, without its linked base color.
     by_cycles : completes the illumination, which all plans share.
     color : base color that is linked to the node, or None.
@@ -57,7 +57,7 @@ class BakePlan:
 
     target: Target
     image: str
-    maps: list[UvMap]
+    mesh: FlatMesh
     size: tuple[int, int]
     surface: Surface
     illumination: Illumination
@@ -80,7 +80,7 @@ class BakePlan:
 
     def forecast(self) -> Forecast:
         """Facts that tell how long the bake will take."""
-        name, grids = self.target.object_name, [outline(uv_map, *self.size) for uv_map in self.maps]
+        name, grids = self.target.object_name, [outline(part, *self.size) for part in self.mesh.parts]
         light = self.illumination.lighting(name)
         lamps = sum(name in bpy.data.objects for name in light.by_cycles)
         bounced = bool(light.lights or light.by_cycles) and self.by_cycles.is_below_something(grids)
@@ -96,8 +96,8 @@ class BakePlan:
     def bake(self, settings: BakeSettings) -> Bake:
         """The bake, with its job or the error; call it in the main thread."""
         try:
-            receiver = build_receiver(self.maps, *self.size, self.target.object_name)
-            illumination = self.illumination.lighting(self.target.object_name)
+            receiver = build_receiver(self.mesh, *self.size, self.target.object_name)
+            illumination = self.illumination.lighting(self.target.object_name).with_messages(*self.mesh.messages)
             job = BakeJob(
                 self.target.object_name, receiver, illumination, self.surface_with_color(), settings, BAKE_STEPS
             )
@@ -271,12 +271,12 @@ def _read_target(
         image_size = size_of_frames(image) if is_sequence(image) else tuple(image.size)
         size = image_size if resolution is None else None
     polygons = read_polygons(instance.obj, target.material_name, instance.matrix)
-    maps = fit_uv_maps(polygons)
-    size = size or texture_size(maps, resolution or depsgraph.scene.beamspread.resolution)
-    plan = BakePlan(target, "" if image is None else image.name_full, maps, size, surface, *light)
+    mesh = flatten(polygons, min(surface.material.mean_free_path), target.object_name)
+    size = size or texture_size(mesh, resolution or depsgraph.scene.beamspread.resolution)
+    plan = BakePlan(target, "" if image is None else image.name_full, mesh, size, surface, *light)
     if not node.has_texture():
         return plan
-    receiver, blur = build_receiver(maps, *size), node.texture_blur
+    receiver, blur = build_receiver(mesh, *size), node.texture_blur
     color = read_texture(node.color_input(evaluated.groups), blur, instance, receiver, check)
     matrix = np.array(instance.matrix).tolist() if instance.is_instance else None
     return replace(plan, color=color, blur=blur, matrix=matrix)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...native import native
-from ..receiver import Grid, Vector
+from ..grid import Grid, Vector
 from .light_kinds import Light
 
 # Rings of the hemisphere from the zenith down: squared sine of the angle at the lower border, and number of sectors.

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...native import native
 from ...recent import keep_with
-from ..receiver import Grid, Vector
+from ..grid import Grid, Vector
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,68 @@
+"""A mesh as flat parts, each a plane with the islands that show it in a texture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import ReceiverError
+from ..messages import Message, note, warning
+from .islands import Island, check_uvs, find_islands
+from .planes import FLATNESS_TOLERANCE, FLATTENED, Plane, find_planes
+from .polygons import Polygons
+
+
+@dataclass(frozen=True, eq=False)
+class FlatPart:
+    """Faces of a mesh on one plane."""
+
+    plane: Plane
+    islands: tuple[Island, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class FlatMesh:
+    """The parts of a mesh that can be baked, the largest first, and messages about the rest."""
+
+    parts: tuple[FlatPart, ...]
+    messages: tuple[Message, ...] = ()
+
+
+def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> FlatMesh:
+    """Find the flat parts of a mesh of the object `name`.
+
+    Faces are flattened onto a plane within a mean free path, in the units of the mesh, or within `FLATTENED`: the
+    medium, or the texels, show no more.
+
+    Raises
+    ------
+    ReceiverError
+        The mesh has no faces, no area or no flat part, or UVs that are missing, outside 0..1 or without area.
+    """
+    if not polygons.count:
+        raise ReceiverError("No face uses this material.", "Assign it to the faces that should be baked.")
+    if not np.isfinite(polygons.corners).all():
+        raise ReceiverError("The mesh has vertices at infinity.", "Check its modifiers and scale.")
+    tolerance = max(mean_free_path, FLATTENED * polygons.diagonal)
+    planes, bent = find_planes(polygons, tolerance)
+    if not planes:
+        raise ReceiverError(
+            "The faces are not flat: they bend from one to the next.",
+            "Only flat faces, and edges of 30 degrees or more between them, can be baked.",
+        )
+    check_uvs(polygons.uvs)
+    exact = FLATNESS_TOLERANCE * polygons.diagonal
+    parts = []
+    for plane in planes:
+        # Faces that are flattened are shorter on the plane than their UVs say.
+        fitted = tolerance if plane.deviation > exact else exact
+        parts.append(FlatPart(plane, find_islands(polygons, plane, fitted)))
+    messages = []
+    if len(bent):
+        text = f"{len(bent)} of {polygons.count} faces of '{name}' are bent and stay black."
+        messages.append(warning(name, text, "Give them another material, or flatten them."))
+    deviation = max(plane.deviation for plane in planes)
+    if deviation > exact:
+        messages.append(note(name, f"'{name}' is baked as flat faces; it departs from them by {deviation:.3g} units."))
+    return FlatMesh(tuple(parts), tuple(messages))

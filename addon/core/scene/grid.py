@@ -1,0 +1,85 @@
+"""Grids of texels on planes, on which light arrives and is solved.
+
+Positions are world positions in scene units. Rows of all arrays run up the plane: row 0 is the bottom.
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..native import native
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """The grid. Its frame is the plane's: x along columns, y up the rows, z outward.
+
+    Attributes
+    ----------
+    origin : world position of the outer corner of texel (0, 0).
+    x_axis, y_axis : unit vectors along columns and (upward) rows, orthogonal; a mirrored UV map makes
+        (x_axis, y_axis, normal) left-handed, which is fine because LDFs are mirror-symmetric.
+    normal : unit vector, outward.
+    pitch_x, pitch_y : texel size along the axes, scene units.
+    width, height : number of texels.
+    coverage : float32 (height, width), fraction of each texel inside the mesh, 0..1.
+    clearance : largest distance of the mesh from the plane, scene units; shadow rays start above it.
+    owner : name of the object that the plane belongs to; faces of other objects that lie on the plane cover it.
+    color_in, color_out : float32 (height, width, 3), factors of entering and leaving light by the surface's texture;
+        None without a texture.
+    """
+
+    origin: Vector
+    x_axis: Vector
+    y_axis: Vector
+    normal: Vector
+    pitch_x: float
+    pitch_y: float
+    width: int
+    height: int
+    coverage: np.ndarray
+    clearance: float = 0.0
+    color_in: np.ndarray | None = None
+    color_out: np.ndarray | None = None
+    owner: str = ""
+
+    @property
+    def centre(self) -> np.ndarray:
+        """World position of the grid's centre."""
+        across = 0.5 * self.width * self.pitch_x * np.array(self.x_axis)
+        return self.origin + across + 0.5 * self.height * self.pitch_y * np.array(self.y_axis)
+
+    def positions(self, at: tuple[float, float] = (0.5, 0.5)) -> np.ndarray:
+        """World positions, float64 (height, width, 3), `at` columns and rows from each texel's corner."""
+        columns = (np.arange(self.width) + at[0])[None, :, None] * self.pitch_x * np.array(self.x_axis)
+        rows = (np.arange(self.height) + at[1])[:, None, None] * self.pitch_y * np.array(self.y_axis)
+        return np.array(self.origin) + columns + rows
+
+    def columns_and_rows(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Columns and rows, flat arrays in texels, of world positions (..., 3)."""
+        offsets = positions.reshape(-1, 3) - self.origin
+        return offsets @ np.array(self.x_axis) / self.pitch_x, offsets @ np.array(self.y_axis) / self.pitch_y
+
+    def height_of(self, point: Vector) -> float:
+        """Distance of a world point from the plane, outward; negative behind it."""
+        return float(np.dot(np.subtract(point, self.origin), self.normal))
+
+    def native(self):
+        """The native `ReceiverGrid`."""
+        axes = self.x_axis, self.y_axis, self.normal
+        size = self.pitch_x, self.pitch_y, self.width, self.height
+        return native.ReceiverGrid(self.origin, *axes, *size, owner_number(self.owner))
+
+    def surface(self):
+        """The native `Surface`, which views the arrays of the grid."""
+        return native.Surface(self.native(), self.coverage, self.clearance, self.color_in, self.color_out)
+
+
+def owner_number(name: str) -> int:
+    """Number that stands for an object in native code."""
+    return zlib.crc32(name.encode())

@@ -1,0 +1,149 @@
+"""Islands: parts of a plane that the UV map shows in one piece, by an affine map P = p_0 + u p_u + v p_v."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import ReceiverError
+from .planes import FLATNESS_TOLERANCE, Plane
+from .polygons import Polygons, components
+
+# Largest distance of UVs from 0..1: rounding of float32 coordinates.
+UV_TOLERANCE = 1e-4
+
+# Extent in UVs, over that of the whole map, below which an island has no area.
+NO_EXTENT = 1e-6
+
+# Largest number of islands of a mesh; more take much time and memory.
+MAX_ISLANDS = 100_000
+
+
+@dataclass(frozen=True, eq=False)
+class Island:
+    """Faces of a plane with P(u, v) = p_0 + u p_u + v p_v; `polygons` have their corners on the plane."""
+
+    polygons: Polygons
+    p_0: np.ndarray
+    p_u: np.ndarray
+    p_v: np.ndarray
+
+    def is_orthogonal(self) -> bool:
+        """True if texels are rectangles."""
+        cosine = self.p_u @ self.p_v / (np.linalg.norm(self.p_u) * np.linalg.norm(self.p_v))
+        return abs(cosine) < FLATNESS_TOLERANCE
+
+
+def check_uvs(uvs: np.ndarray | None) -> None:
+    """Raise ReceiverError for UVs that are missing, no numbers, or outside of the image."""
+    if uvs is None or len(uvs) == 0:
+        raise ReceiverError("The mesh has no UV map.", "Unwrap it first (UV > Unwrap in Edit Mode).")
+    if not np.isfinite(uvs).all():
+        raise ReceiverError("The UV map has coordinates that are not numbers.", "Unwrap the mesh again.")
+    low, high = uvs.min(), uvs.max()
+    if low < -UV_TOLERANCE or high > 1 + UV_TOLERANCE:
+        raise ReceiverError(
+            f"The UV map reaches outside the image (coordinates from {low:.3g} to {high:.3g}).",
+            "Scale and move it to fit between 0 and 1.",
+        )
+
+
+def find_islands(polygons: Polygons, plane: Plane, tolerance: float) -> tuple[Island, ...]:
+    """Islands of a plane, the largest first. Corners are within `tolerance` of their affine map.
+
+    Faces that their UVs bend, as trapezoids on squares, are cut into triangles.
+
+    Raises
+    ------
+    ReceiverError
+        Faces have no area in the UV map.
+    """
+    part = polygons.of_faces(plane.faces)
+    heights = (part.corners - plane.centre) @ plane.normal
+    part = replace(part, corners=part.corners - heights[:, None] * plane.normal)
+    whole = _fit(part, plane, tolerance)
+    if whole is not None:
+        return (whole,)
+    islands: list[Island] = []
+    for piece in _pieces(part, _connected(part)):
+        island = _fit(piece, plane, tolerance)
+        islands += [island] if island is not None else _of_triangles(piece, plane, tolerance)
+    lost = part.areas.sum() - sum(island.polygons.areas.sum() for island in islands)
+    if lost > FLATNESS_TOLERANCE * part.areas.sum():
+        raise ReceiverError("The UV map has no area, in all or some of the faces.", "Unwrap the mesh again.")
+    return tuple(sorted(islands, key=lambda island: -island.polygons.areas.sum()))
+
+
+def _of_triangles(piece: Polygons, plane: Plane, tolerance: float) -> list[Island]:
+    """Islands of faces that the UV map bends: of faces where it is affine within one, else of triangles."""
+    islands = []
+    for face in _pieces(piece, np.arange(piece.count)):
+        island = _fit(face, plane, tolerance)
+        if island is not None:
+            islands.append(island)
+            continue
+        triangles = face.triangles()
+        parts = _pieces(triangles, np.arange(triangles.count))
+        islands += filter(None, (_fit(triangle, plane, np.inf) for triangle in parts if triangle.areas.any()))
+    return _joined(islands)
+
+
+def _joined(islands: Sequence[Island]) -> list[Island]:
+    """Islands with the same map become one."""
+    groups: dict[tuple, list[Island]] = {}
+    for island in islands:
+        values = np.concatenate([island.p_0, island.p_u, island.p_v])
+        step = FLATNESS_TOLERANCE * np.linalg.norm(island.p_u)
+        groups.setdefault(tuple(np.round(values / step).tolist()), []).append(island)
+    return [_union(group) for group in groups.values()]
+
+
+def _union(group: Sequence[Island]) -> Island:
+    parts = [island.polygons for island in group]
+    sizes = np.concatenate([part.sizes for part in parts])
+    corners, uvs, normals = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("corners", "uvs", "normals")
+    )
+    joined = Polygons(corners, uvs, np.concatenate([[0], np.cumsum(sizes)]).astype(int), normals)
+    return replace(group[0], polygons=joined)
+
+
+def _connected(part: Polygons) -> np.ndarray:
+    """Number of the connected part in the UV map of each face, int (N,)."""
+    first, second = part.shared_edges
+    following = part.next_corners
+    is_same = np.zeros(len(first), bool)
+    for begin, end in ((second, following[second]), (following[second], second)):
+        near = np.abs(part.uvs[first] - part.uvs[begin]).max(axis=1) < UV_TOLERANCE * 0.1
+        near &= np.abs(part.uvs[following[first]] - part.uvs[end]).max(axis=1) < UV_TOLERANCE * 0.1
+        is_same |= near
+    faces = part.face_of
+    return components(part.count, faces[first[is_same]], faces[second[is_same]])
+
+
+def _pieces(part: Polygons, labels: np.ndarray) -> list[Polygons]:
+    order = np.argsort(labels, kind="stable")
+    counts = np.bincount(labels)
+    if len(counts) > MAX_ISLANDS:
+        raise ReceiverError(
+            f"The UV map has {len(counts)} islands; {MAX_ISLANDS} are allowed.", "Unwrap the mesh again."
+        )
+    return [part.of_faces(faces) for faces in np.split(order, np.cumsum(counts)[:-1])]
+
+
+def _fit(part: Polygons, plane: Plane, tolerance: float) -> Island | None:
+    """The island of faces; None if no affine map with an area fits them."""
+    corners, uvs = part.corners, part.uvs
+    uv_centre, centre = uvs.mean(axis=0), corners.mean(axis=0)
+    extents = np.linalg.svd(uvs - uv_centre, compute_uv=False)
+    if extents[1] < NO_EXTENT * np.sqrt(len(uvs)):
+        return None
+    slopes = np.linalg.lstsq(uvs - uv_centre, corners - centre, rcond=None)[0]
+    if np.abs(centre + (uvs - uv_centre) @ slopes - corners).max() > tolerance:
+        return None
+    p_u, p_v = slopes - np.outer(slopes @ plane.normal, plane.normal)
+    if np.linalg.norm(np.cross(p_u, p_v)) < 1e-9 * np.linalg.norm(p_u) * np.linalg.norm(p_v):
+        return None
+    return Island(part, centre - uv_centre @ slopes, p_u, p_v)

@@ -1,0 +1,154 @@
+"""Faces of a mesh, and which of them touch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+# Distance of corners, over the diagonal of all, below which they are the same point.
+SAME_POINT = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Polygons:
+    """The faces that receive light.
+
+    Attributes
+    ----------
+    corners : float64 (K, 3), world positions of all face corners.
+    uvs : float64 (K, 2), or None if the mesh has no UV map.
+    starts : int (N + 1,), face i has the corners starts[i] : starts[i + 1].
+    normals : float64 (N, 3), outward unit normals, world.
+    """
+
+    corners: np.ndarray
+    uvs: np.ndarray | None
+    starts: np.ndarray
+    normals: np.ndarray
+
+    @property
+    def count(self) -> int:
+        """Number of faces."""
+        return len(self.starts) - 1
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """Number of corners of each face, int (N,)."""
+        return np.diff(self.starts)
+
+    @property
+    def face_of(self) -> np.ndarray:
+        """Face of each corner, int (K,)."""
+        return np.repeat(np.arange(self.count), self.sizes)
+
+    @property
+    def diagonal(self) -> float:
+        """Length of the diagonal of the box around all corners."""
+        return float(np.linalg.norm(np.ptp(self.corners, axis=0))) if len(self.corners) else 0.0
+
+    @cached_property
+    def area_vectors(self) -> np.ndarray:
+        """Area of each face times its unit normal, float64 (N, 3), outward."""
+        first = self.corners[np.repeat(self.starts[:-1], self.sizes)]
+        crosses = np.cross(self.corners - first, self.corners[self.next_corners] - first)
+        vectors = 0.5 * sums(crosses, self.starts)
+        is_inward = np.einsum("ij,ij->i", vectors, np.nan_to_num(self.normals)) < 0
+        return np.where(is_inward[:, None], -vectors, vectors)
+
+    @cached_property
+    def areas(self) -> np.ndarray:
+        """Area of each face, float64 (N,)."""
+        return np.linalg.norm(self.area_vectors, axis=1)
+
+    @cached_property
+    def points(self) -> np.ndarray:
+        """Number of the point of each corner, int (K,): corners at the same position are one point."""
+        step = SAME_POINT * max(self.diagonal, 1e-30)
+        cells = np.round((self.corners - self.corners.min(axis=0)) / step).astype(np.int64)
+        return np.unique(_mixed(cells), return_inverse=True)[1]
+
+    @cached_property
+    def shared_edges(self) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs of corners, two arrays (P,), at which edges begin that two faces have in common."""
+        begin, end = self.points, self.points[self.next_corners]
+        edges = np.minimum(begin, end) * (begin.max(initial=0) + 1) + np.maximum(begin, end)
+        order = np.argsort(edges, kind="stable")
+        order = order[(begin != end)[order]]
+        is_same = edges[order[1:]] == edges[order[:-1]]
+        return order[:-1][is_same], order[1:][is_same]
+
+    @cached_property
+    def next_corners(self) -> np.ndarray:
+        """The next corner of the same face, int (K,)."""
+        following = np.arange(1, len(self.corners) + 1)
+        ends = self.starts[1:][self.sizes > 0] - 1
+        following[ends] = self.starts[:-1][self.sizes > 0]
+        return following
+
+    def split(self, points: np.ndarray) -> list[np.ndarray]:
+        """Split a per-corner array into one array per face."""
+        return [points[begin:end] for begin, end in zip(self.starts[:-1], self.starts[1:])]
+
+    def of_faces(self, faces: np.ndarray) -> Polygons:
+        """These faces alone."""
+        sizes = self.sizes[faces]
+        starts = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
+        corners = np.repeat(self.starts[:-1][faces] - starts[:-1], sizes) + np.arange(starts[-1])
+        uvs = None if self.uvs is None else self.uvs[corners]
+        return Polygons(self.corners[corners], uvs, starts, self.normals[faces])
+
+    def triangles(self) -> Polygons:
+        """The same faces as triangles around their first corners."""
+        counts = np.maximum(self.sizes - 2, 0)
+        faces = np.repeat(np.arange(self.count), counts)
+        first = self.starts[:-1][faces]
+        step = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        corners = np.stack([first, first + step + 1, first + step + 2], axis=1).ravel()
+        uvs = None if self.uvs is None else self.uvs[corners]
+        return Polygons(self.corners[corners], uvs, np.arange(0, len(corners) + 1, 3), self.normals[faces])
+
+
+def sums(values: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """Sums of rows (K, ...) over the runs that begin at starts[:-1]."""
+    total = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
+    return total[starts[1:]] - total[starts[:-1]]
+
+
+def largest(values: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """Largest value (K,), 0 or more, of each run that begins at starts[:-1]; 0 for an empty one."""
+    result = np.zeros(len(starts) - 1)
+    is_filled = np.diff(starts) > 0
+    if is_filled.any():
+        result[is_filled] = np.maximum.reduceat(values, starts[:-1][is_filled])
+    return result
+
+
+def components(count: int, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Number of the connected part of each of `count` items, int (count,), from pairs of connected items."""
+    label = np.arange(count)
+    while len(first):
+        low = np.minimum(label[first], label[second])
+        before = label.copy()
+        np.minimum.at(label, first, low)
+        np.minimum.at(label, second, low)
+        np.minimum.at(label, before[first], low)
+        np.minimum.at(label, before[second], low)
+        while True:  # every item points at the first item of its part
+            shorter = label[label]
+            if np.array_equal(shorter, label):
+                break
+            label = shorter
+        if np.array_equal(label[first], label[second]):
+            break
+    return np.unique(label, return_inverse=True)[1]
+
+
+def _mixed(cells: np.ndarray) -> np.ndarray:
+    """A number for each row of integers (K, 3); different rows have different ones but for 1 in 2^40 pairs or so."""
+    mixed = cells.astype(np.uint64)
+    with np.errstate(over="ignore"):
+        keys = mixed[:, 0] * np.uint64(0x9E3779B97F4A7C15) + mixed[:, 1] * np.uint64(0xC2B2AE3D27D4EB4F)
+        keys = keys + mixed[:, 2] * np.uint64(0x165667B19E3779F9)
+    return keys ^ (keys >> np.uint64(29))

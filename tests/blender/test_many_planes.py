@@ -1,0 +1,97 @@
+"""Objects with several planes: each is baked as if it were alone, in its own place of the image."""
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+from beamspread.blender.jobs.state import state
+from live_scenes import live_pixels, switch_off
+from mathutils import Matrix
+
+SIDE = 96
+MARGIN = 4
+
+
+@pytest.fixture
+def box():
+    """A turned box with Blender's own UVs, a cross, above a floor, under a lamp and a grey sky."""
+    settings = bpy.context.scene.beamspread
+    settings.use_indirect, settings.margin = False, MARGIN
+    image = bpy.data.images.new("Target", SIDE, SIDE, float_buffer=True, alpha=False)
+    material = scenes.add_material(image=image, linked=True)
+    bpy.ops.mesh.primitive_cube_add(size=1.0)
+    cube = bpy.context.object
+    cube.matrix_world = Matrix.Rotation(0.4, 4, "Z") @ Matrix.Translation((0, 0, 0.6))
+    cube.data.materials.append(material)
+    scenes.add_plane("Floor", (4, 4))
+    scenes.add_lamp((1.5, -1.0, 2.5), power=200, radius=0.2)
+    scenes.add_world((0.2, 0.2, 0.2, 1))
+    return cube
+
+
+def alone(cube, number):
+    """A copy of the box with one face, and a material and an image of its own."""
+    mesh = bpy.data.meshes.new("Face")
+    polygon = cube.data.polygons[number]
+    mesh.from_pydata([cube.data.vertices[v].co for v in polygon.vertices], [], [range(4)])
+    layer = mesh.uv_layers.new(name="UVMap")
+    for corner, loop in enumerate(polygon.loop_indices):
+        layer.data[corner].uv = cube.data.uv_layers[0].data[loop].uv
+    image = bpy.data.images.new("Alone", SIDE, SIDE, float_buffer=True, alpha=False)
+    mesh.materials.append(scenes.add_material("Alone", image=image, linked=True))
+    face = bpy.data.objects.new("Face", mesh)
+    face.matrix_world = cube.matrix_world
+    bpy.context.collection.objects.link(face)
+    return face
+
+
+def texels_of(cube, number):
+    """Bool (SIDE, SIDE): texels wholly inside a face."""
+    loops = cube.data.polygons[number].loop_indices
+    uvs = np.array([cube.data.uv_layers[0].data[loop].uv for loop in loops]) * SIDE
+    low, high = np.ceil(uvs.min(axis=0) + 1).astype(int), np.floor(uvs.max(axis=0) - 1).astype(int)
+    inside = np.zeros((SIDE, SIDE), bool)
+    inside[low[1] : high[1], low[0] : high[0]] = True
+    return inside
+
+
+def test_each_face_of_a_box_is_baked_as_if_it_were_alone(box):
+    """The box stays as a shadow: its back faces block the light of the faces that are baked alone."""
+    together = scenes.bake(box)[0]
+    for number in range(6):
+        face = alone(box, number)
+        inside = texels_of(box, number)
+        expected = scenes.bake(face)[0]
+        bpy.data.objects.remove(face)
+        assert inside.sum() > 100
+        # Both bakes find shadows by rays of the same seed; the material of the box and of the face are the same.
+        np.testing.assert_allclose(together[inside], expected[inside], atol=1e-3 * together.max())
+
+
+def test_live_follows_all_planes(box):
+    bpy.context.scene.beamspread.use_live = True
+    material = box.data.materials[0]
+    live_pixels(material)
+    box.location.x += 0.3
+    live = live_pixels(material)
+    switch_off()
+    np.testing.assert_allclose(live, scenes.bake(box)[0], rtol=1e-4, atol=1e-6)
+
+
+def test_bent_faces_beside_flat_ones_are_named(box):
+    bpy.ops.mesh.primitive_cylinder_add(vertices=64, location=(3, 0, 0))
+    cylinder = bpy.context.object
+    cylinder.data.materials.append(scenes.add_material("Drum"))
+    image = scenes.bake(cylinder)[0]
+    assert image.max() > 0
+    (line,) = [line for line in state.lines() if "bent" in line]
+    assert line.startswith("64 of 66 faces of 'Cylinder' are bent and stay black.")
+
+
+def test_a_ball_is_refused(box):
+    bpy.ops.mesh.primitive_uv_sphere_add(location=(3, 0, 0))
+    ball = bpy.context.object
+    ball.data.materials.append(scenes.add_material("Ball"))
+    scenes.select(ball)
+    with pytest.raises(RuntimeError, match="not flat: they bend from one to the next"):
+        bpy.ops.beamspread.bake()

@@ -1,0 +1,196 @@
+"""Planes and islands: any set of flat faces with clean UVs becomes charts; bent faces are named."""
+
+import numpy as np
+import pytest
+from beamspread.core.errors import ReceiverError
+from beamspread.core.scene.flat_mesh import flatten
+from beamspread.core.scene.planes import find_planes
+from beamspread.core.scene.polygons import Polygons, components
+from beamspread.core.scene.receiver import build_receiver
+
+SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
+
+
+def mesh_of(faces, uvs=None):
+    """Polygons of faces (n, 3) and their UVs (n, 2); normals by the order of corners."""
+    corners = np.concatenate(faces)
+    starts = np.concatenate([[0], np.cumsum([len(face) for face in faces])])
+    normals = np.array([np.cross(face[1] - face[0], face[2] - face[0]) for face in faces])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+    return Polygons(corners, None if uvs is None else np.concatenate(uvs), starts, normals)
+
+
+def box(size=(1.0, 1.0, 1.0)):
+    """Six faces of a box around the origin, normals outward."""
+    faces = []
+    for axis in range(3):
+        for sign in (-1, 1):
+            u, v = ((axis + 1) % 3, (axis + 2) % 3)[:: int(sign)]
+            face = np.zeros((4, 3))
+            face[:, u], face[:, v], face[:, axis] = SQUARE[:, 0] - 0.5, SQUARE[:, 1] - 0.5, 0.5 * sign
+            faces.append(face * size)
+    return faces
+
+
+def atlas(count, margin=0.02):
+    """UVs of squares beside each other in rows of three."""
+    places = [np.array([number % 3, number // 3]) / 3 for number in range(count)]
+    return [place + margin + SQUARE * (1 / 3 - 2 * margin) for place in places]
+
+
+def heights(function, count=24):
+    """Quads over the unit square whose corners have the height that a function gives."""
+    line = np.linspace(0, 1, count + 1)
+    x, y = np.meshgrid(line, line)
+    points = np.stack([x, y, function(x, y)], -1)
+    quads = [points[:-1, :-1], points[:-1, 1:], points[1:, 1:], points[1:, :-1]]
+    faces = np.stack(quads, axis=2).reshape(-1, 4, 3)
+    return list(faces), list(faces[:, :, :2])
+
+
+def test_a_box_has_six_planes_and_each_face_its_texels():
+    receiver = build_receiver(flatten(mesh_of(box(), atlas(6))), 96, 96)
+    assert len(receiver.charts) == 6
+    normals = sorted(tuple(np.round(chart.grid.normal, 9)) for chart in receiver.charts)
+    assert normals == sorted(map(tuple, np.concatenate([np.eye(3), -np.eye(3)])))
+    # Means of positions over the texels of a face are its center.
+    texture = receiver.to_texture([np.float32(chart.grid.positions()) for chart in receiver.charts])
+    for face, uvs in zip(box(), atlas(6)):
+        column, row = (uvs.mean(axis=0) * 96).astype(int)
+        assert texture[row, column] == pytest.approx(face.mean(axis=0), abs=0.03)
+
+
+def test_faces_without_common_vertices_join_by_position():
+    """A plane of four quads whose vertices are all split, as by custom normals."""
+    faces, uvs = heights(lambda x, _y: 0 * x, 2)
+    (part,) = flatten(mesh_of(faces, uvs)).parts
+    assert len(part.plane.faces) == 4
+    assert len(part.islands) == 1
+
+
+def test_both_sides_of_a_plate_are_two_planes():
+    mesh = flatten(mesh_of([*box((1, 1, 1e-3))], atlas(6)))
+    assert len(mesh.parts) == 6
+    assert [abs(part.plane.normal[2]) for part in mesh.parts[:2]] == [1, 1]
+    assert mesh.parts[0].plane.normal[2] == -mesh.parts[1].plane.normal[2]
+
+
+def test_coplanar_faces_of_both_orientations_are_two_planes():
+    face = np.column_stack([SQUARE, np.zeros(4)])
+    mesh = flatten(mesh_of([face, face[::-1]], [SQUARE * 0.4, SQUARE[::-1] * 0.4 + 0.5]))
+    assert sorted(part.plane.normal[2] for part in mesh.parts) == [-1, 1]
+
+
+def test_noise_within_the_medium_is_flattened_and_said():
+    noise = 1e-3 * np.random.default_rng(1).uniform(-1, 1, (25, 25))
+    mesh = flatten(mesh_of(*heights(lambda _x, _y: noise)), mean_free_path=1.1e-3, name="Scan")
+    (part,) = mesh.parts
+    assert len(part.plane.faces) == 24**2
+    assert part.plane.deviation == pytest.approx(1e-3, rel=0.05)
+    (message,) = mesh.messages
+    assert message.text.startswith("'Scan' is baked as flat faces; it departs from them by 0.00")
+
+
+def bevelled_box(bevel, side=1.0):
+    """A strip of a box: top, bevel of two segments and a side."""
+    profile = np.array([(0, side), (0.5, side)])
+    turns = np.pi / 2 - np.array([1, 2, 3]) * np.pi / 6
+    arc = np.column_stack([0.5 + bevel * np.cos(turns), side - bevel + bevel * np.sin(turns)])
+    profile = np.concatenate([profile, arc, [(0.5 + bevel, 0)]])
+    faces, uvs = [], []
+    along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(profile, axis=0), axis=1))])
+    for (x0, z0), (x1, z1), begin, end in zip(profile, profile[1:], along, along[1:]):
+        faces.append(np.array([(x0, 0, z0), (x1, 0, z1), (x1, 1, z1), (x0, 1, z0)]))
+        uvs.append(np.array([(begin, 0), (end, 0), (end, 1), (begin, 1)]) / along[-1])
+    return mesh_of([face[::-1] for face in faces], [uv[::-1] for uv in uvs])
+
+
+def test_small_bevels_go_to_their_planes():
+    mesh = flatten(bevelled_box(1e-3), mean_free_path=2e-3, name="Box")
+    assert len(mesh.parts) == 2
+    assert sum(len(part.plane.faces) for part in mesh.parts) == 5
+    assert "departs" in mesh.messages[0].text
+
+
+def test_a_bent_mesh_is_refused_and_flat_parts_of_another_are_baked():
+    faces, uvs = heights(lambda x, _y: 0.2 * np.sin(6 * x))
+    with pytest.raises(ReceiverError, match="not flat"):
+        flatten(mesh_of(faces, uvs))
+    wall = np.array([(0, 0, 1), (0, 1, 1), (0, 1, 2), (0, 0, 2.0)])
+    mesh = flatten(mesh_of([*faces, wall], [*(uv * 0.5 for uv in uvs), SQUARE * 0.4 + 0.55]), name="Both")
+    (part,) = mesh.parts
+    assert part.plane.faces.tolist() == [24**2]
+    assert mesh.messages[0].text == "576 of 577 faces of 'Both' are bent and stay black."
+
+
+def test_light_crosses_uv_cuts_of_a_plane():
+    """Two halves of a plane lie apart in the image, one of them turned: they share a grid."""
+    left = np.array([(0, 0, 0), (1, 0, 0), (1, 2, 0), (0, 2, 0.0)])
+    right = left + (1, 0, 0)
+    uvs = [SQUARE * (0.2, 0.4), np.array([(0.9, 0.5), (0.9, 0.7), (0.5, 0.7), (0.5, 0.5)])]
+    receiver = build_receiver(flatten(mesh_of([left, right], uvs)), 100, 100)
+    (chart,) = receiver.charts
+    assert len(chart.islands) == 2
+    assert (chart.grid.width, chart.grid.height) == (40, 40)
+    assert chart.grid.coverage == pytest.approx(np.ones((40, 40)))
+    # A linear function of the position comes to the texels that show it.
+    values = np.float32(chart.grid.positions())
+    texture = receiver.to_texture([values])
+    assert texture[20, 10] == pytest.approx(left.mean(axis=0), abs=0.06)
+    assert texture[60, 70] == pytest.approx(right.mean(axis=0), abs=0.06)
+    np.testing.assert_allclose(chart.read(texture)[2:-2, 2:18], values[2:-2, 2:18], atol=0.06)
+
+
+def test_a_trapezoid_on_a_square_is_cut_into_triangles():
+    face = np.array([(0, 0, 0), (1, 0, 0), (0.8, 1, 0), (0.2, 1, 0.0)])
+    receiver = build_receiver(flatten(mesh_of([face], [SQUARE])), 64, 64)
+    (chart,) = receiver.charts
+    assert len(chart.islands) == 2
+    texture = receiver.to_texture([np.float32(chart.grid.positions())])
+    # The diagonal from (0, 0) to (1, 1) of the square shows that of the trapezoid.
+    assert texture[32, 32, :2] == pytest.approx((0.4, 0.5), abs=0.02)
+
+
+def test_overlapping_islands_are_refused():
+    with pytest.raises(ReceiverError, match="overlaps: 100%"):
+        build_receiver(flatten(mesh_of(box(), [SQUARE] * 6)), 32, 32)
+
+
+def test_faces_without_area_in_the_map_are_refused():
+    with pytest.raises(ReceiverError, match="no area"):
+        flatten(mesh_of(box(), [*atlas(5), np.full((4, 2), 0.9)]))
+
+
+def test_each_plane_is_baked_as_if_it_were_alone():
+    """Light, shadows and texels of a chart follow from its own grid."""
+    faces, uvs = box(), atlas(6)
+    together = build_receiver(flatten(mesh_of(faces, uvs)), 60, 60)
+    for face, uv in zip(faces, uvs):
+        (alone,) = build_receiver(flatten(mesh_of([face], [uv])), 60, 60).charts
+        (same,) = [c for c in together.charts if np.allclose(c.grid.normal, alone.grid.normal)]
+        np.testing.assert_allclose(same.grid.positions(), alone.grid.positions(), atol=1e-9)
+        np.testing.assert_array_equal(same.grid.coverage, alone.grid.coverage)
+
+
+def test_components_are_those_of_a_search():
+    rng = np.random.default_rng(2)
+    first, second = rng.integers(0, 300, (2, 220))
+    labels = components(300, first, second)
+    neighbors = {number: {number} for number in range(300)}
+    for _ in range(300):
+        for a, b in zip(first.tolist(), second.tolist()):
+            union = neighbors[a] | neighbors[b]
+            for member in union:
+                neighbors[member] = union
+    for number in range(300):
+        assert set(np.flatnonzero(labels == labels[number])) == neighbors[number]
+
+
+def test_many_faces_fall_into_their_planes():
+    faces = []
+    for number in range(100):
+        quads, _ = heights(lambda x, _y: 0 * x, 10)
+        faces += [quad + (2 * (number % 10), 2 * (number // 10), 0.1 * number) for quad in quads]
+    planes, bent = find_planes(mesh_of(faces), 1e-6)
+    assert len(planes) == 100
+    assert not len(bent)
