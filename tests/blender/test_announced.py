@@ -133,6 +133,26 @@ def test_measured_times_correct_the_line():
     assert line_of(state.announced, [target, Target("Gone")]) == ""
 
 
+def test_a_file_remembers_the_time_of_its_bakes(tmp_path):
+    add_lamp((0, 0, 1))
+    one = plane()
+    bpy.context.scene.beamspread.image_storage = "PACKED"
+    select(one)
+    announced(one)
+    target = find_targets([one])[0]
+    (solution,) = state.announced[target].steps
+    bpy.ops.beamspread.bake()
+    solution.compare(5 * solution.seconds)
+    bpy.ops.beamspread.bake()
+    measured = pace.ratios_of("Plane")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    pace.forget()
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
+    stale.refresh(bpy.context)
+    assert pace.ratios_of("Plane") == measured
+    assert solution.kind in measured
+
+
 def light_of_all_kinds():
     add_sun()
     add_lamp((0, 0, 1), radius=0.1)

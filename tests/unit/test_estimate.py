@@ -105,6 +105,27 @@ def test_a_corrected_estimate_approaches_measured_times():
     assert pace.corrected("Baking", "Plane", 2.0) == pytest.approx(6.0)
 
 
+def test_ratios_outlive_their_session():
+    pace, later = Pace(), Pace()
+    pace.note("Baking", "Plane", 2.0, 6.0)
+    assert pace.ratios_of("Plane") == {"Baking": 3.0}
+    assert pace.ratios_of("Other") == {}
+    later.recall("Plane", {"Baking": 3.0})
+    assert later.corrected("Baking", "Plane", 2.0) == pytest.approx(6.0)
+    later.note("Baking", "Plane", 1.0, 2.0)
+    later.recall("Plane", {"Baking": 3.0})  # what this session has measured counts
+    assert later.corrected("Baking", "Plane", 1.0) == pytest.approx(2.0)
+
+
+def test_another_scene_keeps_the_mean():
+    pace = Pace()
+    for name, ratio in (("First", 2.0), ("Second", 8.0)):
+        pace.note("Baking", name, 1.0, ratio)
+    pace.forget_subjects()
+    assert pace.ratios_of("First") == {}
+    assert pace.corrected("Baking", "First", 1.0) == pytest.approx(4.0**0.5)
+
+
 def test_a_bake_teaches_the_next_one():
     job = bake_job([SUN], grid=square(512))
     announced = job.seconds()

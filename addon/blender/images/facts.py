@@ -16,6 +16,7 @@ from typing import NamedTuple
 import bpy
 from bpy.app.handlers import persistent
 
+from ...core.bake.pace import pace
 from ...core.bake.runner import Bake
 from ...core.disk import text_of
 from ...core.messages import Level, Message, note, warning
@@ -52,6 +53,7 @@ class Record:
     warnings, notes : messages of the bake.
     is_dirty : True if the image had unsaved pixels right after the bake.
     scheme : number of the way in which the digests were made; 1 in files of earlier versions.
+    ratios : measured over estimated seconds of the bake's steps, by their kind, see `Pace`.
     """
 
     parts: dict[str, str] = field(default_factory=dict)
@@ -59,6 +61,7 @@ class Record:
     is_dirty: bool = False
     notes: tuple[str, ...] = ()
     scheme: int = SCHEME
+    ratios: dict[str, float] = field(default_factory=dict)
 
     def is_comparable(self) -> bool:
         """True if the digests can be compared with present ones."""
@@ -105,7 +108,7 @@ class ImageFacts:
 def record_of_bake(bake: Bake, parts: dict[str, str], is_dirty: bool = False) -> Record:
     """Record of a bake that has read these parts."""
     warnings, notes = (tuple(map(str, bake.messages.of(level))) for level in (Level.WARNING, Level.INFO))
-    return Record(parts, warnings, is_dirty, notes)
+    return Record(parts, warnings, is_dirty, notes, ratios=pace.ratios_of(bake.target.object_name))
 
 
 def facts_of(image) -> ImageFacts:
@@ -234,7 +237,7 @@ def _parsed(text: str) -> dict:
 
 def _record(entry: dict) -> Record:
     warnings, notes = entry.get("warnings", ()), entry.get("notes", ())
-    rest = tuple(warnings), entry.get("is_dirty", False), tuple(notes), entry.get("scheme", 1)
+    rest = tuple(warnings), entry.get("is_dirty", False), tuple(notes), entry.get("scheme", 1), entry.get("ratios", {})
     return Record(entry.get("parts", {}), *rest)
 
 

@@ -10,7 +10,7 @@ from enum import Enum
 
 from bpy.app.handlers import persistent
 
-from ...core.bake.pace import Estimate
+from ...core.bake.pace import Estimate, pace
 from ...core.bake.runner import CANCELLED, WRITTEN, Bake
 from ...core.messages import Level, Message
 from ...core.progress import Progress
@@ -180,6 +180,7 @@ def redraw(context, *area_types: str) -> None:
 @persistent
 def _forget(*_arguments) -> None:
     state.forget()
+    pace.forget_subjects()
 
 
 register, unregister = all_or_nothing(*handlers(load_pre=_forget))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 
@@ -35,6 +36,20 @@ class Pace:
             return estimated * ratios[subject]
         # One more of ratio 1: few measurements of others say little about this one.
         return estimated * math.exp(sum(map(math.log, list(ratios.values()))) / (len(ratios) + 1))
+
+    def ratios_of(self, subject: str) -> dict[str, float]:
+        """The ratios of a subject by kind of step, for `recall`."""
+        return {kind: ratios[subject] for kind, ratios in self._ratios.items() if subject in ratios}
+
+    def recall(self, subject: str, ratios: Mapping[str, float]) -> None:
+        """Take ratios of an earlier session, by kind of step, for what this session has not measured."""
+        for kind, ratio in ratios.items():
+            self._ratios.setdefault(kind, {}).setdefault(subject, ratio)
+
+    def forget_subjects(self) -> None:
+        """Keep the mean of all subjects alone: another scene may have others of the same names."""
+        for kind, ratios in self._ratios.items():
+            self._ratios[kind] = {"": math.exp(sum(map(math.log, ratios.values())) / len(ratios))}
 
     def forget(self) -> None:
         """Forget all ratios."""

@@ -11,6 +11,7 @@ from dataclasses import replace
 import bpy
 from bpy.app.handlers import persistent
 
+from ....core.bake.pace import pace
 from ....core.bake.runner import Bake
 from ....core.messages import Level, Message, note, warning
 from ....core.target import Target
@@ -62,6 +63,8 @@ def refresh(context) -> None:
     images = {target: image_of(target) for target in find_bakeable(context.view_layer, context.scene.objects)}
     records = {target: _record(target, image, context.scene) for target, image in images.items()}
     recorded = [target for target, record in records.items() if record is not None]
+    for target in recorded:
+        pace.recall(target.object_name, records[target].ratios)
     now = fingerprints(context, recorded) if recorded else {}
     state.rows = {target: _row(target, image, records[target], now.get(target)) for target, image in images.items()}
     state.rows |= {row.target: row for row in _failures_of_others(context.scene, list(images))}

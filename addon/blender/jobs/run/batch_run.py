@@ -105,7 +105,7 @@ class _Batch(Sink):
     def store(self, bake: Bake) -> str:
         # The size of the image is no part of a sequence.
         parts = {name: digest for name, digest in self._parts.get(bake.target, {}).items() if name != IMAGE}
-        attributes = attributes_of(replace(record_of_bake(bake, parts), notes=())) if parts else {}
+        attributes = attributes_of(replace(record_of_bake(bake, parts), notes=(), ratios={})) if parts else {}
         return self._outputs.write(bake, self._frame, attributes)
 
     def end(self, bake: Bake) -> None:
