@@ -81,7 +81,7 @@ def test_each_medium_to_simulate_takes_its_time():
 
 
 def test_more_triangles_make_bounced_light_slower():
-    assert bounced_seconds(100, 0) < bounced_seconds(10**6, 0)
+    assert bounced_seconds(100, 1, 0) < bounced_seconds(10**6, 1, 0) < bounced_seconds(10**6, 9, 0)
 
 
 def test_more_threads_are_faster():
@@ -126,7 +126,8 @@ def test_another_scene_keeps_the_mean():
     assert pace.corrected("Baking", "First", 1.0) == pytest.approx(4.0**0.5)
 
 
-def test_a_bake_teaches_the_next_one():
+def test_a_bake_teaches_the_next_one(monkeypatch):
+    monkeypatch.setattr(Pace, "MIN_SECONDS", 0.0)
     job = bake_job([SUN], grid=square(512))
     announced = job.seconds()
     pace.note(steps.Solve.kind_for(SETTINGS), "Plane", 1.0, 5.0)

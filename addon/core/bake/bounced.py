@@ -60,7 +60,7 @@ class BouncedLight(Step):
     finds_light = True
 
     def seconds(self, job: BakeJob) -> float:
-        return bounced_seconds(job.illumination.triangle_count, job.settings.threads)
+        return bounced_seconds(job.illumination.triangle_count, len(job.illumination.lights), job.settings.threads)
 
     def run(self, job: BakeJob, progress: Progress) -> BakeJob:
         receiver, illumination, settings = job.receiver, job.illumination, job.settings

@@ -24,17 +24,18 @@ ANY_BAKE = 0.05
 
 # Seconds per texel of the transforms for suns alone; for lamps of one direction at each texel, with an index of
 # refraction above 1 and without; and for any other light.
-SUNS, LAMPS, WIDE = 0.06e-6, (1.0e-6, 1.8e-6), (4e-6, 8e-6)
+SUNS, LAMPS, WIDE = 0.06e-6, (1.0e-6, 1.8e-6), (4e-6, 5e-6)
 # Seconds of the choice of terms for other light.
-CHOICE = 0.6, 1.6
+CHOICE = 0.6, 1.0
 # Multiple of slabs of one mean free path with an index of refraction above 1; thicker ones come closer to 1.
 THIN_SLAB = 6.0
 
 # Seconds of a ray without obstacles; of a shadow ray towards lights all around, and towards others, where penumbras
 # are small.
-OPEN_RAY, BROAD_RAY, NARROW_RAY = 0.015e-6, 0.22e-6, 0.05e-6
-# Seconds per texel and lamp of the rays to a lamp without a size.
-LAMP_RAYS = 0.15e-6
+OPEN_RAY, BROAD_RAY, NARROW_RAY = 0.015e-6, 0.18e-6, 0.05e-6
+# Seconds per texel and lamp of the rays to a lamp without a size, and for each doubling of `MANY_TRIANGLES`: their
+# shadows have more borders.
+LAMP_RAYS, LAMP_TRIANGLES = 0.15e-6, 0.3e-6
 # Triangles from which on shadow rays take longer, by a tenth for each doubling.
 MANY_TRIANGLES = 1000
 
@@ -44,14 +45,16 @@ ADAPTIVE, DIRECT = (1e-6, 3e-6), (0.2e-9, 30e-9)
 # Seconds of the simulation of an angle in final quality, in half-spaces and in slabs.
 HALF_SPACE_ANGLE, SLAB_ANGLE = 6.0, 2.5
 
-# Seconds of bounced light by rays of our own.
-BOUNCED = 0.8
+# Seconds of bounced light by rays of our own: in any case, for each doubling of the triangles, and for that and each
+# light.
+BOUNCED, BOUNCED_TRIANGLES, BOUNCED_LIGHTS = 0.1, 0.02, 0.012
+# Seconds of the solution for bounced light: in any case, and per texel.
+SPREAD_BOUNCED, SPREAD_BOUNCED_TEXEL = 0.15, 0.65e-6
 
 # Seconds until Cycles has started, and of each triangle; of the light of a lamp, of bounced light, of a panorama of the
 # world, and of a base color for each texel.
 CYCLES_START, CYCLES_TRIANGLE = 1.5, 5e-6
 CYCLES_LAMP, CYCLES_BOUNCED, CYCLES_WORLD, CYCLES_COLOR = 3.0, 6.0, 8.0, 5e-6
-
 
 # Fraction of the light that comes from a world, or from glowing meshes, whose light is not known, about.
 OF_WORLD, OF_MESHES = 0.5, 0.25
@@ -128,7 +131,8 @@ class Workload:
         return ANY_BAKE + _parallel(tracing + self._spreading(settings), settings.threads)
 
     def _rays_of_lamps(self, settings: BakeSettings) -> float:
-        return LAMP_RAYS * (self.suns + self.lamps) * (1 + self._shadows() * settings.samples**2 / 16)
+        doublings = max(math.log2(max(self.triangles, 1) / MANY_TRIANGLES), 0.0)
+        return (self.suns + self.lamps) * (LAMP_RAYS + LAMP_TRIANGLES * doublings * settings.samples**2 / 16)
 
     def _rays_of_sizes(self) -> float:
         rays, shadows = self.broad_rays + self.narrow_rays, self._shadows()
@@ -142,7 +146,7 @@ class Workload:
 
     def _spreading(self, settings: BakeSettings) -> float:
         """Seconds of the solver."""
-        is_wide = self.bounced or self.broad_rays + self.narrow_rays > 0
+        is_wide = self.broad_rays + self.narrow_rays > 0
         others = self.lamps + self.broad_rays + self.narrow_rays + len(STRATA) * self.bounced
         if settings.solver != "fft":
             sun, other = ADAPTIVE if settings.solver == "adaptive" else DIRECT
@@ -150,11 +154,10 @@ class Workload:
             return pairs * (sun * self.suns + other * others)
         is_plain = self.ior <= 1
         slab = 1 + (THIN_SLAB - 1) / max(self.thickness, 1.0) if self.ior > 1 else 1.0
+        bounced = self.bounced * (SPREAD_BOUNCED + SPREAD_BOUNCED_TEXEL * self.texels)
         if is_wide:
-            return CHOICE[is_plain] + slab * WIDE[is_plain] * self.texels
-        if self.lamps:
-            return slab * LAMPS[is_plain] * self.texels
-        return SUNS * self.texels
+            return bounced + CHOICE[is_plain] + slab * WIDE[is_plain] * self.texels
+        return bounced + (slab * LAMPS[is_plain] if self.lamps else SUNS) * self.texels
 
 
 def _rays(
@@ -191,9 +194,9 @@ def _parallel(seconds: float, threads: int) -> float:
     return seconds / (threads or os.cpu_count() or 1) ** THREADS_POWER
 
 
-def bounced_seconds(triangles: int, threads: int) -> float:
+def bounced_seconds(triangles: int, lights: int, threads: int) -> float:
     """Seconds in which our own rays find bounced light."""
-    return _parallel(BOUNCED * (1 + 0.1 * max(math.log2(max(triangles, 1) / MANY_TRIANGLES), 0.0)), threads)
+    return _parallel(BOUNCED + (BOUNCED_TRIANGLES + BOUNCED_LIGHTS * lights) * math.log2(1 + triangles), threads)
 
 
 def cycles_light_seconds(world: bool, lamps: int, bounced: bool, triangles: int) -> float:

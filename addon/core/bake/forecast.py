@@ -77,7 +77,7 @@ class Forecast:
             lights = finders.world, finders.lamps, by_cycles
             steps.append((CYCLES_LIGHT, cycles_light_seconds(*lights, self.triangles)))
         if bounced and finders.is_own:
-            steps.append((BouncedLight.name, bounced_seconds(self.triangles, threads)))
+            steps.append((BouncedLight.name, bounced_seconds(self.triangles, len(self.lights), threads)))
         unknown = max(self.unknown, OF_WORLD * finders.world)
         load = Workload.of(self.grids, self.lights, self.triangles, self.surface, settings, bounced, unknown)
         steps.append((Solve.kind_for(settings), load.seconds(settings)))
