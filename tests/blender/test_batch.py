@@ -155,7 +155,6 @@ def add_failures(folder):
         "Gone": ({"image": missing_image(folder)}, "gone.exr"),
         "Locked": ({"image": read_only_image(folder)}, "read-only"),
         "Bent": ({}, "not flat"),
-        "Unwrapped": ({}, "no UV map"),
         "Hidden": ({}, "hidden from render"),
     }
     for place, (name, (properties, _)) in enumerate(wrong.items(), start=1):
@@ -163,8 +162,6 @@ def add_failures(folder):
         plane = add_plane(name, matrix=matrix, material=add_material(f"M {name}", **properties))
         if name == "Bent":
             plane.data.vertices[0].co.z = 1
-        elif name == "Unwrapped":
-            plane.data.uv_layers.remove(plane.data.uv_layers[0])
         elif name == "Hidden":
             plane.hide_render = True
     return {name: word for name, (_, word) in wrong.items()}

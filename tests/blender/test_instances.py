@@ -312,10 +312,6 @@ def instance_again(tile):
     add_instancer(tile.users_collection[0], MIRRORED)
 
 
-def remove_uvs(tile):
-    tile.data.uv_layers.remove(tile.data.uv_layers[0])
-
-
 def make_black_holes(tile):
     scenes.node_of(tile.data.materials[0]).albedo = (1, 1, 1)
 
@@ -327,7 +323,6 @@ def hide_within(tile):
 PROBLEMS = {
     "'Grouped' has one image, but its node group 'Outer'": use_shared_group,
     "The object 'Tile' has 2 instances": instance_again,
-    "UV map": remove_uvs,
     "The albedo's red is 1": make_black_holes,
     "The object 'Tile' is hidden from render": hide_within,
 }

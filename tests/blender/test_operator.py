@@ -246,10 +246,6 @@ def bent(plane):
     plane.data.vertices[0].co.z = 0.5
 
 
-def without_uvs(plane):
-    plane.data.uv_layers.remove(plane.data.uv_layers[0])
-
-
 def hidden(plane):
     plane.hide_render = True
 
@@ -273,7 +269,6 @@ def setting(name, value):
     ("spoil", "words"),
     [
         (bent, "not flat"),
-        (without_uvs, "no UV map"),
         (hidden, "hidden from render"),
         (in_hidden_collection, "hidden from render"),
         (setting("albedo", (0.5, 1.0, 0.5)), "albedo's green is 1"),

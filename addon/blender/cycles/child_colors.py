@@ -35,7 +35,8 @@ def colors(request, scene, _progress) -> dict:
         slot.material = copied if slot.material == material else bare
     baker = Baker(scene, obj, image, "EMIT")
     layers = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.uv_layers
-    baker.options |= {"use_clear": False, "uv_layer": next(layer.name for layer in layers if layer.active_render)}
+    uv_map = request["uv_map"] or next(layer.name for layer in layers if layer.active_render)
+    baker.options |= {"use_clear": False, "uv_layer": uv_map}
     fine = baker.bake_passes(set()).reshape(height, side, width, side, 3)
     total, count = np.nan_to_num(fine, nan=0.0).sum(axis=(1, 3)), np.isfinite(fine).sum(axis=(1, 3))
     return {"colors": np.where(count > 0, total / np.maximum(count, 1), np.nan).astype(np.float32)}

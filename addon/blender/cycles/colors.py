@@ -107,6 +107,7 @@ def colors_by_cycles(
         "texture": copy.textures[target.material_name],
         "width": receiver.width,
         "height": receiver.height,
+        "uv_map": receiver.uv_map,
         **_samples(receiver.width, receiver.height),
     }
     colors = run(copy.scene, "colors", request, progress, "Evaluating the base color")["colors"]

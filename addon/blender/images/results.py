@@ -68,7 +68,7 @@ class Results:
         if layer != COMBINED:
             return self._store_beside(node, bake, layer, texture)
         path, image = self._store_shown(node, bake, texture)
-        bake.messages.add(*link_result(node, image))
+        bake.messages.add(*link_result(node, image, bake.job.receiver.uv_map))
         return path
 
     def fill(self, image, bake: Bake, texture: np.ndarray, shown=None) -> str | None:

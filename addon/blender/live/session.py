@@ -219,7 +219,10 @@ class Session:
             return
         if targets is None:
             targets = self._read_all(context.evaluated_depsgraph_get())
-        self._thread.adopt([target for target in targets if target.target.material_name in baked])
+        adopted = [target for target in targets if target.target.material_name in baked]
+        self._thread.adopt(adopted)
+        for target in adopted:
+            self._errors.pop(target.target, None)
         for name in baked & set(self._previews):
             self._previews.pop(name).remove()
 

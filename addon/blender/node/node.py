@@ -24,6 +24,7 @@ from .tree import (
     own_tree,
     release_unused_trees,
     show_ior,
+    show_map,
     show_own_images,
     show_values,
     upgrade,
@@ -104,12 +105,17 @@ def _show(node, _context) -> None:
         _color_edited(node, _context)
 
 
-def link_result(node, image) -> list[Message]:
-    """Show `image` in the node, and the node at its material's output; messages as of `link_output`."""
+def link_result(node, image, uv_map: str | None = None) -> list[Message]:
+    """Show `image` in the node, and the node at its material's output; messages as of `link_output`.
+
+    `uv_map` is the name of the map that shows it, "" for the one that renders; None: as before.
+    """
     if node.node_tree is None:
         node.node_tree = make_inner_tree()
     node.image = image
     _show(node, None)
+    if uv_map is not None:
+        show_map(node.node_tree, uv_map)
     return link_output(node)
 
 

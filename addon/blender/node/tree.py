@@ -9,7 +9,7 @@ from ..read.nodes import INNER_TREE, OWN_NODE
 NAME = INNER_TREE
 BASE_COLOR, ROUGHNESS, NORMAL = "Base Color", "Roughness", "Normal"
 IMAGE, FRESNEL, COAT, GLOSSY = "Image", "Fresnel", "Coat", "Glossy"
-FACING = "Facing"
+FACING, UV_MAP = "Facing", "UV Map"
 INPUT, EMISSION, UNSEEN, TOTAL, OUTPUT = "Input", "Emission", "Unseen", "Total", "Output"
 BAKED = "Is Baked"
 
@@ -155,6 +155,18 @@ def show_image(tree, image) -> None:
     is_baked = float(image is not None)
     if baked is not None and baked.default_value != is_baked:
         baked.default_value = is_baked
+
+
+def show_map(tree, name: str) -> None:
+    """Show the image by the UV map of that name; "" is the one that renders."""
+    node = tree.nodes.get(UV_MAP)
+    if node is None and not name:
+        return
+    if node is None:
+        node = _add(tree, "ShaderNodeUVMap", UV_MAP, (-800, 0))
+        tree.links.new(tree.nodes[IMAGE].inputs["Vector"], node.outputs["UV"])
+    if node.uv_map != name:
+        node.uv_map = name
 
 
 def follow_frames(tree, first: int, last: int) -> None:

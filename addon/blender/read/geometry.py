@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ...core.errors import ReceiverError
 from ...core.messages import Message
+from ...core.scene.islands import check_map
 from ...core.scene.occluders import Mesh, Occluder
 from ...core.scene.polygons import Polygons
 from .image_nodes import UVTransform
 from .reflection import MaterialReflection, MediumOf, reflection_of
 from .scene_cache import SceneCache
 from .transparency import MaterialTransmittance, transmittance_of
+
+OWN_MAP = "Beamspread"
+"""Name of UV maps that bakes make."""
 
 # A depsgraph holds curves, text and metaballs also as meshes, which are instances of themselves: only these are read.
 GEOMETRY_TYPES = {"MESH"}
@@ -175,6 +180,8 @@ def _transform(points: np.ndarray, matrix) -> np.ndarray:
 def read_polygons(obj, material_name: str, matrix=None) -> Polygons:
     """Faces of an evaluated mesh object that carry the material, in world space.
 
+    Their UVs are those of the map that renders or, if these don't fit into one image, of a map of our own.
+
     Parameters
     ----------
     matrix : transform to the world; None: the object's own.
@@ -182,31 +189,50 @@ def read_polygons(obj, material_name: str, matrix=None) -> Polygons:
     matrix = obj.matrix_world if matrix is None else matrix
     mesh = obj.to_mesh()
     try:
-        totals, starts, slots = (np.empty(len(mesh.polygons), np.int32) for _ in range(3))
-        mesh.polygons.foreach_get("loop_total", totals)
-        mesh.polygons.foreach_get("loop_start", starts)
+        slots = np.empty(len(mesh.polygons), np.int32)
         mesh.polygons.foreach_get("material_index", slots)
-        normals = np.empty(len(mesh.polygons) * 3, np.float32)
-        mesh.polygons.foreach_get("normal", normals)
-        corners = np.empty(len(mesh.loops), np.int32)
-        mesh.loops.foreach_get("vertex_index", corners)
-        uvs, vertices = _uvs(mesh), _vertices(mesh)
+        chosen = np.flatnonzero(_has_material(obj, slots, material_name))
+        polygons = polygons_of(mesh, matrix).of_faces(chosen)
+        uvs = _uvs(mesh, OWN_MAP)
+        if uvs is None or not polygons.count or _fits(polygons):
+            return polygons
+        again = replace(polygons_of(mesh, matrix), uvs=uvs.astype(float), uv_map=OWN_MAP).of_faces(chosen)
+        return again if _fits(again) else polygons
     finally:
         obj.to_mesh_clear()
-    chosen = np.flatnonzero(_has_material(obj, slots, material_name))
-    sizes = totals[chosen]
-    new_starts = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
-    loops = np.repeat(starts[chosen] - new_starts[:-1], sizes) + np.arange(new_starts[-1])
+
+
+def _fits(polygons: Polygons) -> bool:
+    """True if the UV map shows each face in a place of its own."""
+    try:
+        check_map(polygons)
+    except ReceiverError:
+        return False
+    return True
+
+
+def polygons_of(mesh, matrix) -> Polygons:
+    """All faces of a mesh, in world space."""
+    totals, first = (np.empty(len(mesh.polygons), np.int32) for _ in range(2))
+    mesh.polygons.foreach_get("loop_total", totals)
+    mesh.polygons.foreach_get("loop_start", first)
+    normals = np.empty(len(mesh.polygons) * 3, np.float32)
+    mesh.polygons.foreach_get("normal", normals)
+    corners = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    uvs, vertices = _uvs(mesh), _vertices(mesh)
+    starts = np.concatenate([[0], np.cumsum(totals)]).astype(int)
+    loops = np.repeat(first - starts[:-1], totals) + np.arange(starts[-1])
     world = np.array(matrix, dtype=float)[:3, :3]
     if abs(np.linalg.det(world)) < 1e-30:
         world = _flat_scale(world)
     # Normals transform with the inverse transpose, which also keeps them outward under mirroring.
-    world_normals = normals.reshape(-1, 3)[chosen] @ np.linalg.inv(world)
+    world_normals = normals.reshape(-1, 3) @ np.linalg.inv(world)
     lengths = np.linalg.norm(world_normals, axis=1, keepdims=True)
     return Polygons(
         corners=_transform(vertices[corners[loops]], matrix),
         uvs=None if uvs is None else uvs[loops].astype(float),
-        starts=new_starts,
+        starts=starts,
         normals=world_normals / np.where(lengths > 0, lengths, 1),
     )
 

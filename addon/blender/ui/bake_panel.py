@@ -9,7 +9,6 @@ import bpy
 from ...core import native
 from ...core.errors import BakeError, message_of
 from ...core.messages import Messages
-from ...core.scene.islands import check_uvs
 from .. import compat
 from ..images.files import check_image
 from ..images.results import check_editable
@@ -50,7 +49,6 @@ def problems_of(obj, counts: dict[str, int]) -> Messages:
     times = counts.get(obj.name, 0)
     for target in targets:
         checks = [
-            lambda: obj.data.uv_layers or check_uvs(None),
             lambda: check_instance(obj.name, ObjectInstance(obj, None, times) if times else None, view_layer),
             lambda target=target: target.node.surface().check(),
         ]

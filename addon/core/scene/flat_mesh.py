@@ -23,10 +23,11 @@ class FlatPart:
 
 @dataclass(frozen=True, eq=False)
 class FlatMesh:
-    """The parts of a mesh that can be baked, the largest first, and messages about the rest."""
+    """Parts of a mesh that can be baked, the largest first; messages about the rest; `uv_map` as of `Polygons`."""
 
     parts: tuple[FlatPart, ...]
     messages: tuple[Message, ...] = ()
+    uv_map: str = ""
 
 
 def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> FlatMesh:
@@ -65,4 +66,4 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> 
     deviation = max(plane.deviation for plane in planes)
     if deviation > exact:
         messages.append(note(name, f"'{name}' is baked as flat faces; it departs from them by {deviation:.3g} units."))
-    return FlatMesh(tuple(parts), tuple(messages))
+    return FlatMesh(tuple(parts), tuple(messages), polygons.uv_map)

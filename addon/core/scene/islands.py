@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import ReceiverError
+from ..native import native
 from .planes import FLATNESS_TOLERANCE, Plane
 from .polygons import Polygons, components
 
@@ -16,6 +17,13 @@ UV_TOLERANCE = 1e-4
 
 # Extent in UVs, over that of the whole map, below which an island has no area.
 NO_EXTENT = 1e-6
+
+# Area of a face in the UV map, over that of the image, that counts as none.
+NO_UV_AREA = 1e-14
+
+# Texels along the side of an image in which overlaps are looked for, and part of the map that may overlap: rounding,
+# and faces that share a border.
+PROBE_SIDE, MAX_OVERLAP = 2048, 0.01
 
 # Largest number of islands of a mesh; more take much time and memory.
 MAX_ISLANDS = 100_000
@@ -39,7 +47,7 @@ class Island:
 def check_uvs(uvs: np.ndarray | None) -> None:
     """Raise ReceiverError for UVs that are missing, no numbers, or outside of the image."""
     if uvs is None or len(uvs) == 0:
-        raise ReceiverError("The mesh has no UV map.", "Unwrap it first (UV > Unwrap in Edit Mode).")
+        raise ReceiverError("The mesh has no UV map.", "Bake it: Beamspread's own Bake makes a UV map.")
     if not np.isfinite(uvs).all():
         raise ReceiverError("The UV map has coordinates that are not numbers.", "Unwrap the mesh again.")
     low, high = uvs.min(), uvs.max()
@@ -48,6 +56,23 @@ def check_uvs(uvs: np.ndarray | None) -> None:
             f"The UV map reaches outside the image (coordinates from {low:.3g} to {high:.3g}).",
             "Scale and move it to fit between 0 and 1.",
         )
+
+
+def check_map(polygons: Polygons) -> None:
+    """Raise ReceiverError for a UV map that can't show each face in a place of its own in one image."""
+    check_uvs(polygons.uvs)
+    sizes = polygons.uv_areas
+    is_lost = (sizes <= NO_UV_AREA) & (polygons.areas > FLATNESS_TOLERANCE**2 * polygons.areas.max())
+    if is_lost.any():
+        text = f"The UV map has no area in {is_lost.sum()} of {polygons.count} faces."
+        raise ReceiverError(text, "Unwrap the mesh again.")
+    texels = np.ascontiguousarray(np.clip(polygons.uvs, 0, 1) * PROBE_SIDE)
+    # A small map fills few texels of the probe.
+    shown = float(native.coverage(texels, polygons.sizes.astype(np.uint32), PROBE_SIDE, PROBE_SIDE).sum(dtype=float))
+    overlap = 1 - shown / max(float(sizes.sum()) * PROBE_SIDE**2, 1e-30)
+    if overlap > MAX_OVERLAP:
+        text = f"The UV map overlaps: {overlap:.0%} of it show several faces."
+        raise ReceiverError(text, "Unwrap the mesh so that each face has its own place (UV > Smart UV Project).")
 
 
 def find_islands(polygons: Polygons, plane: Plane, tolerance: float) -> tuple[Island, ...]:

@@ -21,12 +21,14 @@ class Polygons:
     uvs : float64 (K, 2), or None if the mesh has no UV map.
     starts : int (N + 1,), face i has the corners starts[i] : starts[i + 1].
     normals : float64 (N, 3), outward unit normals, world.
+    uv_map : name of the map of the UVs; "" is the one that renders.
     """
 
     corners: np.ndarray
     uvs: np.ndarray | None
     starts: np.ndarray
     normals: np.ndarray
+    uv_map: str = ""
 
     @property
     def count(self) -> int:
@@ -51,9 +53,11 @@ class Polygons:
     @cached_property
     def area_vectors(self) -> np.ndarray:
         """Area of each face times its unit normal, float64 (N, 3), outward."""
-        first = self.corners[np.repeat(self.starts[:-1], self.sizes)]
-        crosses = np.cross(self.corners - first, self.corners[self.next_corners] - first)
-        vectors = 0.5 * sums(crosses, self.starts)
+        points = self.corners - self.corners[np.repeat(self.starts[:-1], self.sizes)]
+        x, y, z = points.T
+        next_x, next_y, next_z = points[self.next_corners].T
+        crosses = y * next_z - z * next_y, z * next_x - x * next_z, x * next_y - y * next_x
+        vectors = 0.5 * np.stack([sums(part, self.starts) for part in crosses], axis=1)
         is_inward = np.einsum("ij,ij->i", vectors, np.nan_to_num(self.normals)) < 0
         return np.where(is_inward[:, None], -vectors, vectors)
 
@@ -61,6 +65,12 @@ class Polygons:
     def areas(self) -> np.ndarray:
         """Area of each face, float64 (N,)."""
         return np.linalg.norm(self.area_vectors, axis=1)
+
+    @cached_property
+    def uv_areas(self) -> np.ndarray:
+        """Area of each face in the UV map, float64 (N,)."""
+        u, v = (self.uvs - self.uvs[np.repeat(self.starts[:-1], self.sizes)]).T
+        return 0.5 * np.abs(sums(u * v[self.next_corners] - v * u[self.next_corners], self.starts))
 
     @cached_property
     def points(self) -> np.ndarray:
@@ -97,7 +107,7 @@ class Polygons:
         starts = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
         corners = np.repeat(self.starts[:-1][faces] - starts[:-1], sizes) + np.arange(starts[-1])
         uvs = None if self.uvs is None else self.uvs[corners]
-        return Polygons(self.corners[corners], uvs, starts, self.normals[faces])
+        return Polygons(self.corners[corners], uvs, starts, self.normals[faces], self.uv_map)
 
     def triangles(self) -> Polygons:
         """The same faces as triangles around their first corners."""
@@ -111,17 +121,20 @@ class Polygons:
 
 
 def sums(values: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """Sums of rows (K, ...) over the runs that begin at starts[:-1]."""
-    total = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
-    return total[starts[1:]] - total[starts[:-1]]
+    """Sum of the values (K,) of each run that begins at starts[:-1]; 0 for an empty one."""
+    return _of_runs(np.add, values, starts)
 
 
 def largest(values: np.ndarray, starts: np.ndarray) -> np.ndarray:
     """Largest value (K,), 0 or more, of each run that begins at starts[:-1]; 0 for an empty one."""
+    return _of_runs(np.maximum, values, starts)
+
+
+def _of_runs(operation: np.ufunc, values: np.ndarray, starts: np.ndarray) -> np.ndarray:
     result = np.zeros(len(starts) - 1)
     is_filled = np.diff(starts) > 0
     if is_filled.any():
-        result[is_filled] = np.maximum.reduceat(values, starts[:-1][is_filled])
+        result[is_filled] = operation.reduceat(values, starts[:-1][is_filled])
     return result
 
 

@@ -35,10 +35,12 @@ class Receiver:
     ----------
     coverage : float32 (height, width), largest fraction of each texel inside an island.
     charts : flat parts, the largest first.
+    uv_map : name of the UV map; "" is the one that renders.
     """
 
     coverage: np.ndarray
     charts: tuple[Chart, ...]
+    uv_map: str = ""
 
     @property
     def height(self) -> int:
@@ -96,7 +98,7 @@ def build_receiver(mesh: FlatMesh, width: int, height: int, owner: str = "") -> 
             raise ReceiverError(text, "Unwrap the mesh so that each face has its own place (UV > Smart UV Project).")
     if not in_chart(coverage).any():
         raise ReceiverError("The UV map covers no texel of the image.", "Enlarge it, or the image.")
-    return Receiver(coverage, charts)
+    return Receiver(coverage, charts, mesh.uv_map)
 
 
 def outline(part: FlatPart, width: int, height: int) -> Grid:

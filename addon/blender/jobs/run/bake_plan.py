@@ -5,7 +5,7 @@ Jobs are large, so a plan makes its job when its turn comes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import bpy
@@ -17,6 +17,8 @@ from ....core.bake.job import BakeJob
 from ....core.bake.runner import Bake
 from ....core.bake.steps import BAKE_STEPS, needs_medium, to_simulate
 from ....core.bake.surface import Surface
+from ....core.errors import BakeError
+from ....core.messages import Message
 from ....core.native import native
 from ....core.scene.flat_mesh import FlatMesh, flatten
 from ....core.scene.illumination import Illumination
@@ -34,6 +36,7 @@ from ...read.base_color import read_texture
 from ...read.geometry import read_polygons
 from ...read.lights import read_illumination
 from ...read.scene_cache import SceneCache, scene_cache
+from ...read.uv_maps import Outcome, make_maps
 from ...read.visibility import ObjectInstance, as_rendered, check_instance, find_instances, render_visible_names
 
 PLACEHOLDER_COLOR = (0.5, 0.5, 0.5)
@@ -65,6 +68,10 @@ class BakePlan:
     color: BaseColor | None = None
     blur: float = 0.0
     matrix: list | None = None
+
+    def with_message(self, message: Message) -> BakePlan:
+        """The plan with a message about its mesh."""
+        return replace(self, mesh=replace(self.mesh, messages=(message, *self.mesh.messages)))
 
     def surface_with_color(self) -> Surface:
         """The surface with its mean base color; with a placeholder if only Cycles can evaluate it."""
@@ -180,8 +187,10 @@ def read_scene(
     _update_nodes(context.evaluated_depsgraph_get())
     with as_rendered(view_layer):
         visible, depsgraph = render_visible_names(view_layer), context.evaluated_depsgraph_get()
+        maps = make_maps(depsgraph, targets)
         scene_cache.check_images()
-        plans = read_plans(depsgraph, targets, visible, resolution, cache=scene_cache, check=check, indirect=indirect)
+        options = {"cache": scene_cache, "check": check, "indirect": indirect, "maps": maps}
+        plans = read_plans(depsgraph, targets, visible, resolution, **options)
     if not context.scene.beamspread.use_live:
         scene_cache.drop_arrays()
     return plans
@@ -221,6 +230,7 @@ def read_plans(
     cache: SceneCache | None = None,
     check: Check | None = None,
     indirect: bool | None = None,
+    maps: Mapping[str, Outcome] | None = None,
 ) -> list[Plan]:
     """Read the targets and the light of a depsgraph, which is not needed afterwards.
 
@@ -231,7 +241,9 @@ def read_plans(
     size : width and height of the texture, overrides all other sizes.
     copy : copy of the scene for Cycles, if there is one already. Else the first job that needs one makes it.
     cache : results of earlier reads, for a depsgraph of the viewport; None: everything is read.
+    maps : outcomes of `make_maps`.
     """
+    maps = maps or {}
     indirect = depsgraph.scene.beamspread.use_indirect if indirect is None else indirect
     try:
         instances = find_instances(depsgraph, {target.object_name for target in targets}, visible)
@@ -244,7 +256,11 @@ def read_plans(
         try:
             instance = instances.get(target.object_name)
             check_instance(target.object_name, instance, depsgraph.view_layer)
-            plans.append(_read_target(depsgraph, target, instance, resolution, size, light, check))
+            outcome = maps.get(target.object_name)
+            if isinstance(outcome, BakeError):
+                raise outcome
+            plan = _read_target(depsgraph, target, instance, resolution, size, light, check)
+            plans.append(plan if outcome is None else plan.with_message(outcome))
         except (KeyboardInterrupt, native.Cancelled) as error:
             return [FailedPlan(target, error) for target in targets]
         except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked

@@ -1,0 +1,110 @@
+"""A UV map for any mesh: islands cut where faces bend, at one texel density, packed into one image without overlaps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .planes import COPLANAR_COSINE, SMOOTH_COSINE
+from .polygons import Polygons, components
+
+# Space around each island, over the side of the image: four texels at 1024 on each side.
+SPACE = 4 / 1024
+
+# Number of edges of an island, the longest, along which its rectangle is tried. More pack islands tighter.
+MAX_DIRECTIONS = 16
+
+# Number of rounds in which the side of the image and the space around islands find each other.
+ROUNDS = 4
+
+
+def unwrap(polygons: Polygons) -> np.ndarray:
+    """UVs of all corners, float64 (K, 2), 0 to 1.
+
+    Flat parts keep their shape. Bent ones are cut into islands whose faces look the same way, and projected.
+    """
+    labels = _islands(polygons)
+    order = np.argsort(labels, kind="stable")
+    groups = np.split(order, np.cumsum(np.bincount(labels))[:-1])
+    positions, sizes = np.zeros((len(polygons.corners), 2)), np.zeros((len(groups), 2))
+    corners_of = np.split(np.arange(len(polygons.corners)), polygons.starts[1:-1])
+    for number, faces in enumerate(groups):
+        corners = np.concatenate([corners_of[face] for face in faces])
+        flat = _laid_flat(polygons, faces, corners)
+        positions[corners], sizes[number] = flat, flat.max(axis=0)
+    offsets, side = _packed(sizes)
+    return (positions + offsets[labels][polygons.face_of]) / side
+
+
+def _islands(polygons: Polygons) -> np.ndarray:
+    """Number of the island of each face, int (N,): faces that join smoothly and look along the same axis."""
+    normals = polygons.area_vectors / np.maximum(polygons.areas, 1e-300)[:, None]
+    faces = polygons.face_of
+    first, second = (faces[corners] for corners in polygons.shared_edges)
+    cosines = np.einsum("ij,ij->i", normals[first], normals[second])
+    # Parts that are flat look along one axis as a whole.
+    is_flat = cosines > COPLANAR_COSINE
+    flat = components(polygons.count, first[is_flat], second[is_flat])
+    means = np.stack([np.bincount(flat, polygons.area_vectors[:, axis]) for axis in range(3)], axis=1)[flat]
+    axis = np.abs(means).argmax(axis=1)
+    looks = 2 * axis + (np.take_along_axis(means, axis[:, None], 1)[:, 0] > 0)
+    is_joined = is_flat | ((cosines > SMOOTH_COSINE) & (looks[first] == looks[second]))
+    return components(polygons.count, first[is_joined], second[is_joined])
+
+
+def _laid_flat(polygons: Polygons, faces: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Positions (C, 2) of an island's corners, projected along its mean normal, in the smallest rectangle from 0."""
+    normal = polygons.area_vectors[faces].sum(axis=0)
+    length = np.linalg.norm(normal)
+    normal = normal / length if length > 0 else np.array([0.0, 0.0, 1.0])
+    x_axis = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    x_axis /= np.linalg.norm(x_axis)
+    points = polygons.corners[corners] @ np.stack([x_axis, np.cross(normal, x_axis)], axis=1)
+    edges = polygons.corners[polygons.next_corners[corners]] - polygons.corners[corners]
+    edges = edges @ np.stack([x_axis, np.cross(normal, x_axis)], axis=1)
+    lengths = np.linalg.norm(edges, axis=1)
+    longest = np.argsort(-lengths, kind="stable")[:MAX_DIRECTIONS]
+    best = points
+    if lengths[longest[0]] > 0:
+        directions = edges[longest] / np.maximum(lengths[longest], 1e-300)[:, None]
+        best = min((_turned(points, *direction) for direction in directions), key=lambda p: np.ptp(p, axis=0).prod())
+    if np.ptp(best[:, 0]) < np.ptp(best[:, 1]):
+        best = _turned(best, 0.0, 1.0)
+    return best - best.min(axis=0)
+
+
+def _turned(points: np.ndarray, cosine: float, sine: float) -> np.ndarray:
+    """Points in a frame whose x axis has this direction."""
+    return points @ np.array([(cosine, -sine), (sine, cosine)])
+
+
+def _packed(sizes: np.ndarray) -> tuple[np.ndarray, float]:
+    """Offsets (M, 2) of rectangles (M, 2) that don't overlap, and the side of the square around them.
+
+    Rectangles stand in rows, the highest first.
+    """
+    order = np.argsort(-sizes[:, 1], kind="stable")
+    side = max(float(np.sqrt((sizes[:, 0] * sizes[:, 1]).sum())), float(sizes.max()), 1e-30)
+    best = None
+    for stretch in (1.0, 1.05, 1.1, 1.2, 1.35, 1.5):
+        width = stretch * side
+        for _ in range(ROUNDS):
+            space = SPACE * width
+            offsets, extent = _in_rows(sizes + 2 * space, order, width)
+            width = max(extent, width * (1.0 if extent <= width else 0.0))
+        if best is None or width < best[1]:
+            best = offsets + space, width
+    return best
+
+
+def _in_rows(sizes: np.ndarray, order: np.ndarray, width: float) -> tuple[np.ndarray, float]:
+    """Offsets of rectangles in rows of at most this width, and the side of the square that they need."""
+    offsets = np.zeros(sizes.shape)
+    x = y = height = widest = 0.0
+    for number in order.tolist():
+        across, up = sizes[number]
+        if x > 0 and x + across > width:
+            x, y, height = 0.0, y + height, 0.0
+        offsets[number] = x, y
+        x, height = x + across, max(height, up)
+        widest = max(widest, x)
+    return offsets, max(widest, y + height)

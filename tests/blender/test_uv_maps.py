@@ -1,0 +1,182 @@
+"""Objects whose UV maps don't fit into one image get one of their own, which the image then uses."""
+
+import bpy
+import numpy as np
+import pytest
+import scenes
+from beamspread.blender.jobs.state import state
+from beamspread.blender.read.geometry import OWN_MAP
+from live_scenes import live_lines, live_pixels, settle, switch_off
+from nodes import Nodes
+
+SIDE = 64
+
+
+@pytest.fixture(autouse=True)
+def light():
+    settings = bpy.context.scene.beamspread
+    settings.use_indirect, settings.resolution, settings.margin = False, SIDE, 4
+    scenes.add_lamp((0.4, -0.6, 2.0), power=200)
+    scenes.add_world((0.3, 0.3, 0.3, 1))
+
+
+def add_box(*, uvs=True):
+    bpy.ops.mesh.primitive_cube_add(size=1.0, calc_uvs=uvs)
+    box = bpy.context.object
+    box.data.materials.append(scenes.add_material(linked=True))
+    return box
+
+
+def set_uvs(mesh, values):
+    mesh.uv_layers[0].data.foreach_set("uv", np.ascontiguousarray(values, np.float32).ravel())
+
+
+def uvs_of(mesh, name):
+    values = np.empty(2 * len(mesh.loops), np.float32)
+    mesh.uv_layers[name].data.foreach_get("uv", values)
+    return values.reshape(-1, 2)
+
+
+PROBLEMS = {
+    "overlaps: 83% of it": lambda mesh: np.tile([(0, 0), (1, 0), (1, 1), (0, 1)], (6, 1)),
+    "reaches outside the image": lambda mesh: uvs_of(mesh, "UVMap") * 11 - 10,
+    "no area in 6 of 6 faces": lambda mesh: np.zeros((24, 2)),
+    "not numbers": lambda mesh: np.full((24, 2), np.nan),
+}
+
+
+@pytest.mark.parametrize("problem", PROBLEMS)
+def test_a_map_that_does_not_fit_stays_and_another_one_is_used(problem):
+    box = add_box()
+    values = PROBLEMS[problem](box.data)
+    set_uvs(box.data, values)
+    box.data.uv_layers.new(name="Second", do_init=False)
+    box.data.uv_layers.active_index = 1
+    pixels = scenes.bake(box)[0]
+    layers = box.data.uv_layers
+    assert [layer.name for layer in layers] == ["UVMap", "Second", OWN_MAP]
+    assert layers.active_index == 1
+    assert layers["UVMap"].active_render
+    np.testing.assert_array_equal(uvs_of(box.data, "UVMap"), np.float32(values))
+    (line,) = [line for line in state.lines() if OWN_MAP in line]
+    assert problem in line
+    assert line.startswith(f"'Cube' has a new UV map '{OWN_MAP}', which its image uses.")
+    assert (pixels > 0).any(axis=2).mean() > 0.5
+
+
+def test_a_mesh_without_a_map_gets_one_and_the_next_bake_keeps_it():
+    box = add_box(uvs=False)
+    first = scenes.bake(box)[0]
+    values = uvs_of(box.data, OWN_MAP)
+    np.testing.assert_array_equal(scenes.bake(box)[0], first)
+    np.testing.assert_array_equal(uvs_of(box.data, OWN_MAP), values)
+    assert not any(OWN_MAP in line for line in state.lines())
+
+
+def test_a_map_that_fits_is_used_as_before():
+    box = add_box()
+    scenes.bake(box)
+    assert [layer.name for layer in box.data.uv_layers] == ["UVMap"]
+    tree = scenes.node_of(box.data.materials[0]).node_tree
+    assert "UV Map" not in tree.nodes
+
+
+def test_a_map_of_our_own_follows_a_changed_mesh():
+    box = add_box(uvs=False)
+    scenes.bake(box)
+    before = uvs_of(box.data, OWN_MAP)
+    box.data.uv_layers[OWN_MAP].data.foreach_set("uv", np.zeros(48, np.float32))
+    box.data.update()
+    scenes.bake(box)
+    np.testing.assert_array_equal(uvs_of(box.data, OWN_MAP), before)
+
+
+def rendered(samples=8):
+    """A picture by Cycles from above the corner of the box."""
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location, camera.rotation_euler = (2, -2, 1.6), (1.06, 0, 0.785)
+    bpy.context.collection.objects.link(camera)
+    scene.camera = camera
+    scene.render.resolution_x = scene.render.resolution_y = 64
+    scene.cycles.samples, scene.cycles.use_denoising = samples, False
+    return camera
+
+
+def test_renderers_show_the_image_by_its_map(tmp_path):
+    """The picture of a box with a map of its own is that of a box whose only map is the same."""
+    box = add_box()
+    set_uvs(box.data, np.tile([(0, 0), (1, 0), (1, 1), (0, 1)], (6, 1)))
+    scenes.bake(box)
+    rendered()
+    pictures = []
+    for number in range(2):
+        bpy.context.scene.render.filepath = str(tmp_path / f"{number}.exr")
+        bpy.context.scene.render.image_settings.file_format = "OPEN_EXR"
+        bpy.ops.render.render(write_still=True)
+        pictures.append(scenes.pixels(bpy.data.images.load(str(tmp_path / f"{number}.exr"))))
+        set_uvs(box.data, uvs_of(box.data, OWN_MAP))
+        tree = scenes.node_of(box.data.materials[0]).node_tree
+        tree.nodes["UV Map"].uv_map = ""
+    assert pictures[0].max() > 0
+    # Eight samples of the coat and of the sky: the same seed in both.
+    np.testing.assert_allclose(pictures[0], pictures[1], atol=1e-3 * pictures[0].max())
+
+
+def test_modifiers_that_make_faces_are_named():
+    box = add_box(uvs=False)
+    box.modifiers.new("Array", "ARRAY")
+    scenes.select(box)
+    with pytest.raises(RuntimeError, match="Its modifiers make new faces"):
+        bpy.ops.beamspread.bake()
+    assert OWN_MAP not in box.data.uv_layers
+
+
+def test_a_mesh_full_of_maps_is_named():
+    box = add_box(uvs=False)
+    for number in range(100):
+        if box.data.uv_layers.new(name=f"Map {number}", do_init=False) is None:
+            break
+        box.data.uv_layers[-1].data.foreach_set("uv", np.zeros(48, np.float32))
+    else:
+        pytest.skip("this Blender has no limit")
+    scenes.select(box)
+    with pytest.raises(RuntimeError, match="as many UV maps as it can have"):
+        bpy.ops.beamspread.bake()
+
+
+def test_live_asks_for_a_bake_and_then_follows():
+    box = add_box(uvs=False)
+    bpy.context.scene.beamspread.use_live = True
+    settle()
+    assert any("Bake it: Beamspread's own Bake makes a UV map." in line for line in live_lines())
+    baked = scenes.bake(box)[0]
+    settle()
+    assert live_lines() == []
+    box.location.x = 0.2
+    live = live_pixels(box.data.materials[0])
+    assert live_lines() == []
+    switch_off()
+    np.testing.assert_allclose(live, scenes.bake(box)[0], rtol=1e-4, atol=1e-6)
+    assert np.abs(live - baked).max() > 0
+
+
+def test_a_texture_on_the_artists_map_colors_the_bake():
+    """The texture repeats over the artist's map; Cycles evaluates it at the texels of the new one."""
+    bpy.context.scene.render.engine = "CYCLES"
+    plane = scenes.add_plane(uvs=np.array([(0, 0), (2, 0), (2, 2), (0, 2)]))
+    material = scenes.add_material(linked=True, color_mode="BASE_COLOR")
+    plane.data.materials.append(material)
+    image = bpy.data.images.new("Halves", 2, 1, float_buffer=True)
+    image.pixels = [0.8, 0.2, 0.2, 1, 0.2, 0.2, 0.8, 1]
+    nodes = Nodes(material)
+    texture = nodes.tree.nodes.new("ShaderNodeTexImage")
+    texture.image, texture.interpolation = image, "Closest"
+    nodes.tree.links.new(scenes.node_of(material).inputs["Base Color"], texture.outputs["Color"])
+    pixels = scenes.bake(plane)[0]
+    assert [layer.name for layer in plane.data.uv_layers] == ["UVMap", OWN_MAP]
+    row = pixels[SIDE // 2]
+    stripes = row[:, 0] > row[:, 2]
+    lit = row.max(axis=1) > 0
+    assert np.count_nonzero(np.diff(stripes[lit].astype(int))) == 3
