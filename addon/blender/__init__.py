@@ -11,7 +11,7 @@ Each part imports only core and those above it (tests/unit/test_layers.py reads 
     node          the shader node, and finding it in a scene
     cycles        light and colors that Cycles finds in a process of its own
     images        images of the scene: their files, facts about their bakes, storing results
-    jobs          bakes of targets (run), their status (state), and changes since (out_of_date)
+    jobs          bakes of targets (run), their status (state), time (announced), and changes since (out_of_date)
     live          previews that follow the scene while it is worked on
     ui            panels
 """

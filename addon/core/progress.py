@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -10,18 +9,13 @@ from contextlib import contextmanager
 import numpy as np
 
 from .native import native
+from .time_left import TimeLeft
 
 Callback = Callable[[float], object]
 """Takes the finished fraction, 0..1. The answer False (or NumPy's) cancels the work; any other lets it go on."""
 
 ROUNDING = 1e-9
 """Fraction of a whole by which parts that follow each other may seem to overlap."""
-
-OVERRUN = 0.15
-"""Seconds that a stage is expected to go on for each second so far, once it takes longer than estimated."""
-
-FOLLOWING = 0.05
-"""Fraction of a run's time within which the time left that is shown follows a new estimate; longer is steadier."""
 
 
 class Progress:
@@ -46,7 +40,7 @@ class Progress:
         self._stage_part, self._stage_began = self, self._began
         self._parts: list[Progress] = []
         self._expected: Callable[[], float] | None = None
-        self._shown = _Shown()
+        self._time_left = TimeLeft()
 
     @staticmethod
     def of(progress: Progress | Callback | None) -> Progress:
@@ -77,6 +71,7 @@ class Progress:
         whole = self._whole
         if (whole.stage, whole._stage_part) != (stage, self):
             whole.stage, whole._stage_part, whole._stage_began = stage, self, time.monotonic()
+            whole._time_left.begin_stage()
 
     def __call__(self, fraction: float) -> bool:
         """Report the finished fraction of this part; False if the work is to stop."""
@@ -121,9 +116,9 @@ class Progress:
         if expected is None:
             return None, self.fraction
         now, part = time.monotonic(), self._stage_part
-        left = stage_left(expected, now - self._stage_began, self.stage_fraction)
-        left += self._seconds_after(part._start + part._length, part)
-        return self._shown.update(now, now - self._began, left)
+        later = self._seconds_after(part._start + part._length, part)
+        stage = now - self._stage_began, expected, self.stage_fraction
+        return self._time_left.update(now, now - self._began, *stage, later)
 
     def _seconds(self) -> float | None:
         """Estimate of the seconds that this part takes in all; None if unknown."""
@@ -139,34 +134,6 @@ class Progress:
         if self._parts:
             return sum(part._seconds_after(point, current) for part in self._parts)
         return (self._seconds() or 0.0) if self._start >= point - ROUNDING else 0.0
-
-
-def stage_left(expected: float, lasted: float, fraction: float) -> float:
-    """Estimate of the seconds that a stage still takes.
-
-    The less of it is finished, the more the expected length counts, and the less its speed so far.
-    """
-    by_plan = max(expected - lasted, OVERRUN * lasted)
-    by_speed = lasted * (1.0 - fraction) / fraction if fraction > 0 else 0.0
-    return (1.0 - fraction) * by_plan + fraction * by_speed
-
-
-class _Shown:
-    """The time left as it is shown: it follows estimates without jumps."""
-
-    def __init__(self) -> None:
-        self._left: float | None = None
-        self._fraction = self._time = 0.0
-
-    def update(self, now: float, lasted: float, left: float) -> tuple[float, float]:
-        """Seconds left and the finished fraction of the time, from the estimate of the seconds left."""
-        if self._left is not None:
-            passed = now - self._time
-            steady = max(self._left - passed, 0.0)
-            left = steady + (left - steady) * -math.expm1(-passed / (FOLLOWING * (lasted + max(left, steady, 1e-9))))
-        self._left, self._time = left, now
-        self._fraction = max(self._fraction, lasted / max(lasted + left, 1e-9))
-        return left, self._fraction
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import bpy
@@ -23,12 +23,18 @@ from ..read.lights import lights_surfaces
 from ..read.node_kinds import NodeKinds, all_known, kinds_of
 from ..read.scene_cache import scene_cache
 from ..read.visibility import SURFACE_TYPES, by_name, placed, render_visible_names
-from .state import Announced, duration
+from .state import Announced, duration, state
 
 PLACEHOLDER_COLOR = (0.5, 0.5, 0.5)
 
 # Most targets whose bakes are announced, since each takes time in scans.
 MAX_TARGETS = 200
+
+# Height above a receiver, relative to its size, from which on an object is above it.
+LOW = 1e-4
+
+# Fraction of a receiver that an object has to reach over for it to be enclosed.
+ENCLOSED = 0.9
 
 # Shortest simulation that a line names, seconds.
 MIN_SIMULATION = 1.0
@@ -47,17 +53,27 @@ def announce(context, targets: list[Target]) -> dict[Target, Announced]:
         found = [item for item in targets_of(objects[target.object_name]) if item.name == target]
         forecast = facts.forecast(found[0], scene.beamspread.resolution) if found else None
         if forecast is not None:
-            announced[target] = _announced(forecast, settings)
+            announced[target] = _announced(target, forecast, settings, facts.encloses(forecast.grids[0]))
     return announced
 
 
-def _announced(forecast: Forecast, settings: BakeSettings) -> Announced:
+def compare(target: Target, read: Sequence[Estimate]) -> None:
+    """Note the estimates for a bake once its scene was read: they tell how far the facts without meshes are off."""
+    for step in state.announced[target].steps if target in state.announced else ():
+        plain = step.seconds / state.factors.get((target, step.kind), 1.0)
+        seconds = next((item.seconds for item in read if item.kind == step.kind), 0.0)
+        if plain and seconds:
+            state.factors[target, step.kind] = seconds / plain
+
+
+def _announced(target: Target, forecast: Forecast, settings: BakeSettings, is_enclosed: bool) -> Announced:
     steps, simulations = forecast.steps(settings), forecast.simulations(settings)
+    steps = [replace(step, seconds=step.seconds * state.factors.get((target, step.kind), 1.0)) for step in steps]
     if simulations and settings.quality == FINAL and not bpy.app.background:
         quick = replace(settings, quality=PREVIEW, indirect=False)  # the preview of `steps_of`
         steps += forecast.steps(quick)
         simulations |= forecast.simulations(quick)
-    return Announced(tuple(steps), simulations)
+    return Announced(tuple(steps), simulations, is_enclosed)
 
 
 class _SceneFacts:
@@ -66,7 +82,7 @@ class _SceneFacts:
     def __init__(self, scene, view_layer, depsgraph) -> None:
         self.lights: list[Light] = []
         self.triangles, self.lamps_by_cycles, self.is_traceable = 0, 0, True
-        self._corners = [np.zeros((0, 3))]
+        self._corners = [np.zeros((0, 8, 3))]
         visible = render_visible_names(view_layer)
         shown = (obj for obj in scene.objects if obj.name in visible)
         self._glowing = False
@@ -88,7 +104,7 @@ class _SceneFacts:
     def _add_solid(self, obj, matrix: np.ndarray) -> None:
         if obj.visible_shadow:
             self.triangles += 2 * len(getattr(obj.data, "polygons", ()))
-        self._corners.append(np.array(obj.bound_box) @ matrix[:3, :3].T + matrix[:3, 3])
+        self._corners.append((np.array(obj.bound_box) @ matrix[:3, :3].T + matrix[:3, 3])[None])
         kinds = [_kinds(slot.material.original) for slot in obj.material_slots if slot.material is not None]
         self._glowing |= any(kind.glows for kind in kinds)
         self.is_traceable &= all(kind.is_known for kind in kinds)
@@ -105,13 +121,23 @@ class _SceneFacts:
             rows = tuple(map(tuple, np.eye(3).tolist()))
             self.lights.append(WorldLight("World", 1.0, color, True, np.ones((1, 1, 3), np.float32), rows))
 
+    def encloses(self, grid: Grid) -> bool:
+        """True if the box around an object reaches over nearly all of a grid, as a room's does."""
+        axes = np.array((grid.x_axis, grid.y_axis, grid.normal))
+        corners = (self._corners - grid.centre) @ axes.T
+        size = np.array((grid.width * grid.pitch_x, grid.height * grid.pitch_y))
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        shared = np.minimum(high[:, :2], size / 2) - np.maximum(low[:, :2], -size / 2)
+        covered = np.prod(np.maximum(shared, 0) / size, axis=1)
+        return bool((covered[high[:, 2] > LOW * size.max()] > ENCLOSED).any())
+
     def forecast(self, target: BakeTarget, resolution: int) -> Forecast | None:
         """The forecast for a target; None if it has no faces or no size."""
         grid, obj = _grid(target, resolution), target.obj
         if grid is None or not (self.lights or self.unknown or self.world_by_cycles or self.lamps_by_cycles):
             return None
         heights = (self._corners - grid.origin) @ np.array(grid.normal)
-        is_below = heights.max(initial=0.0) > 1e-4 * max(obj.dimensions)
+        is_below = heights.max(initial=0.0) > LOW * max(obj.dimensions)
         surface = target.node.surface()
         is_textured = target.node.has_texture()
         finders = Finders(
@@ -163,7 +189,10 @@ def _grid(target: BakeTarget, resolution: int) -> Grid | None:
 def line_of(announced: dict[Target, Announced], targets: Iterable[Target]) -> str:
     """How long bakes of the targets take, such as "About 4 s"; "" if that is not known of one of them."""
     chosen = [announced.get(target) for target in targets]
-    return f"About {duration(_total(chosen))}" if chosen and None not in chosen else ""
+    if not chosen or None in chosen:
+        return ""
+    about = "At least" if any(bake.is_rough() for bake in chosen) else "About"
+    return f"{about} {duration(_total(chosen))}"
 
 
 def simulation_line(announced: dict[Target, Announced], targets: Iterable[Target]) -> str:

@@ -10,6 +10,7 @@ from enum import Enum
 
 from bpy.app.handlers import persistent
 
+from ...core.bake.bounced import BouncedLight
 from ...core.bake.pace import Estimate, pace
 from ...core.bake.runner import CANCELLED, WRITTEN, Bake
 from ...core.messages import Level, Message
@@ -48,10 +49,17 @@ class Announced:
     ----------
     steps : estimates of its steps.
     simulations : estimates of the simulations that it needs first, by medium and quality: bakes share them.
+    is_enclosed : True if an object reaches over all of the receiver, so that bounced light may take much longer.
     """
 
     steps: tuple[Estimate, ...]
     simulations: dict[object, Estimate]
+    is_enclosed: bool = False
+
+    def is_rough(self) -> bool:
+        """True if the bake may take much longer."""
+        bounced = (step for step in self.steps if step.kind == BouncedLight.name)
+        return self.is_enclosed and not all(step.is_measured() for step in bounced)
 
 
 @dataclass(frozen=True)
@@ -105,12 +113,14 @@ class State:
     run : the run in the window, or None.
     rows : status of each target of the scene; `out_of_date.stale` keeps them up to date.
     announced : how long bakes of targets will take; so does this.
+    factors : estimates once a scene was read, relative to those without its meshes, by target and kind of step.
     """
 
     def __init__(self) -> None:
         self.run: Run | None = None
         self.rows: dict[Target, Row] = {}
         self.announced: dict[Target, Announced] = {}
+        self.factors: dict[tuple[Target, str], float] = {}
         self._last: dict[Target, Row] = {}
 
     def is_running(self) -> bool:
@@ -164,6 +174,7 @@ class State:
         self._last.clear()
         self.rows.clear()
         self.announced.clear()
+        self.factors.clear()
 
 
 state = State()

@@ -30,13 +30,13 @@ CHOICE = 0.6, 1.0
 # Multiple of slabs of one mean free path with an index of refraction above 1; thicker ones come closer to 1.
 THIN_SLAB = 6.0
 
-# Seconds of a ray without obstacles; of a shadow ray towards lights all around, and towards others, where penumbras
-# are small.
+# Seconds of a ray without obstacles; besides, of a shadow ray towards lights all around, and towards others, where
+# penumbras are small.
 OPEN_RAY, BROAD_RAY, NARROW_RAY = 0.015e-6, 0.18e-6, 0.05e-6
 # Seconds per texel and lamp of the rays to a lamp without a size, and for each doubling of `MANY_TRIANGLES`: their
 # shadows have more borders.
 LAMP_RAYS, LAMP_TRIANGLES = 0.15e-6, 0.3e-6
-# Triangles from which on shadow rays take longer, by a tenth for each doubling.
+# Triangles of an average scene, whose shadow rays take these times. Fewer cast fewer shadows; more are traced longer.
 MANY_TRIANGLES = 1000
 
 # Seconds per texel and direction of the solver `adaptive`, and per pair of texels of `direct`; for suns and for others.
@@ -139,10 +139,8 @@ class Workload:
         return OPEN_RAY * rays + shadows * (BROAD_RAY * self.broad_rays + NARROW_RAY * self.narrow_rays)
 
     def _shadows(self) -> float:
-        """Time of a shadow ray, relative to that among few triangles."""
-        if self.triangles <= 2:  # the receiver itself
-            return 0.0
-        return 1 + 0.1 * max(math.log2(self.triangles / MANY_TRIANGLES), 0.0)
+        """Time of the shadow rays, relative to `MANY_TRIANGLES`; two are the receiver itself."""
+        return math.log2(max(self.triangles, 2) / 2) / math.log2(MANY_TRIANGLES / 2)
 
     def _spreading(self, settings: BakeSettings) -> float:
         """Seconds of the solver."""

@@ -17,7 +17,7 @@ class Pace:
     MIN_SECONDS = 0.1
     """Seconds that a step takes at least, or was estimated to take, to count; shorter ones tell little."""
 
-    LARGEST = 10.0
+    LARGEST = 100.0
     """Largest ratio, and the inverse of the smallest one."""
 
     def __init__(self) -> None:
@@ -36,6 +36,10 @@ class Pace:
             return estimated * ratios[subject]
         # One more of ratio 1: few measurements of others say little about this one.
         return estimated * math.exp(sum(map(math.log, list(ratios.values()))) / (len(ratios) + 1))
+
+    def has_measured(self, kind: str, subject: str) -> bool:
+        """True if there is a ratio of this subject."""
+        return subject in self._ratios.get(kind, {})
 
     def ratios_of(self, subject: str) -> dict[str, float]:
         """The ratios of a subject by kind of step, for `recall`."""
@@ -71,6 +75,10 @@ class Estimate:
     def corrected(self) -> float:
         """Seconds at the pace of this session."""
         return pace.corrected(self.kind, self.subject, self.seconds)
+
+    def is_measured(self) -> bool:
+        """True if such a step of this subject was measured."""
+        return pace.has_measured(self.kind, self.subject)
 
     def compare(self, measured: float) -> None:
         """Note how many seconds the step took."""

@@ -15,6 +15,7 @@ from ....core.messages import Level, Message, Messages, warning
 from ....core.progress import Progress
 from ....core.target import Target
 from ...images.results import Results
+from .. import announced
 from ..out_of_date import stale
 from ..out_of_date.fingerprint import Parts
 from ..state import state
@@ -102,8 +103,10 @@ class BakeRun(Sink):
         expected = steps_of_bakes([(step.plan.forecast(), step.settings) for step in steps])
         self._progress = Progress()
         self._shares = self._progress.split(map(seconds_of, expected))
-        for share, estimates in zip(self._shares, expected):
+        for step, share, estimates in zip(steps, self._shares, expected):
             share.expect(partial(seconds_of, estimates))
+            if step.purpose != Pass.PREVIEW:
+                announced.compare(step.plan.target, estimates)
 
     def bakes(self) -> Iterator[Bake]:
         """The bakes in their order, until the run is cancelled."""

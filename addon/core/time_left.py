@@ -1,0 +1,76 @@
+"""The time that a run still takes: from estimates of its stages, and from how fast they go."""
+
+from __future__ import annotations
+
+import math
+
+OVERRUN = 0.15
+"""Seconds that a stage is expected to go on for each second so far, once its estimate is over. Larger: longer times."""
+
+RECENT = 0.7
+"""Fraction of a stage's time so far that its speed is taken from. Larger: steadier, slower to follow another speed."""
+
+LONGEST = 2.0
+"""Largest number of times that a stage is expected to take its time so far and its estimate once more."""
+
+FOLLOWING = 0.05
+"""Fraction of a run's time within which the time left that is shown follows a new estimate; longer is steadier."""
+
+MAX_LOOKS = 200
+"""Number of earlier fractions that are kept of a stage."""
+
+
+class TimeLeft:
+    """The time left as it is shown: it follows estimates without jumps."""
+
+    def __init__(self) -> None:
+        self._left: float | None = None
+        self._fraction = self._time = 0.0
+        self._looks: list[tuple[float, float]] = []
+
+    def begin_stage(self) -> None:
+        """Forget the speed of the stage before."""
+        self._looks = []
+
+    def update(
+        self, now: float, lasted: float, stage_lasted: float, expected: float, fraction: float, later: float
+    ) -> tuple[float, float]:
+        """Seconds left of the run, and the finished fraction of its time, which never falls.
+
+        Parameters
+        ----------
+        now, lasted, stage_lasted : time of a clock; seconds since the run and its stage began.
+        expected, fraction : estimate of the stage's seconds in all, and its finished fraction.
+        later : estimate of the seconds of all stages that follow.
+        """
+        left = later + stage_left(expected, stage_lasted, fraction, self._by_speed(stage_lasted, fraction))
+        if self._left is not None:
+            passed = max(now - self._time, 0.0)
+            steady = max(self._left - passed, 0.0)
+            left = steady + (left - steady) * -math.expm1(-passed / (FOLLOWING * (lasted + max(left, steady, 1e-9))))
+        self._left, self._time = left, now
+        self._fraction = max(self._fraction, lasted / max(lasted + left, 1e-9))
+        return left, self._fraction
+
+    def _by_speed(self, lasted: float, fraction: float) -> float | None:
+        """Seconds left of a stage at its recent speed; None if it has not gone on recently."""
+        looks = self._looks
+        looks.append((lasted, fraction))
+        if len(looks) > MAX_LOOKS:
+            del looks[::2]
+        since = (1 - RECENT) * lasted
+        before, done = next((look for look in reversed(looks) if look[0] <= since), (0.0, 0.0))
+        return (1.0 - fraction) * (lasted - before) / (fraction - done) if fraction > done else None
+
+
+def stage_left(expected: float, lasted: float, fraction: float, by_speed: float | None) -> float:
+    """Estimate of the seconds that a stage still takes.
+
+    Its estimate counts at first. The more of its time has passed, or the more is finished, the more its speed counts;
+    fractions that are reported at uneven speed matter little thus.
+    """
+    by_plan = max(expected - lasted, OVERRUN * lasted)
+    if by_speed is None:
+        return by_plan
+    weight = min(max(fraction, (lasted / expected) ** 2 if expected > 0 else 1.0), 1.0)
+    return (1.0 - weight) * by_plan + weight * min(by_speed, LONGEST * (lasted + expected))
