@@ -94,6 +94,11 @@ def add_input_socket(tree, socket_type: str, name: str, default=None, hide_value
     socket.hide_value = hide_value
 
 
+def uv_attribute_type() -> str:
+    """Type of an attribute that is a UV map; Blender 3.4 has none that geometry nodes can store."""
+    return "FLOAT_VECTOR" if bpy.app.version < (3, 5, 0) else "FLOAT2"
+
+
 def has_input_socket(tree, name: str) -> bool:
     """True if a node group has an input of that name."""
     if hasattr(tree, "interface"):

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 import scenes
 from beamspread.blender.jobs.state import state
-from beamspread.blender.read.geometry import OWN_MAP
+from beamspread.blender.node.tree import show_map
+from beamspread.blender.read.geometry import OWN_MAP, read_polygons
 from live_scenes import live_lines, live_pixels, settle, switch_off
 from nodes import Nodes
 
@@ -118,19 +119,46 @@ def test_renderers_show_the_image_by_its_map(tmp_path):
         pictures.append(scenes.pixels(bpy.data.images.load(str(tmp_path / f"{number}.exr"))))
         set_uvs(box.data, uvs_of(box.data, OWN_MAP))
         tree = scenes.node_of(box.data.materials[0]).node_tree
-        tree.nodes["UV Map"].uv_map = ""
+        show_map(tree, "")
     assert pictures[0].max() > 0
     # Eight samples of the coat and of the sky: the same seed in both.
     np.testing.assert_allclose(pictures[0], pictures[1], atol=1e-3 * pictures[0].max())
 
 
-def test_modifiers_that_make_faces_are_named():
-    box = add_box(uvs=False)
-    box.modifiers.new("Array", "ARRAY")
+MODIFIERS = {
+    "ARRAY": {"count": 3},
+    "MIRROR": {"use_axis": (True, False, False)},
+    "BEVEL": {"width": 0.02, "segments": 1},
+    "SOLIDIFY": {"thickness": 0.1},
+}
+
+
+@pytest.mark.parametrize("kind", MODIFIERS)
+def test_faces_that_modifiers_make_have_places_of_their_own(kind):
+    """A modifier after the others makes the map. The texels hold as much light as the faces receive."""
+    box = add_box()
+    modifier = box.modifiers.new("First", kind)
+    for name, value in MODIFIERS[kind].items():
+        setattr(modifier, name, value)
+    settings = bpy.context.scene.beamspread
+    settings.output, settings.resolution = "IRRADIANCE", 256
+    if kind == "BEVEL":  # Blender itself gives its faces places in the map
+        set_uvs(box.data, np.tile([(0, 0), (1, 0), (1, 1), (0, 1)], (6, 1)))
     scenes.select(box)
-    with pytest.raises(RuntimeError, match="Its modifiers make new faces"):
-        bpy.ops.beamspread.bake()
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    assert [modifier.name for modifier in box.modifiers] == ["First", "Beamspread UV Map"]
     assert OWN_MAP not in box.data.uv_layers
+    (line,) = [line for line in state.lines() if OWN_MAP in line]
+    assert "has a new modifier 'Beamspread UV Map'" in line
+    evaluated = box.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    polygons = read_polygons(evaluated, box.data.materials[0].name, evaluated.matrix_world)
+    assert polygons.uv_map == OWN_MAP
+    density = polygons.uv_areas / polygons.areas
+    assert density.min() > 0.9 * density.max()
+    assert density.sum() * polygons.areas.mean() > 0.3
+    scenes.select(box)
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    assert len(box.modifiers) == 2
 
 
 def test_a_mesh_full_of_maps_is_named():

@@ -32,6 +32,7 @@ SHAPES = {
         face + (2 * i, 3 * j, 0) for i in range(5) for j in range(4) for face in box((1, 1 + i, 0.3 * j + 0.1))
     ],
     "triangle": [np.array([(0, 0, 0), (1, 0, 0), (0.2, 0.7, 0.5)])],
+    "double corners": [np.array([(0, 0, 0), (1, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 0.0)])],
     "letter": [np.array([(0, 0, 0), (3, 0, 0), (3, 1, 0), (1, 1, 0), (1, 4, 0), (0, 4, 0.0)])],
 }
 

@@ -162,11 +162,18 @@ def show_map(tree, name: str) -> None:
     node = tree.nodes.get(UV_MAP)
     if node is None and not name:
         return
+    # Blender 3.4 has the map of a modifier as an attribute alone.
+    kind, output, attribute = ("UVMap", "UV", "uv_map")
+    if compat.uv_attribute_type() != "FLOAT2" and name:
+        kind, output, attribute = ("Attribute", "Vector", "attribute_name")
+    if node is not None and node.bl_idname != f"ShaderNode{kind}":
+        tree.nodes.remove(node)
+        node = None
     if node is None:
-        node = _add(tree, "ShaderNodeUVMap", UV_MAP, (-800, 0))
-        tree.links.new(tree.nodes[IMAGE].inputs["Vector"], node.outputs["UV"])
-    if node.uv_map != name:
-        node.uv_map = name
+        node = _add(tree, f"ShaderNode{kind}", UV_MAP, (-800, 0))
+        tree.links.new(tree.nodes[IMAGE].inputs["Vector"], node.outputs[output])
+    if getattr(node, attribute) != name:
+        setattr(node, attribute, name)
 
 
 def follow_frames(tree, first: int, last: int) -> None:

@@ -251,11 +251,17 @@ def _flat_scale(world: np.ndarray) -> np.ndarray:
 def _uvs(mesh, name: str = "") -> np.ndarray | None:
     """UVs of each loop, float32 (N, 2), in the map of that name, or without a name in the map that renders."""
     layer = next((layer for layer in mesh.uv_layers if (layer.name == name if name else layer.active_render)), None)
-    if layer is None:
+    if layer is not None:
+        uvs = np.empty(len(mesh.loops) * 2, np.float32)
+        layer.data.foreach_get("uv", uvs)
+        return uvs.reshape(-1, 2)
+    # Blender 3.4 stores UVs of geometry nodes as vectors.
+    attribute = mesh.attributes.get(name) if name else None
+    if attribute is None or (attribute.domain, attribute.data_type) != ("CORNER", "FLOAT_VECTOR"):
         return None
-    uvs = np.empty(len(mesh.loops) * 2, np.float32)
-    layer.data.foreach_get("uv", uvs)
-    return uvs.reshape(-1, 2)
+    vectors = np.empty(len(mesh.loops) * 3, np.float32)
+    attribute.data.foreach_get("vector", vectors)
+    return np.ascontiguousarray(vectors.reshape(-1, 3)[:, :2])
 
 
 def _has_material(obj, slots: np.ndarray, material_name: str) -> np.ndarray:

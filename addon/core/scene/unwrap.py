@@ -63,10 +63,10 @@ def _laid_flat(polygons: Polygons, faces: np.ndarray, corners: np.ndarray) -> np
     edges = edges @ np.stack([x_axis, np.cross(normal, x_axis)], axis=1)
     lengths = np.linalg.norm(edges, axis=1)
     longest = np.argsort(-lengths, kind="stable")[:MAX_DIRECTIONS]
-    best = points
-    if lengths[longest[0]] > 0:
-        directions = edges[longest] / np.maximum(lengths[longest], 1e-300)[:, None]
-        best = min((_turned(points, *direction) for direction in directions), key=lambda p: np.ptp(p, axis=0).prod())
+    # Edges of corners at the same place have no direction.
+    longest = longest[lengths[longest] > 1e-3 * lengths.max()]
+    turned = [_turned(points, *direction) for direction in edges[longest] / lengths[longest][:, None]]
+    best = min(turned, key=lambda at: np.ptp(at, axis=0).prod(), default=points)
     if np.ptp(best[:, 0]) < np.ptp(best[:, 1]):
         best = _turned(best, 0.0, 1.0)
     return best - best.min(axis=0)

@@ -32,11 +32,11 @@ from ...images.facts import is_sequence, size_of_frames
 from ...images.files import check_image
 from ...node.find import BakeTarget, find_node_in_groups, medium_of, targets_of
 from ...node.node import BeamspreadNode
+from ...node.uv_maps import Outcome, make_maps
 from ...read.base_color import read_texture
 from ...read.geometry import read_polygons
 from ...read.lights import read_illumination
 from ...read.scene_cache import SceneCache, scene_cache
-from ...read.uv_maps import Outcome, make_maps
 from ...read.visibility import ObjectInstance, as_rendered, check_instance, find_instances, render_visible_names
 
 PLACEHOLDER_COLOR = (0.5, 0.5, 0.5)
@@ -188,6 +188,8 @@ def read_scene(
     with as_rendered(view_layer):
         visible, depsgraph = render_visible_names(view_layer), context.evaluated_depsgraph_get()
         maps = make_maps(depsgraph, targets)
+        if maps:
+            depsgraph = context.evaluated_depsgraph_get()
         scene_cache.check_images()
         options = {"cache": scene_cache, "check": check, "indirect": indirect, "maps": maps}
         plans = read_plans(depsgraph, targets, visible, resolution, **options)

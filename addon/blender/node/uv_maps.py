@@ -1,0 +1,99 @@
+"""UV maps that bakes make, where no other map of an object fits into one image."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from ...core.errors import BakeError, ReceiverError
+from ...core.messages import Message, note
+from ...core.scene.islands import check_map
+from ...core.scene.unwrap import unwrap
+from ...core.target import Target
+from ..read.geometry import OWN_MAP, polygons_of, read_polygons
+from ..read.visibility import find_instances
+from .unwrap_group import add_modifier
+
+Outcome = Message | BakeError
+"""A note about a new map, or the reason why there can be none."""
+
+
+def make_maps(depsgraph, targets: Iterable[Target]) -> dict[str, Outcome]:
+    """Give each object without a UV map that fits into one image a map of its own; outcomes by the object's name.
+
+    The other maps stay as they are, and so does the choice of the active one. Where modifiers make new faces, another
+    modifier makes the map after them.
+    """
+    targets = list(targets)
+    problems = problems_of(depsgraph, targets)
+    return {name: _make(depsgraph, name, targets, problem) for name, problem in problems.items()}
+
+
+def problems_of(depsgraph, targets: Iterable[Target]) -> dict[str, str]:
+    """Sentences that say why no UV map of an object fits into one image, by the object's name."""
+    problems: dict[str, str] = {}
+    targets = list(targets)
+    instances = find_instances(depsgraph, {target.object_name for target in targets})
+    for target in targets:
+        instance = instances.get(target.object_name)
+        if instance is None or instance.obj.type != "MESH":
+            continue
+        polygons = read_polygons(instance.obj, target.material_name, instance.matrix)
+        try:
+            if polygons.count:
+                check_map(polygons)
+        except ReceiverError as error:
+            problems.setdefault(target.object_name, error.text)
+    return problems
+
+
+def _make(depsgraph, name: str, targets: list[Target], problem: str) -> Outcome:
+    obj = find_instances(depsgraph, {name})[name].obj.original
+    mesh = obj.data
+    if obj.library or obj.override_library or mesh.library or mesh.override_library:
+        text = f"{problem} '{name}' belongs to another .blend file, so it can't get a map of its own."
+        return ReceiverError(text, "Make it local (Object > Relations > Make Local > Selected Objects and Data).")
+    if mesh.is_editmode:
+        return ReceiverError(f"{problem} A bake makes a map of its own.", "Leave Edit Mode first.")
+    if _keeps_faces(depsgraph, obj):
+        if not _fill_layer(mesh, np.array(obj.matrix_world, float)):
+            text = f"{problem} The mesh has as many UV maps as it can have."
+            return ReceiverError(text, "Remove one of them.")
+        added = f"'{name}' has a new UV map '{OWN_MAP}', which its image uses."
+    else:
+        modifier = add_modifier(obj)
+        depsgraph.update()
+        if name in problems_of(depsgraph, [target for target in targets if target.object_name == name]):
+            obj.modifiers.remove(modifier)
+            return ReceiverError(
+                f"{problem} Its modifiers make new faces, and these could not be unwrapped.",
+                "Apply the modifiers (Object > Apply > Visual Geometry to Mesh), and unwrap the mesh.",
+            )
+        added = f"'{name}' has a new modifier '{modifier.name}', which makes the UV map '{OWN_MAP}' for its image."
+    return note(name, f"{added} {problem}")
+
+
+def _keeps_faces(depsgraph, obj) -> bool:
+    """True if the modifiers of an object make no faces."""
+    evaluated = obj.evaluated_get(depsgraph)
+    copy = evaluated.to_mesh()
+    try:
+        return len(copy.loops) == len(obj.data.loops) and len(copy.polygons) == len(obj.data.polygons)
+    finally:
+        evaluated.to_mesh_clear()
+
+
+def _fill_layer(mesh, matrix: np.ndarray) -> bool:
+    """Unwrap a mesh into a UV map of our own; False if there is no room for it. The active maps stay active."""
+    layers = mesh.uv_layers
+    if OWN_MAP not in layers:
+        active, rendered = layers.active_index, next((layer.name for layer in layers if layer.active_render), "")
+        if layers.new(name=OWN_MAP, do_init=False) is None:
+            return False
+        if rendered:
+            layers.active_index, layers[rendered].active_render = active, True
+    uvs = unwrap(polygons_of(mesh, matrix))
+    layers[OWN_MAP].data.foreach_set("uv", uvs.astype(np.float32).ravel())
+    mesh.update()
+    return True
