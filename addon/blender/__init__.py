@@ -17,7 +17,7 @@ Each part imports only core and those above it (tests/unit/test_layers.py reads 
 """
 
 from . import preferences, settings
-from .cycles import process
+from .cycles import kept_world, process
 from .images import facts, image_operators, undo
 from .jobs import state
 from .jobs.out_of_date import stale
@@ -37,6 +37,7 @@ PARTS = (
     node,
     buttons,
     scene_cache,  # its listeners show the nodes that `node` has restored after undo
+    kept_world,
     process,
     state,
     stale,

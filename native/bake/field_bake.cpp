@@ -19,7 +19,7 @@ constexpr std::size_t max_suns = 4;
 constexpr std::size_t max_examples = 4;
 
 // Rays from each texel to an example that has a size. Larger: slower choice, less noise in it.
-constexpr int example_rays = 8;
+constexpr int example_rays = 4;
 
 // Texels along a side, and rays, of the survey, which finds the angles and the mean irradiance of lights that nothing
 // blocks. Larger: slower choice.

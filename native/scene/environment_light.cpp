@@ -298,14 +298,28 @@ EnvironmentLight::EnvironmentLight(const View2D<const Vec3f>& radiance, const Ma
     }
 }
 
-std::unique_ptr<const Light> EnvironmentLight::facing(const Vec3& normal) const
+std::shared_ptr<const Light> EnvironmentLight::facing(const Vec3& normal) const
 {
-    return std::make_unique<FacingEnvironment>(m_map, normal);
+    return prepared(m_facing, normal);
 }
 
-std::unique_ptr<const Light> EnvironmentLight::facing_all() const
+std::shared_ptr<const Light> EnvironmentLight::facing_all() const
 {
-    return std::make_unique<FacingEnvironment>(m_map, std::nullopt);
+    return prepared(m_facing_all, std::nullopt);
+}
+
+std::shared_ptr<const Light> EnvironmentLight::prepared(Prepared& last, const std::optional<Vec3>& normal) const
+{
+    {
+        const std::scoped_lock lock(m_mutex);
+        if (last.light && last.normal == normal)
+            return last.light;
+    }
+    // Without the lock, since its loop runs in parallel.
+    auto light = std::make_shared<const FacingEnvironment>(m_map, normal);
+    const std::scoped_lock lock(m_mutex);
+    last = {normal, light};
+    return light;
 }
 
 void EnvironmentLight::sample(std::span<const Vec3> points, const Vec3& normal, std::span<const Vec2> square,

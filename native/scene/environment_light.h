@@ -1,6 +1,9 @@
 // The world: radiance from all directions, infinitely far away, as an equirectangular image.
 #pragma once
 
+#include <memory>
+#include <mutex>
+#include <optional>
 #include <vector>
 
 #include "base/view.h"
@@ -26,18 +29,29 @@ public:
     // `radiance` >= 0 in W/(m^2 sr); `to_world` turns directions of the image into the world. Throws InvalidArgument.
     EnvironmentLight(const View2D<const Vec3f>& radiance, const Mat3& to_world);
 
-    // Both prepare the light with `facing` at each call; callers with many points sample that, which chooses directions
-    // by radiance times cosine.
+    // Both use `facing`; callers with many points sample that, which chooses directions by radiance times cosine.
     void sample(std::span<const Vec3> points, const Vec3& normal, std::span<const Vec2> square,
                 LightRay* rays) const override;
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
-    std::unique_ptr<const Light> facing(const Vec3& normal) const override;
-    std::unique_ptr<const Light> facing_all() const override;
+    // The last one is kept: a bake asks for the same light several times.
+    std::shared_ptr<const Light> facing(const Vec3& normal) const override;
+    std::shared_ptr<const Light> facing_all() const override;
     bool is_colored() const override { return m_is_colored; }
 
 private:
+    // A light that was prepared for a normal, or for all.
+    struct Prepared {
+        std::optional<Vec3> normal;
+        std::shared_ptr<const Light> light;
+    };
+
+    std::shared_ptr<const Light> prepared(Prepared& last, const std::optional<Vec3>& normal) const;
+
     EnvironmentMap m_map;
     bool m_is_colored = false;
+    mutable std::mutex m_mutex;  // of the lights below
+    mutable Prepared m_facing;
+    mutable Prepared m_facing_all;
 };
 
 }  // namespace beamspread

@@ -59,10 +59,10 @@ public:
     virtual bool is_colored() const { return false; }
 
     // The same light prepared for surfaces with that normal; null if preparation does not pay.
-    virtual std::unique_ptr<const Light> facing(const Vec3& /*normal*/) const { return nullptr; }
+    virtual std::shared_ptr<const Light> facing(const Vec3& /*normal*/) const { return nullptr; }
 
     // The same light prepared for points anywhere with any normal; null if preparation does not pay.
-    virtual std::unique_ptr<const Light> facing_all() const { return nullptr; }
+    virtual std::shared_ptr<const Light> facing_all() const { return nullptr; }
 
     // The light if its radiance is known in each direction; null for others.
     virtual const DistantLight* as_distant() const { return nullptr; }

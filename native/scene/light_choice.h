@@ -75,7 +75,7 @@ private:
     float visibility(std::uint32_t cell, std::size_t light) const;
 
     std::vector<SceneLight> m_lights;
-    std::vector<std::unique_ptr<const Light>> m_prepared;
+    std::vector<std::shared_ptr<const Light>> m_prepared;
     std::vector<const DistantLight*> m_distant;  // [light] null for others
     std::vector<double> m_cumulated;  // probabilities of many lights; one more than lights
     const BounceGuide* m_guide = nullptr;

@@ -66,10 +66,10 @@ double MeshLight::distance_from(const Vec3& point) const
     return glm::distance(point, glm::clamp(point, m_low, m_high));
 }
 
-std::unique_ptr<const Light> MeshLight::facing_all() const
+std::shared_ptr<const Light> MeshLight::facing_all() const
 {
-    // make_unique can't reach the private constructor.
-    std::unique_ptr<MeshLight> light(new MeshLight());
+    // make_shared can't reach the private constructor.
+    std::shared_ptr<MeshLight> light(new MeshLight());
     light->m_low = m_low;
     light->m_high = m_high;
     light->m_faces = m_faces;

@@ -20,7 +20,7 @@ public:
     double distance_from(const Vec3& point) const override;
     bool is_colored() const override { return m_is_colored; }
     // A copy whose near faces are sampled by solid angle, so that rays from points beside them have bounded flux.
-    std::unique_ptr<const Light> facing_all() const override;
+    std::shared_ptr<const Light> facing_all() const override;
 
 private:
     struct Face {

@@ -364,7 +364,7 @@ private:
     }
 
     const ReceiverGrid& m_grid;
-    std::unique_ptr<const Light> m_prepared;
+    std::shared_ptr<const Light> m_prepared;
     const Light& m_light;
     OpenIrradiance m_open;
     const Occluders* m_occluders;

@@ -2,9 +2,13 @@
 
 import bpy
 import numpy as np
+import pytest
 import scenes
+from beamspread.blender.cycles import cycles_light, kept_world
 from beamspread.blender.cycles.cycles_light import world_panorama
 from beamspread.blender.cycles.scene_copy import SceneCopy
+from beamspread.blender.jobs.run.batch_run import bake_all
+from beamspread.core.batch.batch_options import parse
 from cycles_truth import cycles_bake, target_material
 
 
@@ -68,3 +72,80 @@ def test_panorama_has_all_of_a_sky_s_sun():
     floor = scenes.add_plane("Floor", material=material)
     truth = cycles_bake(floor, image, {"DIRECT"}, 16384).mean(axis=(0, 1))
     np.testing.assert_allclose(ours, truth, rtol=0.01)
+
+
+def test_panorama_without_detail_has_fewer_texels():
+    """Light that changes by half a per cent from texel to texel; a small lamp in it keeps all texels."""
+    nodes, background = scenes.add_world()
+    moved = nodes.add("VectorMath", {0: nodes.add("TexCoord").outputs["Generated"], 1: (2, 2, 2)})
+    nodes.set(background.inputs["Color"], moved.outputs[0])
+    np.testing.assert_allclose(panorama(1024, 512), 2 + directions(512, 256), atol=np.pi / 512)
+    up = nodes.add("SeparateXYZ", {0: nodes.add("TexCoord").outputs["Generated"]}).outputs["Z"]
+    is_lamp = nodes.add("Math", {0: up, 1: 0.9999}, operation="GREATER_THAN")
+    strength = nodes.add("Math", {0: is_lamp.outputs[0], 1: 1e5, 2: 1.0}, operation="MULTIPLY_ADD")
+    nodes.set(background.inputs["Strength"], strength.outputs[0])
+    assert panorama(1024, 512).shape == (512, 1024, 3)
+
+
+@pytest.fixture
+def rendered(monkeypatch):
+    """Names of the worlds that Cycles renders."""
+    names = []
+
+    def render(copy, progress=None):
+        names.append(bpy.data.scenes[copy.request["scene"]].world.name)
+        return np.ones((4, 8, 3), np.float32)
+
+    monkeypatch.setattr(cycles_light, "world_panorama", render)
+    kept_world._kept.clear()
+    yield names
+    kept_world._kept.clear()
+
+
+def sky_over_floor():
+    nodes, background = scenes.add_world(name="Sky")
+    checker = nodes.add("TexChecker")
+    nodes.set(background.inputs["Color"], checker.outputs["Color"])
+    scenes.add_plane("Floor", material=scenes.add_material())
+    bpy.context.scene.beamspread.resolution = 16
+    return checker
+
+
+def bake_frames(folder, frames="1-2"):
+    report = bake_all(parse(["--frames", frames, "--no-indirect", "--output", str(folder)]))
+    assert [bake.status for bake in report.bakes] == ["written"] * len(report.bakes)
+    assert {bake.lights for bake in report.bakes} == {1}
+
+
+def test_frames_share_a_world_until_it_changes(rendered, tmp_path):
+    checker = sky_over_floor()
+    lamp = scenes.add_sun(30.0)
+    lamp.location.x = 1.0
+    lamp.data.energy = 0.0
+    lamp.keyframe_insert("location", frame=1)
+    bake_frames(tmp_path, "1-3")
+    assert rendered == ["Sky"]
+    bpy.context.scene.world.name = "Renamed"
+    bake_frames(tmp_path)
+    assert rendered == ["Sky"]
+    checker.inputs["Scale"].default_value = 7.0
+    bake_frames(tmp_path)
+    assert rendered == ["Sky", "Renamed"]
+
+
+def test_worlds_that_move_are_rendered_at_each_frame(rendered, tmp_path):
+    checker = sky_over_floor()
+    checker.inputs["Scale"].keyframe_insert("default_value", frame=1)
+    bake_frames(tmp_path)
+    assert len(rendered) == 2
+
+
+def test_worlds_that_hang_on_objects_are_rendered_anew(rendered, tmp_path):
+    checker = sky_over_floor()
+    tree = bpy.context.scene.world.node_tree
+    place = tree.nodes.new("ShaderNodeTexCoord")
+    place.object = scenes.add_sun(30.0)
+    place.object.data.energy = 0.0
+    tree.links.new(checker.inputs["Vector"], place.outputs["Object"])
+    bake_frames(tmp_path)
+    assert len(rendered) == 2

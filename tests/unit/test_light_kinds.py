@@ -195,6 +195,16 @@ def environment_radiance(image, to_world):
     return radiance
 
 
+def test_a_world_that_was_prepared_for_one_normal_serves_others():
+    """It keeps what it prepared last."""
+    normals = [(0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (0.0, 0.0, 1.0)]
+    light = native.EnvironmentLight(IMAGE, TILTED)
+    for normal in normals:
+        fresh = irradiance(native.EnvironmentLight(IMAGE, TILTED), (0.0, 0.0, 0.0), normal)
+        assert irradiance(light, (0.0, 0.0, 0.0), normal) == fresh
+    assert irradiance(light, (0.0, 0.0, 0.0), normals[1]) != fresh
+
+
 @pytest.mark.parametrize("normal", NORMALS.values(), ids=NORMALS.keys())
 def test_environment_equals_brute_force(normal):
     light = native.EnvironmentLight(IMAGE, TILTED)

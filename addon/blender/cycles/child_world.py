@@ -19,6 +19,10 @@ LIGHT_PATH = {"Is Diffuse Ray": 1.0, "Ray Depth": 1.0, "Diffuse Depth": 1.0}
 # that are rendered again with more samples.
 TILE, TILES = 32, 12
 
+# Rows of a panorama without detail, at least, and the fraction of its light that may change its texel at each step
+# toward that. More rows and less change: slower bakes.
+MIN_HEIGHT, MAX_LOSS = 256, 5e-3
+
 
 def panorama(request, scene, progress) -> dict:
     """Task `world`; the request has width, height, samples and fine_samples."""
@@ -39,7 +43,7 @@ def panorama(request, scene, progress) -> dict:
     for number, (row, column) in enumerate(tiles):
         refine(studio, radiance, row, column, request["fine_samples"])
         progress(0.7 + 0.3 * (number + 1) / len(tiles))
-    return {"radiance": radiance}
+    return {"radiance": coarsened(radiance)}
 
 
 def lights_diffuse(world) -> bool:
@@ -116,6 +120,20 @@ def render(studio, samples: int) -> np.ndarray:
         radiance = values.reshape(image.size[1], image.size[0], image.channels)[..., :3].copy()
         bpy.data.images.remove(image)
     return np.nan_to_num(radiance, nan=0.0, posinf=0.0, neginf=0.0)
+
+
+def coarsened(radiance: np.ndarray) -> np.ndarray:
+    """The radiance with means of 2 x 2 texels, as often as they hardly differ from the texels."""
+    while min(radiance.shape[:2]) > MIN_HEIGHT:
+        height, width, _ = radiance.shape
+        solid = np.sin((np.arange(height) + 0.5) / height * np.pi).astype(np.float32)
+        blocks = radiance.reshape(height // 2, 2, width // 2, 2, 3)
+        means = blocks.mean(axis=(1, 3))
+        lost = np.abs(blocks - means[:, None, :, None]).sum(axis=(2, 3, 4)).ravel() @ solid
+        if lost > MAX_LOSS * (radiance.sum(axis=(1, 2)) @ solid):
+            break
+        radiance = means
+    return radiance
 
 
 def uneven_tiles(radiance: np.ndarray) -> list:

@@ -35,6 +35,7 @@ from .. import compat
 from ..read.image_nodes import missing_images
 from ..read.nodes import Links, surface_of
 from ..read.visibility import SOLID_TYPES, render_visible_names, renders
+from . import kept_world
 from .process import run, start
 from .scene_copy import CopyForCycles, SceneCopy
 
@@ -100,6 +101,11 @@ class CyclesLight:
             if not why_not_own:
                 job = replace(job, steps=(BouncedLight(self._max_bounces), *job.steps))
                 illumination, bounced = illumination.with_messages(BY_OWN_RAYS), False
+        key = self._key_of(world)
+        kept = kept_world.kept(key, world)
+        if kept is not None:
+            illumination = illumination.without({world}).lit_by([kept]).with_messages(note("", _found([world])))
+            world = ""
         job = replace(job, illumination=illumination)
         if not (world or bounced or objects):
             return job
@@ -112,13 +118,20 @@ class CyclesLight:
             return replace(job, illumination=illumination.with_messages(missing))
         start(self._copy.scene)
         illumination = illumination.without({world, *objects} - {""}).with_messages(*self._copy.scene.warnings)
-        names = ", ".join(f"'{name}'" for name in [world, *objects] if name)
-        found = [f"Cycles finds the light of {names}."] if names else []
+        names = [name for name in [world, *objects] if name]
+        found = [_found(names)] if names else []
         if bounced:
             found.append(f"Cycles finds the bounced light, since Beamspread's own rays can't. {why_not_own}")
         illumination = illumination.with_messages(*(note("", text) for text in found))
-        step = LightByCycles(self._copy, world, {name: self._lamps.get(name) for name in objects}, bounced, has_world)
+        lamps = {name: self._lamps.get(name) for name in objects}
+        step = LightByCycles(self._copy, world, lamps, bounced, has_world, key)
         return replace(job, illumination=illumination, steps=(step, *job.steps))
+
+    def _key_of(self, world: str) -> str:
+        """Key of the light of a world for later bakes; "" without a world, and in the thread of a render."""
+        if not world or threading.current_thread() is not threading.main_thread():
+            return ""
+        return kept_world.key_of(bpy.data.worlds[world], bpy.data.scenes[self._names[0]])
 
     def copy(self) -> CopyForCycles | None:
         """Copy of the scene; None if there is none and this is not the main thread."""
@@ -148,6 +161,7 @@ class LightByCycles(Step):
     lamps : position or direction of each lamp, as an argument of `FieldLight`; None for an object of another kind.
     bounced : True if bounced light is added.
     has_world : False if bounced light is that of a scene without its world.
+    world_key : key of the world for later bakes, or "".
     """
 
     copy: CopyForCycles
@@ -155,6 +169,7 @@ class LightByCycles(Step):
     lamps: dict[str, tuple | None]
     bounced: bool
     has_world: bool
+    world_key: str = ""
 
     name = "Finding light with Cycles"
     finds_light = True
@@ -180,6 +195,7 @@ class LightByCycles(Step):
         if renders_world:
             radiance = world_panorama(self.copy.scene, progress=first)
             self.copy.panorama = WorldLight(self.world, *WHITE, True, radiance, UPRIGHT)
+            kept_world.keep(self.world_key, self.copy.panorama)
         if self.world:
             job = replace(job, illumination=job.illumination.lit_by([self.copy.panorama]))
         for names, part in zip(groups, rest):
@@ -237,6 +253,10 @@ class LightByCycles(Step):
         return job, fields, fraction
 
 
+def _found(names: Sequence[str]) -> str:
+    return "Cycles finds the light of {}.".format(", ".join(f"'{name}'" for name in names))
+
+
 def _listed(names: Sequence[str]) -> str:
     """The first names, and the number of others."""
     shown = ", ".join(f"'{name}'" for name in names[:3])
@@ -289,7 +309,8 @@ def world_panorama(
 
     Returns
     -------
-    float32 (height, width, 3), W/(m^2 sr), row 0 at the bottom: the image of an equirectangular Environment Texture
+    float32 (height, width, 3), W/(m^2 sr), row 0 at the bottom, of fewer texels where nothing is
+        lost: the image of an equirectangular Environment Texture
     node that shows the same world. The direction of the point (u, v), each 0..1, has the azimuth 2 pi (0.5 - u) around
     +Z from +X, and the elevation pi (v - 0.5).
 

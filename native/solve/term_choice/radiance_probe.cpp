@@ -155,8 +155,9 @@ void RadianceProbe::add_beam(const PlaneLight& light, const std::vector<float>& 
     multiple_angles(cosines.data(), static_cast<float>(glm::dot(beam, toward_probe)),
                     static_cast<float>(beam.x * toward_probe.y - beam.y * toward_probe.x), irradiance, m_harmonics);
     for (std::size_t set = 0; set < colors.size(); ++set)
-        add_harmonics(moments.data() + set * m_row_size, by_angle, cosines.data(), colors[set], m_columns.data(),
-                      m_columns.size());
+        if (colors[set] != 0.0f)
+            add_harmonics(moments.data() + set * m_row_size, by_angle, cosines.data(), colors[set], m_columns.data(),
+                          m_columns.size());
 }
 
 }  // namespace beamspread
