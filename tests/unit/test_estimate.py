@@ -124,6 +124,9 @@ def test_another_scene_keeps_the_mean():
     pace.forget_subjects()
     assert pace.ratios_of("First") == {}
     assert pace.corrected("Baking", "First", 1.0) == pytest.approx(4.0**0.5)
+    pace.note("Bounced", "First", 1.0, 60.0)  # a room, which the next scene need not be
+    pace.forget_subjects()
+    assert pace.corrected("Bounced", "First", 1.0) == pytest.approx(Pace.MACHINE**0.5)
 
 
 def test_a_bake_teaches_the_next_one(monkeypatch):

@@ -82,7 +82,7 @@ class _SceneFacts:
     def __init__(self, scene, view_layer, depsgraph) -> None:
         self.lights: list[Light] = []
         self.triangles, self.lamps_by_cycles, self.is_traceable = 0, 0, True
-        self._corners = [np.zeros((0, 8, 3))]
+        self._boxes: list[tuple] = []
         visible = render_visible_names(view_layer)
         shown = (obj for obj in scene.objects if obj.name in visible)
         self._glowing = False
@@ -92,7 +92,9 @@ class _SceneFacts:
             elif obj.type in SURFACE_TYPES and obj.data is not None:
                 self._add_solid(obj, np.array(matrix))
         self._add_world(compat.original_world(view_layer, scene), view_layer)
-        self._corners = np.concatenate(self._corners)
+        # Centers (N, 3) of the boxes around objects, and halves of their axes as columns (N, 3, 3).
+        boxes = self._boxes or [(np.zeros(3), np.zeros((3, 3)))]
+        self._centers, self._halves = map(np.array, zip(*boxes))
 
     def _add_lamp(self, obj, matrix) -> None:
         light, reason = read_lamp(obj, matrix)
@@ -104,7 +106,8 @@ class _SceneFacts:
     def _add_solid(self, obj, matrix: np.ndarray) -> None:
         if obj.visible_shadow:
             self.triangles += 2 * len(getattr(obj.data, "polygons", ()))
-        self._corners.append((np.array(obj.bound_box) @ matrix[:3, :3].T + matrix[:3, 3])[None])
+        low, high = np.array(obj.bound_box[0]), np.array(obj.bound_box[6])
+        self._boxes.append((matrix[:3, :3] @ (low + high) / 2 + matrix[:3, 3], matrix[:3, :3] * (high - low) / 2))
         kinds = [_kinds(slot.material.original) for slot in obj.material_slots if slot.material is not None]
         self._glowing |= any(kind.glows for kind in kinds)
         self.is_traceable &= all(kind.is_known for kind in kinds)
@@ -123,21 +126,24 @@ class _SceneFacts:
 
     def encloses(self, grid: Grid) -> bool:
         """True if the box around an object reaches over nearly all of a grid, as a room's does."""
-        axes = np.array((grid.x_axis, grid.y_axis, grid.normal))
-        corners = (self._corners - grid.centre) @ axes.T
+        low, high = self._extents(grid)
         size = np.array((grid.width * grid.pitch_x, grid.height * grid.pitch_y))
-        low, high = corners.min(axis=1), corners.max(axis=1)
         shared = np.minimum(high[:, :2], size / 2) - np.maximum(low[:, :2], -size / 2)
         covered = np.prod(np.maximum(shared, 0) / size, axis=1)
         return bool((covered[high[:, 2] > LOW * size.max()] > ENCLOSED).any())
+
+    def _extents(self, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest coordinates (N, 3) of all boxes in a grid's frame, from its center."""
+        axes = np.array((grid.x_axis, grid.y_axis, grid.normal))
+        centers, halves = (self._centers - grid.centre) @ axes.T, np.abs(axes @ self._halves).sum(axis=2)
+        return centers - halves, centers + halves
 
     def forecast(self, target: BakeTarget, resolution: int) -> Forecast | None:
         """The forecast for a target; None if it has no faces or no size."""
         grid, obj = _grid(target, resolution), target.obj
         if grid is None or not (self.lights or self.unknown or self.world_by_cycles or self.lamps_by_cycles):
             return None
-        heights = (self._corners - grid.origin) @ np.array(grid.normal)
-        is_below = heights.max(initial=0.0) > LOW * max(obj.dimensions)
+        is_below = self._extents(grid)[1][:, 2].max() > LOW * max(obj.dimensions)
         surface = target.node.surface()
         is_textured = target.node.has_texture()
         finders = Finders(

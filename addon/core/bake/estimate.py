@@ -57,7 +57,7 @@ CYCLES_START, CYCLES_TRIANGLE = 1.5, 5e-6
 CYCLES_LAMP, CYCLES_BOUNCED, CYCLES_WORLD, CYCLES_COLOR = 3.0, 6.0, 8.0, 5e-6
 
 # Fraction of the light that comes from a world, or from glowing meshes, whose light is not known, about.
-OF_WORLD, OF_MESHES = 0.5, 0.25
+OF_WORLD, OF_MESHES = 0.5, 0.1
 
 # Texels along a side at which the brightness of lights is compared. More: slower estimates.
 SURVEY_TEXELS = 8

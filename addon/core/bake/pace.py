@@ -20,22 +20,27 @@ class Pace:
     LARGEST = 100.0
     """Largest ratio, and the inverse of the smallest one."""
 
+    MACHINE = 4.0
+    """Largest ratio, and the inverse of the smallest one, that other scenes are told; larger: more mistakes there."""
+
     def __init__(self) -> None:
         self._ratios: dict[str, dict[str, float]] = {}
+        self._means: dict[str, float] = {}  # for other subjects, by kind
 
     def note(self, kind: str, subject: str, estimated: float, measured: float) -> None:
         """Note how long a step took, and its estimate without this correction."""
         if estimated > 0 and max(estimated, measured) >= self.MIN_SECONDS:
-            ratio = min(max(measured / estimated, 1 / self.LARGEST), self.LARGEST)
-            self._ratios.setdefault(kind, {})[subject] = ratio
+            self._keep(kind, {subject: _within(measured / estimated, self.LARGEST)})
+
+    def _keep(self, kind: str, ratios: Mapping[str, float]) -> None:
+        known = self._ratios[kind] = {**self._ratios.get(kind, {}), **ratios}
+        # One more of ratio 1: few measurements of others say little about a subject.
+        self._means[kind] = math.exp(sum(map(math.log, known.values())) / (len(known) + 1))
 
     def corrected(self, kind: str, subject: str, estimated: float) -> float:
         """The estimate for a step at the pace of this session."""
-        ratios = self._ratios.get(kind, {})
-        if subject in ratios:
-            return estimated * ratios[subject]
-        # One more of ratio 1: few measurements of others say little about this one.
-        return estimated * math.exp(sum(map(math.log, list(ratios.values()))) / (len(ratios) + 1))
+        ratio = self._ratios.get(kind, {}).get(subject)
+        return estimated * (self._means.get(kind, 1.0) if ratio is None else ratio)
 
     def has_measured(self, kind: str, subject: str) -> bool:
         """True if there is a ratio of this subject."""
@@ -48,16 +53,24 @@ class Pace:
     def recall(self, subject: str, ratios: Mapping[str, float]) -> None:
         """Take ratios of an earlier session, by kind of step, for what this session has not measured."""
         for kind, ratio in ratios.items():
-            self._ratios.setdefault(kind, {}).setdefault(subject, ratio)
+            if not self.has_measured(kind, subject):
+                self._keep(kind, {subject: ratio})
 
     def forget_subjects(self) -> None:
         """Keep the mean of all subjects alone: another scene may have others of the same names."""
-        for kind, ratios in self._ratios.items():
-            self._ratios[kind] = {"": math.exp(sum(map(math.log, ratios.values())) / len(ratios))}
+        for kind, ratios in list(self._ratios.items()):
+            mean = math.exp(sum(map(math.log, ratios.values())) / len(ratios))
+            self._ratios[kind] = {}
+            self._keep(kind, {"": _within(mean, self.MACHINE)})
 
     def forget(self) -> None:
         """Forget all ratios."""
         self._ratios.clear()
+        self._means.clear()
+
+
+def _within(ratio: float, limit: float) -> float:
+    return min(max(ratio, 1 / limit), limit)
 
 
 pace = Pace()
