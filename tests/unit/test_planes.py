@@ -130,6 +130,13 @@ def test_faces_without_area_in_the_map_are_refused():
         flatten(mesh_of(box(), [*atlas(5), np.full((4, 2), 0.9)]))
 
 
+def test_tiny_faces_without_area_in_the_map_are_left_out_and_said():
+    sliver = np.array([(5, 0, 0), (5.03, 0, 0), (5.03, 1, 0), (5, 1, 0.0)])
+    mesh = flatten(mesh_of([*box(), sliver], [*atlas(6), np.full((4, 2), 0.9)]), name="Box")
+    assert len(mesh.parts) == 6
+    assert mesh.messages[0].text == "Faces of 'Box' have no area in the UV map: 0.5% of its surface stay black."
+
+
 def test_each_plane_is_baked_as_if_it_were_alone():
     """Light, shadows and texels of a chart follow from its own grid."""
     faces, uvs = box(), atlas(6)

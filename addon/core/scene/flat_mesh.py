@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import ReceiverError
 from ..messages import Message, note, warning
-from .islands import Island, check_uvs, find_islands
+from .islands import MAX_LOST, Island, check_uvs, find_islands
 from .planes import FLATNESS_TOLERANCE, FLATTENED, Plane, find_planes
 from .polygons import Polygons
 
@@ -59,7 +59,15 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> 
         # Faces that are flattened are shorter on the plane than their UVs say.
         fitted = tolerance if plane.deviation > exact else exact
         parts.append(FlatPart(plane, find_islands(polygons, plane, fitted)))
+    areas = [sum(float(island.polygons.areas.sum()) for island in part.islands) for part in parts]
+    lost = 1 - sum(areas) / sum(float((polygons.area_vectors[plane.faces] @ plane.normal).sum()) for plane in planes)
+    if lost > MAX_LOST:
+        raise ReceiverError("The UV map has no area, in all or some of the faces.", "Unwrap the mesh again.")
+    parts = [part for part, area in zip(parts, areas) if area > 0]
     messages = []
+    if lost > FLATNESS_TOLERANCE:
+        text = f"Faces of '{name}' have no area in the UV map: {lost:.1%} of its surface stay black."
+        messages.append(warning(name, text, "Unwrap the mesh again."))
     if len(bent):
         text = f"{len(bent)} of {polygons.count} faces of '{name}' are bent and stay black."
         messages.append(warning(name, text, "Give them another material, or flatten them."))
