@@ -10,6 +10,8 @@ from ...core.errors import BakeError
 from ...core.native import native
 from ...core.recent import keep_recent
 from ...core.scene.lights import WorldLight
+from ..read.scene_cache import scene_cache
+from . import kept_world
 from .cycles_light import UPRIGHT, WHITE, world_panorama
 from .scene_copy import WorldCopy
 
@@ -20,7 +22,10 @@ REST_SECONDS = 0.5
 """Seconds without changes before a sky is rendered as for a bake; more wastes less work on skies that still change."""
 
 MAX_SKIES = 4
-"""Number of panoramas in memory, 100 MB each."""
+"""Number of coarse panoramas in memory, 2 MB each; more show skies at once that were there before."""
+
+UNKEPT = "unkept "
+"""Begin of keys of worlds that later bakes render again, as more than their nodes decides about their light."""
 
 
 class SkyService:
@@ -36,19 +41,20 @@ class SkyService:
         self.time, self.problem = 0, ""
         self._condition = threading.Condition()
         self._wanted: tuple[str, WorldCopy] | None = None
-        self._lights: dict[tuple[str, bool], WorldLight] = {}  # by digest of the world, and True for those of bakes
+        self._lights: dict[str, WorldLight] = {}  # by key of the world
         self._latest: WorldLight | None = None
         self._thread: threading.Thread | None = None
 
-    def light(self, world, key: str) -> WorldLight | None:
+    def light(self, world, scene) -> WorldLight | None:
         """The light of an original world; until it is rendered, that of the former one, or None.
 
-        `key` is equal for worlds of the same light. Call it in the main thread.
+        Call it in the main thread.
         """
-        light = self._lights.get((key, True)) or self._lights.get((key, False))
-        if (key, True) not in self._lights and (self._wanted is None or self._wanted[0] != key):
+        key = kept_world.key_of(world, scene) or UNKEPT + scene_cache.tree(world).text
+        light = kept_world.kept(key, world.name)
+        if light is None and (self._wanted is None or self._wanted[0] != key):
             self._request(key, WorldCopy(world))
-        return light or self._latest
+        return light or self._lights.get(key) or self._latest
 
     def is_busy(self) -> bool:
         """True while a panorama is still to come."""
@@ -89,18 +95,26 @@ class SkyService:
         name = copy.request["world"]
         try:
             radiance = world_panorama(copy, **COARSE, progress=lambda _: self._wanted is not None)
-            self._put(name, key, False, radiance)
+            self._put(keep_recent(self._lights, key, _light(name, radiance), MAX_SKIES))
             with self._condition:
                 if self._condition.wait_for(lambda: self._wanted is not wanted, REST_SECONDS):
                     return
-            self._put(name, key, True, world_panorama(copy, progress=lambda _: self._wanted is wanted))
+            light = _light(name, world_panorama(copy, progress=lambda _: self._wanted is wanted))
+            if key.startswith(UNKEPT):
+                keep_recent(self._lights, key, light, MAX_SKIES)
+            else:
+                kept_world.keep(key, light)
+            self._put(light)
             self.problem = ""
         except native.Cancelled:
             return
         except BakeError as error:
             self.problem = error.text
 
-    def _put(self, name: str, key: str, is_fine: bool, radiance: np.ndarray) -> None:
-        light = WorldLight(name, *WHITE, True, radiance, UPRIGHT)
-        self._latest = keep_recent(self._lights, (key, is_fine), light, MAX_SKIES)
+    def _put(self, light: WorldLight) -> None:
+        self._latest = light
         self.time += 1
+
+
+def _light(name: str, radiance: np.ndarray) -> WorldLight:
+    return WorldLight(name, *WHITE, True, radiance, UPRIGHT)

@@ -25,7 +25,6 @@ from ..images.files import check_image
 from ..images.results import check_editable
 from ..node.find import find_bakeable, find_node, find_node_in_groups, medium_of
 from ..read.base_color import read_texture
-from ..read.digests import digest
 from ..read.geometry import mesh_key, read_polygons
 from ..read.lights import read_illumination, with_lamps
 from ..read.scene_cache import scene_cache
@@ -127,9 +126,7 @@ class Reader:
         """Add the light of a sky that Cycles renders, as far as it is there."""
         self._sky_time, light, world = self._sky.time, self._illumination, compat.world_of(depsgraph)
         if world is not None and world.name in light.by_cycles:
-            tree = scene_cache.tree(world)
-            key = digest(tree.text, *map(scene_cache.image_digest, tree.images))
-            sky = self._sky.light(world.original, key)
+            sky = self._sky.light(world.original, depsgraph.scene.original)
             if sky is not None:
                 light = light.without({world.name}).lit_by([sky])
         self._lit = light
