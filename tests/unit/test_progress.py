@@ -127,6 +127,21 @@ def test_the_time_left_is_exact_where_the_plan_is(clock):
         assert fraction == pytest.approx(now / 20, abs=0.01)
 
 
+def test_parts_of_a_part_share_its_estimate(clock):
+    """The media that a step simulates report their own stages."""
+    whole = Progress()
+    simulation, solution = whole.split([40, 10])
+    simulation.expect(lambda: 40.0)
+    solution.expect(lambda: 10.0)
+    first, second = simulation.split([1, 3])
+    first.begin("First medium")
+    assert whole.seconds_left() == pytest.approx(50)
+    clock[0] += 10
+    first(1.0)
+    second.begin("Second medium")
+    assert whole.seconds_left() == pytest.approx(40)
+
+
 @pytest.mark.parametrize("uneven", [lambda f: f, lambda f: f**0.5, lambda f: f**2, lambda f: 0.0])
 @pytest.mark.parametrize(
     ("planned", "lasting"), [([10, 10, 10], [20, 20, 20]), ([10, 10, 10], [5, 5, 5]), ([2, 20], [0.3, 30]), ([9], [27])]

@@ -118,7 +118,7 @@ class _SceneFacts:
         kinds = NodeKinds() if not is_lit or plain else _kinds(world)
         self.world_by_cycles = not kinds.is_known
         color = tuple(world.color) if plain else kinds.color
-        has_image = kinds.glows and kinds.is_known and color is None
+        has_image = kinds.glows and kinds.is_known and color is None and not kinds.asks_path
         self.unknown = OF_WORLD if has_image else OF_MESHES * self._glowing
         if color is not None and any(color):
             rows = tuple(map(tuple, np.eye(3).tolist()))

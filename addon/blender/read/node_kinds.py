@@ -40,11 +40,13 @@ class NodeKinds:
     glows : True if it gives light.
     color : radiance of a world or lamp of one color without links; None for all others.
     is_known : True if our own readers know all nodes.
+    asks_path : True if it depends on the kind of ray, as that of a world for the camera alone.
     """
 
     glows: bool = False
     color: tuple[float, float, float] | None = None
     is_known: bool = True
+    asks_path: bool = False
 
 
 def kinds_of(owner) -> NodeKinds:
@@ -56,7 +58,8 @@ def kinds_of(owner) -> NodeKinds:
     glowing = [source for source in sources if _glows(source)]
     is_known = all(map(_is_known, sources))
     color = _color(glowing[0].node) if len(sources) == 1 and glowing else None
-    return NodeKinds(bool(glowing), color, is_known)
+    asks_path = any(source.node.bl_idname == "ShaderNodeLightPath" for source in sources)
+    return NodeKinds(bool(glowing), color, is_known, asks_path)
 
 
 def all_known(wanted: InputSocket) -> bool:
@@ -79,7 +82,8 @@ def _is_known(source: Source) -> bool:
     node = source.node
     beyond = [node.inputs[name] for name in BEYOND if name in node.inputs]
     is_beyond = any(socket.is_linked or socket.default_value > 0 for socket in beyond)
-    return shows_bake(node) or (node.bl_idname in KNOWN and not is_beyond)
+    is_uv_map = node.bl_idname == "ShaderNodeAttribute" and source.socket.name == "Vector"
+    return shows_bake(node) or is_uv_map or (node.bl_idname in KNOWN and not is_beyond)
 
 
 def _glows(source: Source) -> bool:

@@ -140,7 +140,8 @@ class Workload:
 
     def _shadows(self) -> float:
         """Time of the shadow rays, relative to `MANY_TRIANGLES`; two are the receiver itself."""
-        return math.log2(max(self.triangles, 2) / 2) / math.log2(MANY_TRIANGLES / 2)
+        relative = math.log2(max(self.triangles, 2) / 2) / math.log2(MANY_TRIANGLES / 2)
+        return min(relative, relative**1.5)
 
     def _spreading(self, settings: BakeSettings) -> float:
         """Seconds of the solver."""
