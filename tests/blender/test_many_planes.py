@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import scenes
 from beamspread.blender.jobs.state import state
-from live_scenes import live_pixels, switch_off
+from live_scenes import live_lines, live_pixels, switch_off
 from mathutils import Matrix
 
 SIDE = 96
@@ -86,6 +86,10 @@ def test_bent_faces_beside_flat_ones_are_named(box):
     assert image.max() > 0
     (line,) = [line for line in state.lines() if "bent" in line]
     assert line.startswith("64 of 66 faces of 'Cylinder' are bent and stay black.")
+    bpy.context.scene.beamspread.use_live = True
+    cylinder.location.x += 0.1
+    live_pixels(cylinder.data.materials[0])
+    assert any(line in message for message in live_lines())
 
 
 def test_a_ball_is_refused(box):

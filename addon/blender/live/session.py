@@ -51,6 +51,7 @@ class Session:
         self._targets: list[LiveTarget] = []
         self._previews: dict[str, Preview] = {}  # by material
         self._errors: dict[Target, str] = {}
+        self._notes: dict[Target, tuple[Message, ...]] = {}  # of the last rendering
         self._facts: dict[str, tuple[int, ImageFacts]] = {}  # address and facts of the image in each material's node
         self._sizes: dict[tuple, tuple[int, int]] = {}  # of previews without an image, by material and resolution
         self._targets_at_bake: list[LiveTarget] | None = None
@@ -126,6 +127,8 @@ class Session:
         errors = (self._reader.errors | self._errors).items()
         messages = Messages(Message(Level.ERROR, str(target), error) for target, error in errors)
         messages.add(*self._reader.messages())
+        shown = {target.target for target in self._targets}
+        messages.add(*(message for target, notes in self._notes.items() if target in shown for message in notes))
         if self._sky.problem:
             messages.add(note("", f"Live has no light of the sky. {self._sky.problem}"))
         medium = self._thread.libraries.simulating
@@ -250,6 +253,7 @@ class Session:
             if target in wanted and rendering.error:
                 self._errors[target] = rendering.error
             elif target in wanted:
+                self._notes[target] = rendering.messages
                 shown |= self._show(rendering)
         if renderings:
             redraw(context, "VIEW_3D")

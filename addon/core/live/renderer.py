@@ -14,6 +14,7 @@ from ..bake.surface import channel_media
 from ..ldf.albedo import albedo_from_reflectance
 from ..ldf.library import load_source
 from ..material import Material
+from ..messages import Message
 from ..progress import Progress
 from ..recent import keep_recent
 from ..scene.flat_mesh import FlatMesh, flatten
@@ -66,6 +67,7 @@ class Rendering:
     texture : float32 (height, width, 3), luminance; None where `error` says why.
     region : bool (height, width), texels of the target, margin included.
     is_exact : True if the values are those of a bake.
+    messages : for the artist: faces that are left out, and noise of an exact rendering.
     """
 
     target: Target
@@ -73,6 +75,7 @@ class Rendering:
     region: np.ndarray | None = None
     is_exact: bool = False
     error: str = ""
+    messages: tuple[Message, ...] = ()
 
 
 def quick_side(lights: Sequence[Light]) -> int:
@@ -127,7 +130,9 @@ class LiveRenderer:
         values = [spread(chart.grid, illumination, *rest) for chart in framed.receiver.charts]
         texture = framed.receiver.to_texture(values)
         texture = extend_margin(texture, framed.receiver.coverage, target.settings.margin)
-        return Rendering(target.target, texture, framed.region, is_exact=True)
+        news = [message for message in illumination.messages if message not in target.illumination.messages]
+        messages = (*self._mesh(target).messages, *news)
+        return Rendering(target.target, texture, framed.region, is_exact=True, messages=messages)
 
     def missing(self, target: LiveTarget) -> list:
         """Media of the target that have no library yet."""
@@ -185,7 +190,7 @@ class LiveRenderer:
         if whole.color_out is not None:
             # At all texels, so that the texture keeps its detail.
             resized_texture = resized_texture * whole.color_out
-        return Rendering(target.target, resized_texture, whole.region)
+        return Rendering(target.target, resized_texture, whole.region, messages=self._mesh(target).messages)
 
     def _quick_luminance(
         self,
@@ -218,11 +223,12 @@ class LiveRenderer:
         return luminance if color is None else luminance * color
 
     def _mesh(self, target: LiveTarget) -> FlatMesh:
-        path = min(target.surface.material.mean_free_path)
-        key = id(target.polygons), path
+        path, polygons = min(target.surface.material.mean_free_path), target.polygons
+        key = id(polygons), path
         if key not in self._meshes:
+            mesh = flatten(polygons, path, target.target.object_name)
             # The entry holds the polygons, so that no others get their identity.
-            keep_recent(self._meshes, key, (target.polygons, flatten(target.polygons, path)), MAX_RECEIVERS)
+            keep_recent(self._meshes, key, (polygons, mesh), MAX_RECEIVERS)
         return self._meshes[key][1]
 
     def _receiver(self, target: LiveTarget, size: tuple[int, int]) -> FramedReceiver:
