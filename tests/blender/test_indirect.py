@@ -20,6 +20,7 @@ from beamspread.core.bake.runner import CANCELLED, FAILED
 from beamspread.core.bake.smoothing import SPLINE_VARIANCE
 from beamspread.core.messages import Level
 from beamspread.core.native import native
+from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import DIRECTIONS, STRATA, WEIGHTS
 from beamspread.core.target import Target
 from cycles_truth import cycles_bake, target_material
@@ -34,7 +35,7 @@ def coarse(monkeypatch):
     """Few nodes, with noise far below that of bakes."""
     monkeypatch.setattr(cycles_light, "NODES", 32)
     monkeypatch.setattr(cycles_light, "NOISE", 5e-4)
-    monkeypatch.setattr(cycles_light.CyclesLight, "_why_not_own_rays", lambda *_: "They are off.")
+    monkeypatch.setattr(Illumination, "bounce_problem", "They are off.")
     bpy.context.scene.beamspread.use_indirect = True
     bpy.context.scene.beamspread.margin = 0
 
@@ -206,6 +207,7 @@ def fields_of(chart, **options):
         "light": "DIRECT",
         "only": [],
         "by_lamps": False,
+        "totals_by_lamps": False,
         "reflectances": {},
         "textures": {},
         "tolerance": 0.0,
@@ -221,11 +223,13 @@ def fields_of(chart, **options):
         return process.run(copy, "fields", request)
 
 
+@pytest.mark.parametrize("totals_by_lamps", [False, True])
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("world", FRAMES.values(), ids=FRAMES.keys())
-def test_directions_of_a_glowing_square(world, mirrored):
+def test_directions_of_a_glowing_square(world, mirrored, totals_by_lamps):
     """Light on a small plane, stratum by stratum, against sums over the square. The noise is .4 %: within 1.5 % of the
-    sum. The flow agrees within 7 %, because each stratum counts as one direction and the square fills parts of few.
+    sum; with 16 samples of a stratum at each of 64 nodes .9 %, within five times that. The flow agrees within 7 %,
+    because each stratum counts as one direction and the square fills parts of few.
     """
     side, place = 0.6, np.array((0.5, 0.3, 0.8))
     corners = [place + (x * side / 2, y * side / 2, 0) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
@@ -240,9 +244,9 @@ def test_directions_of_a_glowing_square(world, mirrored):
         "y_axis": axes[1].tolist(),
         "normal": axes[2].tolist(),
         "size": [0.01, 0.01],
-        "nodes": [4, 4],
+        "nodes": [8, 8] if totals_by_lamps else [4, 4],
     }
-    found = fields_of(chart, most_samples=1500)
+    found = fields_of(chart, most_samples=100 if totals_by_lamps else 1500, totals_by_lamps=totals_by_lamps)
     found = found["radiance_0"].mean(axis=(1, 2, 3))
     steps = (np.arange(200) + 0.5) / 200 - 0.5
     x, y = np.meshgrid(place[0] + side * steps, place[1] + side * steps)
@@ -255,7 +259,8 @@ def test_directions_of_a_glowing_square(world, mirrored):
     squared, turn = 1 - cosine**2, np.arctan2(way[..., 1], sign * way[..., 0]) / (2 * np.pi) % 1
     begin, reach, first, part = STRATA.T[:, :, None, None]
     inside = (begin <= squared) & (squared < begin + reach) & (first <= turn) & (turn < first + part)
-    np.testing.assert_allclose(ours, (inside * power).sum(axis=(1, 2)), atol=0.015 * power.sum())
+    atol = (0.045 if totals_by_lamps else 0.015) * power.sum()
+    np.testing.assert_allclose(ours, (inside * power).sum(axis=(1, 2)), atol=atol)
     flow = (power[..., None] * -way / distance[..., None]).sum(axis=(0, 1)) * (sign, 1, 1)
     np.testing.assert_allclose(ours @ DIRECTIONS, flow, atol=0.07 * np.linalg.norm(flow))
 

@@ -22,6 +22,13 @@ MAX_GROWTH = 7
 # Most samples of a bake, after which there is progress.
 MAX_ROUND = 16
 
+# Samples of each half, node and stratum for the strata's parts of an irradiance that is known: without other light, and
+# at least. More take longer and leave less noise in directions.
+PARTS_SAMPLES, MIN_PARTS_SAMPLES = 8, 2
+
+# Part of the time until that irradiance is known.
+TOTALS_PART = 0.5
+
 # Fraction of the unoccluded light below which a surface counts as dim: the number of samples falls in proportion.
 # Larger values leave dark surfaces noisier.
 DIM = 0.01
@@ -31,8 +38,9 @@ def fields(request, scene, progress) -> dict:
     """Task `fields`: radiance_0, radiance_1, ... of the charts, float32 (K, rows, columns, 3), and noise.
 
     `light` is "INDIRECT" or "DIRECT". `only` names the objects whose light counts; none: all. With `by_lamps` a white
-    diffuse surface of one stratum replaces the mirrors, so that Cycles samples lamps of any size. Light below the
-    fraction `negligible` of the unoccluded light `open`, W/m^2, is not refined.
+    diffuse surface of one stratum replaces the mirrors, so that Cycles samples lamps of any size; with
+    `totals_by_lamps` it finds the irradiance, and mirrors the strata's parts of it. Light below the fraction
+    `negligible` of the unoccluded light `open`, W/m^2, is not refined.
 
     Radiance is the cosine-weighted mean of each stratum. The noise is the root mean square error of the irradiance over
     the result, which smooths by a Gaussian of `variance` (squared nodes) or as much as one, relative to the mean of all
@@ -49,17 +57,32 @@ def fields(request, scene, progress) -> dict:
     set_up(scene, request["light"])
     if request["only"]:
         shine_alone(scene, request["only"])
-    strata = [*request["strata"], *request["strata"]]  # two tiles for each: halves of the samples
-    ghost, image = add_ghost(request["charts"], strata, request["by_lamps"])
-    scene.collection.objects.link(ghost)
-    baker = Baker(scene, ghost, image, "DIFFUSE" if request["by_lamps"] else "GLOSSY", request["light"])
+    if not request["totals_by_lamps"]:
+        charts, facts = refine(request, scene, progress)
+    else:
+        most = len(request["strata"]) * request["most_samples"]
+        whole = request | {"strata": [[0.0, 1.0, 0.0, 1.0]], "by_lamps": True, "most_samples": most}
+        totals, facts = refine(whole, scene, lambda fraction: progress(TOTALS_PART * fraction))
+        # Noise counts against all light.
+        share = facts["irradiance"] / max(facts["irradiance"] + request["direct"], 1e-30)
+        samples = max(MIN_PARTS_SAMPLES, math.ceil(PARTS_SAMPLES * share**2))
+        charts = charts_of(request, baker_of(request, scene).bake(samples))
+        for chart, total in zip(charts, totals):
+            chart.clean = total.clean
+    result = {f"radiance_{n}": chart.radiance() for n, chart in enumerate(charts)}
+    return {name: np.asarray(value) for name, value in (result | facts).items()}
+
+
+def refine(request, scene, progress) -> tuple:
+    """The charts once their noise is low enough, and noise, samples and irradiance by these names."""
+    baker = baker_of(request, scene)
     mean, samples, count, wanted = Mean(), 0, FIRST_SAMPLES, math.inf
     while True:
         for part in [MAX_ROUND] * (count // MAX_ROUND) + [count % MAX_ROUND] * (count % MAX_ROUND > 0):
             mean.add(baker.bake(part), part)
             samples += part
             progress(samples / max(wanted, samples))
-        charts = [Chart(request, *halves) for halves in halves_of(request, np.maximum(mean.values(), 0))]
+        charts = charts_of(request, mean.values())
         nodes = np.array([chart.clean[..., 0].size for chart in charts])
         irradiance, noise, blur = (
             float(nodes @ values / nodes.sum())
@@ -73,9 +96,8 @@ def fields(request, scene, progress) -> dict:
         if irradiance < request["negligible"] * request["open"] or samples >= wanted:
             break
         count = int(min(np.ceil(wanted) - samples, MAX_GROWTH * samples))
-    result = {f"radiance_{n}": chart.radiance() for n, chart in enumerate(charts)}
-    result |= {"noise": error, "samples": 2 * samples, "irradiance": irradiance}
-    return {name: np.asarray(value) for name, value in result.items()}
+    baker.remove()
+    return charts, {"noise": error, "samples": 2 * samples, "irradiance": irradiance}
 
 
 class Chart:
@@ -253,6 +275,18 @@ class Mean:
         return np.float32(self._total / np.maximum(self._samples, 1))
 
 
+def baker_of(request, scene):
+    """Baker of a new ghost in the scene: of two tiles for each stratum, halves of the samples."""
+    ghost, image = add_ghost(request["charts"], [*request["strata"], *request["strata"]], request["by_lamps"])
+    scene.collection.objects.link(ghost)
+    return Baker(scene, ghost, image, "DIFFUSE" if request["by_lamps"] else "GLOSSY", request["light"])
+
+
+def charts_of(request, pixels) -> list:
+    """The light on each chart, from the pixels of an image."""
+    return [Chart(request, *halves) for halves in halves_of(request, np.maximum(pixels, 0))]
+
+
 class Baker:
     """Bakes the ghost, any number of times."""
 
@@ -267,6 +301,10 @@ class Baker:
         self.options = {"margin": 0, "use_clear": True, "use_selected_to_active": False, "target": "IMAGE_TEXTURES"}
         if "view_from" in bpy.ops.object.bake.get_rna_type().properties:
             self.options["view_from"] = "ABOVE_SURFACE"
+
+    def remove(self) -> None:
+        """Remove the ghost from the scene."""
+        bpy.data.objects.remove(self.ghost)
 
     def bake(self, samples: int) -> np.ndarray:
         """Pixels of the image, float32 (height, width, 3), NaN included."""

@@ -51,6 +51,7 @@ REQUEST = {
     "with_world": True,
     "only": [],
     "by_lamps": False,
+    "totals_by_lamps": False,
     "reflectances": {},
     "textures": {},
     "tolerance": NOISE,
@@ -205,7 +206,7 @@ class LightByCycles(Step):
     def _with_direct(self, job: BakeJob, names: list[str], progress: Progress) -> BakeJob:
         """The job with the light of one lamp, or of all meshes together."""
         lamp, doing = self.lamps[names[0]], f"Finding the light of {_listed(names)}"
-        options = {"light": "DIRECT", "only": names}
+        options = {"light": "DIRECT", "only": names, "totals_by_lamps": lamp is None}
         if lamp is not None:
             options |= {"nodes": DIRECT_NODES, "by_lamps": True, "strata": [[0.0, 1.0, 0.0, 1.0]]}
         job, fields, _ = self._with_fields(job, progress, doing, **options)
@@ -309,10 +310,9 @@ def world_panorama(
 
     Returns
     -------
-    float32 (height, width, 3), W/(m^2 sr), row 0 at the bottom, of fewer texels where nothing is
-        lost: the image of an equirectangular Environment Texture
-    node that shows the same world. The direction of the point (u, v), each 0..1, has the azimuth 2 pi (0.5 - u) around
-    +Z from +X, and the elevation pi (v - 0.5).
+    float32 (height, width, 3), W/(m^2 sr), row 0 at the bottom, or of fewer texels where nothing is lost: the image of
+    an equirectangular Environment Texture node that shows the same world. The direction of the point (u, v), each 0..1,
+    has the azimuth 2 pi (0.5 - u) around +Z from +X, and the elevation pi (v - 0.5).
 
     Raises
     ------
