@@ -56,7 +56,7 @@ public:
           m_smooth_from(texels_to_smooth_lamp * std::max(grid.pitch_x, grid.pitch_y)),
           m_rays(grid, occluders, settings.clearance),
           m_shadows(grid, m_source, occluders, m_rays.start(), settings.find_shadows),
-          m_sums(grid.height)
+          m_sums(settings.noise ? grid.height : 0)
     {
         const Texel open = gather_texel(0.0, 0.0, m_points, nullptr);
         m_open_irradiance = Vec3f(open.irradiance);
@@ -65,7 +65,7 @@ public:
 
     std::size_t bands() const { return m_shadows.bands(); }
 
-    // Mean irradiance of all texels and channels, W/m^2.
+    // Mean irradiance of all texels and channels, W/m^2, if noise is asked for.
     double mean() const
     {
         return std::accumulate(m_sums.begin(), m_sums.end(), 0.0) /
@@ -111,8 +111,9 @@ private:
             if (travel_varies)
                 work.travel[x] = mean_direction(gathered.flow);
         }
-        for (const Vec3f& light : work.irradiance)
-            m_sums[y] += static_cast<double>(light.x + light.y + light.z);
+        if (!m_sums.empty())
+            for (const Vec3f& light : work.irradiance)
+                m_sums[y] += static_cast<double>(light.x + light.y + light.z);
         sink.add({.sample = y * m_grid.width,
                   .count = m_grid.width,
                   .ray = 0,
@@ -238,7 +239,7 @@ private:
     Shadows m_shadows;
     // Irradiance and travel at texel (0, 0) where nothing blocks the light: those of all texels, if it is infinitely far.
     Vec3f m_open_irradiance, m_far_travel;
-    std::vector<double> m_sums;  // [row] irradiance of texels and channels
+    std::vector<double> m_sums;  // [row] irradiance of texels and channels; empty unless noise is asked for
     PerThread<Work> m_work;
 };
 

@@ -1,31 +1,61 @@
 #include "scene/first_pass.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace beamspread {
 
-FirstPass::FirstPass(std::size_t width, std::size_t height, std::size_t rays, std::uint32_t seed)
-    : m_width(width), m_height(height), m_met(width * height), m_search(width, height, rays, seed)
+namespace {
+
+// Irradiance, as a fraction of the mean where light is seen, from which a texel has all guided rays. Darker ones have fewer
+// in proportion, down to a fraction of all: noise counts against the mean. More: faster, and more noise in dim light.
+constexpr double full_brightness = 0.125;
+constexpr double min_share = 1.0 / 8.0;
+
+}  // namespace
+
+FirstPass::FirstPass(std::size_t width, std::size_t height, std::size_t first_rays, std::size_t rays,
+                     std::uint32_t seed)
+    : m_width(width),
+      m_height(height),
+      m_first_rays(first_rays),
+      m_max_rays(rays),
+      m_texels(width * height),
+      m_search(width, height, rays, seed)
 {
 }
 
-void FirstPass::note(std::size_t x, std::size_t y, const LightHit& hit, const Vec3f& transmittance)
+void FirstPass::note(std::size_t x, std::size_t y, std::span<const std::uint8_t> met, std::span<const FirstRays> rays,
+                     std::span<const LightHit> hits)
 {
-    const bool is_blocked = transmittance == Vec3f(0.0f);
-    m_met[y * m_width + x] |= transmittance == Vec3f(1.0f) ? Met::light : is_blocked ? Met::obstacle : Met::both;
-    m_search.note(x, y, hit, is_blocked);
+    FirstRays sum;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        const float visible = rays[i].open > 0.0f ? std::min(rays[i].irradiance / rays[i].open, 1.0f) : 0.0f;
+        m_texels[y * m_width + x + i] = {met[i], static_cast<std::uint8_t>(std::ceil(255.0f * visible))};
+        sum.traced += rays[i].traced;
+        sum.open += rays[i].open;
+        sum.irradiance += rays[i].irradiance;
+    }
+    m_search.note(x, y, sum, hits);
 }
 
-void FirstPass::find_met_around(std::size_t y, std::vector<std::uint8_t>& around) const
+FirstPass::Around FirstPass::around(std::size_t x, std::size_t y) const
 {
-    around.assign(m_width, Met::nothing);
+    Around sum;
+    std::size_t texels = 0;
     for (std::size_t row = y > 0 ? y - 1 : 0; row <= std::min(y + 1, m_height - 1); ++row)
-        for (std::size_t x = 0; x < m_width; ++x)
-            for (std::size_t beside = x > 0 ? x - 1 : 0; beside <= std::min(x + 1, m_width - 1); ++beside)
-                around[x] |= m_met[row * m_width + beside];
+        for (std::size_t column = x > 0 ? x - 1 : 0; column <= std::min(x + 1, m_width - 1); ++column) {
+            const Texel& texel = m_texels[row * m_width + column];
+            sum.met |= texel.met;
+            sum.visible += static_cast<double>(texel.visible) / 255.0;
+            ++texels;
+        }
+    // One ray more may get through.
+    sum.visible = (sum.visible + 1.0 / static_cast<double>(m_first_rays)) / static_cast<double>(texels);
+    return sum;
 }
 
-RayMethod FirstPass::method_of(std::uint8_t met_around, bool is_rare, bool has_guide)
+RayMethod FirstPass::method_of(std::uint8_t met_around, std::size_t x, std::size_t y) const
 {
     switch (met_around) {
         case Met::nothing:
@@ -33,32 +63,53 @@ RayMethod FirstPass::method_of(std::uint8_t met_around, bool is_rare, bool has_g
         case Met::light:
             return RayMethod::open;
         case Met::both:
-            return is_rare && has_guide ? RayMethod::guided : RayMethod::even;
+            return m_search.is_rare(x, y) && m_search.has_hits_around(x, y) ? RayMethod::guided : RayMethod::even;
         default:
-            if (!has_guide)
-                return RayMethod::single;
-            return is_rare ? RayMethod::guided : RayMethod::few_guided;
+            return m_search.has_hits_around(x, y) ? RayMethod::guided : RayMethod::single;
     }
+}
+
+std::size_t FirstPass::guided_rays(double visible, std::size_t x, std::size_t y) const
+{
+    const double brightness = visible * m_search.open_brightness(x, y);
+    const double share = std::clamp(brightness / full_brightness, min_share, 1.0);
+    return static_cast<std::size_t>(std::ceil(share * static_cast<double>(m_max_rays)));
 }
 
 void FirstPass::Row::find(const FirstPass& pass, std::size_t y)
 {
     // A thread mostly takes the rows of a tile one after the other, which share guides.
-    if (!m_pass || m_y / LightSearch::tile_side != y / LightSearch::tile_side)
+    if (!m_pass || m_y / tile_side != y / tile_side)
         m_guides.assign(pass.m_search.columns(), {});
     m_pass = &pass;
     m_y = y;
-    pass.find_met_around(y, m_met_around);
     m_methods.resize(pass.m_width);
-    for (std::size_t x = 0; x < pass.m_width; ++x)
-        m_methods[x] = m_met_around[x] <= Met::light ? method_of(m_met_around[x], false, false)
-                                                     : method_of(m_met_around[x], pass.m_search.is_rare(x, y),
-                                                                 pass.m_search.has_hits_around(x, y));
+    m_rays.resize(pass.m_width);
+    for (std::size_t x = 0; x < pass.m_width; ++x) {
+        const Around around = pass.around(x, y);
+        m_methods[x] = pass.method_of(around.met, x, y);
+        switch (m_methods[x]) {
+            case RayMethod::none:
+                m_rays[x] = 0;
+                break;
+            case RayMethod::open:
+                m_rays[x] = pass.m_first_rays;
+                break;
+            case RayMethod::even:
+                m_rays[x] = pass.m_max_rays;
+                break;
+            case RayMethod::guided:
+                m_rays[x] = pass.guided_rays(around.visible, x, y);
+                break;
+            case RayMethod::single:
+                m_rays[x] = 1;
+        }
+    }
 }
 
 const LightGuide& FirstPass::Row::guide(std::size_t x)
 {
-    LightGuide& guide = m_guides[x / LightSearch::tile_side];
+    LightGuide& guide = m_guides[x / tile_side];
     if (guide.empty())
         m_pass->m_search.find_guide(x, m_y, guide);
     return guide;

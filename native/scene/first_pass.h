@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "scene/light_guide.h"
@@ -12,26 +13,30 @@ namespace beamspread {
 
 // Rays of a texel. Nothing blocks those up to `open`.
 enum class RayMethod : std::uint8_t {
-    none,        // the light can't reach it
-    open,        // as many as in the first pass, which nothing blocks
-    even,        // all rays
-    guided,      // all rays, guided
-    few_guided,  // as many as in the first pass, guided
-    single       // one, where no ray has found light: few texels find the light that all of them lack
+    none,    // the light can't reach it
+    open,    // as many as in the first pass, which nothing blocks
+    even,    // all rays
+    guided,  // guided rays: all, or fewer where little light arrives
+    single   // one, where no ray has found light: few texels find the light that all of them lack
 };
+
+// Obstacles and light that the rays of a texel met.
+enum Met : std::uint8_t { nothing = 0, light = 1, obstacle = 2, both = light | obstacle };
 
 // The rays of the first pass don't count: where they miss light, other rays of the texel would be left out for the same
 // reason, and light would be lost.
 class FirstPass {
 public:
     // Rows of a tile follow each other, and are noted by one thread.
-    static constexpr std::size_t rows_of_tile = LightSearch::tile_side;
+    static constexpr std::size_t tile_side = LightSearch::tile_side;
 
-    // `rays`: the largest number of rays of a texel.
-    FirstPass(std::size_t width, std::size_t height, std::size_t rays, std::uint32_t seed);
+    // `first_rays`, `rays`: number of rays of a texel in the first pass, and the largest one later.
+    FirstPass(std::size_t width, std::size_t height, std::size_t first_rays, std::size_t rays, std::uint32_t seed);
 
-    // Notes a ray from texel (x, y) toward a place on the light, and the part of its light that arrives.
-    void note(std::size_t x, std::size_t y, const LightHit& hit, const Vec3f& transmittance);
+    // Notes texels of one tile, side by side from (x, y) on: what their rays met, these rays, and the hits of those that
+    // get through.
+    void note(std::size_t x, std::size_t y, std::span<const std::uint8_t> met, std::span<const FirstRays> rays,
+              std::span<const LightHit> hits);
 
     // Searches for rare light once all rays are noted.
     void search(const ProbeLight& probe) { m_search.spread(probe); }
@@ -41,25 +46,37 @@ public:
     public:
         void find(const FirstPass& pass, std::size_t y);
         RayMethod method(std::size_t x) const { return m_methods[x]; }
+        // Number of rays of a texel.
+        std::size_t rays(std::size_t x) const { return m_rays[x]; }
         const LightGuide& guide(std::size_t x);
 
     private:
         const FirstPass* m_pass = nullptr;
         std::size_t m_y = 0;
-        std::vector<std::uint8_t> m_met_around;
         std::vector<RayMethod> m_methods;
+        std::vector<std::size_t> m_rays;
         std::vector<LightGuide> m_guides;  // [tile] of a row of tiles; empty until one is asked for
     };
 
 private:
-    // Obstacles and light that the rays of a texel met.
-    enum Met : std::uint8_t { nothing = 0, light = 1, obstacle = 2, both = light | obstacle };
+    // First rays of a texel.
+    struct Texel {
+        std::uint8_t met = Met::nothing;
+        std::uint8_t visible = 0;  // part of the light that arrives, in steps of 1 / 255, rounded up
+    };
 
-    void find_met_around(std::size_t y, std::vector<std::uint8_t>& around) const;
-    static RayMethod method_of(std::uint8_t met_around, bool is_rare, bool has_guide);
+    // Obstacles and light of a texel and its neighbors, and the part of the light that may arrive.
+    struct Around {
+        std::uint8_t met = Met::nothing;
+        double visible = 0.0;
+    };
 
-    std::size_t m_width, m_height;
-    std::vector<std::uint8_t> m_met;  // [texel]
+    Around around(std::size_t x, std::size_t y) const;
+    RayMethod method_of(std::uint8_t met_around, std::size_t x, std::size_t y) const;
+    std::size_t guided_rays(double visible, std::size_t x, std::size_t y) const;
+
+    std::size_t m_width, m_height, m_first_rays, m_max_rays;
+    std::vector<Texel> m_texels;
     LightSearch m_search;
 };
 

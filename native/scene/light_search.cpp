@@ -13,9 +13,11 @@ constexpr std::size_t search_rays_per_ray = 4;
 constexpr std::size_t min_search_rays = 64;
 constexpr std::size_t max_search_rays = 1024;
 
-// Searches of a tile at most, and if the last one has found many hits. More: guides that fit better, in a longer time.
+// Searches of a tile at most, if the last one has found many hits, and if the first pass has. More: guides that fit better,
+// in a longer time.
 constexpr int max_searches = 4;
 constexpr int max_full_searches = 2;
+constexpr int max_lit_searches = 1;
 
 // Hits that a tile keeps of the first pass and in all, and that it takes from each neighbor. More: guides that fit better,
 // and take longer.
@@ -34,6 +36,20 @@ constexpr std::uint32_t search_seed = 0x9e3779b9u;
 bool LightSearch::Tile::is_rare() const
 {
     return static_cast<double>(arrived) < max_rare_share * static_cast<double>(traced);
+}
+
+// Keeps hits until there are enough; later ones replace as many as a row's share.
+void LightSearch::Tile::keep_first(std::span<const LightHit> new_hits)
+{
+    const std::size_t room = std::max(first_hits - hits.size(), first_hits / tile_side);
+    const std::size_t kept = std::min(new_hits.size(), room);
+    for (std::size_t i = 0; i < kept; ++i) {
+        const LightHit& hit = new_hits[i * new_hits.size() / kept];
+        if (hits.size() < first_hits)
+            hits.push_back(hit);
+        else
+            hits[replaced++ % first_hits] = hit;
+    }
 }
 
 // Keeps some of the hits, evenly.
@@ -62,18 +78,18 @@ LightSearch::LightSearch(std::size_t width, std::size_t height, std::size_t rays
 {
 }
 
-void LightSearch::note(std::size_t x, std::size_t y, const LightHit& hit, bool is_blocked)
+void LightSearch::note(std::size_t x, std::size_t y, const FirstRays& rays, std::span<const LightHit> hits)
 {
     Tile& tile = m_tiles[y / tile_side * m_columns + x / tile_side];
-    ++tile.traced;
-    if (is_blocked)
-        return;
-    if (tile.hits.size() < first_hits)
-        tile.hits.push_back(hit);
-    else
-        tile.hits[tile.arrived % first_hits] = hit;
-    ++tile.arrived;
-    tile.has_news = true;
+    const std::size_t columns = std::min(tile_side, m_width - x / tile_side * tile_side);
+    const std::size_t rows = std::min(tile_side, m_height - y / tile_side * tile_side);
+    const auto texels = static_cast<double>(columns * rows);
+    tile.traced += rays.traced;
+    tile.arrived += hits.size();
+    tile.open += static_cast<double>(rays.open) / texels;
+    tile.irradiance += static_cast<double>(rays.irradiance) / texels;
+    tile.keep_first(hits);
+    tile.has_news |= !hits.empty();
 }
 
 template <class Visit>
@@ -108,10 +124,16 @@ std::vector<LightHit> LightSearch::hits_around(std::size_t tile) const
     return hits;
 }
 
+int LightSearch::max_searches_of(const Tile& tile)
+{
+    if (tile.arrived >= first_hits)
+        return max_lit_searches;
+    return tile.hits.size() == max_hits ? max_full_searches : max_searches;
+}
+
 bool LightSearch::is_due(std::size_t tile) const
 {
-    const bool is_full = m_tiles[tile].hits.size() == max_hits;
-    if (!m_tiles[tile].is_rare() || m_tiles[tile].searches >= (is_full ? max_full_searches : max_searches))
+    if (!m_tiles[tile].is_rare() || m_tiles[tile].searches >= max_searches_of(m_tiles[tile]))
         return false;
     bool has_news = false;
     visit_around(tile, [&](std::size_t i) { has_news |= m_tiles[i].has_news; });
@@ -163,6 +185,7 @@ std::vector<LightHit> LightSearch::search(std::size_t tile, const ProbeLight& pr
 
 void LightSearch::spread(const ProbeLight& probe)
 {
+    find_mean();
     while (true) {
         std::vector<std::size_t> due;
         for (std::size_t i = 0; i < m_tiles.size(); ++i)
@@ -181,6 +204,19 @@ void LightSearch::spread(const ProbeLight& probe)
             tile.keep(hits[k]);
         }
     }
+}
+
+void LightSearch::find_mean()
+{
+    double sum = 0.0;
+    std::size_t lit = 0;
+    for (const Tile& tile : m_tiles)
+        if (tile.irradiance > 0.0) {
+            sum += tile.irradiance;
+            ++lit;
+        }
+    if (lit > 0)
+        m_mean = sum / static_cast<double>(lit);
 }
 
 bool LightSearch::has_hits_around(std::size_t x, std::size_t y) const

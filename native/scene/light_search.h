@@ -17,6 +17,14 @@ namespace beamspread {
 using ProbeLight =
     std::function<void(std::span<const Vec2> positions, std::span<const Vec2> places, std::uint8_t* arrives)>;
 
+// Rays of the first pass from some texels: their number, and their light, mean of the channels, if nothing blocked it and
+// as it arrives, summed over the texels, W/m^2.
+struct FirstRays {
+    std::uint32_t traced = 0;
+    float open = 0.0f;
+    float irradiance = 0.0f;
+};
+
 class LightSearch {
 public:
     static constexpr std::size_t tile_side = 8;  // texels
@@ -27,11 +35,16 @@ public:
     // Number of tiles in a row.
     std::size_t columns() const { return m_columns; }
 
-    // Notes a ray of the first pass from texel (x, y); one thread at a time for each row of tiles.
-    void note(std::size_t x, std::size_t y, const LightHit& hit, bool is_blocked);
+    // Notes rays of some texels in the tile of texel (x, y), and the hits of those that get through; one thread at a time
+    // for each row of tiles.
+    void note(std::size_t x, std::size_t y, const FirstRays& rays, std::span<const LightHit> hits);
 
     // Traces rays around hits from tiles that see little light, and goes on in their neighbors until no tile finds more.
     void spread(const ProbeLight& probe);
+
+    // Irradiance of the tile of texel (x, y) if nothing blocked the light, relative to the mean of tiles that see light in
+    // the first pass; known after `spread`.
+    double open_brightness(std::size_t x, std::size_t y) const { return tile_of(x, y).open / m_mean; }
 
     // True if few rays from the tile of a texel get through, so that guided rays have less noise.
     bool is_rare(std::size_t x, std::size_t y) const { return tile_of(x, y).is_rare(); }
@@ -45,11 +58,15 @@ public:
 private:
     struct Tile {
         std::vector<LightHit> hits;
-        std::uint32_t traced = 0, arrived = 0;  // rays of the first pass
+        std::size_t traced = 0, arrived = 0;  // rays of the first pass
+        std::size_t replaced = 0;             // hits of the first pass that others have replaced
+        double irradiance = 0.0;              // mean of texels and channels, W/m^2
+        double open = 0.0;                    // the same if nothing blocked the light
         int searches = 0;
         bool has_news = false;  // hits that its neighbors have not used
 
         bool is_rare() const;
+        void keep_first(std::span<const LightHit> new_hits);
         void keep(std::span<const LightHit> new_hits);
     };
 
@@ -60,13 +77,16 @@ private:
     template <class Visit>
     void visit_around(std::size_t tile, const Visit& visit) const;
     std::vector<LightHit> hits_around(std::size_t tile) const;
+    static int max_searches_of(const Tile& tile);
     bool is_due(std::size_t tile) const;
     std::vector<LightHit> search(std::size_t tile, const ProbeLight& probe) const;
+    void find_mean();
 
     std::size_t m_width, m_height, m_columns, m_rows;
     std::size_t m_search_rays;
     GridSobol m_sobol;
     std::vector<Tile> m_tiles;
+    double m_mean = 1.0;  // irradiance of tiles that see light, W/m^2
 };
 
 }  // namespace beamspread

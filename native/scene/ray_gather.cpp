@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,6 +22,10 @@ namespace {
 // Texels of a row, and rays of each, that are gathered at once. More need more of the processor's cache: 400 kB here.
 constexpr std::size_t texels_at_once = 64;
 constexpr std::size_t max_rays_at_once = 256;
+
+// Parts along a side of a light by which the rays of a texel are sorted. More: rays of a packet meet more of the same
+// triangles, and sorting takes longer.
+constexpr std::size_t light_parts = 8;
 
 // Number of times that the rays of a texel are moved on if none finds the light. More find narrower lights.
 constexpr int max_trials = 64;
@@ -47,8 +52,9 @@ public:
           m_rays(grid, occluders, settings.clearance)
     {
         if (m_even_rays > 0 && m_even_rays < m_ray_count)
-            m_first_pass.emplace(grid.width, grid.height, m_ray_count, settings.seed);
-        m_noise.resize(grid.height);
+            m_first_pass.emplace(grid.width, grid.height, m_even_rays, m_ray_count, settings.seed);
+        if (settings.noise)
+            m_noise.resize(grid.height);
     }
 
     bool has_first_pass() const { return m_first_pass.has_value(); }
@@ -56,7 +62,7 @@ public:
     // Traces few rays from all texels, to find where they and their neighbors need more.
     void trace_first(Progress& progress)
     {
-        constexpr std::size_t rows = FirstPass::rows_of_tile;
+        constexpr std::size_t rows = FirstPass::tile_side;
         parallel_for((m_grid.height + rows - 1) / rows, [&](std::size_t i) {
             const std::size_t end = std::min((i + 1) * rows, m_grid.height);
             for (std::size_t y = i * rows; y < end; ++y)
@@ -76,11 +82,12 @@ public:
             const Span span{y, x, std::min(texels_at_once, m_grid.width - x)};
             std::size_t most = 0;
             for (std::size_t i = 0; i < span.width; ++i)
-                most = std::max(most, rays_of(method(work, x + i)));
-            work.sums.assign(span.width, {});
+                most = std::max(most, rays_of(work, x + i));
+            work.halves.assign(m_noise.empty() ? 0 : 2 * span.width, 0.0);
             for (std::size_t first = 0; first < most; first += max_rays_at_once)
                 gather_span(span, first, std::min(most - first, max_rays_at_once), work, sink);
-            m_noise[y].add(noise_of(work), 1.0);
+            if (!m_noise.empty())
+                m_noise[y].add(noise_of(span, work), 1.0);
         }
     }
 
@@ -102,18 +109,16 @@ private:
         std::size_t width;
     };
 
-    // Light of either half of the rays of a texel, the mean of their channels, W/m^2.
-    struct TexelSum {
-        double first = 0.0;
-        double second = 0.0;
-    };
-
     // Working memory of a thread: first the rays of a span, then those of one texel.
     struct Work {
         Span span{};
         std::vector<Vec3f> travel, irradiance;  // [ray * width + texel]
-        std::vector<LightHit> hits;             // [ray * width + texel] of the first pass alone
-        std::vector<TexelSum> sums;             // [texel]
+        std::vector<double> halves;             // [half * width + texel] light of either half of its rays
+        // Of the first pass alone.
+        std::vector<LightHit> hits;        // [ray * width + texel], also of rays that are blocked
+        std::vector<std::uint8_t> met;     // [texel]
+        std::vector<FirstRays> first;      // [texel]
+        std::vector<LightHit> arrived;     // rays of some texels that get through
         FirstPass::Row row;
         // A packet of rays that is being filled, and the index of each in `irradiance`.
         std::array<ShadowRay, Occluders::packet_size> packet;
@@ -124,6 +129,8 @@ private:
         std::vector<double> densities;
         std::vector<Vec3> points, weights;
         std::vector<LightRay> rays;
+        std::vector<std::uint8_t> parts;   // of the light
+        std::vector<std::uint16_t> order;  // in which rays are traced
 
         void start(std::size_t count, const Span& new_span)
         {
@@ -142,6 +149,8 @@ private:
             points.resize(count);
             weights.resize(count);
             rays.resize(count);
+            parts.resize(count);
+            order.resize(count);
         }
     };
 
@@ -163,19 +172,9 @@ private:
         return has_first_pass() ? work.row.method(x) : RayMethod::even;
     }
 
-    std::size_t rays_of(RayMethod method) const
+    std::size_t rays_of(const Work& work, std::size_t x) const
     {
-        switch (method) {
-            case RayMethod::none:
-                return 0;
-            case RayMethod::single:
-                return 1;
-            case RayMethod::open:
-            case RayMethod::few_guided:
-                return m_even_rays;
-            default:
-                return m_ray_count;
-        }
+        return has_first_pass() ? work.row.rays(x) : m_ray_count;
     }
 
     // Traces few rays from a row.
@@ -187,27 +186,49 @@ private:
             work.start(m_even_rays, span);
             work.is_first = true;
             work.hits.resize(m_even_rays * span.width);
+            work.met.assign(span.width, Met::nothing);
+            work.first.assign(span.width, {});
             for (std::size_t i = 0; i < span.width; ++i)
                 gather_texel(i, {&m_even_sobol, 0, m_even_rays, m_even_rays, true}, work);
             trace(work);
+            for (std::size_t i = 0; i < span.width; i += FirstPass::tile_side)
+                note(i, std::min(FirstPass::tile_side, span.width - i), work);
         }
     }
 
-    // Sums of the noise of a span, of a row's part.
-    RayNoise noise_of(const Work& work) const
+    // Notes the first rays of texels [first, first + count) of a span, which lie in one tile.
+    void note(std::size_t first, std::size_t count, Work& work)
+    {
+        work.arrived.clear();
+        for (std::size_t i = 0; i < m_even_rays; ++i)
+            for (std::size_t k = first; k < first + count; ++k) {
+                const std::size_t index = i * work.span.width + k;
+                if (work.irradiance[index] != Vec3f(0.0f))
+                    work.arrived.push_back(work.hits[index]);
+            }
+        m_first_pass->note(work.span.x + first, work.span.y, std::span(work.met).subspan(first, count),
+                           std::span(work.first).subspan(first, count), work.arrived);
+    }
+
+    // Mean of the channels.
+    static float mean(const Vec3f& light) { return (light.x + light.y + light.z) / 3.0f; }
+
+    // Sums of the noise of a span.
+    RayNoise noise_of(const Span& span, const Work& work) const
     {
         RayNoise noise;
-        for (std::size_t i = 0; i < work.span.width; ++i) {
-            const RayMethod method_here = method(work, work.span.x + i);
+        for (std::size_t i = 0; i < span.width; ++i) {
+            const RayMethod method_here = method(work, span.x + i);
             if (method_here <= RayMethod::open) {
-                const Vec3& open = m_open.at(work.span.x + i, work.span.y);
+                const Vec3& open = m_open.at(span.x + i, span.y);
                 noise.irradiance += method_here == RayMethod::open ? (open.x + open.y + open.z) / 3.0 : 0.0;
                 continue;
             }
-            const TexelSum& sum = work.sums[i];
-            noise.irradiance += sum.first + sum.second;
+            const double first = work.halves[i];
+            const double second = work.halves[span.width + i];
+            noise.irradiance += first + second;
             // The variance of the sum, if the halves are independent; that of low-discrepancy rays is less.
-            noise.variance += (sum.first - sum.second) * (sum.first - sum.second);
+            noise.variance += (first - second) * (first - second);
         }
         return noise;
     }
@@ -217,19 +238,20 @@ private:
         work.start(count, span);
         for (std::size_t i = 0; i < span.width; ++i) {
             const RayMethod method_here = method(work, span.x + i);
-            const std::size_t all = rays_of(method_here);
+            const std::size_t all = rays_of(work, span.x + i);
             if (first >= all)
                 continue;
             Part part{&m_sobol, first, std::min(count, all - first), all, m_occluders != nullptr};
             if (method_here == RayMethod::open)
                 part = {&m_even_sobol, first, part.count, all, false};
-            else if (method_here == RayMethod::guided || method_here == RayMethod::few_guided)
+            else if (method_here == RayMethod::guided)
                 part.guide = &work.row.guide(span.x + i);
             part.is_scaled = method_here == RayMethod::even || method_here == RayMethod::open;
             gather_texel(i, part, work);
         }
         trace(work);
-        add_sums(first, count, work);
+        if (!m_noise.empty())
+            add_halves(first, count, work);
         for (std::size_t i = 0; i < count; ++i) {
             const std::size_t begin = i * span.width;
             sink.add({.sample = span.y * m_grid.width + span.x,
@@ -240,22 +262,18 @@ private:
         }
     }
 
-    // Adds rays [first, first + count) of a span to its sums, unless all texels are open.
-    void add_sums(std::size_t first, std::size_t count, Work& work) const
+    // Adds rays [first, first + count) of a span to its halves, unless all texels are open.
+    void add_halves(std::size_t first, std::size_t count, Work& work) const
     {
+        const std::size_t width = work.span.width;
         bool is_open = has_first_pass();
-        for (std::size_t k = 0; k < work.span.width && is_open; ++k)
+        for (std::size_t k = 0; k < width && is_open; ++k)
             is_open = work.row.method(work.span.x + k) <= RayMethod::open;
-        if (is_open)
-            return;
-        for (std::size_t k = 0; k < work.span.width; ++k) {
-            const std::size_t half = (rays_of(method(work, work.span.x + k)) + 1) / 2;
-            for (std::size_t i = 0; i < count; ++i) {
-                const Vec3f& light = work.irradiance[i * work.span.width + k];
-                double& sum = first + i < half ? work.sums[k].first : work.sums[k].second;
-                sum += static_cast<double>(light.x + light.y + light.z) / 3.0;
+        for (std::size_t i = 0; i < count && !is_open; ++i)
+            for (std::size_t k = 0; k < width; ++k) {
+                const std::size_t half = 2 * (first + i) < rays_of(work, work.span.x + k) ? 0 : 1;
+                work.halves[half * width + k] += static_cast<double>(mean(work.irradiance[i * width + k]));
             }
-        }
     }
 
     void gather_texel(std::size_t texel, const Part& part, Work& work)
@@ -292,7 +310,10 @@ private:
         if (part.guide)
             for (std::size_t i = 0; i < count; ++i)
                 work.weights[i] /= work.densities[i];
-        for (std::size_t i = 0; i < count; ++i) {
+        if (part.is_traced)
+            sort(work);
+        for (std::size_t k = 0; k < count; ++k) {
+            const std::size_t i = part.is_traced ? work.order[k] : k;
             if (work.weights[i] == Vec3(0.0))
                 continue;
             const LightRay& ray = work.rays[i];
@@ -310,6 +331,31 @@ private:
             if (++work.waiting == Occluders::packet_size)
                 trace(work);
         }
+    }
+
+    // Orders the rays of a texel so that those to the same part of the light are traced together: they meet the same
+    // triangles.
+    static void sort(Work& work)
+    {
+        constexpr std::array<std::uint8_t, light_parts> spread = {0, 1, 4, 5, 16, 17, 20, 21};  // of a Morton curve
+        const auto index = [](double place) {
+            return std::min(static_cast<std::size_t>(place * static_cast<double>(light_parts)), light_parts - 1);
+        };
+        const std::size_t count = work.rays.size();
+        if (count < 2 * Occluders::packet_size) {
+            std::iota(work.order.begin(), work.order.end(), std::uint16_t{0});
+            return;
+        }
+        std::array<std::uint16_t, light_parts * light_parts + 1> ends{};
+        for (std::size_t i = 0; i < count; ++i) {
+            const Vec2& place = work.on_light[i];
+            work.parts[i] = static_cast<std::uint8_t>(spread[index(place.x)] + 2 * spread[index(place.y)]);
+            ++ends[work.parts[i] + 1u];
+        }
+        for (std::size_t i = 1; i < ends.size(); ++i)
+            ends[i] = static_cast<std::uint16_t>(ends[i] + ends[i - 1]);
+        for (std::size_t i = 0; i < count; ++i)
+            work.order[ends[work.parts[i]]++] = static_cast<std::uint16_t>(i);
     }
 
     // Finds the rays of a texel at their places and the irradiance that each brings unblocked; returns the sum.
@@ -355,10 +401,18 @@ private:
             m_occluders->transmit(std::span(work.packet).first(work.waiting), transmittance.data(), false);
         for (std::size_t i = 0; i < work.waiting; ++i) {
             const std::size_t index = work.carried[i];
+            const Vec3f open = work.irradiance[index];
             work.irradiance[index] *= transmittance[i];
-            if (work.is_first)
-                m_first_pass->note(work.span.x + index % work.span.width, work.span.y, work.hits[index],
-                                   transmittance[i]);
+            if (!work.is_first)
+                continue;
+            const std::size_t texel = index % work.span.width;
+            work.met[texel] |= transmittance[i] == Vec3f(1.0f)   ? Met::light
+                               : transmittance[i] == Vec3f(0.0f) ? Met::obstacle
+                                                                 : Met::both;
+            FirstRays& rays = work.first[texel];
+            ++rays.traced;
+            rays.open += mean(open);
+            rays.irradiance += mean(work.irradiance[index]);
         }
         work.waiting = 0;
     }
@@ -375,7 +429,7 @@ private:
     GridSobol m_even_sobol;
     ReceiverRays m_rays;
     std::optional<FirstPass> m_first_pass;
-    std::vector<RayNoise> m_noise;  // [row] sums over its texels
+    std::vector<RayNoise> m_noise;  // [row] sums over its texels; empty unless noise is asked for
     PerThread<Work> m_work;
 };
 
