@@ -5,14 +5,15 @@ of all light, and some of it is left in blocks of 16 x 16 nodes. Cycles' is less
 """
 
 import math
+from functools import partial
 
 import bpy
 import numpy as np
 import pytest
 import scenes
 from beamspread.blender.compat import indirect_bakes_lack_lamps
+from beamspread.blender.cycles import cycles_light
 from beamspread.blender.jobs.run.bake_plan import prepare_scene
-from beamspread.core.bake import bounced
 from beamspread.core.bake.bounced import BY_OWN_RAYS, BouncedLight
 from beamspread.core.target import Target
 from cycles_truth import cycles_bake, target_material
@@ -149,7 +150,8 @@ def test_a_ball_under_a_lamp(monkeypatch):
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.4, location=(0.1, 0, 0.5))
     bpy.context.object.data.materials.append(painted((0.8, 0.4, 0.2), "Ball"))
     scenes.add_lamp((0.9, -0.6, 1.2), 100.0, radius=0.1)
-    monkeypatch.setattr(bounced, "NOISE", 1e-3)  # the ball returns a fiftieth of the light
+    # The ball returns a fiftieth of the light.
+    monkeypatch.setattr(cycles_light, "BouncedLight", partial(BouncedLight, tolerance=1e-3))
     compare(floor, samples=4 * SAMPLES, mean=0.02, block=0.15)
 
 
