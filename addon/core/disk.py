@@ -148,9 +148,9 @@ def file_stems(things: Iterable[tuple[str, ...]]) -> dict[tuple[str, ...], str]:
         groups[stem(names).lower()].append(names)
     result = {}
     for group in groups.values():
-        first, *others = sorted(group, key=lambda names: ("_".join(names) != stem(names), len(names), names))
+        first, *rest = sorted(group, key=lambda names: ("_".join(names) != stem(names), len(names), names))
         result[first] = stem(first)
-        result |= {names: f"{stem(names)}_{_letters(names)}" for names in others}
+        result |= {names: f"{stem(names)}_{_letters(names)}" for names in rest}
     return result
 
 

@@ -4,7 +4,9 @@ import threading
 
 import bpy
 import pytest
+from beamspread.blender.cycles import cycles_light
 from beamspread.blender.live import timer
+from beamspread.core.scene.illumination import Illumination
 
 
 @pytest.fixture(autouse=True)
@@ -13,7 +15,7 @@ def empty_file():
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.render.engine = "CYCLES"
     bpy.context.scene.beamspread.quality = "preview"
-    bpy.context.scene.beamspread.use_indirect = False  # starts another Blender; test_indirect.py asks for it
+    bpy.context.scene.beamspread.use_indirect = False  # starts another Blender; `few_nodes` asks for it
 
 
 @pytest.fixture
@@ -22,3 +24,13 @@ def live_switched_off():
     yield
     timer.end()
     assert not [thread.name for thread in threading.enumerate() if thread.name.startswith("Beamspread")]
+
+
+@pytest.fixture
+def few_nodes(monkeypatch):
+    """Bounced light by Cycles at few nodes, with noise far below that of bakes."""
+    monkeypatch.setattr(cycles_light, "NODES", 32)
+    monkeypatch.setattr(cycles_light, "NOISE", 5e-4)
+    monkeypatch.setattr(Illumination, "bounce_problem", "They are off.")
+    bpy.context.scene.beamspread.use_indirect = True
+    bpy.context.scene.beamspread.margin = 0

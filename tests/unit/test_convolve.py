@@ -234,8 +234,11 @@ def test_texels_need_not_be_square(library):
     coarse[5, 5] = fine[16, 5] = 1
     expected = convolve(coarse, travel(50, 33), library, ALBEDO, 1.0, 1.0)
     merged = convolve(fine, travel(50, 33), library, ALBEDO, 1.0, (1.0, 1 / 3)).reshape(11, 3, 11, 3).sum(1)
-    # Values below 0, which the noise of this library leaves in the dark, count as 0 in either.
-    assert merged == pytest.approx(expected, rel=3e-3, abs=3e-5 * expected.max())
+    # The noise of this library leaves values below 0 in the dark, which count as 0 in either: differences of 2e-5.
+    lit = expected > 1e-4 * expected.max()
+    assert lit.mean() > 0.5
+    assert merged[lit] == pytest.approx(expected[lit], rel=3e-3, abs=1e-6 * expected.max())
+    assert merged[~lit] == pytest.approx(expected[~lit], abs=3e-5 * expected.max())
 
 
 def test_light_that_leaves_the_plane_does_not_come_back(library):

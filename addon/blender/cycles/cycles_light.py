@@ -105,7 +105,7 @@ class CyclesLight:
         key = self._key_of(world)
         kept = kept_world.kept(key, world)
         if kept is not None:
-            illumination = illumination.without({world}).lit_by([kept]).with_messages(note("", _found([world])))
+            illumination = illumination.without({world}).lit_by([kept]).with_messages(note("", _finder_note([world])))
             world = ""
         job = replace(job, illumination=illumination)
         if not (world or bounced or objects):
@@ -120,10 +120,10 @@ class CyclesLight:
         start(self._copy.scene)
         illumination = illumination.without({world, *objects} - {""}).with_messages(*self._copy.scene.warnings)
         names = [name for name in [world, *objects] if name]
-        found = [_found(names)] if names else []
+        texts = [_finder_note(names)] if names else []
         if bounced:
-            found.append(f"Cycles finds the bounced light, since Beamspread's own rays can't. {why_not_own}")
-        illumination = illumination.with_messages(*(note("", text) for text in found))
+            texts.append(f"Cycles finds the bounced light, since Beamspread's own rays can't. {why_not_own}")
+        illumination = illumination.with_messages(*(note("", text) for text in texts))
         lamps = {name: self._lamps.get(name) for name in objects}
         step = LightByCycles(self._copy, world, lamps, bounced, has_world, key)
         return replace(job, illumination=illumination, steps=(step, *job.steps))
@@ -249,12 +249,12 @@ class LightByCycles(Step):
         noise, irradiance = float(arrays["noise"]), float(arrays["irradiance"])
         fraction = irradiance / without_obstacles if without_obstacles > 0 else math.inf * (irradiance > 0)
         if fraction >= NEGLIGIBLE and noise > NOISY * NOISE:
-            text = f"{doing} on '{job.name}' ended with {noise:.1%} of noise, relative to all light there."
+            text = f"{doing} on '{job.name}' ended with {100 * noise:.1f} % of noise, relative to all light there."
             job = replace(job, illumination=job.illumination.with_messages(note(job.name, text)))
         return job, fields, fraction
 
 
-def _found(names: Sequence[str]) -> str:
+def _finder_note(names: Sequence[str]) -> str:
     return "Cycles finds the light of {}.".format(", ".join(f"'{name}'" for name in names))
 
 

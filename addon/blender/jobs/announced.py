@@ -50,8 +50,8 @@ def announce(context, targets: list[Target]) -> dict[Target, Announced]:
     facts = _SceneFacts(scene, view_layer, depsgraph)
     announced = {}
     for target in targets:
-        found = [item for item in targets_of(objects[target.object_name]) if item.name == target]
-        forecast = facts.forecast(found[0], scene.beamspread.resolution) if found else None
+        bakes = [item for item in targets_of(objects[target.object_name]) if item.name == target]
+        forecast = facts.forecast(bakes[0], scene.beamspread.resolution) if bakes else None
         if forecast is not None:
             announced[target] = _announced(target, forecast, settings, facts.encloses(forecast.grids[0]))
     return announced

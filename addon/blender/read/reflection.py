@@ -174,9 +174,9 @@ def _texels(value: Callable, check) -> tuple[np.ndarray, UVTransform | None, np.
     """A value at the texels of the largest image, (H, W, channels); the UV transform; the value beyond the images."""
     pixels, links = _CoarsePixels(), Links()
     probe = ReflectionEvaluator(pixels, PROBE, links=links, check=check)
-    found = value(probe)
+    even = value(probe)
     if probe.transform is None:
-        return found, None, found
+        return even, None, even
     texels = value(ReflectionEvaluator(pixels, probe.largest, links=links, check=check))
     return texels, probe.transform, value(ReflectionEvaluator(pixels, is_outside=True, links=links))
 

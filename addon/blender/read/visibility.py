@@ -245,8 +245,8 @@ def check_instance(name: str, instance: ObjectInstance | None, view_layer) -> No
 
 def why_hidden(name: str, view_layer) -> str:
     """A sentence about an object that does not render."""
-    others = [] if name in view_layer.objects else with_instanced(view_layer.objects)
-    names = " and ".join(f"'{obj.name}'" for obj in others if _instances(obj, name))
+    instancers = [] if name in view_layer.objects else with_instanced(view_layer.objects)
+    names = " and ".join(f"'{obj.name}'" for obj in instancers if _instances(obj, name))
     icons = "its camera icon, and its collections'" + (f", and those of {names}, which shows it" if names else "")
     return f"The object '{name}' is hidden from render: turn on {icons}, in the Outliner."
 

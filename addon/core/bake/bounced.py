@@ -70,7 +70,7 @@ class BouncedLight(Step):
             (light.at(grid), light.rgb().tolist(), surfaces if light.cast_shadow else None)
             for light in illumination.lights
         ]
-        found = native.bounced_light(
+        bounced = native.bounced_light(
             charts_of(receiver, self.nodes),
             STRATA,
             lights,
@@ -83,17 +83,18 @@ class BouncedLight(Step):
             max_samples=self.max_samples,
             progress=progress,
         )
-        if not found["irradiance"] > 0:
+        if not bounced["irradiance"] > 0:
             return job
         in_the_open = mean_over(receiver, lambda grid: mean_open_irradiance(grid, illumination.lights))
-        if found["irradiance"] < NEGLIGIBLE * in_the_open:
+        if bounced["irradiance"] < NEGLIGIBLE * in_the_open:
             return replace(job, illumination=illumination.with_messages(NOTHING_BOUNCES))
-        if found["noise"] > NOISY * self.tolerance:
-            text = f"Bounced light on '{job.name}' has {found['noise']:.1%} of noise, relative to all light there."
+        if bounced["noise"] > NOISY * self.tolerance:
+            percent = 100 * bounced["noise"]
+            text = f"Bounced light on '{job.name}' has {percent:.1f} % of noise, relative to all light there."
             illumination = illumination.with_messages(note(job.name, text))
         fields = tuple(
             Field(chart.grid.origin, chart.grid.normal, radiance)
-            for chart, radiance in zip(receiver.charts, found["radiance"])
+            for chart, radiance in zip(receiver.charts, bounced["radiance"])
         )
         light = FieldLight("Bounced light", 1.0, (1.0, 1.0, 1.0), False, fields)
         return replace(job, illumination=illumination.lit_by([light]))

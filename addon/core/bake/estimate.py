@@ -11,7 +11,7 @@ from ..ldf.library import PHOTONS, angles_for
 from ..scene.lights import STRATA, AreaLight, Light, MeshLight, WorldLight
 from ..scene.receiver import Grid
 from .bake_settings import BakeSettings
-from .layers import MIN_RAYS, MOST_RAYS, RAYS_PER_SAMPLE, WITHOUT_MEDIUM, mean_open_irradiance, rays_per_texel
+from .layers import MAX_RAYS_BY_SAMPLES, MIN_RAYS, RAYS_PER_SAMPLE, WITHOUT_MEDIUM, mean_open_irradiance, rays_per_texel
 from .surface import Surface
 
 # The rates are seconds of one thread, fitted to bakes by tests/bench/estimates.py. Larger: longer estimates.
@@ -146,11 +146,11 @@ class Workload:
     def _spreading(self, settings: BakeSettings) -> float:
         """Seconds of the solver."""
         is_wide = self.broad_rays + self.narrow_rays > 0
-        others = self.lamps + self.broad_rays + self.narrow_rays + len(STRATA) * self.bounced
+        directions = self.lamps + self.broad_rays + self.narrow_rays + len(STRATA) * self.bounced
         if settings.solver != "fft":
-            sun, other = ADAPTIVE if settings.solver == "adaptive" else DIRECT
+            sun, direction = ADAPTIVE if settings.solver == "adaptive" else DIRECT
             pairs = self.texels if settings.solver == "adaptive" else self.texels**2
-            return pairs * (sun * self.suns + other * others)
+            return pairs * (sun * self.suns + direction * directions)
         is_plain = self.ior <= 1
         slab = 1 + (THIN_SLAB - 1) / max(self.thickness, 1.0) if self.ior > 1 else 1.0
         bounced = self.bounced * (SPREAD_BOUNCED + SPREAD_BOUNCED_TEXEL * self.texels)
@@ -168,7 +168,7 @@ def _rays(
     """
     lights = [light for light in lights if not light.is_behind(grid)]
     if settings.layer in WITHOUT_MEDIUM:
-        rays = min(RAYS_PER_SAMPLE * settings.samples**2, MOST_RAYS)
+        rays = min(RAYS_PER_SAMPLE * settings.samples**2, MAX_RAYS_BY_SAMPLES)
         return rays, [(light, rays) for light in lights]
     rays = rays_per_texel(grid, surface.material, settings)
     if len(lights) == 1 or not any(light.has_size for light in lights):

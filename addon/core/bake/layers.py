@@ -27,7 +27,7 @@ TOLERANCE = 5e-3
 
 # Rays from each texel to a light of a size at least, to all of them together at 4 x 4 samples at most, and with any
 # number of samples at most. More: less noise, longer bakes. 1024 rays leave .9 % of noise in a texel, 4096 .4 %.
-MIN_RAYS, MAX_RAYS, MOST_RAYS = 8, 1024, 4096
+MIN_RAYS, MAX_RAYS, MAX_RAYS_BY_SAMPLES = 8, 1024, 4096
 
 # Bytes of irradiance that are stored until the solver sees all lights, see `bake_luminance`.
 MAX_STORED_BYTES = 512 << 20
@@ -148,7 +148,7 @@ def rays_per_texel(grid: Grid, material: Material, settings: BakeSettings) -> in
     """
     wanted = (69.0 / math.sqrt(spread_texels(grid, material))) ** (8.0 / 5.0)
     at_four = min(max(wanted, MIN_RAYS), MAX_RAYS)
-    return min(round(at_four * (settings.samples / 4) ** 2) or 1, MOST_RAYS)
+    return min(round(at_four * (settings.samples / 4) ** 2) or 1, MAX_RAYS_BY_SAMPLES)
 
 
 def spread_texels(grid: Grid, material: Material) -> float:
@@ -185,7 +185,7 @@ def arrive(
         grid.surface(),
         illumination.native_lights(grid),
         samples=settings.samples,
-        rays=min(RAYS_PER_SAMPLE * settings.samples**2, MOST_RAYS),
+        rays=min(RAYS_PER_SAMPLE * settings.samples**2, MAX_RAYS_BY_SAMPLES),
         threads=settings.threads,
         progress=progress,
         report_noise=report_noise,

@@ -76,12 +76,12 @@ def _failures_of_others(scene, targets: list[Target]) -> list[Row]:
 
     Failures of objects that are gone, or that have another material by now, are left out.
     """
-    others = [row for row in state.failures() if row.target not in targets]
-    named, objects = {target.object_name for target in targets}, by_name(scene) if others else {}
-    others = [row for row in others if row.target.object_name in objects]
-    again = find_misplaced(objects[name] for name in named & {row.target.object_name for row in others})
+    rows = [row for row in state.failures() if row.target not in targets]
+    named, objects = {target.object_name for target in targets}, by_name(scene) if rows else {}
+    rows = [row for row in rows if row.target.object_name in objects]
+    again = find_misplaced(objects[name] for name in named & {row.target.object_name for row in rows})
     misplaced = {bake.target for bake in again}
-    return [row for row in others if row.target.object_name not in named or row.target in misplaced]
+    return [row for row in rows if row.target.object_name not in named or row.target in misplaced]
 
 
 def parts_of(context, targets: list[Target]) -> dict[Target, Parts]:
