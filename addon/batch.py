@@ -60,6 +60,8 @@ def run(arguments: list[str]) -> int:
             is_saved = _save(report, options.report)
             if stop and not report.all_written():
                 return stop.exit_code
+            if options.save:
+                is_saved &= _save_scene()
         return 0 if is_saved and report.all_written() and (options.allow_dark or not report.dark()) else 1
     finally:
         # Registered classes, and nodes of unregistered ones, can keep newer versions from exiting.
@@ -76,6 +78,18 @@ def _save(report, path: str | None) -> bool:
         report.save(path)
     except OSError as error:
         print(f"Beamspread: the report {path} cannot be written: {error}", file=sys.stderr)
+        return False
+    return True
+
+
+def _save_scene() -> bool:
+    """Save the .blend file; True unless that fails."""
+    import bpy
+
+    try:
+        bpy.ops.wm.save_mainfile()
+    except RuntimeError as error:
+        print(f"Beamspread: the scene cannot be saved: {error}", file=sys.stderr)
         return False
     return True
 

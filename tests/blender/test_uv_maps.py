@@ -1,5 +1,7 @@
 """Objects whose UV maps don't fit into one image get one of their own, which the image then uses."""
 
+import subprocess
+
 import bpy
 import numpy as np
 import pytest
@@ -172,6 +174,35 @@ def test_a_mesh_full_of_maps_is_named():
     scenes.select(box)
     with pytest.raises(RuntimeError, match="as many UV maps as it can have"):
         bpy.ops.beamspread.bake()
+
+
+def test_objects_of_one_material_with_different_maps_are_named():
+    box = add_box(uvs=False)
+    box.name = "Bare"
+    scenes.bake(box)
+    plane = scenes.add_plane(uvs=np.array([(0.97, 0.97), (1, 0.97), (1, 1), (0.97, 1)]), material=box.data.materials[0])
+    plane.location.x = 3
+    # The box needs the map of its own beside another one.
+    layer = box.data.uv_layers.new(name="Other")
+    layer.data.foreach_set("uv", np.zeros(48, np.float32))
+    layer.active_render = True
+    bpy.context.view_layer.update()
+    scenes.select(plane)
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    (line,) = [line for line in state.lines() if "share a material" in line]
+    assert "'Bare' and 'Plane' share a material and have different UV maps: only 'Plane' shows its bake." in line
+
+
+@pytest.mark.parametrize("saves", [False, True])
+def test_a_batch_says_that_a_new_map_is_not_saved_or_saves_it(saves, tmp_path):
+    add_box(uvs=False)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    options = "--output", tmp_path, "--resolution", 32, *["--save"] * saves
+    done = subprocess.run(scenes.batch_command(tmp_path / "scene.blend", *options), capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert ("lacks the new UV map" in done.stdout) == (not saves)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
+    assert (OWN_MAP in bpy.data.objects["Cube"].data.uv_layers) == saves
 
 
 def test_live_asks_for_a_bake_and_then_follows():

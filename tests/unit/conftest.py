@@ -33,3 +33,23 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if item.path.parent == HERE and item.path.stem not in SLOW:
             item.add_marker("fast")
+
+
+@pytest.fixture
+def renderer():
+    """A renderer for Live."""
+    from beamspread.core.live.library_service import LibraryService
+    from beamspread.core.live.renderer import LiveRenderer
+
+    return LiveRenderer(LibraryService())
+
+
+@pytest.fixture
+def thread():
+    """A thread that renders for Live, and ends with the test."""
+    from beamspread.core.live.render_thread import RenderThread
+
+    thread = RenderThread(rest_seconds=0.01)
+    yield thread
+    thread.end()
+    assert thread.join(20)

@@ -16,8 +16,7 @@ from beamspread.core.live import library_service
 from beamspread.core.live.framed_receiver import FramedReceiver
 from beamspread.core.live.library_service import LibraryService
 from beamspread.core.live.live_target import LiveTarget
-from beamspread.core.live.render_thread import RenderThread
-from beamspread.core.live.renderer import SIDES, LiveRenderer, for_live, quick_side
+from beamspread.core.live.renderer import SIDES, for_live, quick_side
 from beamspread.core.material import Material
 from beamspread.core.scene.flat_mesh import flatten
 from beamspread.core.scene.illumination import Illumination
@@ -51,20 +50,6 @@ def errors_of(rendering, truth):
     error = np.abs(rendering.texture - truth.texture)
     total = error.sum((0, 1)) / truth.texture.sum((0, 1))
     return total.max(), (error / truth.texture.max((0, 1))).max()
-
-
-@pytest.fixture
-def renderer():
-    return LiveRenderer(LibraryService())
-
-
-@pytest.fixture
-def thread():
-    """A thread that ends with the test."""
-    thread = RenderThread(rest_seconds=0.01)
-    yield thread
-    thread.end()
-    assert thread.join(20)
 
 
 @pytest.mark.parametrize(

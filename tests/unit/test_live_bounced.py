@@ -12,10 +12,8 @@ from beamspread.core.bake.bounced import BouncedLight
 from beamspread.core.bake.job import BakeJob
 from beamspread.core.bake.steps import Solve
 from beamspread.core.bake.surface import Surface
-from beamspread.core.live.library_service import LibraryService
 from beamspread.core.live.live_target import LiveTarget
-from beamspread.core.live.render_thread import RenderThread
-from beamspread.core.live.renderer import LiveRenderer, for_live
+from beamspread.core.live.renderer import for_live
 from beamspread.core.material import Material
 from beamspread.core.native import native
 from beamspread.core.recent import keep_with
@@ -57,20 +55,6 @@ def baked(target):
     receiver = build_receiver(flatten(target.polygons), SIDE, SIDE)
     steps = BouncedLight(target.max_bounces), Solve()
     return BakeJob("Floor", receiver, target.illumination, target.surface, target.settings, steps).run().texture
-
-
-@pytest.fixture
-def renderer():
-    return LiveRenderer(LibraryService())
-
-
-@pytest.fixture
-def thread():
-    """A thread that ends with the test."""
-    thread = RenderThread(rest_seconds=0.01)
-    yield thread
-    thread.end()
-    assert thread.join(20)
 
 
 def test_an_exact_rendering_is_the_bake(renderer):

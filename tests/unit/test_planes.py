@@ -110,6 +110,20 @@ def test_light_crosses_uv_cuts_of_a_plane():
     np.testing.assert_allclose(chart.read(texture)[2:-2, 2:18], values[2:-2, 2:18], atol=0.06)
 
 
+def test_islands_of_very_different_scales_are_baked_coarser_and_said():
+    left = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0.0)])
+    right = np.array([(1, 0, 0), (1.02, 0, 0), (1.02, 1, 0), (1, 1, 0.0)])
+    uvs = [SQUARE * 0.2, SQUARE * 0.4 + 0.5]
+    receiver = build_receiver(flatten(mesh_of([left, right], uvs)), 200, 200)
+    (chart,) = receiver.charts
+    assert chart.grid.coverage.size < 4.2 * (40**2 + 80**2)
+    # The right one has 80 texels over .02.
+    assert chart.grid.pitch_x == pytest.approx(chart.coarser * 0.02 / 80)
+    (message,) = receiver.messages("Boards")
+    assert message.text.startswith("UV islands of 'Boards' differ in scale: the finest is baked 2")
+    assert not build_receiver(flatten(mesh_of([left], uvs[:1])), 200, 200).messages("Board")
+
+
 def test_a_trapezoid_on_a_square_is_cut_into_triangles():
     face = np.array([(0, 0, 0), (1, 0, 0), (0.8, 1, 0), (0.2, 1, 0.0)])
     receiver = build_receiver(flatten(mesh_of([face], [SQUARE])), 64, 64)

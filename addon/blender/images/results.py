@@ -68,6 +68,7 @@ class Results:
         if layer != COMBINED:
             return self._store_beside(node, bake, layer, texture)
         path, image = self._store_shown(node, bake, texture)
+        self._warn_of_other_maps(image, bake)
         bake.messages.add(*link_result(node, image, bake.job.receiver.uv_map))
         return path
 
@@ -122,6 +123,19 @@ class Results:
         path, image = store_new(name_for(bake.target), texture, bake)
         note_bake(image, bake.target)
         return path, image
+
+    def _warn_of_other_maps(self, image, bake: Bake) -> None:
+        """Warn if another object of the same material shows its part of the image by another UV map."""
+        target, uv_map = bake.target, bake.job.receiver.uv_map
+        for owner in owners_of(image):
+            if owner != target and owner.material_name == target.material_name and _map_of(owner) not in (None, uv_map):
+                bake.warn(
+                    image.name,
+                    f"'{owner.object_name}' and '{target.object_name}' share a material and have different UV maps: "
+                    f"only '{target.object_name}' shows its bake.",
+                    f"Give '{target.object_name}' a material of its own (Object > Relations > Make Single User > "
+                    "Materials).",
+                )
 
     def _store_beside(self, node, bake: Bake, layer: str, texture: np.ndarray) -> str:
         """Fill the image of a layer that no node shows; its name begins with that of the node's image."""
@@ -216,6 +230,14 @@ def read_parts(target: Target, width: int, height: int) -> Parts:
         return parts_of(build_receiver(flatten(read_polygons(obj, target.material_name)), width, height))
     except BakeError:
         return ((0, 0, np.ones((height, width), np.float32)),)
+
+
+def _map_of(target: Target) -> str | None:
+    """Name of the UV map of a target, "" for the one that renders; None if the object is gone."""
+    obj = bpy.data.objects.get(target.object_name)
+    if obj is None:
+        return None
+    return read_polygons(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()), target.material_name).uv_map
 
 
 def within(texture: np.ndarray, column: int, row: int, coverage: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import bpy
 import numpy as np
 
 from ...core.errors import BakeError, ReceiverError
@@ -13,7 +14,7 @@ from ...core.scene.unwrap import unwrap
 from ...core.target import Target
 from ..read.geometry import OWN_MAP, polygons_of, read_polygons
 from ..read.visibility import find_instances
-from .unwrap_group import add_modifier
+from .unwrap_group import add_modifier, has_modifier
 
 Outcome = Message | BakeError
 """A note about a new map, or the reason why there can be none."""
@@ -46,6 +47,12 @@ def problems_of(depsgraph, targets: Iterable[Target]) -> dict[str, str]:
         except ReceiverError as error:
             problems.setdefault(target.object_name, error.text)
     return problems
+
+
+def objects_with_maps() -> set[str]:
+    """Names of all objects that have a map of our own, or the modifier that makes it."""
+    meshes = (obj for obj in bpy.data.objects if obj.type == "MESH")
+    return {obj.name for obj in meshes if OWN_MAP in obj.data.uv_layers or has_modifier(obj)}
 
 
 def _make(depsgraph, name: str, targets: list[Target], problem: str) -> Outcome:

@@ -27,7 +27,7 @@ from .surface import Surface
 
 @dataclass(frozen=True)
 class Finders:
-    """What finds the light of a bake that lamps alone do not give.
+    """Sources of a bake's light beside its lamps.
 
     Attributes
     ----------

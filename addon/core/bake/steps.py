@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from ..errors import BakeError
 from ..ldf.library import SIMULATING, is_known, library
 from ..messages import Message, note
 from ..progress import Progress
+from ..scene.chart import Chart
 from .bake_settings import BakeSettings
 from .estimate import simulation_seconds
 from .job import BakeJob, Step
@@ -90,13 +92,16 @@ class Solve(Step):
             material = job.surface.resolve(settings.quality, None, settings.threads)
         rest = material, job.surface.thickness, settings
         charts = job.receiver.charts
-        noises: list[float] = []
+        noises: list[list[float]] = [[] for _ in charts]
         values = [
-            LAYERS[settings.layer](chart.grid, job.illumination, *rest, part, self._bytes_for_light(job), noises.append)
-            for chart, part in zip(charts, progress.split([1.0] * len(charts)))
+            LAYERS[settings.layer](
+                chart.grid, job.illumination, *rest, part, self._bytes_for_light(job), of_chart.append
+            )
+            for chart, of_chart, part in zip(charts, noises, progress.split([1.0] * len(charts)))
         ]
-        if max(noises, default=0.0) > MAX_NOISE:
-            job = replace(job, illumination=job.illumination.with_messages(_noisy(job.name, max(noises))))
+        noise = _noise_of_all(charts, values, [max(of_chart, default=0.0) for of_chart in noises])
+        if noise > MAX_NOISE:
+            job = replace(job, illumination=job.illumination.with_messages(_noisy(job.name, noise)))
         if not all(np.isfinite(on_grid).all() for on_grid in values):
             text = "The bake produced values that are not numbers."
             raise BakeError(text, "Check the strengths of the lights.")
@@ -121,6 +126,16 @@ class Solve(Step):
 
 BAKE_STEPS = (Simulate(), Solve())
 """Steps of a job whose light and colors are known."""
+
+
+def _noise_of_all(charts: Sequence[Chart], values: Sequence[np.ndarray], noises: Sequence[float]) -> float:
+    """Noise of all charts, relative to the mean of all: a dark one among bright ones shows little of its own."""
+    if len(charts) == 1:
+        return noises[0]
+    areas = np.array([chart.grid.coverage.sum() * chart.grid.pitch_x * chart.grid.pitch_y for chart in charts])
+    means = np.array([np.abs(on_grid).mean() for on_grid in values])
+    total = float(areas @ means)
+    return float(np.sqrt(areas.sum() * (areas @ (np.array(noises) * means) ** 2))) / total if total > 0 else 0.0
 
 
 def _noisy(name: str, noise: float) -> Message:

@@ -30,6 +30,7 @@ class BatchOptions:
     allow_dark: bool
     verbose: bool
     resume: bool
+    save: bool
 
 
 def arguments_for_script(argv: Sequence[str], inside_blender: bool) -> list[str]:
@@ -93,6 +94,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--allow-dark", action="store_true", help="exit code 0 even if no light arrives")
     parser.add_argument("--verbose", action="store_true", help="print lights, triangles and the time of each stage")
     parser.add_argument("--resume", action="store_true", help="skip bakes that an earlier run has written")
+    parser.add_argument(
+        "--save", action="store_true", help="save the .blend file with the UV maps that the run has made"
+    )
     return parser
 
 

@@ -65,11 +65,13 @@ class Chart:
     grid : the grid on which light arrives.
     islands : the texels that show it.
     labels : int32 (grid height, grid width), the island of each texel of the grid; None if there is one.
+    coarser : factor by which texels of the grid are longer than the finest of the islands; 1 if none is finer.
     """
 
     grid: Grid
     islands: tuple[ChartIsland, ...]
     labels: np.ndarray | None = None
+    coarser: float = 1.0
 
     def uvs(self, width: int, height: int, at: tuple[float, float] = (0.5, 0.5)) -> np.ndarray:
         """UVs of the grid's texels in a texture of this size, float64 (grid height, grid width, 2), 0..1.

@@ -102,7 +102,7 @@ class Polygons:
         return [points[begin:end] for begin, end in zip(self.starts[:-1], self.starts[1:])]
 
     def of_faces(self, faces: np.ndarray) -> Polygons:
-        """These faces alone."""
+        """Polygons of these faces alone."""
         sizes = self.sizes[faces]
         starts = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
         corners = np.repeat(self.starts[:-1][faces] - starts[:-1], sizes) + np.arange(starts[-1])

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import ReceiverError
+from ..messages import Message, note
 from ..native import native
 from .chart import Chart, ChartIsland, in_chart
 from .flat_mesh import FlatMesh, FlatPart
@@ -22,6 +23,9 @@ EDGE_TOLERANCE = 1e-3
 
 # Largest number of texels of a grid over those of its islands; more keep islands of different density sharper.
 MAX_FINER = 4.0
+
+# Factor of a grid's texels over the finest of its islands above which a bake says so.
+MAX_COARSER = 1.1
 
 # Coverage by several charts, and fraction of the texels, above which the UV map overlaps.
 MAX_COVERAGE, MAX_OVERLAP = 1.5, 1e-3
@@ -53,6 +57,16 @@ class Receiver:
     def inside(self) -> np.ndarray:
         """Bool (height, width): texels that belong to a chart."""
         return in_chart(self.coverage)
+
+    def messages(self, name: str) -> list[Message]:
+        """Messages about the texels of the object `name`."""
+        coarser = max(chart.coarser for chart in self.charts)
+        if coarser <= MAX_COARSER:
+            return []
+        text = (
+            f"UV islands of '{name}' differ in scale: the finest is baked {coarser:.1f} times coarser than its texels."
+        )
+        return [note(name, text, "Unwrap the mesh at one density.")]
 
     def to_texture(self, values: Sequence[np.ndarray]) -> np.ndarray:
         """Texture, float32 (height, width, C), with the charts' grid values (grid height, grid width, C); 0 outside.
@@ -143,7 +157,7 @@ def _chart_of_texels(part: FlatPart, width: int, height: int, owner: str) -> Cha
 
 def _chart_of_grid(part: FlatPart, width: int, height: int, owner: str) -> Chart:
     """A chart with a rectangle around all islands, whose rows are parallel to those of the largest island."""
-    frame = _frame(part.islands[0])
+    frame, coarser = _frame(part.islands[0]), 1.0
     texels = [_in_texture(island, width, height) for island in part.islands]
     if len(texels) == 1:
         pitch = _pitch(part.islands[0], width, height)
@@ -151,7 +165,8 @@ def _chart_of_grid(part: FlatPart, width: int, height: int, owner: str) -> Chart
         pitch = np.repeat(min(_pitch(island, width, height).min() for island in part.islands), 2)
         area = sum(float(island.polygons.areas.sum()) for island in part.islands)
         wanted = MAX_FINER * max(sum(float(island.coverage.sum()) for island in texels), 1.0)
-        pitch *= max(1.0, np.sqrt(area / wanted) / pitch[0])
+        coarser = max(1.0, float(np.sqrt(area / wanted) / pitch[0]))
+        pitch *= coarser
     points = [island.polygons.corners @ frame.T / pitch for island in part.islands]
     everywhere = np.concatenate(points)
     corner = everywhere.min(axis=0)
@@ -164,7 +179,7 @@ def _chart_of_grid(part: FlatPart, width: int, height: int, owner: str) -> Chart
         slopes = [(frame @ island.p_u) / pitch / width, (frame @ island.p_v) / pitch / height]
         to_grid = np.column_stack([*slopes, frame @ island.p_0 / pitch - corner])
         islands.append(ChartIsland(place.coverage, place.offset, to_grid))
-    return Chart(grid, tuple(islands), _labels(part, points, corner, (rows, columns)))
+    return Chart(grid, tuple(islands), _labels(part, points, corner, (rows, columns)), coarser)
 
 
 def _labels(

@@ -104,7 +104,8 @@ class BakePlan:
         """The bake, with its job or the error; call it in the main thread."""
         try:
             receiver = build_receiver(self.mesh, *self.size, self.target.object_name)
-            illumination = self.illumination.lighting(self.target.object_name).with_messages(*self.mesh.messages)
+            messages = *self.mesh.messages, *receiver.messages(self.target.object_name)
+            illumination = self.illumination.lighting(self.target.object_name).with_messages(*messages)
             job = BakeJob(
                 self.target.object_name, receiver, illumination, self.surface_with_color(), settings, BAKE_STEPS
             )

@@ -22,6 +22,8 @@ from ...images.facts import attributes_of, record_of_bake
 from ...images.files import file_of, size_of
 from ...images.outputs import Outputs
 from ...node.find import NOTHING_FOUND, find_bakeable, find_misplaced
+from ...node.uv_maps import objects_with_maps
+from ...read.geometry import OWN_MAP
 from ...read.visibility import by_name
 from ..out_of_date import stale
 from ..out_of_date.fingerprint import IMAGE, SETTINGS, Parts, settings_part
@@ -69,15 +71,19 @@ class _Batch(Sink):
         self._parts: dict[Target, Parts] = {}
         self._settings = self._scene.beamspread.for_bake(options.solver, options.pass_name, options.indirect)
         self._outputs = Outputs(self._scene, options)
+        self._with_maps = objects_with_maps()
         self._earlier = PreviousReport(options.report, _saved()) if options.resume else None
 
     def run_frames(self) -> None:
         """Bake frame by frame."""
-        first, last = self._options.frames or (self._frame, self._frame)
+        current = self._frame
+        first, last = self._options.frames or (current, current)
         for self._frame in range(first, last + 1):
             if self._options.frames and not self._stop:
                 self._scene.frame_set(self._frame)
             self._bake_frame()
+        if self._options.save and self._scene.frame_current != current:
+            self._scene.frame_set(current)
 
     def _bake_frame(self) -> None:
         targets, impossible = self._find()
@@ -110,6 +116,10 @@ class _Batch(Sink):
 
     def end(self, bake: Bake) -> None:
         self._remember(bake)
+        name = bake.target.object_name
+        if bake.status == WRITTEN and not self._options.save and name in objects_with_maps() - self._with_maps:
+            text = f"The .blend file lacks the new UV map '{OWN_MAP}' of '{name}', which shows the image."
+            bake.warn(name, text, "Run the batch with --save.")
         self._note(BakeRecord.of(bake, self._frame))
 
     def _note(self, record: BakeRecord) -> None:
