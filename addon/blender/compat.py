@@ -99,6 +99,13 @@ def uv_attribute_type() -> str:
     return "FLOAT_VECTOR" if bpy.app.version < (3, 5, 0) else "FLOAT2"
 
 
+def input_identifier(tree, name: str) -> str | None:
+    """Name of a modifier's property for an input of its node group; None if the group has no such input."""
+    sockets = tree.interface.items_tree if hasattr(tree, "interface") else tree.inputs
+    inputs = (item for item in sockets if getattr(item, "in_out", "INPUT") == "INPUT" and item.name == name)
+    return next((item.identifier for item in inputs), None)
+
+
 def has_input_socket(tree, name: str) -> bool:
     """True if a node group has an input of that name."""
     if hasattr(tree, "interface"):

@@ -2,13 +2,17 @@
 
 import subprocess
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
 import scenes
 from beamspread.blender.jobs.state import state
 from beamspread.blender.node.tree import show_map
+from beamspread.blender.node.uv_maps import make_maps
 from beamspread.blender.read.geometry import OWN_MAP, read_polygons
+from beamspread.core.scene.islands import check_map
+from beamspread.core.target import Target
 from live_scenes import live_lines, live_pixels, settle, switch_off
 from nodes import Nodes
 
@@ -161,6 +165,102 @@ def test_faces_that_modifiers_make_have_places_of_their_own(kind):
     scenes.select(box)
     assert bpy.ops.beamspread.bake() == {"FINISHED"}
     assert len(box.modifiers) == 2
+
+
+def map_after_modifiers(obj):
+    """The faces of an object after its modifiers, with the map that the image uses, which has been checked."""
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    polygons = read_polygons(evaluated, obj.data.materials[0].name, evaluated.matrix_world)
+    assert polygons.uv_map == OWN_MAP
+    check_map(polygons)
+    return polygons
+
+
+def make_map(obj):
+    """Give an object a map without a bake, which would refuse bent faces; the text of the note."""
+    bpy.context.view_layer.update()
+    targets = [Target(obj.name, obj.data.materials[0].name)]
+    return str(make_maps(bpy.context.evaluated_depsgraph_get(), targets)[obj.name])
+
+
+def test_a_closed_smooth_mesh_gets_a_map():
+    """Blender's own node UV Unwrap gives a map without area."""
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
+    ball = bpy.context.object
+    ball.data.materials.append(scenes.add_material())
+    ball.modifiers.new("Smooth", "SUBSURF").levels = 2
+    ball.modifiers.new("Twice", "ARRAY").count = 2
+    assert "new modifier" in make_map(ball)
+    assert map_after_modifiers(ball).uv_areas.sum() > 0.3
+
+
+def test_faces_without_area_spoil_no_map():
+    """Two vertices of a box are at the same place, and a bevel makes faces without area around them."""
+    box = add_box()
+    box.data.vertices[1].co = box.data.vertices[0].co
+    box.modifiers.new("Bevel", "BEVEL").width = 0.05
+    set_uvs(box.data, np.zeros((24, 2)))
+    assert "new modifier" in make_map(box)
+    polygons = map_after_modifiers(box)
+    shown = polygons.areas > 1e-9
+    assert not shown.all()
+    density = (polygons.uv_areas / np.maximum(polygons.areas, 1e-30))[shown]
+    assert density.min() > 0.5 * density.max()
+
+
+def test_the_map_is_saved_and_a_copy_with_other_faces_gets_its_own(tmp_path):
+    box = add_box()
+    box.modifiers.new("Row", "ARRAY").count = 3
+    make_map(box)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
+    box = bpy.data.objects["Cube"]
+    before = map_after_modifiers(box).uvs
+    copy = box.copy()
+    copy.name = "Copy"
+    bpy.context.collection.objects.link(copy)
+    np.testing.assert_array_equal(map_after_modifiers(copy).uvs, before)
+    copy.modifiers["Row"].count = 5
+    make_map(copy)
+    assert map_after_modifiers(copy).count == 30
+    np.testing.assert_array_equal(map_after_modifiers(box).uvs, before)
+    sources = [obj for obj in bpy.data.objects if obj.name.startswith("Beamspread UV Map")]
+    assert len(sources) == 2
+    box.modifiers["Row"].count = 4
+    make_map(box)
+    assert len([obj for obj in bpy.data.objects if obj.name.startswith("Beamspread UV Map")]) == 2
+
+
+@pytest.mark.parametrize("kind", [None, "ARRAY", "SUBSURF"])
+def test_an_object_in_edit_mode_is_baked(kind, tmp_path):
+    """The operator asks for Object Mode, but files may be saved in Edit Mode."""
+    box = add_box()
+    set_uvs(box.data, np.zeros((24, 2)))
+    if kind is not None:
+        modifier = box.modifiers.new("First", kind)
+    if kind == "SUBSURF":
+        modifier.subdivision_type = "SIMPLE"
+    scenes.select(box)
+    bpy.ops.object.mode_set(mode="EDIT")
+    # The new face is not in the mesh until Edit Mode ends.
+    edited = bmesh.from_edit_mesh(box.data)
+    corners = [edited.verts.new(place) for place in ((2, 0, 0), (3, 0, 0), (3, 1, 0), (2, 1, 0))]
+    edited.faces.new(corners)
+    bmesh.update_edit_mesh(box.data)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    make_map(box)
+    assert box.mode == "EDIT"
+    expected = map_after_modifiers(box).uvs
+    bpy.ops.object.mode_set(mode="OBJECT")
+    polygons = map_after_modifiers(box)
+    assert polygons.count == {None: 7, "ARRAY": 14, "SUBSURF": 28}[kind]
+    np.testing.assert_array_equal(polygons.uvs, expected)
+    command = scenes.batch_command(tmp_path / "scene.blend", "--output", tmp_path, "--resolution", SIDE)
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    (file,) = tmp_path.glob("*.exr")
+    pixels = scenes.pixels(bpy.data.images.load(str(file)))
+    assert (pixels > 0).any(axis=2).mean() > 0.25
 
 
 def test_a_mesh_full_of_maps_is_named():

@@ -52,6 +52,39 @@ def test_flat_parts_keep_their_shape_at_one_density(faces):
     build_receiver(mesh, 128, 128)
 
 
+ON_EACH_OTHER = {
+    "the same twice": [*box(), *box()],
+    # Two faces that share an edge with a third one.
+    "in part": [
+        np.array([(0, 0, 0), (2, 0, 0), (2, 1, 0), (0, 1, 0.0)]),
+        np.array([(2, 0, 0), (3, 0, 0), (3, 1, 0), (2, 1, 0.0)]),
+        np.array([(2, 0, 0), (4, 0.5, 0), (2, 1, 0.0)]),
+    ],
+}
+
+
+@pytest.mark.parametrize("faces", ON_EACH_OTHER.values(), ids=ON_EACH_OTHER)
+def test_faces_on_each_other_have_places_of_their_own(faces):
+    polygons = mesh_of(faces)
+    uvs = unwrap(polygons)
+    assert coverage_sum(polygons, uvs).max() <= 1 + 1e-6
+    density = areas_of(polygons, uvs) / polygons.areas
+    np.testing.assert_allclose(density, density[0], rtol=1e-9)
+    build_receiver(flatten(replace(polygons, uvs=uvs)), 128, 128)
+
+
+def test_faces_that_show_no_light_take_no_room():
+    """Slivers of a bevel, a face of one point, and one with a corner that is not a number."""
+    flat = [np.tile(face[:1], (4, 1)) for face in box()] + [box()[0][[0, 1, 1, 0]]]
+    triangle = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0.0)])
+    polygons = mesh_of([*flat, *box(), triangle, triangle])
+    polygons.corners[-1, 0], polygons.corners[-4, 0] = np.nan, np.inf
+    uvs = polygons.split(unwrap(polygons))
+    assert not np.concatenate([*uvs[:7], *uvs[13:]]).any()
+    np.testing.assert_array_equal(np.concatenate(uvs[7:13]), unwrap(mesh_of(box())))
+    assert not unwrap(polygons.of_faces(np.array([13, 14]))).any()
+
+
 def test_islands_keep_a_distance():
     polygons = mesh_of(box())
     uvs = unwrap(polygons)

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import bmesh
 import bpy
 import numpy as np
 
 from ...core.errors import BakeError, ReceiverError
 from ...core.messages import Message, note
 from ...core.scene.islands import check_map
+from ...core.scene.polygons import Polygons
 from ...core.scene.unwrap import unwrap
 from ...core.target import Target
 from ..read.geometry import OWN_MAP, polygons_of, read_polygons
 from ..read.visibility import find_instances
-from .unwrap_group import add_modifier, has_modifier
+from .unwrap_group import NAME as MODIFIER
+from .unwrap_group import find_modifier, remove_modifier, set_uvs
 
 Outcome = Message | BakeError
 """A note about a new map, or the reason why there can be none."""
@@ -52,7 +55,7 @@ def problems_of(depsgraph, targets: Iterable[Target]) -> dict[str, str]:
 def objects_with_maps() -> set[str]:
     """Names of all objects that have a map of our own, or the modifier that makes it."""
     meshes = (obj for obj in bpy.data.objects if obj.type == "MESH")
-    return {obj.name for obj in meshes if OWN_MAP in obj.data.uv_layers or has_modifier(obj)}
+    return {obj.name for obj in meshes if OWN_MAP in obj.data.uv_layers or find_modifier(obj)}
 
 
 def _make(depsgraph, name: str, targets: list[Target], problem: str) -> Outcome:
@@ -62,22 +65,24 @@ def _make(depsgraph, name: str, targets: list[Target], problem: str) -> Outcome:
         text = f"{problem} '{name}' belongs to another .blend file, so it can't get a map of its own."
         return ReceiverError(text, "Make it local (Object > Relations > Make Local > Selected Objects and Data).")
     if mesh.is_editmode:
-        return ReceiverError(f"{problem} A bake makes a map of its own.", "Leave Edit Mode first.")
+        obj.update_from_editmode()
     if _keeps_faces(depsgraph, obj):
-        if not _fill_layer(mesh, np.array(obj.matrix_world, float)):
+        # The data of a mesh in Edit Mode are empty.
+        polygons = _evaluated_polygons(depsgraph, obj) if mesh.is_editmode else polygons_of(mesh, obj.matrix_world)
+        if not _fill_layer(mesh, unwrap(polygons).astype(np.float32)):
             text = f"{problem} The mesh has as many UV maps as it can have."
             return ReceiverError(text, "Remove one of them.")
         added = f"'{name}' has a new UV map '{OWN_MAP}', which its image uses."
     else:
-        modifier = add_modifier(obj)
+        set_uvs(obj, unwrap(_evaluated_polygons(depsgraph, obj)))
         depsgraph.update()
         if name in problems_of(depsgraph, [target for target in targets if target.object_name == name]):
-            obj.modifiers.remove(modifier)
+            remove_modifier(obj)
             return ReceiverError(
                 f"{problem} Its modifiers make new faces, and these could not be unwrapped.",
-                "Apply the modifiers (Object > Apply > Visual Geometry to Mesh), and unwrap the mesh.",
+                "Apply the modifiers (Object > Apply > Visual Geometry to Mesh), and bake again.",
             )
-        added = f"'{name}' has a new modifier '{modifier.name}', which makes the UV map '{OWN_MAP}' for its image."
+        added = f"'{name}' has a new modifier '{MODIFIER}', which makes the UV map '{OWN_MAP}' for its image."
     return note(name, f"{added} {problem}")
 
 
@@ -91,8 +96,17 @@ def _keeps_faces(depsgraph, obj) -> bool:
         evaluated.to_mesh_clear()
 
 
-def _fill_layer(mesh, matrix: np.ndarray) -> bool:
-    """Unwrap a mesh into a UV map of our own; False if there is no room for it. The active maps stay active."""
+def _evaluated_polygons(depsgraph, obj) -> Polygons:
+    """All faces of an object, after its modifiers, in world space."""
+    evaluated = obj.evaluated_get(depsgraph)
+    try:
+        return polygons_of(evaluated.to_mesh(), evaluated.matrix_world)
+    finally:
+        evaluated.to_mesh_clear()
+
+
+def _fill_layer(mesh, uvs: np.ndarray) -> bool:
+    """Store UVs in the map of our own of a mesh; False if there is no room for it. The active maps stay active."""
     layers = mesh.uv_layers
     if OWN_MAP not in layers:
         active, rendered = layers.active_index, next((layer.name for layer in layers if layer.active_render), "")
@@ -100,7 +114,19 @@ def _fill_layer(mesh, matrix: np.ndarray) -> bool:
             return False
         if rendered:
             layers.active_index, layers[rendered].active_render = active, True
-    uvs = unwrap(polygons_of(mesh, matrix))
-    layers[OWN_MAP].data.foreach_set("uv", uvs.astype(np.float32).ravel())
-    mesh.update()
+    if mesh.is_editmode:
+        _fill_edited(mesh, uvs)
+    else:
+        layers[OWN_MAP].data.foreach_set("uv", uvs.ravel())
+        mesh.update()
     return True
+
+
+def _fill_edited(mesh, uvs: np.ndarray) -> None:
+    """Store UVs of all face corners in the map of our own of a mesh in Edit Mode."""
+    edited = bmesh.from_edit_mesh(mesh)
+    layer = edited.loops.layers.uv[OWN_MAP]
+    loops = (loop for face in edited.faces for loop in face.loops)
+    for loop, uv in zip(loops, uvs.tolist()):
+        loop[layer].uv = uv
+    bmesh.update_edit_mesh(mesh, loop_triangles=False, destructive=False)

@@ -18,6 +18,9 @@ FLATTENED = 5e-4
 # Area of a face that counts as none, over the squared diagonal of all faces.
 NO_AREA = 1e-10
 
+# Area of a face that counts as none, over that of the largest face. More leaves out slivers, which show as black lines.
+NO_AREA_BESIDE = 1e-12
+
 # Cosine of the angle between neighbors below which a bend is an edge between planes: 30 degrees. Less joins more faces
 # to bent surfaces.
 SMOOTH_COSINE = 0.866
@@ -73,7 +76,7 @@ class _Search:
     def __init__(self, polygons: Polygons, tolerance: float) -> None:
         self.polygons, self.tolerance = polygons, tolerance
         self.normals = polygons.area_vectors / np.maximum(polygons.areas, 1e-300)[:, None]
-        self.has_area = polygons.areas > 1e-12 * polygons.areas.max()
+        self.has_area = polygons.areas > NO_AREA_BESIDE * polygons.areas.max()
         first, second = polygons.shared_edges
         faces = polygons.face_of
         self.pairs = faces[first], faces[second]

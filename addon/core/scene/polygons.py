@@ -10,6 +10,9 @@ import numpy as np
 # Distance of corners, over the diagonal of all, below which they are the same point.
 SAME_POINT = 1e-6
 
+# Largest coordinate, in scene units. Native code takes ten times as much (`max_coordinate` in triangle_set.cpp).
+MAX_COORDINATE = 1e17
+
 
 @dataclass(frozen=True, eq=False)
 class Polygons:
@@ -49,6 +52,12 @@ class Polygons:
     def diagonal(self) -> float:
         """Length of the diagonal of the box around all corners."""
         return float(np.linalg.norm(np.ptp(self.corners, axis=0))) if len(self.corners) else 0.0
+
+    @cached_property
+    def is_finite(self) -> np.ndarray:
+        """True for each face whose corners are at finite positions that computations can tell apart, bool (N,)."""
+        is_far = ~(np.abs(self.corners) < MAX_COORDINATE).all(axis=1)
+        return sums(is_far, self.starts) == 0
 
     @cached_property
     def area_vectors(self) -> np.ndarray:

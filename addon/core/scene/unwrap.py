@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from .planes import COPLANAR_COSINE, SMOOTH_COSINE
-from .polygons import Polygons, components
+from ..native import native
+from .planes import COPLANAR_COSINE, NO_AREA_BESIDE, SMOOTH_COSINE
+from .polygons import Polygons, components, sums
 
 # Space around each island, over the side of the image: four texels at 1024 on each side.
 SPACE = 4 / 1024
 
 # Number of edges of an island, the longest, along which its rectangle is tried. More pack islands tighter.
 MAX_DIRECTIONS = 16
+
+# Texels per face along the side of a picture of an island, the least and most of them along the side, and part of the
+# island that may overlap. More texels find smaller overlaps.
+TEXELS_PER_FACE, PROBE_SIDES, MAX_OVERLAP = 8, (32, 1024), 0.002
 
 # Number of rounds in which the side of the image and the space around islands find each other.
 ROUNDS = 4
@@ -20,19 +25,51 @@ ROUNDS = 4
 def unwrap(polygons: Polygons) -> np.ndarray:
     """UVs of all corners, float64 (K, 2), 0 to 1.
 
-    Flat parts keep their shape. Bent ones are cut into islands whose faces look the same way, and projected.
+    Flat parts keep their shape. Bent ones are cut into islands whose faces look the same way, and projected. Faces that
+    show no light, without area or with corners at no finite position, are all at (0, 0).
     """
+    uvs = np.zeros((len(polygons.corners), 2))
+    shown = np.flatnonzero(polygons.is_finite)
+    areas = polygons.of_faces(shown).areas
+    shown = shown[areas > NO_AREA_BESIDE * areas.max(initial=0.0)]
+    if len(shown):
+        is_shown = np.zeros(polygons.count, bool)
+        is_shown[shown] = True
+        uvs[is_shown[polygons.face_of]] = _unwrapped(polygons.of_faces(shown))
+    return uvs
+
+
+def _unwrapped(polygons: Polygons) -> np.ndarray:
+    """UVs of all corners, float64 (K, 2), of faces that have areas."""
     labels = _islands(polygons)
     order = np.argsort(labels, kind="stable")
-    groups = np.split(order, np.cumsum(np.bincount(labels))[:-1])
-    positions, sizes = np.zeros((len(polygons.corners), 2)), np.zeros((len(groups), 2))
+    waiting = np.split(order, np.cumsum(np.bincount(labels))[:-1])[::-1]
+    positions, sizes = np.zeros((len(polygons.corners), 2)), []
     corners_of = np.split(np.arange(len(polygons.corners)), polygons.starts[1:-1])
-    for number, faces in enumerate(groups):
+    while waiting:
+        faces = waiting.pop()
         corners = np.concatenate([corners_of[face] for face in faces])
         flat = _laid_flat(polygons, faces, corners)
-        positions[corners], sizes[number] = flat, flat.max(axis=0)
-    offsets, side = _packed(sizes)
+        if len(faces) > 1 and _overlaps(flat, polygons.sizes[faces]):
+            waiting += np.split(faces, len(faces))
+            continue
+        labels[faces] = len(sizes)
+        positions[corners] = flat
+        sizes.append(flat.max(axis=0))
+    offsets, side = _packed(np.array(sizes))
     return (positions + offsets[labels][polygons.face_of]) / side
+
+
+def _overlaps(flat: np.ndarray, counts: np.ndarray) -> bool:
+    """True if faces of an island, of `counts` corners each, lie on each other."""
+    side = int(np.clip(TEXELS_PER_FACE * np.sqrt(len(counts)), *PROBE_SIDES))
+    texels = np.ascontiguousarray(flat * (side / np.maximum(flat.max(axis=0), 1e-300)))
+    first = np.repeat(np.cumsum(counts) - counts, counts)
+    x, y = (texels - texels[first]).T
+    following = np.arange(1, len(flat) + 1)
+    following[np.cumsum(counts) - 1] = np.cumsum(counts) - counts
+    total = 0.5 * np.abs(np.add.reduceat(x * y[following] - y * x[following], np.cumsum(counts) - counts)).sum()
+    return native.coverage(texels, counts.astype(np.uint32), side, side).sum(dtype=float) < (1 - MAX_OVERLAP) * total
 
 
 def _islands(polygons: Polygons) -> np.ndarray:
@@ -42,13 +79,28 @@ def _islands(polygons: Polygons) -> np.ndarray:
     first, second = (faces[corners] for corners in polygons.shared_edges)
     cosines = np.einsum("ij,ij->i", normals[first], normals[second])
     # Parts that are flat look along one axis as a whole.
-    is_flat = cosines > COPLANAR_COSINE
+    layers = _layers(polygons, normals)
+    is_beside = layers[first] == layers[second]
+    is_flat = is_beside & (cosines > COPLANAR_COSINE)
     flat = components(polygons.count, first[is_flat], second[is_flat])
     means = np.stack([np.bincount(flat, polygons.area_vectors[:, axis]) for axis in range(3)], axis=1)[flat]
     axis = np.abs(means).argmax(axis=1)
     looks = 2 * axis + (np.take_along_axis(means, axis[:, None], 1)[:, 0] > 0)
-    is_joined = is_flat | ((cosines > SMOOTH_COSINE) & (looks[first] == looks[second]))
+    is_joined = is_flat | (is_beside & (cosines > SMOOTH_COSINE) & (looks[first] == looks[second]))
     return components(polygons.count, first[is_joined], second[is_joined])
+
+
+def _layers(polygons: Polygons, normals: np.ndarray) -> np.ndarray:
+    """Number of faces before each one that have the same corners and look the same way, int (N,)."""
+    keys = np.random.default_rng(0).random(polygons.points.max(initial=0) + 1)
+    sides = np.take_along_axis(normals, np.abs(normals).argmax(axis=1)[:, None], 1)[:, 0] > 0
+    faces = np.column_stack([sums(keys[polygons.points], polygons.starts), polygons.sizes, sides])
+    same = np.unique(np.round(faces, 9), axis=0, return_inverse=True)[1]
+    order = np.argsort(same, kind="stable")
+    counts = np.bincount(same)
+    layers = np.empty(polygons.count, int)
+    layers[order] = np.arange(polygons.count) - np.repeat(np.cumsum(counts) - counts, counts)
+    return layers
 
 
 def _laid_flat(polygons: Polygons, faces: np.ndarray, corners: np.ndarray) -> np.ndarray:
