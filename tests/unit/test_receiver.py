@@ -191,7 +191,7 @@ def replaced(**changes):
         (replaced(uvs=SQUARE * np.nan), "not numbers"),
         (replaced(corners=np.zeros((4, 3))), "no area"),
         (replaced(corners=np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3.0, 0, 0]])), "no area"),
-        (replaced(corners=np.full((4, 3), np.inf)), "infinity"),
+        (replaced(corners=np.full((4, 3), np.inf)), "The positions of face 0 are infinite"),
         (replaced(starts=np.array([0]), corners=np.zeros((0, 3)), normals=np.zeros((0, 3))), "No face"),
     ],
 )

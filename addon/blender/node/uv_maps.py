@@ -43,9 +43,12 @@ def problems_of(depsgraph, targets: Iterable[Target]) -> dict[str, str]:
         instance = instances.get(target.object_name)
         if instance is None or instance.obj.type != "MESH":
             continue
-        polygons = read_polygons(instance.obj, target.material_name, instance.matrix)
         try:
-            if polygons.count:
+            polygons = read_polygons(instance.obj, target.material_name, instance.matrix)
+        except ReceiverError:
+            continue  # no map mends it: the bake says what would
+        try:
+            if polygons.count and polygons.is_finite.all():
                 check_map(polygons)
         except ReceiverError as error:
             problems.setdefault(target.object_name, error.text)

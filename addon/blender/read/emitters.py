@@ -8,6 +8,8 @@ import numpy as np
 
 from ...core.errors import MissingImageError, NotSupportedError
 from ...core.scene.lights import MeshLight
+from ...core.scene.occluders import is_within
+from ...core.scene.polygons import MAX_COORDINATE
 from .. import compat
 from .image_nodes import missing_images
 from .nodes import InputSocket, Links, surface_of
@@ -51,6 +53,7 @@ class EmissiveMesh:
     ----------
     reason : why the emission of a material is left out; None if it is not.
     missing : errors for the images of that material that no renderer can load.
+    lost : number of triangles that are left out, since a vertex is at no finite position.
     """
 
     def __init__(self, obj, cache: SceneCache) -> None:
@@ -58,6 +61,7 @@ class EmissiveMesh:
         self._matrices: list[np.ndarray] = []
         self.reason: NotSupportedError | None = None
         self.missing: list[MissingImageError] = []
+        self.lost, self._reach = 0, 0.0
         radiance = {index: radiance_of(slot.material, cache) for index, slot in enumerate(obj.material_slots)}
         radiance = {index: light for index, light in radiance.items() if light is not None}
         if radiance:
@@ -69,10 +73,13 @@ class EmissiveMesh:
         mesh._matrices = []
         return mesh
 
-    def add_instance(self, matrix) -> None:
-        """Add an instance at a 4 x 4 matrix."""
-        if self._parts:
-            self._matrices.append(np.array(matrix, dtype=float))
+    def add_instance(self, matrix) -> bool:
+        """Add an instance at a 4 x 4 matrix; False if that is at no finite position."""
+        matrix = np.array(matrix, dtype=float)
+        is_finite = is_within(matrix, self._reach)
+        if self._parts and is_finite:
+            self._matrices.append(matrix)
+        return is_finite
 
     def light(self, common: tuple) -> MeshLight | None:
         """All instances in the world as one light, or None if they are dark."""
@@ -91,6 +98,11 @@ class EmissiveMesh:
             corners, uvs, slots = _triangles(mesh, len(obj.material_slots))
         finally:
             obj.to_mesh_clear()
+        is_finite = (np.abs(corners) < MAX_COORDINATE).all(axis=(1, 2))
+        self.lost = int(np.count_nonzero(~is_finite))
+        if self.lost:
+            corners, slots, uvs = corners[is_finite], slots[is_finite], None if uvs is None else uvs[is_finite]
+        self._reach = float(np.abs(corners).max(initial=0.0))
         for index, light in radiance.items():
             chosen = slots == index
             if not chosen.any():

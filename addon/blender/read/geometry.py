@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.errors import ReceiverError
-from ...core.messages import Message
+from ...core.messages import Message, warning
+from ...core.scene.flat_mesh import finite_remedy
 from ...core.scene.islands import check_map
-from ...core.scene.occluders import Mesh, Occluder
+from ...core.scene.occluders import Mesh, Occluder, is_within
 from ...core.scene.polygons import Polygons
 from .image_nodes import UVTransform
 from .reflection import MaterialReflection, MediumOf, reflection_of
@@ -20,6 +21,12 @@ from .transparency import MaterialTransmittance, transmittance_of
 
 OWN_MAP = "Beamspread"
 """Name of UV maps that bakes make."""
+
+INFINITE_MATRIX = "Its location, rotation or scale is infinite or not a number."
+MATRIX_REMEDY = "Clear it (Object > Clear), and check constraints and drivers."
+
+# Scale along an axis, over the largest, that counts as zero: single precision can't tell its normals.
+NO_SCALE = 1e-12
 
 # A depsgraph holds curves, text and metaballs also as meshes, which are instances of themselves: only these are read.
 GEOMETRY_TYPES = {"MESH"}
@@ -56,9 +63,15 @@ class OccluderReader:
         key = mesh_key(obj)
         if key not in self._meshes:
             self._meshes[key] = self._read(instance, key)
-        if self._meshes[key] is not None:
-            matrix = instance.matrix_world
-            self._matrices.setdefault((obj.name, key), []).append((*matrix[0], *matrix[1], *matrix[2]))
+        mesh, matrix = self._meshes[key], np.array(instance.matrix_world, float)
+        if mesh is None:
+            return
+        if mesh.lost:
+            self.messages.append(lost_triangles(obj.name, mesh.lost))
+        if is_within(matrix, mesh.reach):
+            self._matrices.setdefault((obj.name, key), []).append(matrix[:3])
+        else:
+            self.messages.append(lost_instance(obj.name))
 
     def _read(self, instance, key: tuple) -> Mesh | None:
         obj = instance.object
@@ -88,6 +101,19 @@ class OccluderReader:
             Occluder(name, self._meshes[key], np.array(matrices, float).reshape(-1, 3, 4))
             for (name, key), matrices in self._matrices.items()
         ]
+
+
+def lost_triangles(name: str, count: int) -> Message:
+    """Warning about triangles of an object whose vertices are at no finite position."""
+    text = (
+        f"{count} triangles of '{name}' are left out: they have vertices whose positions are infinite or not numbers."
+    )
+    return warning(name, text, finite_remedy(name))
+
+
+def lost_instance(name: str) -> Message:
+    """Warning about an object, or an instance of it, that is at no finite position."""
+    return warning(name, f"'{name}' is left out. {INFINITE_MATRIX}", MATRIX_REMEDY)
 
 
 def casts_shadows(obj, instancer) -> bool:
@@ -128,9 +154,9 @@ def local_mesh(obj, slots: Sequence[Slot]) -> Mesh | None:
         is_even = not transmittances and all(item is reflections[0] for item in reflections)
         if is_even and reflections[0].uv_transform is None:
             reflector = reflections[0].reflector
-            return Mesh(vertices, triangles, reflectors=(reflector,) if reflector else ())
+            return Mesh(vertices, triangles, reflectors=(reflector,) if reflector else ()).finite()
         if not transmittances and not any(item.reflector for item in reflections):
-            return Mesh(vertices, triangles)
+            return Mesh(vertices, triangles).finite()
         numbers = np.empty(count, np.int32)
         mesh.loop_triangles.foreach_get("material_index", numbers)
         numbers = np.clip(numbers, 0, len(slots) - 1)
@@ -144,7 +170,9 @@ def local_mesh(obj, slots: Sequence[Slot]) -> Mesh | None:
         )
         reflectors = tuple(item.reflector for item in reflections)
         reflectors = reflectors if any(reflectors) else ()
-        return Mesh(vertices, triangles, transmittances, numbers.astype(np.uint32), uvs, reflectors, reflector_uvs)
+        return Mesh(
+            vertices, triangles, transmittances, numbers.astype(np.uint32), uvs, reflectors, reflector_uvs
+        ).finite()
     finally:
         obj.to_mesh_clear()
 
@@ -223,9 +251,10 @@ def polygons_of(mesh, matrix) -> Polygons:
     uvs, vertices = _uvs(mesh), _vertices(mesh)
     starts = np.concatenate([[0], np.cumsum(totals)]).astype(int)
     loops = np.repeat(first - starts[:-1], totals) + np.arange(starts[-1])
-    world = np.array(matrix, dtype=float)[:3, :3]
-    if abs(np.linalg.det(world)) < 1e-30:
-        world = _flat_scale(world)
+    world = np.array(matrix, dtype=float)[:3]
+    if not is_within(world, 1.0):
+        raise ReceiverError(INFINITE_MATRIX, MATRIX_REMEDY)
+    world = _regular(world[:, :3])
     # Normals transform with the inverse transpose, which also keeps them outward under mirroring.
     world_normals = normals.reshape(-1, 3) @ np.linalg.inv(world)
     lengths = np.linalg.norm(world_normals, axis=1, keepdims=True)
@@ -237,15 +266,18 @@ def polygons_of(mesh, matrix) -> Polygons:
     )
 
 
-def _flat_scale(world: np.ndarray) -> np.ndarray:
-    """The matrix with a length along the one axis of scale 0: a plane may have it, and only its normal needs it."""
-    scales = np.linalg.norm(world, axis=0)
-    if (scales == 0).sum() != 1:
-        raise ReceiverError("The object's scale is zero along more than one axis: reset it (Alt+S).")
-    flat = int(np.argmin(scales))
-    world = world.copy()
-    world[:, flat] = np.cross(world[:, (flat + 1) % 3], world[:, (flat + 2) % 3])
-    return world
+def _regular(world: np.ndarray) -> np.ndarray:
+    """The matrix (3, 3) with a length along an axis of scale 0: planes may have one, which only their normals need."""
+    left, scales, right = np.linalg.svd(world)
+    if not scales[1] > NO_SCALE * scales[0]:
+        raise ReceiverError(
+            "The object's scale is zero along more than one axis.", "Clear it (Object > Clear > Scale)."
+        )
+    if scales[2] > NO_SCALE * scales[0]:
+        return world
+    # The sign keeps normals outward.
+    scales[2] = scales[0] * np.sign(np.linalg.det(left) * np.linalg.det(right))
+    return left * scales @ right
 
 
 def _uvs(mesh, name: str = "") -> np.ndarray | None:

@@ -14,7 +14,7 @@ from ...core.scene.illumination import Illumination
 from ...core.scene.lights import Light
 from .. import compat
 from .emitters import VARYING, EmissiveMesh, radiance_of
-from .geometry import GEOMETRY_TYPES, OccluderReader, casts_shadows, shapes_of
+from .geometry import GEOMETRY_TYPES, OccluderReader, casts_shadows, lost_instance, lost_triangles, shapes_of
 from .image_nodes import missing_images
 from .lamps import fault, is_portal, read_lamp
 from .nodes import Links, surface_of
@@ -161,8 +161,13 @@ class _Lights:
             if mesh is not None and mesh.reason:
                 text = f"The emission of '{obj.name}' is left out."
                 self._warn_of(obj.name, text, mesh.reason, mesh.missing, self._links[obj.name])
-        if self._emissive[key] is not None:
-            self._emissive[key].add_instance(instance.matrix_world)
+        mesh = self._emissive[key]
+        if mesh is None:
+            return
+        if mesh.lost:
+            self.warn(lost_triangles(obj.name, mesh.lost))
+        if not mesh.add_instance(instance.matrix_world):
+            self.warn(lost_instance(obj.name))
 
     def _emissive_mesh(self, instance, key: tuple) -> EmissiveMesh | None:
         """The mesh without its instances; None if all of its materials are dark."""

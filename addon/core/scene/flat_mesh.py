@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ..errors import ReceiverError
 from ..messages import Message, note, warning
 from .islands import MAX_LOST, Island, check_uvs, find_islands
@@ -30,6 +28,11 @@ class FlatMesh:
     uv_map: str = ""
 
 
+def finite_remedy(name: str) -> str:
+    """Advice about an object with vertices at no finite position."""
+    return f"Check its scale and modifiers, or run bpy.data.objects['{name}'].data.validate() in the Python Console."
+
+
 def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> FlatMesh:
     """Find the flat parts of a mesh of the object `name`.
 
@@ -43,8 +46,9 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> 
     """
     if not polygons.count:
         raise ReceiverError("No face uses this material.", "Assign it to the faces that should be baked.")
-    if not np.isfinite(polygons.corners).all():
-        raise ReceiverError("The mesh has vertices at infinity.", "Check its modifiers and scale.")
+    if not polygons.is_finite.all():
+        text = f"The positions of {polygons.listed(~polygons.is_finite)} are infinite or not numbers."
+        raise ReceiverError(text, finite_remedy(name))
     tolerance = max(mean_free_path, FLATTENED * polygons.diagonal)
     planes, bent = find_planes(polygons, tolerance)
     if not planes:
@@ -70,7 +74,8 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> 
         messages.append(warning(name, text, "Unwrap the mesh again."))
     if len(bent):
         text = f"{len(bent)} of {polygons.count} faces of '{name}' are bent and stay black."
-        messages.append(warning(name, text, "Give them another material, or flatten them."))
+        remedy = f"Give them another material, or flatten them: {polygons.listed(bent)}."
+        messages.append(warning(name, text, remedy))
     deviation = max(plane.deviation for plane in planes)
     if deviation > exact:
         messages.append(note(name, f"'{name}' is baked as flat faces; it departs from them by {deviation:.3g} units."))

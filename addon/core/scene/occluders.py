@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from ..native import native
 from .grid import Vector, owner_number
+from .polygons import MAX_COORDINATE
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +28,7 @@ class Mesh:
     reflectors : a native `Reflector` for each material, None for a black one; without `materials` one for all. Empty:
         the mesh reflects nothing.
     reflector_uvs : as `uvs`, in the images of the reflectors.
+    lost : number of triangles that are left out, since a vertex is at no finite position.
     """
 
     vertices: np.ndarray
@@ -36,6 +38,23 @@ class Mesh:
     uvs: np.ndarray | None = None
     reflectors: tuple = ()
     reflector_uvs: np.ndarray | None = None
+    lost: int = 0
+
+    def finite(self) -> Mesh:
+        """The mesh without triangles that have a vertex at no finite position."""
+        is_finite = (np.abs(self.vertices) < MAX_COORDINATE).all(axis=1)
+        if is_finite.all():
+            return self
+        kept = is_finite[self.triangles].all(axis=1)
+        rows = {name: getattr(self, name) for name in ("triangles", "materials", "uvs", "reflector_uvs")}
+        rows = {name: None if values is None else values[kept] for name, values in rows.items()}
+        vertices = np.where(is_finite[:, None], self.vertices, 0.0)
+        return replace(self, vertices=vertices, lost=int(np.count_nonzero(~kept)), **rows)
+
+    @cached_property
+    def reach(self) -> float:
+        """Largest coordinate of a vertex."""
+        return float(np.abs(self.vertices).max(initial=0.0))
 
     @cached_property
     def content(self) -> int:
@@ -59,6 +78,12 @@ class Mesh:
             _uvs(self.reflector_uvs),
             owners=owners,
         )
+
+
+def is_within(matrix: np.ndarray, reach: float) -> bool:
+    """True if a matrix (3, 4) or (4, 4) takes coordinates up to `reach` to finite positions."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        return bool(reach * np.abs(matrix[:3, :3]).sum() + np.abs(matrix[:3, 3]).max() < MAX_COORDINATE)
 
 
 def _uvs(uvs: np.ndarray | None) -> np.ndarray | None:

@@ -13,6 +13,9 @@ SAME_POINT = 1e-6
 # Largest coordinate, in scene units. Native code takes ten times as much (`max_coordinate` in triangle_set.cpp).
 MAX_COORDINATE = 1e17
 
+# Largest number of faces, or runs of faces, that a message lists.
+MAX_LISTED = 5
+
 
 @dataclass(frozen=True, eq=False)
 class Polygons:
@@ -25,6 +28,7 @@ class Polygons:
     starts : int (N + 1,), face i has the corners starts[i] : starts[i + 1].
     normals : float64 (N, 3), outward unit normals, world.
     uv_map : name of the map of the UVs; "" is the one that renders.
+    numbers : int (N,), numbers of the faces in the mesh; None: all in their order.
     """
 
     corners: np.ndarray
@@ -32,6 +36,7 @@ class Polygons:
     starts: np.ndarray
     normals: np.ndarray
     uv_map: str = ""
+    numbers: np.ndarray | None = None
 
     @property
     def count(self) -> int:
@@ -116,7 +121,17 @@ class Polygons:
         starts = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
         corners = np.repeat(self.starts[:-1][faces] - starts[:-1], sizes) + np.arange(starts[-1])
         uvs = None if self.uvs is None else self.uvs[corners]
-        return Polygons(self.corners[corners], uvs, starts, self.normals[faces], self.uv_map)
+        numbers = np.arange(self.count)[faces] if self.numbers is None else self.numbers[faces]
+        return Polygons(self.corners[corners], uvs, starts, self.normals[faces], self.uv_map, numbers)
+
+    def listed(self, faces: np.ndarray) -> str:
+        """Words for faces (an index) by their numbers: "faces 2, 5 and 6 to 9"; the first few of many."""
+        numbers = np.sort(np.arange(self.count)[faces] if self.numbers is None else self.numbers[faces])
+        runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
+        names = [name for run in runs for name in (map(str, run) if len(run) < 3 else [f"{run[0]} to {run[-1]}"])]
+        names[MAX_LISTED:] = ["more"] * (len(names) > MAX_LISTED)
+        listed = " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+        return f"face{'s' if len(numbers) > 1 else ''} {listed}"
 
     def triangles(self) -> Polygons:
         """The same faces as triangles around their first corners."""
