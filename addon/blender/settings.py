@@ -1,11 +1,24 @@
 """Settings of a scene: `scene.beamspread`."""
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
 from ..core.bake.bake_settings import OUTPUTS, BakeSettings
+from ..core.bake.spread import side_for
+from ..core.bake.surface import Surface
 from . import compat, preferences
 from .registration import all_or_nothing, classes
+
+
+def _follows_size(settings) -> bool:
+    return not settings.is_property_set("resolution")
+
+
+def _follow_size(settings, value: bool) -> None:
+    if value:
+        settings.property_unset("resolution")
+    else:
+        settings.resolution = settings.resolution
 
 
 class BeamspreadSettings(bpy.types.PropertyGroup):
@@ -20,6 +33,22 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         soft_max=8192,
         max=65536,
         subtype="PIXEL",
+    )
+    use_size: BoolProperty(
+        name="Resolution from Size",
+        description="Choose the resolution of each new image by the size of its object, Texel Density, and how far the "
+        "medium spreads light. A resolution that you set switches this off",
+        get=_follows_size,
+        set=_follow_size,
+    )
+    texel_density: FloatProperty(
+        name="Texel Density",
+        description="Pixels per meter of new images, whose longer side has 512 to 2048 pixels. It has up to 4096 where "
+        "the spread of light needs them",
+        default=512.0,
+        min=0.01,
+        soft_min=16.0,
+        soft_max=4096.0,
     )
     solver: EnumProperty(
         name="Solver",
@@ -175,6 +204,13 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         ],
         default="EXR",
     )
+
+    def side_for(self, length: float, surface: Surface, is_textured: bool) -> int:
+        """Pixels along the longer side of a new image; arguments as of `spread.side_for`."""
+        if not self.use_size:
+            return self.resolution
+        density = self.texel_density * self.id_data.unit_settings.scale_length
+        return side_for(length, surface, density, is_textured)
 
     def for_bake(
         self, solver: str | None = None, output: str | None = None, indirect: bool | None = None

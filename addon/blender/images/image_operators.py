@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import bpy
+from bpy.props import IntProperty
 
 from ...core.bake.bake_settings import COMBINED
 from ...core.bake.runner import Bake
@@ -87,13 +88,18 @@ class BEAMSPREAD_OT_resize_image(ImageOperator, bpy.types.Operator):
     bl_idname = "beamspread.resize_image"
     bl_label = "Resize Image"
 
+    side: IntProperty(
+        name="Side", description="Longer side in pixels. 0: the scene's resolution", min=0, options={"HIDDEN"}
+    )
+
     @classmethod
     def needed(cls, context, image) -> bool:
-        return tuple(image.size) != wanted_size(image, context.scene.beamspread.resolution)
+        settings = context.scene.beamspread
+        return settings.use_size or tuple(image.size) != wanted_size(image, settings.resolution)
 
     def execute(self, context):
         image = image_in(context)
-        icons.scale(image, *wanted_size(image, context.scene.beamspread.resolution))
+        icons.scale(image, *wanted_size(image, self.side or context.scene.beamspread.resolution))
         image.update_tag()  # Blender sends no update for a new size
         return {"FINISHED"}
 

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import bpy
 import numpy as np
 
-from ...core.bake.bake_settings import FINAL, PREVIEW, BakeSettings
+from ...core.bake.bake_settings import COMBINED, FINAL, PREVIEW, BakeSettings
 from ...core.bake.estimate import OF_MESHES, OF_WORLD
 from ...core.bake.forecast import Finders, Forecast, seconds_of
 from ...core.bake.pace import Estimate
+from ...core.bake.spread import Spread, image_length
+from ...core.errors import MaterialError
 from ...core.scene.lights import Light, WorldLight
 from ...core.scene.receiver import Grid
 from ...core.target import Target
 from .. import compat
 from ..images.facts import is_sequence
 from ..node.find import BakeTarget, targets_of
+from ..read.geometry import mesh_key, read_polygons
 from ..read.lamps import fault, is_portal, read_lamp
 from ..read.lights import lights_surfaces
 from ..read.node_kinds import NodeKinds, all_known, kinds_of
@@ -36,6 +40,12 @@ LOW = 1e-4
 # Fraction of a receiver that an object has to reach over for it to be enclosed.
 ENCLOSED = 0.9
 
+# Number of faces of a mesh up to which their areas are read. More slow the scans of a scene down.
+MAX_FACES = 100_000
+
+# Number of lines about the spread of light in a panel.
+MAX_LINES = 4
+
 # Shortest simulation that a line names, seconds.
 MIN_SIMULATION = 1.0
 
@@ -51,9 +61,13 @@ def announce(context, targets: list[Target]) -> dict[Target, Announced]:
     announced = {}
     for target in targets:
         bakes = [item for item in targets_of(objects[target.object_name]) if item.name == target]
-        forecast = facts.forecast(bakes[0], scene.beamspread.resolution) if bakes else None
+        length = _image_length(bakes[0], depsgraph) if bakes and _is_valid(bakes[0]) else 0.0
+        forecast = facts.forecast(bakes[0], _side(bakes[0], length, scene)) if length else None
         if forecast is not None:
-            announced[target] = _announced(target, forecast, settings, facts.encloses(forecast.grids[0]))
+            bake = _announced(target, forecast, settings, facts.encloses(forecast.grids[0]))
+            (grid,) = forecast.grids
+            spread = Spread.of(length, forecast.surface, (grid.width, grid.height))
+            announced[target] = replace(bake, spread=spread if settings.layer == COMBINED else None)
     return announced
 
 
@@ -161,6 +175,39 @@ def _kinds(owner) -> NodeKinds:
     return scene_cache.get(("kinds", owner), [owner, owner.node_tree], lambda: kinds_of(owner))
 
 
+def _is_valid(target: BakeTarget) -> bool:
+    """True if a medium can have the values of the node."""
+    try:
+        target.node.surface().check()
+    except MaterialError:
+        return False
+    return True
+
+
+def _side(target: BakeTarget, length: float, scene) -> int:
+    """Texels along the longer side of a new image for a target, about."""
+    return scene.beamspread.side_for(length, target.node.surface(), target.node.has_texture())
+
+
+def _image_length(target: BakeTarget, depsgraph) -> float:
+    """Length of an image's side on the surface, scene units; 0 for a surface without area.
+
+    Where a mesh is large, that of the box around its object.
+    """
+    obj, matrix = target.obj, target.obj.matrix_world
+    if len(obj.data.polygons) > MAX_FACES:
+        return max(obj.dimensions)
+    evaluated = obj.evaluated_get(depsgraph)
+
+    def read() -> float:
+        polygons = read_polygons(evaluated, target.material.name)
+        length = image_length([polygons]) if polygons.count else 0.0
+        return length if math.isfinite(length) else 0.0
+
+    state = mesh_key(evaluated), *(tuple(row) for row in matrix)
+    return scene_cache.get(("length", obj, target.material.name), [obj], read, state=state)
+
+
 def _grid(target: BakeTarget, resolution: int) -> Grid | None:
     """About the grid of a target: as if the texture covered the object's largest two sides."""
     obj, image = target.obj, target.image
@@ -213,6 +260,17 @@ def simulation_line(announced: dict[Target, Announced], targets: Iterable[Target
         return ""
     first, *rest = names
     return f"Of which {duration(seconds)} simulate {first}{f' and {len(rest)} more' if rest else ''} (once)"
+
+
+def spread_lines(announced: dict[Target, Announced], targets: Iterable[Target]) -> list[str]:
+    """How far light spreads in the images of targets, in texels; bakes in which it spreads less than a texel apart."""
+    spreads = {target: announced[target].spread for target in targets if target in announced}
+    shown = [spread.texels for spread in spreads.values() if spread is not None and not spread.is_diffuse]
+    least, most = (f"{texels:.2g}" for texels in (min(shown, default=0.0), max(shown, default=0.0)))
+    lines = [f"The light spreads over {least if least == most else f'{least} to {most}'} texels"] if shown else []
+    diffuse = {target: spread for target, spread in spreads.items() if spread is not None and spread.is_diffuse}
+    lines += [str(message) for target, spread in diffuse.items() for message in spread.messages(target.object_name)]
+    return lines[:MAX_LINES]
 
 
 def _total(chosen: list[Announced]) -> float:

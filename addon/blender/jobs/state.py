@@ -13,6 +13,7 @@ from bpy.app.handlers import persistent
 from ...core.bake.bounced import BouncedLight
 from ...core.bake.pace import Estimate, pace
 from ...core.bake.runner import CANCELLED, WRITTEN, Bake
+from ...core.bake.spread import Spread
 from ...core.messages import Level, Message
 from ...core.progress import Progress
 from ...core.target import Target
@@ -50,11 +51,13 @@ class Announced:
     steps : estimates of its steps.
     simulations : estimates of the simulations that it needs first, by medium and quality: bakes share them.
     is_enclosed : True if an object reaches over all of the receiver, so that bounced light may take much longer.
+    spread : how far light spreads in the image; None if the result is not luminance.
     """
 
     steps: tuple[Estimate, ...]
     simulations: dict[object, Estimate]
     is_enclosed: bool = False
+    spread: Spread | None = None
 
     def is_rough(self) -> bool:
         """True if the bake may take much longer."""

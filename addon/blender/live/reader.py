@@ -9,6 +9,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
+from ...core.bake.spread import image_length
 from ...core.errors import text_of
 from ...core.live.live_target import LiveTarget
 from ...core.live.renderer import for_live
@@ -182,14 +183,15 @@ class Reader:
             self._lighting[target.object_name] = self._lit.lighting(target.object_name)
         try:
             size = _image_size(material, node.image) or sizes.get(target.material_name)
-            color = self._base_color(depsgraph, target, size or settings.resolution)
+            side = self._side(target, node, settings)
+            color = self._base_color(depsgraph, target, size or side)
         except Exception as error:  # noqa: BLE001 - the other targets are still to be read
             self.errors[target] = text_of(error)
             return None
         parts = {
             "polygons": self._polygons[target],
             "size": size,
-            "resolution": settings.resolution,
+            "resolution": side,
             "illumination": self._lighting[target.object_name],
             "surface": node.surface() if color is None else node.surface().colored(color),
             "texture": None if color is None else color.texture,
@@ -201,6 +203,15 @@ class Reader:
         if former is not None and all(_is_same(getattr(former, name), value) for name, value in parts.items()):
             return former
         return LiveTarget(target, **parts)
+
+    def _side(self, target: Target, node, settings) -> int:
+        """Texels along the longer side of an image that the next bake would make."""
+        if not settings.use_size:
+            return settings.resolution
+        surface = node.surface()
+        surface.check()
+        length = image_length([self._polygons[target]])
+        return min(MAX_TEXELS, settings.side_for(length, surface, node.has_texture()))
 
     def _max_bounces(self, depsgraph, illumination: Illumination) -> tuple[int, int, int] | None:
         """Cycles' numbers of bounces; None where no light bounces, or only Cycles can find it."""

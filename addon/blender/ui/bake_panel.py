@@ -12,7 +12,7 @@ from ...core.messages import Messages
 from .. import compat
 from ..images.files import check_image
 from ..images.results import check_editable
-from ..jobs.announced import line_of, simulation_line
+from ..jobs.announced import line_of, simulation_line, spread_lines
 from ..jobs.state import Row, Status, state
 from ..live import timer
 from ..node.find import find_misplaced, find_targets, rendered_counts, targets_of
@@ -138,6 +138,8 @@ def draw_announced(layout, context) -> None:
         line = f"{line}; all {line_of_all.lower()}"
     simulation = simulation_line(state.announced, chosen) if line else ""
     draw_lines(layout, context, filter(None, [line, simulation]), "TIME")
+    lines = spread_lines(state.announced, chosen)
+    draw_lines(layout, context, lines, "MATERIAL")
 
 
 def draw_progress(layout, context) -> None:

@@ -8,8 +8,9 @@ from .. import compat
 from ..images.files import clips
 from ..images.image_operators import image_in, wanted_size
 from ..jobs.run.engine import BeamspreadEngine, active_image
+from ..jobs.state import state
 from ..node.draw import draw_properties
-from ..node.find import find_node, find_node_in_groups
+from ..node.find import find_node, find_node_in_groups, image_of
 from ..node.tree import BASE_COLOR
 from ..preferences import draw_help
 from ..read.nodes import Links
@@ -23,16 +24,31 @@ def _use_columns(layout) -> None:
 
 
 def draw_image_buttons(layout, context) -> None:
-    """Draw Make Float if the node's image clips, and Resize if its size differs from the scene's resolution."""
+    """Draw Make Float if the node's image clips, and Resize if its size differs from that wanted."""
     image = image_in(context)
     if image is None or 0 in image.size or image.library is not None:
         return
     if clips(image):
         layout.operator("beamspread.make_float", text="Make Float: image clips values above 1", icon="IMAGE_DATA")
-    size = wanted_size(image, context.scene.beamspread.resolution)
+    side = _wanted_side(image, context.scene.beamspread)
+    size = wanted_size(image, side)
     if tuple(image.size) != size:
         text = f"Resize {image.size[0]} x {image.size[1]} to {size[0]} x {size[1]}"
-        layout.operator("beamspread.resize_image", text=text, icon="FULLSCREEN_ENTER")
+        resize = layout.operator("beamspread.resize_image", text=text, icon="FULLSCREEN_ENTER")
+        if context.scene.beamspread.use_size:
+            resize.side = side
+
+
+def _wanted_side(image, settings) -> int:
+    """Texels along the longer side that an image should have.
+
+    Where the resolution follows the size of objects, an image keeps its size unless light spreads less than a texel.
+    """
+    if not settings.use_size:
+        return settings.resolution
+    announced = (bake for target, bake in state.announced.items() if image_of(target) == image)
+    sides = (bake.spread.better_side for bake in announced if bake.spread is not None)
+    return max(filter(None, sides), default=max(image.size))
 
 
 class RenderPanel:
@@ -57,8 +73,9 @@ class BEAMSPREAD_PT_render(RenderPanel, bpy.types.Panel):
         draw_bake(layout, context)
         column = layout.column()
         settings = context.scene.beamspread
-        for name in ("output", "resolution"):
-            column.prop(settings, name)
+        column.prop(settings, "output")
+        column.prop(settings, "use_size")
+        column.prop(settings, "texel_density" if settings.use_size else "resolution")
         draw_image_buttons(column, context)  # beside the resolution, which existing images don't follow
         column.prop(settings, "use_indirect")
 

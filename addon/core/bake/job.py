@@ -19,6 +19,7 @@ from .bake_settings import COMBINED, BakeSettings
 from .estimate import OF_WORLD, Workload
 from .layers import WITHOUT_MEDIUM
 from .pace import Estimate
+from .spread import Spread
 from .surface import Surface
 
 
@@ -68,6 +69,7 @@ class BakeJob:
     ----------
     name : of the object, for messages.
     texture : result, float32 (height, width, 3) with margin, row 0 at the bottom; None until the last step has run.
+    spread : how far light spreads in the texture; None if the result is not luminance.
     """
 
     name: str
@@ -77,6 +79,7 @@ class BakeJob:
     settings: BakeSettings
     steps: tuple[Step, ...]
     texture: np.ndarray | None = None
+    spread: Spread | None = None
 
     def run(self, progress: Callback | None = None) -> BakeJob:
         """The job after all its steps. It may have more messages than before."""
@@ -149,7 +152,8 @@ class BakeJob:
 
     def messages(self) -> list[Message]:
         """Messages for the artist before the job runs."""
-        return [*self.left_out(), *self._surely_dark()]
+        spread = [] if self.spread is None else self.spread.messages(self.name)
+        return [*self.left_out(), *self._surely_dark(), *spread]
 
     def left_out(self) -> list[Message]:
         """Messages about light that is missing from the job."""

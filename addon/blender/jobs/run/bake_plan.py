@@ -11,33 +11,31 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ....core.bake.bake_settings import BakeSettings
+from ....core.bake.bake_settings import COMBINED, BakeSettings
 from ....core.bake.forecast import Finders, Forecast
 from ....core.bake.job import BakeJob
 from ....core.bake.runner import Bake
+from ....core.bake.spread import Spread, length_of
 from ....core.bake.steps import BAKE_STEPS, needs_medium, to_simulate
 from ....core.bake.surface import Surface
 from ....core.errors import BakeError
-from ....core.messages import Message
 from ....core.native import native
-from ....core.scene.flat_mesh import FlatMesh, flatten
+from ....core.scene.flat_mesh import FlatMesh
 from ....core.scene.illumination import Illumination
-from ....core.scene.receiver import build_receiver, outline, texture_size
+from ....core.scene.receiver import build_receiver, outline
 from ....core.scene.texture import BaseColor
 from ....core.target import Target
 from ...cycles.colors import BaseColorByCycles, not_evaluated
 from ...cycles.cycles_light import CyclesLight
 from ...cycles.scene_copy import CopyForCycles
-from ...images.facts import is_sequence, size_of_frames
-from ...images.files import check_image
-from ...node.find import BakeTarget, find_node_in_groups, medium_of, targets_of
+from ...node.find import find_node_in_groups, medium_of
 from ...node.node import BeamspreadNode
 from ...node.uv_maps import Outcome, make_maps
 from ...read.base_color import read_texture
-from ...read.geometry import read_polygons
 from ...read.lights import read_illumination
 from ...read.scene_cache import SceneCache, scene_cache
-from ...read.visibility import ObjectInstance, as_rendered, check_instance, find_instances, render_visible_names
+from ...read.visibility import as_rendered, check_instance, find_instances, render_visible_names
+from .receiving import Receiving, read_receiver, size_for
 
 PLACEHOLDER_COLOR = (0.5, 0.5, 0.5)
 """Base color until Cycles has evaluated it."""
@@ -56,6 +54,7 @@ class BakePlan:
     color : base color that is linked to the node, or None.
     blur : fraction of its texture that light passes on its way in.
     matrix : rows of the matrix of the instance that is baked; None if the object itself is.
+    tells_spread : True if the size of the image is for the artist to choose in the panels of the add-on.
     """
 
     target: Target
@@ -68,10 +67,7 @@ class BakePlan:
     color: BaseColor | None = None
     blur: float = 0.0
     matrix: list | None = None
-
-    def with_message(self, message: Message) -> BakePlan:
-        """The plan with a message about its mesh."""
-        return replace(self, mesh=replace(self.mesh, messages=(message, *self.mesh.messages)))
+    tells_spread: bool = True
 
     def surface_with_color(self) -> Surface:
         """The surface with its mean base color; with a placeholder if only Cycles can evaluate it."""
@@ -110,6 +106,8 @@ class BakePlan:
                 self.target.object_name, receiver, illumination, self.surface_with_color(), settings, BAKE_STEPS
             )
             job = self._with_color(self.by_cycles.complete(job))
+            if settings.layer == COMBINED and self.tells_spread:
+                job = replace(job, spread=Spread.of(length_of(self.mesh), job.surface, self.size))
             job.check_memory()
             return Bake(self.target, job)
         except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
@@ -180,8 +178,8 @@ def read_scene(
 
     Parameters
     ----------
-    resolution : texels along the longer side; None keeps the size of the node's image, or the scene's setting where
-        there is none.
+    resolution : texels along the longer side; None keeps the size of the node's image, or follows the scene's settings
+        where there is none.
     indirect : True if light may bounce; None: as the scene's settings say.
     """
     view_layer = context.view_layer
@@ -254,48 +252,45 @@ def read_plans(
         light = illumination, CyclesLight(depsgraph, copy)
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - each bake asked for needs an answer
         return [FailedPlan(target, error) for target in targets]
-    plans: list[Plan] = []
-    for target in targets:
-        try:
-            instance = instances.get(target.object_name)
-            check_instance(target.object_name, instance, depsgraph.view_layer)
-            outcome = maps.get(target.object_name)
-            if isinstance(outcome, BakeError):
-                raise outcome
-            plan = _read_target(depsgraph, target, instance, resolution, size, light, check)
-            plans.append(plan if outcome is None else plan.with_message(outcome))
-        except (KeyboardInterrupt, native.Cancelled) as error:
-            return [FailedPlan(target, error) for target in targets]
-        except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
-            plans.append(FailedPlan(target, error))
-    return plans
+    plans: dict[Target, Plan] = {}
+    receivers: dict[Target, Receiving] = {}
+
+    def each(read: Callable[[Target], None]) -> None:
+        for target in targets:
+            try:
+                read(target)
+            except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
+                plans[target] = FailedPlan(target, error)
+
+    def read_mesh(target: Target) -> None:
+        instance, outcome = instances.get(target.object_name), maps.get(target.object_name)
+        check_instance(target.object_name, instance, depsgraph.view_layer)
+        if isinstance(outcome, BakeError):
+            raise outcome
+        receivers[target] = read_receiver(target, instance, size is None, outcome)
+
+    def read_plan(target: Target) -> None:
+        if target in receivers:
+            chosen = size or size_for(receivers[target], receivers.values(), resolution, depsgraph.scene.beamspread)
+            plans[target] = replace(_plan(receivers[target], chosen, light, check), tells_spread=size is None)
+
+    try:
+        each(read_mesh)
+        each(read_plan)
+    except (KeyboardInterrupt, native.Cancelled) as error:
+        return [FailedPlan(target, error) for target in targets]
+    return [plans[target] for target in targets]
 
 
-def _read_target(
-    depsgraph,
-    target: Target,
-    instance: ObjectInstance,
-    resolution: int | None,
-    size: tuple[int, int] | None,
-    light: tuple[Illumination, CyclesLight],
-    check: Check | None,
+def _plan(
+    receiving: Receiving, size: tuple[int, int], light: tuple[Illumination, CyclesLight], check: Check | None
 ) -> BakePlan:
-    evaluated: BakeTarget = next(evaluated for evaluated in targets_of(instance.obj) if evaluated.name == target)
-    node, image = evaluated.node, evaluated.image
-    surface = node.surface()
-    surface.check()
-    if size is None and image is not None:
-        if not is_sequence(image):  # a batch fills its files
-            check_image(image)
-        image_size = size_of_frames(image) if is_sequence(image) else tuple(image.size)
-        size = image_size if resolution is None else None
-    polygons = read_polygons(instance.obj, target.material_name, instance.matrix)
-    mesh = flatten(polygons, min(surface.material.mean_free_path), target.object_name)
-    size = size or texture_size(mesh, resolution or depsgraph.scene.beamspread.resolution)
-    plan = BakePlan(target, "" if image is None else image.name_full, mesh, size, surface, *light)
+    target, instance, mesh = receiving.target, receiving.instance, receiving.mesh
+    image, node = target.image, target.node
+    plan = BakePlan(target.name, "" if image is None else image.name_full, mesh, size, receiving.surface, *light)
     if not node.has_texture():
         return plan
     receiver, blur = build_receiver(mesh, *size), node.texture_blur
-    color = read_texture(node.color_input(evaluated.groups), blur, instance, receiver, check)
+    color = read_texture(node.color_input(target.groups), blur, instance, receiver, check)
     matrix = np.array(instance.matrix).tolist() if instance.is_instance else None
     return replace(plan, color=color, blur=blur, matrix=matrix)

@@ -1,0 +1,153 @@
+"""How far a medium spreads light, in texels of an image, and the side of new images that shows it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from ..ldf.albedo import MAX_ALBEDO
+from ..messages import Message, note
+from ..native import native
+from ..scene.flat_mesh import FlatMesh
+from ..scene.polygons import Polygons
+from .surface import Surface, channel_media
+
+# Texels along the longer side of new images: the fewest, the most by texel density, and the most by the medium.
+MIN_SIDE, MAX_BY_DENSITY, MAX_SIDE = 512, 2048, 4096
+
+# Least texels along the longer side of new images for textured surfaces, whose detail the medium does not blur.
+TEXTURED_SIDE = 1024
+
+# Texels in the diffuse mean free path, of the middle channel. More: finer new images, longer bakes.
+TEXELS_PER_PATH = 2.0
+
+# Texels along the longer side, at most, that are offered where a medium spreads light less than a texel.
+MAX_OFFERED = 8192
+
+# Part of an image that a new UV map fills, about. Larger: coarser new images.
+FILLED = 0.6
+
+# Number of albedos between which reflectances are interpolated. More: slower and more exact.
+ALBEDOS = 24
+
+
+def spread_lengths(surface: Surface) -> list[float]:
+    """Diffuse mean free path of each channel, scene units: far from where it entered, light falls to 1 / e in it.
+
+    From diffusion theory: 1 / sqrt(3 sigma_a sigma_t') (Jensen et al. 2001, doi:10.1145/383259.383319); in a slab that
+    of its slowest mode, which is 0 at 2/3 of a transport mean free path outside.
+    """
+    material, lengths = surface.material, []
+    for path, albedo, forward in zip(material.mean_free_path, _albedo(surface), material.channel_anisotropy):
+        transport = path / (1 - albedo * forward)
+        rate = 3 * (1 - albedo) / (path * transport)
+        if surface.thickness:
+            rate += (math.pi / (surface.thickness + 4 / 3 * transport)) ** 2
+        lengths.append(1 / math.sqrt(rate))
+    return lengths
+
+
+def _albedo(surface: Surface) -> list[float]:
+    """Albedo of each channel; that of a base color by exact totals, without the library that a bake needs."""
+    if surface.base_color is None:
+        return [min(albedo, MAX_ALBEDO) for albedo in surface.material.albedo]
+    media = channel_media(surface.material, surface.thickness)
+    return [_albedo_of(color, medium) for color, medium in zip(surface.base_color, media)]
+
+
+def _albedo_of(color: float, medium) -> float:
+    roots, reflectances = _reflectances(medium)
+    return 1 - float(np.interp(color, reflectances, roots)) ** 2
+
+
+@lru_cache(maxsize=64)
+def _reflectances(medium) -> tuple[np.ndarray, np.ndarray]:
+    """sqrt(1 - albedo), in which it is almost linear, and the reflectance under uniform diffuse light, increasing."""
+    roots = np.linspace(1.0, (1 - MAX_ALBEDO) ** 0.25, ALBEDOS) ** 2  # closer to each other for bright media
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    cosines = (nodes + 1) / 2
+    reflected, _ = native.exact_totals(medium, np.degrees(np.arccos(cosines)).tolist(), (1 - roots**2).tolist())
+    return roots, (weights * cosines) @ reflected
+
+
+def image_length(meshes: Iterable[Polygons]) -> float:
+    """Length that the side of a square image has on the surface, scene units, by the areas of faces and of their UVs.
+
+    A map that does not fit into one image will be replaced by one that fills `FILLED` of it.
+    """
+    area = uv_area = 0.0
+    for polygons in meshes:
+        area += float(polygons.areas.sum())
+        uv_area += 0.0 if polygons.uvs is None else float(polygons.uv_areas.sum())
+    return math.sqrt(area / (uv_area if 0 < uv_area <= 1 else FILLED))
+
+
+def length_of(mesh: FlatMesh) -> float:
+    """`image_length` of a mesh with flat parts."""
+    return image_length(island.polygons for part in mesh.parts for island in part.islands)
+
+
+def side_for(length: float, surface: Surface, density: float, is_textured: bool = False) -> int:
+    """Texels along the longer side of a new image: a power of two that shows the surface and its medium.
+
+    Parameters
+    ----------
+    length : see `image_length`.
+    density : texels per scene unit that a surface should have.
+    """
+    lengths = spread_lengths(surface)
+    side = min(max(density * length, TEXTURED_SIDE if is_textured else MIN_SIDE), MAX_BY_DENSITY)
+    if max(lengths) * MAX_SIDE >= length:  # else no image shows it
+        side = max(side, min(TEXELS_PER_PATH * length / sorted(lengths)[1], MAX_SIDE))
+    return _power_of_two(side)
+
+
+def _power_of_two(side: float) -> int:
+    return 2 ** math.ceil(math.log2(side) - 1e-3)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Spread of light in an image.
+
+    Attributes
+    ----------
+    texels : diffuse mean free path, of the channel that spreads most, in texels.
+    side : texels along the longer side of the image.
+    """
+
+    texels: float
+    side: int
+
+    @classmethod
+    def of(cls, length: float, surface: Surface, size: tuple[int, int]) -> Spread:
+        """The spread on a surface of this `image_length` in an image of this size."""
+        width, height = size
+        return cls(max(spread_lengths(surface)) * math.sqrt(width * height) / length, max(size))
+
+    @property
+    def is_diffuse(self) -> bool:
+        """True if light spreads less than a texel."""
+        return self.texels < 1
+
+    @property
+    def better_side(self) -> int | None:
+        """Texels along the longer side of an image that shows the spread, if there can be one."""
+        wanted = self.side * TEXELS_PER_PATH / self.texels
+        return _power_of_two(wanted) if self.is_diffuse and wanted <= MAX_OFFERED else None
+
+    def _remedy(self) -> str:
+        if self.better_side is None:
+            return f"Even {MAX_OFFERED} texels along the longer side would hardly show more."
+        return f"Choose a Resolution of {self.better_side}, then Resize."
+
+    def messages(self, name: str) -> list[Message]:
+        """The note about the object `name` whose bake is a diffuse one."""
+        if not self.is_diffuse:
+            return []
+        text = f"The light inside '{name}' spreads over {self.texels:.2g} texels, so this is a diffuse bake."
+        return [note(name, text, self._remedy())]
