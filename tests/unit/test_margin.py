@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from beamspread.core.bake.margin import extend_margin
+from beamspread.core.bake.margin import extend_margin, part_in_shared
 from beamspread.core.native import native
 
 
@@ -61,3 +61,54 @@ def test_nothing_to_do(fill):
 def test_negative_margin_is_refused():
     with pytest.raises(ValueError, match="margin is -1"):
         extend_margin(np.zeros((2, 2, 3), np.float32), np.ones((2, 2), bool), -1)
+
+
+def test_each_island_continues_itself():
+    labels = np.full((12, 16), -1, np.int32)
+    labels[3:9, 2:6], labels[3:9, 8:13] = 0, 1
+    coverage = np.float32(labels >= 0)
+    texture = np.where(labels[..., None] == 1, np.float32([5, 0]), np.float32([0, 7])) * coverage[..., None]
+    extended = extend_margin(texture, coverage, 2, labels)
+    expected = np.zeros((12, 16, 2), np.float32)
+    expected[1:11, :7], expected[1:11, 7:15] = [0, 7], [5, 0]
+    np.testing.assert_array_equal(extended, expected)
+
+
+def test_texels_across_an_edge_continue_their_own_island():
+    """Two islands side by side; the texels at their common border are half of the one and half of the other."""
+    labels = np.zeros((6, 8), np.int32)
+    labels[:, 4:] = 1
+    coverage = np.ones((6, 8), np.float32)
+    coverage[:, 3:5], coverage[0] = 0.6, 0
+    labels[0] = -1
+    texture = np.where(labels[..., None] == 1, np.float32([5, 0]), np.float32([0, 7])) * coverage[..., None]
+    above = extend_margin(texture, coverage, 1, labels)[0]
+    np.testing.assert_allclose(above[:4], np.tile(np.float32([0, 7]), (4, 1)), rtol=1e-6)
+    np.testing.assert_allclose(above[4:], np.tile(np.float32([5, 0]), (4, 1)), rtol=1e-6)
+
+
+def test_parts_of_a_shared_image_are_the_same_whichever_is_baked():
+    rng = np.random.default_rng(3)
+    # Blocks with a random coverage, some of which touch or overlap.
+    surfaces = np.zeros((5, 40, 40), np.float32)
+    for surface in surfaces:
+        row, column = rng.integers(0, 24, 2)
+        surface[row : row + 8, column : column + 10] = rng.random((8, 10))
+    nothing = np.zeros((40, 40), np.float32)
+    parts = [
+        part_in_shared(
+            surface,
+            np.max([nothing, *surfaces[:number]], axis=0),
+            np.max([nothing, *surfaces[number + 1 :]], axis=0),
+            4,
+        )
+        for number, surface in enumerate(surfaces)
+    ]
+    covered = surfaces.max(axis=0) > 0
+    reached = np.pad(covered, 4)
+    within = np.any([reached[y : y + 40, x : x + 40] for y in range(9) for x in range(9)], axis=0)
+    count = np.sum(parts, axis=0)
+    np.testing.assert_array_equal(count, within)
+    for part, surface in zip(parts, surfaces):
+        assert part[(surface > 0) & (surface == surfaces.max(axis=0))].all()
+        assert not part[covered & (surface == 0)].any()

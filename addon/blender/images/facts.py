@@ -21,7 +21,7 @@ from ...core.bake.runner import Bake
 from ...core.disk import text_of
 from ...core.messages import Level, Message, note, warning
 from ...core.target import Target
-from ..node.find import targets_of
+from ..node.find import BakeTarget, targets_of
 from ..read.digests import SCHEME
 from ..read.visibility import with_instanced
 from ..registration import all_or_nothing, handlers
@@ -166,8 +166,17 @@ def owners_of(image) -> list[Target]:
 
 def users_of(image) -> list[Target]:
     """Targets in any scene whose Beamspread node shows the image."""
+    return [target.name for target in _all_targets() if target.image == image]
+
+
+def users_of_material(name: str) -> list[Target]:
+    """Targets in any scene that have the material of that name."""
+    return [target.name for target in _all_targets() if target.material.name == name]
+
+
+def _all_targets() -> list[BakeTarget]:
     objects = with_instanced(obj for obj in bpy.data.objects if obj.users_scene)
-    return [target.name for obj in objects for target in targets_of(obj) if target.image == image]
+    return [target for obj in objects for target in targets_of(obj)]
 
 
 def file_of(image) -> Path | None:

@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import bpy
 import numpy as np
 
 from ...core.bake.bake_settings import COMBINED
-from ...core.bake.margin import WHOLE, extend_margin
 from ...core.bake.runner import Bake
 from ...core.errors import BakeError
-from ...core.scene.flat_mesh import flatten
-from ...core.scene.receiver import Receiver, build_receiver
+from ...core.messages import note
 from ...core.target import Target
-from ..node.find import find_node
+from ..node.find import find_node, node_of
 from ..node.node import link_result
 from ..read.geometry import read_polygons
 from . import files, icons
-from .facts import note_bake, owners_of, users_of
+from .facts import note_bake, owners_of, users_of, users_of_material
 from .new_image import name_for, separate_from_other_scene, store_new
-
-OVERLAP_TOLERANCE = 0.01
-"""Fraction of a receiver's texels that may lie in another's charts: rounding at a common border is less."""
-
-Parts = tuple[tuple[int, int, np.ndarray], ...]
-"""Charts in a texture: column and row of the first texel, and coverage of each texel, float32 (rows, columns)."""
+from .shared import Parts, overlaps, parts_of, read_parts, texels_of
 
 
 class Results:
@@ -31,7 +26,7 @@ class Results:
 
     def __init__(self) -> None:
         self._planned: dict[str, list[Target]] = {}  # targets by the name of their image, in the order of the run
-        self._parts: dict[tuple, Parts] = {}  # charts by target and size of the image
+        self._parts: dict[tuple, Parts | None] = {}  # islands by target and size of the image
 
     def admit(self, bake: Bake) -> Bake:
         """The bake if its result can be stored, else a failed bake with the reason."""
@@ -77,17 +72,12 @@ class Results:
 
         `shown` is the image whose owners count: the node's, if `image` is beside it.
         """
-        receiver, owners = bake.job.receiver, self._other_owners(shown or image, bake)
-        if owners:
-            parts = [part for owner in owners for part in self._parts_of(owner, image)]
-            if overlaps(receiver, parts):
-                return None
-            covered = receiver.coverage.copy()
-            for part in parts:
-                chart = within(covered, *part)
-                np.maximum(chart, part[2], out=chart)
-            merged = np.where(receiver.inside()[..., None], texture, files.linear_pixels(image))
-            texture = extend_margin(merged, covered, bake.job.settings.margin)
+        if self._overlapping(image, bake, shown):
+            return None
+        neighbors = self._neighbors(image, bake, users_of(shown or image))
+        if neighbors:
+            filled = texels_of(bake.target, bake.job.receiver, neighbors, bake.job.settings.margin)
+            texture = np.where(filled[..., None], texture, files.linear_pixels(image))
         return files.fill_image(image, texture)
 
     def fill_shown(self, image, bake: Bake, texture: np.ndarray) -> str | None:
@@ -114,12 +104,21 @@ class Results:
         if path is not None:
             return path, image
         self._check_room(image, bake)
-        names = " and ".join(f"'{owner}'" for owner in self._other_owners(image, bake))
+        names = " and ".join(f"'{owner}'" for owner in self._overlapping(image, bake))
         path, new = self._new(bake, texture)
-        bake.warn(image.name, f"The image '{image.name}' belongs to {names}: '{bake.target}' now has '{new.name}'.")
+        text = (
+            f"The image '{image.name}' belongs to {names}: '{bake.target}' overlaps it there and now has '{new.name}'."
+        )
+        bake.warn(image.name, text, "To share one image, move the UVs of one of them.")
         return path, new
 
     def _new(self, bake: Bake, texture: np.ndarray) -> tuple[str, bpy.types.Image]:
+        """Store the bake in a new image; texels of objects with the same material, which will share it, stay empty."""
+        users = users_of_material(bake.target.material_name)
+        neighbors = self._parts_beside(bake, users, texture.shape[1::-1])
+        if neighbors:
+            filled = texels_of(bake.target, bake.job.receiver, neighbors, bake.job.settings.margin)
+            texture = np.where(filled[..., None], texture, np.float32(0))
         path, image = store_new(name_for(bake.target), texture, bake)
         note_bake(image, bake.target)
         return path, image
@@ -171,11 +170,35 @@ class Results:
         ]
 
     def _covers(self, owner: Target, image, bake: Bake) -> bool:
-        return overlaps(bake.job.receiver, self._parts_of(owner, image))
+        return overlaps(bake.job.receiver, self._parts_of(owner, tuple(image.size)))
 
-    def _parts_of(self, target: Target, image) -> Parts:
-        """The target's charts in the image."""
-        key = target, *image.size
+    def _overlapping(self, image, bake: Bake, shown=None) -> list[Target]:
+        """Owners of an image whose parts of it the bake overlaps; `shown` as for `fill`."""
+        return [owner for owner in self._other_owners(shown or image, bake) if self._covers(owner, image, bake)]
+
+    def _neighbors(self, image, bake: Bake, users: list[Target]) -> dict[Target, Parts]:
+        """Parts of an image that other targets fill, or will fill. A note names those that the bake overlaps."""
+        owners = self._other_owners(image, bake)
+        neighbors = self._parts_beside(bake, [*owners, *users], tuple(image.size))
+        if bake.target.object_name in bpy.data.objects:  # it may have been renamed, and be a user itself
+            for user in [user for user in users if user not in (*owners, *neighbors, bake.target)]:
+                if self._known_parts(user, tuple(image.size)) is not None:
+                    text = f"'{bake.target}' and '{user}' overlap in the image '{image.name}'."
+                    bake.messages.add(note(image.name, text, "To share it, move the UVs of one of them."))
+        return neighbors
+
+    def _parts_beside(self, bake: Bake, targets: Iterable[Target], size: tuple[int, int]) -> dict[Target, Parts]:
+        """Parts of other targets in a texture, without those of targets that can't be baked, or that overlap."""
+        known = {target: self._known_parts(target, size) for target in targets if target != bake.target}
+        return {target: parts for target, parts in known.items() if parts and not overlaps(bake.job.receiver, parts)}
+
+    def _parts_of(self, target: Target, size: tuple[int, int]) -> Parts:
+        """The target's islands in a texture; the whole texture if they are unknown."""
+        return self._known_parts(target, size) or ((0, 0, np.ones(size[::-1], np.float32)),)
+
+    def _known_parts(self, target: Target, size: tuple[int, int]) -> Parts | None:
+        """The target's islands in a texture; None if it can't be baked."""
+        key = target, *size
         if key not in self._parts:
             self._parts[key] = read_parts(*key)
         return self._parts[key]
@@ -186,7 +209,7 @@ class Results:
         if receiver.coverage.shape != tuple(image.size)[::-1]:
             return
         for owner in self._other_owners(image, bake):
-            if owner.material_name == target.material_name and overlaps(receiver, self._parts_of(owner, image)):
+            if owner.material_name == target.material_name and self._covers(owner, image, bake):
                 raise BakeError(
                     f"'{owner.object_name}' is baked to the same part of the image '{image.name}' by the same "
                     "material.",
@@ -216,36 +239,13 @@ def check_editable(material) -> None:
         )
 
 
-def parts_of(receiver: Receiver) -> Parts:
-    """Islands of a receiver in its texture."""
-    islands = (island for chart in receiver.charts for island in chart.islands)
-    return tuple((*island.offset, island.coverage) for island in islands)
-
-
-def read_parts(target: Target, width: int, height: int) -> Parts:
-    """Islands of a target in a texture of that size; the whole texture if they are unknown."""
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    try:
-        obj = bpy.data.objects[target.object_name].evaluated_get(depsgraph)
-        return parts_of(build_receiver(flatten(read_polygons(obj, target.material_name)), width, height))
-    except BakeError:
-        return ((0, 0, np.ones((height, width), np.float32)),)
-
-
 def _map_of(target: Target) -> str | None:
-    """Name of the UV map of a target, "" for the one that renders; None if the object is gone."""
+    """Name of the UV map of a target, "" for the one that renders; None if the target or the map is gone."""
     obj = bpy.data.objects.get(target.object_name)
     if obj is None:
         return None
-    return read_polygons(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()), target.material_name).uv_map
-
-
-def within(texture: np.ndarray, column: int, row: int, coverage: np.ndarray) -> np.ndarray:
-    """View of the texels of a texture (height, width) on which a chart lies."""
-    return texture[row : row + coverage.shape[0], column : column + coverage.shape[1]]
-
-
-def overlaps(receiver: Receiver, parts: Parts) -> bool:
-    """True if the receiver's charts overlap others in the same texture by more than rounding."""
-    shared = sum(int(((within(receiver.coverage, *part) > WHOLE) & (part[2] > 0)).sum()) for part in parts)
-    return shared > OVERLAP_TOLERANCE * receiver.inside().sum()
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    try:
+        return read_polygons(evaluated, target.material_name, None, getattr(node_of(target), "uv_map", "")).uv_map
+    except BakeError:
+        return None

@@ -7,12 +7,14 @@ from collections.abc import Collection
 import bpy
 import numpy as np
 
+from ...core.bake.margin import part_in_shared
+from ...core.live.framed_receiver import FramedReceiver
 from ...core.live.renderer import Rendering
 from ...core.target import Target
 from ..images import files, icons
 from ..node.find import find_node
 from ..node.node import all_nodes, own_tree
-from ..node.tree import IMAGE, show_image
+from ..node.tree import IMAGE, show_image, show_map_for_now, show_own_image
 
 NAME = ".Beamspread Live"  # the dot hides it in menus
 
@@ -30,18 +32,19 @@ class Preview:
     Attributes
     ----------
     size : width and height in texels.
-    regions : bool (height, width), the texels of each target.
+    parts : the texels of each target and of its margin.
     tree_name : name of the inner tree that shows the preview.
     """
 
     def __init__(self, material_name: str, size: tuple[int, int]) -> None:
         self.size = size
-        self.regions: dict[Target, np.ndarray] = {}
+        self.parts: dict[Target, FramedReceiver] = {}
+        self._masks: dict[Target, np.ndarray] = {}  # bool (height, width), texels that each target fills
         self.tree_name = ""
         self._material_name = material_name
         self._pixels = np.zeros((size[1], size[0], 4), np.float32)
         self._pixels[..., 3] = 1
-        self._name, self._former_name = "", ""
+        self._name, self._former_name, self._uv_map = "", "", ""
         self._is_new_to_cycles = False
 
     def names(self) -> set[str]:
@@ -64,11 +67,12 @@ class Preview:
 
     def show(self, rendering: Rendering) -> None:
         """Put a rendering into the preview."""
-        is_moved = self.regions.get(rendering.target) is not rendering.region
-        self.regions[rendering.target] = rendering.region
+        is_moved = self.parts.get(rendering.target) is not rendering.framed
+        self.parts[rendering.target], self._uv_map = rendering.framed, rendering.framed.receiver.uv_map
         if is_moved:
+            self._share()
             self._copy_own_pixels()
-        np.copyto(self._pixels[..., :3], rendering.texture, where=rendering.region[..., None])
+        np.copyto(self._pixels[..., :3], rendering.texture, where=self._masks[rendering.target][..., None])
         self.place(is_filled=False)
 
     def place(self, is_filled: bool = True) -> None:
@@ -86,6 +90,7 @@ class Preview:
             tree = own_tree(node)
             show_image(tree, image)
             self.tree_name = tree.name
+        show_map_for_now(node.node_tree, self._uv_map)
 
     def renew(self) -> None:
         """Show the same pixels in a new hidden image. Cycles, which reads an image once, starts again with it."""
@@ -127,21 +132,35 @@ class Preview:
         self._name = self._former_name = ""
 
     def drop(self, targets: Collection[Target]) -> None:
-        """Show the own image's pixels again in the regions of targets that are gone."""
+        """Show the own image's pixels again in the parts of targets that are gone."""
         for target in targets:
-            self.regions.pop(target, None)
+            self.parts.pop(target, None)
+        self._share()
         self.refresh()
 
     def refresh(self) -> None:
-        """Take the pixels outside of all regions from the node's own image as it is now."""
+        """Take the pixels outside of all parts from the node's own image as it is now."""
         self._copy_own_pixels()
         self.place(is_filled=False)
+
+    def _share(self) -> None:
+        """Divide the texels among the targets as bakes do."""
+        self._masks = {target: framed.region for target, framed in self.parts.items()}
+        if len(self.parts) < 2:
+            return
+        for target, framed in self.parts.items():
+            before, after = np.zeros((2, *framed.inside.shape), np.float32)
+            for neighbor, its in self.parts.items():
+                if neighbor != target and its.inside.shape == framed.inside.shape:
+                    side = before if neighbor < target else after
+                    np.maximum(side, its.receiver.coverage, out=side)
+            self._masks[target] = part_in_shared(framed.receiver.coverage, before, after, framed.margin)
 
     def _node(self):
         return find_node(bpy.data.materials.get(self._material_name))
 
     def _copy_own_pixels(self) -> None:
-        outside = ~np.any([*self.regions.values()], axis=0)
+        outside = ~np.any([framed.region for framed in self.parts.values()], axis=0)
         if not outside.any():
             return
         image = self._node().image
@@ -166,7 +185,7 @@ def _show_own_images(names: Collection[str]) -> None:
             continue
         image = tree.nodes[IMAGE].image
         if image is not None and image.name in names:
-            show_image(tree, node.image)
+            show_own_image(tree, node.image)
 
 
 def _remove(names: Collection[str]) -> None:

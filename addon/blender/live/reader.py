@@ -24,7 +24,7 @@ from .. import compat
 from ..cycles.sky import SkyService
 from ..images.files import check_image
 from ..images.results import check_editable
-from ..node.find import find_bakeable, find_node, find_node_in_groups, medium_of
+from ..node.find import find_bakeable, find_node, find_node_in_groups, medium_of, node_of
 from ..read.base_color import read_texture
 from ..read.geometry import mesh_key, read_polygons
 from ..read.lights import read_illumination, with_lamps
@@ -240,9 +240,14 @@ class Reader:
 
 def _polygons(target: Target, instance: ObjectInstance) -> Polygons:
     obj, matrix = instance.obj, instance.matrix
-    state = mesh_key(obj), *(tuple(row) for row in matrix)
+    uv_map = getattr(node_of(target), "uv_map", "")
+    state = mesh_key(obj), *(tuple(row) for row in matrix), uv_map
     key = "polygons", obj.original, target.material_name
-    return scene_cache.get(key, [obj.original], lambda: read_polygons(obj, target.material_name, matrix), state=state)
+
+    def read() -> Polygons:
+        return read_polygons(obj, target.material_name, matrix, uv_map)
+
+    return scene_cache.get(key, [obj.original], read, state=state)
 
 
 def _blurred(color: BaseColor, blur: float) -> BaseColor:

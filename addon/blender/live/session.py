@@ -233,9 +233,9 @@ class Session:
         """Show all previews whose targets are still there, and remove the others."""
         known = set(self._reader.targets)
         for name, preview in list(self._previews.items()):
-            gone = set(preview.regions) - known
-            if gone == set(preview.regions) or not preview.fits():
-                self._thread.forget(set(preview.regions))
+            gone = set(preview.parts) - known
+            if gone == set(preview.parts) or not preview.fits():
+                self._thread.forget(set(preview.parts))
                 self._previews.pop(name).remove()
             elif gone:
                 self._thread.forget(gone)
@@ -287,17 +287,18 @@ class Session:
         """Another target of the same preview with the same texels: one with a bake there, else the first by name."""
         target = rendering.target
         preview, image = self._previews.get(target.material_name), _image_of(target.material_name)
-        if preview is None or len(preview.regions) < (2 if target in preview.regions else 1):
+        if preview is None or len(preview.parts) < (2 if target in preview.parts else 1):
             return None
         owners = owners_of(image) if image is not None else []
 
         def rank(candidate: Target) -> tuple:
             return candidate not in owners, str(candidate)
 
-        for neighbor, region in preview.regions.items():
-            if neighbor == target or region.shape != rendering.region.shape or rank(neighbor) >= rank(target):
+        inside = rendering.framed.inside
+        for neighbor, framed in preview.parts.items():
+            if neighbor == target or framed.inside.shape != inside.shape or rank(neighbor) >= rank(target):
                 continue
-            if (region & rendering.region).sum() > MAX_OVERLAP * rendering.region.sum():
+            if (framed.inside & inside).sum() > MAX_OVERLAP * inside.sum():
                 return neighbor
         return None
 

@@ -42,6 +42,7 @@ def draw_properties(node, layout) -> None:
     layout.prop(node, "ior")
     layout.prop(node, "thickness")
     layout.template_ID(node, "image", new="image.new", open="image.open")
+    _draw_map(node, layout)
     _draw_actions(node, layout)
 
 
@@ -55,6 +56,15 @@ def _draw_color(node, layout) -> None:
         layout.prop(node, "base_color")
     else:
         _draw_channels(layout, node, "albedo", "Scattering Albedo")
+
+
+def _draw_map(node, layout) -> None:
+    """Draw the choice among the UV maps of the active object; those that modifiers make are typed."""
+    mesh = getattr(bpy.context.view_layer.objects.active, "data", None)
+    if hasattr(mesh, "uv_layers"):
+        layout.prop_search(node, "uv_map", mesh, "uv_layers", icon="GROUP_UVS", results_are_suggestions=True)
+    else:
+        layout.prop(node, "uv_map", icon="GROUP_UVS")
 
 
 def _draw_actions(node, layout) -> None:

@@ -20,11 +20,11 @@ from .tree import (
     BASE_COLOR,
     all_nodes,
     is_shared,
+    keep_map,
     make_inner_tree,
     own_tree,
     release_unused_trees,
     show_ior,
-    show_map,
     show_own_images,
     show_values,
     upgrade,
@@ -97,6 +97,11 @@ def _color_edited(node, _context) -> None:
         node.inputs[BASE_COLOR].default_value = color
 
 
+def _map_edited(node, _context) -> None:
+    """Have Live read the mesh again: no update comes from values that scripts set."""
+    node.id_data.update_tag()
+
+
 def _show(node, _context) -> None:
     """Bring image and IOR into the node's inner tree."""
     tree = own_tree(node)
@@ -115,7 +120,7 @@ def link_result(node, image, uv_map: str | None = None) -> list[Message]:
     node.image = image
     _show(node, None)
     if uv_map is not None:
-        show_map(node.node_tree, uv_map)
+        keep_map(node.node_tree, uv_map)
     return link_output(node)
 
 
@@ -209,6 +214,11 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         description="Image that the bake fills. Empty: a new image is created",
         type=bpy.types.Image,
         update=_show,
+    )
+    uv_map: StringProperty(
+        name="UV Map",
+        description="UV map of the image. Empty: the map that renders or, if it does not fit, one that the bake makes",
+        update=_map_edited,
     )
     texture_blur: FloatProperty(
         name="Texture Blur",

@@ -13,6 +13,9 @@ FACING, UV_MAP = "Facing", "UV Map"
 INPUT, EMISSION, UNSEEN, TOTAL, OUTPUT = "Input", "Emission", "Unseen", "Total", "Output"
 BAKED = "Is Baked"
 
+FORMER_MAP = "beamspread_uv_map"
+"""Key of a tree: name of the UV map of its own image, while Live shows another one."""
+
 # Roughness of the coat of older trees, in their Glossy node.
 ROUGHNESS_BEFORE = 0.1
 
@@ -176,6 +179,28 @@ def show_map(tree, name: str) -> None:
         setattr(node, attribute, name)
 
 
+def keep_map(tree, name: str) -> None:
+    """Show the image by the UV map of that name from here on."""
+    show_map(tree, name)
+    tree.pop(FORMER_MAP, None)
+
+
+def show_map_for_now(tree, name: str) -> None:
+    """Show the image by the UV map of that name until `show_own_image`."""
+    node = tree.nodes.get(UV_MAP)
+    shown = "" if node is None else getattr(node, "uv_map", None) or getattr(node, "attribute_name", "")
+    if name != shown:
+        tree[FORMER_MAP] = tree.get(FORMER_MAP, shown)
+        show_map(tree, name)
+
+
+def show_own_image(tree, image) -> None:
+    """Show the image of the tree's node, by the UV map of its bake."""
+    show_image(tree, image)
+    if FORMER_MAP in tree:
+        keep_map(tree, tree[FORMER_MAP])
+
+
 def follow_frames(tree, first: int, last: int) -> None:
     """Have the tree's image, a sequence, follow the scene's frame from the first to the last file."""
     user = tree.nodes[IMAGE].image_user
@@ -257,7 +282,7 @@ def show_own_images(*_arguments) -> None:
     for node in all_nodes():
         tree = node.node_tree
         if tree is not None and tree.library is None and IMAGE in tree.nodes:
-            show_image(tree, node.image)
+            show_own_image(tree, node.image)
 
 
 @persistent

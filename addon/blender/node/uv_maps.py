@@ -16,6 +16,7 @@ from ...core.scene.unwrap import unwrap
 from ...core.target import Target
 from ..read.geometry import OWN_MAP, polygons_of, read_polygons
 from ..read.visibility import find_instances
+from .find import node_of
 from .unwrap_group import NAME as MODIFIER
 from .unwrap_group import find_modifier, remove_modifier, set_uvs
 
@@ -42,6 +43,8 @@ def problems_of(depsgraph, targets: Iterable[Target]) -> dict[str, str]:
     for target in targets:
         instance = instances.get(target.object_name)
         if instance is None or instance.obj.type != "MESH":
+            continue
+        if getattr(node_of(target), "uv_map", ""):  # the artist has chosen one
             continue
         try:
             polygons = read_polygons(instance.obj, target.material_name, instance.matrix)

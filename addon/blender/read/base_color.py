@@ -39,7 +39,7 @@ def read_texture(
     check : called now and then, raises an exception to cancel.
     """
     name = instance.obj.name
-    if receiver.uv_map:
+    if receiver.uv_map not in ("", _uv_map(instance.obj)):
         return BaseColor(unknown=f"The bake has a UV map of its own, '{receiver.uv_map}'.")
     try:
         colors = read_base_color(wanted, instance, receiver, check)

@@ -205,14 +205,19 @@ def _transform(points: np.ndarray, matrix) -> np.ndarray:
     return points.astype(float) @ world[:3, :3].T + world[:3, 3]
 
 
-def read_polygons(obj, material_name: str, matrix=None) -> Polygons:
+def read_polygons(obj, material_name: str, matrix=None, uv_map: str = "") -> Polygons:
     """Faces of an evaluated mesh object that carry the material, in world space.
-
-    Their UVs are those of the map that renders or, if these don't fit into one image, of a map of our own.
 
     Parameters
     ----------
     matrix : transform to the world; None: the object's own.
+    uv_map : name of the map of their UVs; "": the one that renders or, if this does not fit into one image, a map of
+        our own.
+
+    Raises
+    ------
+    ReceiverError
+        The object has no UV map of that name.
     """
     matrix = obj.matrix_world if matrix is None else matrix
     mesh = obj.to_mesh()
@@ -220,6 +225,9 @@ def read_polygons(obj, material_name: str, matrix=None) -> Polygons:
         slots = np.empty(len(mesh.polygons), np.int32)
         mesh.polygons.foreach_get("material_index", slots)
         chosen = np.flatnonzero(_has_material(obj, slots, material_name))
+        if uv_map:
+            uvs = _uvs_by_name(obj, mesh, uv_map)
+            return replace(polygons_of(mesh, matrix), uvs=uvs, uv_map=uv_map).of_faces(chosen)
         polygons = polygons_of(mesh, matrix).of_faces(chosen)
         uvs = _uvs(mesh, OWN_MAP)
         if uvs is None or not polygons.count or _fits(polygons):
@@ -228,6 +236,17 @@ def read_polygons(obj, material_name: str, matrix=None) -> Polygons:
         return again if _fits(again) else polygons
     finally:
         obj.to_mesh_clear()
+
+
+def _uvs_by_name(obj, mesh, name: str) -> np.ndarray:
+    """UVs of each loop, float64 (N, 2), in the map of that name."""
+    uvs = _uvs(mesh, name)
+    if uvs is None:
+        names = " and ".join(f"'{layer.name}'" for layer in mesh.uv_layers)
+        text = f"'{obj.name}' has no UV map '{name}', which the Beamspread node asks for."
+        text += f" It has {names}." if names else " It has none."
+        raise ReceiverError(text, "Choose another one in the node, or clear the field.")
+    return uvs.astype(float)
 
 
 def _fits(polygons: Polygons) -> bool:

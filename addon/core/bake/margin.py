@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from ..scene.receiver import Receiver
+
 NEIGHBOURS = [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)]
+STRAIGHT, DIAGONAL = ([step for step in NEIGHBOURS if (0 in step) == is_straight] for is_straight in (True, False))
 
 WHOLE = 0.99
 """Coverage from which a texel counts as completely inside a chart; the rest is rounding."""
@@ -13,17 +18,29 @@ BORDER_RINGS = 2
 """Distance (texels) within which every texel that a straight edge cuts has a neighbour completely inside the chart."""
 
 
-def extend_margin(texture: np.ndarray, coverage: np.ndarray, margin: int) -> np.ndarray:
-    """Fill up to `margin` rings of texels around a chart with the mean of their filled neighbours.
+NO_ISLAND = np.iinfo(np.int32).max
+"""Label of texels outside of all islands."""
 
-    A texel that the chart's edge cuts holds only the light of its part inside. The rings therefore continue the texels
-    completely inside, if there are any nearby.
+
+def with_margin(receiver: Receiver, texture: np.ndarray, margin: int) -> np.ndarray:
+    """The texture of a receiver with a margin around each island, see `extend_margin`."""
+    return extend_margin(texture, receiver.coverage, margin, receiver.labels())
+
+
+def extend_margin(
+    texture: np.ndarray, coverage: np.ndarray, margin: int, labels: np.ndarray | None = None
+) -> np.ndarray:
+    """Fill up to `margin` rings of texels around each island with the mean of their filled neighbours.
+
+    A texel that the island's edge cuts holds only the light of its part inside. The rings therefore continue the texels
+    completely inside, if there are any nearby. Where rings of two islands meet, each ends.
 
     Parameters
     ----------
     texture : float32 (H, W, C)
-    coverage : (H, W), fraction of each texel inside the chart. Texels with a coverage above 0 stay as they are.
+    coverage : (H, W), fraction of each texel inside the islands. Texels with a coverage above 0 stay as they are.
     margin : number of rings of texels, >= 0.
+    labels : int32 (H, W), the island of each covered texel, below 0 elsewhere; None: all belong to the same.
 
     Returns
     -------
@@ -33,38 +50,99 @@ def extend_margin(texture: np.ndarray, coverage: np.ndarray, margin: int) -> np.
         raise ValueError(f"margin is {margin}; it must be 0 or more")
     baked, whole = coverage > 0, coverage > WHOLE
     baked_texels = baked[..., None]
+    if labels is not None:
+        labels = np.where(labels < 0, NO_ISLAND, labels)
     continued = texture
     if not np.array_equal(baked, whole):
-        continued = np.where(baked_texels, _add_rings(texture, whole, BORDER_RINGS), texture)
-    return np.where(baked_texels, texture, _add_rings(continued, baked, margin)).astype(np.float32, copy=False)
+        continued = np.where(baked_texels, _add_rings(texture, whole, BORDER_RINGS, labels), texture)
+    return np.where(baked_texels, texture, _add_rings(continued, baked, margin, labels)).astype(np.float32, copy=False)
 
 
-def _add_rings(texture: np.ndarray, known: np.ndarray, count: int) -> np.ndarray:
-    """A copy with `count` rings around the known texels filled."""
+def part_in_shared(coverage: np.ndarray, before: np.ndarray, after: np.ndarray, margin: int) -> np.ndarray:
+    """Bool (H, W): texels that a surface and its margin fill in an image that it shares with other surfaces.
+
+    A texel belongs to the surface that covers most of it. Margins grow ring by ring from all surfaces at once, so they
+    end where they meet. The parts of all surfaces are the same whichever of them is baked, and don't overlap.
+
+    Parameters
+    ----------
+    coverage : (H, W), fraction of each texel inside the surface.
+    before, after : the same of all surfaces that take, and that leave, a texel to which both have the same right.
+    margin : number of rings of texels.
+    """
+    result = np.zeros(coverage.shape, bool)
+    rows, columns = (np.flatnonzero((coverage > 0).any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return result
+    # Twice the margin: rings of neighbours begin outside of the surface's own.
+    near = tuple(slice(max(0, line[0] - 2 * margin), line[-1] + 1 + 2 * margin) for line in (rows, columns))
+    coverage, before, after = coverage[near], before[near], after[near]
+    is_own = (coverage > before) & (coverage >= after) & (coverage > 0)
+    is_before = ~is_own & (before > 0) & (before >= after)
+    is_after = ~is_own & ~is_before & (after > 0)
+    for _ in range(margin):
+        is_free = ~(is_own | is_before | is_after)
+        masks = is_before, is_own, is_after
+        for steps in (STRAIGHT, DIAGONAL):
+            rings = []
+            for mask in masks:
+                rings.append(is_free & _beside(mask, steps))
+                is_free = is_free & ~rings[-1]
+            is_before, is_own, is_after = is_before | rings[0], is_own | rings[1], is_after | rings[2]
+    result[near] = is_own
+    return result
+
+
+def _beside(mask: np.ndarray, steps: Sequence[tuple[int, int]]) -> np.ndarray:
+    """Bool (H, W): texels that are a step away from one of the mask."""
+    padded, (height, width) = np.pad(mask, 1), mask.shape
+    return np.any([padded[1 + dy : 1 + dy + height, 1 + dx : 1 + dx + width] for dy, dx in steps], axis=0)
+
+
+def _add_rings(texture: np.ndarray, known: np.ndarray, count: int, labels: np.ndarray | None) -> np.ndarray:
+    """A copy with `count` rings around the known texels filled; a texel with a label continues that island alone."""
     # A frame of unknown texels makes border checks unnecessary.
     result = np.pad(texture.astype(np.float32, copy=False), ((1, 1), (1, 1), (0, 0)))
     filled = np.pad(known, 1)
+    label_of = np.zeros((1, 1), np.int32) if labels is None else np.pad(labels, 1, constant_values=NO_ISLAND)
     rows, columns = np.nonzero(_touched(filled))
     for _ in range(count):
         if not len(rows):
             break
+        chosen = None if labels is None else _chosen(label_of, filled, rows, columns)
         weight, total = np.zeros((len(rows), 1), np.float32), np.zeros((len(rows), result.shape[2]), np.float32)
         for dy, dx in NEIGHBOURS:
             counts = filled[rows + dy, columns + dx, None]
+            if chosen is not None:
+                counts = counts & (label_of[rows + dy, columns + dx] == chosen)[:, None]
             weight += counts
             total += np.where(counts, result[rows + dy, columns + dx], 0)
-        result[rows, columns] = total / weight
-        filled[rows, columns] = True
+        is_known = weight[:, 0] > 0
+        known_rows, known_columns = rows[is_known], columns[is_known]
+        result[known_rows, known_columns] = total[is_known] / weight[is_known]
+        filled[known_rows, known_columns] = True
+        if chosen is not None:
+            label_of[known_rows, known_columns] = chosen[is_known]
         rows, columns = _around(filled, rows, columns)
     return result[1:-1, 1:-1]
 
 
+def _chosen(label_of: np.ndarray, filled: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Label of the island that each texel continues: its own, else the lowest straight beside it, else diagonally."""
+    chosen = label_of[rows, columns]
+    for steps in (STRAIGHT, DIAGONAL):
+        lowest = np.full(len(rows), NO_ISLAND, np.int32)
+        for dy, dx in steps:
+            beside = np.where(filled[rows + dy, columns + dx], label_of[rows + dy, columns + dx], NO_ISLAND)
+            lowest = np.minimum(lowest, beside)
+        chosen = np.where(chosen == NO_ISLAND, lowest, chosen)
+    return chosen
+
+
 def _touched(filled: np.ndarray) -> np.ndarray:
     """Unknown texels beside known ones, without the frame."""
-    height, width = filled.shape[0] - 2, filled.shape[1] - 2
     near = np.zeros_like(filled)
-    for dy, dx in NEIGHBOURS:
-        near[1:-1, 1:-1] |= filled[1 + dy : 1 + dy + height, 1 + dx : 1 + dx + width]
+    near[1:-1, 1:-1] = _beside(filled, NEIGHBOURS)[1:-1, 1:-1]
     return near & ~filled
 
 

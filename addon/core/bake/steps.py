@@ -17,7 +17,7 @@ from .bake_settings import BakeSettings
 from .estimate import simulation_seconds
 from .job import BakeJob, Step
 from .layers import LAYERS, WITHOUT_MEDIUM
-from .margin import extend_margin
+from .margin import with_margin
 from .surface import Surface
 
 SUNS, NARROW, WIDE = range(3)
@@ -107,7 +107,7 @@ class Solve(Step):
             raise BakeError(text, "Check the strengths of the lights.")
         texture = job.receiver.to_texture(values)
         del values  # large
-        return replace(job, texture=extend_margin(texture, job.receiver.coverage, settings.margin))
+        return replace(job, texture=with_margin(job.receiver, texture, settings.margin))
 
     def memory_bytes(self, job: BakeJob) -> float:
         texels, lights, surface = job.receiver.coverage.size, job.illumination.lights, job.surface

@@ -15,16 +15,17 @@ class FramedReceiver:
 
     Attributes
     ----------
-    region : bool (height, width), texels of the charts and of their margin.
+    margin : number of texels around the charts.
+    inside, region : bool (height, width), texels of the charts; the same with their margin.
     """
 
     def __init__(self, receiver: Receiver, margin: int) -> None:
         self.receiver = receiver
-        inside = receiver.inside()
+        self.margin, self.inside = margin, receiver.inside()
         whole = receiver.coverage > WHOLE
-        source = _nearest_texels(whole if whole.any() else inside, margin + 2)
+        source = _nearest_texels(whole if whole.any() else self.inside, margin + 2)
         self._source = None if whole.all() else source
-        self.region = _dilated(inside, margin)
+        self.region = _dilated(self.inside, margin)
 
     @cached_property
     def color_out(self) -> np.ndarray | None:

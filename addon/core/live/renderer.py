@@ -9,7 +9,7 @@ import numpy as np
 
 from ..bake.bake_settings import COMBINED, BakeSettings
 from ..bake.layers import spread
-from ..bake.margin import extend_margin
+from ..bake.margin import with_margin
 from ..bake.surface import channel_media
 from ..ldf.albedo import albedo_from_reflectance
 from ..ldf.library import load_source
@@ -65,14 +65,14 @@ class Rendering:
     Attributes
     ----------
     texture : float32 (height, width, 3), luminance; None where `error` says why.
-    region : bool (height, width), texels of the target, margin included.
+    framed : texels of the target and of its margin.
     is_exact : True if the values are those of a bake.
     messages : for the artist: faces that are left out, and noise of an exact rendering.
     """
 
     target: Target
     texture: np.ndarray | None = None
-    region: np.ndarray | None = None
+    framed: FramedReceiver | None = None
     is_exact: bool = False
     error: str = ""
     messages: tuple[Message, ...] = ()
@@ -129,10 +129,10 @@ class LiveRenderer:
         rest = material, sources, target.settings, progress
         values = [spread(chart.grid, illumination, *rest) for chart in framed.receiver.charts]
         texture = framed.receiver.to_texture(values)
-        texture = extend_margin(texture, framed.receiver.coverage, target.settings.margin)
+        texture = with_margin(framed.receiver, texture, target.settings.margin)
         news = [message for message in illumination.messages if message not in target.illumination.messages]
         messages = (*self._mesh(target).messages, *news)
-        return Rendering(target.target, texture, framed.region, is_exact=True, messages=messages)
+        return Rendering(target.target, texture, framed, is_exact=True, messages=messages)
 
     def missing(self, target: LiveTarget) -> list:
         """Media of the target that have no library yet."""
@@ -190,7 +190,7 @@ class LiveRenderer:
         if whole.color_out is not None:
             # At all texels, so that the texture keeps its detail.
             resized_texture = resized_texture * whole.color_out
-        return Rendering(target.target, resized_texture, whole.region, messages=self._mesh(target).messages)
+        return Rendering(target.target, resized_texture, whole, messages=self._mesh(target).messages)
 
     def _quick_luminance(
         self,

@@ -58,6 +58,17 @@ class Receiver:
         """Bool (height, width): texels that belong to a chart."""
         return in_chart(self.coverage)
 
+    def labels(self) -> np.ndarray | None:
+        """Int32 (height, width): number of the island that covers most of each texel, -1 where none; None with one."""
+        islands = [island for chart in self.charts for island in chart.islands]
+        if len(islands) < 2:
+            return None
+        labels = np.full(self.coverage.shape, -1, np.int32)
+        for number, island in enumerate(islands):
+            is_most = in_chart(island.coverage) & (island.coverage >= island.part_of(self.coverage))
+            island.part_of(labels)[is_most] = number
+        return labels
+
     def messages(self, name: str) -> list[Message]:
         """Messages about the texels of the object `name`."""
         coarser = max(chart.coarser for chart in self.charts)

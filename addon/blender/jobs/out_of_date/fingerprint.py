@@ -54,7 +54,7 @@ def fingerprints(context, targets: Iterable[Target], is_for_bake: bool = False) 
             "lights": _text(objects.lamps),
             "world": world,
             "textures": _digest_of({*objects.images, *texture.images} - results),
-            "material": digest(surface_values(*place), texture.text),
+            "material": digest(surface_values(*place), texture.text, *filter(None, [place[0].uv_map])),
             SETTINGS: settings_part(scene),
             QUALITY: _quality(scene),
             IMAGE: image_part(place[0].image),

@@ -218,7 +218,7 @@ def _is_current(node, copy) -> bool:
     """
     if copy.bl_idname != node.bl_idname or not isinstance(node, BeamspreadNode):
         return copy.bl_idname == node.bl_idname
-    return (copy.surface(), copy.texture_blur) == (node.surface(), node.texture_blur)
+    return (copy.surface(), copy.texture_blur, copy.uv_map) == (node.surface(), node.texture_blur, node.uv_map)
 
 
 def read_plans(

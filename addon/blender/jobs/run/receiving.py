@@ -35,7 +35,7 @@ def read_receiver(target: Target, instance: ObjectInstance, fills_image: bool, o
     surface.check()
     if fills_image and image is not None and not is_sequence(image):  # a batch fills a sequence's files
         check_image(image)
-    polygons = read_polygons(instance.obj, target.material_name, instance.matrix)
+    polygons = read_polygons(instance.obj, target.material_name, instance.matrix, evaluated.node.uv_map)
     mesh = flatten(polygons, min(surface.material.mean_free_path), target.object_name)
     if outcome is not None:
         mesh = replace(mesh, messages=(outcome, *mesh.messages))
