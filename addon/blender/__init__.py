@@ -18,7 +18,7 @@ Each part imports only core and those above it (tests/unit/test_layers.py reads 
 
 from . import preferences, settings
 from .cycles import kept_world, process
-from .images import facts, image_operators, undo
+from .images import atlas, facts, image_operators, undo
 from .jobs import state
 from .jobs.out_of_date import stale
 from .jobs.run import engine, operator
@@ -32,6 +32,7 @@ PARTS = (
     preferences,
     settings,
     image_operators,
+    atlas,
     facts,
     undo,
     node,

@@ -7,7 +7,7 @@ import pytest
 from beamspread.core.native import native
 from beamspread.core.scene.flat_mesh import flatten
 from beamspread.core.scene.receiver import build_receiver
-from beamspread.core.scene.unwrap import SPACE, unwrap
+from beamspread.core.scene.unwrap import SPACE, unwrap, unwrap_together
 
 from mesh_shapes import SQUARE, box, heights, mesh_of
 
@@ -116,3 +116,14 @@ def test_bent_parts_are_projected_without_overlaps():
 def test_a_mesh_of_one_plane_fills_its_longer_side():
     uvs = unwrap(mesh_of([np.column_stack([SQUARE * (4, 1), np.zeros(4)])]))
     assert np.ptp(uvs, axis=0) == pytest.approx((1 - 2 * SPACE, (1 - 2 * SPACE) / 4), rel=0.01)
+
+
+def test_meshes_lie_side_by_side_at_one_density():
+    meshes = [mesh_of(box()), mesh_of(box((3.0, 0.2, 0.1))), mesh_of(SHAPES["letter"])]
+    uvs = unwrap_together(meshes)
+    total = sum(coverage_sum(polygons, at) for polygons, at in zip(meshes, uvs))
+    assert total.max() <= 1 + 1e-6
+    density = np.concatenate([areas_of(polygons, at) / polygons.areas for polygons, at in zip(meshes, uvs)])
+    np.testing.assert_allclose(density, density[0], rtol=1e-9)
+    assert min(at.min() for at in uvs) >= 0
+    assert max(at.max() for at in uvs) <= 1

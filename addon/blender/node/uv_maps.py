@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
 
 import bmesh
 import bpy
@@ -12,9 +13,9 @@ from ...core.errors import BakeError, ReceiverError
 from ...core.messages import Message, note
 from ...core.scene.islands import check_map
 from ...core.scene.polygons import Polygons
-from ...core.scene.unwrap import unwrap
+from ...core.scene.unwrap import unwrap, unwrap_together
 from ...core.target import Target
-from ..read.geometry import OWN_MAP, polygons_of, read_polygons
+from ..read.geometry import OWN_MAP, faces_with, polygons_of, read_polygons
 from ..read.visibility import find_instances
 from .find import node_of
 from .unwrap_group import NAME as MODIFIER
@@ -58,6 +59,40 @@ def problems_of(depsgraph, targets: Iterable[Target]) -> dict[str, str]:
     return problems
 
 
+def make_maps_together(depsgraph, materials: Mapping[object, Collection[str]]) -> list[Polygons]:
+    """Give local objects maps of our own that lie side by side in one image, at one texel density.
+
+    Parameters
+    ----------
+    materials : names of the materials whose faces get places in the image, by (original) object.
+
+    Returns
+    -------
+    Their faces, with the new UVs.
+    """
+    # A modifier gives each of the objects that share a mesh a map of its own.
+    by_layer = [_users(obj.data) == 1 and _keeps_faces(depsgraph, obj) for obj in materials]
+    meshes = [
+        _mesh_polygons(obj) if is_layer else _evaluated_polygons(depsgraph, obj)
+        for obj, is_layer in zip(materials, by_layer)
+    ]
+    chosen = [_evaluated_faces(depsgraph, obj, names) for obj, names in materials.items()]
+    parts = [polygons.of_faces(faces) for polygons, faces in zip(meshes, chosen)]
+    parts = [replace(part, uvs=uvs) for part, uvs in zip(parts, unwrap_together(parts))]
+    for obj, is_layer, polygons, faces, part in zip(materials, by_layer, meshes, chosen, parts):
+        uvs = np.zeros((len(polygons.corners), 2), np.float32)
+        uvs[np.isin(polygons.face_of, faces)] = part.uvs
+        if is_layer and find_modifier(obj) is not None:
+            remove_modifier(obj)
+        if not is_layer or not _fill_layer(obj.data, uvs):  # the mesh may have as many maps as it can have
+            set_uvs(obj, uvs)
+    return parts
+
+
+def _users(mesh) -> int:
+    return mesh.users - mesh.use_fake_user
+
+
 def objects_with_maps() -> set[str]:
     """Names of all objects that have a map of our own, or the modifier that makes it."""
     meshes = (obj for obj in bpy.data.objects if obj.type == "MESH")
@@ -74,7 +109,7 @@ def _make(depsgraph, name: str, targets: list[Target], problem: str) -> Outcome:
         obj.update_from_editmode()
     if _keeps_faces(depsgraph, obj):
         # The data of a mesh in Edit Mode are empty.
-        polygons = _evaluated_polygons(depsgraph, obj) if mesh.is_editmode else polygons_of(mesh, obj.matrix_world)
+        polygons = _evaluated_polygons(depsgraph, obj) if mesh.is_editmode else _mesh_polygons(obj)
         if not _fill_layer(mesh, unwrap(polygons).astype(np.float32)):
             text = f"{problem} The mesh has as many UV maps as it can have."
             return ReceiverError(text, "Remove one of them.")
@@ -98,6 +133,20 @@ def _keeps_faces(depsgraph, obj) -> bool:
     copy = evaluated.to_mesh()
     try:
         return len(copy.loops) == len(obj.data.loops) and len(copy.polygons) == len(obj.data.polygons)
+    finally:
+        evaluated.to_mesh_clear()
+
+
+def _mesh_polygons(obj) -> Polygons:
+    """All faces of an object's own mesh, in world space."""
+    return polygons_of(obj.data, obj.matrix_world)
+
+
+def _evaluated_faces(depsgraph, obj, materials: Collection[str]) -> np.ndarray:
+    """Numbers of the faces of an object, after its modifiers, that carry one of the materials."""
+    evaluated = obj.evaluated_get(depsgraph)
+    try:
+        return faces_with(evaluated, evaluated.to_mesh(), materials)
     finally:
         evaluated.to_mesh_clear()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -222,9 +222,7 @@ def read_polygons(obj, material_name: str, matrix=None, uv_map: str = "") -> Pol
     matrix = obj.matrix_world if matrix is None else matrix
     mesh = obj.to_mesh()
     try:
-        slots = np.empty(len(mesh.polygons), np.int32)
-        mesh.polygons.foreach_get("material_index", slots)
-        chosen = np.flatnonzero(_has_material(obj, slots, material_name))
+        chosen = faces_with(obj, mesh, {material_name})
         if uv_map:
             uvs = _uvs_by_name(obj, mesh, uv_map)
             return replace(polygons_of(mesh, matrix), uvs=uvs, uv_map=uv_map).of_faces(chosen)
@@ -315,8 +313,11 @@ def _uvs(mesh, name: str = "") -> np.ndarray | None:
     return np.ascontiguousarray(vectors.reshape(-1, 3)[:, :2])
 
 
-def _has_material(obj, slots: np.ndarray, material_name: str) -> np.ndarray:
-    """True for each face that carries the material; faces with a slot too high have the last one, as in Blender."""
-    names = [slot.material.name if slot.material else None for slot in obj.material_slots]
-    matches = np.array([name == material_name for name in names] or [False])
-    return matches[np.clip(slots, 0, len(matches) - 1)]
+def faces_with(obj, mesh, materials: Collection[str]) -> np.ndarray:
+    """Numbers of the faces that carry one of the materials; a slot too high stands for the last one, as in Blender."""
+    slots = np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("material_index", slots)
+    matches = np.array(
+        [bool(slot.material and slot.material.name in materials) for slot in obj.material_slots] or [False]
+    )
+    return np.flatnonzero(matches[np.clip(slots, 0, len(matches) - 1)])

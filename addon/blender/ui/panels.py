@@ -159,6 +159,7 @@ class BEAMSPREAD_PT_images(RenderPanel, bpy.types.Panel):
         if settings.image_storage == "FILES":
             layout.prop(settings, "image_dir")
         layout.prop(settings, "image_name")
+        layout.operator("beamspread.make_atlas", icon="UV_ISLANDSEL")
 
 
 class BEAMSPREAD_PT_batch(RenderPanel, bpy.types.Panel):

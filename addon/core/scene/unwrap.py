@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..native import native
@@ -28,19 +30,38 @@ def unwrap(polygons: Polygons) -> np.ndarray:
     Flat parts keep their shape. Bent ones are cut into islands whose faces look the same way, and projected. Faces that
     show no light, without area or with corners at no finite position, are all at (0, 0).
     """
-    uvs = np.zeros((len(polygons.corners), 2))
-    shown = np.flatnonzero(polygons.is_finite)
-    areas = polygons.of_faces(shown).areas
-    shown = shown[areas > NO_AREA_BESIDE * areas.max(initial=0.0)]
-    if len(shown):
-        is_shown = np.zeros(polygons.count, bool)
-        is_shown[shown] = True
-        uvs[is_shown[polygons.face_of]] = _unwrapped(polygons.of_faces(shown))
-    return uvs
+    return unwrap_together([polygons])[0]
 
 
-def _unwrapped(polygons: Polygons) -> np.ndarray:
-    """UVs of all corners, float64 (K, 2), of faces that have areas."""
+def unwrap_together(meshes: Sequence[Polygons]) -> list[np.ndarray]:
+    """UVs of all corners of each mesh as of `unwrap`; all meshes lie side by side in one square, at one density."""
+    shown = [_has_light(polygons) for polygons in meshes]
+    laid = [_laid_out(polygons.of_faces(np.flatnonzero(is_shown))) for polygons, is_shown in zip(meshes, shown)]
+    sizes_of_all = np.concatenate([sizes for *_, sizes in laid])
+    if not len(sizes_of_all):
+        return [np.zeros((len(polygons.corners), 2)) for polygons in meshes]
+    offsets, side = _packed(sizes_of_all)
+    result, first = [], 0
+    for polygons, is_shown, (positions, labels, sizes) in zip(meshes, shown, laid):
+        uvs = np.zeros((len(polygons.corners), 2))
+        uvs[is_shown[polygons.face_of]] = (positions + offsets[first + labels]) / side
+        result.append(uvs)
+        first += len(sizes)
+    return result
+
+
+def _has_light(polygons: Polygons) -> np.ndarray:
+    """Bool (N,): faces that have an area, beside the largest."""
+    is_shown = polygons.is_finite.copy()
+    areas = polygons.of_faces(np.flatnonzero(is_shown)).areas
+    is_shown[is_shown] = areas > NO_AREA_BESIDE * areas.max(initial=0.0)
+    return is_shown
+
+
+def _laid_out(polygons: Polygons) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions (K, 2) of all corners in their islands, each corner's island, and the islands' sizes (M, 2)."""
+    if not polygons.count:
+        return np.zeros((0, 2)), np.zeros(0, int), np.zeros((0, 2))
     labels = _islands(polygons)
     order = np.argsort(labels, kind="stable")
     waiting = np.split(order, np.cumsum(np.bincount(labels))[:-1])[::-1]
@@ -56,8 +77,7 @@ def _unwrapped(polygons: Polygons) -> np.ndarray:
         labels[faces] = len(sizes)
         positions[corners] = flat
         sizes.append(flat.max(axis=0))
-    offsets, side = _packed(np.array(sizes))
-    return (positions + offsets[labels][polygons.face_of]) / side
+    return positions, labels[polygons.face_of], np.array(sizes)
 
 
 def _overlaps(flat: np.ndarray, counts: np.ndarray) -> bool:
