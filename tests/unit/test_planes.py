@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from beamspread.core.errors import ReceiverError
+from beamspread.core.scene import islands
 from beamspread.core.scene.flat_mesh import flatten
 from beamspread.core.scene.planes import find_planes
 from beamspread.core.scene.polygons import components
@@ -57,7 +58,22 @@ def test_noise_within_the_medium_is_flattened_and_said():
     assert len(part.plane.faces) == 24**2
     assert part.plane.deviation == pytest.approx(1e-3, rel=0.05)
     (message,) = mesh.messages
-    assert message.text.startswith("'Scan' is baked as flat faces; it departs from them by 0.00")
+    deviation = part.plane.deviation
+    assert message.text == (
+        f"'Scan' is baked as flat faces; it departs from them by {deviation:.3g} units, {deviation / 1.1e-3:.2g} mean "
+        "free paths."
+    )
+    assert build_receiver(mesh, 512, 512).messages("Scan") == []
+    (message,) = build_receiver(mesh, 2048, 2048).messages("Scan")
+    assert message.text == "The faces of 'Scan' depart from the planes that are baked by up to 2.0 texels."
+
+
+def test_noise_of_a_fine_scan_bends_neighbors_by_more_than_bevels():
+    """One millimetre over a square metre, vertices five millimetres apart, in marble: neighbors bend by 25 degrees."""
+    noise = 1e-3 * np.random.default_rng(1).uniform(-1, 1, (201, 201))
+    mesh = flatten(mesh_of(*heights(lambda _x, _y: noise, 200)), mean_free_path=4e-4, name="Scan")
+    (part,) = mesh.parts
+    assert len(part.plane.faces) == 200**2
 
 
 def bevelled_box(bevel, side=1.0):
@@ -139,9 +155,26 @@ def test_overlapping_islands_are_refused():
         build_receiver(flatten(mesh_of(box(), [SQUARE] * 6)), 32, 32)
 
 
-def test_faces_without_area_in_the_map_are_refused():
+def test_a_plane_without_area_in_the_map_stays_black_and_is_named():
+    mesh = flatten(mesh_of(box(), [*atlas(5), np.full((4, 2), 0.9)]), name="Box")
+    assert len(mesh.parts) == 5
+    (message,) = mesh.messages
+    assert message.text == "Faces of 'Box' have no area in the UV map: 16.7% of its surface stay black."
+    assert message.remedy == "Unwrap the mesh again: face 5."
     with pytest.raises(ReceiverError, match="no area"):
-        flatten(mesh_of(box(), [*atlas(5), np.full((4, 2), 0.9)]))
+        flatten(mesh_of(box(), [np.full((4, 2), 0.9)] * 6))
+
+
+def test_a_plane_with_too_many_islands_stays_black_and_is_named(monkeypatch):
+    quads, uvs = heights(lambda x, _y: 0 * x, 2)
+    places = [uv * 0.8 + number / 40 for number, uv in enumerate(uvs)]
+    wall = np.array([(0, 0, 1), (0, 1, 1), (0, 1, 2), (0, 0, 2.0)])
+    monkeypatch.setattr(islands, "MAX_ISLANDS", 3)
+    mesh = flatten(mesh_of([*quads, wall], [*places, 0.95 + 0.04 * SQUARE]), name="Floor")
+    (part,) = mesh.parts
+    assert part.plane.faces.tolist() == [4]
+    (message,) = mesh.messages
+    assert message.text == "The UV map has 4 islands; 3 are allowed. Faces 0 to 3 of 'Floor' stay black."
 
 
 def test_tiny_faces_without_area_in_the_map_are_left_out_and_said():
@@ -184,3 +217,70 @@ def test_many_faces_fall_into_their_planes():
     planes, bent = find_planes(mesh_of(faces), 1e-6)
     assert len(planes) == 100
     assert not len(bent)
+
+
+def test_a_wall_on_a_floor_does_not_cut_it():
+    """Three faces share an edge; the wall lies between both halves of the floor in the order of faces."""
+    left = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0.0)])
+    wall = np.array([(1, 0, 0), (1, 1, 0), (1, 1, 1), (1, 0, 1.0)])
+    planes, bent = find_planes(mesh_of([left, wall, left + (1, 0, 0)]), 1e-6)
+    assert [plane.faces.tolist() for plane in planes] == [[0, 2], [1]]
+    assert not len(bent)
+
+
+def test_faces_on_each_other_are_one_plane():
+    """The medium is there once, and each copy shows it."""
+    face = np.column_stack([SQUARE, np.zeros(4)])
+    uvs = [SQUARE * 0.4, SQUARE * 0.4 + 0.5]
+    receiver = build_receiver(flatten(mesh_of([face, face], uvs)), 100, 100)
+    (chart,) = receiver.charts
+    assert chart.grid.coverage == pytest.approx(np.ones((40, 40)))
+    texture = receiver.to_texture([np.float32(chart.grid.positions())])
+    np.testing.assert_allclose(texture[:40, :40], texture[50:90, 50:90], atol=1e-6)
+
+
+def test_large_faces_of_a_large_mesh_are_planes():
+    """Bevels join a desk's panels smoothly; each is a small part of a house."""
+    desk = bevelled_box(0.2)
+    house = [20 * face + (100, 0, 0) for face in box()]
+    planes, bent = find_planes(mesh_of([*desk.split(desk.corners), *house]), 1e-6)
+    is_flat = ~np.isin(np.arange(desk.count), bent)
+    assert is_flat[[0, -1]].all()
+    assert sum(len(plane.faces) for plane in planes) >= 8
+
+
+def test_a_strip_of_many_panels_with_bevels_has_planes():
+    """Forty panels in a zigzag of 28 degrees, rounded at each edge by a strip of a twentieth."""
+    turn, points = np.radians(14), [np.zeros(2)]
+    for number in range(40):
+        angle = turn * (-1) ** number
+        for length, direction in ((1.0, angle), (0.05, 0.0)):
+            points.append(points[-1] + length * np.array([np.cos(direction), np.sin(direction)]))
+    faces = [
+        np.array([(*a[:1], 0, a[1]), (*b[:1], 0, b[1]), (b[0], 1, b[1]), (a[0], 1, a[1])])
+        for a, b in zip(points, points[1:])
+    ]
+    planes, bent = find_planes(mesh_of(faces), 1e-6)
+    assert len(planes) == 40
+    assert len(bent) == 40
+
+
+@pytest.mark.parametrize("count", [24, 32, 64])
+def test_a_cylinder_is_bent(count):
+    turns = 2 * np.pi * np.arange(count + 1) / count
+    circle = np.stack([np.cos(turns), np.sin(turns)], 1)
+    sides = [np.array([(*a, 0), (*b, 0), (*b, 2), (*a, 2)]) for a, b in zip(circle, circle[1:])]
+    caps = [np.column_stack([circle[:-1], np.full(count, 2.0)]), np.column_stack([circle[:-1][::-1], np.zeros(count)])]
+    planes, bent = find_planes(mesh_of([*sides, *caps]), 1e-6)
+    assert sorted(plane.faces.tolist() for plane in planes) == [[count], [count + 1]]
+    assert len(bent) == count
+
+
+def test_a_few_flat_faces_do_not_make_a_ball_flat():
+    turns, rows = np.meshgrid(2 * np.pi * np.arange(65) / 64, np.pi * np.arange(1, 32) / 32)
+    ball = np.stack([np.sin(rows) * np.cos(turns), np.sin(rows) * np.sin(turns), -np.cos(rows)], -1)
+    quads = [ball[:-1, :-1], ball[:-1, 1:], ball[1:, 1:], ball[1:, :-1]]
+    faces = list(np.stack(quads, axis=2).reshape(-1, 4, 3))
+    chip = np.array([(3, 0, 0), (3.2, 0, 0), (3.2, 0.2, 0), (3, 0.2, 0.0)])
+    with pytest.raises(ReceiverError, match="not flat"):
+        flatten(mesh_of([*faces, chip], [SQUARE * 1e-3] * (len(faces) + 1)))

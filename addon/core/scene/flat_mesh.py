@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..errors import ReceiverError
 from ..messages import Message, note, warning
-from .islands import MAX_LOST, Island, check_uvs, find_islands
+from .islands import NO_UV_AREA, Island, check_uvs, find_islands
 from .planes import FLATNESS_TOLERANCE, FLATTENED, Plane, find_planes
 from .polygons import Polygons
+
+# Part of the surface that must be flat. More refuses bent meshes with a few flat faces.
+MIN_FLAT = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +47,8 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> 
     Raises
     ------
     ReceiverError
-        The mesh has no faces, no area or no flat part, or UVs that are missing, outside 0..1 or without area.
+        The mesh has no faces, no area, hardly a flat part or vertices at no finite position; or UVs that are missing,
+        outside 0..1 or all without area.
     """
     if not polygons.count:
         raise ReceiverError("No face uses this material.", "Assign it to the faces that should be baked.")
@@ -51,32 +57,49 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> 
         raise ReceiverError(text, finite_remedy(name))
     tolerance = max(mean_free_path, FLATTENED * polygons.diagonal)
     planes, bent = find_planes(polygons, tolerance)
-    if not planes:
+    if polygons.areas[bent].sum() > (1 - MIN_FLAT) * polygons.areas.sum():
         raise ReceiverError(
             "The faces are not flat: they bend from one to the next.",
             "Only flat faces, and edges of 30 degrees or more between them, can be baked.",
         )
     check_uvs(polygons.uvs)
     exact = FLATNESS_TOLERANCE * polygons.diagonal
-    parts = []
+    messages, parts, lost = [], [], 0.0
+    is_lost = np.zeros(polygons.count, bool)
     for plane in planes:
         # Faces that are flattened are shorter on the plane than their UVs say.
         fitted = tolerance if plane.deviation > exact else exact
-        parts.append(FlatPart(plane, find_islands(polygons, plane, fitted)))
-    areas = [sum(float(island.polygons.areas.sum()) for island in part.islands) for part in parts]
-    lost = 1 - sum(areas) / sum(float((polygons.area_vectors[plane.faces] @ plane.normal).sum()) for plane in planes)
-    if lost > MAX_LOST:
+        try:
+            islands = find_islands(polygons, plane, fitted)
+        except ReceiverError as error:
+            text = f"{error.text} {_capital(polygons.listed(plane.faces))} of '{name}' stay black."
+            messages.append(warning(name, text, error.remedy))
+            continue
+        area = sum(float(island.polygons.areas.sum()) for island in islands)
+        lost += float((polygons.area_vectors[plane.faces] @ plane.normal).sum()) - area
+        is_lost[plane.faces] = polygons.uv_areas[plane.faces] <= NO_UV_AREA if area > 0 else True
+        if area > 0:
+            parts.append(FlatPart(plane, islands))
+    if not parts:
+        if messages:
+            raise ReceiverError(messages[0].text, messages[0].remedy)
         raise ReceiverError("The UV map has no area, in all or some of the faces.", "Unwrap the mesh again.")
-    parts = [part for part, area in zip(parts, areas) if area > 0]
-    messages = []
-    if lost > FLATNESS_TOLERANCE:
-        text = f"Faces of '{name}' have no area in the UV map: {lost:.1%} of its surface stay black."
-        messages.append(warning(name, text, "Unwrap the mesh again."))
+    part_lost = lost / sum(float(polygons.areas[plane.faces].sum()) for plane in planes)
+    if part_lost > FLATNESS_TOLERANCE:
+        text = f"Faces of '{name}' have no area in the UV map: {part_lost:.1%} of its surface stay black."
+        remedy = f"Unwrap the mesh again{': ' + polygons.listed(is_lost) if is_lost.any() else ''}."
+        messages.append(warning(name, text, remedy))
     if len(bent):
         text = f"{len(bent)} of {polygons.count} faces of '{name}' are bent and stay black."
         remedy = f"Give them another material, or flatten them: {polygons.listed(bent)}."
         messages.append(warning(name, text, remedy))
-    deviation = max(plane.deviation for plane in planes)
+    deviation = max(part.plane.deviation for part in parts)
     if deviation > exact:
-        messages.append(note(name, f"'{name}' is baked as flat faces; it departs from them by {deviation:.3g} units."))
+        text = f"'{name}' is baked as flat faces; it departs from them by {deviation:.3g} units"
+        paths = f", {deviation / mean_free_path:.2g} mean free paths" if mean_free_path > 0 else ""
+        messages.append(note(name, f"{text}{paths}."))
     return FlatMesh(tuple(parts), tuple(messages), polygons.uv_map)
+
+
+def _capital(words: str) -> str:
+    return words[:1].upper() + words[1:]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,8 +13,9 @@ from .polygons import Polygons, components, largest
 # Distance from a plane that counts as none, over the diagonal of all faces: a tenth of a texel at 1024.
 FLATNESS_TOLERANCE = 1e-4
 
-# Distance from a plane up to which faces are flattened onto it, over the same: half a texel at 1024.
-FLATTENED = 5e-4
+# Distance from a plane up to which faces are flattened onto it, over the same: a texel at 1024. More flattens rougher
+# scans.
+FLATTENED = 1e-3
 
 # Area of a face that counts as none, over the squared diagonal of all faces.
 NO_AREA = 1e-10
@@ -31,11 +33,13 @@ COPLANAR_COSINE = 0.99996
 # Cosine of the angle to a plane within which its distance alone decides whether a face is flattened onto it.
 FLATTENED_COSINE = 0.5
 
-# Largest number of planes of a mesh that are looked for, the largest first.
+# Largest number of planes of a part that bends smoothly, the largest first.
 MAX_PLANES = 4096
 
-# Ratio of areas of a plane and of a bent neighbor, and fraction of all area, from which the plane is baked alone.
-MIN_RATIO, MIN_PART = 4.0, 0.05
+# Fraction of the area of a part that bends smoothly from which a flat piece is a plane; the same for pieces that are
+# larger than each neighbor by the ratio; and the ratio of areas to a bent neighbor below which none is. Larger: more
+# is bent.
+MIN_PART, MIN_APART, MIN_RATIO = 0.05, 0.01, 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,50 +77,78 @@ def find_planes(polygons: Polygons, tolerance: float) -> tuple[list[Plane], np.n
 
 
 class _Search:
+    """Splits a mesh into parts that bend smoothly, which share no plane."""
+
     def __init__(self, polygons: Polygons, tolerance: float) -> None:
         self.polygons, self.tolerance = polygons, tolerance
         self.normals = polygons.area_vectors / np.maximum(polygons.areas, 1e-300)[:, None]
         self.has_area = polygons.areas > NO_AREA_BESIDE * polygons.areas.max()
         first, second = polygons.shared_edges
         faces = polygons.face_of
-        self.pairs = faces[first], faces[second]
-        is_used = self.has_area[self.pairs[0]] & self.has_area[self.pairs[1]] & (self.pairs[0] != self.pairs[1])
-        self.pairs = self.pairs[0][is_used], self.pairs[1][is_used]
+        pairs = np.stack([faces[first], faces[second]])
+        self.pairs = pairs[:, self.has_area[pairs].all(axis=0) & (pairs[0] != pairs[1])]
         self.cosines = np.einsum("ij,ij->i", self.normals[self.pairs[0]], self.normals[self.pairs[1]])
-        self.plane_of = np.full(polygons.count, -1)
-        self.planes: list[Plane] = []
 
     def run(self) -> tuple[list[Plane], np.ndarray]:
-        smooth = self._components(SMOOTH_COSINE)
-        coplanar = self._components(COPLANAR_COSINE)
-        for faces in self._by_area(smooth):
-            plane = self._fit(faces)
-            if plane is not None:
-                self._add(plane)
-            else:
-                self._split(faces, coplanar[faces])
-        bent = self.has_area & (self.plane_of < 0)
-        return sorted(self.planes, key=self._area, reverse=True), np.flatnonzero(bent)
+        planes: list[Plane] = []
+        is_bent = self.has_area.copy()
+        for cosine in (FLATTENED_COSINE, SMOOTH_COSINE):
+            # Noise bends by more than bevels: parts that are flat as a whole come first.
+            for part in self._parts(cosine, is_bent):
+                plane = part.fit(np.arange(len(part.faces)))
+                fitted = [plane] if plane is not None else part.planes() if cosine == SMOOTH_COSINE else []
+                planes += [replace(plane, faces=part.faces[plane.faces]) for plane in fitted]
+            for plane in planes:
+                is_bent[plane.faces] = False
+        areas = self.polygons.areas
+        return sorted(planes, key=lambda plane: -areas[plane.faces].sum()), np.flatnonzero(is_bent)
 
-    def _components(self, cosine: float) -> np.ndarray:
-        is_joined = self.cosines > cosine
-        return components(self.polygons.count, self.pairs[0][is_joined], self.pairs[1][is_joined])
+    def _parts(self, cosine: float, is_left: np.ndarray) -> Iterator[_Part]:
+        """Parts of the faces that are left, whose neighbors look the same way up to an angle of this cosine."""
+        is_used = is_left[self.pairs].all(axis=0)
+        pairs, cosines = self.pairs[:, is_used], self.cosines[is_used]
+        labels = components(self.polygons.count, *pairs[:, cosines > cosine])
+        is_inner = labels[pairs[0]] == labels[pairs[1]]
+        pairs, cosines = pairs[:, is_inner], cosines[is_inner]
+        faces, order = np.flatnonzero(is_left), np.argsort(labels[pairs[0]], kind="stable")
+        faces = faces[np.argsort(labels[faces], kind="stable")]
+        starts = np.flatnonzero(np.diff(labels[faces], prepend=-1))
+        ends = np.append(starts[1:], len(faces))
+        label_of_pair = labels[pairs[0, order]]
+        first, last = (np.searchsorted(label_of_pair, labels[faces[starts]], side) for side in ("left", "right"))
+        place = np.empty(self.polygons.count, int)
+        for begin, end, low, high in zip(starts, ends, first, last):
+            chosen, inner = faces[begin:end], order[low:high]
+            place[chosen] = np.arange(end - begin)
+            polygons = self.polygons.of_faces(chosen)
+            yield _Part(chosen, polygons, self.normals[chosen], place[pairs[:, inner]], cosines[inner], self.tolerance)
 
-    def _by_area(self, labels: np.ndarray, faces: np.ndarray | None = None) -> list[np.ndarray]:
-        """Faces with area of each label, those of the largest area first."""
-        faces = np.flatnonzero(self.has_area) if faces is None else faces
-        labels = np.unique(labels[faces] if len(labels) == self.polygons.count else labels, return_inverse=True)[1]
-        areas = np.bincount(labels, self.polygons.areas[faces])
-        order = np.argsort(labels, kind="stable")
-        groups = np.split(faces[order], np.cumsum(np.bincount(labels))[:-1])
-        return [groups[label] for label in np.argsort(-areas, kind="stable")]
 
-    def _fit(self, faces: np.ndarray) -> Plane | None:
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Faces that bend smoothly.
+
+    Attributes
+    ----------
+    faces : their numbers in the mesh; all other numbers are within the part.
+    polygons, normals : the same faces.
+    pairs : neighbors, int (2, P).
+    cosines : of the angles between neighbors, (P,).
+    """
+
+    faces: np.ndarray
+    polygons: Polygons
+    normals: np.ndarray
+    pairs: np.ndarray
+    cosines: np.ndarray
+    tolerance: float
+
+    def fit(self, faces: np.ndarray) -> Plane | None:
         """The plane of faces; None if they depart from it."""
         part = self.polygons.of_faces(faces)
-        total = self.polygons.area_vectors[faces].sum(axis=0)
+        total = part.area_vectors.sum(axis=0)
         length = np.linalg.norm(total)
-        if length < 0.5 * self.polygons.areas[faces].sum():
+        if length < 0.5 * part.areas.sum():
             return None
         normal = total / length
         heights = part.corners @ normal
@@ -127,57 +159,50 @@ class _Search:
         centre = part.corners.mean(axis=0)
         return Plane(faces, centre + (height - centre @ normal) * normal, normal, deviation)
 
-    def _add(self, plane: Plane) -> None:
-        self.plane_of[plane.faces] = len(self.planes)
-        self.planes.append(plane)
-
-    def _area(self, plane: Plane) -> float:
-        return float(self.polygons.areas[plane.faces].sum())
-
-    def _split(self, faces: np.ndarray, coplanar: np.ndarray) -> None:
-        """Find planes among faces that together are not flat: their largest flat parts, with near faces around."""
-        parts = self._by_area(coplanar, faces)
-        least = MIN_PART * float(self.polygons.areas.sum())
-        kept: list[Plane] = []
-        for part in parts[:MAX_PLANES]:
-            if self.polygons.areas[part].sum() < least:
-                break
-            part = part[self.plane_of[part] < 0]
-            plane = self._fit(part) if len(part) else None
+    def planes(self) -> list[Plane]:
+        """Planes among faces that together are not flat: their largest flat pieces, with near faces around."""
+        areas = self.polygons.areas
+        is_joined = self.cosines > COPLANAR_COSINE
+        pieces = components(len(self.faces), *self.pairs[:, is_joined])
+        sizes = np.bincount(pieces, areas)
+        is_apart = sizes >= np.maximum(MIN_RATIO * self._largest_beside(pieces, sizes), MIN_APART * areas.sum())
+        is_large = is_apart | (sizes >= MIN_PART * areas.sum())
+        is_free, planes = np.ones(len(self.faces), bool), []
+        for piece in np.argsort(-sizes, kind="stable")[:MAX_PLANES]:
+            members = np.flatnonzero((pieces == piece) & is_free) if is_large[piece] else ()
+            plane = self.fit(members) if len(members) else None
             if plane is not None:
-                plane = self._grown(plane, faces)
-                self._add(plane)
-                kept.append(plane)
-        for plane in kept:
-            if self._is_beside_bent(plane, faces, coplanar):
-                self.plane_of[plane.faces] = -1
-                self.planes.remove(plane)
+                planes.append(self._grown(plane, is_free))
+                is_free[planes[-1].faces] = False
+        return [plane for plane in planes if not self._is_beside_bent(plane, is_free, pieces, sizes)]
 
-    def _grown(self, plane: Plane, faces: np.ndarray) -> Plane:
-        """The plane with the faces around it that lie within the tolerance."""
-        part = self.polygons.of_faces(faces)
-        distance = largest(np.abs((part.corners - plane.centre) @ plane.normal), part.starts)
-        is_near = (distance <= self.tolerance) & (self.normals[faces] @ plane.normal > FLATTENED_COSINE)
-        is_member = np.zeros(self.polygons.count, bool)
-        is_member[faces[is_near & (self.plane_of[faces] < 0)]] = True
+    def _largest_beside(self, pieces: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+        """Area of the largest piece beside each piece; infinite without any."""
+        largest_beside = np.zeros(len(sizes))
+        first, second = pieces[self.pairs]
+        is_across = first != second
+        for piece, beside in ((first, second), (second, first)):
+            np.maximum.at(largest_beside, piece[is_across], sizes[beside[is_across]])
+        return np.where(largest_beside > 0, largest_beside, np.inf)
+
+    def _grown(self, plane: Plane, is_free: np.ndarray) -> Plane:
+        """The plane with the free faces around it that lie within the tolerance."""
+        distance = largest(np.abs((self.polygons.corners - plane.centre) @ plane.normal), self.polygons.starts)
+        is_member = (distance <= self.tolerance) & (self.normals @ plane.normal > FLATTENED_COSINE) & is_free
         is_member[plane.faces] = True
-        is_joined = is_member[self.pairs[0]] & is_member[self.pairs[1]]
-        labels = components(self.polygons.count, self.pairs[0][is_joined], self.pairs[1][is_joined])
+        is_joined = is_member[self.pairs].all(axis=0)
+        labels = components(len(self.faces), *self.pairs[:, is_joined])
         grown = np.flatnonzero(is_member & (labels == labels[plane.faces[0]]))
         heights = (self.polygons.of_faces(grown).corners - plane.centre) @ plane.normal
         return Plane(grown, plane.centre, plane.normal, float(np.abs(heights).max()))
 
-    def _is_beside_bent(self, plane: Plane, faces: np.ndarray, coplanar: np.ndarray) -> bool:
-        """True if a smooth edge joins the plane to bent faces that are about as large."""
-        is_inside = np.zeros(self.polygons.count, bool)
+    def _is_beside_bent(self, plane: Plane, is_free: np.ndarray, pieces: np.ndarray, sizes: np.ndarray) -> bool:
+        """True if a smooth edge joins the plane to bent faces, those without a plane, that are about as large."""
+        is_inside = np.zeros(len(self.faces), bool)
         is_inside[plane.faces] = True
-        first, second = is_inside[self.pairs[0]], is_inside[self.pairs[1]]
-        across = (first != second) & (self.cosines > SMOOTH_COSINE)
-        outside = np.where(first, self.pairs[1], self.pairs[0])[across]
-        outside = outside[self.plane_of[outside] < 0]
-        if not len(outside):
-            return False
-        label = np.zeros(self.polygons.count, int)
-        label[faces] = np.unique(coplanar, return_inverse=True)[1]
-        areas = np.bincount(label[faces], self.polygons.areas[faces])
-        return self._area(plane) < MIN_RATIO * areas[label[outside]].max()
+        first, second = is_inside[self.pairs]
+        is_across = (first != second) & (self.cosines > SMOOTH_COSINE)
+        outside = np.where(first, self.pairs[1], self.pairs[0])[is_across]
+        outside = outside[is_free[outside]]
+        area = self.polygons.areas[plane.faces].sum()
+        return len(outside) > 0 and area < MIN_RATIO * sizes[pieces[outside]].max()

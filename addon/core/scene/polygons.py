@@ -10,6 +10,10 @@ import numpy as np
 # Distance of corners, over the diagonal of all, below which they are the same point.
 SAME_POINT = 1e-6
 
+# Number of faces after a face, in the order of their numbers, with which an edge pairs it. More find coplanar faces at
+# edges of more than nine faces.
+MAX_APART = 8
+
 # Largest coordinate, in scene units. Native code takes ten times as much (`max_coordinate` in triangle_set.cpp).
 MAX_COORDINATE = 1e17
 
@@ -95,13 +99,22 @@ class Polygons:
 
     @cached_property
     def shared_edges(self) -> tuple[np.ndarray, np.ndarray]:
-        """Pairs of corners, two arrays (P,), at which edges begin that two faces have in common."""
+        """Pairs of corners, two arrays (P,), at which edges begin that two faces have in common.
+
+        An edge of many faces gives pairs of each face and the `MAX_APART` after it.
+        """
         begin, end = self.points, self.points[self.next_corners]
         edges = np.minimum(begin, end) * (begin.max(initial=0) + 1) + np.maximum(begin, end)
         order = np.argsort(edges, kind="stable")
         order = order[(begin != end)[order]]
-        is_same = edges[order[1:]] == edges[order[:-1]]
-        return order[:-1][is_same], order[1:][is_same]
+        edges, first, second = edges[order], [], []
+        for apart in range(1, MAX_APART + 1):
+            is_same = edges[apart:] == edges[:-apart]
+            if not is_same.any():
+                break
+            first.append(order[:-apart][is_same])
+            second.append(order[apart:][is_same])
+        return tuple(np.concatenate([*pairs, np.zeros(0, int)]) for pairs in (first, second))
 
     @cached_property
     def next_corners(self) -> np.ndarray:

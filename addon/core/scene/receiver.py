@@ -72,12 +72,18 @@ class Receiver:
     def messages(self, name: str) -> list[Message]:
         """Messages about the texels of the object `name`."""
         coarser = max(chart.coarser for chart in self.charts)
-        if coarser <= MAX_COARSER:
-            return []
-        text = (
-            f"UV islands of '{name}' differ in scale: the finest is baked {coarser:.1f} times coarser than its texels."
-        )
-        return [note(name, text, "Unwrap the mesh at one density.")]
+        texels = max(chart.grid.clearance / min(chart.grid.pitch_x, chart.grid.pitch_y) for chart in self.charts)
+        messages = []
+        if coarser > MAX_COARSER:
+            text = (
+                f"UV islands of '{name}' differ in scale: the finest is baked {coarser:.1f} times coarser than its "
+                "texels."
+            )
+            messages.append(note(name, text, "Unwrap the mesh at one density."))
+        if texels > 1:
+            text = f"The faces of '{name}' depart from the planes that are baked by up to {texels:.1f} texels."
+            messages.append(note(name, text, "Their shadows may be off by as much."))
+        return messages
 
     def to_texture(self, values: Sequence[np.ndarray]) -> np.ndarray:
         """Texture, float32 (height, width, C), with the charts' grid values (grid height, grid width, C); 0 outside.
