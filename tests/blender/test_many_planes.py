@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import scenes
 from beamspread.blender.jobs.state import state
+from beamspread.blender.read import geometry
 from live_scenes import live_lines, live_pixels, switch_off
 from mathutils import Matrix
 
@@ -99,3 +100,20 @@ def test_a_ball_is_refused(box):
     scenes.select(ball)
     with pytest.raises(RuntimeError, match="not flat: they bend from one to the next"):
         bpy.ops.beamspread.bake()
+
+
+def test_faces_that_take_more_memory_than_allowed_are_refused_before(box, monkeypatch):
+    """Ten million quads would take 22 GB; here the machine is small instead."""
+    assert pytest.approx(22.4 * 2**30, rel=0.01) == geometry.BYTES_PER_CORNER * 4e7
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=100, y_subdivisions=100, location=(3, 0, 0))
+    grid = bpy.context.object
+    grid.data.materials.append(scenes.add_material("Fine"))
+    monkeypatch.setattr(geometry, "machine_bytes", lambda: 2**24)
+    read = []
+    polygons_of = geometry.polygons_of
+    monkeypatch.setattr(geometry, "polygons_of", lambda *arguments: read.append(1) or polygons_of(*arguments))
+    scenes.select(grid)
+    with pytest.raises(RuntimeError, match=r"The 10000 faces of 'Grid' take about 0\.0 GB of memory, and 0\.0 GB are"):
+        bpy.ops.beamspread.bake()
+    assert not read
+    assert scenes.bake(box)[0].max() > 0

@@ -14,7 +14,7 @@ from ...core.bake.estimate import OF_MESHES, OF_WORLD
 from ...core.bake.forecast import Finders, Forecast, seconds_of
 from ...core.bake.pace import Estimate
 from ...core.bake.spread import Spread, image_length
-from ...core.errors import MaterialError
+from ...core.errors import BakeError, MaterialError
 from ...core.scene.lights import Light, WorldLight
 from ...core.scene.receiver import Grid
 from ...core.target import Target
@@ -200,7 +200,10 @@ def _image_length(target: BakeTarget, depsgraph) -> float:
     evaluated = obj.evaluated_get(depsgraph)
 
     def read() -> float:
-        polygons = read_polygons(evaluated, target.material.name)
+        try:
+            polygons = read_polygons(evaluated, target.material.name)
+        except BakeError:
+            return 0.0  # the bake says why
         length = image_length([polygons]) if polygons.count else 0.0
         return length if math.isfinite(length) else 0.0
 

@@ -8,12 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...core.bake.job import machine_bytes
 from ...core.errors import ReceiverError
 from ...core.messages import Message, warning
 from ...core.scene.flat_mesh import finite_remedy
 from ...core.scene.islands import check_map
 from ...core.scene.occluders import Mesh, Occluder, is_within
 from ...core.scene.polygons import Polygons
+from ..preferences import memory_limit
 from .image_nodes import UVTransform
 from .reflection import MaterialReflection, MediumOf, reflection_of
 from .scene_cache import SceneCache
@@ -24,6 +26,9 @@ OWN_MAP = "Beamspread"
 
 INFINITE_MATRIX = "Its location, rotation or scale is infinite or not a number."
 MATRIX_REMEDY = "Clear it (Object > Clear), and check constraints and drivers."
+
+# Memory for each corner of a receiver's faces while they are unwrapped, the most that their planes and islands take.
+BYTES_PER_CORNER = 600
 
 # Scale along an axis, over the largest, that counts as zero: single precision can't tell its normals.
 NO_SCALE = 1e-12
@@ -217,9 +222,10 @@ def read_polygons(obj, material_name: str, matrix=None, uv_map: str = "") -> Pol
     Raises
     ------
     ReceiverError
-        The object has no UV map of that name.
+        The object has no UV map of that name, is at no finite position, or has more faces than fit into the memory.
     """
     matrix = obj.matrix_world if matrix is None else matrix
+    _check_memory(obj)
     mesh = obj.to_mesh()
     try:
         chosen = faces_with(obj, mesh, {material_name})
@@ -234,6 +240,19 @@ def read_polygons(obj, material_name: str, matrix=None, uv_map: str = "") -> Pol
         return again if _fits(again) else polygons
     finally:
         obj.to_mesh_clear()
+
+
+def _check_memory(obj) -> None:
+    """Raise ReceiverError if the faces of a mesh object would take more memory than the limit, or than there is."""
+    count, limit = len(obj.data.loops), memory_limit() or machine_bytes()
+    needed = BYTES_PER_CORNER * count
+    if limit and needed > limit:
+        text = (
+            f"The {len(obj.data.polygons)} faces of '{obj.name}' take about {needed / 2**30:.1f} GB of memory, and "
+            f"{limit / 2**30:.1f} GB are allowed."
+        )
+        remedy = "Simplify the mesh (modifier Decimate), or raise the memory limit in the add-on's preferences."
+        raise ReceiverError(text, remedy)
 
 
 def _uvs_by_name(obj, mesh, name: str) -> np.ndarray:

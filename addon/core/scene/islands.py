@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import ReceiverError
 from ..native import native
+from .ears import triangulated
 from .planes import FLATNESS_TOLERANCE, Plane
 from .polygons import Polygons, components
 
@@ -105,10 +106,18 @@ def _of_triangles(piece: Polygons, plane: Plane, tolerance: float) -> list[Islan
         if island is not None:
             islands.append(island)
             continue
-        triangles = face.triangles()
-        parts = _pieces(triangles, np.arange(triangles.count))
-        islands += filter(None, (_fit(triangle, plane, np.inf) for triangle in parts if triangle.areas.any()))
+        islands += filter(None, (_fit(triangle, plane, np.inf) for triangle in _triangles(face, plane)))
     return _joined(islands)
+
+
+def _triangles(face: Polygons, plane: Plane) -> list[Polygons]:
+    """Triangles with an area of a face on a plane."""
+    x_axis = np.cross(plane.normal, np.eye(3)[np.abs(plane.normal).argmin()])
+    flat = face.corners @ np.stack([x_axis, np.cross(plane.normal, x_axis)], axis=1)
+    corners = triangulated(flat - flat[0])
+    starts, normals = np.arange(0, corners.size + 1, 3), np.repeat(face.normals, len(corners), axis=0)
+    triangles = Polygons(face.corners[corners.ravel()], face.uvs[corners.ravel()], starts, normals)
+    return [triangle for triangle in _pieces(triangles, np.arange(triangles.count)) if triangle.areas.any()]
 
 
 def _joined(islands: Sequence[Island]) -> list[Island]:

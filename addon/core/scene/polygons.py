@@ -146,16 +146,6 @@ class Polygons:
         listed = " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
         return f"face{'s' if len(numbers) > 1 else ''} {listed}"
 
-    def triangles(self) -> Polygons:
-        """The same faces as triangles around their first corners."""
-        counts = np.maximum(self.sizes - 2, 0)
-        faces = np.repeat(np.arange(self.count), counts)
-        first = self.starts[:-1][faces]
-        step = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-        corners = np.stack([first, first + step + 1, first + step + 2], axis=1).ravel()
-        uvs = None if self.uvs is None else self.uvs[corners]
-        return Polygons(self.corners[corners], uvs, np.arange(0, len(corners) + 1, 3), self.normals[faces])
-
 
 def sums(values: np.ndarray, starts: np.ndarray) -> np.ndarray:
     """Sum of the values (K,) of each run that begins at starts[:-1]; 0 for an empty one."""

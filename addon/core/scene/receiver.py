@@ -27,8 +27,9 @@ MAX_FINER = 4.0
 # Factor of a grid's texels over the finest of its islands above which a bake says so.
 MAX_COARSER = 1.1
 
-# Coverage by several charts, and fraction of the texels, above which the UV map overlaps.
-MAX_COVERAGE, MAX_OVERLAP = 1.5, 1e-3
+# Coverage by several charts, and fraction of the texels, above which the UV map overlaps. `check_map` accepts none that
+# comes near it.
+MAX_COVERAGE, MAX_OVERLAP = 1.5, 0.03
 
 
 @dataclass(frozen=True, eq=False)

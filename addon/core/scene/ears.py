@@ -1,0 +1,45 @@
+"""Triangles of a polygon, which may have notches, by clipping ears (Meisters 1975, doi:10.2307/2319703)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+# Number of corners above which a polygon with notches becomes a fan. Time is in proportion to its cube at worst.
+MAX_CORNERS = 1000
+
+
+def triangulated(points: np.ndarray) -> np.ndarray:
+    """Corners of the triangles, int (N - 2 or fewer, 3), of a simple polygon (N, 2)."""
+    count = len(points)
+    fan = np.column_stack([np.zeros(count - 2, int), np.arange(1, count - 1), np.arange(2, count)])
+    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
+    turns = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    x, y = (points - points[0]).T
+    sign = np.sign(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+    if count > MAX_CORNERS or not (sign * turns < 0).any():
+        return fan
+    points, left, triangles = points * [1, sign], list(range(count)), []
+    while len(left) > 3:
+        ear = next((place for place in range(len(left)) if _is_ear(points, left, place)), None)
+        if ear is None:  # the polygon crosses itself
+            break
+        triangles.append((left[ear - 1], left[ear], left[(ear + 1) % len(left)]))
+        del left[ear]
+    rest = [(left[0], left[place], left[place + 1]) for place in range(1, len(left) - 1)]
+    return np.array(triangles + rest)
+
+
+def _is_ear(points: np.ndarray, left: list[int], place: int) -> bool:
+    """True if the triangle of a corner of the rest of a polygon, anticlockwise, and its neighbors is inside of it."""
+    a, b, c = points[left[place - 1]], points[left[place]], points[left[(place + 1) % len(left)]]
+    if _side(a, b, c) <= 0:
+        return False
+    rest = points[left]
+    is_inside = (_side(a, b, rest) >= 0) & (_side(b, c, rest) >= 0) & (_side(c, a, rest) >= 0)
+    is_corner = (rest == a).all(axis=1) | (rest == b).all(axis=1) | (rest == c).all(axis=1)
+    return not (is_inside & ~is_corner).any()
+
+
+def _side(a: np.ndarray, b: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Twice the signed area of a triangle: positive to the left of the line from a to b."""
+    return (b[0] - a[0]) * (point[..., 1] - a[1]) - (b[1] - a[1]) * (point[..., 0] - a[0])
