@@ -174,6 +174,12 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         description="Name of new images and their files. {object} and {material} are replaced by the names of both",
         default="{object}_{material}",
     )
+    use_udim: BoolProperty(
+        name="UDIM Tiles",
+        description="Give new images a tile for each unit square of the UV map that an object uses, in files "
+        "NAME.<UDIM>.exr. Else an object whose UVs leave the image gets a UV map of its own",
+        default=False,
+    )
     use_view_transform: BoolProperty(
         name="View Transform",
         description="Give PNG files the view transform, exposure and look of Color Management, as in a render",

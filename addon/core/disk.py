@@ -45,19 +45,32 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     OSError
         The file cannot be written completely.
     """
-    target = Path(path).resolve()
-    _remove_leftovers(target.parent)
-    temporary = target.with_name(f"{target.stem}.beamspread-{uuid.uuid4().hex[:8]}.tmp{target.suffix}")
-    lock = _create_locked(temporary)
-    try:
+    with whole_files([path]) as (temporary,):
         yield temporary
-        _flush(temporary)
-        if target.exists():
-            shutil.copymode(target, temporary)
-        temporary.replace(target)
+
+
+@contextmanager
+def whole_files(paths: Iterable[str | Path]) -> Iterator[list[Path]]:
+    """`whole_file` for several files. No file is replaced before all are written."""
+    targets = [Path(path).resolve() for path in paths]
+    temporaries: list[Path] = []
+    locks: list[int | None] = []
+    try:
+        for target in targets:
+            _remove_leftovers(target.parent)
+            temporaries.append(target.with_name(f"{target.stem}.beamspread-{uuid.uuid4().hex[:8]}.tmp{target.suffix}"))
+            locks.append(_create_locked(temporaries[-1]))
+        yield temporaries
+        for target, temporary in zip(targets, temporaries):
+            _flush(temporary)
+            if target.exists():
+                shutil.copymode(target, temporary)
+        for target, temporary in zip(targets, temporaries):
+            temporary.replace(target)
     finally:
-        temporary.unlink(missing_ok=True)
-        if lock is not None:
+        for temporary in temporaries:
+            temporary.unlink(missing_ok=True)
+        for lock in filter(lambda lock: lock is not None, locks):
             os.close(lock)
 
 

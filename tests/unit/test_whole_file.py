@@ -129,3 +129,18 @@ def test_systems_without_file_locks_write_as_well(tmp_path, monkeypatch):
     write(tmp_path / "light.exr")
     assert (tmp_path / "light.exr").read_text() == "whole"
     assert leftover.exists()
+
+
+def test_several_files_are_replaced_together(tmp_path):
+    """Nothing is written to the second file, which is an error: the first one keeps its content, too."""
+    paths = [tmp_path / "first.exr", tmp_path / "second.exr"]
+    for path in paths:
+        path.write_text("old")
+    with pytest.raises(OSError, match="nothing was written"), module.whole_files(paths) as temporaries:
+        temporaries[0].write_text("new")
+    assert [path.read_text() for path in paths] == ["old", "old"]
+    with module.whole_files(paths) as temporaries:
+        for temporary in temporaries:
+            temporary.write_text("new")
+    assert [path.read_text() for path in paths] == ["new", "new"]
+    assert sorted(tmp_path.iterdir()) == paths

@@ -36,10 +36,25 @@ def colors(request, scene, _progress) -> dict:
     baker = Baker(scene, obj, image, "EMIT")
     layers = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.uv_layers
     uv_map = request["uv_map"] or next(layer.name for layer in layers if layer.active_render)
+    if any(request["tile"]):
+        uv_map = moved_map(obj.data, uv_map, request["tile"])
     baker.options |= {"use_clear": False, "uv_layer": uv_map}
     fine = baker.bake_passes(set()).reshape(height, side, width, side, 3)
     total, count = np.nan_to_num(fine, nan=0.0).sum(axis=(1, 3)), np.isfinite(fine).sum(axis=(1, 3))
     return {"colors": np.where(count > 0, total / np.maximum(count, 1), np.nan).astype(np.float32)}
+
+
+def moved_map(mesh, name: str, corner) -> str:
+    """Name of a copy of a UV map, in which the UDIM tile with this corner lies from 0 to 1."""
+    layer = mesh.uv_layers.new(name="Tile", do_init=False)
+    if layer is None:
+        raise RuntimeError("the mesh has as many UV maps as it can have")
+    uvs = np.empty(2 * len(mesh.loops), np.float32)
+    mesh.uv_layers[name].data.foreach_get("uv", uvs)
+    layer.data.foreach_set("uv", (uvs.reshape(-1, 2) - np.float32(corner)).ravel())
+    mesh.update()
+    bpy.context.view_layer.update()
+    return layer.name
 
 
 def show_as_emission(tree, source, image) -> None:

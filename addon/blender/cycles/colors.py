@@ -15,6 +15,7 @@ from ...core.messages import warning
 from ...core.progress import Callback, Progress
 from ...core.scene.receiver import Receiver
 from ...core.scene.texture import BaseColor
+from ...core.scene.tiles import Place
 from ...core.target import Target
 from .process import run
 from .scene_copy import CopyForCycles
@@ -100,17 +101,24 @@ def colors_by_cycles(
     Cancelled
         `progress` returned False.
     """
-    request = {
-        "object": target.object_name,
-        "matrix": matrix,
-        "material": target.material_name,
-        "texture": copy.textures[target.material_name],
-        "width": receiver.width,
-        "height": receiver.height,
-        "uv_map": receiver.uv_map,
-        **_samples(receiver.width, receiver.height),
-    }
-    colors = run(copy.scene, "colors", request, progress, "Evaluating the base color")["colors"]
+    colors = np.full((receiver.height, receiver.width, 3), np.nan, np.float32)
+    places = [Place(0, 0, receiver.width, receiver.height)]
+    if receiver.tiling is not None:
+        places = list(receiver.tiling.places.values())
+    for place, part in zip(places, Progress.of(progress).split([place.width * place.height for place in places])):
+        request = {
+            "object": target.object_name,
+            "matrix": matrix,
+            "material": target.material_name,
+            "texture": copy.textures[target.material_name],
+            "width": place.width,
+            "height": place.height,
+            "tile": (place.u, place.v),
+            "uv_map": receiver.uv_map,
+            **_samples(place.width, place.height),
+        }
+        result = run(copy.scene, "colors", request, part, "Evaluating the base color")["colors"]
+        colors[place.row : place.row + place.height, : place.width] = result
     known = np.isfinite(colors).all(axis=2)
     if not known.any():
         raise BakeError("Cycles found no texel on the mesh.")

@@ -181,7 +181,7 @@ def _all_targets() -> list[BakeTarget]:
 
 def file_of(image) -> Path | None:
     """Absolute path of the image's file, None if its pixels live in the .blend file."""
-    if image.source == "GENERATED" or image.packed_file is not None:
+    if image.source == "GENERATED" or image.packed_file is not None or not image.filepath:
         return None
     return Path(os.path.normpath(bpy.path.abspath(image.filepath, library=image.library)))
 

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-from ...core.disk import is_half, text_of, whole_file
+from ...core.disk import is_half, text_of, whole_files
 from ...core.errors import ImageError
 from ...core.native import native
 from .. import compat
 from ..read.image_nodes import from_srgb
 from . import icons, undo
 from .facts import facts_of, file_of
+from .udim import check_tiles, files_of, is_tiled
 
 EXTENSIONS = {"EXR": ".exr", "PNG": ".png"}
 """Extensions of the formats that bakes are written in."""
@@ -31,16 +32,23 @@ MADE_FOR = "beamspread:madeFor"
 def check_image(image) -> None:
     """Raise ImageError with one sentence if a bake could not be stored in the image."""
     name = f"The image '{image.name}'"
-    if image.source == "TILED":
-        raise ImageError(f"{name} has UDIM tiles, which cannot be baked yet.", "Choose a single image in the node.")
     if image.source == "SEQUENCE" and facts_of(image).frames:
         raise ImageError(
             f"{name} holds the frames of a batch.", "Use Show Single Images (Render > Beamspread > Animation) first."
         )
-    if image.source not in {"FILE", "GENERATED"}:
+    if image.source not in {"FILE", "GENERATED", "TILED"}:
         raise ImageError(f"{name} is a sequence, movie or viewer.", "Choose a single image in the node.")
     if image.library is not None:
         raise ImageError(f"{name} belongs to another .blend file.", "Make it local, or choose another in the node.")
+    if is_tiled(image):
+        check_tiles(image)
+        paths = files_of(image)
+        protected = [file for file in (*paths, *(path.parent for path in paths[:1])) if file.exists()]
+        protected = [file for file in protected if is_read_only(file)]
+        if protected:
+            text = f"{name} cannot be saved because {protected[0]} is read-only."
+            raise ImageError(text, "Allow writing, or choose another.")
+        return
     path = file_of(image)
     if path is not None:
         if not path.is_file():
@@ -134,6 +142,18 @@ def is_read_only(path: Path) -> bool:
     return not os.access(path, os.W_OK) or not path.stat().st_mode & 0o222
 
 
+def check_writable(paths: Iterable[Path]) -> None:
+    """Make the folder of files; raises ImageError if they can't be written."""
+    for path in paths:
+        make_folder(path.parent)
+        protected = next((part for part in (path, path.parent) if part.exists() and is_read_only(part)), None)
+        if protected is not None:
+            raise ImageError(
+                f"The output cannot be written because {protected} is read-only.",
+                "Allow writing, or choose another folder.",
+            )
+
+
 def write_file(
     path: Path, texture: np.ndarray, file_format: str, attributes: dict[str, str] | None = None, view_of=None
 ) -> None:
@@ -141,13 +161,7 @@ def write_file(
 
     `view_of` is the scene whose view transform a PNG gets, None for plain sRGB.
     """
-    make_folder(path.parent)
-    protected = next((part for part in (path, path.parent) if part.exists() and is_read_only(part)), None)
-    if protected is not None:
-        raise ImageError(
-            f"The output cannot be written because {protected} is read-only.",
-            "Allow writing, or choose another folder.",
-        )
+    check_writable([path])
     if file_format == "EXR":
         write_exr(path, texture, attributes)
     else:
@@ -170,13 +184,24 @@ def write_exr(
     The file keeps its `MADE_FOR` attribute. It has 16 bits if the file `like`, by default the old file, has 16 bits and
     the values fit.
     """
+    with _whole_images([path]) as (temporary,):
+        _write_exr(temporary, texture, attributes, path, like or path)
+
+
+def write_exrs(textures: Mapping[Path, np.ndarray], attributes: dict[str, str] | None = None) -> None:
+    """`write_exr` for several files. No file is replaced before all are written."""
+    with _whole_images(textures) as temporaries:
+        for temporary, (path, texture) in zip(temporaries, textures.items()):
+            _write_exr(temporary, texture, attributes, path, path)
+
+
+def _write_exr(temporary: Path, texture: np.ndarray, attributes: dict[str, str] | None, path: Path, like: Path) -> None:
     texture = np.ascontiguousarray(texture, np.float32)
-    half = is_half(like or path) and np.abs(texture).max() <= np.finfo(np.float16).max
+    half = is_half(like) and np.abs(texture).max() <= np.finfo(np.float16).max
     owner = {MADE_FOR: made_for(path)} if made_for(path) else {}
-    with _whole_image(path) as temporary:
-        native.write_exr(
-            str(temporary), texture, ["R", "G", "B"], owner | (attributes or {}), compression="none", half=bool(half)
-        )
+    native.write_exr(
+        str(temporary), texture, ["R", "G", "B"], owner | (attributes or {}), compression="none", half=bool(half)
+    )
 
 
 def made_for(path: Path) -> str:
@@ -227,6 +252,16 @@ def size_of(path: Path) -> tuple[int, int] | None:
         bpy.data.images.remove(image)
 
 
+def write_like(path: Path, texture: np.ndarray, like) -> None:
+    """Replace the linear RGB (height, width, 3) of a file in its format, with the color space of the image `like`."""
+    image = bpy.data.images.load(str(path))
+    try:
+        image.colorspace_settings.name = like.colorspace_settings.name
+        _write_like(image, to_srgb(texture) if _is_encoded(image) else texture, path)
+    finally:
+        bpy.data.images.remove(image)
+
+
 def _write_like(image, encoded: np.ndarray, path: Path) -> None:
     """Write pixels to a file of the image's own format."""
     copy = image.copy()
@@ -253,11 +288,20 @@ def _check_written(path: Path, size: tuple[int, int]) -> None:
 @contextmanager
 def _whole_image(path: Path) -> Iterator[Path]:
     """Like `whole_file`, but an ImageError names the file that can't be written."""
+    with _whole_images([path]) as (temporary,):
+        yield temporary
+
+
+@contextmanager
+def _whole_images(paths: Collection[Path]) -> Iterator[list[Path]]:
+    """Like `whole_files`, but an ImageError names the files that can't be written."""
+    names = ", ".join(map(str, paths))
     try:
-        with whole_file(path) as temporary:
-            yield temporary
+        with whole_files(paths) as temporaries:
+            yield temporaries
     except (OSError, RuntimeError) as error:
-        raise ImageError(f"The file {path} cannot be written and stays as it was: {_reason(error)}.") from error
+        files, stay = ("files", "stay as they were") if len(paths) > 1 else ("file", "stays as it was")
+        raise ImageError(f"The {files} {names} cannot be written and {stay}: {_reason(error)}.") from error
 
 
 def _reason(error: Exception) -> str:

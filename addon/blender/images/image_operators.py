@@ -6,6 +6,7 @@ The frames are shown as an image sequence, which follows the scene's frame.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,6 +28,7 @@ from . import files, icons
 from .facts import Frames, facts_of, is_sequence, set_facts
 from .new_image import store_new
 from .outputs import Outputs
+from .udim import is_tiled
 
 
 def image_in(context):
@@ -37,9 +39,9 @@ def image_in(context):
     return None if node is None or material.library is not None else node.image
 
 
-def wanted_size(image, resolution: int) -> tuple[int, int]:
+def wanted_size(size: Sequence[int], resolution: int) -> tuple[int, int]:
     """Size of an image of the same shape with `resolution` texels along its longer side."""
-    return tuple(max(1, round(resolution * side / max(image.size))) for side in image.size)
+    return tuple(max(1, round(resolution * side / max(size))) for side in size)
 
 
 class ImageOperator:
@@ -50,7 +52,7 @@ class ImageOperator:
     @classmethod
     def poll(cls, context):
         image = image_in(context)
-        if image is None:
+        if image is None or is_tiled(image):
             return False
         return 0 not in image.size and image.library is None and cls.needed(context, image)
 
@@ -95,11 +97,11 @@ class BEAMSPREAD_OT_resize_image(ImageOperator, bpy.types.Operator):
     @classmethod
     def needed(cls, context, image) -> bool:
         settings = context.scene.beamspread
-        return settings.use_size or tuple(image.size) != wanted_size(image, settings.resolution)
+        return settings.use_size or tuple(image.size) != wanted_size(image.size, settings.resolution)
 
     def execute(self, context):
         image = image_in(context)
-        icons.scale(image, *wanted_size(image, self.side or context.scene.beamspread.resolution))
+        icons.scale(image, *wanted_size(image.size, self.side or context.scene.beamspread.resolution))
         image.update_tag()  # Blender sends no update for a new size
         return {"FINISHED"}
 

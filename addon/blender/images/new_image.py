@@ -39,8 +39,12 @@ def store_new(name: str, texture: np.ndarray, bake: Bake, is_data: bool = False)
 
 def uses_files() -> bool:
     """True if new images go to files. A folder beside a scene that was never saved does not exist."""
-    settings = bpy.context.scene.beamspread
-    return settings.image_storage == "FILES" and bool(bpy.data.filepath or not settings.image_dir.startswith("//"))
+    return bpy.context.scene.beamspread.image_storage == "FILES" and has_folder()
+
+
+def has_folder() -> bool:
+    """True if there is a folder for files of new images."""
+    return bool(bpy.data.filepath or not bpy.context.scene.beamspread.image_dir.startswith("//"))
 
 
 def _in_file(name: str, texture: np.ndarray, is_data: bool) -> tuple[str, bpy.types.Image]:
@@ -49,9 +53,9 @@ def _in_file(name: str, texture: np.ndarray, is_data: bool) -> tuple[str, bpy.ty
     for unused in [image for image in bpy.data.images if files.file_of(image) == path]:
         icons.remove(unused)
     image = bpy.data.images.load(str(path))
-    image.name = _free_name(name)
+    image.name = free_name(name)
     image.colorspace_settings.is_data = is_data
-    _point_to(image, path)
+    point_to(image, path)
     undo.stamp(image)
     return str(path), image
 
@@ -71,7 +75,7 @@ def separate_from_other_scene(image) -> tuple[Message, ...]:
     new_path, made_for = _new_file(image.name)
     files.make_folder(new_path.parent)
     files.write_exr(new_path, files.linear_pixels(image), {files.MADE_FOR: made_for}, like=path)
-    _point_to(image, new_path)
+    point_to(image, new_path)
     icons.reload(image)
     text = f"'{path.name}' belongs to '{owner.name}': the image '{image.name}' now has the file '{new_path.name}'."
     return (warning(image.name, text),)
@@ -85,6 +89,12 @@ def _scene_of(path: Path) -> Path | None:
 
 def _new_file(name: str) -> tuple[Path, str]:
     """Path of a file for a new image in the scene's folder, and the file's `MADE_FOR` attribute."""
+    folder, made_for = made_for_scene(name)
+    return _free_path(folder, stem([name]), made_for), made_for
+
+
+def made_for_scene(name: str) -> tuple[Path, str]:
+    """Folder of the files of new images, and the `MADE_FOR` attribute of such a file."""
     folder = Path(bpy.path.abspath(bpy.context.scene.beamspread.image_dir)).absolute()
     scene = bpy.data.filepath
     if scene:
@@ -92,11 +102,11 @@ def _new_file(name: str) -> tuple[Path, str]:
             scene = Path(os.path.relpath(scene, folder)).as_posix()
         except ValueError:  # the folder is on another drive
             scene = Path(scene).as_posix()
-    made_for = f"{scene}: {name}"
-    return _free_path(folder, stem([name]), made_for), made_for
+    return folder, f"{scene}: {name}"
 
 
-def _point_to(image, path: Path) -> None:
+def point_to(image, path: Path) -> None:
+    """Set the path of an image's file, relative to the .blend file if there is one."""
     image.filepath = bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
 
 
@@ -112,7 +122,7 @@ def _free_path(folder: Path, plain: str, made_for: str) -> Path:
     return next(path for path in free if not path.exists() or files.made_for(path) == made_for)
 
 
-def _free_name(name: str) -> str:
+def free_name(name: str) -> str:
     """First free name, numbered as by Blender. If a name is taken, Blender 3.4 would rename the image that has it."""
     numbered = (f"{name}.{number:03d}" for number in itertools.count(1))
     return next(free for free in itertools.chain([name], numbered) if free not in bpy.data.images)

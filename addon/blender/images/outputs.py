@@ -12,11 +12,13 @@ from ...core.bake.runner import Bake
 from ...core.batch.batch_options import BatchOptions
 from ...core.disk import file_stems
 from ...core.errors import ImageError
+from ...core.scene.tiles import Tiling
 from ...core.target import Target
 from ..node.find import find_targets, image_of
 from ..read.visibility import with_instanced
-from . import files
+from . import files, tiled
 from .results import Results
+from .udim import TOKEN, is_tiled, tile_sizes
 
 
 class Outputs:
@@ -31,8 +33,8 @@ class Outputs:
     def write(self, bake: Bake, frame: int, attributes: dict[str, str]) -> str:
         """Write the result of a bake; EXR files of frames get the attributes. The path of the file."""
         layer, texture = bake.job.settings.layer, bake.texture
-        image = self.own_image(bake.target, layer)
-        if image is not None and tuple(image.size) == texture.shape[1::-1]:
+        image, tiling = self.own_image(bake.target, layer), bake.job.receiver.tiling
+        if image is not None and _has_size(image, texture.shape[1::-1], tiling):
             filled = self._results.fill_shown(image, bake, texture)
             if filled is not None:
                 return filled
@@ -40,7 +42,11 @@ class Outputs:
             bake.warn(image.name, text)
         path = self.path(bake.target, layer, frame)
         frame_attributes = attributes if self._options.frames else None
-        files.write_file(path, texture, _format_of(path), frame_attributes, view_of=self._view_of)
+        if tiling is None:
+            files.write_file(path, texture, _format_of(path), frame_attributes, view_of=self._view_of)
+        else:
+            path = path.with_name(f"{path.stem}.{TOKEN}{path.suffix}")
+            tiled.write_tiles(path, texture, tiling, frame_attributes, self._view_of)
         if path.suffix == files.EXTENSIONS["PNG"] and texture.max() > 1 and self._view_of is None:
             bake.warn(path.name, f"'{path.name}' clips values above 1.", "EXR keeps them.")
         return str(path)
@@ -63,10 +69,17 @@ class Outputs:
         if options.output is not None or options.frames is not None or layer != COMBINED:
             return None
         image = image_of(target)
-        path = None if image is None or image.source != "FILE" else files.file_of(image)
+        path = None if image is None or image.source not in ("FILE", "TILED") else files.file_of(image)
         if path is None or options.format not in (None, _format_of(path)):
             return None
         return image
+
+
+def _has_size(image, size: tuple[int, int], tiling: Tiling | None) -> bool:
+    """True if an image has the size of a texture, or its tiles have those of the texture's tiles."""
+    if tiling is None or not is_tiled(image):
+        return tiling is None and not is_tiled(image) and tuple(image.size) == size
+    return tile_sizes(image).items() >= tiling.sizes.items()
 
 
 def _names(target: Target, layer: str) -> tuple[str, ...]:

@@ -11,14 +11,16 @@ from ...core.bake.bake_settings import COMBINED
 from ...core.bake.runner import Bake
 from ...core.errors import BakeError
 from ...core.messages import note
+from ...core.scene.tiles import Tiling
 from ...core.target import Target
-from ..node.find import find_node, node_of
+from ..node.find import find_node, node_of, uses_tiles
 from ..node.node import link_result
 from ..read.geometry import read_polygons
-from . import files, icons
+from . import files, icons, tiled
 from .facts import note_bake, owners_of, users_of, users_of_material
 from .new_image import name_for, separate_from_other_scene, store_new
-from .shared import Parts, overlaps, parts_of, read_parts, texels_of
+from .shared import Parts, Size, overlaps, parts_of, read_parts, texels_of
+from .udim import is_tiled
 
 
 class Results:
@@ -42,10 +44,13 @@ class Results:
         """Reserve the bake's part of an image; raises BakeError if it belongs to another target of the material."""
         if image is not None:
             files.check_image(image)
+            if is_tiled(image) and files.file_of(image) is None:
+                tiled.check_folder()
             self._check_room(image, bake)
             self._planned.setdefault(image.name, []).append(bake.target)
-            receiver = bake.job.receiver
-            self._parts[bake.target, receiver.width, receiver.height] = parts_of(receiver)
+            self._parts[bake.target, _size_in(image, bake)] = parts_of(bake.job.receiver)
+        elif bake.job.receiver.tiling is not None:
+            tiled.check_folder()
 
     def store(self, bake: Bake) -> str:
         """Fill the image of the target's node, or a new one, and show it; other layers have images of their own.
@@ -77,13 +82,14 @@ class Results:
         neighbors = self._neighbors(image, bake, users_of(shown or image))
         if neighbors:
             filled = texels_of(bake.target, bake.job.receiver, neighbors, bake.job.settings.margin)
-            texture = np.where(filled[..., None], texture, files.linear_pixels(image))
-        return files.fill_image(image, texture)
+            texture = np.where(filled[..., None], texture, _pixels_of(image, bake))
+        tiling = bake.job.receiver.tiling
+        return files.fill_image(image, texture) if tiling is None else tiled.fill(image, texture, tiling)
 
     def fill_shown(self, image, bake: Bake, texture: np.ndarray) -> str | None:
         """Fill the bake's part of its node's image and record its owner; None if the part belongs to another."""
         size = texture.shape[1::-1]
-        if tuple(image.size) != size and 0 not in image.size:
+        if bake.job.receiver.tiling is None and tuple(image.size) != size and 0 not in image.size:
             icons.scale(image, *size)
             bake.warn(
                 image.name, f"The image '{image.name}' was resized during the bake. It has its former size again."
@@ -115,11 +121,11 @@ class Results:
     def _new(self, bake: Bake, texture: np.ndarray) -> tuple[str, bpy.types.Image]:
         """Store the bake in a new image; texels of objects with the same material, which will share it, stay empty."""
         users = users_of_material(bake.target.material_name)
-        neighbors = self._parts_beside(bake, users, texture.shape[1::-1])
+        neighbors = self._parts_beside(bake, users, bake.job.receiver.tiling or texture.shape[1::-1])
         if neighbors:
             filled = texels_of(bake.target, bake.job.receiver, neighbors, bake.job.settings.margin)
             texture = np.where(filled[..., None], texture, np.float32(0))
-        path, image = store_new(name_for(bake.target), texture, bake)
+        path, image = _store_new(name_for(bake.target), texture, bake)
         note_bake(image, bake.target)
         return path, image
 
@@ -142,8 +148,8 @@ class Results:
         for name in [*names, f"{name_for(bake.target)} {layer}"]:
             image, size = bpy.data.images.get(name), texture.shape[1::-1]
             if image is None:
-                return store_new(name, texture, bake, is_data=True)[0]
-            if tuple(image.size) != size and 0 not in image.size:
+                return _store_new(name, texture, bake, is_data=True)[0]
+            if bake.job.receiver.tiling is None and tuple(image.size) != size and 0 not in image.size:
                 icons.scale(image, *size)
             path = self.fill(image, bake, texture, node.image)
             if path is not None:
@@ -170,7 +176,7 @@ class Results:
         ]
 
     def _covers(self, owner: Target, image, bake: Bake) -> bool:
-        return overlaps(bake.job.receiver, self._parts_of(owner, tuple(image.size)))
+        return overlaps(bake.job.receiver, self._parts_of(owner, _size_in(image, bake)))
 
     def _overlapping(self, image, bake: Bake, shown=None) -> list[Target]:
         """Owners of an image whose parts of it the bake overlaps; `shown` as for `fill`."""
@@ -179,26 +185,31 @@ class Results:
     def _neighbors(self, image, bake: Bake, users: list[Target]) -> dict[Target, Parts]:
         """Parts of an image that other targets fill, or will fill. A note names those that the bake overlaps."""
         owners = self._other_owners(image, bake)
-        neighbors = self._parts_beside(bake, [*owners, *users], tuple(image.size))
+        size = _size_in(image, bake)
+        neighbors = self._parts_beside(bake, [*owners, *users], size)
         if bake.target.object_name in bpy.data.objects:  # it may have been renamed, and be a user itself
             for user in [user for user in users if user not in (*owners, *neighbors, bake.target)]:
-                if self._known_parts(user, tuple(image.size)) is not None:
+                if self._known_parts(user, size):
                     text = f"'{bake.target}' and '{user}' overlap in the image '{image.name}'."
                     bake.messages.add(note(image.name, text, "To share it, move the UVs of one of them."))
         return neighbors
 
-    def _parts_beside(self, bake: Bake, targets: Iterable[Target], size: tuple[int, int]) -> dict[Target, Parts]:
+    def _parts_beside(self, bake: Bake, targets: Iterable[Target], size: Size) -> dict[Target, Parts]:
         """Parts of other targets in a texture, without those of targets that can't be baked, or that overlap."""
         known = {target: self._known_parts(target, size) for target in targets if target != bake.target}
         return {target: parts for target, parts in known.items() if parts and not overlaps(bake.job.receiver, parts)}
 
-    def _parts_of(self, target: Target, size: tuple[int, int]) -> Parts:
+    def _parts_of(self, target: Target, size: Size) -> Parts:
         """The target's islands in a texture; the whole texture if they are unknown."""
-        return self._known_parts(target, size) or ((0, 0, np.ones(size[::-1], np.float32)),)
+        parts = self._known_parts(target, size)
+        if parts is None:
+            width, height = size.size if isinstance(size, Tiling) else size
+            return ((0, 0, np.ones((height, width), np.float32)),)
+        return parts
 
-    def _known_parts(self, target: Target, size: tuple[int, int]) -> Parts | None:
+    def _known_parts(self, target: Target, size: Size) -> Parts | None:
         """The target's islands in a texture; None if it can't be baked."""
-        key = target, *size
+        key = target, size
         if key not in self._parts:
             self._parts[key] = read_parts(*key)
         return self._parts[key]
@@ -206,7 +217,7 @@ class Results:
     def _check_room(self, image, bake: Bake) -> None:
         """Raise BakeError if the part belongs to a target of the same material, which can't have two images."""
         receiver, target = bake.job.receiver, bake.target
-        if receiver.coverage.shape != tuple(image.size)[::-1]:
+        if receiver.tiling is None and receiver.coverage.shape != tuple(image.size)[::-1]:
             return
         for owner in self._other_owners(image, bake):
             if owner.material_name == target.material_name and self._covers(owner, image, bake):
@@ -216,6 +227,21 @@ class Results:
                     f"Give '{target.object_name}' a material of its own (Object > Relations > Make Single User > "
                     "Materials), or move its UVs.",
                 )
+
+
+def _size_in(image, bake: Bake) -> Size:
+    """Size of the texture that a bake fills in an image, or the tiles in it."""
+    return bake.job.receiver.tiling or tuple(image.size)
+
+
+def _pixels_of(image, bake: Bake) -> np.ndarray:
+    tiling = bake.job.receiver.tiling
+    return files.linear_pixels(image) if tiling is None else tiled.linear_pixels(image, tiling)
+
+
+def _store_new(name: str, texture: np.ndarray, bake: Bake, is_data: bool = False) -> tuple[str, bpy.types.Image]:
+    store = store_new if bake.job.receiver.tiling is None else tiled.store_new
+    return store(name, texture, bake, is_data)
 
 
 def _node(target: Target, layer: str):
@@ -244,8 +270,9 @@ def _map_of(target: Target) -> str | None:
     obj = bpy.data.objects.get(target.object_name)
     if obj is None:
         return None
-    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    evaluated, node = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()), node_of(target)
+    in_tiles = node is not None and uses_tiles(node)
     try:
-        return read_polygons(evaluated, target.material_name, None, getattr(node_of(target), "uv_map", "")).uv_map
+        return read_polygons(evaluated, target.material_name, None, getattr(node, "uv_map", ""), in_tiles).uv_map
     except BakeError:
         return None

@@ -11,6 +11,7 @@ from ...core.bake.margin import WHOLE, part_in_shared
 from ...core.errors import BakeError
 from ...core.scene.flat_mesh import flatten
 from ...core.scene.receiver import Receiver, build_receiver
+from ...core.scene.tiles import Tiling
 from ...core.target import Target
 from ..node.find import node_of
 from ..read.geometry import read_polygons
@@ -21,6 +22,9 @@ OVERLAP_TOLERANCE = 0.01
 Parts = tuple[tuple[int, int, np.ndarray], ...]
 """Islands in a texture: column and row of the first texel, and coverage of each texel, float32 (rows, columns)."""
 
+Size = tuple[int, int] | Tiling
+"""Width and height of a texture, or the tiles of which it consists."""
+
 
 def parts_of(receiver: Receiver) -> Parts:
     """Islands of a receiver in its texture."""
@@ -28,15 +32,20 @@ def parts_of(receiver: Receiver) -> Parts:
     return tuple((*island.offset, island.coverage) for island in islands)
 
 
-def read_parts(target: Target, width: int, height: int) -> Parts | None:
-    """Islands of a target in a texture of that size; None if it can't be baked as it is."""
+def read_parts(target: Target, size: Size) -> Parts | None:
+    """Islands of a target in a texture of that size; None if it can't be baked as it is.
+
+    Of a texture of tiles, those in its tiles.
+    """
     obj, node = bpy.data.objects.get(target.object_name), node_of(target)
     if obj is None or node is None:
         return None
     evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
     try:
-        polygons = read_polygons(evaluated, target.material_name, None, node.uv_map)
-        return parts_of(build_receiver(flatten(polygons), width, height))
+        is_tiled = isinstance(size, Tiling)
+        mesh = flatten(read_polygons(evaluated, target.material_name, None, node.uv_map, is_tiled))
+        mesh = mesh.within(size) if is_tiled else mesh
+        return parts_of(build_receiver(mesh, *(size.size if is_tiled else size))) if mesh.parts else ()
     except BakeError:
         return None
 

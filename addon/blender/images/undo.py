@@ -58,7 +58,7 @@ def _key(image) -> tuple[str, str]:
 
 
 def _has_file(image) -> bool:
-    return image.source == "FILE" and image.packed_file is None
+    return image.source in ("FILE", "TILED") and image.packed_file is None
 
 
 @persistent

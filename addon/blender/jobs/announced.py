@@ -20,7 +20,7 @@ from ...core.scene.receiver import Grid
 from ...core.target import Target
 from .. import compat
 from ..images.facts import is_sequence
-from ..node.find import BakeTarget, targets_of
+from ..node.find import BakeTarget, targets_of, uses_tiles
 from ..read.geometry import mesh_key, read_polygons
 from ..read.lamps import fault, is_portal, read_lamp
 from ..read.lights import lights_surfaces
@@ -197,17 +197,18 @@ def _image_length(target: BakeTarget, depsgraph) -> float:
     obj, matrix = target.obj, target.obj.matrix_world
     if len(obj.data.polygons) > MAX_FACES:
         return max(obj.dimensions)
-    evaluated = obj.evaluated_get(depsgraph)
+    evaluated, node = obj.evaluated_get(depsgraph), target.node
+    is_tiled = uses_tiles(node)
 
     def read() -> float:
         try:
-            polygons = read_polygons(evaluated, target.material.name)
+            polygons = read_polygons(evaluated, target.material.name, None, node.uv_map, is_tiled)
         except BakeError:
             return 0.0  # the bake says why
         length = image_length([polygons]) if polygons.count else 0.0
         return length if math.isfinite(length) else 0.0
 
-    state = mesh_key(evaluated), *(tuple(row) for row in matrix)
+    state = mesh_key(evaluated), node.uv_map, is_tiled, *(tuple(row) for row in matrix)
     return scene_cache.get(("length", obj, target.material.name), [obj], read, state=state)
 
 

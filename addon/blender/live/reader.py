@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ...core.bake.spread import image_length
-from ...core.errors import text_of
+from ...core.errors import ImageError, text_of
 from ...core.live.live_target import LiveTarget
 from ...core.live.renderer import for_live
 from ...core.messages import Message, note
@@ -24,6 +24,7 @@ from .. import compat
 from ..cycles.sky import SkyService
 from ..images.files import check_image
 from ..images.results import check_editable
+from ..images.udim import is_tiled
 from ..node.find import find_bakeable, find_node, find_node_in_groups, medium_of, node_of
 from ..read.base_color import read_texture
 from ..read.geometry import mesh_key, read_polygons
@@ -268,6 +269,8 @@ def _image_size(material, image) -> tuple[int, int] | None:
     check_editable(material)
     if image is None:
         return None
+    if is_tiled(image):
+        raise ImageError(f"Live has no previews in UDIM tiles: '{image.name}' shows the last bake.")
     if image.source not in SINGLE:
         check_image(image)
     return None if 0 in image.size else tuple(image.size)

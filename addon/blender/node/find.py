@@ -67,6 +67,13 @@ def image_of(target: Target):
     return None if node is None else node.image
 
 
+def uses_tiles(node) -> bool:
+    """True if the node's image has UDIM tiles, or will have them."""
+    if node.image is None:
+        return bpy.context.scene.beamspread.use_udim
+    return node.image.source == "TILED"
+
+
 def find_node_in_groups(material) -> tuple | None:
     """The material's node and the group nodes around it, or None; groups with other users don't count."""
     if material is None or not compat.uses_nodes(material):

@@ -17,7 +17,7 @@ from ...core.scene.unwrap import unwrap, unwrap_together
 from ...core.target import Target
 from ..read.geometry import OWN_MAP, faces_with, polygons_of, read_polygons
 from ..read.visibility import find_instances
-from .find import node_of
+from .find import node_of, uses_tiles
 from .unwrap_group import NAME as MODIFIER
 from .unwrap_group import find_modifier, remove_modifier, set_uvs
 
@@ -45,10 +45,12 @@ def problems_of(depsgraph, targets: Iterable[Target]) -> dict[str, str]:
         instance = instances.get(target.object_name)
         if instance is None or instance.obj.type != "MESH":
             continue
-        if getattr(node_of(target), "uv_map", ""):  # the artist has chosen one
+        node = node_of(target)
+        if getattr(node, "uv_map", ""):  # the artist has chosen one
             continue
+        is_tiled = node is not None and uses_tiles(node)
         try:
-            polygons = read_polygons(instance.obj, target.material_name, instance.matrix)
+            polygons = read_polygons(instance.obj, target.material_name, instance.matrix, is_tiled=is_tiled)
         except ReceiverError:
             continue  # no map mends it: the bake says what would
         try:

@@ -15,6 +15,7 @@ from ...core.scene.flat_mesh import finite_remedy
 from ...core.scene.islands import check_map
 from ...core.scene.occluders import Mesh, Occluder, is_within
 from ...core.scene.polygons import Polygons
+from ...core.scene.tiles import in_tiles
 from ..preferences import memory_limit
 from .image_nodes import UVTransform
 from .reflection import MaterialReflection, MediumOf, reflection_of
@@ -210,7 +211,7 @@ def _transform(points: np.ndarray, matrix) -> np.ndarray:
     return points.astype(float) @ world[:3, :3].T + world[:3, 3]
 
 
-def read_polygons(obj, material_name: str, matrix=None, uv_map: str = "") -> Polygons:
+def read_polygons(obj, material_name: str, matrix=None, uv_map: str = "", is_tiled: bool = False) -> Polygons:
     """Faces of an evaluated mesh object that carry the material, in world space.
 
     Parameters
@@ -218,25 +219,31 @@ def read_polygons(obj, material_name: str, matrix=None, uv_map: str = "") -> Pol
     matrix : transform to the world; None: the object's own.
     uv_map : name of the map of their UVs; "": the one that renders or, if this does not fit into one image, a map of
         our own.
+    is_tiled : True if the image has UDIM tiles.
 
     Raises
     ------
     ReceiverError
-        The object has no UV map of that name, is at no finite position, or has more faces than fit into the memory.
+        The object has no UV map of that name, is at no finite position, or has more faces than fit into the memory; a
+        face crosses the border of a tile.
     """
     matrix = obj.matrix_world if matrix is None else matrix
     _check_memory(obj)
+
+    def placed(polygons: Polygons) -> Polygons:
+        return in_tiles(polygons, obj.name) if is_tiled else polygons
+
     mesh = obj.to_mesh()
     try:
         chosen = faces_with(obj, mesh, {material_name})
         if uv_map:
             uvs = _uvs_by_name(obj, mesh, uv_map)
-            return replace(polygons_of(mesh, matrix), uvs=uvs, uv_map=uv_map).of_faces(chosen)
-        polygons = polygons_of(mesh, matrix).of_faces(chosen)
+            return placed(replace(polygons_of(mesh, matrix), uvs=uvs, uv_map=uv_map).of_faces(chosen))
+        polygons = placed(polygons_of(mesh, matrix).of_faces(chosen))
         uvs = _uvs(mesh, OWN_MAP)
         if uvs is None or not polygons.count or _fits(polygons):
             return polygons
-        again = replace(polygons_of(mesh, matrix), uvs=uvs.astype(float), uv_map=OWN_MAP).of_faces(chosen)
+        again = placed(replace(polygons_of(mesh, matrix), uvs=uvs.astype(float), uv_map=OWN_MAP).of_faces(chosen))
         return again if _fits(again) else polygons
     finally:
         obj.to_mesh_clear()

@@ -7,6 +7,7 @@ import bpy
 from .. import compat
 from ..images.files import clips
 from ..images.image_operators import image_in, wanted_size
+from ..images.udim import is_tiled
 from ..jobs.run.engine import BeamspreadEngine, active_image
 from ..jobs.state import state
 from ..node.draw import draw_properties
@@ -26,12 +27,12 @@ def _use_columns(layout) -> None:
 def draw_image_buttons(layout, context) -> None:
     """Draw Make Float if the node's image clips, and Resize if its size differs from that wanted."""
     image = image_in(context)
-    if image is None or 0 in image.size or image.library is not None:
+    if image is None or 0 in image.size or image.library is not None or is_tiled(image):
         return
     if clips(image):
         layout.operator("beamspread.make_float", text="Make Float: image clips values above 1", icon="IMAGE_DATA")
     side = _wanted_side(image, context.scene.beamspread)
-    size = wanted_size(image, side)
+    size = wanted_size(image.size, side)
     if tuple(image.size) != size:
         text = f"Resize {image.size[0]} x {image.size[1]} to {size[0]} x {size[1]}"
         resize = layout.operator("beamspread.resize_image", text=text, icon="FULLSCREEN_ENTER")
@@ -159,6 +160,7 @@ class BEAMSPREAD_PT_images(RenderPanel, bpy.types.Panel):
         if settings.image_storage == "FILES":
             layout.prop(settings, "image_dir")
         layout.prop(settings, "image_name")
+        layout.prop(settings, "use_udim")
         layout.operator("beamspread.make_atlas", icon="UV_ISLANDSEL")
 
 

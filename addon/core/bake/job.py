@@ -152,8 +152,7 @@ class BakeJob:
 
     def messages(self) -> list[Message]:
         """Messages for the artist before the job runs."""
-        spread = [] if self.spread is None else self.spread.messages(self.name)
-        return [*self.left_out(), *self._surely_dark(), *spread]
+        return [*self.left_out(), *self._surely_dark()]
 
     def left_out(self) -> list[Message]:
         """Messages about light that is missing from the job."""

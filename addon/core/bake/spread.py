@@ -80,15 +80,35 @@ def image_length(meshes: Iterable[Polygons]) -> float:
     A map that does not fit into one image will be replaced by one that fills `FILLED` of it.
     """
     area = uv_area = 0.0
+    images: set[int] = set()
     for polygons in meshes:
         area += float(polygons.areas.sum())
         uv_area += 0.0 if polygons.uvs is None else float(polygons.uv_areas.sum())
-    return math.sqrt(area / (uv_area if 0 < uv_area <= 1 else FILLED))
+        images |= {0} if polygons.tiles is None else set(np.unique(polygons.tiles).tolist())
+    return math.sqrt(area / (uv_area if 0 < uv_area <= len(images) else FILLED))
 
 
 def length_of(mesh: FlatMesh) -> float:
     """`image_length` of a mesh with flat parts."""
-    return image_length(island.polygons for part in mesh.parts for island in part.islands)
+    return image_length(island.polygons for island in mesh.islands)
+
+
+def lengths_of_tiles(mesh: FlatMesh) -> dict[int, float]:
+    """`image_length` of each UDIM tile, by its number."""
+    numbers = sorted({island.tile for island in mesh.islands})
+    return {
+        number: image_length(island.polygons for island in mesh.islands if island.tile == number) for number in numbers
+    }
+
+
+def mean_size(mesh: FlatMesh, size: tuple[int, int]) -> tuple[int, int]:
+    """Width and height of the image, or of the mean UDIM tile, in a texture of this size."""
+    if mesh.tiling is None:
+        return size
+    weights = [float(island.polygons.uv_areas.sum()) for island in mesh.islands]
+    sizes = [mesh.tiling.sizes[island.tile] for island in mesh.islands]
+    width, height = np.rint(np.average(sizes, axis=0, weights=weights)).astype(int).tolist()
+    return width, height
 
 
 def side_for(length: float, surface: Surface, density: float, is_textured: bool = False) -> int:

@@ -19,7 +19,9 @@ class BakeRecord:
 
     Attributes
     ----------
-    path : the file that was written.
+    path : the file that was written; of UDIM tiles that with <UDIM> in place of their numbers.
+    width, height : texels; of UDIM tiles those of the largest.
+    files : files of UDIM tiles; the report has this key for them alone.
     seconds : wall-clock time.
     estimated_seconds : the same, as estimated before the bake.
     output : the requested pass, LUMINANCE, IRRADIANCE or DIRECTION.
@@ -44,6 +46,7 @@ class BakeRecord:
     indirect: bool = False
     dark: bool = False
     estimated_seconds: float = 0.0
+    files: list[str] = field(default_factory=list)
 
     @classmethod
     def of(cls, bake: Bake, frame: int) -> BakeRecord:
@@ -57,10 +60,18 @@ class BakeRecord:
             [str(message) for message in job.left_out() if message.level is not Level.INFO],
             job.settings.indirect,
         )
-        size = job.receiver.width, job.receiver.height
-        return cls(
-            *subject, *size, *outcome, job.settings.output, *lights, bake.is_dark, round(bake.estimated_seconds, 3)
-        )
+        size, tiles = (job.receiver.width, job.receiver.height), {}
+        if job.receiver.tiling is not None:
+            tiles = job.receiver.tiling.sizes if bake.path else {}
+            size = max(job.receiver.tiling.sizes.values())
+        files = [bake.path.replace("<UDIM>", str(number)) for number in tiles]
+        rest = bake.is_dark, round(bake.estimated_seconds, 3), files
+        return cls(*subject, *size, *outcome, job.settings.output, *lights, *rest)
+
+    def entry(self) -> dict:
+        """Entry of the report."""
+        entry = asdict(self)
+        return entry if self.files else {key: value for key, value in entry.items() if key != "files"}
 
     def __str__(self) -> str:
         subject = f"{self.object} / {self.material}" if self.material else self.object
@@ -90,7 +101,7 @@ class Report:
 
         target = Path(path)
         target.parent.mkdir(parents=True, exist_ok=True)
-        text = json.dumps({"bakes": [asdict(bake) for bake in self.bakes]}, indent=2, ensure_ascii=False)
+        text = json.dumps({"bakes": [bake.entry() for bake in self.bakes]}, indent=2, ensure_ascii=False)
         with whole_file(target) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
 

@@ -6,12 +6,14 @@ Otherwise it is a rectangular grid of the finest density, which the texels of ea
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from .grid import Grid
 from .sampling import bilinear
+from .tiles import Place
 
 
 def in_chart(coverage: np.ndarray) -> np.ndarray:
@@ -29,11 +31,13 @@ class ChartIsland:
     offset : (column, row) of that part's first texel in the texture.
     texel_to_grid : (2, 3), maps (column, row, 1) in the texture to grid coordinates, both in texels with centres at
         half-integers; None if the grid consists of the part's texels.
+    place : texels of the island's UDIM tile in the texture; None if the texture is one image.
     """
 
     coverage: np.ndarray
     offset: tuple[int, int]
     texel_to_grid: np.ndarray | None = None
+    place: Place | None = None
 
     def part_of(self, texture: np.ndarray) -> np.ndarray:
         """View of the texture's part around the island."""
@@ -46,6 +50,11 @@ class ChartIsland:
             return positions + self.offset
         matrix, shift = self.texel_to_grid[:, :2], self.texel_to_grid[:, 2]
         return (positions - shift) @ np.linalg.inv(matrix).T
+
+    def uvs(self, texels: np.ndarray, width: int, height: int) -> np.ndarray:
+        """UVs (..., 2) at columns and rows (..., 2) of a texture of this size."""
+        place = self.place or Place(0, 0, width, height)
+        return (texels - (place.column, place.row)) / (place.width, place.height) + (place.u, place.v)
 
     def sampled(self, values: np.ndarray, inside: np.ndarray) -> np.ndarray:
         """Values (N, C) at the texels that `inside` (rows, columns) chooses, from those of the grid (H, W, C)."""
@@ -74,25 +83,29 @@ class Chart:
     coarser: float = 1.0
 
     def uvs(self, width: int, height: int, at: tuple[float, float] = (0.5, 0.5)) -> np.ndarray:
-        """UVs of the grid's texels in a texture of this size, float64 (grid height, grid width, 2), 0..1.
+        """UVs of the grid's texels in a texture of this size, float64 (grid height, grid width, 2).
 
-        `at` is the sample position: columns and rows from each texel's corner, its centre by default.
+        They are from 0 to 1 in one image. `at` is the sample position: columns and rows from each texel's corner, its
+        centre by default.
         """
+        return self._by_island(lambda island, at: island.uvs(island.to_texels(at), width, height), at)
+
+    def _by_island(self, function: Callable, at: tuple[float, float] = (0.5, 0.5)) -> np.ndarray:
+        """Result of a function of an island and positions (..., 2) on the grid, by the island of each of its texels."""
         columns, rows = np.meshgrid(np.arange(self.grid.width) + at[0], np.arange(self.grid.height) + at[1])
         positions = np.stack([columns, rows], -1)
         if self.labels is None:
-            texels = self.islands[0].to_texels(positions)
-        else:
-            texels = np.empty(positions.shape)
-            for label, island in enumerate(self.islands):
-                chosen = self.labels == label
-                texels[chosen] = island.to_texels(positions[chosen])
-        return texels / [width, height]
+            return function(self.islands[0], positions)
+        result = np.empty(positions.shape)
+        for label, island in enumerate(self.islands):
+            chosen = self.labels == label
+            result[chosen] = function(island, positions[chosen])
+        return result
 
     def read(self, texture: np.ndarray) -> np.ndarray:
         """Values (grid height, grid width, C) on the grid, from a texture (height, width, C)."""
         if self.labels is None and self.islands[0].texel_to_grid is None:
             return self.islands[0].part_of(texture)
-        height, width = texture.shape[:2]
-        x, y = np.moveaxis(self.uvs(width, height).reshape(-1, 2) * [width, height], -1, 0)
+        texels = self._by_island(lambda island, at: island.to_texels(at))
+        x, y = np.moveaxis(texels.reshape(-1, 2), -1, 0)
         return bilinear(texture, x, y).reshape(self.grid.height, self.grid.width, -1).astype(np.float32)

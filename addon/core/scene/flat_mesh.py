@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from ..messages import Message, note, warning
 from .islands import NO_UV_AREA, Island, check_uvs, find_islands
 from .planes import FLATNESS_TOLERANCE, FLATTENED, Plane, find_planes
 from .polygons import Polygons
+from .tiles import Place, Tiling
 
 # Part of the surface that must be flat. More refuses bent meshes with a few flat faces.
 MIN_FLAT = 0.01
@@ -26,11 +27,32 @@ class FlatPart:
 
 @dataclass(frozen=True, eq=False)
 class FlatMesh:
-    """Parts of a mesh that can be baked, the largest first; messages about the rest; `uv_map` as of `Polygons`."""
+    """Parts of a mesh that can be baked, the largest first; messages about the rest; `uv_map` as of `Polygons`.
+
+    `tiling` has the UDIM tiles of its islands in the texture; None for one image.
+    """
 
     parts: tuple[FlatPart, ...]
     messages: tuple[Message, ...] = ()
     uv_map: str = ""
+    tiling: Tiling | None = None
+
+    @property
+    def islands(self) -> list[Island]:
+        """Islands of all parts."""
+        return [island for part in self.parts for island in part.islands]
+
+    def within(self, tiling: Tiling) -> FlatMesh:
+        """The islands in these tiles."""
+        parts = []
+        for part in self.parts:
+            islands = tuple(island for island in part.islands if island.tile in tiling.sizes)
+            parts += [replace(part, islands=islands)] if islands else []
+        return replace(self, parts=tuple(parts), tiling=tiling)
+
+    def place(self, island: Island, width: int, height: int) -> Place:
+        """Texels of the island's image in a texture of this size."""
+        return Place(0, 0, width, height) if self.tiling is None else self.tiling.places[island.tile]
 
 
 def finite_remedy(name: str) -> str:

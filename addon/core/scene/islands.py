@@ -35,12 +35,16 @@ MAX_ISLANDS = 100_000
 
 @dataclass(frozen=True, eq=False)
 class Island:
-    """Faces of a plane with P(u, v) = p_0 + u p_u + v p_v; `polygons` have their corners on the plane."""
+    """Faces of a plane with P(u, v) = p_0 + u p_u + v p_v; `polygons` have their corners on the plane.
+
+    `tile` is the number of the UDIM tile whose corner is the UV (0, 0); 0 for one image.
+    """
 
     polygons: Polygons
     p_0: np.ndarray
     p_u: np.ndarray
     p_v: np.ndarray
+    tile: int = 0
 
     def is_orthogonal(self) -> bool:
         """True if texels are rectangles."""
@@ -70,13 +74,19 @@ def check_map(polygons: Polygons) -> None:
     if polygons.areas[is_lost].sum() > MAX_LOST * polygons.areas.sum():
         text = f"The UV map has no area in {is_lost.sum()} of {polygons.count} faces."
         raise ReceiverError(text, "Unwrap the mesh again.")
-    texels = np.ascontiguousarray(np.clip(polygons.uvs, 0, 1) * PROBE_SIDE)
     # A small map fills few texels of the probe.
-    shown = float(native.coverage(texels, polygons.sizes.astype(np.uint32), PROBE_SIDE, PROBE_SIDE).sum(dtype=float))
+    shown = sum(map(_shown, polygons.by_tile().values()))
     overlap = 1 - shown / max(float(sizes.sum()) * PROBE_SIDE**2, 1e-30)
     if overlap > MAX_OVERLAP:
         text = f"The UV map overlaps: {overlap:.0%} of it show several faces."
         raise ReceiverError(text, "Unwrap the mesh so that each face has its own place (UV > Smart UV Project).")
+
+
+def _shown(polygons: Polygons) -> float:
+    """Texels of the probe that faces of one image cover."""
+    texels = np.ascontiguousarray(np.clip(polygons.uvs, 0, 1) * PROBE_SIDE)
+    coverage = native.coverage(texels, polygons.sizes.astype(np.uint32), PROBE_SIDE, PROBE_SIDE)
+    return float(coverage.sum(dtype=float))
 
 
 def find_islands(polygons: Polygons, plane: Plane, tolerance: float) -> tuple[Island, ...]:
@@ -88,14 +98,21 @@ def find_islands(polygons: Polygons, plane: Plane, tolerance: float) -> tuple[Is
     part = polygons.of_faces(plane.faces)
     heights = (part.corners - plane.centre) @ plane.normal
     part = replace(part, corners=part.corners - heights[:, None] * plane.normal)
+    islands: list[Island] = []
+    for tile, polygons in part.by_tile().items():
+        islands += [replace(island, tile=tile) for island in _in_one_image(polygons, plane, tolerance)]
+    return tuple(sorted(islands, key=lambda island: -island.polygons.areas.sum()))
+
+
+def _in_one_image(part: Polygons, plane: Plane, tolerance: float) -> list[Island]:
     whole = _fit(part, plane, tolerance)
     if whole is not None:
-        return (whole,)
+        return [whole]
     islands: list[Island] = []
     for piece in _pieces(part, _connected(part)):
         island = _fit(piece, plane, tolerance)
         islands += [island] if island is not None else _of_triangles(piece, plane, tolerance)
-    return tuple(sorted(islands, key=lambda island: -island.polygons.areas.sum()))
+    return islands
 
 
 def _of_triangles(piece: Polygons, plane: Plane, tolerance: float) -> list[Island]:

@@ -33,6 +33,7 @@ class Polygons:
     normals : float64 (N, 3), outward unit normals, world.
     uv_map : name of the map of the UVs; "" is the one that renders.
     numbers : int (N,), numbers of the faces in the mesh; None: all in their order.
+    tiles : int (N,), number of each face's UDIM tile, in which its UVs lie; None: one image.
     """
 
     corners: np.ndarray
@@ -41,6 +42,7 @@ class Polygons:
     normals: np.ndarray
     uv_map: str = ""
     numbers: np.ndarray | None = None
+    tiles: np.ndarray | None = None
 
     @property
     def count(self) -> int:
@@ -135,7 +137,15 @@ class Polygons:
         corners = np.repeat(self.starts[:-1][faces] - starts[:-1], sizes) + np.arange(starts[-1])
         uvs = None if self.uvs is None else self.uvs[corners]
         numbers = np.arange(self.count)[faces] if self.numbers is None else self.numbers[faces]
-        return Polygons(self.corners[corners], uvs, starts, self.normals[faces], self.uv_map, numbers)
+        tiles = None if self.tiles is None else self.tiles[faces]
+        return Polygons(self.corners[corners], uvs, starts, self.normals[faces], self.uv_map, numbers, tiles)
+
+    def by_tile(self) -> dict[int, Polygons]:
+        """Faces of each UDIM tile, by its number; all by 0 without tiles."""
+        if self.tiles is None:
+            return {0: self}
+        numbers = np.unique(self.tiles).tolist()
+        return {number: self.of_faces(np.flatnonzero(self.tiles == number)) for number in numbers}
 
     def listed(self, faces: np.ndarray) -> str:
         """Words for faces (an index) by their numbers: "faces 2, 5 and 6 to 9"; the first few of many."""

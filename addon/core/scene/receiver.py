@@ -6,7 +6,7 @@ Rows of all arrays run up: row 0 is the bottom (v = 0), as Blender stores images
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from .chart import Chart, ChartIsland, in_chart
 from .flat_mesh import FlatMesh, FlatPart
 from .grid import Grid
 from .islands import Island
+from .tiles import Place, Tiling
 
 # Overlap with an island, in texels, below which texels at its border are not part of it: rounding of float32 UVs.
 EDGE_TOLERANCE = 1e-3
@@ -41,11 +42,13 @@ class Receiver:
     coverage : float32 (height, width), largest fraction of each texel inside an island.
     charts : flat parts, the largest first.
     uv_map : name of the UV map; "" is the one that renders.
+    tiling : UDIM tiles of which the texture consists; None for one image.
     """
 
     coverage: np.ndarray
     charts: tuple[Chart, ...]
     uv_map: str = ""
+    tiling: Tiling | None = None
 
     @property
     def height(self) -> int:
@@ -101,8 +104,8 @@ class Receiver:
 
 def texture_size(mesh: FlatMesh, resolution: int) -> tuple[int, int]:
     """Width and height of a texture with `resolution` texels along the longer side; texels are nearly square."""
-    islands = [island for part in mesh.parts for island in part.islands]
-    lengths = np.max([(np.linalg.norm(island.p_u), np.linalg.norm(island.p_v)) for island in islands], axis=0).tolist()
+    sides = [(np.linalg.norm(island.p_u), np.linalg.norm(island.p_v)) for island in mesh.islands]
+    lengths = np.max(sides, axis=0).tolist()
     return tuple(max(1, round(resolution * length / max(lengths))) for length in lengths)
 
 
@@ -114,7 +117,10 @@ def build_receiver(mesh: FlatMesh, width: int, height: int, owner: str = "") -> 
     ReceiverError
         The mesh covers no texel, or texels several times.
     """
-    charts = tuple(_chart(part, width, height, owner) for part in mesh.parts)
+    charts = []
+    for part in mesh.parts:
+        places = [mesh.place(island, width, height) for island in part.islands]
+        charts.append(_chart(part, places, owner))
     islands = [island for chart in charts for island in chart.islands]
     if len(islands) == 1 and islands[0].coverage.shape == (height, width):
         coverage = islands[0].coverage
@@ -130,13 +136,13 @@ def build_receiver(mesh: FlatMesh, width: int, height: int, owner: str = "") -> 
             raise ReceiverError(text, "Unwrap the mesh so that each face has its own place (UV > Smart UV Project).")
     if not in_chart(coverage).any():
         raise ReceiverError("The UV map covers no texel of the image.", "Enlarge it, or the image.")
-    return Receiver(coverage, charts, mesh.uv_map)
+    return Receiver(coverage, tuple(charts), mesh.uv_map, mesh.tiling)
 
 
-def outline(part: FlatPart, width: int, height: int) -> Grid:
-    """About the grid of a flat part of an object, in a texture of that size, as a rectangle; quickly made."""
+def outline(mesh: FlatMesh, part: FlatPart, width: int, height: int) -> Grid:
+    """About the grid of a flat part of a mesh, in a texture of that size, as a rectangle; quickly made."""
     island = part.islands[0]
-    frame, pitch = _frame(island), _pitch(island, width, height)
+    frame, pitch = _frame(island), _pitch(island, mesh.place(island, width, height))
     points = np.concatenate([island.polygons.corners @ frame.T / pitch for island in part.islands])
     corner, size = points.min(axis=0), np.ptp(points, axis=0)
     columns, rows = np.maximum(np.rint(size), 1).astype(int).tolist()
@@ -144,11 +150,11 @@ def outline(part: FlatPart, width: int, height: int) -> Grid:
     return _grid(origin, frame, part, pitch, np.broadcast_to(np.float32(1), (rows, columns)), "")
 
 
-def _chart(part: FlatPart, width: int, height: int, owner: str) -> Chart:
+def _chart(part: FlatPart, places: Sequence[Place], owner: str) -> Chart:
     first, *rest = part.islands
     if not rest and first.is_orthogonal():
-        return _chart_of_texels(part, width, height, owner)
-    return _chart_of_grid(part, width, height, owner)
+        return _chart_of_texels(part, places[0], owner)
+    return _chart_of_grid(part, places, owner)
 
 
 def _frame(island: Island) -> np.ndarray:
@@ -158,29 +164,29 @@ def _frame(island: Island) -> np.ndarray:
     return np.stack([x_axis, across / np.linalg.norm(across)])
 
 
-def _pitch(island: Island, width: int, height: int) -> np.ndarray:
+def _pitch(island: Island, place: Place) -> np.ndarray:
     """Size of the island's texels along the columns and across them, scene units."""
     frame = _frame(island)
-    return np.array([np.linalg.norm(island.p_u) / width, island.p_v @ frame[1] / height])
+    return np.array([np.linalg.norm(island.p_u) / place.width, island.p_v @ frame[1] / place.height])
 
 
-def _chart_of_texels(part: FlatPart, width: int, height: int, owner: str) -> Chart:
+def _chart_of_texels(part: FlatPart, place: Place, owner: str) -> Chart:
     (island,) = part.islands
-    texels = _in_texture(island, width, height)
-    columns, rows = texels.offset
-    origin = island.p_0 + columns / width * island.p_u + rows / height * island.p_v
-    grid = _grid(origin, _frame(island), part, _pitch(island, width, height), texels.coverage, owner)
+    texels = _in_texture(island, place)
+    columns, rows = texels.offset[0] - place.column, texels.offset[1] - place.row
+    origin = island.p_0 + columns / place.width * island.p_u + rows / place.height * island.p_v
+    grid = _grid(origin, _frame(island), part, _pitch(island, place), texels.coverage, owner)
     return Chart(grid, (texels,))
 
 
-def _chart_of_grid(part: FlatPart, width: int, height: int, owner: str) -> Chart:
+def _chart_of_grid(part: FlatPart, places: Sequence[Place], owner: str) -> Chart:
     """A chart with a rectangle around all islands, whose rows are parallel to those of the largest island."""
     frame, coarser = _frame(part.islands[0]), 1.0
-    texels = [_in_texture(island, width, height) for island in part.islands]
+    texels = [_in_texture(island, place) for island, place in zip(part.islands, places)]
     if len(texels) == 1:
-        pitch = _pitch(part.islands[0], width, height)
+        pitch = _pitch(part.islands[0], places[0])
     else:
-        pitch = np.repeat(min(_pitch(island, width, height).min() for island in part.islands), 2)
+        pitch = np.repeat(min(_pitch(island, place).min() for island, place in zip(part.islands, places)), 2)
         area = sum(float(island.polygons.areas.sum()) for island in part.islands)
         wanted = MAX_FINER * max(sum(float(island.coverage.sum()) for island in texels), 1.0)
         coarser = max(1.0, float(np.sqrt(area / wanted) / pitch[0]))
@@ -193,10 +199,10 @@ def _chart_of_grid(part: FlatPart, width: int, height: int, owner: str) -> Chart
     origin = (corner * pitch) @ frame + (part.plane.centre @ part.plane.normal) * part.plane.normal
     grid = _grid(origin, frame, part, pitch, _coverage(faces, columns, rows), owner)
     islands = []
-    for island, place in zip(part.islands, texels):
-        slopes = [(frame @ island.p_u) / pitch / width, (frame @ island.p_v) / pitch / height]
-        to_grid = np.column_stack([*slopes, frame @ island.p_0 / pitch - corner])
-        islands.append(ChartIsland(place.coverage, place.offset, to_grid))
+    for island, place, shown in zip(part.islands, places, texels):
+        slopes = np.stack([(frame @ island.p_u) / pitch / place.width, (frame @ island.p_v) / pitch / place.height])
+        first = frame @ island.p_0 / pitch - corner - np.array([place.column, place.row]) @ slopes
+        islands.append(replace(shown, texel_to_grid=np.column_stack([*slopes, first])))
     return Chart(grid, tuple(islands), _labels(part, points, corner, (rows, columns)), coarser)
 
 
@@ -218,12 +224,13 @@ def _labels(
     return labels
 
 
-def _in_texture(island: Island, width: int, height: int) -> ChartIsland:
-    texels = island.polygons.uvs * [width, height]
+def _in_texture(island: Island, place: Place) -> ChartIsland:
+    texels, width, height = island.polygons.uvs * [place.width, place.height], place.width, place.height
     first = np.clip(np.floor(texels.min(axis=0) + EDGE_TOLERANCE), 0, [width - 1, height - 1]).astype(int)
     last = np.clip(np.ceil(texels.max(axis=0) - EDGE_TOLERANCE), first + 1, [width, height]).astype(int)
     faces = island.polygons.split(texels - first)
-    return ChartIsland(_coverage(faces, *(last - first).tolist()), tuple(first.tolist()))
+    offset = place.column + int(first[0]), place.row + int(first[1])
+    return ChartIsland(_coverage(faces, *(last - first).tolist()), offset, place=place if island.tile else None)
 
 
 def _grid(

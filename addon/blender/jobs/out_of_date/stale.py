@@ -27,6 +27,7 @@ from ...images.facts import (
     record_of_bake,
 )
 from ...images.files import file_of
+from ...images.udim import is_tiled, missing_files
 from ...images.undo import is_undone
 from ...node.find import find_bakeable, find_misplaced, image_of
 from ...read.scene_cache import listeners
@@ -158,6 +159,8 @@ def _row_of_frames(target: Target, frames: Frames, record: Record | None, now: P
 
 
 def _has_lost_its_file(image) -> bool:
+    if is_tiled(image):
+        return bool(missing_files(image))
     path = file_of(image)
     return path is not None and not path.is_file()
 

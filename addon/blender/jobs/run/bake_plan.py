@@ -15,7 +15,7 @@ from ....core.bake.bake_settings import COMBINED, BakeSettings
 from ....core.bake.forecast import Finders, Forecast
 from ....core.bake.job import BakeJob
 from ....core.bake.runner import Bake
-from ....core.bake.spread import Spread, length_of
+from ....core.bake.spread import Spread, length_of, mean_size
 from ....core.bake.steps import BAKE_STEPS, needs_medium, to_simulate
 from ....core.bake.surface import Surface
 from ....core.errors import BakeError
@@ -35,7 +35,7 @@ from ...read.base_color import read_texture
 from ...read.lights import read_illumination
 from ...read.scene_cache import SceneCache, scene_cache
 from ...read.visibility import as_rendered, check_instance, find_instances, render_visible_names
-from .receiving import Receiving, read_receiver, size_for
+from .receiving import Receiving, read_receiver, sized
 
 PLACEHOLDER_COLOR = (0.5, 0.5, 0.5)
 """Base color until Cycles has evaluated it."""
@@ -54,7 +54,6 @@ class BakePlan:
     color : base color that is linked to the node, or None.
     blur : fraction of its texture that light passes on its way in.
     matrix : rows of the matrix of the instance that is baked; None if the object itself is.
-    tells_spread : True if the size of the image is for the artist to choose in the panels of the add-on.
     """
 
     target: Target
@@ -67,7 +66,6 @@ class BakePlan:
     color: BaseColor | None = None
     blur: float = 0.0
     matrix: list | None = None
-    tells_spread: bool = True
 
     def surface_with_color(self) -> Surface:
         """The surface with its mean base color; with a placeholder if only Cycles can evaluate it."""
@@ -83,7 +81,7 @@ class BakePlan:
 
     def forecast(self) -> Forecast:
         """Facts that tell how long the bake will take."""
-        name, grids = self.target.object_name, [outline(part, *self.size) for part in self.mesh.parts]
+        name, grids = self.target.object_name, [outline(self.mesh, part, *self.size) for part in self.mesh.parts]
         light = self.illumination.lighting(name)
         lamps = sum(name in bpy.data.objects for name in light.by_cycles)
         bounced = bool(light.lights or light.by_cycles) and self.by_cycles.is_below_something(grids)
@@ -106,8 +104,8 @@ class BakePlan:
                 self.target.object_name, receiver, illumination, self.surface_with_color(), settings, BAKE_STEPS
             )
             job = self._with_color(self.by_cycles.complete(job))
-            if settings.layer == COMBINED and self.tells_spread:
-                job = replace(job, spread=Spread.of(length_of(self.mesh), job.surface, self.size))
+            if settings.layer == COMBINED:
+                job = replace(job, spread=Spread.of(length_of(self.mesh), job.surface, mean_size(self.mesh, self.size)))
             job.check_memory()
             return Bake(self.target, job)
         except Exception as error:  # noqa: BLE001 - one object's failure must not keep the others from being baked
@@ -271,8 +269,11 @@ def read_plans(
 
     def read_plan(target: Target) -> None:
         if target in receivers:
-            chosen = size or size_for(receivers[target], receivers.values(), resolution, depsgraph.scene.beamspread)
-            plans[target] = replace(_plan(receivers[target], chosen, light, check), tells_spread=size is None)
+            receiving, settings = receivers[target], depsgraph.scene.beamspread
+            mesh, chosen = receiving.mesh, size
+            if size is None:
+                mesh, chosen = sized(receiving, receivers.values(), resolution, settings)
+            plans[target] = _plan(receiving, mesh, chosen, light, check)
 
     try:
         each(read_mesh)
@@ -283,9 +284,13 @@ def read_plans(
 
 
 def _plan(
-    receiving: Receiving, size: tuple[int, int], light: tuple[Illumination, CyclesLight], check: Check | None
+    receiving: Receiving,
+    mesh: FlatMesh,
+    size: tuple[int, int],
+    light: tuple[Illumination, CyclesLight],
+    check: Check | None,
 ) -> BakePlan:
-    target, instance, mesh = receiving.target, receiving.instance, receiving.mesh
+    target, instance = receiving.target, receiving.instance
     image, node = target.image, target.node
     plan = BakePlan(target.name, "" if image is None else image.name_full, mesh, size, receiving.surface, *light)
     if not node.has_texture():

@@ -21,7 +21,7 @@ from ....core.target import Target
 from ...images.facts import attributes_of, record_of_bake
 from ...images.files import file_of, size_of
 from ...images.outputs import Outputs
-from ...node.find import NOTHING_FOUND, find_bakeable, find_misplaced
+from ...node.find import NOTHING_FOUND, find_bakeable, find_misplaced, node_of, uses_tiles
 from ...node.uv_maps import objects_with_maps
 from ...read.geometry import OWN_MAP
 from ...read.visibility import by_name
@@ -117,6 +117,8 @@ class _Batch(Sink):
     def end(self, bake: Bake) -> None:
         self._remember(bake)
         name = bake.target.object_name
+        if bake.status == WRITTEN and bake.job.spread is not None:  # panels say it before the bake
+            bake.messages.add(*bake.job.spread.messages(name))
         if bake.status == WRITTEN and not self._options.save and name in objects_with_maps() - self._with_maps:
             text = f"The .blend file lacks the new UV map '{OWN_MAP}' of '{name}', which shows the image."
             bake.warn(name, text, "Run the batch with --save.")
@@ -146,7 +148,8 @@ class _Batch(Sink):
 
     def _skipped(self, target: Target, image) -> BakeRecord | None:
         """The record of a file that an earlier run has written; `image` is the node's if its file is the target."""
-        if self._earlier is None or self._stop:
+        node = node_of(target)
+        if self._earlier is None or self._stop or (node is not None and uses_tiles(node)):
             return None
         settings, resolution = self._settings, self._options.resolution
         try:

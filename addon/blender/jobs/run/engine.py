@@ -18,6 +18,7 @@ from ....core.progress import Progress
 from ....core.target import Target
 from ... import compat
 from ...cycles.scene_copy import CopyForCycles
+from ...images.udim import is_tiled
 from ...node.find import NOTHING_FOUND, BakeTarget, find_misplaced, find_targets, image_of, targets_of
 from ...registration import all_or_nothing, classes, handlers
 from ..out_of_date import stale
@@ -109,6 +110,11 @@ def _prepare(engine, depsgraph, obj, passes, size: tuple[int, int]) -> list[Bake
 def _check_active_image(target: BakeTarget, settings: BakeSettings) -> None:
     """Raise ImageError if the result would be taken for luminance, or would replace a texture of the surface."""
     active = active_image(target.material)
+    if is_tiled(active):
+        raise ImageError(
+            f"The active image '{active.name}' has UDIM tiles, which Blender's own Bake can't fill by Beamspread.",
+            "Choose it in the Beamspread node, and use Bake Beamspread.",
+        )
     if active is not None and active in _images_read(target.node):
         raise ImageError(
             f"The active image '{active.name}' is a texture of the Beamspread node and no target.",

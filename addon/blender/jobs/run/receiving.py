@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from ....core.bake.spread import length_of
+from ....core.bake.spread import length_of, lengths_of_tiles
 from ....core.bake.surface import Surface
 from ....core.messages import Message
 from ....core.scene.flat_mesh import FlatMesh, flatten
 from ....core.scene.receiver import texture_size
+from ....core.scene.tiles import Tiling
 from ....core.target import Target
 from ...images.facts import is_sequence, size_of_frames
 from ...images.files import check_image
-from ...node.find import BakeTarget, targets_of
+from ...images.image_operators import wanted_size
+from ...images.udim import sizes_for
+from ...node.find import BakeTarget, targets_of, uses_tiles
 from ...read.geometry import read_polygons
 from ...read.visibility import ObjectInstance
 from ...settings import BeamspreadSettings
@@ -27,29 +30,55 @@ class Receiving:
     instance: ObjectInstance
     surface: Surface
     mesh: FlatMesh
+    is_tiled: bool
 
 
 def read_receiver(target: Target, instance: ObjectInstance, fills_image: bool, outcome: Message | None) -> Receiving:
+    """Read a target; `fills_image` is False if its result goes to another image than the node's."""
     evaluated: BakeTarget = next(evaluated for evaluated in targets_of(instance.obj) if evaluated.name == target)
     surface, image = evaluated.node.surface(), evaluated.image
     surface.check()
     if fills_image and image is not None and not is_sequence(image):  # a batch fills a sequence's files
         check_image(image)
-    polygons = read_polygons(instance.obj, target.material_name, instance.matrix, evaluated.node.uv_map)
+    is_tiled = fills_image and uses_tiles(evaluated.node)
+    polygons = read_polygons(instance.obj, target.material_name, instance.matrix, evaluated.node.uv_map, is_tiled)
     mesh = flatten(polygons, min(surface.material.mean_free_path), target.object_name)
     if outcome is not None:
         mesh = replace(mesh, messages=(outcome, *mesh.messages))
-    return Receiving(evaluated, instance, surface, mesh)
+    return Receiving(evaluated, instance, surface, mesh, is_tiled)
 
 
-def size_for(
+def sized(
     receiving: Receiving, together: Iterable[Receiving], resolution: int | None, settings: BeamspreadSettings
-) -> tuple[int, int]:
-    """Width and height of a target's texture. Targets of one material without an image will share a new one."""
-    target, image = receiving.target, receiving.target.image
-    if resolution is None and image is not None:
-        return size_of_frames(image) if is_sequence(image) else tuple(image.size)
+) -> tuple[FlatMesh, tuple[int, int]]:
+    """The mesh with its UDIM tiles, and width and height of its texture.
+
+    Targets of one material without an image will share a new one.
+    """
+    target, image, mesh = receiving.target, receiving.target.image, receiving.mesh
     sharing = [item for item in together if item.target.material.name == target.material.name]
-    is_textured = target.node.has_texture()
-    sides = (settings.side_for(length_of(item.mesh), item.surface, is_textured) for item in sharing)
-    return texture_size(receiving.mesh, resolution or max(sides))
+    if receiving.is_tiled:
+        sizes = _tile_sizes(receiving, sharing, resolution, settings)
+        tiling = Tiling(tuple(sorted(sizes.items())), settings.margin)
+        return replace(mesh, tiling=tiling), tiling.size
+    if resolution is None and image is not None:
+        return mesh, size_of_frames(image) if is_sequence(image) else tuple(image.size)
+    sides = (settings.side_for(length_of(item.mesh), item.surface, target.node.has_texture()) for item in sharing)
+    return mesh, texture_size(mesh, resolution or max(sides))
+
+
+def _tile_sizes(
+    receiving: Receiving, sharing: list[Receiving], resolution: int | None, settings: BeamspreadSettings
+) -> dict[int, tuple[int, int]]:
+    """Width and height of the tiles that a target uses, by their numbers. New tiles are squares."""
+    target, numbers = receiving.target, sorted({island.tile for island in receiving.mesh.islands})
+    if target.image is not None:
+        sizes = sizes_for(target.image, numbers, target.name.object_name)
+        return {number: wanted_size(size, resolution or max(size)) for number, size in sizes.items()}
+    sides = dict.fromkeys(numbers, resolution or 0)
+    for item in [] if resolution else sharing:
+        for number, length in lengths_of_tiles(item.mesh).items():
+            if number in sides:
+                side = settings.side_for(length, item.surface, target.node.has_texture())
+                sides[number] = max(sides[number], side)
+    return {number: (side, side) for number, side in sides.items()}
