@@ -6,8 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..scene.receiver import Receiver
-
 NEIGHBOURS = [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)]
 STRAIGHT, DIAGONAL = ([step for step in NEIGHBOURS if (0 in step) == is_straight] for is_straight in (True, False))
 
@@ -20,11 +18,6 @@ BORDER_RINGS = 2
 
 NO_ISLAND = np.iinfo(np.int32).max
 """Label of texels outside of all islands."""
-
-
-def with_margin(receiver: Receiver, texture: np.ndarray, margin: int) -> np.ndarray:
-    """The texture of a receiver with a margin around each island, see `extend_margin`."""
-    return extend_margin(texture, receiver.coverage, margin, receiver.labels())
 
 
 def extend_margin(
@@ -54,8 +47,8 @@ def extend_margin(
         labels = np.where(labels < 0, NO_ISLAND, labels)
     continued = texture
     if not np.array_equal(baked, whole):
-        continued = np.where(baked_texels, _add_rings(texture, whole, BORDER_RINGS, labels), texture)
-    return np.where(baked_texels, texture, _add_rings(continued, baked, margin, labels)).astype(np.float32, copy=False)
+        continued = np.where(baked_texels, add_rings(texture, whole, BORDER_RINGS, labels), texture)
+    return np.where(baked_texels, texture, add_rings(continued, baked, margin, labels)).astype(np.float32, copy=False)
 
 
 def part_in_shared(coverage: np.ndarray, before: np.ndarray, after: np.ndarray, margin: int) -> np.ndarray:
@@ -99,7 +92,7 @@ def _beside(mask: np.ndarray, steps: Sequence[tuple[int, int]]) -> np.ndarray:
     return np.any([padded[1 + dy : 1 + dy + height, 1 + dx : 1 + dx + width] for dy, dx in steps], axis=0)
 
 
-def _add_rings(texture: np.ndarray, known: np.ndarray, count: int, labels: np.ndarray | None) -> np.ndarray:
+def add_rings(texture: np.ndarray, known: np.ndarray, count: int, labels: np.ndarray | None = None) -> np.ndarray:
     """A copy with `count` rings around the known texels filled; a texel with a label continues that island alone."""
     # A frame of unknown texels makes border checks unnecessary.
     result = np.pad(texture.astype(np.float32, copy=False), ((1, 1), (1, 1), (0, 0)))

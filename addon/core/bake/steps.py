@@ -15,9 +15,9 @@ from ..progress import Progress
 from ..scene.chart import Chart
 from .bake_settings import BakeSettings
 from .estimate import simulation_seconds
+from .finish import finished_texture
 from .job import BakeJob, Step
 from .layers import LAYERS, WITHOUT_MEDIUM
-from .margin import with_margin
 from .surface import Surface
 
 SUNS, NARROW, WIDE = range(3)
@@ -105,9 +105,7 @@ class Solve(Step):
         if not all(np.isfinite(on_grid).all() for on_grid in values):
             text = "The bake produced values that are not numbers."
             raise BakeError(text, "Check the strengths of the lights.")
-        texture = job.receiver.to_texture(values)
-        del values  # large
-        return replace(job, texture=with_margin(job.receiver, texture, settings.margin))
+        return replace(job, texture=finished_texture(job.receiver, values, material, settings))
 
     def memory_bytes(self, job: BakeJob) -> float:
         texels, lights, surface = job.receiver.coverage.size, job.illumination.lights, job.surface

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..bake.bake_settings import COMBINED, BakeSettings
+from ..bake.finish import finished_texture
 from ..bake.layers import spread
-from ..bake.margin import with_margin
 from ..bake.surface import channel_media
 from ..ldf.albedo import albedo_from_reflectance
 from ..ldf.library import load_source
@@ -128,8 +128,7 @@ class LiveRenderer:
         illumination = with_bounced(target, framed.receiver, progress)
         rest = material, sources, target.settings, progress
         values = [spread(chart.grid, illumination, *rest) for chart in framed.receiver.charts]
-        texture = framed.receiver.to_texture(values)
-        texture = with_margin(framed.receiver, texture, target.settings.margin)
+        texture = finished_texture(framed.receiver, values, material, target.settings)
         news = [message for message in illumination.messages if message not in target.illumination.messages]
         messages = (*self._mesh(target).messages, *news)
         return Rendering(target.target, texture, framed, is_exact=True, messages=messages)

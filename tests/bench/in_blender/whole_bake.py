@@ -75,7 +75,7 @@ def phases(folder):
     time_calls("extract", bakes, "prepare_scene")
     time_calls("library from the cache", layers, "_libraries")
     time_calls("light and solution", layers, "spread")
-    time_calls("margin", steps, "with_margin")
+    time_calls("margin", steps, "finished_texture")
     time_calls("image file", files, "write_file")
     time_calls("unregister", blender, "unregister")
     batch.run(["--output", folder, "--report", str(Path(folder) / "report.json")])
