@@ -9,7 +9,7 @@ logs=$pictures/logs
 
 "$root/tools/build.sh"
 package=$root/build/stage/beamspread
-mkdir -p "$logs"
+mkdir -p "$logs" "$pictures/baked"
 
 # step NAME COMMAND...: its output goes to a log, which is shown after a failure.
 step() {
@@ -25,12 +25,13 @@ step() {
     printf '%4d s\n' $((SECONDS - begin))
 }
 
-bake() { # SCENE [batch options]
-    local scene=$1
+bake() { # SCENE [batch options]; a copy of the scene keeps the UV maps that the bake makes
+    local scene=$1 copy=$pictures/baked/$1.blend
     shift
-    step "bake $scene" blender -b --factory-startup "$here/$scene.blend" --python-exit-code 1 \
-        --python "$package/batch.py" -- --output "$pictures/baked/$scene" --report "$pictures/baked/$scene.json" "$@"
-    step "render $scene" blender -b --factory-startup "$here/$scene.blend" --python-exit-code 1 \
+    cp "$here/$scene.blend" "$copy"
+    step "bake $scene" blender -b --factory-startup "$copy" --python-exit-code 1 --python "$package/batch.py" -- \
+        --save --output "$pictures/baked/$scene" --report "$pictures/baked/$scene.json" "$@"
+    step "render $scene" blender -b --factory-startup "$copy" --python-exit-code 1 \
         --python "$here/render_examples.py" -- "$pictures/baked/$scene.json" "$pictures"
 }
 
@@ -42,6 +43,9 @@ bake low_sun --no-indirect
 bake soapstone
 bake stage
 bake shop_window
+bake soap_bar
+bake plank_floor
+bake acrylic_letters
 step "plot obstacle_cut" env PYTHONPATH="$root/build/stage" MPLBACKEND=Agg "$root/build/venv/bin/python" \
     "$here/cut_plot.py" "$pictures/baked/obstacle.json" "$here/cycles_edge.csv" "$pictures/obstacle_cut.png"
 cat "$logs/plot_obstacle_cut.log"

@@ -24,11 +24,12 @@ render low_sun with_diffusion.py "$pictures/low_sun_with_diffusion.png" 1024
 beside low_sun "$pictures/low_sun.png" "Beamspread: light goes on the way it was going" \
     "$pictures/low_sun_with_diffusion.png" "Cycles, subsurface scattering: it spreads evenly"
 
-for scene in soapstone stage shop_window; do
+for scene in soapstone stage shop_window soap_bar plank_floor acrylic_letters; do
     render "$scene" with_diffusion.py "$pictures/${scene}_diffuse.png" 64 diffuse
 done
-beside soapstone "$pictures/soapstone.png" "Beamspread" "$pictures/soapstone_diffuse.png" "Cycles, diffuse"
-beside shop_window "$pictures/shop_window.png" "Beamspread" "$pictures/shop_window_diffuse.png" "Cycles, diffuse"
+for scene in soapstone shop_window soap_bar plank_floor acrylic_letters; do
+    beside "$scene" "$pictures/$scene.png" "Beamspread" "$pictures/${scene}_diffuse.png" "Cycles, diffuse"
+done
 
 render stage with_volume.py "$pictures/stage_by_volume.png" \
     "$pictures/baked/stage/Stage_floor_Milky_acrylic.exr" 384

@@ -15,11 +15,14 @@ from mathutils import Vector
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "build" / "stage")]
 
+import acrylic_letters  # noqa: E402
 import beamspread  # noqa: E402
 import low_sun  # noqa: E402
 import marble_floor  # noqa: E402
+import plank_floor  # noqa: E402
 import scene_parts as parts  # noqa: E402
 import shop_window  # noqa: E402
+import soap_bar  # noqa: E402
 import soapstone  # noqa: E402
 import stage  # noqa: E402
 
@@ -86,11 +89,14 @@ def obstacle():
 def main():
     beamspread.register()
     scenes = {
+        "acrylic_letters": acrylic_letters.build,
         "laser_beams": laser_beams,
         "obstacle": obstacle,
         "marble_floor": marble_floor.build,
         "low_sun": low_sun.build,
+        "plank_floor": plank_floor.build,
         "soapstone": soapstone.build,
+        "soap_bar": soap_bar.build,
         "stage": stage.build,
         "shop_window": shop_window.build,
     }

@@ -49,6 +49,8 @@ def replace(tree, node, subsurface):
         "Roughness": 0.1,
     }.items():
         bsdf.inputs[name].default_value = value
+    if node.inputs["Base Color"].is_linked:
+        tree.links.new(bsdf.inputs["Base Color"], node.inputs["Base Color"].links[0].from_socket)
     tree.links.new(bsdf.outputs["BSDF"], tree.get_output_node("CYCLES").inputs["Surface"])
 
 

@@ -4,7 +4,11 @@ from pathlib import Path
 
 import bpy
 import pytest
+from beamspread.blender.jobs.run.bake_plan import read_scene
 from beamspread.blender.jobs.run.batch_run import bake_all
+from beamspread.blender.node.find import find_bakeable
+from beamspread.blender.node.uv_maps import objects_with_maps
+from beamspread.blender.read.geometry import OWN_MAP
 from beamspread.blender.read.lights import read_illumination
 from beamspread.core.batch.batch_options import parse
 
@@ -18,7 +22,11 @@ KINDS = {
     "soapstone": ["WorldLight"],
     "stage": ["AreaLight"] + ["SpotLight"] * 4,
     "shop_window": ["AreaLight"] * 2 + ["MeshLight"] * 9,
+    "soap_bar": ["PointLight", "WorldLight"],
+    "plank_floor": ["SunLight", "WorldLight"],
+    "acrylic_letters": ["SpotLight", "WorldLight"],
 }
+PLANES = {"soap_bar": 6, "plank_floor": 35, "acrylic_letters": 6}
 
 
 def test_all_are_listed():
@@ -33,10 +41,22 @@ def test_all_light_is_understood(name):
     assert sorted(type(light).__name__ for light in illumination.lights) == KINDS[name]
 
 
+@pytest.mark.parametrize("name", PLANES)
+def test_objects_of_many_planes_get_a_map(name):
+    """They come without a UV map that fits into one image, as artists have them."""
+    bpy.ops.wm.open_mainfile(filepath=str(FOLDER / f"{name}.blend"))
+    targets = find_bakeable(bpy.context.view_layer)
+    assert not objects_with_maps()
+    (plan,) = read_scene(bpy.context, targets)
+    assert objects_with_maps() == {plan.target.object_name}
+    assert (len(plan.mesh.parts), plan.mesh.uv_map) == (PLANES[name], OWN_MAP)
+    assert len(plan.mesh.messages) == 1 + (name == "soap_bar")  # the new map; the bevel is flattened
+
+
 @pytest.mark.parametrize("name", KINDS)
 def test_all_are_baked(name, tmp_path):
-    # Glowing meshes of the marble floor would send bounced light to Cycles, which takes long.
-    arguments = ["--no-indirect"] if name == "marble_floor" else []
+    # Bounced light takes long: Cycles would find that of the marble floor, and the planks lie in a room.
+    arguments = ["--no-indirect"] if name in ("marble_floor", "plank_floor") else []
     bpy.ops.wm.open_mainfile(filepath=str(FOLDER / f"{name}.blend"))
     bpy.context.scene.beamspread.quality = "preview"
     report = bake_all(parse([*arguments, "--resolution", "64", "--output", str(tmp_path)]))

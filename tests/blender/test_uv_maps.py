@@ -295,14 +295,18 @@ def test_objects_of_one_material_with_different_maps_are_named():
 
 @pytest.mark.parametrize("saves", [False, True])
 def test_a_batch_says_that_a_new_map_is_not_saved_or_saves_it(saves, tmp_path):
-    add_box(uvs=False)
+    set_uvs(add_box().data, np.tile([(0, 0), (1, 0), (1, 1), (0, 1)], (6, 1)))
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
     options = "--output", tmp_path, "--resolution", 32, *["--save"] * saves
     done = subprocess.run(scenes.batch_command(tmp_path / "scene.blend", *options), capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert ("lacks the new UV map" in done.stdout) == (not saves)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
-    assert (OWN_MAP in bpy.data.objects["Cube"].data.uv_layers) == saves
+    cube = bpy.data.objects["Cube"]
+    assert (OWN_MAP in cube.data.uv_layers) == saves
+    # The image, once it is chosen in the node, appears by the new map.
+    inner = scenes.node_of(cube.data.materials[0]).node_tree
+    assert inner.nodes["Image"].inputs["Vector"].is_linked == saves
 
 
 def test_live_asks_for_a_bake_and_then_follows():

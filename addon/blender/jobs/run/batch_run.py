@@ -11,6 +11,7 @@ from pathlib import Path
 
 import bpy
 
+from ....core.bake.bake_settings import COMBINED
 from ....core.bake.runner import CANCELLED, SKIPPED, WRITTEN, Bake, Sink, run_bakes
 from ....core.batch.batch_options import BatchOptions
 from ....core.batch.report import BakeRecord, Inventory, PreviousReport, Report
@@ -22,6 +23,7 @@ from ...images.facts import attributes_of, record_of_bake
 from ...images.files import file_of, size_of
 from ...images.outputs import Outputs
 from ...node.find import NOTHING_FOUND, find_bakeable, find_misplaced, node_of, uses_tiles
+from ...node.tree import keep_map
 from ...node.uv_maps import objects_with_maps
 from ...read.geometry import OWN_MAP
 from ...read.visibility import by_name
@@ -112,6 +114,9 @@ class _Batch(Sink):
         # The size of the image is no part of a sequence.
         parts = {name: digest for name, digest in self._parts.get(bake.target, {}).items() if name != IMAGE}
         attributes = attributes_of(replace(record_of_bake(bake, parts), notes=(), ratios={})) if parts else {}
+        node = node_of(bake.target)
+        if self._options.save and self._settings.layer == COMBINED and node is not None and node.node_tree is not None:
+            keep_map(node.node_tree, bake.job.receiver.uv_map)
         return self._outputs.write(bake, self._frame, attributes)
 
     def end(self, bake: Bake) -> None:
