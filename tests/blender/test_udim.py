@@ -7,7 +7,8 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from beamspread.blender.jobs.state import state
+from beamspread.blender.jobs.out_of_date import stale
+from beamspread.blender.jobs.state import Status, state
 from beamspread.core.native import native
 from live_scenes import live_lines, settle
 from nodes import Nodes
@@ -256,6 +257,75 @@ def test_objects_share_tiles(tmp_path):
     assert state.lines() == []
 
 
+def test_objects_of_one_material_share_a_new_image(tmp_path):
+    """The first bake makes the image, the second one adds a tile; both have one size in the tile that they share."""
+    settings = bpy.context.scene.beamspread
+    settings.use_udim = True
+    material = scenes.add_material(linked=True)
+    scenes.node_of(material).preset = "marble"
+    first = add_quads([((-3, -3), 1.2)], [((0, 0), 0.4)], material, "First")
+    second = add_quads([((1, 0), 0.5), ((1, 1), 0.5)], [((0.5, 0.5), 0.4), ((1, 0), 1)], material, "Second")
+    scenes.select(first, second)
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    image = scenes.image_of(first)
+    sizes = {tile.number: tuple(tile.size) for tile in image.tiles}
+    assert sizes == {1001: (2048, 2048), 1002: (512, 512)}
+    texels = read(tile_file(tmp_path, 1001, "First_Medium"))
+    assert texels[100:700, 100:700].min() > 0
+    assert texels[1100:1700, 1100:1700].min() > 0
+    assert state.lines() == []
+
+
+def test_a_tiled_bake_is_up_to_date_until_something_changes(tmp_path):
+    quads = four_planes(tiled_image(tmp_path))
+    scenes.select(quads)
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    scenes.reopen(tmp_path)
+    stale.refresh(bpy.context)
+    (row,) = state.rows.values()
+    assert (row.status, row.messages) == (Status.BAKED, ())
+    tile_file(tmp_path, 1011).unlink()
+    scenes.reopen(tmp_path)
+    stale.refresh(bpy.context)
+    (row,) = state.rows.values()
+    assert "image file (missing)" in str(row.messages[0])
+
+
+def test_tiles_of_another_scene_stay(tmp_path):
+    """After Save As, the new scene's first bake makes files of its own."""
+    bpy.context.scene.beamspread.use_udim, bpy.context.scene.beamspread.resolution = True, 32
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "first.blend"))
+    quads = four_planes(None)
+    scenes.select(quads)
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "first.blend"))
+    before = {path: path.read_bytes() for path in tmp_path.glob("*.exr")}
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "second.blend"))
+    bpy.data.objects["Lamp"].location.x = -0.5
+    scenes.select(quads)
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    assert len(before) == 4
+    assert {path: path.read_bytes() for path in before} == before
+    image = scenes.image_of(quads)
+    assert image.filepath.endswith("Quads_Medium_2.<UDIM>.exr")
+    assert {tile.number: tuple(tile.size) for tile in image.tiles} == dict.fromkeys(SIZES, (32, 32))
+    (line,) = [line for line in state.lines() if "belongs to" in line]
+    assert "'Quads_Medium.<UDIM>.exr' belongs to 'first.blend'" in line
+
+
+def test_irradiance_has_tiles_of_its_own(tmp_path):
+    """Twice: the second time they are there already."""
+    quads = four_planes(tiled_image(tmp_path))
+    bpy.context.scene.beamspread.output = "IRRADIANCE"
+    for _ in range(2):
+        scenes.select(quads)
+        assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    assert not read(tile_file(tmp_path, 1001)).any()
+    files = sorted(path.name for path in tmp_path.glob("*Irradiance*"))
+    assert files == [f"Tiles.1001.exr_Irradiance.{number}.exr" for number in SIZES]
+    assert all(read(tmp_path / name).any() for name in files)
+
+
 def test_a_batch_writes_tiles_and_lists_them(tmp_path):
     four_planes(tiled_image(tmp_path))
     out = tmp_path / "out"
@@ -273,6 +343,10 @@ def test_a_batch_writes_tiles_and_lists_them(tmp_path):
         assert (entry["width"], entry["height"]) == (24, 24)
         assert [read(file).shape for file in entry["files"]] == [(24, 24, 3)] * 2 + [(24, 19, 3), (24, 24, 3)]
     assert not read(tile_file(tmp_path, 1001)).any()
+    (out / "Quads_Medium_0003.1011.exr").unlink()
+    done = subprocess.run([*command, "--resume"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert [entry["status"] for entry in json.loads(report.read_text())["bakes"]] == ["skipped", "written"]
     done = subprocess.run(scenes.batch_command(tmp_path / "scene.blend"), capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert all(read(tile_file(tmp_path, number)).any() for number in SIZES)

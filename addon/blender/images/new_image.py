@@ -69,9 +69,9 @@ def separate_from_other_scene(image) -> tuple[Message, ...]:
         The file can't be written.
     """
     path = files.file_of(image)
-    owner = _scene_of(path) if path is not None and bpy.data.filepath else None
-    if owner is None or owner == Path(bpy.data.filepath).resolve() or not owner.exists():
-        return ()  # a missing owner was renamed or moved: it is this scene
+    owner = None if path is None else other_owner(path)
+    if owner is None:
+        return ()
     new_path, made_for = _new_file(image.name)
     files.make_folder(new_path.parent)
     files.write_exr(new_path, files.linear_pixels(image), {files.MADE_FOR: made_for}, like=path)
@@ -81,10 +81,12 @@ def separate_from_other_scene(image) -> tuple[Message, ...]:
     return (warning(image.name, text),)
 
 
-def _scene_of(path: Path) -> Path | None:
-    """The .blend file that the image file belongs to, or None."""
+def other_owner(path: Path) -> Path | None:
+    """The other .blend file that the image file belongs to; None if it belongs to this one, or to none."""
     scene, separator, _name = files.made_for(path).partition(": ")
-    return (path.parent / scene).resolve() if separator else None
+    owner = (path.parent / scene).resolve() if separator and bpy.data.filepath else None
+    # A missing owner was renamed or moved: it is this scene.
+    return None if owner is None or owner == Path(bpy.data.filepath).resolve() or not owner.exists() else owner
 
 
 def _new_file(name: str) -> tuple[Path, str]:

@@ -18,7 +18,7 @@ from ..node.find import find_targets, image_of
 from ..read.visibility import with_instanced
 from . import files, tiled
 from .results import Results
-from .udim import TOKEN, is_tiled, tile_sizes
+from .udim import is_tiled, tile_sizes, tiles_path
 
 
 class Outputs:
@@ -45,7 +45,7 @@ class Outputs:
         if tiling is None:
             files.write_file(path, texture, _format_of(path), frame_attributes, view_of=self._view_of)
         else:
-            path = path.with_name(f"{path.stem}.{TOKEN}{path.suffix}")
+            path = tiles_path(path)
             tiled.write_tiles(path, texture, tiling, frame_attributes, self._view_of)
         if path.suffix == files.EXTENSIONS["PNG"] and texture.max() > 1 and self._view_of is None:
             bake.warn(path.name, f"'{path.name}' clips values above 1.", "EXR keeps them.")

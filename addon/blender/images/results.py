@@ -105,7 +105,8 @@ class Results:
         image = node.image
         if image is None:
             return self._new(bake, texture)
-        bake.messages.add(*separate_from_other_scene(image))
+        separate = tiled.separate_from_other_scene if is_tiled(image) else separate_from_other_scene
+        bake.messages.add(*separate(image))
         path = self.fill_shown(image, bake, texture)
         if path is not None:
             return path, image

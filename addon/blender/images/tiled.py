@@ -11,11 +11,12 @@ import numpy as np
 from ...core.bake.runner import Bake
 from ...core.disk import stem
 from ...core.errors import ImageError
+from ...core.messages import Message, warning
 from ...core.scene.tiles import Tiling
 from . import files, icons, undo
 from .facts import file_of
-from .new_image import free_name, has_folder, made_for_scene, point_to
-from .udim import TOKEN, file_of_tile, is_tiled, planned_sizes, tile_sizes
+from .new_image import free_name, has_folder, made_for_scene, other_owner, point_to
+from .udim import TOKEN, file_of_tile, files_of, is_tiled, planned_sizes, tile_sizes
 
 
 def check_sizes(image, tiling: Tiling) -> None:
@@ -128,6 +129,25 @@ def store_new(name: str, texture: np.ndarray, bake: Bake, is_data: bool = False)
     image.colorspace_settings.is_data = is_data
     _show_files(image, path, tiling)
     return str(path), image
+
+
+def separate_from_other_scene(image) -> tuple[Message, ...]:
+    """Give tiles files of their own if they belong to another .blend file, as after Save As; a warning then.
+
+    Raises
+    ------
+    ImageError
+        The files can't be written.
+    """
+    owner = next(filter(None, (other_owner(file) for file in files_of(image) if file.is_file())), None)
+    if owner is None:
+        return ()
+    former, (folder, made_for) = file_of(image), made_for_scene(image.name)
+    tiling, path = Tiling(tuple(sorted(tile_sizes(image).items()))), _free_path(folder, stem([image.name]), made_for)
+    write_tiles(path, linear_pixels(image, tiling), tiling, {files.MADE_FOR: made_for})
+    _show_files(image, path, tiling)
+    text = f"'{former.name}' belongs to '{owner.name}': the image '{image.name}' now has the files '{path.name}'."
+    return (warning(image.name, text),)
 
 
 def check_folder() -> None:

@@ -22,6 +22,11 @@ def file_of_tile(path: Path, number: int) -> Path:
     return path.with_name(path.name.replace(TOKEN, str(number)))
 
 
+def tiles_path(path: Path) -> Path:
+    """Path with the token for the tiles of a result that has this path as one image."""
+    return path.with_name(f"{path.stem}.{TOKEN}{path.suffix}")
+
+
 def tile_sizes(image) -> dict[int, tuple[int, int]]:
     """Width and height of each tile that has pixels, by its number."""
     return {tile.number: tuple(tile.size) for tile in image.tiles if 0 not in tile.size}

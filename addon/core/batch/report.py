@@ -147,6 +147,21 @@ class PreviousReport:
             return None
         return replace(record, status=SKIPPED, message=record.message or KEPT)
 
+    def skipped_tiles(self, wanted: BakeRecord, resolution: int | None) -> BakeRecord | None:
+        """The record of a bake of UDIM tiles that can be skipped, or None: the report must have it, and its files.
+
+        The caller checks that the files are complete. `resolution`: texels along the longer side, None for any.
+        """
+        record = self._records.get((wanted.object, wanted.material, wanted.frame))
+        if record is None or not record.files or record.status not in (WRITTEN, SKIPPED):
+            return None
+        paths = [Path(file) for file in record.files]
+        is_new = all(path.is_file() and path.stat().st_mtime > self._since for path in paths)
+        same = all(getattr(record, name) == getattr(wanted, name) for name in ("path", "output", "indirect"))
+        if not (is_new and same) or resolution not in (None, max(record.width, record.height)):
+            return None
+        return replace(record, status=SKIPPED, message=record.message or KEPT)
+
 
 def _entries(report: str | None) -> list[dict]:
     if report is None:

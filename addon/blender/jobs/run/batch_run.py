@@ -22,6 +22,7 @@ from ....core.target import Target
 from ...images.facts import attributes_of, record_of_bake
 from ...images.files import file_of, size_of
 from ...images.outputs import Outputs
+from ...images.udim import tiles_path
 from ...node.find import NOTHING_FOUND, find_bakeable, find_misplaced, node_of, uses_tiles
 from ...node.tree import keep_map
 from ...node.uv_maps import objects_with_maps
@@ -154,13 +155,19 @@ class _Batch(Sink):
     def _skipped(self, target: Target, image) -> BakeRecord | None:
         """The record of a file that an earlier run has written; `image` is the node's if its file is the target."""
         node = node_of(target)
-        if self._earlier is None or self._stop or (node is not None and uses_tiles(node)):
+        if self._earlier is None or self._stop:
             return None
         settings, resolution = self._settings, self._options.resolution
         try:
             path = self._outputs.path(target, settings.layer, self._frame) if image is None else file_of(image)
         except BakeError:
             return None  # the preparation names the error
+        if node is not None and uses_tiles(node):
+            path = path if image is not None else tiles_path(path)
+            wanted = BakeRecord(target.object_name, target.material_name, self._frame, str(path))
+            wanted.output, wanted.indirect = settings.output, settings.indirect
+            record = self._earlier.skipped_tiles(wanted, resolution)
+            return record if record is not None and all(size_of(Path(file)) for file in record.files) else None
         size = size_of(path)
         if size is None or (resolution is not None and max(size) != resolution):
             return None
