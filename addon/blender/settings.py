@@ -121,6 +121,15 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         max=1024,
         subtype="PIXEL",
     )
+    margin_type: EnumProperty(
+        name="Margin Type",
+        description="Content of the margin",
+        items=[
+            ("EXTEND", "Extend", "Each UV island goes on as at its border", 0),
+            ("ADJACENT_FACES", "Adjacent Faces", "Light of the face on the other side of the UV border", 1),
+        ],
+        default="EXTEND",
+    )
     output: EnumProperty(
         name="Output",
         description="Quantity to bake. Irradiance and Direction go to extra images, named after the node's",
@@ -230,6 +239,7 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
             threads=preferences.threads(),
             memory_limit=preferences.memory_limit(),
             margin=self.margin,
+            margin_type=self.margin_type,
             quality=self.quality,
             distributions=self.distributions.lower(),
             sample_folder=bpy.path.abspath(self.sample_folder),

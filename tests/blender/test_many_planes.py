@@ -17,7 +17,7 @@ MARGIN = 4
 def box():
     """A turned box with Blender's own UVs, a cross, above a floor, under a lamp and a grey sky."""
     settings = bpy.context.scene.beamspread
-    settings.use_indirect, settings.margin = False, MARGIN
+    settings.use_indirect, settings.margin, settings.resolution = False, MARGIN, 256
     image = bpy.data.images.new("Target", SIDE, SIDE, float_buffer=True, alpha=False)
     material = scenes.add_material(image=image, linked=True)
     bpy.ops.mesh.primitive_cube_add(size=1.0)

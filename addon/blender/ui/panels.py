@@ -95,6 +95,7 @@ class BEAMSPREAD_PT_expert(RenderPanel, bpy.types.Panel):
         _use_columns(self.layout)
         column = self.layout.column()
         settings = context.scene.beamspread
+        column.prop(settings, "margin_type")
         column.prop(settings, "margin")
         column.prop(settings, "samples")
         if settings.output != "LUMINANCE":

@@ -13,6 +13,9 @@ PREVIEW, FINAL = "preview", "final"
 OUTPUTS = {"LUMINANCE": COMBINED, "IRRADIANCE": IRRADIANCE, "DIRECTION": DIRECTION}
 """Layers by their names for users."""
 
+EXTEND, ADJACENT_FACES = "EXTEND", "ADJACENT_FACES"
+"""Margins that continue each island, and margins with the light beyond the edges of islands."""
+
 
 @dataclass(frozen=True)
 class BakeSettings:
@@ -22,7 +25,8 @@ class BakeSettings:
     ----------
     solver : "fft", "direct" or "adaptive".
     samples : side of the grid of points per texel at which visibility is sampled.
-    margin : texels that continue the result around the charts.
+    margin : texels around the islands that continue the result.
+    margin_type : `EXTEND`, or `ADJACENT_FACES`.
     quality : quality of the LDF, "final" or "preview".
     distributions : "library" simulates the material; "angular", "adaptive" and "planar" interpolate the samples in
         `sample_folder`, which then replace anisotropy, index of refraction and thickness of every material.
@@ -35,6 +39,7 @@ class BakeSettings:
     solver: str = "fft"
     samples: int = 4
     margin: int = 16
+    margin_type: str = EXTEND
     quality: str = "final"
     distributions: str = "library"
     sample_folder: str = ""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..bake.bake_settings import COMBINED, BakeSettings
-from ..bake.finish import finished_texture
+from ..bake.finish import finished_texture, with_seams
 from ..bake.layers import spread
 from ..bake.surface import channel_media
 from ..ldf.albedo import albedo_from_reflectance
@@ -232,9 +232,9 @@ class LiveRenderer:
 
     def _receiver(self, target: LiveTarget, size: tuple[int, int]) -> FramedReceiver:
         mesh = self._mesh(target)
-        key = id(mesh), id(target.texture), size, target.settings.margin
+        key = id(mesh), id(target.texture), size, target.settings.margin, target.settings.margin_type
         if key not in self._receivers:
-            receiver = build_receiver(mesh, *size, target.target.object_name)
+            receiver = with_seams(build_receiver(mesh, *size, target.target.object_name), mesh, target.settings)
             if target.texture is not None:
                 receiver = target.texture.on(receiver)
             framed = FramedReceiver(receiver, target.settings.margin)

@@ -17,6 +17,7 @@ from .chart import Chart, ChartIsland, in_chart
 from .flat_mesh import FlatMesh, FlatPart
 from .grid import Grid
 from .islands import Island
+from .seams import Seams
 from .tiles import Place, Tiling
 
 # Overlap with an island, in texels, below which texels at its border are not part of it: rounding of float32 UVs.
@@ -43,12 +44,14 @@ class Receiver:
     charts : flat parts, the largest first.
     uv_map : name of the UV map; "" is the one that renders.
     tiling : UDIM tiles of which the texture consists; None for one image.
+    seams : edges of the islands; None if margins need none.
     """
 
     coverage: np.ndarray
     charts: tuple[Chart, ...]
     uv_map: str = ""
     tiling: Tiling | None = None
+    seams: Seams | None = None
 
     @property
     def height(self) -> int:

@@ -92,6 +92,8 @@ def settings_part(scene, solver: str | None = None, indirect: bool | None = None
         [getattr(scene.cycles, name, None) for name in BOUNCES] if use_indirect and hasattr(scene, "cycles") else []
     )
     values = [solver or settings.solver, settings.distributions, settings.samples, settings.margin, use_indirect]
+    if settings.margin_type != "EXTEND":
+        values.append(settings.margin_type)
     return digest(values, compat.transparent_bounces(scene), *bounces)
 
 

@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 
 from ....core.bake.bake_settings import COMBINED, BakeSettings
+from ....core.bake.finish import with_seams
 from ....core.bake.forecast import Finders, Forecast
 from ....core.bake.job import BakeJob
 from ....core.bake.runner import Bake
@@ -98,6 +99,7 @@ class BakePlan:
         """The bake, with its job or the error; call it in the main thread."""
         try:
             receiver = build_receiver(self.mesh, *self.size, self.target.object_name)
+            receiver = with_seams(receiver, self.mesh, settings)
             messages = *self.mesh.messages, *receiver.messages(self.target.object_name)
             illumination = self.illumination.lighting(self.target.object_name).with_messages(*messages)
             job = BakeJob(
