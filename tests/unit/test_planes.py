@@ -1,5 +1,7 @@
 """Planes and islands: any set of flat faces with clean UVs becomes charts; bent faces are named."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from beamspread.core.errors import ReceiverError
@@ -284,3 +286,43 @@ def test_a_few_flat_faces_do_not_make_a_ball_flat():
     chip = np.array([(3, 0, 0), (3.2, 0, 0), (3.2, 0.2, 0), (3, 0.2, 0.0)])
     with pytest.raises(ReceiverError, match="not flat"):
         flatten(mesh_of([*faces, chip], [SQUARE * 1e-3] * (len(faces) + 1)))
+
+
+def test_a_warped_face_is_refused_alone_and_baked_as_triangles_beside_flat_ones():
+    warped = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0.2), (0, 1, 0.0)])
+    with pytest.raises(ReceiverError, match=r"not flat: the corners of each are not on a plane\. Triangulate"):
+        flatten(mesh_of([warped], [SQUARE]))
+    # The advice works.
+    triangles = [warped[[0, 1, 2]], warped[[0, 2, 3]]]
+    assert len(flatten(mesh_of(triangles, [SQUARE[[0, 1, 2]], SQUARE[[0, 2, 3]]])).parts) == 2
+    faces, uvs = [*box()[:5], warped + (3, 0, 0)], atlas(6)
+    mesh = flatten(replace(mesh_of(faces, uvs), tiles=np.array([1001] * 5 + [1012])), name="Box")
+    assert [part.islands[0].tile for part in mesh.parts].count(1012) == 2
+    mesh = flatten(mesh_of(faces, uvs), name="Box")
+    assert len(mesh.parts) == 7
+    assert not mesh.messages
+    receiver = build_receiver(mesh, 96, 96)
+    texture = receiver.to_texture([np.float32(chart.grid.positions()) for chart in receiver.charts])
+    column, row = ([0.75, 0.25] @ uvs[5][[1, 3]] * 96).astype(int)
+    assert texture[row, column] == pytest.approx(0.75 * warped[1] + 0.25 * warped[3] + (3, 0, 0), abs=0.06)
+
+
+def test_noise_may_have_outliers():
+    """Gaussian noise of a millimetre over a square metre: the largest is four times the deviation."""
+    noise = 1e-3 * np.random.default_rng(1).normal(size=(101, 101))
+    mesh = flatten(mesh_of(*heights(lambda _x, _y: noise, 100)), mean_free_path=4e-4, name="Scan")
+    (part,) = mesh.parts
+    assert len(part.plane.faces) == 100**2
+    assert part.plane.deviation == pytest.approx(4e-3, rel=0.1)
+
+
+def test_a_small_bent_part_is_no_noise():
+    """Half of a thin pipe on a large plate, as far from its plane as noise may be."""
+    turns = np.linspace(0, np.pi, 13)
+    arc = 4e-3 * np.stack([np.cos(turns), np.sin(turns)], 1) + (0, 0.01)
+    pipe = [
+        np.array([(a[0], 0, a[1]), (a[0], 1, a[1]), (b[0], 1, b[1]), (b[0], 0, b[1])]) for a, b in zip(arc, arc[1:])
+    ]
+    plate = np.array([(-1, -1, 0), (1, -1, 0), (1, 2, 0), (-1, 2, 0.0)])
+    planes, _ = find_planes(mesh_of([*pipe, plate]), 1e-3 * 3.6 / 5)
+    assert all(plane.deviation <= 1e-3 for plane in planes)

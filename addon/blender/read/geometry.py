@@ -111,9 +111,8 @@ class OccluderReader:
 
 def lost_triangles(name: str, count: int) -> Message:
     """Warning about triangles of an object whose vertices are at no finite position."""
-    text = (
-        f"{count} triangles of '{name}' are left out: they have vertices whose positions are infinite or not numbers."
-    )
+    triangles = "triangle is" if count == 1 else "triangles are"
+    text = f"{count} {triangles} left out of '{name}': the positions of vertices are infinite or not numbers."
     return warning(name, text, finite_remedy(name))
 
 
@@ -224,7 +223,7 @@ def read_polygons(obj, material_name: str, matrix=None, uv_map: str = "", is_til
     Raises
     ------
     ReceiverError
-        The object has no UV map of that name, is at no finite position, or has more faces than fit into the memory; a
+        The object has no faces, no UV map of that name, no finite position or more faces than fit into the memory; a
         face crosses the border of a tile.
     """
     matrix = obj.matrix_world if matrix is None else matrix
@@ -235,6 +234,10 @@ def read_polygons(obj, material_name: str, matrix=None, uv_map: str = "", is_til
 
     mesh = obj.to_mesh()
     try:
+        if not len(mesh.polygons):
+            raise ReceiverError(
+                f"'{obj.name}' has no faces.", "Fill its edges (Edit Mode: A, then F), or check modifiers."
+            )
         chosen = faces_with(obj, mesh, {material_name})
         if uv_map:
             uvs = _uvs_by_name(obj, mesh, uv_map)

@@ -4,8 +4,37 @@ from __future__ import annotations
 
 import numpy as np
 
+from .polygons import Polygons
+
 # Number of corners above which a polygon with notches becomes a fan. Time is in proportion to its cube at worst.
 MAX_CORNERS = 1000
+
+
+def with_triangles(polygons: Polygons, chosen: np.ndarray) -> Polygons:
+    """Polygons with the triangles of the chosen faces (an index), as renderers show them, after the other faces."""
+    is_chosen = np.zeros(polygons.count, bool)
+    is_chosen[chosen] = True
+    rest = polygons.of_faces(np.flatnonzero(~is_chosen))
+    parts, owners = [], []
+    for face in np.flatnonzero(is_chosen).tolist():
+        corners = np.arange(polygons.starts[face], polygons.starts[face + 1])
+        parts.append(corners[triangles_of_face(polygons.corners[corners], polygons.area_vectors[face])].ravel())
+        owners += [face] * (len(parts[-1]) // 3)
+    corners, owners = np.concatenate([*parts, np.zeros(0, int)]), np.array(owners, int)
+    points = np.concatenate([rest.corners, polygons.corners[corners]])
+    uvs = None if polygons.uvs is None else np.concatenate([rest.uvs, polygons.uvs[corners]])
+    starts = np.concatenate([rest.starts, rest.starts[-1] + 3 * np.arange(1, len(owners) + 1)])
+    numbers = np.arange(polygons.count) if polygons.numbers is None else polygons.numbers
+    numbers = np.concatenate([rest.numbers, numbers[owners]])
+    normals = np.concatenate([rest.normals, polygons.normals[owners]])
+    tiles = None if polygons.tiles is None else np.concatenate([rest.tiles, polygons.tiles[owners]])
+    return Polygons(points, uvs, starts, normals, polygons.uv_map, numbers, tiles)
+
+
+def triangles_of_face(corners: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Corners of the triangles, int (M, 3), of a face (N, 3), as seen along a normal of any length."""
+    x_axis = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    return triangulated((corners - corners[0]) @ np.stack([x_axis, np.cross(normal, x_axis)], axis=1))
 
 
 def triangulated(points: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import ReceiverError
 from ..messages import Message, note, warning
+from .ears import with_triangles
 from .islands import NO_UV_AREA, Island, check_uvs, find_islands
 from .planes import FLATNESS_TOLERANCE, FLATTENED, Plane, find_planes
 from .polygons import Polygons
@@ -78,7 +79,15 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> 
         text = f"The positions of {polygons.listed(~polygons.is_finite)} are infinite or not numbers."
         raise ReceiverError(text, finite_remedy(name))
     tolerance = max(mean_free_path, FLATTENED * polygons.diagonal)
+    count = polygons.count
     planes, bent = find_planes(polygons, tolerance)
+    warped = bent[(polygons.sizes[bent] > 3) & (polygons.deviations[bent] > tolerance)]
+    if len(warped) == count:
+        text = "The faces are not flat: the corners of each are not on a plane."
+        raise ReceiverError(text, "Triangulate them (Edit Mode: Ctrl T), or use Mesh > Clean Up > Make Planar Faces.")
+    if len(warped):
+        polygons = with_triangles(polygons, warped)
+        planes, bent = find_planes(polygons, tolerance)
     if polygons.areas[bent].sum() > (1 - MIN_FLAT) * polygons.areas.sum():
         raise ReceiverError(
             "The faces are not flat: they bend from one to the next.",
@@ -112,7 +121,8 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> 
         remedy = f"Unwrap the mesh again{': ' + polygons.listed(is_lost) if is_lost.any() else ''}."
         messages.append(warning(name, text, remedy))
     if len(bent):
-        text = f"{len(bent)} of {polygons.count} faces of '{name}' are bent and stay black."
+        number = len(bent) if polygons.numbers is None else len(np.unique(polygons.numbers[bent]))
+        text = f"{number} of {count} faces of '{name}' are bent and stay black."
         remedy = f"Give them another material, or flatten them: {polygons.listed(bent)}."
         messages.append(warning(name, text, remedy))
     deviation = max(part.plane.deviation for part in parts)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import ReceiverError
 from ..native import native
-from .ears import triangulated
+from .ears import triangles_of_face
 from .planes import FLATNESS_TOLERANCE, Plane
 from .polygons import Polygons, components
 
@@ -129,9 +129,7 @@ def _of_triangles(piece: Polygons, plane: Plane, tolerance: float) -> list[Islan
 
 def _triangles(face: Polygons, plane: Plane) -> list[Polygons]:
     """Triangles with an area of a face on a plane."""
-    x_axis = np.cross(plane.normal, np.eye(3)[np.abs(plane.normal).argmin()])
-    flat = face.corners @ np.stack([x_axis, np.cross(plane.normal, x_axis)], axis=1)
-    corners = triangulated(flat - flat[0])
+    corners = triangles_of_face(face.corners, plane.normal)
     starts, normals = np.arange(0, corners.size + 1, 3), np.repeat(face.normals, len(corners), axis=0)
     triangles = Polygons(face.corners[corners.ravel()], face.uvs[corners.ravel()], starts, normals)
     return [triangle for triangle in _pieces(triangles, np.arange(triangles.count)) if triangle.areas.any()]

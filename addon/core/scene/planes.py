@@ -17,6 +17,11 @@ FLATNESS_TOLERANCE = 1e-4
 # scans.
 FLATTENED = 1e-3
 
+# Noise whose root mean square is within the distance above is flattened, too. Its largest distance from the plane,
+# and the least size of a part that is noisy rather than bent, over the distance above. More flattens more
+# outliers; fewer parts.
+OUTLIERS, MIN_NOISY = 5.0, 50.0
+
 # Area of a face that counts as none, over the squared diagonal of all faces.
 NO_AREA = 1e-10
 
@@ -63,8 +68,8 @@ class Plane:
 def find_planes(polygons: Polygons, tolerance: float) -> tuple[list[Plane], np.ndarray]:
     """Planes of a mesh, the largest first, and the numbers of the faces that belong to none, which are bent.
 
-    Faces that touch are flattened onto one plane if no corner is farther from it than the tolerance. Faces without area
-    are left out.
+    Faces that touch are flattened onto one plane if no corner is farther from it than the tolerance, or if the root
+    mean square of noise is within. Faces without area are left out.
 
     Raises
     ------
@@ -154,7 +159,12 @@ class _Part:
         heights = part.corners @ normal
         height = 0.5 * (heights.min() + heights.max())
         deviation = float(np.abs(heights - height).max())
-        if deviation > self.tolerance or (self.normals[faces] @ normal <= 0).any():
+        is_noise = (
+            deviation <= OUTLIERS * self.tolerance
+            and heights.std() <= self.tolerance
+            and np.sqrt(length) >= MIN_NOISY * self.tolerance
+        )
+        if not (deviation <= self.tolerance or is_noise) or (self.normals[faces] @ normal <= 0).any():
             return None
         centre = part.corners.mean(axis=0)
         return Plane(faces, centre + (height - centre @ normal) * normal, normal, deviation)

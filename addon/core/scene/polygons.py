@@ -147,9 +147,17 @@ class Polygons:
         numbers = np.unique(self.tiles).tolist()
         return {number: self.of_faces(np.flatnonzero(self.tiles == number)) for number in numbers}
 
+    @property
+    def deviations(self) -> np.ndarray:
+        """Largest distance of a corner from the mean plane of its face, float64 (N,)."""
+        normals = self.area_vectors / np.maximum(self.areas, 1e-300)[:, None]
+        heights = np.einsum("ij,ij->i", self.corners, normals[self.face_of])
+        means = sums(heights, self.starts) / np.maximum(self.sizes, 1)
+        return largest(np.abs(heights - means[self.face_of]), self.starts)
+
     def listed(self, faces: np.ndarray) -> str:
         """Words for faces (an index) by their numbers: "faces 2, 5 and 6 to 9"; the first few of many."""
-        numbers = np.sort(np.arange(self.count)[faces] if self.numbers is None else self.numbers[faces])
+        numbers = np.unique(np.arange(self.count)[faces] if self.numbers is None else self.numbers[faces])
         runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
         names = [name for run in runs for name in (map(str, run) if len(run) < 3 else [f"{run[0]} to {run[-1]}"])]
         names[MAX_LISTED:] = ["more"] * (len(names) > MAX_LISTED)
