@@ -96,6 +96,9 @@ def test_the_panel_tells_the_spread():
     marble_plane(1.0, "Small")
     scenes.select(*bpy.context.scene.objects[-2:])
     assert "The light spreads over 4.4 texels" in panel()
+    image = bpy.data.images.new("Fine", 1024, 1024, float_buffer=True)
+    scenes.select(marble_plane(2e-3, "Tiny", image=image))
+    assert "The light spreads over 4,400 texels" in panel()
 
 
 def test_a_diffuse_bake_is_named_in_panel_report_and_log(tmp_path):

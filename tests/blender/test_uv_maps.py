@@ -67,7 +67,7 @@ def test_a_map_that_does_not_fit_stays_and_another_one_is_used(problem):
     np.testing.assert_array_equal(uvs_of(box.data, "UVMap"), np.float32(values))
     (line,) = [line for line in state.lines() if OWN_MAP in line]
     assert problem in line
-    assert line.startswith(f"'Cube' has a new UV map '{OWN_MAP}', which its image uses.")
+    assert line.endswith(f" So 'Cube' has a new UV map '{OWN_MAP}', which its image uses.")
     assert (pixels > 0).any(axis=2).mean() > 0.5
 
 

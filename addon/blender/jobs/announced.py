@@ -270,7 +270,8 @@ def spread_lines(announced: dict[Target, Announced], targets: Iterable[Target]) 
     """How far light spreads in the images of targets, in texels; bakes in which it spreads less than a texel apart."""
     spreads = {target: announced[target].spread for target in targets if target in announced}
     shown = [spread.texels for spread in spreads.values() if spread is not None and not spread.is_diffuse]
-    least, most = (f"{texels:.2g}" for texels in (min(shown, default=0.0), max(shown, default=0.0)))
+    # Two digits, without exponent.
+    least, most = (f"{float(f'{texels:.2g}'):,.10g}" for texels in (min(shown, default=0.0), max(shown, default=0.0)))
     lines = [f"The light spreads over {least if least == most else f'{least} to {most}'} texels"] if shown else []
     diffuse = {target: spread for target, spread in spreads.items() if spread is not None and spread.is_diffuse}
     lines += [str(message) for target, spread in diffuse.items() for message in spread.messages(target.object_name)]

@@ -126,7 +126,7 @@ def _make(depsgraph, name: str, targets: list[Target], problem: str) -> Outcome:
                 "Apply the modifiers (Object > Apply > Visual Geometry to Mesh), and bake again.",
             )
         added = f"'{name}' has a new modifier '{MODIFIER}', which makes the UV map '{OWN_MAP}' for its image."
-    return note(name, f"{added} {problem}")
+    return note(name, f"{problem} So {added}")
 
 
 def _keeps_faces(depsgraph, obj) -> bool:
