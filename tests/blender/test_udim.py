@@ -357,7 +357,7 @@ def test_live_and_blenders_bake_say_that_they_have_no_tiles(tmp_path):
     quads = four_planes(image)
     bpy.context.scene.beamspread.use_live = True
     settle()
-    assert any("Live has no previews in UDIM tiles" in line for line in live_lines())
+    assert any("has UDIM tiles, in which Live has no previews" in line for line in live_lines())
     bpy.context.scene.beamspread.use_live = False
     tree = quads.data.materials[0].node_tree
     texture = tree.nodes.new("ShaderNodeTexImage")

@@ -270,7 +270,7 @@ def _image_size(material, image) -> tuple[int, int] | None:
     if image is None:
         return None
     if is_tiled(image):
-        raise ImageError(f"Live has no previews in UDIM tiles: '{image.name}' shows the last bake.")
+        raise ImageError(f"The image '{image.name}' has UDIM tiles, in which Live has no previews: they show a bake.")
     if image.source not in SINGLE:
         check_image(image)
     return None if 0 in image.size else tuple(image.size)

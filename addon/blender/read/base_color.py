@@ -81,7 +81,8 @@ def read_base_color(
     """
     to_local, images, links = np.array(instance.matrix.inverted_safe(), dtype=float), Images(), Links()
     width, height, uv_map = receiver.width, receiver.height, _uv_map(instance.obj)
-    side = _positions_along_texels(links, wanted, max(width, height))
+    sizes = [(width, height)] if receiver.tiling is None else receiver.tiling.sizes.values()
+    side = _positions_along_texels(links, wanted, max(map(max, sizes)))
     colors = []
     for chart in receiver.charts:
         total = np.zeros((chart.grid.height, chart.grid.width, 3), np.float32)
