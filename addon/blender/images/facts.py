@@ -157,10 +157,14 @@ def record_of(image, target: Target) -> Record | None:
     return record if record is not None and record.parts else None
 
 
-def owners_of(image) -> list[Target]:
-    """Targets whose results the image holds and that still show it, by their present names."""
+def owners_of(image, users: list[Target] | None = None) -> list[Target]:
+    """Targets whose results the image holds and that still show it, by their present names.
+
+    `users` is the result of `users_of`, if it is known.
+    """
     bakes = facts_of(image).bakes
-    users = users_of(image) if bakes else []
+    if users is None:
+        users = users_of(image) if bakes else []
     return list(dict.fromkeys(user for name in bakes for user in _known_as(name, users)))
 
 

@@ -28,6 +28,7 @@ class Results:
 
     def __init__(self) -> None:
         self._planned: dict[str, list[Target]] = {}  # targets by the name of their image, in the order of the run
+        self._maps: dict[Target, str | None] = {}  # as of `_map_of`
         self._parts: dict[tuple, Parts | None] = {}  # islands by target and size of the image
 
     def admit(self, bake: Bake) -> Bake:
@@ -77,9 +78,11 @@ class Results:
 
         `shown` is the image whose owners count: the node's, if `image` is beside it.
         """
-        if self._overlapping(image, bake, shown):
+        users = users_of(shown or image)
+        owners = self._other_owners(shown or image, bake, users)
+        if any(self._covers(owner, image, bake) for owner in owners):
             return None
-        neighbors = self._neighbors(image, bake, users_of(shown or image))
+        neighbors = self._neighbors(image, bake, owners, users)
         if neighbors:
             filled = texels_of(bake.target, bake.job.receiver, neighbors, bake.job.settings.margin)
             texture = np.where(filled[..., None], texture, _pixels_of(image, bake))
@@ -111,7 +114,8 @@ class Results:
         if path is not None:
             return path, image
         self._check_room(image, bake)
-        names = " and ".join(f"'{owner}'" for owner in self._overlapping(image, bake))
+        overlapping = (owner for owner in self._other_owners(image, bake) if self._covers(owner, image, bake))
+        names = " and ".join(f"'{owner}'" for owner in overlapping)
         path, new = self._new(bake, texture)
         text = (
             f"The image '{image.name}' belongs to {names}: '{bake.target}' overlaps it there and now has '{new.name}'."
@@ -133,8 +137,13 @@ class Results:
     def _warn_of_other_maps(self, image, bake: Bake) -> None:
         """Warn if another object of the same material shows its part of the image by another UV map."""
         target, uv_map = bake.target, bake.job.receiver.uv_map
+        self._maps[target] = uv_map
         for owner in owners_of(image):
-            if owner != target and owner.material_name == target.material_name and _map_of(owner) not in (None, uv_map):
+            if owner == target or owner.material_name != target.material_name:
+                continue
+            if owner not in self._maps:
+                self._maps[owner] = _map_of(owner)
+            if self._maps[owner] not in (None, uv_map):
                 bake.warn(
                     image.name,
                     f"'{owner.object_name}' and '{target.object_name}' share a material and have different UV maps: "
@@ -159,13 +168,13 @@ class Results:
             f"Another object is baked to the same part of the image '{name}'.", "Move the UVs of one of them."
         )
 
-    def _other_owners(self, image, bake: Bake) -> list[Target]:
-        """Other targets whose results the image holds, or that come first in this run."""
+    def _other_owners(self, image, bake: Bake, users: list[Target] | None = None) -> list[Target]:
+        """Other targets whose results the image holds, or that come first in this run; `users` as of `owners_of`."""
         target = bake.target
         planned = self._planned.get(image.name, [])
         first = planned[: planned.index(target)] if target in planned else planned
-        users = users_of(image)
-        owners = dict.fromkeys([*owners_of(image), *(owner for owner in first if owner in users)])
+        users = users_of(image) if users is None else users
+        owners = dict.fromkeys([*owners_of(image, users), *(owner for owner in first if owner in users)])
         owners.pop(target, None)
         if target.object_name in bpy.data.objects:
             return list(owners)
@@ -179,13 +188,8 @@ class Results:
     def _covers(self, owner: Target, image, bake: Bake) -> bool:
         return overlaps(bake.job.receiver, self._parts_of(owner, _size_in(image, bake)))
 
-    def _overlapping(self, image, bake: Bake, shown=None) -> list[Target]:
-        """Owners of an image whose parts of it the bake overlaps; `shown` as for `fill`."""
-        return [owner for owner in self._other_owners(shown or image, bake) if self._covers(owner, image, bake)]
-
-    def _neighbors(self, image, bake: Bake, users: list[Target]) -> dict[Target, Parts]:
+    def _neighbors(self, image, bake: Bake, owners: list[Target], users: list[Target]) -> dict[Target, Parts]:
         """Parts of an image that other targets fill, or will fill. A note names those that the bake overlaps."""
-        owners = self._other_owners(image, bake)
         size = _size_in(image, bake)
         neighbors = self._parts_beside(bake, [*owners, *users], size)
         if bake.target.object_name in bpy.data.objects:  # it may have been renamed, and be a user itself

@@ -52,12 +52,13 @@ def read_parts(target: Target, size: Size) -> Parts | None:
 
 def overlaps(receiver: Receiver, parts: Parts) -> bool:
     """True if the receiver's charts overlap others in the same texture by more than rounding."""
-    shared = texels = 0
-    for part in parts:
-        is_shown = part[2] > 2 * (1 - WHOLE)
-        shared += int((is_shown & (within(receiver.coverage, *part) > WHOLE)).sum())
-        texels += int(is_shown.sum())
-    return shared > OVERLAP_TOLERANCE * min(texels, receiver.inside().sum())
+    shown = [part[2] > 2 * (1 - WHOLE) for part in parts]
+    wholes = (within(receiver.coverage, *part) > WHOLE for part in parts)
+    shared = sum(np.count_nonzero(is_shown & is_whole) for is_shown, is_whole in zip(shown, wholes))
+    if not shared:  # counting all texels takes long in large images
+        return False
+    texels = sum(map(np.count_nonzero, shown))
+    return shared > OVERLAP_TOLERANCE * min(texels, np.count_nonzero(receiver.inside()))
 
 
 def texels_of(target: Target, receiver: Receiver, neighbors: Mapping[Target, Parts], margin: int) -> np.ndarray:

@@ -41,6 +41,19 @@ def extend_margin(
     """
     if margin < 0:
         raise ValueError(f"margin is {margin}; it must be 0 or more")
+    result = texture.astype(np.float32)
+    near = _around_charts(coverage, margin)
+    result[near] = _extended(texture[near], coverage[near], margin, None if labels is None else labels[near])
+    return result
+
+
+def _around_charts(coverage: np.ndarray, margin: int) -> tuple[slice, slice]:
+    """Rows and columns of all texels with a coverage, and of a margin around them; an image may have many surfaces."""
+    lines = (np.flatnonzero((coverage > 0).any(axis=axis)) for axis in (1, 0))
+    return tuple(slice(max(0, line[0] - margin), line[-1] + 1 + margin) if len(line) else slice(0) for line in lines)
+
+
+def _extended(texture: np.ndarray, coverage: np.ndarray, margin: int, labels: np.ndarray | None) -> np.ndarray:
     baked, whole = coverage > 0, coverage > WHOLE
     baked_texels = baked[..., None]
     if labels is not None:
@@ -48,7 +61,7 @@ def extend_margin(
     continued = texture
     if not np.array_equal(baked, whole):
         continued = np.where(baked_texels, add_rings(texture, whole, BORDER_RINGS, labels), texture)
-    return np.where(baked_texels, texture, add_rings(continued, baked, margin, labels)).astype(np.float32, copy=False)
+    return np.where(baked_texels, texture, add_rings(continued, baked, margin, labels))
 
 
 def part_in_shared(coverage: np.ndarray, before: np.ndarray, after: np.ndarray, margin: int) -> np.ndarray:
@@ -64,11 +77,7 @@ def part_in_shared(coverage: np.ndarray, before: np.ndarray, after: np.ndarray, 
     margin : number of rings of texels.
     """
     result = np.zeros(coverage.shape, bool)
-    rows, columns = (np.flatnonzero((coverage > 0).any(axis=axis)) for axis in (1, 0))
-    if not len(rows):
-        return result
-    # Twice the margin: rings of neighbours begin outside of the surface's own.
-    near = tuple(slice(max(0, line[0] - 2 * margin), line[-1] + 1 + 2 * margin) for line in (rows, columns))
+    near = _around_charts(coverage, 2 * margin)  # rings of neighbours begin outside of the surface's own
     coverage, before, after = coverage[near], before[near], after[near]
     is_own = (coverage > before) & (coverage >= after) & (coverage > 0)
     is_before = ~is_own & (before > 0) & (before >= after)
