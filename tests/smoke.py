@@ -128,8 +128,10 @@ def rays(library):
     arriving, flow = native.bake_arrival(surface, steep, rays=4, threads=THREADS)
     assert arriving.max() > 0 > flow[..., 2].min()
     for solver in ("fft", "direct", "adaptive"):
-        luminance = native.bake_luminance(surface, steep, *medium, solver, 1e-2, rays=2, threads=THREADS)
-        assert np.isfinite(luminance).all()
+        for luminance in native.bake_luminance(
+            [surface] * 2, [steep] * 2, *medium, solver, 1e-2, rays=2, threads=THREADS
+        ):
+            assert np.isfinite(luminance).all()
     kept = native.LightField((SIZE, SIZE), *medium, (pitch, pitch), 60.0, 0.1, True, threads=THREADS)
     assert np.isfinite(kept.luminance(surface, steep, rays=2, threads=THREADS)).all()
     computed = native.FieldLight(np.ones((1, 2, 2, 3), np.float32), np.ones(1, np.float32), position=(0.1, 0.1, 1))

@@ -4,7 +4,10 @@
 #include <numeric>
 #include <utility>
 
+#include "bake/canvas.h"
+#include "bake/canvas_light.h"
 #include "bake/field_bake.h"
+#include "bake/stored_light.h"
 #include "simd/loops.h"
 #include "solve/solve.h"
 
@@ -18,16 +21,17 @@ constexpr int rays_per_even_ray = 8;
 constexpr int min_even_rays = 4;
 constexpr int max_even_rays = 16;
 
+// Texels of a canvas of several patches, and bytes of moments of each, about. More: fewer choices of terms, more memory.
+constexpr std::size_t canvas_texels = std::size_t{1} << 21;
+constexpr std::size_t moment_bytes = 400;
+
 // Luminance of lights whose irradiance is stored before the solver begins. Lights of many rays, which `direct` and
 // `adaptive` solve ray by ray, are stored one after the other.
-void bake_stored(const Surface& surface, const std::vector<SurfaceLight>& lights, const BakeOptions& options,
+void bake_stored(const Canvas& canvas, const std::vector<CanvasLight>& lights, const BakeOptions& options,
                  Problem problem, Progress& progress, float* luminance)
 {
-    const auto has_one_direction = [&](const SurfaceLight& light) {
-        return light.directions(surface.grid).has_value();
-    };
-    const std::size_t group_size =
-        std::ranges::all_of(lights, has_one_direction) ? std::max<std::size_t>(lights.size(), 1) : 1;
+    const bool all_have_one = std::ranges::all_of(lights, &CanvasLight::has_one_direction);
+    const std::size_t group_size = all_have_one ? std::max<std::size_t>(lights.size(), 1) : 1;
     const std::size_t groups = lights.size() / group_size;
     const std::size_t values = problem.plane.texels() * problem.channels.size();
     progress.set_total(light_work * static_cast<double>(lights.size()) + solver_work);
@@ -37,12 +41,12 @@ void bake_stored(const Surface& surface, const std::vector<SurfaceLight>& lights
         StoredLight stored;
         for (std::size_t i = group * group_size; i < (group + 1) * group_size; ++i)
             progress.advance_by(light_work, [&](Progress& part) {
-                RaySettings settings = options.ray_settings(surface, options.rays);
-                if (has_one_direction(lights[i])) {
-                    stored.add_one_direction(surface, lights[i], settings, part);
+                RaySettings settings = options.ray_settings(options.rays);
+                if (lights[i].has_one_direction()) {
+                    stored.add_one_direction(canvas, lights[i], settings, part);
                 } else {
                     settings.even_rays = 0;
-                    stored.add_rays(surface, lights[i], settings, part);
+                    stored.add_rays(canvas, lights[i], settings, part);
                 }
             });
         if (stored.lights.empty())
@@ -55,38 +59,107 @@ void bake_stored(const Surface& surface, const std::vector<SurfaceLight>& lights
     }
 }
 
+// Luminance of a canvas without the color of light that leaves its surfaces.
+void bake_canvas(const Canvas& canvas, const std::vector<CanvasLight>& lights, const BakeOptions& options,
+                 Problem problem, Progress& progress, float* luminance)
+{
+    problem.plane = canvas.plane;
+    const bool all_have_one = std::ranges::all_of(lights, &CanvasLight::has_one_direction);
+    const bool fits = lights.size() * canvas.samples() * sizeof(float) <= options.max_stored_bytes;
+    if (options.solver != Solver::fft || (all_have_one && fits))
+        bake_stored(canvas, lights, options, std::move(problem), progress, luminance);
+    else
+        bake_by_field(canvas, lights, options, std::move(problem), progress, luminance);
+    progress.finish();
+}
+
+std::vector<CanvasLight> on_canvas(const Canvas& canvas, const std::vector<ArrivingLights>& lights)
+{
+    std::vector<CanvasLight> on_patches;
+    for (std::size_t l = 0; l < lights.front().size(); ++l) {
+        std::vector<const SurfaceLight*> parts;
+        for (const Patch& patch : canvas.patches) {
+            const std::optional<SurfaceLight>& light = lights[patch.index][l];
+            parts.push_back(light ? &*light : nullptr);
+        }
+        if (std::ranges::any_of(parts, [](const SurfaceLight* part) { return part != nullptr; }))
+            on_patches.emplace_back(canvas, std::move(parts));
+    }
+    return on_patches;
+}
+
+// Copies the texels of a patch.
+void read_patch(const Canvas& canvas, const Patch& patch, std::size_t channels, const float* from, float* to)
+{
+    const std::size_t width = patch.surface->grid.width;
+    for (std::size_t first = 0; first < patch.surface->samples(); first += width)
+        std::copy_n(from + canvas.sample(patch, first) * channels, width * channels, to + first * channels);
+}
+
+std::vector<Canvas> canvases_of(const std::vector<Surface>& surfaces, const std::vector<ChannelMedium>& channels,
+                                const BakeOptions& options)
+{
+    if (options.solver == Solver::fft) {
+        const std::size_t in_memory = options.max_moment_bytes / moment_bytes;
+        return canvases(surfaces, channels, in_memory > 0 ? std::min(in_memory, canvas_texels) : canvas_texels);
+    }
+    std::vector<Canvas> alone;  // other solvers sum over all pairs of texels, however far apart
+    for (const Surface& surface : surfaces)
+        alone.emplace_back(surface, alone.size());
+    return alone;
+}
+
 }  // namespace
 
-RaySettings BakeOptions::ray_settings(const Surface& surface, int ray_count) const
+RaySettings BakeOptions::ray_settings(int ray_count) const
 {
     return {.samples = samples,
             .rays = ray_count,
             .even_rays = std::clamp(ray_count / rays_per_even_ray, min_even_rays, max_even_rays),
             .seed = seed,
-            .clearance = surface.clearance,
             .threads = threads,
             .noise = noise};
 }
 
-void bake_luminance(const Surface& surface, const std::vector<SurfaceLight>& lights,
+void bake_luminance(const std::vector<Surface>& surfaces, const std::vector<ArrivingLights>& lights,
                     const std::vector<ChannelMedium>& channels, const BakeOptions& options, Progress& progress,
-                    float* luminance)
+                    const std::vector<float*>& luminance)
 {
+    const std::vector<Canvas> all = canvases_of(surfaces, channels, options);
+    double texels = 0.0;
+    double area = 0.0;
+    for (const Canvas& canvas : all) {
+        texels += static_cast<double>(canvas.samples());
+        area += canvas.area();
+    }
+    progress.set_total(texels);
     Problem problem;
-    problem.plane = surface.plane();
     problem.channels = channels;
     problem.solver = options.solver;
     problem.tolerance = options.tolerance;
     problem.threads = options.threads;
     problem.max_moment_bytes = options.max_moment_bytes;
-    const bool has_one_direction_each = std::ranges::all_of(
-        lights, [&](const SurfaceLight& light) { return light.directions(surface.grid).has_value(); });
-    const bool fits = lights.size() * surface.samples() * sizeof(float) <= options.max_stored_bytes;
-    if (options.solver != Solver::fft || (has_one_direction_each && fits))
-        bake_stored(surface, lights, options, std::move(problem), progress, luminance);
-    else
-        bake_by_field(surface, lights, options, std::move(problem), progress, luminance);
-    surface.scale_by_color_out(channels.size(), luminance);
+    std::vector<float> values;
+    for (const Canvas& canvas : all) {
+        RayNoise noise;
+        BakeOptions of_canvas = options;
+        of_canvas.noise = options.noise ? &noise : nullptr;
+        const std::size_t first = canvas.patches.front().index;
+        values.resize(canvas.is_alone() ? 0 : canvas.samples() * channels.size());
+        float* const result = canvas.is_alone() ? luminance[first] : values.data();
+        progress.advance_by(static_cast<double>(canvas.samples()), [&](Progress& part) {
+            bake_canvas(canvas, on_canvas(canvas, lights), of_canvas, problem, part, result);
+        });
+        for (const Patch& patch : canvas.patches) {
+            if (!canvas.is_alone())
+                read_patch(canvas, patch, channels.size(), result, luminance[patch.index]);
+            patch.surface->scale_by_color_out(channels.size(), luminance[patch.index]);
+        }
+        if (options.noise) {
+            options.noise->irradiance += canvas.area() / area * noise.irradiance;
+            options.noise->variance += canvas.area() / area * noise.variance;
+        }
+    }
     progress.finish();
 }
 
@@ -98,9 +171,9 @@ void bake_arrival(const Surface& surface, const std::vector<SurfaceLight>& light
     std::fill_n(flow, 3 * whole.samples(), 0.0f);
     progress.set_total(std::max<double>(1.0, static_cast<double>(lights.size())));
     for (const SurfaceLight& light : lights) {
-        RaySum sum(whole.grid, 3, true);
+        RaySum sum(whole.samples(), 3, true);
         progress.advance_by(
-            1.0, [&](Progress& part) { light.gather(whole, options.ray_settings(whole, options.rays), sum, part); });
+            1.0, [&](Progress& part) { light.gather(whole, options.ray_settings(options.rays), sum, part); });
         const double mean_color = std::accumulate(light.color.begin(), light.color.end(), 0.0) / 3.0;
         for (std::size_t i = 0; i < whole.samples(); ++i)
             for (std::size_t c = 0; c < 3; ++c) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "bake/surface.h"
@@ -28,16 +29,20 @@ struct BakeOptions {
     RayNoise* noise = nullptr;  // takes the noise of all lights by rays; may be null
 
     // Settings for a light of so many rays from each texel.
-    RaySettings ray_settings(const Surface& surface, int ray_count) const;
+    RaySettings ray_settings(int ray_count) const;
 };
 
-// Writes (height, width, channels), exitance / pi in W/(m^2 sr) (Manabe et al. 2012, Eq. 2). The result is the same for
-// any number of threads. Throws InvalidArgument, MemoryLimit, Cancelled.
-void bake_luminance(const Surface& surface, const std::vector<SurfaceLight>& lights,
-                    const std::vector<ChannelMedium>& channels, const BakeOptions& options, Progress& progress,
-                    float* luminance);
+// Light of a bake on one of its surfaces, [light]; none where the light does not arrive.
+using ArrivingLights = std::vector<std::optional<SurfaceLight>>;
 
-// The same by a field that is kept from bake to bake, which only `options.rays` of each light are added to.
+// Writes (height, width, channels) of each surface, exitance / pi in W/(m^2 sr) (Manabe et al. 2012, Eq. 2). Light does
+// not pass from surface to surface. `lights`: [surface], all of the same number. The result is the same for any number of
+// threads. Throws InvalidArgument, MemoryLimit, Cancelled.
+void bake_luminance(const std::vector<Surface>& surfaces, const std::vector<ArrivingLights>& lights,
+                    const std::vector<ChannelMedium>& channels, const BakeOptions& options, Progress& progress,
+                    const std::vector<float*>& luminance);
+
+// Luminance by a field that is kept from bake to bake, which only `options.rays` of each light are added to.
 void bake_luminance(const Surface& surface, const std::vector<SurfaceLight>& lights, LightField& field,
                     const BakeOptions& options, Progress& progress, float* luminance);
 

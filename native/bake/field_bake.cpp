@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <list>
 #include <numeric>
 #include <utility>
 
@@ -25,6 +26,9 @@ constexpr int example_rays = 4;
 // blocks. Larger: slower choice.
 constexpr std::size_t survey_texels = 96;
 constexpr int survey_rays = 4;
+
+// The same on a patch among many, at least.
+constexpr std::size_t min_survey_texels = 12;
 
 // Unit of progress, as those of field_bake.h: one ray from each texel to a light with a size. Larger: a bar that slows
 // down less at such lights.
@@ -67,29 +71,30 @@ private:
     PerThread<std::vector<Vec3f>> m_scratch;
 };
 
-// Adds all rays of a light to a field, or their moments.
-void add_light(const Surface& surface, const SurfaceLight& light, RaySettings settings, LightField& field,
-               Progress& progress)
+// Adds all rays of a light to a field, or their moments. `settings`: [patch].
+void add_light(const CanvasLight& light, std::vector<RaySettings> settings, LightField& field, Progress& progress)
 {
-    const std::optional<Directions> directions = light.directions(surface.grid);
-    settings.with_travel = !directions;
-    FieldSink sink(field, light.color, light.is_colored(surface), directions);
+    const std::optional<Directions> directions = light.directions();
+    for (RaySettings& of_patch : settings)
+        of_patch.with_travel = !directions;
+    FieldSink sink(field, light.color(), light.is_colored(), directions);
     const bool by_moments = light.is_smooth() && field.counts_moments_alone();
     progress.set_total(by_moments ? 2.0 : 1.0);
     if (by_moments)
-        progress.advance_by(1.0, [&](Progress& part) {
-            light.field->add_inner_moments(surface, light.color, settings.threads, field, part);
-        });
-    progress.advance_by(1.0, [&](Progress& part) { light.gather(surface, settings, sink, part, !by_moments); });
+        progress.advance_by(1.0,
+                            [&](Progress& part) { light.add_inner_moments(settings.front().threads, field, part); });
+    progress.advance_by(1.0, [&](Progress& part) { light.gather(settings, sink, part, !by_moments); });
     progress.finish();
 }
 
-// The same plane with few texels, wholly covered.
-Surface survey_surface(const Surface& surface)
+// The plane of a patch with few texels, wholly covered. `share`: of the texels of all patches.
+Surface survey_surface(const Surface& surface, double share)
 {
+    const auto side = std::clamp(static_cast<std::size_t>(std::sqrt(share) * static_cast<double>(survey_texels)),
+                                 min_survey_texels, survey_texels);
     Surface coarse{.grid = surface.grid, .clearance = surface.clearance};
-    coarse.grid.width = std::min(surface.grid.width, survey_texels);
-    coarse.grid.height = std::min(surface.grid.height, survey_texels);
+    coarse.grid.width = std::min(surface.grid.width, side);
+    coarse.grid.height = std::min(surface.grid.height, side);
     coarse.grid.pitch_x *= static_cast<double>(surface.grid.width) / static_cast<double>(coarse.grid.width);
     coarse.grid.pitch_y *= static_cast<double>(surface.grid.height) / static_cast<double>(coarse.grid.height);
     return coarse;
@@ -111,8 +116,8 @@ std::vector<PlaneLight> by_channel(const std::vector<PlaneLight>& lights)
 // Luminance of lights of any number and size by a light field, in memory that does not grow with them.
 class FieldBake {
 public:
-    FieldBake(const Surface& surface, const std::vector<SurfaceLight>& lights, const BakeOptions& options)
-        : m_surface(surface), m_lights(lights), m_options(options)
+    FieldBake(const Canvas& canvas, const std::vector<CanvasLight>& lights, const BakeOptions& options)
+        : m_canvas(canvas), m_lights(lights), m_options(options)
     {
     }
 
@@ -124,24 +129,23 @@ public:
         StoredLight kept;
         for (const std::size_t i : m_suns)
             progress.advance_by(light_work, [&](Progress& part) {
-                kept.add_one_direction(m_surface, m_lights[i], settings_for(i), part);
+                kept.add_one_direction(m_canvas, m_lights[i], m_options.ray_settings(m_options.rays), part);
             });
         problem.lights = kept.lights;
         std::unique_ptr<LightField> field;
         {
             StoredLight examples;
             // The mean direction of each texel: harmonics of all its directions together are weaker.
-            RaySettings few = m_options.ray_settings(m_surface, example_rays);
+            RaySettings few = m_options.ray_settings(example_rays);
             few.noise = nullptr;
             for (const std::size_t i : m_examples)
-                progress.advance_by(light_work, [&](Progress& part) {
-                    examples.add_mean_direction(m_surface, m_lights[i], few, part);
-                });
+                progress.advance_by(
+                    light_work, [&](Progress& part) { examples.add_mean_direction(m_canvas, m_lights[i], few, part); });
             problem.coming.examples = examples.lights;
             problem.coming.irradiance = m_mean;
             for (const std::size_t i : m_later)
                 if (m_lights[i].is_smooth())
-                    problem.coming.smooth.push_back(m_lights[i].field->smooth_light(m_lights[i].color));
+                    problem.coming.smooth.push_back(m_lights[i].smooth_light());
             if (problem.lights.empty() && examples.lights.empty() && m_mean == 0.0) {
                 std::fill_n(luminance, problem.plane.texels() * problem.channels.size(), 0.0f);
                 return;
@@ -149,11 +153,10 @@ public:
             progress.advance_by(solver_work,
                                 [&](Progress& part) { field = std::make_unique<LightField>(problem, part); });
         }
-        m_survey = {};
+        m_surveys.clear();
         for (const std::size_t i : m_later)
-            progress.advance_by(gather_work(i), [&](Progress& part) {
-                add_light(m_surface, m_lights[i], settings_for(i), *field, part);
-            });
+            progress.advance_by(gather_work(i),
+                                [&](Progress& part) { add_light(m_lights[i], settings_for(i), *field, part); });
         progress.advance_by(solver_work, [&](Progress& part) { field->solve(part, luminance); });
     }
 
@@ -161,28 +164,44 @@ private:
     // Finds the angles, colors and mean irradiance of lights where nothing blocks them.
     void survey(ComingLight& coming)
     {
-        const Surface coarse = survey_surface(m_surface);
-        coming.plane = coarse.plane();
+        m_means.assign(m_lights.size(), 0.0);
+        m_patch_means.assign(m_lights.size(), std::vector<double>(m_canvas.patches.size()));
+        for (std::size_t i = 0; i < m_canvas.patches.size(); ++i)
+            survey(i, coming);
+        m_mean = std::accumulate(m_means.begin(), m_means.end(), 0.0);
+    }
+
+    void survey(std::size_t i, ComingLight& coming)
+    {
+        const Patch& patch = m_canvas.patches[i];
+        const double share = m_canvas.share(patch);
+        const Surface coarse = survey_surface(*patch.surface, share);
+        const Canvas alone(coarse);
+        const double texels_each =
+            static_cast<double>(patch.surface->samples()) / static_cast<double>(coarse.samples());
         BakeOptions options = m_options;
         options.samples = 1;
         options.noise = nullptr;
-        RaySettings settings = options.ray_settings(coarse, survey_rays);
+        RaySettings settings = options.ray_settings(survey_rays);
         settings.even_rays = 0;
         Progress unseen;
-        for (const SurfaceLight& light : m_lights) {
-            SurfaceLight open = light;
+        for (std::size_t l = 0; l < m_lights.size(); ++l) {
+            const SurfaceLight* const light = m_lights[l].parts()[i];
+            if (!light)
+                continue;
+            SurfaceLight open = *light;
             open.occluders = nullptr;
-            StoredLight& stored = m_survey.emplace_back();
+            const CanvasLight on_patch(alone, {&open});
+            StoredLight& stored = m_surveys.emplace_back();
             if (open.directions(coarse.grid) && !open.field)
-                stored.add_one_direction(coarse, open, settings, unseen);
+                stored.add_one_direction(alone, on_patch, settings, unseen);
             else
-                stored.add_rays(coarse, open, settings, unseen);
-            m_means.push_back(stored.mean());
-            const std::vector<PlaneLight>& lights =
-                light.is_colored(m_surface) ? by_channel(stored.lights) : stored.lights;
-            coming.survey.insert(coming.survey.end(), lights.begin(), lights.end());
+                stored.add_rays(alone, on_patch, settings, unseen);
+            m_patch_means[l][i] = stored.mean();
+            m_means[l] += share * m_patch_means[l][i];
+            for (const PlaneLight& part : light->is_colored(*patch.surface) ? by_channel(stored.lights) : stored.lights)
+                coming.survey.push_back({coarse.plane(), texels_each, part});
         }
-        m_mean = std::accumulate(m_means.begin(), m_means.end(), 0.0);
     }
 
     // Decides which lights are kept as suns, which are added as rays or moments, and which of these are examples.
@@ -192,7 +211,7 @@ private:
         std::iota(brightest.begin(), brightest.end(), std::size_t{0});
         std::ranges::stable_sort(brightest, std::greater{}, [&](std::size_t i) { return m_means[i]; });
         std::ranges::copy_if(brightest, std::back_inserter(m_suns), [&](std::size_t i) {
-            const auto directions = m_lights[i].field ? std::nullopt : m_lights[i].directions(m_surface.grid);
+            const auto directions = m_lights[i].is_field() ? std::nullopt : m_lights[i].directions();
             return directions && std::holds_alternative<OneDirection>(*directions);
         });
         if (m_suns.size() > max_suns)
@@ -206,19 +225,26 @@ private:
                 m_examples.push_back(m_later[k]);
     }
 
-    // Rays are shared among lights by their mean irradiance.
-    RaySettings settings_for(std::size_t i) const
+    // Rays of a light from each texel of each patch: lights share them by their mean irradiance there.
+    std::vector<RaySettings> settings_for(std::size_t i) const
     {
-        const bool is_sun = std::ranges::find(m_suns, i) != m_suns.end();
-        const double share = m_mean > 0.0 ? m_means[i] / m_mean : 0.0;
-        const int rays = static_cast<int>(std::nearbyint(m_options.rays * share));
-        return m_options.ray_settings(m_surface, is_sun ? m_options.rays : std::max(m_options.min_rays, rays));
+        std::vector<RaySettings> settings;
+        for (std::size_t patch = 0; patch < m_canvas.patches.size(); ++patch) {
+            double all = 0.0;
+            for (const std::vector<double>& means : m_patch_means)
+                all += means[patch];
+            const double share = all > 0.0 ? m_patch_means[i][patch] / all : 0.0;
+            const int rays = static_cast<int>(std::nearbyint(m_options.rays * share));
+            settings.push_back(m_options.ray_settings(std::max(m_options.min_rays, rays)));
+        }
+        return settings;
     }
 
     double gather_work(std::size_t i) const
     {
-        const bool is_traced = m_lights[i].light && m_lights[i].has_size() && !m_lights[i].directions(m_surface.grid);
-        return light_work + (is_traced ? ray_work * settings_for(i).rays : 0.0);
+        const bool is_traced = !m_lights[i].is_field() && m_lights[i].has_size() && !m_lights[i].has_one_direction();
+        const double share = m_mean > 0.0 ? m_means[i] / m_mean : 0.0;
+        return light_work + (is_traced ? ray_work * std::max<double>(m_options.min_rays, m_options.rays * share) : 0.0);
     }
 
     void set_total(Progress& progress) const
@@ -229,21 +255,22 @@ private:
         progress.set_total(total);
     }
 
-    const Surface& m_surface;
-    const std::vector<SurfaceLight>& m_lights;
+    const Canvas& m_canvas;
+    const std::vector<CanvasLight>& m_lights;
     const BakeOptions& m_options;
-    std::vector<StoredLight> m_survey;  // [light]
-    std::vector<double> m_means;        // [light] mean irradiance of the survey, W/m^2
+    std::list<StoredLight> m_surveys;
+    std::vector<double> m_means;  // [light] mean irradiance of the survey, W/m^2
+    std::vector<std::vector<double>> m_patch_means;  // [light][patch]
     double m_mean = 0.0;                // sum of these
     std::vector<std::size_t> m_suns, m_later, m_examples;  // lights, the brightest first
 };
 
 }  // namespace
 
-void bake_by_field(const Surface& surface, const std::vector<SurfaceLight>& lights, const BakeOptions& options,
+void bake_by_field(const Canvas& canvas, const std::vector<CanvasLight>& lights, const BakeOptions& options,
                    Problem problem, Progress& progress, float* luminance)
 {
-    FieldBake(surface, lights, options).run(std::move(problem), progress, luminance);
+    FieldBake(canvas, lights, options).run(std::move(problem), progress, luminance);
 }
 
 void bake_luminance(const Surface& surface, const std::vector<SurfaceLight>& lights, LightField& field,
@@ -251,9 +278,10 @@ void bake_luminance(const Surface& surface, const std::vector<SurfaceLight>& lig
 {
     progress.set_total(light_work * static_cast<double>(lights.size()) + solver_work);
     field.clear();
+    const Canvas alone(surface);
     for (const SurfaceLight& light : lights)
         progress.advance_by(light_work, [&](Progress& part) {
-            add_light(surface, light, options.ray_settings(surface, options.rays), field, part);
+            add_light(CanvasLight(alone, {&light}), {options.ray_settings(options.rays)}, field, part);
         });
     progress.advance_by(solver_work, [&](Progress& part) { field.solve(part, luminance); });
     surface.scale_by_color_out(field.channels(), luminance);
@@ -279,9 +307,11 @@ std::unique_ptr<LightField> any_light_field(const Plane& plane, const std::vecto
     problem.channels = channels;
     problem.tolerance = tolerance;
     problem.threads = threads;
-    problem.coming.plane = {any_light_angles, 1, plane.pitch_x * static_cast<double>(plane.width) / any_light_angles,
-                            plane.pitch_y * static_cast<double>(plane.height)};
-    problem.coming.survey = is_colored ? by_channel({light}) : std::vector{light};
+    const Plane few{any_light_angles, 1, plane.pitch_x * static_cast<double>(plane.width) / any_light_angles,
+                    plane.pitch_y * static_cast<double>(plane.height)};
+    const double texels_each = static_cast<double>(plane.texels()) / any_light_angles;
+    for (const PlaneLight& part : is_colored ? by_channel({light}) : std::vector{light})
+        problem.coming.survey.push_back({few, texels_each, part});
     Progress unseen;
     return std::make_unique<LightField>(problem, unseen);
 }

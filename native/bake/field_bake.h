@@ -4,6 +4,8 @@
 #include <vector>
 
 #include "bake/bake.h"
+#include "bake/canvas_light.h"
+#include "bake/stored_light.h"
 
 namespace beamspread {
 
@@ -12,8 +14,8 @@ namespace beamspread {
 inline constexpr double light_work = 1.0;
 inline constexpr double solver_work = 3.0;
 
-// Writes the luminance without the color of light that leaves the surface. `problem` has no lights yet.
-void bake_by_field(const Surface& surface, const std::vector<SurfaceLight>& lights, const BakeOptions& options,
+// Writes the luminance of a canvas without the color of light that leaves its surfaces. `problem` has no lights yet.
+void bake_by_field(const Canvas& canvas, const std::vector<CanvasLight>& lights, const BakeOptions& options,
                    Problem problem, Progress& progress, float* luminance);
 
 }  // namespace beamspread

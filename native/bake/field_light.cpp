@@ -141,8 +141,8 @@ void FieldLight::gather_part(const ReceiverGrid& grid, const NodeSpline& nodes, 
     }
 }
 
-void FieldLight::add_inner_moments(const Surface& surface, const std::vector<double>& color, int threads,
-                                   LightField& field, Progress& progress) const
+void FieldLight::add_inner_moments(const Surface& surface, const Texel& place, const std::vector<double>& color,
+                                   int threads, LightField& field, Progress& progress) const
 {
     const std::size_t width = surface.grid.width;
     const NodeSpline nodes = spline(surface.grid);
@@ -180,7 +180,8 @@ void FieldLight::add_inner_moments(const Surface& surface, const std::vector<dou
         }
         for (std::size_t term = 0; term < moments.size(); ++term)
             if (!moments[term].empty())
-                field.add_moments(term, span, received[field.channel(term)].data(), row.read(moments[term]).data());
+                field.add_moments(term, {place.y + span.y, place.x + span.x, span.width},
+                                  received[field.channel(term)].data(), row.read(moments[term]).data());
         progress.advance(1.0);
     };
     progress.set_total(static_cast<double>(bottom - top));

@@ -41,9 +41,10 @@ public:
 
     // Adds the light that inner texels of a surface receive, times `color`, to the moments of a field that counts
     // moments alone. Inner texels lie between the outermost nodes. Light is linear in the nodes there, so that the sums
-    // over lobes are made at the nodes. Not for light from a point. Throws Cancelled.
-    void add_inner_moments(const Surface& surface, const std::vector<double>& color, int threads, LightField& field,
-                           Progress& progress) const;
+    // over lobes are made at the nodes. `place` is that of the surface's first texel in the field. Not for light from a
+    // point. Throws Cancelled.
+    void add_inner_moments(const Surface& surface, const Texel& place, const std::vector<double>& color, int threads,
+                           LightField& field, Progress& progress) const;
 
     // The light times `color` as the choice of terms needs it. Not for light from a point.
     SmoothLight smooth_light(const std::vector<double>& color) const;

@@ -46,37 +46,13 @@ private:
 class RaySum final : public RaySink {
 public:
     // `channels`: 1 for the first one alone, or 3.
-    RaySum(const ReceiverGrid& grid, std::size_t channels, bool with_flow);
+    RaySum(std::size_t samples, std::size_t channels, bool with_flow);
 
     void add(const RayRun& run) override;
 
     std::size_t channels;
     std::vector<float> irradiance;  // [texel][channel], W/m^2
     std::vector<Vec3f> flow;        // [texel] sum of mean irradiance times travel, W/m^2; empty without
-};
-
-// Lights of a surface at all its texels, and the arrays that hold them.
-struct StoredLight {
-    std::vector<std::vector<float>> arrays;
-    std::vector<PlaneLight> lights;  // dark ones are left out
-
-    // Adds irradiance [texel][channel] of one color or of three; the light's color is a factor.
-    void add(const ReceiverGrid& grid, std::vector<float> irradiance, std::size_t channels,
-             const Directions& directions, const std::vector<double>& color);
-
-    // Adds a light that has one direction at each texel.
-    void add_one_direction(const Surface& surface, const SurfaceLight& light, const RaySettings& settings,
-                           Progress& progress);
-
-    // Adds each ray of a light as a light of its own.
-    void add_rays(const Surface& surface, const SurfaceLight& light, const RaySettings& settings, Progress& progress);
-
-    // Adds a light with the mean direction of each texel.
-    void add_mean_direction(const Surface& surface, const SurfaceLight& light, const RaySettings& settings,
-                            Progress& progress);
-
-    // Mean irradiance of all lights, texels and channels, W/m^2.
-    double mean() const;
 };
 
 }  // namespace beamspread

@@ -1,7 +1,9 @@
 // Python names of native/bake: Surface, FieldLight, LightField, bake_luminance, bake_arrival.
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,7 +28,8 @@ struct HeldField {
 };
 
 // (light, color, occluders): a Light or a FieldLight, RGB, and Occluders or None.
-using LightTuples = std::vector<std::tuple<py::object, std::vector<double>, const Occluders*>>;
+using LightTuple = std::tuple<py::object, std::vector<double>, const Occluders*>;
+using LightTuples = std::vector<LightTuple>;
 
 const float* values_of(const std::string& name, const py::object& values, std::vector<std::size_t> shape,
                        std::vector<py::object>& arrays)
@@ -76,19 +79,39 @@ FieldLight field_light(const Array<float>& radiance, const Array<float>& solid_a
     return {radiance.data(), rows, columns, lobes};
 }
 
+SurfaceLight light_of(const LightTuple& tuple)
+{
+    const auto& [light, color, occluders] = tuple;
+    if (color.size() != 3)
+        reject("color", std::to_string(color.size()) + " channels", "3");
+    SurfaceLight use{.color = color, .occluders = occluders};
+    if (py::isinstance<FieldLight>(light))
+        use.field = &py::cast<const FieldLight&>(light);
+    else
+        use.light = &py::cast<const Light&>(light);
+    return use;
+}
+
 std::vector<SurfaceLight> lights_of(const LightTuples& tuples)
 {
     std::vector<SurfaceLight> lights;
-    for (const auto& [light, color, occluders] : tuples) {
-        if (color.size() != 3)
-            reject("color", std::to_string(color.size()) + " channels", "3");
-        SurfaceLight& use = lights.emplace_back();
-        if (py::isinstance<FieldLight>(light))
-            use.field = &py::cast<const FieldLight&>(light);
-        else
-            use.light = &py::cast<const Light&>(light);
-        use.color = color;
-        use.occluders = occluders;
+    std::ranges::transform(tuples, std::back_inserter(lights), light_of);
+    return lights;
+}
+
+// The lights of each surface; none where a light does not arrive.
+std::vector<ArrivingLights> arriving_lights(const std::vector<std::vector<std::optional<LightTuple>>>& tuples,
+                                            std::size_t surfaces)
+{
+    if (tuples.size() != surfaces || surfaces == 0)
+        reject("lights", "of " + std::to_string(tuples.size()) + " surfaces", "as many as 'surfaces', 1 or more");
+    std::vector<ArrivingLights> lights;
+    for (const auto& of_surface : tuples) {
+        if (of_surface.size() != tuples.front().size())
+            reject("lights", std::to_string(of_surface.size()) + " of a surface", "as many for each surface");
+        ArrivingLights& arriving = lights.emplace_back();
+        for (const std::optional<LightTuple>& tuple : of_surface)
+            arriving.push_back(tuple ? std::optional(light_of(*tuple)) : std::nullopt);
     }
     return lights;
 }
@@ -119,27 +142,35 @@ HeldField make_field(std::pair<std::size_t, std::size_t> shape, const Sources& l
     return {ldf, any_light_field(plane, media, max_angle, tolerance, is_colored, threads)};
 }
 
-Array<float> luminance(const HeldSurface& held, const LightTuples& light_tuples, const Sources& ldf,
-                       const std::vector<double>& albedo, const std::vector<double>& mean_free_path,
-                       const std::string& solver, double tolerance, int samples, int rays, int min_rays,
-                       std::uint32_t seed, int threads, std::size_t max_stored_bytes, std::size_t memory_limit,
-                       const py::object& progress, const py::object& report_noise)
+std::vector<Array<float>> luminance(const std::vector<const HeldSurface*>& held,
+                                    const std::vector<std::vector<std::optional<LightTuple>>>& light_tuples,
+                                    const Sources& ldf, const std::vector<double>& albedo,
+                                    const std::vector<double>& mean_free_path, const std::string& solver,
+                                    double tolerance, int samples, int rays, int min_rays, std::uint32_t seed,
+                                    int threads, std::size_t max_stored_bytes, std::size_t memory_limit,
+                                    const py::object& progress, const py::object& report_noise)
 {
     const std::vector<ChannelMedium> media = media_of(ldf, albedo, mean_free_path);
-    const std::vector<SurfaceLight> lights = lights_of(light_tuples);
+    const std::vector<ArrivingLights> lights = arriving_lights(light_tuples, held.size());
     RayNoise noise;
     const BakeOptions options{named_solver(solver), tolerance,    samples, rays, min_rays, seed, threads,
                               max_stored_bytes,     memory_limit, &noise};
     Progress report(progress_callback(progress));
-    Array<float> result({held.surface.grid.height, held.surface.grid.width, media.size()});
-    float* data = result.mutable_data();
+    std::vector<Array<float>> results;
+    std::vector<Surface> surfaces;
+    std::vector<float*> data;
+    for (const HeldSurface* surface : held) {
+        surfaces.push_back(surface->surface);
+        const ReceiverGrid& grid = surface->surface.grid;
+        data.push_back(results.emplace_back(Array<float>({grid.height, grid.width, media.size()})).mutable_data());
+    }
     {
         const py::gil_scoped_release release;
-        bake_luminance(held.surface, lights, media, options, report, data);
+        bake_luminance(surfaces, lights, media, options, report, data);
     }
     if (!report_noise.is_none())
-        report_noise(noise.relative());
-    return result;
+        report_noise(noise.irradiance, noise.variance);
+    return results;
 }
 
 Array<float> field_luminance(HeldField& held, const HeldSurface& surface, const LightTuples& light_tuples, int samples,
@@ -175,7 +206,7 @@ py::tuple arrival(const HeldSurface& held, const LightTuples& light_tuples, int 
         bake_arrival(held.surface, lights, options, report, irradiance_data, flow_data);
     }
     if (!report_noise.is_none())
-        report_noise(noise.relative());
+        report_noise(noise.irradiance, noise.variance);
     return py::make_tuple(irradiance, flow);
 }
 
@@ -215,18 +246,20 @@ position : 3 floats, optional
         .def(py::init(&field_light), py::arg("radiance"), py::arg("solid_angles"), py::arg("directions") = py::none(),
              py::arg("position") = py::none());
 
-    m.def("bake_luminance", &luminance, py::arg("surface"), py::arg("lights"), py::arg("ldf"), py::arg("albedo"),
+    m.def("bake_luminance", &luminance, py::arg("surfaces"), py::arg("lights"), py::arg("ldf"), py::arg("albedo"),
           py::arg("mean_free_path"), py::arg("solver") = "fft", py::arg("tolerance") = 5e-3, py::arg("samples") = 4,
           py::arg("rays") = 256, py::arg("min_rays") = BakeOptions().min_rays, py::arg("seed") = 0,
           py::arg("threads") = 0, py::arg("max_stored_bytes") = BakeOptions().max_stored_bytes,
           py::arg("memory_limit") = 0, py::arg("progress") = py::none(), py::arg("report_noise") = py::none(),
-          R"(Luminance of a translucent surface: the engine behind `beamspread.core.bake`.
+          R"(Luminance of translucent surfaces: the engine behind `beamspread.core.bake`.
 
 Parameters
 ----------
-surface : Surface
-lights : sequence of (light, color, occluders)
-    A Light or FieldLight of strength 1, its strength times color, RGB, and the Occluders that block it or None.
+surfaces : sequence of Surface
+    Light does not pass from one to another.
+lights : sequence of sequences of (light, color, occluders) or None
+    For each surface and light: a Light or FieldLight of strength 1, its strength times color, RGB, and the Occluders
+    that block it or None. None for a light that does not reach the surface.
 ldf, albedo, mean_free_path, solver, tolerance
     As for `convolve`; one value per channel.
 samples : int
@@ -247,13 +280,13 @@ memory_limit : int
 progress : callable, optional
     progress(fraction) returns False to stop.
 report_noise : callable, optional
-    report_noise(error) takes the standard error of the irradiance of a texel, root mean square over the texels and
-    relative to the mean irradiance. It comes from two halves of the rays to lights of a size.
+    report_noise(irradiance, variance) takes the means over all surfaces of the irradiance, W/m^2, and of its variance
+    in a texel, (W/m^2)^2. The latter comes from two halves of the rays to lights of a size.
 
 Returns
 -------
-ndarray, float32, shape (H, W, channels)
-    Exitance / pi, W/(m^2 sr). Row 0 is the lowest row.
+list of ndarray, float32, shape (H, W, channels)
+    Of each surface: exitance / pi, W/(m^2 sr). Row 0 is the lowest row.
 
 Raises
 ------

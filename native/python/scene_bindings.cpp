@@ -54,7 +54,7 @@ py::tuple gather(const ReceiverGrid& grid, const Light& light, const Occluders* 
                  int threads, const py::object& callback, double clearance, int even_rays, int samples,
                  bool find_shadows)
 {
-    RaySum sum(grid, 3, true);
+    RaySum sum(grid.width * grid.height, 3, true);
     const RaySettings settings{.samples = samples,
                                .rays = rays,
                                .even_rays = even_rays,

@@ -24,6 +24,10 @@ namespace {
 // rays, in proportion, and take more memory.
 constexpr std::size_t min_cells = 256;
 
+// Pixels of all images that are kept prepared for normals, some 10 bytes each. More: planes of several normals share
+// them, more memory.
+constexpr std::size_t max_prepared_pixels = std::size_t{1} << 23;
+
 // Borders of the columns or rows of cells.
 struct Lines {
     std::vector<double> angle, sine, cosine;
@@ -308,17 +312,21 @@ std::shared_ptr<const Light> EnvironmentLight::facing_all() const
     return prepared(m_facing_all, std::nullopt);
 }
 
-std::shared_ptr<const Light> EnvironmentLight::prepared(Prepared& last, const std::optional<Vec3>& normal) const
+std::shared_ptr<const Light> EnvironmentLight::prepared(std::vector<Prepared>& last,
+                                                        const std::optional<Vec3>& normal) const
 {
     {
         const std::scoped_lock lock(m_mutex);
-        if (last.light && last.normal == normal)
-            return last.light;
+        const auto known = std::ranges::find(last, normal, &Prepared::normal);
+        if (known != last.end())
+            return known->light;
     }
     // Without the lock, since its loop runs in parallel.
     auto light = std::make_shared<const FacingEnvironment>(m_map, normal);
     const std::scoped_lock lock(m_mutex);
-    last = {normal, light};
+    if (last.size() >= std::max<std::size_t>(max_prepared_pixels / m_map.radiance.size(), 1))
+        last.erase(last.begin());
+    last.push_back({normal, light});
     return light;
 }
 

@@ -33,7 +33,7 @@ public:
     void sample(std::span<const Vec3> points, const Vec3& normal, std::span<const Vec2> square,
                 LightRay* rays) const override;
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
-    // The last one is kept: a bake asks for the same light several times.
+    // The last ones are kept: a bake asks for the same light several times.
     std::shared_ptr<const Light> facing(const Vec3& normal) const override;
     std::shared_ptr<const Light> facing_all() const override;
     bool is_colored() const override { return m_is_colored; }
@@ -45,13 +45,13 @@ private:
         std::shared_ptr<const Light> light;
     };
 
-    std::shared_ptr<const Light> prepared(Prepared& last, const std::optional<Vec3>& normal) const;
+    std::shared_ptr<const Light> prepared(std::vector<Prepared>& last, const std::optional<Vec3>& normal) const;
 
     EnvironmentMap m_map;
     bool m_is_colored = false;
     mutable std::mutex m_mutex;  // of the lights below
-    mutable Prepared m_facing;
-    mutable Prepared m_facing_all;
+    mutable std::vector<Prepared> m_facing;
+    mutable std::vector<Prepared> m_facing_all;
 };
 
 }  // namespace beamspread

@@ -1,7 +1,6 @@
 // The one tracer: lights and occluders to rays that arrive at the samples of a receiver.
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -46,9 +45,6 @@ struct RayNoise {
         irradiance += strength * light.irradiance;
         variance += strength * strength * light.variance;
     }
-
-    // Standard error of a texel, relative to the mean irradiance.
-    double relative() const { return variance > 0.0 ? std::sqrt(variance) / irradiance : 0.0; }
 };
 
 struct RaySettings {

@@ -354,7 +354,7 @@ def test_other_layers_have_images_and_files_beside_the_combined_one(monkeypatch,
     image = node_of(plane.data.materials[0]).image
     plain = BeamspreadSettings.for_bake
     monkeypatch.setattr(BeamspreadSettings, "for_bake", lambda *options: replace(plain(*options), layer="Half"))
-    monkeypatch.setitem(LAYERS, "Half", lambda *arguments: LAYERS[COMBINED](*arguments) / 2)
+    monkeypatch.setitem(LAYERS, "Half", lambda *arguments: [values / 2 for values in LAYERS[COMBINED](*arguments)])
     bake(plane)
     assert pixels(bpy.data.images[f"{image.name} Half"]) == pytest.approx(combined / 2)
     bake(plane)

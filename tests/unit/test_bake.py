@@ -321,8 +321,8 @@ def test_a_new_kind_of_light_and_a_new_layer_need_nothing_but_themselves(monkeyp
         def is_behind(self, target):
             return False
 
-    def irradiance(target, illumination, _material, _thickness, settings, _progress, _bytes_for_light, _report):
-        return arrive(target, illumination, settings)[0]
+    def irradiance(targets, illumination, _material, _thickness, settings, _progress, _bytes_for_light, _report):
+        return [arrive(target, illumination, settings)[0] for target in targets]
 
     monkeypatch.setitem(LAYERS, "Own", irradiance)
     sky = Sky("Sky", 3.0, (1.0, 0.5, 0.0), True)

@@ -182,7 +182,12 @@ def test_noise_that_is_reported_is_that_of_the_image():
     light, casters, exact = window()
     surface = native.Surface(receiver())
     reported = []
-    got, _ = native.bake_arrival(surface, [(light, (1, 1, 1), casters)], rays=256, report_noise=reported.append)
+    got, _ = native.bake_arrival(
+        surface,
+        [(light, (1, 1, 1), casters)],
+        rays=256,
+        report_noise=lambda irradiance, variance: reported.append(variance**0.5 / irradiance),
+    )
     wanted = mean_over_texels(exact)
     noise = np.sqrt(((got.mean(axis=2) - wanted) ** 2).mean()) / wanted.mean()
     assert 0.6 * reported[0] < noise < 1.1 * reported[0]

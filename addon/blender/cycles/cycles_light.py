@@ -24,7 +24,7 @@ from ...core.bake.bounced import (
 )
 from ...core.bake.estimate import cycles_light_seconds
 from ...core.bake.job import BakeJob, Step
-from ...core.bake.layers import mean_irradiance, mean_open_irradiance
+from ...core.bake.mean_light import mean_irradiance, mean_open_irradiance
 from ...core.bake.smoothing import SPLINE_VARIANCE, smoothing_variance
 from ...core.errors import MissingImageError
 from ...core.messages import Message, note, warning

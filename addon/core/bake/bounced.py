@@ -16,7 +16,8 @@ from ..scene.lights import STRATA, Field, FieldLight
 from ..scene.receiver import Receiver
 from .estimate import bounced_seconds
 from .job import BakeJob, Step
-from .layers import WITHOUT_MEDIUM, mean_irradiance, mean_open_irradiance
+from .layers import WITHOUT_MEDIUM
+from .mean_light import mean_irradiance, mean_open_irradiance
 from .smoothing import SPLINE_VARIANCE, smoothing_variance
 
 # Nodes along the longest side of a receiver; more resolve bounced light more finely and take longer.

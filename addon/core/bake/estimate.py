@@ -11,7 +11,8 @@ from ..ldf.library import PHOTONS, angles_for
 from ..scene.lights import STRATA, AreaLight, Light, MeshLight, WorldLight
 from ..scene.receiver import Grid
 from .bake_settings import BakeSettings
-from .layers import MAX_RAYS_BY_SAMPLES, MIN_RAYS, RAYS_PER_SAMPLE, WITHOUT_MEDIUM, mean_open_irradiance, rays_per_texel
+from .layers import MAX_RAYS_BY_SAMPLES, MIN_RAYS, RAYS_PER_SAMPLE, WITHOUT_MEDIUM, rays_per_texel
+from .mean_light import mean_open_irradiance
 from .surface import Surface
 
 # The rates are seconds of one thread, fitted to bakes by tests/bench/estimates.py. Larger: longer estimates.
@@ -19,8 +20,8 @@ from .surface import Surface
 # Speed of n threads is this power of n.
 THREADS_POWER = 0.85
 
-# Seconds of any bake.
-ANY_BAKE = 0.05
+# Seconds of any bake, and of each plane.
+ANY_BAKE, ANY_PLANE = 0.05, 2e-3
 
 # Seconds per texel of the transforms for suns alone; for lamps of one direction at each texel, with an index of
 # refraction above 1 and without; and for any other light.
@@ -73,6 +74,7 @@ class Workload:
     Attributes
     ----------
     texels : of all grids.
+    planes : number of grids.
     suns, lamps : numbers of lights of one direction, and of one direction at each texel.
     broad_rays, narrow_rays : rays of each texel to lights from all around, and to other lights of a size.
     bounced : True if bounced light may be added.
@@ -82,6 +84,7 @@ class Workload:
     """
 
     texels: int
+    planes: int = 1
     suns: int = 0
     lamps: int = 0
     broad_rays: float = 0.0
@@ -106,8 +109,8 @@ class Workload:
 
         `unknown`: fraction of all light, about, that comes from all around and is not among `lights`.
         """
-        load = cls(sum(grid.width * grid.height for grid in grids), bounced=bounced, triangles=triangles)
-        largest = max(grids, key=lambda grid: grid.width * grid.height)
+        load = cls(sum(grid.texels for grid in grids), len(grids), bounced=bounced, triangles=triangles)
+        largest = max(grids, key=lambda grid: grid.texels)
         all_rays, shared = _rays(largest, lights, surface, settings, unknown)
         load = replace(load, broad_rays=all_rays * (unknown if shared else math.ceil(unknown)))
         for light, rays in shared:
@@ -126,9 +129,10 @@ class Workload:
     def seconds(self, settings: BakeSettings) -> float:
         """Seconds of the solution."""
         tracing = self.texels * (self._rays_of_lamps(settings) + self._rays_of_sizes())
+        fixed = ANY_BAKE + ANY_PLANE * self.planes
         if settings.layer in WITHOUT_MEDIUM:
-            return ANY_BAKE + _parallel(tracing, settings.threads)
-        return ANY_BAKE + _parallel(tracing + self._spreading(settings), settings.threads)
+            return fixed + _parallel(tracing, settings.threads)
+        return fixed + _parallel(tracing + self._spreading(settings), settings.threads)
 
     def _rays_of_lamps(self, settings: BakeSettings) -> float:
         doublings = max(math.log2(max(self.triangles, 1) / MANY_TRIANGLES), 0.0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -15,7 +14,6 @@ from ..native import native
 from ..progress import Callback, Progress
 from ..scene.grid import Grid
 from ..scene.illumination import Illumination
-from ..scene.lights import Light
 from .bake_settings import COMBINED, DIRECTION, IRRADIANCE, BakeSettings
 from .surface import channel_media
 
@@ -36,13 +34,8 @@ MAX_STORED_BYTES = 512 << 20
 # which no medium blurs.
 RAYS_PER_SAMPLE = 4
 
-# Texels along a side, and rays from each, where nothing blocks the light.
-OPEN_TEXELS, OPEN_RAYS = 96, 4
-# The same with shadows, for means that are right to some percent.
-SHADOW_TEXELS, SHADOW_RAYS = 48, 16
-
-Report = Callable[[float], None]
-"""Takes the noise of light, relative to its mean."""
+Report = Callable[[float, float, float], None]
+"""Takes an area, the mean irradiance there, W/m^2, and the mean variance of it that is left in the result."""
 
 
 def bake(
@@ -55,21 +48,37 @@ def bake(
     bytes_for_light: int = 0,
     report_noise: Report | None = None,
 ) -> np.ndarray:
-    """Luminance of a translucent plane.
+    """Luminance of a translucent plane: `bake_all` of one grid."""
+    (luminance,) = bake_all(
+        [grid], illumination, material, thickness, settings, progress, bytes_for_light, report_noise
+    )
+    return luminance
+
+
+def bake_all(
+    grids: Sequence[Grid],
+    illumination: Illumination,
+    material: Material,
+    thickness: float,
+    settings: BakeSettings,
+    progress: Callback | None = None,
+    bytes_for_light: int = 0,
+    report_noise: Report | None = None,
+) -> list[np.ndarray]:
+    """Luminance of translucent planes, between which no light passes.
 
     Parameters
     ----------
-    grid : the plane that light arrives on, scene units.
-    material : its mean free path is in the units of the grid.
-    thickness : in the units of the grid, 0 for a half-space.
+    grids : the planes that light arrives on, scene units.
+    material : its mean free path is in the units of the grids.
+    thickness : in the units of the grids, 0 for a half-space.
     progress : called with 0..1, returns False to stop.
     bytes_for_light : largest memory, bytes, of the moments that the fft solver makes of light; 0: any.
-    report_noise : takes the noise of the light, relative to its mean and averaged over the area in which the medium
-        spreads it.
+    report_noise : takes the noise of the light, averaged over the area in which the medium spreads it.
 
     Returns
     -------
-    float32 (grid.height, grid.width, 3), exitance / pi in W/(m^2 sr), row 0 at the bottom.
+    float32 (grid.height, grid.width, 3) of each grid, exitance / pi in W/(m^2 sr), row 0 at the bottom.
 
     Raises
     ------
@@ -88,13 +97,18 @@ def bake(
         sources = _libraries(material, thickness, settings, media_progress)
     else:
         sources = [load_source(settings.sample_folder, settings.distributions)] * 3
-    return spread(
-        grid, illumination, material, sources, settings, light_progress, bytes_for_light, report_noise=report_noise
+    return spread_all(
+        grids, illumination, material, sources, settings, light_progress, bytes_for_light, report_noise=report_noise
     )
 
 
-def spread(
-    grid: Grid,
+def spread(grid: Grid, *arguments, **options) -> np.ndarray:
+    """Luminance of a plane: `spread_all` of one grid."""
+    return spread_all([grid], *arguments, **options)[0]
+
+
+def spread_all(
+    grids: Sequence[Grid],
     illumination: Illumination,
     material: Material,
     sources: list,
@@ -103,24 +117,52 @@ def spread(
     bytes_for_light: int = 0,
     seed: int = 0,
     report_noise: Report | None = None,
-) -> np.ndarray:
-    """`bake` with the LDF of each channel given; the material is checked, and `settings.quality` does not count."""
+) -> list[np.ndarray]:
+    """`bake_all` with the LDF of each channel given; the material is checked, and `settings.quality` does not count."""
+    by_rays: dict[int, list[int]] = {}
+    for number, grid in enumerate(grids):
+        by_rays.setdefault(rays_per_texel(grid, material, settings), []).append(number)
+    groups = [(rays, [grids[number] for number in numbers]) for rays, numbers in by_rays.items()]
+    parts = Progress.of(progress).split([float(sum(grid.texels for grid in group)) for _, group in groups])
+    rest = illumination, material, sources, settings
+    luminances: list = [None] * len(grids)
+    for (rays, group), numbers, part in zip(groups, by_rays.values(), parts):
+        of_group = _spread_group(group, *rest, rays, part, bytes_for_light, seed, report_noise)
+        for number, luminance in zip(numbers, of_group):
+            luminances[number] = luminance
+    return luminances
 
-    def report_spread(noise: float) -> None:
+
+def _spread_group(
+    grids: list[Grid],
+    illumination: Illumination,
+    material: Material,
+    sources: list,
+    settings: BakeSettings,
+    rays: int,
+    progress: Progress,
+    bytes_for_light: int,
+    seed: int,
+    report_noise: Report | None,
+) -> list[np.ndarray]:
+    """`spread_all` for grids with as many rays to each texel."""
+
+    def report_spread(irradiance: float, variance: float) -> None:
         if report_noise:
-            report_noise(noise / math.sqrt(spread_texels(grid, material)))
+            area = sum(grid.area for grid in grids)
+            report_noise(area, irradiance, variance / spread_texels(grids[0], material))
 
     try:
         return native.bake_luminance(
-            grid.surface(),
-            illumination.native_lights(grid),
+            [grid.surface() for grid in grids],
+            illumination.arriving_lights(grids),
             sources,
             material.albedo,
             material.mean_free_path,
             settings.solver,
             TOLERANCE,
             samples=settings.samples,
-            rays=rays_per_texel(grid, material, settings),
+            rays=rays,
             min_rays=MIN_RAYS,
             seed=seed,
             threads=settings.threads,
@@ -130,8 +172,9 @@ def spread(
             report_noise=report_spread,
         )
     except native.MemoryLimit as error:
+        largest = max(grids, key=lambda grid: grid.texels)
         raise BakeError(
-            f"{grid.width} x {grid.height} texels are too many: {error}.",
+            f"{largest.width} x {largest.height} texels are too many: {error}.",
             "Lower the resolution, or raise the memory limit in the add-on's preferences.",
         ) from error
     except ValueError as error:
@@ -181,6 +224,11 @@ def arrive(
     flow : float32 (H, W, 3), sum over the light of its irradiance, the mean of the channels, times the unit vector
         along which it travels, in the plane's frame. Its direction is the mean one.
     """
+
+    def report(irradiance: float, variance: float) -> None:
+        if report_noise:
+            report_noise(grid.area, irradiance, variance)
+
     return native.bake_arrival(
         grid.surface(),
         illumination.native_lights(grid),
@@ -188,7 +236,7 @@ def arrive(
         rays=min(RAYS_PER_SAMPLE * settings.samples**2, MAX_RAYS_BY_SAMPLES),
         threads=settings.threads,
         progress=progress,
-        report_noise=report_noise,
+        report_noise=report,
     )
 
 
@@ -198,43 +246,24 @@ def mean_direction(flow: np.ndarray) -> np.ndarray:
     return np.divide(flow, length, out=np.zeros_like(flow), where=length > 0)
 
 
-def mean_open_irradiance(grid: Grid, lights: Sequence[Light], texels: int = OPEN_TEXELS) -> float:
-    """Mean irradiance of lights that nothing blocks, W/m^2, by so many texels along a side."""
-    return _mean_irradiance(grid, Illumination(lights), texels, OPEN_RAYS)
+Layer = Callable[[Sequence[Grid], Illumination, Material, float, BakeSettings, Progress, int, Report], list[np.ndarray]]
+"""Takes the arguments of `bake_all`; float32 (height, width, 3) of each grid, row 0 at the bottom."""
 
 
-def mean_irradiance(grid: Grid, illumination: Illumination) -> float:
-    """Mean irradiance with shadows, W/m^2."""
-    return _mean_irradiance(grid, illumination, SHADOW_TEXELS, SHADOW_RAYS)
+def irradiance(grids, illumination, _material, _thickness, settings, progress, _bytes_for_light, report) -> list:
+    return [irradiance for irradiance, _ in _arrive_on_all(grids, illumination, settings, progress, report)]
 
 
-def _mean_irradiance(grid: Grid, illumination: Illumination, texels: int, rays: int) -> float:
-    width, height = min(grid.width, texels), min(grid.height, texels)
-    pitch = {"pitch_x": grid.pitch_x * grid.width / width, "pitch_y": grid.pitch_y * grid.height / height}
-    whole = np.ones((height, width), np.float32)
-    coarse = replace(grid, width=width, height=height, coverage=whole, color_in=None, color_out=None, **pitch)
-    arriving = [  # the occluders are those of the grid itself, which the bake needs as well
-        (light.at(coarse), light.rgb().tolist(), illumination.caster(grid, light) if light.cast_shadow else None)
-        for light in illumination.lights
-        if not light.is_behind(coarse)
-    ]
-    irradiance, _ = native.bake_arrival(coarse.surface(), arriving, samples=1, rays=rays)
-    return float(irradiance.mean())
+def direction(grids, illumination, _material, _thickness, settings, progress, _bytes_for_light, report) -> list:
+    return [mean_direction(flow) for _, flow in _arrive_on_all(grids, illumination, settings, progress, report)]
 
 
-Layer = Callable[[Grid, Illumination, Material, float, BakeSettings, Progress, int, Report], np.ndarray]
-"""Takes the arguments of `luminance.bake`; float32 (grid height, grid width, 3), row 0 at the bottom."""
+def _arrive_on_all(grids, illumination, settings, progress, report) -> list[tuple[np.ndarray, np.ndarray]]:
+    parts = progress.split([float(grid.texels) for grid in grids])
+    return [arrive(grid, illumination, settings, part, report) for grid, part in zip(grids, parts)]
 
 
-def irradiance(grid, illumination, _material, _thickness, settings, progress, _bytes_for_light, report) -> np.ndarray:
-    return arrive(grid, illumination, settings, progress, report)[0]
-
-
-def direction(grid, illumination, _material, _thickness, settings, progress, _bytes_for_light, report) -> np.ndarray:
-    return mean_direction(arrive(grid, illumination, settings, progress, report)[1])
-
-
-LAYERS: dict[str, Layer] = {COMBINED: bake, IRRADIANCE: irradiance, DIRECTION: direction}
+LAYERS: dict[str, Layer] = {COMBINED: bake_all, IRRADIANCE: irradiance, DIRECTION: direction}
 
 WITHOUT_MEDIUM = {IRRADIANCE, DIRECTION}
 """Layers that do not depend on the material."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +11,6 @@ from ..errors import BakeError
 from ..ldf.library import SIMULATING, is_known, library
 from ..messages import Message, note
 from ..progress import Progress
-from ..scene.chart import Chart
 from .bake_settings import BakeSettings
 from .estimate import simulation_seconds
 from .finish import finished_texture
@@ -45,6 +43,22 @@ NARROW_SLAB, WIDE_SLAB = (200e6, 300), (800e6, 300)
 
 MAX_NOISE = 0.03
 """Noise of the light, relative to its mean, above which a bake names it. More: fewer notes."""
+
+
+class NoiseSum:
+    """Noise of the light on several planes: a dark one among bright ones shows little of its own."""
+
+    def __init__(self) -> None:
+        self._sums = np.zeros(3)
+
+    def add(self, area: float, irradiance: float, variance: float) -> None:
+        """Take a plane's mean irradiance and its variance."""
+        self._sums += area, area * irradiance, area * variance
+
+    def relative(self) -> float:
+        """Standard error of the irradiance, root mean square over the planes and relative to its mean."""
+        area, irradiance, variance = self._sums.tolist()
+        return math.sqrt(area * variance) / irradiance if irradiance > 0 else 0.0
 
 
 @dataclass(frozen=True)
@@ -90,18 +104,20 @@ class Solve(Step):
         material, settings = job.surface.material, job.settings
         if needs_medium(settings):
             material = job.surface.resolve(settings.quality, None, settings.threads)
-        rest = material, job.surface.thickness, settings
-        charts = job.receiver.charts
-        noises: list[list[float]] = [[] for _ in charts]
-        values = [
-            LAYERS[settings.layer](
-                chart.grid, job.illumination, *rest, part, self._bytes_for_light(job), of_chart.append
-            )
-            for chart, of_chart, part in zip(charts, noises, progress.split([1.0] * len(charts)))
-        ]
-        noise = _noise_of_all(charts, values, [max(of_chart, default=0.0) for of_chart in noises])
-        if noise > MAX_NOISE:
-            job = replace(job, illumination=job.illumination.with_messages(_noisy(job.name, noise)))
+        grids = [chart.grid for chart in job.receiver.charts]
+        noise = NoiseSum()
+        values = LAYERS[settings.layer](
+            grids,
+            job.illumination,
+            material,
+            job.surface.thickness,
+            settings,
+            progress,
+            self._bytes_for_light(job),
+            noise.add,
+        )
+        if noise.relative() > MAX_NOISE:
+            job = replace(job, illumination=job.illumination.with_messages(_noisy(job.name, noise.relative())))
         if not all(np.isfinite(on_grid).all() for on_grid in values):
             text = "The bake produced values that are not numbers."
             raise BakeError(text, "Check the strengths of the lights.")
@@ -124,16 +140,6 @@ class Solve(Step):
 
 BAKE_STEPS = (Simulate(), Solve())
 """Steps of a job whose light and colors are known."""
-
-
-def _noise_of_all(charts: Sequence[Chart], values: Sequence[np.ndarray], noises: Sequence[float]) -> float:
-    """Noise of all charts, relative to the mean of all: a dark one among bright ones shows little of its own."""
-    if len(charts) == 1:
-        return noises[0]
-    areas = np.array([chart.grid.coverage.sum() * chart.grid.pitch_x * chart.grid.pitch_y for chart in charts])
-    means = np.array([np.abs(on_grid).mean() for on_grid in values])
-    total = float(areas @ means)
-    return float(np.sqrt(areas.sum() * (areas @ (np.array(noises) * means) ** 2))) / total if total > 0 else 0.0
 
 
 def _noisy(name: str, noise: float) -> Message:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..bake.bake_settings import COMBINED, BakeSettings
 from ..bake.finish import finished_texture, with_seams
-from ..bake.layers import spread
+from ..bake.layers import spread, spread_all
 from ..bake.surface import channel_media
 from ..ldf.albedo import albedo_from_reflectance
 from ..ldf.library import load_source
@@ -127,7 +127,7 @@ class LiveRenderer:
         material, sources = self._material(target)
         illumination = with_bounced(target, framed.receiver, progress)
         rest = material, sources, target.settings, progress
-        values = [spread(chart.grid, illumination, *rest) for chart in framed.receiver.charts]
+        values = spread_all([chart.grid for chart in framed.receiver.charts], illumination, *rest)
         texture = finished_texture(framed.receiver, values, material, target.settings)
         news = [message for message in illumination.messages if message not in target.illumination.messages]
         messages = (*self._mesh(target).messages, *news)

@@ -49,6 +49,15 @@ class Grid:
     owner: str = ""
 
     @property
+    def texels(self) -> int:
+        return self.width * self.height
+
+    @property
+    def area(self) -> float:
+        """Area of the grid, square scene units."""
+        return self.texels * self.pitch_x * self.pitch_y
+
+    @property
     def centre(self) -> np.ndarray:
         """World position of the grid's centre."""
         across = 0.5 * self.width * self.pitch_x * np.array(self.x_axis)

@@ -94,11 +94,17 @@ class Illumination:
 
     def native_lights(self, grid: Grid) -> list[tuple]:
         """The lights that can reach a grid, as native code takes them: light, RGB strength, and `Occluders` or None."""
+        return [self._native_light(light, grid) for light in self.lights if not light.is_behind(grid)]
+
+    def arriving_lights(self, grids: Sequence[Grid]) -> list[list[tuple | None]]:
+        """All lights at each grid, as those of `native_lights`; None where they can't reach it."""
+        lights = self.lights
         return [
-            (light.at(grid), light.rgb().tolist(), self.caster(grid, light) if light.cast_shadow else None)
-            for light in self.lights
-            if not light.is_behind(grid)
+            [None if light.is_behind(grid) else self._native_light(light, grid) for light in lights] for grid in grids
         ]
+
+    def _native_light(self, light: Light, grid: Grid) -> tuple:
+        return light.at(grid), light.rgb().tolist(), self.caster(grid, light) if light.cast_shadow else None
 
     def with_lights(self, lights: Sequence[Light]) -> Illumination:
         """A copy with these lights instead; shares the hierarchies."""

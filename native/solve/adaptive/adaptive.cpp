@@ -181,9 +181,10 @@ std::vector<Square> beam_squares(const Plane& plane, const PlaneLight& light, do
 std::vector<double> solve_adaptive(const Plane& plane, const PlaneLight& light, const ChannelMedium& medium,
                                    double tolerance, Progress& progress)
 {
-    const auto [width, height, metres_x, metres_y] = plane;
-    const double pitch_y = metres_y / medium.mean_free_path;
-    const double pitch_x = metres_x / medium.mean_free_path;
+    const std::size_t width = plane.width;
+    const std::size_t height = plane.height;
+    const double pitch_y = plane.pitch_y / medium.mean_free_path;
+    const double pitch_x = plane.pitch_x / medium.mean_free_path;
     std::vector<double> exitance(height * width);
     const std::vector<Square> squares = beam_squares(plane, light, tolerance);
     if (squares.empty()) {

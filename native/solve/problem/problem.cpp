@@ -108,16 +108,18 @@ void validate(const Problem& problem)
     for (const auto* lights : {&problem.lights, &problem.coming.examples})
         for (const PlaneLight& light : *lights)
             check_light(plane, problem.channels.size(), light);
-    for (const PlaneLight& light : problem.coming.survey)
-        check_light(problem.coming.plane, problem.channels.size(), light);
+    for (const SurveyedLight& surveyed : problem.coming.survey)
+        check_light(surveyed.plane, problem.channels.size(), surveyed.light);
 }
 
 ChannelSets::ChannelSets(const Problem& problem)
 {
     std::vector<std::vector<double>> colors;
-    for (const auto* lights : {&problem.lights, &problem.coming.survey, &problem.coming.examples})
+    for (const auto* lights : {&problem.lights, &problem.coming.examples})
         for (const PlaneLight& light : *lights)
             colors.push_back(light.color);
+    for (const SurveyedLight& surveyed : problem.coming.survey)
+        colors.push_back(surveyed.light.color);
     for (std::size_t c = 0; c < problem.channels.size(); ++c) {
         double factor = 0.0;
         std::size_t set = 0;

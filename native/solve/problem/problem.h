@@ -12,12 +12,14 @@
 namespace beamspread {
 
 // A plane of texels. Texel (0, 0) lies at the origin of the plane frame: x runs along rows, y from row to row, z
-// outward.
+// outward. The plane may consist of rectangular parts with dark gaps between them, which light does not cross.
 struct Plane {
     std::size_t width = 0;
     std::size_t height = 0;
     double pitch_x = 1.0;  // metres
     double pitch_y = 1.0;
+    double extent = 0.0;  // largest distance of two texels of a part, metres; 0: the plane is one part
+    double gap = 0.0;     // least distance of texels of different parts, metres
 
     std::size_t texels() const { return width * height; }
 };
@@ -106,11 +108,17 @@ struct SmoothLight {
     std::vector<double> products;  // [direction][direction] mean over texels and channels, of irradiances, (W/m^2)^2
 };
 
+// Light at few texels that are spread over a part of the plane.
+struct SurveyedLight {
+    Plane plane;
+    double texels_each = 1.0;  // texels of the plane that each of these stands for
+    PlaneLight light;
+};
+
 // Light that will be added to a light field later. It decides which terms the field keeps.
 struct ComingLight {
-    // All of that light at few texels, spread over a plane of the same size: its angles and colors.
-    Plane plane;
-    std::vector<PlaneLight> survey;
+    // All of that light: its angles and colors.
+    std::vector<SurveyedLight> survey;
 
     // Some of that light at all texels; terms are chosen for its luminance. Empty: for any light of the survey's
     // angles.

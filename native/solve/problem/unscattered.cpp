@@ -197,17 +197,20 @@ UnscatteredRays::UnscatteredRays(const Problem& problem) : m_plane(problem.plane
     for (const auto* lights : {&problem.lights, &problem.coming.examples})
         for (const PlaneLight& light : *lights)
             include(problem.plane, light);
-    for (const PlaneLight& light : problem.coming.survey)
-        include(problem.coming.plane, light);
+    for (const SurveyedLight& surveyed : problem.coming.survey)
+        include(surveyed.plane, surveyed.light);
     std::size_t count = 0;
     for (const ChannelMedium& medium : problem.channels)
         count += m_exits->tables.emplace_back(m_plane, medium, angles).count();
     double max_irradiance = 0.0;  // W/m^2, in any channel
-    for (const auto* lights : {&problem.lights, &problem.coming.survey, &problem.coming.examples})
-        for (const PlaneLight& light : *lights) {
-            const auto [y, x] = brightest(light.irradiance);
-            max_irradiance += static_cast<double>(light.irradiance(y, x)) * *std::ranges::max_element(light.color);
-        }
+    const auto add_brightest = [&](const PlaneLight& light) {
+        const auto [y, x] = brightest(light.irradiance);
+        max_irradiance += static_cast<double>(light.irradiance(y, x)) * *std::ranges::max_element(light.color);
+    };
+    for (const auto* lights : {&problem.lights, &problem.coming.examples})
+        std::ranges::for_each(*lights, add_brightest);
+    for (const SurveyedLight& surveyed : problem.coming.survey)
+        add_brightest(surveyed.light);
     m_unit = std::ldexp(max_irradiance > 0.0 ? max_irradiance : 1.0, -fraction_bits);
     if (count > 0)
         m_sums.resize(m_plane.texels() * problem.channels.size());

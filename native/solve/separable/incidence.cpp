@@ -91,15 +91,15 @@ Histogram histogram_of(const Plane& plane, const std::vector<PlaneLight>& lights
 double max_step(const ComingLight& coming)
 {
     float step = 0.0f;
-    const std::size_t width = coming.plane.width;
-    for (const PlaneLight& light : coming.survey) {
+    for (const auto& [plane, texels_each, light] : coming.survey) {
         if (!std::holds_alternative<FromPoint>(light.directions))
             continue;
+        const std::size_t width = plane.width;
         BeamRow row;
         BeamRow below;  // the previous row
-        for (std::size_t y = 0; y < coming.plane.height; ++y) {
+        for (std::size_t y = 0; y < plane.height; ++y) {
             std::swap(row, below);
-            if (!row.read(coming.plane, light, {y, 0, width})) {
+            if (!row.read(plane, light, {y, 0, width})) {
                 row.irradiance.assign(width, 0.0f);
                 continue;
             }
@@ -132,12 +132,12 @@ Incidence::Incidence(const Plane& plane, const std::vector<PlaneLight>& lights, 
     Histogram histogram = histogram_of(plane, lights);
     extremes = histogram.extremes;
     extend(extremes, 0.0);
-    if (!coming.survey.empty()) {
-        const Histogram later = histogram_of(coming.plane, coming.survey);
-        const double texels = static_cast<double>(plane.texels()) / static_cast<double>(coming.plane.texels());
-        add_scaled(histogram.light.data(), later.light.data(), texels, bin_count);
-        add_scaled(histogram.beams.data(), later.beams.data(), texels, bin_count);
-        extend(later.extremes, max_step(coming));
+    const double margin = max_step(coming);
+    for (const SurveyedLight& surveyed : coming.survey) {
+        const Histogram later = histogram_of(surveyed.plane, {surveyed.light});
+        add_scaled(histogram.light.data(), later.light.data(), surveyed.texels_each, bin_count);
+        add_scaled(histogram.beams.data(), later.beams.data(), surveyed.texels_each, bin_count);
+        extend(later.extremes, margin);
     }
     if (none())
         return;

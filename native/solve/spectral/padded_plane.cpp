@@ -153,22 +153,27 @@ SpectraAtOnce spectra_at_once(const PaddedPlane& plane, std::size_t terms, std::
 
 Levels choose_levels(const Plane& plane, const std::vector<ScaledProfile>& profiles, const LevelChoice& choice)
 {
-    const auto [width, height, pitch_x, pitch_y] = plane;
+    const auto [width, height, pitch_x, pitch_y, extent, gap] = plane;
     Level single{{width, height, pitch_x, pitch_y}, KernelCentre{}, std::nullopt};
     const double unit = single.plane.unit();
     double cut = 0.0;
     for (const ScaledProfile& scaled : profiles)
         cut = std::max(cut, scaled.reach / unit);
-    const double diagonal =
-        std::hypot(static_cast<double>(width) * pitch_x / unit, static_cast<double>(height) * pitch_y / unit);
+    // No two texels of a part are farther apart.
+    const double diagonal = extent > 0.0 ? extent / unit
+                                         : std::hypot(static_cast<double>(width) * pitch_x / unit,
+                                                      static_cast<double>(height) * pitch_y / unit);
+    const double farthest = gap > 0.0 ? gap / unit : std::numeric_limits<double>::infinity();
     const double deviation = widened(centre_deviation, profiles, unit);
     const double centre_end = window_end * deviation;
+    // The centre needs no taper.
+    cut = std::min(cut, diagonal <= centre_end && extent > 0.0 ? diagonal : farthest);
     if (cut > centre_end && std::max(width, height) > max_centre_side) {
         single.ring = {deviation, 0.0, cut, 0.0};
         if (cut > diagonal) {
-            // No two texels are farther apart than the diagonal. The taper avoids ringing of an abrupt end.
+            // The taper avoids ringing of an abrupt end.
             single.ring->cut = diagonal;
-            single.ring->taper = std::max(centre_end, diagonal / 8.0);
+            single.ring->taper = std::min(std::max(centre_end, diagonal / 8.0), farthest - diagonal);
         }
     }
     const auto half_width = [&](double pitch, std::size_t size) {
@@ -188,7 +193,8 @@ Levels choose_levels(const Plane& plane, const std::vector<ScaledProfile>& profi
             continue;
         const auto step = static_cast<double>(coarsening);
         const double border = step * widened(level_deviation, profiles, step * unit);
-        if (window_end * border >= single.ring->cut)
+        // Splines of the coarse grid widen light by two nodes, and once more its luminance.
+        if (window_end * border >= single.ring->cut || single.ring->end() + 4.0 * step > farthest)
             break;
         Level fine = single;
         fine.ring = inside(*single.ring, border);

@@ -61,6 +61,8 @@ RadianceProbe::RadianceProbe(const LightTerms& light, std::vector<std::size_t> l
     const Plane& plane = light.plane;
     reach = std::min(reach, std::hypot(static_cast<double>(plane.width) * plane.pitch_x,
                                        static_cast<double>(plane.height) * plane.pitch_y));
+    if (plane.gap > 0.0)
+        reach = std::min(reach, plane.gap);
     // The first ring lies inside the texel itself.
     for (double r = 0.5 * std::min(plane.pitch_x, plane.pitch_y); m_radii.empty() || m_radii.back() < reach;
          r *= std::exp2(1.0 / rings_per_octave)) {

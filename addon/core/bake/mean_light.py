@@ -1,0 +1,47 @@
+"""Mean irradiance of a grid, from few texels and rays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..native import native
+from ..scene.grid import Grid
+from ..scene.illumination import Illumination
+from ..scene.lights import Light, WorldLight
+
+# Texels along a side, and rays from each, where nothing blocks the light.
+OPEN_TEXELS, OPEN_RAYS = 96, 4
+# The same with shadows, for means that are right to some percent.
+SHADOW_TEXELS, SHADOW_RAYS = 48, 16
+# Rows of the world's image for these means. More: slower, where planes have different normals.
+MEAN_WORLD_ROWS = 512
+
+
+def mean_open_irradiance(grid: Grid, lights: Sequence[Light], texels: int = OPEN_TEXELS) -> float:
+    """Mean irradiance of lights that nothing blocks, W/m^2, by so many texels along a side."""
+    return _mean_irradiance(grid, Illumination(lights), texels, OPEN_RAYS)
+
+
+def mean_irradiance(grid: Grid, illumination: Illumination) -> float:
+    """Mean irradiance with shadows, W/m^2."""
+    return _mean_irradiance(grid, illumination, SHADOW_TEXELS, SHADOW_RAYS)
+
+
+def _mean_irradiance(grid: Grid, illumination: Illumination, texels: int, rays: int) -> float:
+    width, height = min(grid.width, texels), min(grid.height, texels)
+    pitch = {"pitch_x": grid.pitch_x * grid.width / width, "pitch_y": grid.pitch_y * grid.height / height}
+    whole = np.ones((height, width), np.float32)
+    coarse = replace(grid, width=width, height=height, coverage=whole, color_in=None, color_out=None, **pitch)
+    lights = [
+        light.coarse(MEAN_WORLD_ROWS) if isinstance(light, WorldLight) else light for light in illumination.lights
+    ]
+    arriving = [  # the occluders are those of the grid itself, which the bake needs as well
+        (light.at(coarse), light.rgb().tolist(), illumination.caster(grid, light) if light.cast_shadow else None)
+        for light in lights
+        if not light.is_behind(coarse)
+    ]
+    irradiance, _ = native.bake_arrival(coarse.surface(), arriving, samples=1, rays=rays)
+    return float(irradiance.mean())
