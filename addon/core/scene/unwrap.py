@@ -10,8 +10,12 @@ from ..native import native
 from .planes import COPLANAR_COSINE, NO_AREA_BESIDE, SMOOTH_COSINE
 from .polygons import Polygons, components, sums
 
-# Space around each island, over the side of the image: four texels at 1024 on each side.
-SPACE = 4 / 1024
+# Space around each island, over the side of the image: 8 texels at 1024 on each side, and the least of it where there
+# are many islands. More: less color of other islands in the mipmaps of distant surfaces, and fewer texels.
+SPACE, MIN_SPACE = 8 / 1024, 4 / 1024
+
+# Part of the side of the image that spaces around islands take about, on one side of each; more islands have MIN_SPACE.
+SPACES = 0.05
 
 # Number of edges of an island, the longest, along which its rectangle is tried. More pack islands tighter.
 MAX_DIRECTIONS = 16
@@ -155,12 +159,13 @@ def _packed(sizes: np.ndarray) -> tuple[np.ndarray, float]:
     Rectangles stand in rows, the highest first.
     """
     order = np.argsort(-sizes[:, 1], kind="stable")
+    least = float(np.clip(SPACES / np.sqrt(len(sizes)), MIN_SPACE, SPACE))
     side = max(float(np.sqrt((sizes[:, 0] * sizes[:, 1]).sum())), float(sizes.max()), 1e-30)
     best = None
     for stretch in (1.0, 1.05, 1.1, 1.2, 1.35, 1.5):
         width = stretch * side
         for _ in range(ROUNDS):
-            space = SPACE * width
+            space = least * width
             offsets, extent = _in_rows(sizes + 2 * space, order, width)
             width = max(extent, width * (1.0 if extent <= width else 0.0))
         if best is None or width < best[1]:
