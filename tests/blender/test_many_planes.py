@@ -6,6 +6,8 @@ import pytest
 import scenes
 from beamspread.blender.jobs.state import state
 from beamspread.blender.read import geometry
+from beamspread.core.scene.flat_mesh import flatten
+from beamspread.core.scene.receiver import build_receiver
 from live_scenes import live_lines, live_pixels, switch_off
 from mathutils import Matrix
 
@@ -117,3 +119,29 @@ def test_faces_that_take_more_memory_than_allowed_are_refused_before(box, monkey
         bpy.ops.beamspread.bake()
     assert not read
     assert scenes.bake(box)[0].max() > 0
+
+
+@pytest.mark.parametrize("extrude", [0.0, 0.05])
+def test_text_is_baked_once_it_is_a_mesh(box, extrude):
+    """The message tells how. Texels cover the area of all faces, except the walls of round letters, which are bent."""
+    bpy.ops.object.text_add(location=(3, 0, 0))
+    text = bpy.context.object
+    text.data.body, text.data.extrude = "AB8%", extrude
+    text.data.materials.append(scenes.add_material("Letters", mean_free_path=(1e-4,) * 3))
+    scenes.select(text)
+    with pytest.raises(RuntimeError, match=r"'Text' is not a mesh\. Convert it to one"):
+        bpy.ops.beamspread.bake()
+    bpy.ops.object.convert(target="MESH")
+    letters = bpy.context.object
+    assert scenes.bake(letters)[0].max() > 0
+    evaluated = letters.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    polygons = geometry.read_polygons(evaluated, "Letters")
+    mesh = flatten(polygons, 1e-4, "Text")
+    receiver = build_receiver(mesh, 1024, 1024)
+    pitches = [chart.grid.pitch_x * chart.grid.pitch_y for chart in receiver.charts]
+    covered = sum(pitch * chart.grid.coverage.sum(dtype=float) for pitch, chart in zip(pitches, receiver.charts))
+    faces = np.concatenate([part.plane.faces for part in mesh.parts])
+    # Charts may lack a thousandth of a texel at each border; walls are a texel wide and wider.
+    assert covered == pytest.approx(polygons.areas[faces].sum(), rel=2e-3)
+    front = polygons.normals[:, 2] > 0.9
+    assert np.isin(np.flatnonzero(front), faces).all()

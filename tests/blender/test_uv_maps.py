@@ -325,8 +325,12 @@ def test_live_asks_for_a_bake_and_then_follows():
     assert np.abs(live - baked).max() > 0
 
 
-def test_a_texture_on_the_artists_map_colors_the_bake():
-    """The texture repeats over the artist's map; Cycles evaluates it at the texels of the new one."""
+@pytest.mark.parametrize("is_modified", [False, True])
+def test_a_texture_on_the_artists_map_colors_the_bake(is_modified):
+    """The texture repeats over the artist's map; Cycles evaluates it at the texels of the new one.
+
+    A modifier makes the map where another one multiplies faces: two planes above each other.
+    """
     bpy.context.scene.render.engine = "CYCLES"
     plane = scenes.add_plane(uvs=np.array([(0, 0), (2, 0), (2, 2), (0, 2)]))
     material = scenes.add_material(linked=True, color_mode="BASE_COLOR")
@@ -337,9 +341,14 @@ def test_a_texture_on_the_artists_map_colors_the_bake():
     texture = nodes.tree.nodes.new("ShaderNodeTexImage")
     texture.image, texture.interpolation = image, "Closest"
     nodes.tree.links.new(scenes.node_of(material).inputs["Base Color"], texture.outputs["Color"])
+    if is_modified:
+        array = plane.modifiers.new("Two", "ARRAY")
+        array.relative_offset_displace = (1.0, 0.0, 0.0)
+        array.use_relative_offset, array.use_constant_offset = False, True
+        array.constant_offset_displace = (0.0, 0.0, -2.0)
     pixels = scenes.bake(plane)[0]
-    assert [layer.name for layer in plane.data.uv_layers] == ["UVMap", OWN_MAP]
-    row = pixels[SIDE // 2]
+    assert [layer.name for layer in plane.data.uv_layers] == ["UVMap", OWN_MAP][: 2 - is_modified]
+    row = pixels[SIDE // 4]
     stripes = row[:, 0] > row[:, 2]
     lit = row.max(axis=1) > 0
     assert np.count_nonzero(np.diff(stripes[lit].astype(int))) == 3

@@ -19,6 +19,8 @@ def colors(request, scene, _progress) -> dict:
     """
     obj, material = made_real(scene, request["object"], request["matrix"]), bpy.data.materials[request["material"]]
     obj = selectable(scene, obj)
+    if request["uv_map"] and request["uv_map"] not in obj.data.uv_layers:
+        apply_modifiers(obj, request["uv_map"])
     copied = material.copy()  # a linked material can't be changed
     source = linked_source(copied.node_tree, *request["texture"])
     if source is None:
@@ -42,6 +44,28 @@ def colors(request, scene, _progress) -> dict:
     fine = baker.bake_passes(set()).reshape(height, side, width, side, 3)
     total, count = np.nan_to_num(fine, nan=0.0).sum(axis=(1, 3)), np.isfinite(fine).sum(axis=(1, 3))
     return {"colors": np.where(count > 0, total / np.maximum(count, 1), np.nan).astype(np.float32)}
+
+
+def apply_modifiers(obj, uv_map: str) -> None:
+    """Give an object its evaluated mesh: Blender bakes to maps of the mesh itself, and a modifier may make this one.
+
+    Blender 3.4 has it as an attribute of vectors.
+    """
+    depsgraph, before = bpy.context.evaluated_depsgraph_get(), obj.data
+    evaluated = obj.evaluated_get(depsgraph)
+    mesh = bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
+    mesh.use_auto_texspace = False
+    mesh.texspace_location, mesh.texspace_size = before.texspace_location, before.texspace_size
+    attribute = None if uv_map in mesh.uv_layers else mesh.attributes.get(uv_map)
+    if attribute is not None:
+        vectors = np.empty(3 * len(mesh.loops), np.float32)
+        attribute.data.foreach_get("vector", vectors)
+        mesh.attributes.remove(attribute)
+        layer = mesh.uv_layers.new(name=uv_map, do_init=False)
+        layer.data.foreach_set("uv", np.ascontiguousarray(vectors.reshape(-1, 3)[:, :2]).ravel())
+    obj.modifiers.clear()
+    obj.data = mesh
+    bpy.context.view_layer.update()
 
 
 def moved_map(mesh, name: str, corner) -> str:
