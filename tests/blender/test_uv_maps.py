@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.state import state
 from beamspread.blender.node.tree import show_map
 from beamspread.blender.node.uv_maps import make_maps
@@ -261,6 +262,21 @@ def test_an_object_in_edit_mode_is_baked(kind, tmp_path):
     (file,) = tmp_path.glob("*.exr")
     pixels = scenes.pixels(bpy.data.images.load(str(file)))
     assert (pixels > 0).any(axis=2).mean() > 0.25
+
+
+@pytest.mark.parametrize("bevels", [False, True])
+def test_bakes_that_make_maps_are_up_to_date(bevels):
+    boxes = [add_box(uvs=False), add_box(uvs=False)]
+    for x, box in enumerate(boxes):
+        box.location.x = 3 * x
+        if bevels:
+            box.modifiers.new("Bevel", "BEVEL")
+    bpy.context.scene.beamspread.resolution = 32
+    scenes.select(*boxes)
+    assert bpy.ops.beamspread.bake() == {"FINISHED"}
+    stale.refresh(bpy.context)
+    assert len(state.rows) == 2
+    assert not any(row.is_stale for row in state.rows.values())
 
 
 def test_a_mesh_full_of_maps_is_named():

@@ -100,8 +100,8 @@ class _Batch(Sink):
                 left.append(target)
             else:
                 self._note(record)
-        self._parts = self._parts_of([target for target in left if self._options.frames or images[target]])
-        run_bakes(self._prepared(left), self)
+        recorded = [target for target in left if self._options.frames or images[target]]
+        run_bakes(self._prepared(left, recorded), self)
 
     def run(self, bake: Bake) -> Iterator[None]:
         bake.run(Progress(_Printer(bake.target, self._stop)))
@@ -189,8 +189,11 @@ class _Batch(Sink):
         if image is not None and bake.path == str(file_of(image)):
             stale.keep(bake, self._parts.get(bake.target))
 
-    def _prepared(self, targets: list[Target]) -> Iterator[Bake]:
-        """A bake for each target, prepared when its turn comes; cancelled bakes once the batch is asked to stop."""
+    def _prepared(self, targets: list[Target], recorded: list[Target]) -> Iterator[Bake]:
+        """A bake for each target, prepared when its turn comes; cancelled bakes once the batch is asked to stop.
+
+        Images of the `recorded` targets remember the state of the scene.
+        """
         if not targets:
             return
         prepared, inventory = iter(()), Inventory()
@@ -198,6 +201,7 @@ class _Batch(Sink):
             with timed("scene"):
                 check = partial(Progress(lambda _: not self._stop).check, 0.0)
                 prepared = prepare_scene(bpy.context, targets, self._settings, self._options.resolution, check)
+            self._parts = self._parts_of(recorded)  # with the UV maps that the reader makes
         for target in targets:
             bake = _cancelled(target) if self._stop else next(prepared)
             if self._options.verbose:

@@ -132,7 +132,8 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
         state.forget_failures()
         for bake in misplaced:
             self._run.end(bake)
-        parts, plans = stale.parts_of(context, targets), read_scene(context, targets)
+        plans = read_scene(context, targets)
+        parts = stale.parts_of(context, targets)  # with the UV maps that the reader makes
         self._run.take(steps_of(plans, context.scene.beamspread.for_bake(), preview_first=in_window), parts)
         return True
 
