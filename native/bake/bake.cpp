@@ -99,14 +99,10 @@ void read_patch(const Canvas& canvas, const Patch& patch, std::size_t channels, 
 std::vector<Canvas> canvases_of(const std::vector<Surface>& surfaces, const std::vector<ChannelMedium>& channels,
                                 const BakeOptions& options)
 {
-    if (options.solver == Solver::fft) {
-        const std::size_t in_memory = options.max_moment_bytes / moment_bytes;
-        return canvases(surfaces, channels, in_memory > 0 ? std::min(in_memory, canvas_texels) : canvas_texels);
-    }
-    std::vector<Canvas> alone;  // other solvers sum over all pairs of texels, however far apart
-    for (const Surface& surface : surfaces)
-        alone.emplace_back(surface, alone.size());
-    return alone;
+    if (options.solver != Solver::fft)
+        return canvases(surfaces, channels, 0);  // these sum over all pairs of texels, however far apart
+    const std::size_t in_memory = options.max_moment_bytes / moment_bytes;
+    return canvases(surfaces, channels, in_memory > 0 ? std::min(in_memory, canvas_texels) : canvas_texels);
 }
 
 }  // namespace
@@ -145,13 +141,14 @@ void bake_luminance(const std::vector<Surface>& surfaces, const std::vector<Arri
         BakeOptions of_canvas = options;
         of_canvas.noise = options.noise ? &noise : nullptr;
         const std::size_t first = canvas.patches.front().index;
-        values.resize(canvas.is_alone() ? 0 : canvas.samples() * channels.size());
-        float* const result = canvas.is_alone() ? luminance[first] : values.data();
+        const bool is_surface = canvas.is_alone() && !canvas.is_mirrored();
+        values.resize(is_surface ? 0 : canvas.samples() * channels.size());
+        float* const result = is_surface ? luminance[first] : values.data();
         progress.advance_by(static_cast<double>(canvas.samples()), [&](Progress& part) {
             bake_canvas(canvas, on_canvas(canvas, lights), of_canvas, problem, part, result);
         });
         for (const Patch& patch : canvas.patches) {
-            if (!canvas.is_alone())
+            if (!is_surface)
                 read_patch(canvas, patch, channels.size(), result, luminance[patch.index]);
             patch.surface->scale_by_color_out(channels.size(), luminance[patch.index]);
         }

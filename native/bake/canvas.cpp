@@ -30,6 +30,9 @@ constexpr double taper = 0.125;
 constexpr double wide_gap = 111.0;
 constexpr double beside_gap = 32.0;
 
+// Texels of a canvas of mirror images, the most. More: light that was returned more often, more time and memory.
+constexpr std::size_t max_mirrored_texels = std::size_t{1} << 24;
+
 // Patches that are worth a canvas: their number, and texels of one, or its area with gaps relative to its own. Larger
 // patches choose fewer terms alone, and gaps have to be transformed.
 constexpr std::size_t min_patches = 8;
@@ -90,6 +93,19 @@ std::size_t padded_texels(const Surface& surface, const Plane& gaps)
 
 }  // namespace
 
+Canvas::Canvas(const Patch& unplaced, double reach) : plane(unplaced.surface->plane()), patches{unplaced}
+{
+    Patch& patch = patches.front();
+    patch.x = gap_texels(reach, plane.pitch_x);
+    patch.y = gap_texels(reach, plane.pitch_y);
+    while ((plane.width + 2 * patch.x) * (plane.height + 2 * patch.y) > max_mirrored_texels && patch.x + patch.y > 0) {
+        patch.x -= patch.x / 4 + std::min<std::size_t>(patch.x, 1);
+        patch.y -= patch.y / 4 + std::min<std::size_t>(patch.y, 1);
+    }
+    plane.width += 2 * patch.x;
+    plane.height += 2 * patch.y;
+}
+
 Canvas::Canvas(std::span<const Patch> unplaced, std::size_t side, const Plane& gaps)
     : plane(gaps), patches(unplaced.begin(), unplaced.end())
 {
@@ -133,6 +149,8 @@ std::vector<std::vector<Patch>> by_pitch(const std::vector<Surface>& surfaces)
 {
     std::vector<std::vector<Patch>> groups;
     for (std::size_t i = 0; i < surfaces.size(); ++i) {
+        if (surfaces[i].is_mirrored)
+            continue;
         const auto same = std::ranges::find_if(
             groups, [&](const auto& group) { return have_same_pitch(*group.front().surface, surfaces[i]); });
         (same == groups.end() ? groups.emplace_back() : *same).push_back({.surface = &surfaces[i], .index = i});
@@ -188,13 +206,23 @@ void add_canvases(std::vector<Patch> group, double all_reach, std::size_t max_te
 std::vector<Canvas> canvases(const std::vector<Surface>& surfaces, const std::vector<ChannelMedium>& media,
                              std::size_t max_texels)
 {
+    const bool are_packed = max_texels > 0;
+    const bool any_mirrored = std::ranges::any_of(surfaces, &Surface::is_mirrored);
     double all_reach = 0.0;
-    if (surfaces.size() >= min_patches)
+    if (surfaces.size() >= min_patches || any_mirrored)
         for (const ChannelMedium& medium : media)
             all_reach = std::max(all_reach, reach(medium));
     std::vector<Canvas> all;
+    for (std::size_t i = 0; i < surfaces.size(); ++i) {
+        const Patch patch{.surface = &surfaces[i], .index = i};
+        if (surfaces[i].is_mirrored)
+            all.emplace_back(patch, all_reach);
+        else if (!are_packed)
+            all.emplace_back(surfaces[i], i);
+    }
     for (std::vector<Patch>& group : by_pitch(surfaces))
-        add_canvases(std::move(group), all_reach, max_texels, all);
+        if (are_packed)
+            add_canvases(std::move(group), all_reach, max_texels, all);
     return all;
 }
 

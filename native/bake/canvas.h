@@ -10,7 +10,7 @@
 
 namespace beamspread {
 
-// A surface whose texel (0, 0) is the canvas's texel (x, y).
+// A surface whose texel (0, 0) is the canvas's texel (x, y). If it is mirrored, its mirror images fill the canvas.
 struct Patch {
     const Surface* surface;
     std::size_t index = 0;  // among all surfaces of the bake
@@ -28,11 +28,15 @@ struct Canvas {
     {
     }
 
+    // A mirrored surface alone, with mirror images as far as light spreads, metres.
+    Canvas(const Patch& unplaced, double reach);
+
     // Patches with gaps, `side` texels wide.
     Canvas(std::span<const Patch> unplaced, std::size_t side, const Plane& gaps);
 
     std::size_t samples() const { return plane.texels(); }
     bool is_alone() const { return patches.size() == 1; }
+    bool is_mirrored() const { return patches.front().surface->is_mirrored; }
 
     // Area of all patches, m^2.
     double area() const;
@@ -49,7 +53,8 @@ struct Canvas {
 };
 
 // Canvases of all surfaces, which share one if their texels are of one size. Light of one patch does not reach another:
-// the gaps follow from the reach of the media. `max_texels`: of a canvas of several patches.
+// the gaps follow from the reach of the media. `max_texels`: of a canvas of several patches;
+// 0: each surface stays alone.
 std::vector<Canvas> canvases(const std::vector<Surface>& surfaces, const std::vector<ChannelMedium>& media,
                              std::size_t max_texels);
 

@@ -3,32 +3,14 @@
 #include <algorithm>
 #include <utility>
 
+#include "bake/patch_sink.h"
+
 namespace beamspread {
 
 namespace {
 
 // Directions of a sun on patches with a kernel of their own each. More: more transforms, fewer choices of terms.
 constexpr std::size_t max_directions = 8;
-
-// Passes on rays of a patch at the samples of the canvas.
-class PatchSink final : public RaySink {
-public:
-    PatchSink(const Canvas& canvas, const Patch& patch, RaySink& next) : m_canvas(canvas), m_patch(patch), m_next(next)
-    {
-    }
-
-    void add(const RayRun& run) override
-    {
-        RayRun moved = run;
-        moved.sample = m_canvas.sample(m_patch, run.sample);
-        m_next.add(moved);
-    }
-
-private:
-    const Canvas& m_canvas;
-    const Patch& m_patch;
-    RaySink& m_next;
-};
 
 // Adds light to a sum over all patches, whose direction to[i] is direction i of the light.
 void add_products(const SmoothLight& light, const std::vector<std::size_t>& to, double share, SmoothLight& sum)
@@ -69,7 +51,8 @@ bool CanvasLight::is_colored() const
 
 bool CanvasLight::is_smooth() const
 {
-    return any([](const SurfaceLight& part, const Surface& /*surface*/) { return part.is_smooth(); });
+    return !m_canvas.is_mirrored() &&
+           any([](const SurfaceLight& part, const Surface& /*surface*/) { return part.is_smooth(); });
 }
 
 bool CanvasLight::has_one_direction() const
@@ -84,6 +67,8 @@ bool CanvasLight::has_size() const
 
 std::optional<Directions> CanvasLight::directions() const
 {
+    if (m_canvas.is_mirrored())
+        return std::nullopt;
     if (m_canvas.is_alone())
         return m_parts.front()->directions(m_canvas.patches.front().surface->grid);
     std::optional<Vec3> travel;
@@ -100,6 +85,8 @@ std::optional<Directions> CanvasLight::directions() const
 std::vector<std::pair<OneDirection, std::vector<std::size_t>>> CanvasLight::parallel() const
 {
     std::vector<std::pair<OneDirection, std::vector<std::size_t>>> groups;
+    if (m_canvas.is_mirrored())
+        return {};
     for (std::size_t i = 0; i < m_parts.size(); ++i) {
         if (!m_parts[i])
             continue;

@@ -121,10 +121,12 @@ void StoredLight::add_rays(const Canvas& canvas, const CanvasLight& light, const
 {
     const FieldLight* const field = light.parts().front()->field;
     const std::size_t rays = field ? field->lobes() : static_cast<std::size_t>(settings.rays);
-    RayLayers layers(canvas.samples(), rays, !field);
+    // The directions of computed light are those of its parts, but for mirror images.
+    const bool has_directions = field && !canvas.is_mirrored();
+    RayLayers layers(canvas.samples(), rays, !has_directions);
     light.gather(settings, layers, progress);
     for (std::size_t i = 0; i < rays; ++i) {
-        if (field) {
+        if (has_directions) {
             add(canvas.plane, std::move(layers.irradiance[i]), 3, field->directions(i), light.color());
         } else {
             const std::vector<float>& travel = arrays.emplace_back(std::move(layers.travel[i]));

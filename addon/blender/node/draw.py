@@ -41,6 +41,7 @@ def draw_properties(node, layout) -> None:
     layout.prop(node, "anisotropy")
     layout.prop(node, "ior")
     layout.prop(node, "thickness")
+    layout.prop(node, "edges")
     layout.template_ID(node, "image", new="image.new", open="image.open")
     _draw_map(node, layout)
     _draw_actions(node, layout)

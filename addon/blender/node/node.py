@@ -7,6 +7,7 @@ import numpy as np
 from bpy.app.handlers import persistent
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty, StringProperty
 
+from ...core.bake.edges import MIRROR, OPEN
 from ...core.bake.surface import Surface
 from ...core.errors import MaterialError
 from ...core.material import Material, presets
@@ -209,6 +210,15 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         precision=5,
         update=_color_edited,
     )
+    edges: EnumProperty(
+        name="Edges",
+        description="What the edges of a plane do with light inside the material",
+        items=(
+            (OPEN, "Open", "Light leaves through the edges"),
+            (MIRROR, "Mirror", "Light returns as from a mirror: tiles, trim sheets, floors that end at walls"),
+        ),
+        default=OPEN,
+    )
     image: PointerProperty(
         name="Image",
         description="Image that the bake fills. Empty: a new image is created",
@@ -251,7 +261,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
             ior=_decimal(self.ior),
         )
         base_color = tuple(map(_decimal, self.base_color)) if self.color_mode == "BASE_COLOR" else None
-        return Surface(material, _decimal(self.thickness), base_color)
+        return Surface(material, _decimal(self.thickness), base_color, self.edges)
 
     def visible_color(self) -> list[float]:
         """Color in white, uniform light, 0 to 1; the base color if the values are out of range."""

@@ -12,6 +12,7 @@ from ..ldf.library import SIMULATING, is_known, library
 from ..messages import Message, note
 from ..progress import Progress
 from .bake_settings import BakeSettings
+from .edges import with_edges
 from .estimate import simulation_seconds
 from .finish import finished_texture
 from .job import BakeJob, Step
@@ -104,7 +105,8 @@ class Solve(Step):
         material, settings = job.surface.material, job.settings
         if needs_medium(settings):
             material = job.surface.resolve(settings.quality, None, settings.threads)
-        grids = [chart.grid for chart in job.receiver.charts]
+        grids, messages = with_edges([chart.grid for chart in job.receiver.charts], job.surface.edges, job.name)
+        job = replace(job, illumination=job.illumination.with_messages(*messages))
         noise = NoiseSum()
         values = LAYERS[settings.layer](
             grids,

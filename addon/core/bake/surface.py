@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from ..material import RGB, Material, check_base_color, check_thickness
 from ..native import native
 from ..progress import Callback, Progress
 from ..scene.texture import BaseColor
+from .edges import OPEN
 
 
 def channel_media(material: Material, thickness: float) -> list:
@@ -28,11 +29,13 @@ class Surface:
     material : its lengths are in scene units.
     thickness : thickness of the slab; 0 for a half-space.
     base_color : reflectance under uniform diffuse light; None if the material's albedo counts.
+    edges : OPEN or MIRROR, see `edges.py`.
     """
 
     material: Material
     thickness: float = 0.0
     base_color: RGB | None = None
+    edges: str = field(default=OPEN, repr=False)  # digests of former bakes hold no edges
 
     def colored(self, color: BaseColor) -> Surface:
         """The surface with the mean of a base color, or unchanged if the color is unknown."""

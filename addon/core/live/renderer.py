@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..bake.bake_settings import COMBINED, BakeSettings
+from ..bake.edges import with_edges
 from ..bake.finish import finished_texture, with_seams
 from ..bake.layers import spread, spread_all
 from ..bake.surface import channel_media
@@ -127,10 +128,13 @@ class LiveRenderer:
         material, sources = self._material(target)
         illumination = with_bounced(target, framed.receiver, progress)
         rest = material, sources, target.settings, progress
-        values = spread_all([chart.grid for chart in framed.receiver.charts], illumination, *rest)
+        grids, edges = with_edges(
+            [chart.grid for chart in framed.receiver.charts], target.surface.edges, target.target.object_name
+        )
+        values = spread_all(grids, illumination, *rest)
         texture = finished_texture(framed.receiver, values, material, target.settings)
         news = [message for message in illumination.messages if message not in target.illumination.messages]
-        messages = (*self._mesh(target).messages, *news)
+        messages = (*self._mesh(target).messages, *edges, *news)
         return Rendering(target.target, texture, framed, is_exact=True, messages=messages)
 
     def missing(self, target: LiveTarget) -> list:

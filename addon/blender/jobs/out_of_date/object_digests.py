@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ....core.bake.edges import OPEN
 from ... import compat
 from ...node.find import find_node_in_groups
 from ...read.digests import TreeDigest, digest, digest_of_mesh, values_of
@@ -148,7 +149,9 @@ def texture_tree(material, node, groups: tuple) -> TreeDigest:
 
 def surface_values(node, _groups: tuple = ()) -> list:
     """Values of a Beamspread node that bakes read, without those that are linked to it."""
-    return [repr(node.surface()), getattr(node, "side", ""), node.has_texture() and node.texture_blur]
+    surface = node.surface()
+    edges = [] if surface.edges == OPEN else [surface.edges]
+    return [repr(surface), getattr(node, "side", ""), node.has_texture() and node.texture_blur, *edges]
 
 
 def _scatters(obj) -> bool:
