@@ -244,12 +244,20 @@ def read_polygons(obj, material_name: str, matrix=None, uv_map: str = "", is_til
             return placed(replace(polygons_of(mesh, matrix), uvs=uvs, uv_map=uv_map).of_faces(chosen))
         polygons = placed(polygons_of(mesh, matrix).of_faces(chosen))
         uvs = _uvs(mesh, OWN_MAP)
-        if uvs is None or not polygons.count or _fits(polygons):
+        if uvs is None or not polygons.count:
             return polygons
+        if _fits(polygons):
+            # By its name, so that the image keeps it when the artist makes another one render.
+            return replace(polygons, uv_map=OWN_MAP) if _renders(mesh, OWN_MAP) else polygons
         again = placed(replace(polygons_of(mesh, matrix), uvs=uvs.astype(float), uv_map=OWN_MAP).of_faces(chosen))
         return again if _fits(again) else polygons
     finally:
         obj.to_mesh_clear()
+
+
+def _renders(mesh, name: str) -> bool:
+    """True if the UV map of that name is the one that renders."""
+    return any(layer.active_render and layer.name == name for layer in mesh.uv_layers)
 
 
 def _check_memory(obj) -> None:
