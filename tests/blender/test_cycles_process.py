@@ -1,5 +1,6 @@
 """The process of Cycles: it stays, forgets each request, and leaves nothing behind however it or its parent ends."""
 
+import gc
 import os
 import signal
 import subprocess
@@ -26,9 +27,16 @@ PARENT, STAGE = Path(__file__).with_name("cycles_parent.py"), Path(beamspread.__
 IS_POSIX = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 
 
+earlier: set[Path] = set()
+"""Folders that objects of earlier tests hold until the process ends."""
+
+
 @pytest.fixture(autouse=True)
 def ended():
     process.end()
+    gc.collect()
+    earlier.clear()
+    earlier.update(folders(os.getpid()))
     yield
     process.end()
 
@@ -53,7 +61,7 @@ def ends(number, seconds=20.0):
 
 
 def folders(parent):
-    return list(Path(tempfile.gettempdir()).glob(f"{PREFIX}{parent}-*"))
+    return [folder for folder in Path(tempfile.gettempdir()).glob(f"{PREFIX}{parent}-*") if folder not in earlier]
 
 
 def new_copy():
