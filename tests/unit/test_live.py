@@ -247,3 +247,18 @@ def test_quick_renderings_have_all_detail_of_a_texture(blur, renderer):
     total, worst = errors_of(quick, exact)
     assert total < (0.01 if blur == 0 else 0.05)
     assert worst < (0.02 if blur == 0 else 0.1)
+
+
+@pytest.mark.parametrize("lights", [[LAMP], [AREA]], ids=["lamp", "area"])
+def test_quick_renderings_of_many_planes_are_nearly_bakes(lights, renderer):
+    """Planes of twelve sizes are solved together. Most of the error: bakes alone finish texels that edges cut."""
+    edges = np.concatenate([[0], np.cumsum(np.arange(8, 20))]) / 162
+    corners, starts = [], [0]
+    for low, high in zip(edges, edges[1:]):
+        corners += [(2 * low - 0.99, -1, 0), (2 * high - 1, -1, 0), (2 * high - 1, 1, 0), (2 * low - 0.99, 1, 0)]
+        starts.append(len(corners))
+    corners = np.array(corners, float)
+    planes = Polygons(corners, corners[:, :2] / 2 + 0.5, np.array(starts), np.tile((0.0, 0, 1), (len(starts) - 1, 1)))
+    target = replace(live_target(*lights), polygons=planes)
+    assert errors_of(renderer.quick(target, 256), renderer.exact(target))[0] < 0.03
+    assert renderer.kernels.made == 0

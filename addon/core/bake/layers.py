@@ -117,17 +117,21 @@ def spread_all(
     bytes_for_light: int = 0,
     seed: int = 0,
     report_noise: Report | None = None,
+    rays: int = 0,
 ) -> list[np.ndarray]:
-    """`bake_all` with the LDF of each channel given; the material is checked, and `settings.quality` does not count."""
+    """`bake_all` with the LDF of each channel given; the material is checked, and `settings.quality` does not count.
+
+    `rays`: from each texel to all lights of a size together; 0: by the medium, see `rays_per_texel`.
+    """
     by_rays: dict[int, list[int]] = {}
     for number, grid in enumerate(grids):
-        by_rays.setdefault(rays_per_texel(grid, material, settings), []).append(number)
-    groups = [(rays, [grids[number] for number in numbers]) for rays, numbers in by_rays.items()]
+        by_rays.setdefault(rays or rays_per_texel(grid, material, settings), []).append(number)
+    groups = [(count, [grids[number] for number in numbers]) for count, numbers in by_rays.items()]
     parts = Progress.of(progress).split([float(sum(grid.texels for grid in group)) for _, group in groups])
     rest = illumination, material, sources, settings
     luminances: list = [None] * len(grids)
-    for (rays, group), numbers, part in zip(groups, by_rays.values(), parts):
-        of_group = _spread_group(group, *rest, rays, part, bytes_for_light, seed, report_noise)
+    for (count, group), numbers, part in zip(groups, by_rays.values(), parts):
+        of_group = _spread_group(group, *rest, count, part, bytes_for_light, seed, report_noise)
         for number, luminance in zip(numbers, of_group):
             luminances[number] = luminance
     return luminances

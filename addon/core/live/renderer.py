@@ -27,7 +27,7 @@ from ..scene.sampling import resized
 from ..target import Target
 from .bounced_layer import BOUNCED_SIDE, BouncedLayers, with_bounced, without_direct
 from .framed_receiver import FramedReceiver
-from .kernel_cache import KernelCache
+from .kernel_cache import MAX_FIELDS, KernelCache
 from .library_service import LibraryService
 from .live_target import LiveTarget
 
@@ -54,6 +54,9 @@ MAX_EXACT_SUNS = 4
 
 MIN_EXACT_TEXELS = 384**2
 """Texels from which on exact kernels of suns cost less than the transforms of a field for all directions."""
+
+MAX_GRIDS_APART = 32
+"""Number of grids that a quick rendering solves apart; more: slower for objects of many planes, quicker for few."""
 
 MAX_RECEIVERS = 32
 """Number of receivers in memory; more helps scenes with more targets."""
@@ -179,7 +182,11 @@ class LiveRenderer:
         """Luminance below the surface, float32 (height, width, 3), continued around the charts."""
         rest = *self._material(target), settings, progress
         grids = [replace(chart.grid, color_out=None) for chart in framed.receiver.charts]
-        values = [self._quick_luminance(grid, illumination, *rest) for grid in grids]
+        sizes = {(grid.width, grid.height, grid.pitch_x, grid.pitch_y) for grid in grids}
+        if len(grids) > MAX_GRIDS_APART or len(sizes) > MAX_FIELDS:  # the cache has kernels of few sizes
+            values = spread_all(grids, illumination, *rest, rays=QUICK_RAYS * max(len(illumination.lights), 1))
+        else:
+            values = [self._quick_luminance(grid, illumination, *rest) for grid in grids]
         return framed.continued(framed.receiver.to_texture(values))
 
     def _together(self, target: LiveTarget) -> Rendering:
