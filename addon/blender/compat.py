@@ -106,6 +106,23 @@ def input_identifier(tree, name: str) -> str | None:
     return next((item.identifier for item in inputs), None)
 
 
+def group_input(modifier, name: str):
+    """Value of an input of a modifier's node group; None if there is none."""
+    identifier = input_identifier(modifier.node_group, name)
+    if hasattr(modifier, "properties"):  # from Blender 5.2 on
+        return getattr(getattr(modifier.properties.inputs, identifier, None), "value", None)
+    return modifier.get(identifier)
+
+
+def set_group_input(modifier, name: str, value) -> None:
+    """Set an input of a modifier's node group."""
+    identifier = input_identifier(modifier.node_group, name)
+    if hasattr(modifier, "properties"):
+        getattr(modifier.properties.inputs, identifier).value = value
+    else:
+        modifier[identifier] = value
+
+
 def has_input_socket(tree, name: str) -> bool:
     """True if a node group has an input of that name."""
     if hasattr(tree, "interface"):

@@ -7,15 +7,13 @@ import numpy as np
 import pytest
 from beamspread.core.bake.job import Step
 from beamspread.core.bake.runner import Bake, Sink, run_bakes
-from beamspread.core.bake.steps import _noise_of_all
 from beamspread.core.bake.surface import Surface
 from beamspread.core.messages import warning
-from beamspread.core.scene.chart import Chart, ChartIsland
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import SunLight
 from beamspread.core.target import Target
 
-from bakes import MATERIAL, bake_job, square
+from bakes import MATERIAL, bake_job
 
 SUN = SunLight("Sun", 2.0, (1.0, 1.0, 1.0), True, (0.0, 0.0, -1.0))
 
@@ -134,13 +132,3 @@ def test_a_bake_that_ended_before_it_was_cancelled_keeps_nothing():
     one.cancel()
     one.keep(lambda _bake: pytest.fail("stored"))
     assert one.status == "cancelled"
-
-
-def test_noise_of_a_dark_plane_counts_against_the_light_on_all():
-    """One plane has a hundredth of the light and 400 % of noise; both have the same area."""
-    bright, dark = (Chart(square(8), (ChartIsland(np.ones((8, 8), np.float32), (0, 0)),)) for _ in range(2))
-    values = np.full((8, 8, 3), 1.0), np.full((8, 8, 3), 0.01)
-    expected = np.sqrt((0.02**2 + 0.04**2) / 2) / (1.01 / 2)
-    assert _noise_of_all((bright, dark), values, [0.02, 4.0]) == pytest.approx(expected)
-    assert _noise_of_all((dark,), values[1:], [4.0]) == 4.0
-    assert _noise_of_all((dark, dark), (0 * values[0], 0 * values[0]), [0.0, 0.0]) == 0.0

@@ -30,14 +30,14 @@ def set_uvs(obj, uvs: np.ndarray) -> None:
     mesh.vertices.foreach_set("co", np.column_stack([uvs, np.zeros(len(uvs))]).astype(np.float32).ravel())
     modifier = obj.modifiers.new(NAME, "NODES")
     modifier.node_group = next((tree for tree in bpy.data.node_groups if _is_group(tree)), None) or _make_group()
-    modifier[compat.input_identifier(modifier.node_group, SOURCE)] = bpy.data.objects.new(NAME, mesh)
+    compat.set_group_input(modifier, SOURCE, bpy.data.objects.new(NAME, mesh))
     obj.update_tag()
 
 
 def remove_modifier(obj) -> None:
     """Remove the modifier, and its UVs unless a copy of the object uses them."""
     modifier = find_modifier(obj)
-    source = modifier.get(compat.input_identifier(modifier.node_group, SOURCE))
+    source = compat.group_input(modifier, SOURCE)
     obj.modifiers.remove(modifier)
     if source is not None and source.users == 0:
         mesh = source.data

@@ -24,6 +24,10 @@ MAX_DIRECTIONS = 16
 # island that may overlap. More texels find smaller overlaps.
 TEXELS_PER_FACE, PROBE_SIDES, MAX_OVERLAP = 8, (32, 1024), 0.002
 
+# Relative difference, and digits of numbers around 1, within which lengths count as equal: those of one shape in
+# different versions of Blender differ by rounding.
+SAME, SAME_DIGITS = 1e-4, 4
+
 # Number of rounds in which the side of the image and the space around islands find each other.
 ROUNDS = 4
 
@@ -41,12 +45,12 @@ def unwrap_together(meshes: Sequence[Polygons]) -> list[np.ndarray]:
     """UVs of all corners of each mesh as of `unwrap`; all meshes lie side by side in one square, at one density."""
     shown = [_has_light(polygons) for polygons in meshes]
     laid = [_laid_out(polygons.of_faces(np.flatnonzero(is_shown))) for polygons, is_shown in zip(meshes, shown)]
-    sizes_of_all = np.concatenate([sizes for *_, sizes in laid])
+    sizes_of_all = np.concatenate([sizes for _, _, sizes, _ in laid])
     if not len(sizes_of_all):
         return [np.zeros((len(polygons.corners), 2)) for polygons in meshes]
-    offsets, side = _packed(sizes_of_all)
+    offsets, side = _packed(sizes_of_all, np.concatenate([places for *_, places in laid]))
     result, first = [], 0
-    for polygons, is_shown, (positions, labels, sizes) in zip(meshes, shown, laid):
+    for polygons, is_shown, (positions, labels, sizes, _) in zip(meshes, shown, laid):
         uvs = np.zeros((len(polygons.corners), 2))
         uvs[is_shown[polygons.face_of]] = (positions + offsets[first + labels]) / side
         result.append(uvs)
@@ -62,14 +66,17 @@ def _has_light(polygons: Polygons) -> np.ndarray:
     return is_shown
 
 
-def _laid_out(polygons: Polygons) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions (K, 2) of all corners in their islands, each corner's island, and the islands' sizes (M, 2)."""
+def _laid_out(polygons: Polygons) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Positions (K, 2) of all corners in their islands, each corner's island, and the islands' sizes (M, 2) and places.
+
+    Places (M, 6) are the middle of an island in the world, and the direction that it looks in.
+    """
     if not polygons.count:
-        return np.zeros((0, 2)), np.zeros(0, int), np.zeros((0, 2))
+        return np.zeros((0, 2)), np.zeros(0, int), np.zeros((0, 2)), np.zeros((0, 6))
     labels = _islands(polygons)
     order = np.argsort(labels, kind="stable")
     waiting = np.split(order, np.cumsum(np.bincount(labels))[:-1])[::-1]
-    positions, sizes = np.zeros((len(polygons.corners), 2)), []
+    positions, sizes, places = np.zeros((len(polygons.corners), 2)), [], []
     corners_of = np.split(np.arange(len(polygons.corners)), polygons.starts[1:-1])
     while waiting:
         faces = waiting.pop()
@@ -81,7 +88,10 @@ def _laid_out(polygons: Polygons) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         labels[faces] = len(sizes)
         positions[corners] = flat
         sizes.append(flat.max(axis=0))
-    return positions, labels[polygons.face_of], np.array(sizes)
+        points, normal = polygons.corners[corners], polygons.area_vectors[faces].sum(axis=0)
+        length = max(float(np.linalg.norm(normal)), 1e-300)
+        places.append([*(points.min(axis=0) + points.max(axis=0)) / 2, *normal / length])
+    return positions, labels[polygons.face_of], np.array(sizes), np.array(places)
 
 
 def _overlaps(flat: np.ndarray, counts: np.ndarray) -> bool:
@@ -132,7 +142,7 @@ def _laid_flat(polygons: Polygons, faces: np.ndarray, corners: np.ndarray) -> np
     normal = polygons.area_vectors[faces].sum(axis=0)
     length = np.linalg.norm(normal)
     normal = normal / length if length > 0 else np.array([0.0, 0.0, 1.0])
-    x_axis = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    x_axis = np.cross(normal, np.eye(3)[np.abs(normal).round(SAME_DIGITS).argmin()])
     x_axis /= np.linalg.norm(x_axis)
     points = polygons.corners[corners] @ np.stack([x_axis, np.cross(normal, x_axis)], axis=1)
     edges = polygons.corners[polygons.next_corners[corners]] - polygons.corners[corners]
@@ -141,9 +151,17 @@ def _laid_flat(polygons: Polygons, faces: np.ndarray, corners: np.ndarray) -> np
     longest = np.argsort(-lengths, kind="stable")[:MAX_DIRECTIONS]
     # Edges of corners at the same place have no direction.
     longest = longest[lengths[longest] > 1e-3 * lengths.max()]
-    turned = [_turned(points, *direction) for direction in edges[longest] / lengths[longest][:, None]]
-    best = min(turned, key=lambda at: np.ptp(at, axis=0).prod(), default=points)
-    if np.ptp(best[:, 0]) < np.ptp(best[:, 1]):
+    directions = edges[longest] / lengths[longest][:, None]
+    # Of those that are as good, the first one counterclockwise, so that maps don't depend on the order of edges.
+    angles = (np.arctan2(directions[:, 1], directions[:, 0]) % (2 * np.pi)).round(SAME_DIGITS)
+    directions = directions[np.argsort(angles % round(2 * np.pi, SAME_DIGITS), kind="stable")]
+    best, smallest = points, np.inf
+    for direction in directions:
+        turned = _turned(points, *direction)
+        area = np.ptp(turned, axis=0).prod()
+        if area < smallest * (1 - SAME):
+            best, smallest = turned, area
+    if np.ptp(best[:, 0]) < np.ptp(best[:, 1]) * (1 - SAME):
         best = _turned(best, 0.0, 1.0)
     return best - best.min(axis=0)
 
@@ -153,12 +171,15 @@ def _turned(points: np.ndarray, cosine: float, sine: float) -> np.ndarray:
     return points @ np.array([(cosine, -sine), (sine, cosine)])
 
 
-def _packed(sizes: np.ndarray) -> tuple[np.ndarray, float]:
+def _packed(sizes: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, float]:
     """Offsets (M, 2) of rectangles (M, 2) that don't overlap, and the side of the square around them.
 
-    Rectangles stand in rows, the highest first.
+    Rectangles stand in rows, the highest first; the places of their islands (M, 6) sort those of one size.
     """
-    order = np.argsort(-sizes[:, 1], kind="stable")
+    middles, normals = np.split(places, 2, axis=1)
+    extent = max(float(np.ptp(middles, axis=0).max()), float(sizes.max()), 1e-30)
+    keys = np.column_stack([-sizes[:, ::-1] / extent, middles / extent, normals])
+    order = np.lexsort(keys.round(SAME_DIGITS).T[::-1])
     least = float(np.clip(SPACES / np.sqrt(len(sizes)), MIN_SPACE, SPACE))
     side = max(float(np.sqrt((sizes[:, 0] * sizes[:, 1]).sum())), float(sizes.max()), 1e-30)
     best = None
