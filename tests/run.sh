@@ -124,7 +124,7 @@ fi
 step "the zip" cmake --build build/release --target package
 # Two runs at a time, because tests in a Blender use one core most of the time. The output of the second run comes at
 # its end; it gets some of Blender's tests, so that both take about as long.
-moved=(tests/blender/test_read_world.py tests/blender/test_cycles_irradiance.py)
+moved=(tests/blender/test_read_world.py)
 beside=$(mktemp)
 {
     step "tests" in_venv
