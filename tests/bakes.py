@@ -1,6 +1,7 @@
 """Grids and bakes without Blender that several test modules share."""
 
 import numpy as np
+from beamspread.core.bake import layers
 from beamspread.core.bake.bake_settings import BakeSettings
 from beamspread.core.bake.job import BakeJob
 from beamspread.core.bake.steps import BAKE_STEPS
@@ -21,6 +22,14 @@ def square(size=24, side=1.0, height=None, origin=None):
     axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     corner = (-side / 2, -pitch * height / 2, 0.0) if origin is None else origin
     return Grid(corner, *axes, pitch, pitch, size, height, np.ones((height, size), np.float32))
+
+
+def bake(grid, *arguments, **options):
+    """Luminance of one grid; other arguments as for `layers.bake`."""
+    return layers.bake([grid], *arguments, **options)[0]
+
+
+bake_together = layers.bake
 
 
 def bake_job(lights, occluders=None, surface=None, settings=SETTINGS, grid=None):

@@ -126,7 +126,7 @@ void bake_luminance(const std::vector<Surface>& surfaces, const std::vector<Arri
     double area = 0.0;
     for (const Canvas& canvas : all) {
         texels += static_cast<double>(canvas.samples());
-        area += canvas.area();
+        area += canvas.area;
     }
     progress.set_total(texels);
     Problem problem;
@@ -153,8 +153,8 @@ void bake_luminance(const std::vector<Surface>& surfaces, const std::vector<Arri
             patch.surface->scale_by_color_out(channels.size(), luminance[patch.index]);
         }
         if (options.noise) {
-            options.noise->irradiance += canvas.area() / area * noise.irradiance;
-            options.noise->variance += canvas.area() / area * noise.variance;
+            options.noise->irradiance += canvas.area / area * noise.irradiance;
+            options.noise->variance += canvas.area / area * noise.variance;
         }
     }
     progress.finish();

@@ -30,9 +30,6 @@ constexpr double taper = 0.125;
 constexpr double wide_gap = 111.0;
 constexpr double beside_gap = 32.0;
 
-// Texels of a canvas of mirror images, the most. More: light that was returned more often, more time and memory.
-constexpr std::size_t max_mirrored_texels = std::size_t{1} << 24;
-
 // Patches that are worth a canvas: their number, and texels of one, or its area with gaps relative to its own. Larger
 // patches choose fewer terms alone, and gaps have to be transformed.
 constexpr std::size_t min_patches = 8;
@@ -85,6 +82,13 @@ std::size_t gap_texels(double gap, double pitch)
     return static_cast<std::size_t>(std::ceil(gap / pitch));
 }
 
+double area_of(const Plane& plane, const std::vector<Patch>& patches)
+{
+    const auto add = [](std::size_t sum, const Patch& patch) { return sum + patch.surface->samples(); };
+    const std::size_t texels = std::accumulate(patches.begin(), patches.end(), std::size_t{0}, add);
+    return static_cast<double>(texels) * plane.pitch_x * plane.pitch_y;
+}
+
 std::size_t padded_texels(const Surface& surface, const Plane& gaps)
 {
     return (surface.grid.width + gap_texels(gaps.gap, gaps.pitch_x)) *
@@ -93,21 +97,18 @@ std::size_t padded_texels(const Surface& surface, const Plane& gaps)
 
 }  // namespace
 
-Canvas::Canvas(const Patch& unplaced, double reach) : plane(unplaced.surface->plane()), patches{unplaced}
+Canvas::Canvas(const Surface& surface, std::size_t index)
+    : plane(surface.plane()), patches{{.surface = &surface, .index = index}}, area(area_of(plane, patches))
 {
     Patch& patch = patches.front();
-    patch.x = gap_texels(reach, plane.pitch_x);
-    patch.y = gap_texels(reach, plane.pitch_y);
-    while ((plane.width + 2 * patch.x) * (plane.height + 2 * patch.y) > max_mirrored_texels && patch.x + patch.y > 0) {
-        patch.x -= patch.x / 4 + std::min<std::size_t>(patch.x, 1);
-        patch.y -= patch.y / 4 + std::min<std::size_t>(patch.y, 1);
-    }
+    patch.x = gap_texels(surface.mirrored, plane.pitch_x);
+    patch.y = gap_texels(surface.mirrored, plane.pitch_y);
     plane.width += 2 * patch.x;
     plane.height += 2 * patch.y;
 }
 
 Canvas::Canvas(std::span<const Patch> unplaced, std::size_t side, const Plane& gaps)
-    : plane(gaps), patches(unplaced.begin(), unplaced.end())
+    : plane(gaps), patches(unplaced.begin(), unplaced.end()), area(area_of(plane, patches))
 {
     const std::size_t gap_x = gap_texels(gaps.gap, gaps.pitch_x);
     const std::size_t gap_y = gap_texels(gaps.gap, gaps.pitch_y);
@@ -130,16 +131,9 @@ Canvas::Canvas(std::span<const Patch> unplaced, std::size_t side, const Plane& g
     }
 }
 
-double Canvas::area() const
-{
-    const auto add = [](std::size_t sum, const Patch& patch) { return sum + patch.surface->samples(); };
-    const std::size_t texels = std::accumulate(patches.begin(), patches.end(), std::size_t{0}, add);
-    return static_cast<double>(texels) * plane.pitch_x * plane.pitch_y;
-}
-
 double Canvas::share(const Patch& patch) const
 {
-    return static_cast<double>(patch.surface->samples()) * plane.pitch_x * plane.pitch_y / area();
+    return static_cast<double>(patch.surface->samples()) * plane.pitch_x * plane.pitch_y / area;
 }
 
 namespace {
@@ -149,7 +143,7 @@ std::vector<std::vector<Patch>> by_pitch(const std::vector<Surface>& surfaces)
 {
     std::vector<std::vector<Patch>> groups;
     for (std::size_t i = 0; i < surfaces.size(); ++i) {
-        if (surfaces[i].is_mirrored)
+        if (surfaces[i].mirrored > 0.0)
             continue;
         const auto same = std::ranges::find_if(
             groups, [&](const auto& group) { return have_same_pitch(*group.front().surface, surfaces[i]); });
@@ -207,19 +201,14 @@ std::vector<Canvas> canvases(const std::vector<Surface>& surfaces, const std::ve
                              std::size_t max_texels)
 {
     const bool are_packed = max_texels > 0;
-    const bool any_mirrored = std::ranges::any_of(surfaces, &Surface::is_mirrored);
     double all_reach = 0.0;
-    if (surfaces.size() >= min_patches || any_mirrored)
+    if (are_packed && surfaces.size() >= min_patches)
         for (const ChannelMedium& medium : media)
             all_reach = std::max(all_reach, reach(medium));
     std::vector<Canvas> all;
-    for (std::size_t i = 0; i < surfaces.size(); ++i) {
-        const Patch patch{.surface = &surfaces[i], .index = i};
-        if (surfaces[i].is_mirrored)
-            all.emplace_back(patch, all_reach);
-        else if (!are_packed)
+    for (std::size_t i = 0; i < surfaces.size(); ++i)
+        if (!are_packed || surfaces[i].mirrored > 0.0)
             all.emplace_back(surfaces[i], i);
-    }
     for (std::vector<Patch>& group : by_pitch(surfaces))
         if (are_packed)
             add_canvases(std::move(group), all_reach, max_texels, all);

@@ -21,25 +21,17 @@ struct Patch {
 struct Canvas {
     Plane plane;
     std::vector<Patch> patches;
+    double area;  // of all patches, m^2
 
-    // A surface alone.
-    explicit Canvas(const Surface& surface, std::size_t index = 0)
-        : plane(surface.plane()), patches{{.surface = &surface, .index = index}}
-    {
-    }
-
-    // A mirrored surface alone, with mirror images as far as light spreads, metres.
-    Canvas(const Patch& unplaced, double reach);
+    // A surface alone, with its mirror images.
+    explicit Canvas(const Surface& surface, std::size_t index = 0);
 
     // Patches with gaps, `side` texels wide.
     Canvas(std::span<const Patch> unplaced, std::size_t side, const Plane& gaps);
 
     std::size_t samples() const { return plane.texels(); }
     bool is_alone() const { return patches.size() == 1; }
-    bool is_mirrored() const { return patches.front().surface->is_mirrored; }
-
-    // Area of all patches, m^2.
-    double area() const;
+    bool is_mirrored() const { return patches.front().surface->mirrored > 0.0; }
 
     // Fraction of the texels of all patches that a patch has.
     double share(const Patch& patch) const;

@@ -43,7 +43,7 @@ public:
     void gather(const std::vector<RaySettings>& settings, RaySink& sink, Progress& progress, bool all = true) const;
     void gather(const RaySettings& settings, RaySink& sink, Progress& progress) const;
 
-    // As those of `FieldLight`, of smooth light.
+    // The moments and the products of smooth light, as `FieldLight` has them for one surface.
     void add_inner_moments(int threads, LightField& field, Progress& progress) const;
     SmoothLight smooth_light() const;
 

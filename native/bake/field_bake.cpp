@@ -278,7 +278,9 @@ void bake_luminance(const Surface& surface, const std::vector<SurfaceLight>& lig
 {
     progress.set_total(light_work * static_cast<double>(lights.size()) + solver_work);
     field.clear();
-    const Canvas alone(surface);
+    Surface open = surface;  // the field has no room for mirror images
+    open.mirrored = 0.0;
+    const Canvas alone(open);
     for (const SurfaceLight& light : lights)
         progress.advance_by(light_work, [&](Progress& part) {
             add_light(CanvasLight(alone, {&light}), {options.ray_settings(options.rays)}, field, part);

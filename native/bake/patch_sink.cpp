@@ -5,8 +5,8 @@
 
 namespace beamspread {
 
-// Where texels [at, at + count) of `size` lie on an axis of `all` texels that begins `before` texels before the patch.
-// Images follow each other, every other one flipped.
+// The places of texels [at, at + count) of a patch of `size` texels, on an axis of `all` texels. The patch begins at
+// `before`. Its images follow each other, and every other one is flipped.
 std::vector<PatchSink::Image> PatchSink::images(std::size_t at, std::size_t count, std::size_t size, std::size_t before,
                                                 std::size_t all)
 {
@@ -29,7 +29,7 @@ std::vector<PatchSink::Image> PatchSink::images(std::size_t at, std::size_t coun
 void PatchSink::add(const RayRun& run)
 {
     RayRun moved = run;
-    if (!m_patch.surface->is_mirrored) {
+    if (!m_canvas.is_mirrored()) {
         moved.sample = m_canvas.sample(m_patch, run.sample);
         m_next.add(moved);
         return;

@@ -12,7 +12,7 @@ struct Surface {
     const float* coverage = nullptr;   // [sample] fraction inside the mesh, 0 to 1; null: 1
     const float* color_in = nullptr;   // [sample][channel] factors of light that enters; null: 1
     const float* color_out = nullptr;  // [sample][channel] factors of light that leaves; null: 1
-    bool is_mirrored = false;          // the borders of the grid return light as mirrors; else it leaves there
+    double mirrored = 0.0;  // distance from the borders to which mirror images return light, metres; 0: it leaves
 
     std::size_t samples() const { return grid.width * grid.height; }
     Plane plane() const { return {grid.width, grid.height, grid.pitch_x, grid.pitch_y}; }

@@ -1,6 +1,7 @@
 // Python names of native/bake: Surface, FieldLight, LightField, bake_luminance, bake_arrival.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <iterator>
 #include <memory>
 #include <optional>
@@ -46,10 +47,12 @@ const float* values_of(const std::string& name, const py::object& values, std::v
 }
 
 HeldSurface surface_of(const ReceiverGrid& grid, const py::object& coverage, double clearance,
-                       const py::object& color_in, const py::object& color_out, bool is_mirrored)
+                       const py::object& color_in, const py::object& color_out, double mirrored)
 {
     HeldSurface held;
-    held.surface.is_mirrored = is_mirrored;
+    if (!(mirrored >= 0.0 && std::isfinite(mirrored)))
+        reject("mirrored", mirrored, "0 or more metres");
+    held.surface.mirrored = mirrored;
     held.surface.grid = grid;
     held.surface.clearance = clearance;
     held.surface.coverage = values_of("coverage", coverage, {grid.height, grid.width}, held.arrays);
@@ -226,11 +229,11 @@ clearance : float
     Largest distance of the surface's faces to the plane, metres.
 color_in, color_out : ndarray, float32, shape (H, W, 3), optional
     Factors of light that enters and of light that leaves; None: 1.
-is_mirrored : bool
-    True if the borders of the grid return light as mirrors; else it leaves there.
+mirrored : float
+    Distance from the borders of the grid, metres, to which its mirror images return light; 0: light leaves there.
 )")
         .def(py::init(&surface_of), py::arg("grid"), py::arg("coverage") = py::none(), py::arg("clearance") = 0.0,
-             py::arg("color_in") = py::none(), py::arg("color_out") = py::none(), py::arg("is_mirrored") = false);
+             py::arg("color_in") = py::none(), py::arg("color_out") = py::none(), py::arg("mirrored") = 0.0);
 
     py::class_<FieldLight>(m, "FieldLight", R"(Light that was computed elsewhere, at nodes evenly spread over a plane.
 

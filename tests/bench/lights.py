@@ -57,7 +57,7 @@ def lamps(count):
 def bake(size, lights, material, shadows=0):
     """Luminance, wall clock and CPU seconds."""
     wall, cpu = time.perf_counter(), time.process_time()
-    result = bakes.bake(floor(size), Illumination(lights, cards(shadows)), material, 0.0, SETTINGS)
+    result = bakes.bake([floor(size)], Illumination(lights, cards(shadows)), material, 0.0, SETTINGS)[0]
     return result, time.perf_counter() - wall, time.process_time() - cpu
 
 

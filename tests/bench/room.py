@@ -75,7 +75,7 @@ def bake(size, seed, shapes):
     lights = [sky(), *areas()]
     marble = presets()["marble"]
     sources = [library(medium) for medium in channel_media(marble, 0.0)]
-    result = bakes.spread(floor(size), Illumination(lights, shapes), marble, sources, BakeSettings(), seed=seed)
+    result = bakes.spread([floor(size)], Illumination(lights, shapes), marble, sources, BakeSettings(), seed=seed)[0]
     return result, time.perf_counter() - started
 
 

@@ -3,6 +3,8 @@
 from types import SimpleNamespace
 
 import bpy
+from beamspread.blender.jobs.out_of_date import stale
+from beamspread.blender.ui import bake_panel
 
 
 class Layout:
@@ -37,3 +39,12 @@ def context():
     return SimpleNamespace(
         region=region, preferences=preferences, scene=bpy.context.scene, view_layer=bpy.context.view_layer
     )
+
+
+def panel() -> str:
+    """The text of the bake's panel."""
+    bpy.context.view_layer.update()
+    stale.refresh(bpy.context)
+    layout = Layout()
+    bake_panel.draw_bake(layout, context())
+    return layout.said

@@ -9,7 +9,6 @@ from beamspread.blender.jobs.run.bake_plan import read_scene
 from beamspread.blender.jobs.state import Run, state
 from beamspread.blender.live import timer
 from beamspread.blender.node.find import find_targets
-from beamspread.blender.ui import bake_panel
 from beamspread.core.bake.forecast import Finders, seconds_of
 from beamspread.core.bake.pace import pace
 from beamspread.core.ldf import library
@@ -17,7 +16,7 @@ from beamspread.core.progress import Progress
 from beamspread.core.target import Target
 from mathutils import Matrix
 from nodes import Nodes
-from panel_layout import Layout, context
+from panel_layout import panel
 from scenes import add_lamp, add_material, add_plane, add_sun, add_world, diffuse_material, glowing_material, select
 
 
@@ -38,15 +37,6 @@ def plane(name="Plane", x=0.0, size=(2.0, 2.0), **properties):
     made = add_plane(name, size, Matrix.Translation((x, 0, 0)), material=material)
     bpy.context.view_layer.update()
     return made
-
-
-def panel():
-    """The panel's text."""
-    bpy.context.view_layer.update()
-    stale.refresh(bpy.context)
-    layout = Layout()
-    bake_panel.draw_bake(layout, context())
-    return layout.said
 
 
 def announced(*objects):

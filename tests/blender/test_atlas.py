@@ -195,7 +195,7 @@ def test_undo_takes_maps_and_image_away():
 
 
 def test_the_resolution_follows_all_objects():
-    """Where no resolution is set, the side of the image has the texel density of the scene."""
+    """The scene sets no resolution. The texel density of the scene then gives the side of the image."""
     settings = bpy.context.scene.beamspread
     settings.property_unset("resolution")
     settings.texel_density = 150

@@ -6,14 +6,12 @@ import subprocess
 import bpy
 import pytest
 import scenes
-from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.run.bake_plan import read_scene
 from beamspread.blender.jobs.state import state
 from beamspread.blender.live import timer
 from beamspread.blender.node.find import find_targets
-from beamspread.blender.ui import bake_panel
 from mathutils import Matrix
-from panel_layout import Layout, context
+from panel_layout import panel
 
 DIFFUSE = "spreads over 0.78 texels, so this is a diffuse bake. Choose a Resolution of 64, then Resize."
 
@@ -35,14 +33,6 @@ def sizes():
     """Sizes of the textures of all objects, without baking them."""
     bpy.context.view_layer.update()
     return [plan.size for plan in read_scene(bpy.context, find_targets(bpy.context.scene.objects))]
-
-
-def panel():
-    bpy.context.view_layer.update()
-    stale.refresh(bpy.context)
-    layout = Layout()
-    bake_panel.draw_bake(layout, context())
-    return layout.said
 
 
 @pytest.mark.parametrize(("meters", "side"), [(0.1, 512), (2.0, 1024), (9.0, 4096), (100.0, 2048)])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from beamspread.core.bake.bake_settings import COMBINED
 from beamspread.core.bake.job import BakeJob
-from beamspread.core.bake.layers import LAYERS, arrive, bake, mean_direction, rays_per_texel
+from beamspread.core.bake.layers import LAYERS, arrive, mean_direction, rays_per_texel
 from beamspread.core.bake.steps import BAKE_STEPS
 from beamspread.core.bake.surface import Surface
 from beamspread.core.errors import MaterialError
@@ -21,7 +21,7 @@ from beamspread.core.scene.occluders import Mesh, Occluder
 from beamspread.core.scene.polygons import Polygons
 from beamspread.core.scene.receiver import Receiver, build_receiver
 
-from bakes import MATERIAL, SETTINGS, bake_job, square
+from bakes import MATERIAL, SETTINGS, bake, bake_job, square
 
 SUN = SunLight("Sun", 2.0, (1.0, 1.0, 1.0), True, (0.0, 0.0, -1.0))
 

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 from beamspread import LdfSample, Medium, simulate
 from beamspread.core.bake.bake_settings import BakeSettings
-from beamspread.core.bake.layers import bake
 from beamspread.core.errors import BakeError
 from beamspread.core.ldf.library import load_source
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import SunLight
 
-from bakes import MATERIAL, square
+from bakes import MATERIAL, bake, square
 
 SUN = SunLight("Sun", 2.0, (1.0, 1.0, 1.0), True, (0.0, 0.0, -1.0))
 SQUARE = square()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from beamspread.core.bake.bake_settings import IRRADIANCE, BakeSettings
 from beamspread.core.bake.job import BakeJob
-from beamspread.core.bake.layers import arrive, bake
+from beamspread.core.bake.layers import arrive
 from beamspread.core.bake.steps import Solve, Step
 from beamspread.core.bake.surface import Surface
 from beamspread.core.ldf.library import library
@@ -17,7 +17,7 @@ from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight, WorldLight
 from beamspread.core.scene.receiver import Receiver
 
-from bakes import square
+from bakes import bake, square
 
 WHITE = 1.0, (1.0, 1.0, 1.0), True
 

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from beamspread.core.bake.finish import lit_rims
-from beamspread.core.bake.layers import bake
 from beamspread.core.native import native
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import SunLight
 
-from bakes import MATERIAL, SETTINGS, bake_job, square
+from bakes import MATERIAL, SETTINGS, bake, bake_job, square
 
 SIDE, FINE = 24, 10
 SUN = SunLight("Sun", 2.0, (1.0, 1.0, 1.0), True, (0.0, 0.0, -1.0))

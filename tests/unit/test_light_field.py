@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from beamspread.core.bake import layers
 from beamspread.core.bake.bake_settings import BakeSettings
-from beamspread.core.bake.layers import TOLERANCE, bake
+from beamspread.core.bake.layers import TOLERANCE
 from beamspread.core.material import Material
 from beamspread.core.native import native
 from beamspread.core.scene.illumination import Illumination
 from beamspread.core.scene.lights import AreaLight, PointLight, SpotLight, SunLight, WorldLight
 from beamspread.core.scene.occluders import Mesh
 
-from bakes import square
+from bakes import bake, square
 
 SETTINGS = BakeSettings(quality="preview", samples=1, margin=0)
 MATERIAL = Material(albedo=(0.95, 0.9, 0.8), mean_free_path=(0.01, 0.01, 0.005), anisotropy=0.6, ior=1.4)

@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from beamspread.core.bake.bake_settings import BakeSettings
-from beamspread.core.bake.layers import bake, bake_all
 from beamspread.core.bake.steps import NoiseSum
 from beamspread.core.material import Material
 from beamspread.core.scene.grid import Grid
 from beamspread.core.scene.illumination import Illumination
-from beamspread.core.scene.lights import AreaLight, PointLight, SunLight, WorldLight
+from beamspread.core.scene.lights import STRATA, AreaLight, Field, FieldLight, PointLight, SunLight, WorldLight
 from beamspread.core.scene.occluders import Mesh
+
+from bakes import bake, bake_together
 
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 SETTINGS = BakeSettings(quality="preview")
@@ -49,7 +50,7 @@ def together_and_alone(names, mean_free_path, grids=None, ior=1.4, thickness=0.0
     illumination = Illumination([LIGHTS[name] for name in names], CARD)
     material = Material((0.99, 0.9, 0.6), (mean_free_path, mean_free_path / 2, mean_free_path), 0.8, ior)
     rest = illumination, material, thickness, replace(SETTINGS, **settings)
-    return bake_all(grids, *rest), [bake(grid, *rest) for grid in grids]
+    return bake_together(grids, *rest), [bake(grid, *rest) for grid in grids]
 
 
 def largest_difference(first, second):
@@ -65,6 +66,24 @@ def largest_difference(first, second):
 def test_planes_are_as_if_they_were_alone(names, mean_free_path):
     """A thousandth of the brightest is a fifth of the solver's tolerance: terms differ, and gaps cut kernels."""
     assert largest_difference(*together_and_alone(names, mean_free_path)) < 1e-3
+
+
+def test_light_that_was_computed_elsewhere_is_that_of_each_plane():
+    """Fields differ from plane to plane, and some parts of the hemisphere are dark on some planes."""
+    random, grids = np.random.default_rng(3), planks()
+    fields = []
+    for grid in grids:
+        radiance = random.random((len(STRATA), 4, 5, 3), np.float32)
+        radiance[random.random(len(STRATA)) < 0.3] = 0
+        fields.append(Field(grid.origin, grid.normal, radiance))
+    light = FieldLight("Bounced light", 1.0, WHITE, False, tuple(fields))
+    rest = (
+        Illumination([light, LIGHTS["lamp"]], CARD),
+        Material((0.99, 0.9, 0.6), (0.004,) * 3, 0.8, 1.4),
+        0.0,
+        SETTINGS,
+    )
+    assert largest_difference(bake_together(grids, *rest), [bake(grid, *rest) for grid in grids]) < 1e-3
 
 
 def test_light_that_a_slab_returns_unscattered_stays_on_its_plane():

@@ -317,7 +317,7 @@ def test_noise_may_have_outliers():
 
 
 def test_a_small_bent_part_is_no_noise():
-    """Half of a thin pipe on a large plate, as far from its plane as noise may be."""
+    """A thin half pipe stands on a large plate. Its height is the largest that noise may have."""
     turns = np.linspace(0, np.pi, 13)
     arc = 4e-3 * np.stack([np.cos(turns), np.sin(turns)], 1) + (0, 0.01)
     pipe = [

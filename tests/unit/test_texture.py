@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from beamspread.core.bake.layers import arrive, bake
+from beamspread.core.bake.layers import arrive
 from beamspread.core.material import Material
 from beamspread.core.scene.chart import Chart, ChartIsland
 from beamspread.core.scene.flat_mesh import flatten
@@ -15,7 +15,7 @@ from beamspread.core.scene.polygons import Polygons
 from beamspread.core.scene.receiver import Receiver, build_receiver
 from beamspread.core.scene.texture import mean_color, textured
 
-from bakes import SETTINGS, square
+from bakes import SETTINGS, bake, square
 
 SIZE = 24
 MATERIAL = Material(albedo=(0.9, 0.8, 0.7), mean_free_path=(0.02, 0.02, 0.02), anisotropy=0.0)

@@ -132,7 +132,7 @@ def test_systems_without_file_locks_write_as_well(tmp_path, monkeypatch):
 
 
 def test_several_files_are_replaced_together(tmp_path):
-    """Nothing is written to the second file, which is an error: the first one keeps its content, too."""
+    """An empty second file is an error. The first file then keeps its content, too."""
     paths = [tmp_path / "first.exr", tmp_path / "second.exr"]
     for path in paths:
         path.write_text("old")

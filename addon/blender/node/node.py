@@ -7,8 +7,7 @@ import numpy as np
 from bpy.app.handlers import persistent
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty, StringProperty
 
-from ...core.bake.edges import MIRROR, OPEN
-from ...core.bake.surface import Surface
+from ...core.bake.surface import MIRROR, OPEN, Surface
 from ...core.errors import MaterialError
 from ...core.material import Material, presets
 from ...core.messages import Message

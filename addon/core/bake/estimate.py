@@ -11,6 +11,7 @@ from ..ldf.library import PHOTONS, angles_for
 from ..scene.lights import STRATA, AreaLight, Light, MeshLight, WorldLight
 from ..scene.receiver import Grid
 from .bake_settings import BakeSettings
+from .edges import texels_with_images
 from .layers import MAX_RAYS_BY_SAMPLES, MIN_RAYS, RAYS_PER_SAMPLE, WITHOUT_MEDIUM, rays_per_texel
 from .mean_light import mean_open_irradiance
 from .surface import Surface
@@ -73,7 +74,7 @@ class Workload:
 
     Attributes
     ----------
-    texels : of all grids.
+    texels : of all grids, with their mirror images.
     planes : number of grids.
     suns, lamps : numbers of lights of one direction, and of one direction at each texel.
     broad_rays, narrow_rays : rays of each texel to lights from all around, and to other lights of a size.
@@ -109,7 +110,7 @@ class Workload:
 
         `unknown`: fraction of all light, about, that comes from all around and is not among `lights`.
         """
-        load = cls(sum(grid.texels for grid in grids), len(grids), bounced=bounced, triangles=triangles)
+        load = cls(sum(map(texels_with_images, grids)), len(grids), bounced=bounced, triangles=triangles)
         largest = max(grids, key=lambda grid: grid.texels)
         all_rays, shared = _rays(largest, lights, surface, settings, unknown)
         load = replace(load, broad_rays=all_rays * (unknown if shared else math.ceil(unknown)))

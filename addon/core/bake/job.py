@@ -16,6 +16,7 @@ from ..scene.illumination import Illumination
 from ..scene.receiver import Receiver
 from ..scene.texture import BaseColor, textured
 from .bake_settings import COMBINED, BakeSettings
+from .edges import with_edges
 from .estimate import OF_WORLD, Workload
 from .layers import WITHOUT_MEDIUM
 from .pace import Estimate
@@ -124,7 +125,8 @@ class BakeJob:
 
     def workload(self) -> Workload:
         """Facts that decide how long the solution takes."""
-        grids, light = [chart.grid for chart in self.receiver.charts], self.illumination
+        grids, _ = with_edges([chart.grid for chart in self.receiver.charts], self.surface, self.name)
+        light = self.illumination
         rest = light.triangle_count, self.surface, self.settings, self.finds_light
         return Workload.of(grids, light.lights, *rest, OF_WORLD * any(step.finds_world for step in self.steps))
 

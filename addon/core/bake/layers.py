@@ -39,23 +39,6 @@ Report = Callable[[float, float, float], None]
 
 
 def bake(
-    grid: Grid,
-    illumination: Illumination,
-    material: Material,
-    thickness: float,
-    settings: BakeSettings,
-    progress: Callback | None = None,
-    bytes_for_light: int = 0,
-    report_noise: Report | None = None,
-) -> np.ndarray:
-    """Luminance of a translucent plane: `bake_all` of one grid."""
-    (luminance,) = bake_all(
-        [grid], illumination, material, thickness, settings, progress, bytes_for_light, report_noise
-    )
-    return luminance
-
-
-def bake_all(
     grids: Sequence[Grid],
     illumination: Illumination,
     material: Material,
@@ -97,17 +80,12 @@ def bake_all(
         sources = _libraries(material, thickness, settings, media_progress)
     else:
         sources = [load_source(settings.sample_folder, settings.distributions)] * 3
-    return spread_all(
+    return spread(
         grids, illumination, material, sources, settings, light_progress, bytes_for_light, report_noise=report_noise
     )
 
 
-def spread(grid: Grid, *arguments, **options) -> np.ndarray:
-    """Luminance of a plane: `spread_all` of one grid."""
-    return spread_all([grid], *arguments, **options)[0]
-
-
-def spread_all(
+def spread(
     grids: Sequence[Grid],
     illumination: Illumination,
     material: Material,
@@ -119,7 +97,7 @@ def spread_all(
     report_noise: Report | None = None,
     rays: int = 0,
 ) -> list[np.ndarray]:
-    """`bake_all` with the LDF of each channel given; the material is checked, and `settings.quality` does not count.
+    """`bake` with the LDF of each channel given; the material is checked, and `settings.quality` does not count.
 
     `rays`: from each texel to all lights of a size together; 0: by the medium, see `rays_per_texel`.
     """
@@ -149,7 +127,7 @@ def _spread_group(
     seed: int,
     report_noise: Report | None,
 ) -> list[np.ndarray]:
-    """`spread_all` for grids with as many rays to each texel."""
+    """`spread` for grids with as many rays to each texel."""
 
     def report_spread(irradiance: float, variance: float) -> None:
         if report_noise:
@@ -251,7 +229,7 @@ def mean_direction(flow: np.ndarray) -> np.ndarray:
 
 
 Layer = Callable[[Sequence[Grid], Illumination, Material, float, BakeSettings, Progress, int, Report], list[np.ndarray]]
-"""Takes the arguments of `bake_all`; float32 (height, width, 3) of each grid, row 0 at the bottom."""
+"""Takes the arguments of `bake`; float32 (height, width, 3) of each grid, row 0 at the bottom."""
 
 
 def irradiance(grids, illumination, _material, _thickness, settings, progress, _bytes_for_light, report) -> list:
@@ -267,7 +245,7 @@ def _arrive_on_all(grids, illumination, settings, progress, report) -> list[tupl
     return [arrive(grid, illumination, settings, part, report) for grid, part in zip(grids, parts)]
 
 
-LAYERS: dict[str, Layer] = {COMBINED: bake_all, IRRADIANCE: irradiance, DIRECTION: direction}
+LAYERS: dict[str, Layer] = {COMBINED: bake, IRRADIANCE: irradiance, DIRECTION: direction}
 
 WITHOUT_MEDIUM = {IRRADIANCE, DIRECTION}
 """Layers that do not depend on the material."""

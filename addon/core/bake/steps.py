@@ -12,7 +12,7 @@ from ..ldf.library import SIMULATING, is_known, library
 from ..messages import Message, note
 from ..progress import Progress
 from .bake_settings import BakeSettings
-from .edges import with_edges
+from .edges import texels_with_images, with_edges
 from .estimate import simulation_seconds
 from .finish import finished_texture
 from .job import BakeJob, Step
@@ -105,7 +105,7 @@ class Solve(Step):
         material, settings = job.surface.material, job.settings
         if needs_medium(settings):
             material = job.surface.resolve(settings.quality, None, settings.threads)
-        grids, messages = with_edges([chart.grid for chart in job.receiver.charts], job.surface.edges, job.name)
+        grids, messages = with_edges([chart.grid for chart in job.receiver.charts], job.surface, job.name)
         job = replace(job, illumination=job.illumination.with_messages(*messages))
         noise = NoiseSum()
         values = LAYERS[settings.layer](
@@ -129,6 +129,8 @@ class Solve(Step):
         texels, lights, surface = job.receiver.coverage.size, job.illumination.lights, job.surface
         if not needs_medium(job.settings):
             return pass_bytes(texels)
+        mirrored, _ = with_edges([chart.grid for chart in job.receiver.charts], surface, job.name)
+        texels = max(texels, *map(texels_with_images, mirrored))
         is_narrow = not job.finds_light and all(light.has_one_direction for light in lights)
         kind = (SUNS if all(light.is_parallel for light in lights) else NARROW) if is_narrow else WIDE
         is_slab = surface.thickness > 0 and surface.material.ior > 1

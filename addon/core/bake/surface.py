@@ -12,7 +12,9 @@ from ..material import RGB, Material, check_base_color, check_thickness
 from ..native import native
 from ..progress import Callback, Progress
 from ..scene.texture import BaseColor
-from .edges import OPEN
+
+OPEN, MIRROR = "OPEN", "MIRROR"
+"""Edges of a plane: light leaves through them, or returns as from mirrors."""
 
 
 def channel_media(material: Material, thickness: float) -> list:
@@ -29,7 +31,7 @@ class Surface:
     material : its lengths are in scene units.
     thickness : thickness of the slab; 0 for a half-space.
     base_color : reflectance under uniform diffuse light; None if the material's albedo counts.
-    edges : OPEN or MIRROR, see `edges.py`.
+    edges : OPEN or MIRROR.
     """
 
     material: Material

@@ -10,7 +10,7 @@ import numpy as np
 from ..bake.bake_settings import COMBINED, BakeSettings
 from ..bake.edges import with_edges
 from ..bake.finish import finished_texture, with_seams
-from ..bake.layers import spread, spread_all
+from ..bake.layers import spread
 from ..bake.surface import channel_media
 from ..ldf.albedo import albedo_from_reflectance
 from ..ldf.library import load_source
@@ -132,9 +132,9 @@ class LiveRenderer:
         illumination = with_bounced(target, framed.receiver, progress)
         rest = material, sources, target.settings, progress
         grids, edges = with_edges(
-            [chart.grid for chart in framed.receiver.charts], target.surface.edges, target.target.object_name
+            [chart.grid for chart in framed.receiver.charts], target.surface, target.target.object_name
         )
-        values = spread_all(grids, illumination, *rest)
+        values = spread(grids, illumination, *rest)
         texture = finished_texture(framed.receiver, values, material, target.settings)
         news = [message for message in illumination.messages if message not in target.illumination.messages]
         messages = (*self._mesh(target).messages, *edges, *news)
@@ -184,7 +184,7 @@ class LiveRenderer:
         grids = [replace(chart.grid, color_out=None) for chart in framed.receiver.charts]
         sizes = {(grid.width, grid.height, grid.pitch_x, grid.pitch_y) for grid in grids}
         if len(grids) > MAX_GRIDS_APART or len(sizes) > MAX_FIELDS:  # the cache has kernels of few sizes
-            values = spread_all(grids, illumination, *rest, rays=QUICK_RAYS * max(len(illumination.lights), 1))
+            values = spread(grids, illumination, *rest, rays=QUICK_RAYS * max(len(illumination.lights), 1))
         else:
             values = [self._quick_luminance(grid, illumination, *rest) for grid in grids]
         return framed.continued(framed.receiver.to_texture(values))
@@ -215,7 +215,7 @@ class LiveRenderer:
         if not lights:
             return np.zeros((grid.height, grid.width, 3), np.float32)
         if _are_few_suns(lights, grid) or settings.distributions != "library":
-            return spread(grid, illumination, material, sources, settings, progress)
+            return spread([grid], illumination, material, sources, settings, progress)[0]
         medium = {
             "ldf": sources,
             "albedo": material.albedo,

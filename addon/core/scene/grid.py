@@ -32,7 +32,7 @@ class Grid:
     owner : name of the object that the plane belongs to; faces of other objects that lie on the plane cover it.
     color_in, color_out : float32 (height, width, 3), factors of entering and leaving light by the surface's texture;
         None without a texture.
-    is_mirrored : True if the borders of the grid return light as mirrors; else it leaves there.
+    mirrored : distance from the borders, scene units, to which mirror images of the grid return light; 0: it leaves.
     """
 
     origin: Vector
@@ -48,7 +48,7 @@ class Grid:
     color_in: np.ndarray | None = None
     color_out: np.ndarray | None = None
     owner: str = ""
-    is_mirrored: bool = False
+    mirrored: float = 0.0
 
     @property
     def texels(self) -> int:
@@ -89,7 +89,7 @@ class Grid:
     def surface(self):
         """The native `Surface`, which views the arrays of the grid."""
         colors = self.color_in, self.color_out
-        return native.Surface(self.native(), self.coverage, self.clearance, *colors, self.is_mirrored)
+        return native.Surface(self.native(), self.coverage, self.clearance, *colors, self.mirrored)
 
 
 def owner_number(name: str) -> int:

@@ -98,10 +98,15 @@ class Illumination:
 
     def arriving_lights(self, grids: Sequence[Grid]) -> list[list[tuple | None]]:
         """All lights at each grid, as those of `native_lights`; None where they can't reach it."""
-        lights = self.lights
-        return [
-            [None if light.is_behind(grid) else self._native_light(light, grid) for light in lights] for grid in grids
-        ]
+        # Grids of one origin follow each other, so that its occluders are built once.
+        order = sorted(range(len(grids)), key=lambda number: self._origin(grids[number]))
+        arriving: list[list[tuple | None]] = [[] for _ in grids]
+        for number in order:
+            grid = grids[number]
+            arriving[number] = [
+                None if light.is_behind(grid) else self._native_light(light, grid) for light in self.lights
+            ]
+        return arriving
 
     def _native_light(self, light: Light, grid: Grid) -> tuple:
         return light.at(grid), light.rgb().tolist(), self.caster(grid, light) if light.cast_shadow else None
@@ -138,14 +143,18 @@ class Illumination:
             for occluder in self._occluders
         )
 
+    @staticmethod
+    def _origin(grid: Grid) -> tuple[float, ...]:
+        step = TEXELS_BETWEEN_ORIGINS * 2.0 ** math.ceil(math.log2(min(grid.pitch_x, grid.pitch_y)))
+        return tuple(step * np.round(grid.centre / step))
+
     def caster(self, grid: Grid, light: Light | None = None):
         """The native `Occluders` that may block the light, with its origin near the receiver; None without triangles.
 
         The origin follows from the receiver alone, so that a bake does not depend on earlier ones. Cached occluders
         serve all receivers with the same origin, and all lights with the same blockers.
         """
-        step = TEXELS_BETWEEN_ORIGINS * 2.0 ** math.ceil(math.log2(min(grid.pitch_x, grid.pitch_y)))
-        origin = tuple(step * np.round(grid.centre / step))
+        origin = self._origin(grid)
         if any(cached_origin != origin for cached_origin, _ in self._casters):
             self._casters.clear()  # first, because each may take gigabytes
         blockers = light.blockers if light else None

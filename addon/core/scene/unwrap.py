@@ -152,7 +152,7 @@ def _laid_flat(polygons: Polygons, faces: np.ndarray, corners: np.ndarray) -> np
     # Edges of corners at the same place have no direction.
     longest = longest[lengths[longest] > 1e-3 * lengths.max()]
     directions = edges[longest] / lengths[longest][:, None]
-    # Of those that are as good, the first one counterclockwise, so that maps don't depend on the order of edges.
+    # Equal rectangles are ranked by their angle, so that maps don't depend on the order of edges.
     angles = (np.arctan2(directions[:, 1], directions[:, 0]) % (2 * np.pi)).round(SAME_DIGITS)
     directions = directions[np.argsort(angles % round(2 * np.pi, SAME_DIGITS), kind="stable")]
     best, smallest = points, np.inf

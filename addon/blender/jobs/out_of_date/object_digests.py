@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ....core.bake.edges import OPEN
+from ....core.bake.surface import OPEN
 from ... import compat
 from ...node.find import find_node_in_groups
 from ...read.digests import TreeDigest, digest, digest_of_mesh, values_of

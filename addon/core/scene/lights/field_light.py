@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -59,9 +60,6 @@ class Field:
     normal: Vector
     radiance: np.ndarray
 
-    def is_of(self, grid: Grid) -> bool:
-        return np.array_equal(self.origin, grid.origin) and np.array_equal(self.normal, grid.normal)
-
 
 @dataclass(frozen=True, eq=False)
 class FieldLight(Light):
@@ -90,8 +88,12 @@ class FieldLight(Light):
     def has_one_direction(self):
         return self.position is not None or self.direction is not None
 
+    @cached_property
+    def _fields(self) -> dict[tuple, Field]:
+        return {(tuple(field.origin), tuple(field.normal)): field for field in self.fields}
+
     def field_of(self, grid: Grid) -> Field | None:
-        return next((field for field in self.fields if field.is_of(grid)), None)
+        return self._fields.get((tuple(grid.origin), tuple(grid.normal)))
 
     def is_behind(self, grid):
         field = self.field_of(grid)
