@@ -23,6 +23,18 @@ public:
     // by `angle_weights`, cut to AngleWeights::harmonics.
     virtual std::vector<RadialProfile> node_profiles(double albedo, Side side) const = 0;
 
+    // Curvatures, 1 / mean free path and ascending, of the surfaces whose profiles the source has; 0, a plane, is one of
+    // them. 1 / radius on a ball, negative in a hollow.
+    virtual std::vector<double> curvatures() const { return {0.0}; }
+
+    // `node_profiles` on a surface of `curvatures()[curvature]`. The radius r is the chord, the straight distance of entry
+    // and exit: the area within it is pi r^2 on a ball as on a plane. The azimuth is that of the chord in the tangent plane
+    // of the entry.
+    virtual std::vector<RadialProfile> curved_node_profiles(double albedo, Side side, std::size_t /*curvature*/) const
+    {
+        return node_profiles(albedo, side);
+    }
+
     struct AngleWeights {
         std::vector<double> even;  // [node], for the harmonics of even m
         std::vector<double> odd;
