@@ -131,6 +131,7 @@ void bind_interpolation(py::module_& m);
 void bind_image(py::module_& m);
 void bind_lights(py::module_& m);
 void bind_occluders(py::module_& m);
+void bind_bent_texels(py::module_& m);
 void bind_scene(py::module_& m);
 void bind_solve(py::module_& m);
 void bind_bake(py::module_& m);

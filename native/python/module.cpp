@@ -36,6 +36,7 @@ PYBIND11_MODULE(_native, m)
     bind_transport(m);
     bind_image(m);
     bind_scene(m);
+    bind_bent_texels(m);
     bind_solve(m);
     bind_bake(m);
 }
