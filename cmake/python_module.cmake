@@ -32,7 +32,7 @@ execute_process(COMMAND ${Python_EXECUTABLE} -c "import sysconfig; print(sysconf
 string(SUBSTRING ${suffix} 1 -1 own_tag)
 python_module(_native ${own_tag} ${BEAMSPREAD_STAGE_DIR}/beamspread ${Python_INCLUDE_DIRS})
 # Functions that tests alone call, beside the staged package: neither the zip nor the wheel has them.
-add_library(_native_test MODULE tests/native_test.cpp native/python/casters.cpp)
+add_library(_native_test MODULE tests/native_test.cpp tests/native_surface.cpp native/python/casters.cpp)
 target_link_libraries(_native_test PRIVATE ${beamspread_libraries})
 target_include_directories(_native_test SYSTEM PRIVATE ${Python_INCLUDE_DIRS})
 set_target_properties(_native_test PROPERTIES PREFIX "" SUFFIX .${own_tag}

@@ -16,6 +16,8 @@
 
 namespace beamspread {
 
+void bind_surface(py::module_& m);
+
 namespace {
 
 // Number of lines, and of values in each.
@@ -187,4 +189,5 @@ flux : ndarray, float32, shape (N, 3)
     m.def("transforms", &transforms, py::arg("lights"), py::arg("ldf"), py::arg("albedo"), py::arg("mean_free_path"),
           py::arg("pitch"), py::arg("tolerance"),
           "Number of transforms of light that the solver 'fft' makes for `convolve`.");
+    bind_surface(m);
 }

@@ -27,51 +27,6 @@ Harmonics point_value(const RadialFunction& point, double r)
     return value;
 }
 
-// Mean of c_m(r) cos(m phi) over a disk whose centre is at distance s from the pole.
-Harmonics disk_mean(const RadialFunction& point, double radius, double s)
-{
-    if (s > far_in_radii * radius)
-        return point_value(point, s);
-    Harmonics sum{};
-    // Near the pole integrate C_m itself; elsewhere C_m - C_m(infinity), as constants cancel around a closed border.
-    const bool near = s < 2.0 * radius;
-    // Substitute tau = a sinh(x), with tau the angle at the disk's centre from the point nearest to the pole: steps are
-    // short near that point. The bound on `a` serves points on the disk's edge.
-    const double a = std::max(1e-4, std::abs(radius - s) / std::sqrt(std::max(s, 1e-12 * radius) * radius));
-    const double last = std::asinh(pi / a);
-    // Choose the number of panels: at most half a period of the shortest harmonic each, and at least 16.
-    const double step = 3.2 / static_cast<double>(point.harmonics());
-    const int panels = std::max(16, static_cast<int>(std::ceil(last / step)));
-    const double half = 0.5 * last / panels;
-    for (int i = 0; i < panels; ++i) {
-        for (std::size_t q = 0; q < gauss_node.size(); ++q) {
-            const double x = half * (2 * i + 1 + gauss_node[q]);
-            const double tau = a * std::sinh(x);
-            const double sine = std::sin(0.5 * tau);
-            const double r2 = (radius - s) * (radius - s) + 4.0 * s * radius * sine * sine;
-            const double r = std::sqrt(r2);
-            if (r == 0.0)
-                continue;
-            // Compute the weight d phi / d tau * d tau / dx, twice for both halves of the border.
-            const double phi_slope = radius * (radius - s + 2.0 * s * sine * sine) / r2;
-            const double weight = 2.0 * gauss_weight[q] * half * a * std::cosh(x) * phi_slope;
-            const double cos_phi = (s - radius * std::cos(tau)) / r;
-            const Harmonics radial = near ? point.cumulative(r) : point.remaining(r);
-            double previous = cos_phi;
-            double cosine = 1.0;
-            for (std::size_t m = 0; m < point.harmonics(); ++m) {
-                sum[m] += (near ? weight : -weight) * radial[m] * cosine;
-                const double next = 2.0 * cos_phi * cosine - previous;
-                previous = cosine;
-                cosine = next;
-            }
-        }
-    }
-    for (double& value : sum)
-        value /= pi * radius * radius;
-    return sum;
-}
-
 // Radii between which the disk's means are smooth: its border touches a border of the profile's radius bins there. They
 // are denser toward the disk's edge, where the singularity at the pole shows.
 std::vector<double> breakpoints(double radius, double support)
@@ -126,6 +81,50 @@ double area_below(double radius, double x0, double x1, double y)
 }
 
 }  // namespace
+
+Harmonics disk_mean(const RadialFunction& point, double radius, double s)
+{
+    if (s > far_in_radii * radius)
+        return point_value(point, s);
+    Harmonics sum{};
+    // Near the pole integrate C_m itself; elsewhere C_m - C_m(infinity), as constants cancel around a closed border.
+    const bool near = s < 2.0 * radius;
+    // Substitute tau = a sinh(x), with tau the angle at the disk's centre from the point nearest to the pole: steps are
+    // short near that point. The bound on `a` serves points on the disk's edge.
+    const double a = std::max(1e-4, std::abs(radius - s) / std::sqrt(std::max(s, 1e-12 * radius) * radius));
+    const double last = std::asinh(pi / a);
+    // Choose the number of panels: at most half a period of the shortest harmonic each, and at least 16.
+    const double step = 3.2 / static_cast<double>(point.harmonics());
+    const int panels = std::max(16, static_cast<int>(std::ceil(last / step)));
+    const double half = 0.5 * last / panels;
+    for (int i = 0; i < panels; ++i) {
+        for (std::size_t q = 0; q < gauss_node.size(); ++q) {
+            const double x = half * (2 * i + 1 + gauss_node[q]);
+            const double tau = a * std::sinh(x);
+            const double sine = std::sin(0.5 * tau);
+            const double r2 = (radius - s) * (radius - s) + 4.0 * s * radius * sine * sine;
+            const double r = std::sqrt(r2);
+            if (r == 0.0)
+                continue;
+            // Compute the weight d phi / d tau * d tau / dx, twice for both halves of the border.
+            const double phi_slope = radius * (radius - s + 2.0 * s * sine * sine) / r2;
+            const double weight = 2.0 * gauss_weight[q] * half * a * std::cosh(x) * phi_slope;
+            const double cos_phi = (s - radius * std::cos(tau)) / r;
+            const Harmonics radial = near ? point.cumulative(r) : point.remaining(r);
+            double previous = cos_phi;
+            double cosine = 1.0;
+            for (std::size_t m = 0; m < point.harmonics(); ++m) {
+                sum[m] += (near ? weight : -weight) * radial[m] * cosine;
+                const double next = 2.0 * cos_phi * cosine - previous;
+                previous = cosine;
+                cosine = next;
+            }
+        }
+    }
+    for (double& value : sum)
+        value /= pi * radius * radius;
+    return sum;
+}
 
 DiskProfile::DiskProfile(const RadialFunction& point, double radius)
     : m_harmonics(point.harmonics()),

@@ -90,6 +90,9 @@ void check_pitch(double pitch);
 // mean free path and pitch.
 TexelIntegrals integrate_texels(const RadialFunction& profile, const TexelGrid& grid);
 
+// Means of c_m(r) cos(m phi) over a disk whose middle is at this distance from the pole and azimuth 0.
+Harmonics disk_mean(const RadialFunction& point, double radius, double distance);
+
 // Convolution of an LDF with an evenly lit disk of total weight 1. A disk is symmetric, hence the result has the same
 // harmonics; their radial functions are the means of g cos(m phi) over disks, by Green's theorem integrals of
 // C_m(r) cos(m phi) d phi around the disks' borders.

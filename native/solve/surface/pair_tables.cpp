@@ -1,0 +1,149 @@
+#include "solve/surface/pair_tables.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/constants.h"
+
+namespace beamspread {
+
+namespace {
+
+// Disks per octave of the radius. More: smaller errors where areas differ, more time and memory.
+constexpr float disks_per_octave = 4.0f;
+
+// Chord from which a disk counts as a point, and first chord of its table, in radii. Larger end: smaller errors, more
+// time.
+constexpr float disk_end_radii = 8.0f;
+constexpr float disk_first_radii = 0.125f;
+
+const std::vector<ScaledProfile>& profiles_of(const SurfaceBasis& basis, std::size_t result, std::size_t curvature)
+{
+    const std::size_t medium = basis.terms.sets.results[result].medium;
+    return basis.terms.basis.profiles[basis.first_profiles[medium] + curvature];
+}
+
+std::size_t flat_index(const SurfaceBasis& basis, std::size_t result)
+{
+    const std::vector<double>& nodes = basis.curvatures[basis.terms.sets.results[result].medium];
+    return static_cast<std::size_t>(std::find(nodes.begin(), nodes.end(), 0.0) - nodes.begin());
+}
+
+}  // namespace
+
+PairTables::PairTables(const SurfaceBasis& basis, float min_area, float max_area)
+    : results(basis.terms.sets.results.size()), blocks(basis.blocks)
+{
+    for (const ChannelSets::Result& result : basis.terms.sets.results)
+        set.push_back(result.set);
+    make_scales(basis);
+    for (std::size_t r = 0; r < results; ++r)
+        for (std::size_t k = 0; k < scales[r].nodes.size(); ++k)
+            for (const ScaledProfile& profile : profiles_of(basis, r, k))
+                reach = std::max(reach, static_cast<float>(profile.reach));
+    const auto radius_of = [](float area) { return std::sqrt(area * static_cast<float>(inv_pi)); };
+    m_first_radius = radius_of(min_area);
+    const float octaves = std::log2(radius_of(max_area) / m_first_radius);
+    disks.resize(static_cast<std::size_t>(std::lround(octaves * disks_per_octave)) + 1);
+    for (std::size_t d = 0; d < disks.size(); ++d) {
+        const float radius = m_first_radius * std::exp2(static_cast<float>(d) / disks_per_octave);
+        disk_end.push_back(disk_end_radii * radius);
+        disks[d].first = chord_step(disk_first_radii * radius);
+        make_table(basis, disks[d], radius, std::min(disk_end.back(), reach));
+    }
+    point.first = chord_step(m_first_radius);
+    make_table(basis, point, 0.0f, reach);
+    make_self(basis, m_first_radius, radius_of(max_area));
+}
+
+void PairTables::make_scales(const SurfaceBasis& basis)
+{
+    for (const ChannelSets::Result& result : basis.terms.sets.results) {
+        const ChannelMedium& medium = basis.terms.sets.media[result.medium];
+        CurvatureScale scale;
+        for (const double curvature : basis.curvatures[result.medium])
+            scale.nodes.push_back(static_cast<float>(curvature / medium.mean_free_path));
+        if (scale.nodes.size() > 1) {
+            const float width = scale.nodes.back() - scale.nodes.front();
+            scale.per_step = static_cast<float>(CurvatureScale::steps) / width;
+            for (std::size_t i = 0; i < CurvatureScale::steps; ++i) {
+                const float middle = scale.nodes.front() + (static_cast<float>(i) + 0.5f) / scale.per_step;
+                const auto above = std::upper_bound(scale.nodes.begin() + 1, scale.nodes.end() - 1, middle);
+                scale.interval[i] = static_cast<std::uint8_t>(above - scale.nodes.begin() - 1);
+            }
+        }
+        scales.push_back(std::move(scale));
+    }
+}
+
+void PairTables::make_table(const SurfaceBasis& basis, ChordTable& table, float radius, float end) const
+{
+    table.rows = std::max(chord_step(end), table.first) - table.first + 2;
+    struct Item {
+        std::size_t result, curvature, rank;
+    };
+    std::vector<Item> items;
+    for (std::size_t r = 0; r < results; ++r) {
+        const std::size_t nodes = scales[r].nodes.size();
+        table.values.emplace_back(nodes * table.rows * blocks * lanes_per_block, 0.0f);
+        for (std::size_t k = 0; k < nodes; ++k)
+            for (std::size_t rank = 0; rank < profiles_of(basis, r, k).size(); ++rank)
+                items.push_back({r, k, rank});
+    }
+    parallel_for(items.size(), [&](std::size_t i) {
+        const auto [result, curvature, rank] = items[i];
+        const ScaledProfile& scaled = profiles_of(basis, result, curvature)[rank];
+        const double per_metre = 1.0 / scaled.mean_free_path;
+        float* values =
+            table.values[result].data() + curvature * table.rows * blocks * lanes_per_block + rank * basis.harmonics;
+        for (std::size_t row = 0; row < table.rows; ++row, values += blocks * lanes_per_block) {
+            const auto chord = static_cast<double>(chord_of(table.first + static_cast<std::uint32_t>(row)));
+            if (chord > scaled.reach + static_cast<double>(radius))
+                break;
+            const double c = chord * per_metre;
+            const Harmonics value = radius > 0.0f
+                                        ? disk_mean(scaled.profile, static_cast<double>(radius) * per_metre, c)
+                                        : scaled.profile.density(c);
+            for (std::size_t m = 0; m < basis.harmonics; ++m)
+                values[m] = static_cast<float>(value[m] * c * c);
+        }
+    });
+}
+
+void PairTables::make_self(const SurfaceBasis& basis, float min_radius, float max_radius)
+{
+    m_self.first = chord_step(min_radius);
+    m_self.rows = chord_step(max_radius) - m_self.first + 2;
+    for (std::size_t r = 0; r < results; ++r) {
+        m_self.values.emplace_back(m_self.rows * blocks * lanes_per_block, 0.0f);
+        const std::size_t flat = flat_index(basis, r);
+        const std::vector<ScaledProfile>& profiles = profiles_of(basis, r, flat);
+        for (std::size_t rank = 0; rank < profiles.size(); ++rank)
+            for (std::size_t row = 0; row < m_self.rows; ++row) {
+                const auto radius = static_cast<double>(chord_of(m_self.first + static_cast<std::uint32_t>(row)));
+                m_self.values[r][row * blocks * lanes_per_block + rank * basis.harmonics] = static_cast<float>(
+                    2.0 * pi * profiles[rank].profile.cumulative(radius / profiles[rank].mean_free_path)[0]);
+            }
+    }
+}
+
+std::size_t PairTables::disk(float area) const
+{
+    const float radius = std::sqrt(area * static_cast<float>(inv_pi));
+    const auto nearest = std::lround(std::log2(radius / m_first_radius) * disks_per_octave);
+    return std::min(static_cast<std::size_t>(std::max(nearest, 0L)), disks.size() - 1);
+}
+
+void PairTables::add_self(float area, std::size_t result, float* factors) const
+{
+    const float radius = std::sqrt(area * static_cast<float>(inv_pi));
+    const std::uint32_t step = std::clamp(chord_step(radius), m_self.first, m_self.first + m_self.rows - 2);
+    const float before = chord_of(step);
+    const float part = (radius - before) / (chord_of(step + 1) - before);
+    const std::size_t lanes = blocks * lanes_per_block;
+    const float* values = m_self.values[result].data() + (step - m_self.first) * lanes;
+    for (std::size_t i = 0; i < lanes; ++i)
+        factors[i] += values[i] + part * (values[lanes + i] - values[i]);
+}
+
+}  // namespace beamspread

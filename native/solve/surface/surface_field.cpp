@@ -1,0 +1,259 @@
+#include "solve/surface/surface_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <sstream>
+#include <utility>
+
+#include "base/constants.h"
+#include "base/error.h"
+#include "medium/medium.h"
+#include "simd/loops.h"
+
+namespace beamspread {
+
+namespace {
+
+// Rays that pass all steps together. More: more cache.
+constexpr std::size_t rays_at_once = 512;
+
+// Samples of one work item.
+constexpr std::size_t targets_at_once = 64;
+
+// Largest difference of the squared length of a unit vector from 1, and of the cosine of two vectors from 0.
+constexpr float unit_tolerance = 2e-3f;
+
+// Fraction of a sample's luminance by pairs that bend more than the tables, from which it counts as beyond them.
+constexpr float beyond_fraction = 0.5f;
+
+void check_sample(const SurfaceSample& sample)
+{
+    const auto is_unit = [](const Vec3f& v) { return std::abs(glm::dot(v, v) - 1.0f) < unit_tolerance; };
+    if (!(sample.area > 0.0f && std::isfinite(sample.area)))
+        reject("area", static_cast<double>(sample.area), "above 0 m^2");
+    if (!(std::isfinite(sample.position.x) && std::isfinite(sample.position.y) && std::isfinite(sample.position.z)))
+        reject("position", "not finite", "metres");
+    if (!is_unit(sample.normal) || !is_unit(sample.tangent) ||
+        !(std::abs(glm::dot(sample.normal, sample.tangent)) < unit_tolerance))
+        reject("normal", "with its tangent no frame", "unit vectors at right angles");
+}
+
+void check(const SurfaceProblem& problem)
+{
+    if (problem.samples.empty())
+        reject("samples", "empty", "at least one");
+    if (problem.channels.empty() || problem.channels.size() > 3)
+        reject("channels", static_cast<double>(problem.channels.size()), "1 to 3");
+    if (!(problem.tolerance > 0.0))
+        reject("tolerance", problem.tolerance, "tolerance > 0");
+    if (!(problem.max_angle_deg > 0.0 && problem.max_angle_deg <= 90.0))
+        reject("max_angle_deg", problem.max_angle_deg, "above 0 and up to 90 degrees");
+    for (const ChannelMedium& channel : problem.channels) {
+        check_albedo(channel.albedo);
+        if (!(channel.mean_free_path > 0.0 && std::isfinite(channel.mean_free_path)))
+            reject("mean_free_path", channel.mean_free_path, "above 0 metres");
+    }
+    parallel_for(problem.samples.size() / rays_at_once + 1, [&](std::size_t item) {
+        const std::size_t end = std::min(problem.samples.size(), (item + 1) * rays_at_once);
+        for (std::size_t i = item * rays_at_once; i < end; ++i)
+            check_sample(problem.samples[i]);
+    });
+}
+
+void check_memory(std::size_t bytes, std::size_t limit)
+{
+    if (limit == 0 || bytes <= limit)
+        return;
+    const auto in_gigabytes = [](std::size_t of) { return std::ldexp(static_cast<double>(of), -30); };
+    std::ostringstream text;
+    text << std::fixed << std::setprecision(1) << "the light takes " << in_gigabytes(bytes) << " GB of memory, where "
+         << in_gigabytes(limit) << " GB are left for it";
+    throw MemoryLimit(text.str());
+}
+
+double mean_area(std::span<const SurfaceSample> samples)
+{
+    double sum = 0.0;
+    for (const SurfaceSample& sample : samples)
+        sum += static_cast<double>(sample.area);
+    return sum / static_cast<double>(samples.size());
+}
+
+SurfaceBasis checked_basis(const SurfaceProblem& problem)
+{
+    std::optional<SurfaceBasis> basis;
+    with_threads(problem.threads, [&] {
+        check(problem);
+        basis.emplace(problem.channels, problem.max_angle_deg, std::sqrt(mean_area(problem.samples)),
+                      problem.is_colored, problem.tolerance);
+    });
+    return *std::move(basis);
+}
+
+PairTables tables_of(const SurfaceProblem& problem, const SurfaceBasis& basis)
+{
+    std::optional<PairTables> tables;
+    with_threads(problem.threads, [&] {
+        const auto [min, max] =
+            std::minmax_element(problem.samples.begin(), problem.samples.end(),
+                                [](const SurfaceSample& a, const SurfaceSample& b) { return a.area < b.area; });
+        tables.emplace(basis, min->area, max->area);
+    });
+    return *std::move(tables);
+}
+
+}  // namespace
+
+SurfaceField::SurfaceField(const SurfaceProblem& problem, Progress& progress)
+    : m_problem(problem), m_basis(checked_basis(problem)), m_tables(tables_of(problem, m_basis))
+{
+    check_memory(problem.samples.size() * moment_bytes(), problem.max_moment_bytes);
+    progress.advance(0.0);
+    m_moments.resize(problem.samples.size() * m_basis.moments());
+}
+
+void SurfaceField::set_color(const std::vector<double>& color)
+{
+    const double largest = *std::max_element(color.begin(), color.end());
+    if (largest == 0.0)
+        return;
+    const std::lock_guard lock(m_color_lock);
+    if (m_color.empty())
+        for (const double part : color)
+            m_color.push_back(part / largest);
+    for (std::size_t c = 0; c < color.size(); ++c)
+        if (std::abs(color[c] - m_color[c] * largest) > 1e-5 * largest)
+            reject("color", "not proportional to that of earlier rays", "one color, or a field for colors");
+}
+
+void SurfaceField::add(std::size_t first, std::size_t count, const Vec3f* travel, const Vec3f* irradiance,
+                       const std::vector<double>& color)
+{
+    if (m_basis.terms.terms.empty())  // the medium is black
+        return;
+    Scratch& scratch = m_scratch.local();
+    const std::size_t channels = m_problem.channels.size();
+    const std::size_t sets = m_basis.terms.sets.count();
+    std::vector<float> colors(sets, 1.0f);
+    if (!m_problem.is_colored) {
+        set_color(color);
+        colors[0] = static_cast<float>(*std::max_element(color.begin(), color.end()));
+    } else {
+        for (std::size_t set = 0; set < sets; ++set)
+            colors[set] = static_cast<float>(color[m_basis.terms.sets.channel(set)]);
+    }
+    const std::vector<LightTerm>& terms = m_basis.terms.terms;
+    for (std::size_t x = 0; x < count; x += rays_at_once) {
+        const std::size_t rays = std::min(rays_at_once, count - x);
+        BeamRow& beams = scratch.beams;
+        for (auto* values : {&beams.irradiance, &beams.cos_beta, &beams.sin_beta, &beams.half_tangent})
+            values->resize(rays);
+        float largest = 0.0f;
+        for (std::size_t i = 0; i < rays; ++i) {
+            const Vec3f& power = irradiance[x + i];
+            beams.irradiance[i] = power.x;
+            for (std::size_t c = 1; c < channels; ++c)
+                beams.irradiance[i] = std::max(beams.irradiance[i], power[static_cast<int>(c)]);
+            largest = std::max(largest, beams.irradiance[i]);
+        }
+        if (largest == 0.0f)
+            continue;
+        find_angles(&travel[x].x, beams.irradiance.data(), beams.cos_beta.data(), beams.sin_beta.data(),
+                    beams.half_tangent.data(), rays);
+        if (m_problem.is_colored) {
+            scratch.irradiance.resize(sets * rays);
+            for (std::size_t set = 0; set < sets; ++set)
+                for (std::size_t i = 0; i < rays; ++i)
+                    scratch.irradiance[set * rays + i] =
+                        irradiance[x + i][static_cast<int>(m_basis.terms.sets.channel(set))];
+        }
+        scratch.values.assign(terms.size() * rays, 0.0f);
+        scratch.moments.add(
+            m_basis.terms, beams, colors, 0, terms.size(),
+            [&](std::size_t t) { return scratch.values.data() + t * rays; },
+            m_problem.is_colored ? scratch.irradiance.data() : nullptr);
+        for (std::size_t t = 0; t < terms.size(); ++t) {
+            const std::size_t at = m_basis.place(t);
+            for (std::size_t i = 0; i < rays; ++i)
+                m_moments[(first + x + i) * m_basis.moments() + at] += scratch.values[t * rays + i];
+        }
+    }
+}
+
+void SurfaceField::clear()
+{
+    std::fill(m_moments.begin(), m_moments.end(), 0.0f);
+    m_color.clear();
+}
+
+void SurfaceField::solve(Progress& progress, float* luminance)
+{
+    const std::size_t count = m_problem.samples.size();
+    const std::size_t channels = m_problem.channels.size();
+    const std::size_t stride = m_basis.moments();
+    const std::size_t results = m_tables.results;
+    std::fill_n(luminance, count * channels, 0.0f);
+    m_beyond_share = 0.0;
+    if (stride == 0)
+        return;
+    std::vector<PairSource> sources;
+    for (std::size_t i = 0; i < count; ++i) {
+        const float* moments = m_moments.data() + i * stride;
+        if (std::all_of(moments, moments + stride, [](float value) { return value == 0.0f; }))
+            continue;
+        const SurfaceSample& sample = m_problem.samples[i];
+        sources.push_back({sample.position, sample.area, sample.normal,
+                           static_cast<std::uint32_t>(m_tables.disk(sample.area)), sample.tangent,
+                           static_cast<std::uint32_t>(i)});
+    }
+    const std::size_t items = (count + targets_at_once - 1) / targets_at_once;
+    std::vector<std::array<double, 2>> areas(items);  // beyond the tables, all
+    const auto solve_item = [&](std::size_t item) {
+        std::vector<float> factors(m_basis.functions());
+        const std::size_t end = std::min(count, (item + 1) * targets_at_once);
+        for (std::size_t i = item * targets_at_once; i < end; ++i) {
+            const SurfaceSample& sample = m_problem.samples[i];
+            std::array<float, 3> sums{};
+            float beyond = 0.0f;
+            // Pairs before and after the sample itself.
+            const auto self = std::lower_bound(sources.begin(), sources.end(), i,
+                                               [](const PairSource& a, std::size_t b) { return a.moments < b; });
+            const auto before = static_cast<std::size_t>(self - sources.begin());
+            const bool is_lit = self != sources.end() && self->moments == i;
+            const std::size_t after = before + (is_lit ? 1 : 0);
+            const PairTarget target{sample.position, sample.normal};
+            add_pairs(m_tables, target, sources.data(), before, m_moments.data(), stride, sums.data(), beyond);
+            add_pairs(m_tables, target, sources.data() + after, sources.size() - after, m_moments.data(), stride,
+                      sums.data(), beyond);
+            for (std::size_t r = 0; r < results; ++r) {
+                if (is_lit) {
+                    std::fill(factors.begin(), factors.end(), 0.0f);
+                    m_tables.add_self(sample.area, r, factors.data());
+                    const float* moments = m_moments.data() + i * stride + m_tables.set[r] * 2 * m_basis.functions();
+                    for (std::size_t b = 0; b < m_basis.blocks; ++b)
+                        for (std::size_t k = 0; k < lanes_per_block; ++k)
+                            sums[r] += factors[b * lanes_per_block + k] * moments[b * 2 * lanes_per_block + k];
+                }
+                for (const ChannelSets::Member& member : m_basis.terms.sets.results[r].members) {
+                    const double color = m_problem.is_colored ? 1.0 : m_color.empty() ? 0.0 : m_color[member.channel];
+                    luminance[i * channels + member.channel] = std::max(
+                        0.0f, static_cast<float>(inv_pi * member.factor * color * static_cast<double>(sums[r])));
+                }
+            }
+            areas[item][1] += static_cast<double>(sample.area);
+            if (beyond > beyond_fraction * sums[0])
+                areas[item][0] += static_cast<double>(sample.area);
+        }
+        progress.advance(1.0 / static_cast<double>(items));
+    };
+    with_threads(m_problem.threads, [&] { parallel_for(items, solve_item); });
+    double all = 0.0;
+    for (const auto& [beyond, area] : areas) {
+        m_beyond_share += beyond;
+        all += area;
+    }
+    m_beyond_share /= all;
+}
+
+}  // namespace beamspread

@@ -1,0 +1,85 @@
+// Light on a surface of any shape and the luminance that it causes, by the solver `surface`: a sum over pairs of
+// samples, each by the LDF of its own curvature.
+#pragma once
+
+#include <cstddef>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/progress.h"
+#include "base/threads.h"
+#include "base/vec.h"
+#include "solve/separable/light_terms.h"
+#include "solve/surface/pair_sum.h"
+#include "solve/surface/pair_tables.h"
+#include "solve/surface/surface_basis.h"
+
+namespace beamspread {
+
+// Part of a surface. Its frame has x along the tangent, z along the normal, and y = cross(normal, tangent).
+struct SurfaceSample {
+    Vec3f position;  // metres, from an origin that all samples share
+    Vec3f normal;    // unit vector
+    Vec3f tangent;   // unit vector across the normal
+    float area;      // m^2
+};
+
+struct SurfaceProblem {
+    std::span<const SurfaceSample> samples;
+    std::vector<ChannelMedium> channels;  // at most 3
+    double tolerance = 1e-3;              // largest error of a luminance against all pairs, relative to the largest
+    double max_angle_deg = 90.0;          // light comes at up to this angle from the normal
+    bool is_colored = false;              // true if channels of all light together are not proportional
+    int threads = 0;                      // 0: all
+    std::size_t max_moment_bytes = 0;     // bytes of moments of the light; 0: any
+    bool is_direct = false;               // true: all pairs one by one, the truth
+};
+
+class SurfaceField {
+public:
+    // Views the problem's samples, which must outlive the field. Throws InvalidArgument, MemoryLimit, Cancelled.
+    SurfaceField(const SurfaceProblem& problem, Progress& progress);
+
+    // Adds rays, one at each of samples [first, first + count). `travel` has vectors of the sample's frame with z < 0;
+    // the power of a ray is its irradiance, W/m^2, times the color. Several threads may add to different samples at
+    // once.
+    void add(std::size_t first, std::size_t count, const Vec3f* travel, const Vec3f* irradiance,
+             const std::vector<double>& color);
+
+    // Removes all rays; the basis and tables stay.
+    void clear();
+
+    // Writes [sample][channel], radiance in W/(m^2 sr): the sum over all rays. Throws Cancelled.
+    void solve(Progress& progress, float* luminance);
+
+    // Share of the area whose light comes from pairs that bend more than the media's LDFs cover; after `solve`.
+    double beyond_share() const { return m_beyond_share; }
+
+    // Bytes of a sample's moments.
+    std::size_t moment_bytes() const { return m_basis.moments() * sizeof(float); }
+
+    const SurfaceBasis& basis() const { return m_basis; }
+
+private:
+    struct Scratch {
+        BeamMoments moments;
+        BeamRow beams;
+        std::vector<float> irradiance;  // [set][beam]
+        std::vector<float> values;      // [term][beam]
+    };
+
+    void set_color(const std::vector<double>& color);
+
+    SurfaceProblem m_problem;
+    SurfaceBasis m_basis;
+    PairTables m_tables;
+    std::vector<float> m_moments;  // [sample] as in `SurfaceBasis`
+    std::vector<double> m_color;   // of all light, if channels are proportional
+    std::mutex m_color_lock;
+    PerThread<Scratch> m_scratch;
+    double m_beyond_share = 0.0;
+};
+
+}  // namespace beamspread

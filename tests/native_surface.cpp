@@ -1,0 +1,96 @@
+// The solver `surface` for tests and measurements: part of the module _native_test.
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "python/media.h"
+#include "solve/surface/surface_field.h"
+
+namespace beamspread {
+
+namespace {
+
+// A field with the objects that it views.
+class HeldField {
+public:
+    HeldField(const py::array& samples, const Sources& ldf, const std::vector<double>& albedo,
+              const std::vector<double>& mean_free_path, double tolerance, double max_angle, bool is_colored,
+              int threads, std::size_t max_moment_bytes, bool is_direct)
+        : m_samples(samples), m_ldf(ldf)
+    {
+        SurfaceProblem problem;
+        problem.samples = to_rows<SurfaceSample, float>("samples", samples, "contiguous float32 (N, 10)");
+        problem.channels = media_of(ldf, albedo, mean_free_path);
+        problem.tolerance = tolerance;
+        problem.max_angle_deg = max_angle;
+        problem.is_colored = is_colored;
+        problem.threads = threads;
+        problem.max_moment_bytes = max_moment_bytes;
+        problem.is_direct = is_direct;
+        m_channels = problem.channels.size();
+        Progress unseen;
+        const py::gil_scoped_release release;
+        m_field = std::make_unique<SurfaceField>(problem, unseen);
+    }
+
+    void add(const Array<float>& travel, const Array<float>& irradiance, const std::vector<double>& color,
+             std::size_t first)
+    {
+        const auto rays = to_rows<Vec3f, float>("travel", travel, "float32 (N, 3)");
+        const auto power = to_rows<Vec3f, float>("irradiance", irradiance, "float32 (N, 3)");
+        if (power.size() != rays.size() || first + rays.size() > static_cast<std::size_t>(m_samples.shape(0)))
+            reject("irradiance", shape_text(irradiance), "a row for each ray, one ray for each sample");
+        const py::gil_scoped_release release;
+        m_field->add(first, rays.size(), rays.data(), power.data(), color);
+    }
+
+    Array<float> solve(const py::object& progress)
+    {
+        Progress report(progress_callback(progress));
+        Array<float> luminance({static_cast<std::size_t>(m_samples.shape(0)), m_channels});
+        float* data = luminance.mutable_data();
+        const py::gil_scoped_release release;
+        report.set_total(1.0);
+        m_field->solve(report, data);
+        return luminance;
+    }
+
+    SurfaceField& field() { return *m_field; }
+
+private:
+    py::array m_samples;
+    Sources m_ldf;
+    std::size_t m_channels = 0;
+    std::unique_ptr<SurfaceField> m_field;
+};
+
+}  // namespace
+
+void bind_surface(py::module_& m)
+{
+    py::class_<HeldField>(m, "SurfaceField", "Light on samples of a surface, by the solver `surface`.")
+        .def(py::init<const py::array&, const Sources&, const std::vector<double>&, const std::vector<double>&, double,
+                      double, bool, int, std::size_t, bool>(),
+             py::arg("samples"), py::arg("ldf"), py::arg("albedo"), py::arg("mean_free_path"),
+             py::arg("tolerance") = 1e-3, py::arg("max_angle") = 88.0, py::arg("is_colored") = false,
+             py::arg("threads") = 0, py::arg("max_moment_bytes") = 0, py::arg("is_direct") = false,
+             "`samples`: float32 (N, 10), position, normal, tangent and area.")
+        .def("add", &HeldField::add, py::arg("travel"), py::arg("irradiance"), py::arg("color"), py::arg("first") = 0,
+             "Add a ray to each of the samples from `first` on: float32 (N, 3) in their frames and channels.")
+        .def(
+            "clear", [](HeldField& self) { self.field().clear(); }, "Remove all rays.")
+        .def("solve", &HeldField::solve, py::arg("progress") = py::none(), "Luminance, float32 (N, channels).")
+        .def_property_readonly("beyond_share", [](HeldField& self) { return self.field().beyond_share(); })
+        .def_property_readonly("moment_bytes", [](HeldField& self) { return self.field().moment_bytes(); })
+        .def_property_readonly(
+            "functions",
+            [](HeldField& self) {
+                std::vector<std::pair<std::size_t, std::size_t>> functions;
+                for (const auto& function : self.field().basis().terms.basis.functions)
+                    functions.emplace_back(function.m, function.rank);
+                return functions;
+            },
+            "Harmonic and rank of each function of the angle.");
+}
+
+}  // namespace beamspread
