@@ -52,6 +52,8 @@ HeldSurface surface_of(const ReceiverGrid& grid, const py::object& coverage, dou
     HeldSurface held;
     if (!(mirrored >= 0.0 && std::isfinite(mirrored)))
         reject("mirrored", mirrored, "0 or more metres");
+    if (mirrored > 0.0 && grid.is_bent())
+        reject("mirrored", mirrored, "0 on a mesh that bends");
     held.surface.mirrored = mirrored;
     held.surface.grid = grid;
     held.surface.clearance = clearance;

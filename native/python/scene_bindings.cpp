@@ -2,6 +2,9 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <span>
+#include <string>
+#include <utility>
 #include <variant>
 
 #include "bake/surface_light.h"
@@ -30,6 +33,49 @@ std::unique_ptr<ReceiverGrid> make_grid(const Numbers& origin, const Numbers& x_
                             .owner = owner};
     grid.check();
     return std::make_unique<ReceiverGrid>(grid);
+}
+
+// The values of each texel of a grid of `height` x `width`.
+template <class Value, class Number>
+std::span<const Value> texels_of(const std::string& name, const py::array& array, std::size_t height, std::size_t width,
+                                 const std::string& allowed)
+{
+    const std::size_t size = sizeof(Value) / sizeof(Number);
+    const bool fits = py::isinstance<Array<Number>>(array) && array.ndim() == (size > 1 ? 3 : 2) &&
+                      side(array, 0) == height && side(array, 1) == width && (size == 1 || side(array, 2) == size);
+    if (!fits)
+        reject(name, shape_text(array), allowed);
+    return {static_cast<const Value*>(array.data()), height * width};
+}
+
+std::unique_ptr<ReceiverGrid> make_bent_grid(const py::array& positions, const py::array& steps_x,
+                                             const py::array& steps_y, const py::array& normals,
+                                             const py::array& tangents, const py::array& areas, std::uint32_t owner)
+{
+    if (positions.ndim() != 3)
+        reject("positions", shape_text(positions), "contiguous float64 (H, W, 3)");
+    const std::size_t height = side(positions, 0);
+    const std::size_t width = side(positions, 1);
+    const auto vectors = [&](const char* name, const py::array& array) {
+        return texels_of<Vec3f, float>(name, array, height, width, "contiguous float32 (H, W, 3) as 'positions'");
+    };
+    const auto places = texels_of<Vec3, double>("positions", positions, height, width, "contiguous float64 (H, W, 3)");
+    const std::span<const Vec3f> across = vectors("steps_x", steps_x);
+    const std::span<const Vec3f> up = vectors("steps_y", steps_y);
+    const std::span<const Vec3f> out = vectors("normals", normals);
+    const std::span<const Vec3f> along = vectors("tangents", tangents);
+    const auto sizes = texels_of<float, float>("areas", areas, height, width, "contiguous float32 (H, W)");
+    const py::gil_scoped_release released;
+    std::vector<BentTexel> texels;
+    texels.reserve(places.size());
+    for (std::size_t i = 0; i < places.size(); ++i)
+        texels.push_back({.position = places[i],
+                          .step_x = across[i],
+                          .step_y = up[i],
+                          .normal = out[i],
+                          .tangent = along[i],
+                          .area = sizes[i]});
+    return std::make_unique<ReceiverGrid>(ReceiverGrid::bent(std::move(texels), width, height, owner));
 }
 
 Array<float> coverage(const py::array& corners, const py::array& corner_counts, py::ssize_t width, py::ssize_t height,
@@ -136,7 +182,9 @@ py::dict bounced_light(const std::vector<py::dict>& grids, const Numbers& strata
 void bind_scene(py::module_& m)
 {
     bind_occluders(m);
-    py::class_<ReceiverGrid>(m, "ReceiverGrid", R"(The plane that receives light, divided into texels.
+    py::class_<ReceiverGrid>(
+        m, "ReceiverGrid",
+        R"(The plane that receives light, divided into texels; `bent` makes the grid of a mesh that bends.
 
 Parameters
 ----------
@@ -159,7 +207,41 @@ ValueError
     An argument is out of range; the message names it.
 )")
         .def(py::init(&make_grid), py::arg("origin"), py::arg("x_axis"), py::arg("y_axis"), py::arg("normal"),
-             py::arg("pitch_x"), py::arg("pitch_y"), py::arg("width"), py::arg("height"), py::arg("owner") = 0);
+             py::arg("pitch_x"), py::arg("pitch_y"), py::arg("width"), py::arg("height"), py::arg("owner") = 0)
+        .def_static("bent", &make_bent_grid, py::arg("positions"), py::arg("steps_x"), py::arg("steps_y"),
+                    py::arg("normals"), py::arg("tangents"), py::arg("areas"), py::arg("owner") = 0,
+                    R"(The texels of a mesh that bends, which shadows itself.
+
+A texel lies on one face of the mesh: its points are position + (u - 1/2) steps_x + (v - 1/2) steps_y, u and v from 0 to 1.
+Light from behind that face does not arrive, whatever the shading normal. All arrays are C-contiguous and copied.
+
+Parameters
+----------
+positions : ndarray, float64, shape (H, W, 3)
+    World position, in metres, of the middle of the part of the mesh that each texel shows.
+steps_x, steps_y : ndarray, float32, shape (H, W, 3)
+    World steps of one texel along the columns and up the rows, metres, in the plane of the texel's face.
+normals : ndarray, float32, shape (H, W, 3)
+    Shading normals, unit vectors toward the lit side; 0 for texels outside of the mesh, which get no light.
+tangents : ndarray, float32, shape (H, W, 3)
+    Unit vectors along the columns; their part along the normal is removed. The frame of a texel is tangent, cross(normal,
+    tangent), normal.
+areas : ndarray, float32, shape (H, W)
+    Area of the part of the mesh that each texel shows, m^2.
+owner : int
+    Number of the object, as in `OccluderMesh`.
+
+Returns
+-------
+ReceiverGrid
+
+Raises
+------
+ValueError
+    An argument is out of range; the message names it.
+)")
+        .def_property_readonly(
+            "is_bent", [](const ReceiverGrid& grid) { return grid.is_bent(); }, "bool: True if `bent` made the grid.");
 
     bind_lights(m);
     m.def("coverage", &coverage, py::arg("corners"), py::arg("corner_counts"), py::arg("width"), py::arg("height"),
@@ -190,7 +272,7 @@ ValueError
     m.def("gather_rays", &gather, py::arg("grid"), py::arg("light"), py::arg("occluders") = py::none(),
           py::arg("rays") = 16, py::arg("seed") = 0, py::arg("threads") = 0, py::arg("progress") = py::none(),
           py::arg("clearance") = 0.0, py::arg("even_rays") = 0, py::arg("samples") = 4, py::arg("find_shadows") = true,
-          R"(Irradiance of a plane by a light, and its mean direction.
+          R"(Irradiance of a receiver by a light, and its mean direction.
 
 Parameters
 ----------
@@ -209,7 +291,8 @@ progress : callable, optional
     progress(fraction) returns False to stop.
 clearance : float
     Height above the plane where shadow rays start, metres, besides what rounding needs: the largest distance of the
-    receiver's own faces to the plane, where they are among the occluders.
+    receiver's own faces to the plane, where they are among the occluders. On a mesh that bends the height above the face
+    of each texel.
 even_rays : int
     Rays of a first pass. They are enough in texels that, with their neighbors, see only light or only obstacles; `rays`
     are traced from all others. 0: no first pass.
@@ -225,7 +308,7 @@ irradiance : ndarray, float32, shape (height, width, 3)
     W/m^2: cosine and visible part included. Row 0 is the lowest row.
 flow : ndarray, float32, shape (height, width, 3)
     Sum over the rays of irradiance, the mean of its channels, times the unit vector of travel in the plane frame
-    (x_axis, y_axis, normal), W/m^2.
+    (x_axis, y_axis, normal) or in the frame of the texel, W/m^2.
 
 Raises
 ------

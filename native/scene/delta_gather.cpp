@@ -19,26 +19,37 @@ namespace {
 // Higher values are slower and more exact.
 constexpr double texels_to_smooth_lamp = 16.0;
 
-// Points of a texel relative to its corner in the world, n x n: one in each cell of an n x n grid and one in each of n^2
+// A point of a texel: its place in the unit square, and on a plane the step from the texel's corner in the world.
+struct SubTexel {
+    Vec2 place;
+    Vec3 step;
+};
+
+SubTexel sub_texel(const ReceiverGrid& grid, double x, double y)
+{
+    return {{x, y}, grid.is_bent() ? Vec3(0.0) : grid.step(x, y)};
+}
+
+// Points of a texel, n x n: one in each cell of an n x n grid and one in each of n^2
 // columns and n^2 rows, so that a shadow's border along the texels is resolved as finely as an oblique one (Chiu,
 // Shirley, Wang 1994, "Multi-jittered sampling", without the jitter).
-std::vector<Vec3> sub_texel_points(const ReceiverGrid& grid, int samples)
+std::vector<SubTexel> sub_texel_points(const ReceiverGrid& grid, int samples)
 {
-    std::vector<Vec3> points;
+    std::vector<SubTexel> points;
     for (int j = 0; j < samples; ++j) {
         for (int i = 0; i < samples; ++i)
-            points.push_back(grid.step((i + (j + 0.5) / samples) / samples, (j + (i + 0.5) / samples) / samples));
+            points.push_back(sub_texel(grid, (i + (j + 0.5) / samples) / samples, (j + (i + 0.5) / samples) / samples));
     }
     return points;
 }
 
-std::vector<Vec3> gauss_points(const ReceiverGrid& grid)
+std::vector<SubTexel> gauss_points(const ReceiverGrid& grid)
 {
     const double offset = 0.5 / std::numbers::sqrt3;
-    std::vector<Vec3> points;
+    std::vector<SubTexel> points;
     for (const double y : {0.5 - offset, 0.5 + offset})
         for (const double x : {0.5 - offset, 0.5 + offset})
-            points.push_back(grid.step(x, y));
+            points.push_back(sub_texel(grid, x, y));
     return points;
 }
 
@@ -53,23 +64,24 @@ public:
           m_with_travel(settings.with_travel),
           m_points(sub_texel_points(grid, settings.samples)),
           m_smooth_points(gauss_points(grid)),
-          m_smooth_from(texels_to_smooth_lamp * std::max(grid.pitch_x, grid.pitch_y)),
           m_rays(grid, occluders, settings.clearance),
           m_shadows(grid, m_source, occluders, m_rays.start(), settings.find_shadows),
           m_sums(settings.noise ? grid.height : 0)
     {
-        const Texel open = gather_texel(0.0, 0.0, m_points, nullptr);
+        if (grid.is_bent())
+            return;
+        const Texel open = gather_texel(0, 0, m_points, nullptr);
         m_open_irradiance = Vec3f(open.irradiance);
-        m_far_travel = mean_direction(open.flow);
+        m_far_travel = mean_direction(0, open.flow);
     }
 
     std::size_t bands() const { return m_shadows.bands(); }
 
-    // Mean irradiance of all texels and channels, W/m^2, if noise is asked for.
+    // Mean irradiance of all receiving texels and channels, W/m^2, if noise is asked for.
     double mean() const
     {
-        return std::accumulate(m_sums.begin(), m_sums.end(), 0.0) /
-               (3.0 * static_cast<double>(m_grid.width * m_grid.height));
+        const double texels = static_cast<double>(std::max<std::size_t>(m_grid.receiving(), 1));
+        return std::accumulate(m_sums.begin(), m_sums.end(), 0.0) / (3.0 * texels);
     }
 
     // Hands the rays of a band of rows to the sink; returns their number.
@@ -100,16 +112,16 @@ private:
 
     void gather_row(std::size_t y, const Shade* shades, Work& work, RaySink& sink)
     {
-        const bool travel_varies = m_with_travel && !m_source.is_far;
+        const bool is_same = m_source.is_far && !m_grid.is_bent();
         for (std::size_t x = 0; x < m_grid.width; ++x) {
-            if (m_source.is_far && shades[x] == Shade::none) {
+            if (is_same && shades[x] == Shade::none) {
                 work.irradiance[x] = m_open_irradiance;
                 continue;
             }
-            const Texel gathered = texel(static_cast<double>(x), static_cast<double>(y), shades[x]);
+            const Texel gathered = texel(x, y, shades[x]);
             work.irradiance[x] = Vec3f(gathered.irradiance);
-            if (travel_varies)
-                work.travel[x] = mean_direction(gathered.flow);
+            if (m_with_travel && !is_same)
+                work.travel[x] = mean_direction(y * m_grid.width + x, gathered.flow);
         }
         if (!m_sums.empty())
             for (const Vec3f& light : work.irradiance)
@@ -121,7 +133,7 @@ private:
                   .irradiance = work.irradiance.data()});
     }
 
-    Texel texel(double x, double y, Shade shade) const
+    Texel texel(std::size_t x, std::size_t y, Shade shade) const
     {
         if (shade == Shade::full)
             return {};
@@ -133,54 +145,68 @@ private:
     }
 
     // True if open light is so even within a texel that few points give its mean.
-    bool is_smooth(double x, double y) const
+    bool is_smooth(std::size_t x, std::size_t y) const
     {
-        const Vec3 away = m_source.position - m_grid.point(x, y);
+        const Vec3 away = m_source.position - m_grid.point(static_cast<double>(x), static_cast<double>(y));
+        const double smooth_from = texels_to_smooth_lamp * m_grid.pitch_at(y * m_grid.width + x);
         return m_source.is_smooth && m_points.size() > m_smooth_points.size() &&
-               glm::dot(away, away) > m_smooth_from * m_smooth_from;
+               glm::dot(away, away) > smooth_from * smooth_from;
     }
 
-    Texel gather_texel(double x, double y, std::span<const Vec3> steps, const Occluders* occluders) const
+    // A texel whose light is gathered.
+    struct At {
+        std::size_t texel;
+        Vec2 position;  // texels
+        Vec3 corner;    // world
+    };
+
+    Texel gather_texel(std::size_t x, std::size_t y, std::span<const SubTexel> points, const Occluders* occluders) const
     {
-        const Vec3 corner = m_grid.point(x, y);
         Texel sum;
-        for (std::size_t first = 0; first < steps.size(); first += Occluders::packet_size) {
-            const auto packet = steps.subspan(first, std::min(steps.size() - first, Occluders::packet_size));
+        const std::size_t texel = y * m_grid.width + x;
+        if (m_grid.is_bent() && !m_grid.bent_texel(texel).is_inside())
+            return sum;
+        const Vec2 position(static_cast<double>(x), static_cast<double>(y));
+        const At at{texel, position, m_grid.point(position.x, position.y)};
+        for (std::size_t first = 0; first < points.size(); first += Occluders::packet_size) {
+            const auto packet = points.subspan(first, std::min(points.size() - first, Occluders::packet_size));
             if (occluders)
-                add_traced(corner, packet, *occluders, sum);
+                add_traced(at, packet, *occluders, sum);
             else
-                add_open(corner, packet, sum);
+                add_open(at, packet, sum);
         }
-        sum.irradiance /= static_cast<double>(steps.size());
+        sum.irradiance /= static_cast<double>(points.size());
         return sum;
     }
 
     using Points = std::array<Vec3, Occluders::packet_size>;
     using Rays = std::array<LightRay, Occluders::packet_size>;
 
-    void sample(const Vec3& corner, std::span<const Vec3> steps, Points& points, Rays& rays) const
+    void sample(const At& at, std::span<const SubTexel> in_texel, Points& points, Rays& rays) const
     {
-        for (std::size_t i = 0; i < steps.size(); ++i)
-            points[i] = corner + steps[i];
-        m_light.sample(std::span(points).first(steps.size()), m_grid.normal, {}, rays.data());
+        for (std::size_t i = 0; i < in_texel.size(); ++i)
+            points[i] = m_grid.is_bent() ? m_grid.bent_texel(at.texel).point(in_texel[i].place.x, in_texel[i].place.y)
+                                         : at.corner + in_texel[i].step;
+        m_light.sample(std::span(points).first(in_texel.size()), m_grid.normal_at(at.texel), {}, rays.data());
     }
 
     // Irradiance of a ray, the same in all channels: the light is white.
-    double irradiance(const LightRay& ray) const
+    double irradiance(std::size_t texel, const LightRay& ray) const
     {
-        return static_cast<double>(ray.flux.x) * m_rays.arriving_cosine(ray);
+        return m_rays.is_behind_face(texel, ray) ? 0.0
+                                                 : static_cast<double>(ray.flux.x) * m_rays.arriving_cosine(texel, ray);
     }
 
     // Adds the light of points where nothing blocks it.
-    void add_open(const Vec3& corner, std::span<const Vec3> steps, Texel& sum) const
+    void add_open(const At& at, std::span<const SubTexel> in_texel, Texel& sum) const
     {
         Points points;
         Rays rays;
-        sample(corner, steps, points, rays);
+        sample(at, in_texel, points, rays);
         double white = sum.irradiance.x;
         Vec3 flow = sum.flow;
-        for (std::size_t i = 0; i < steps.size(); ++i) {
-            const double arriving = irradiance(rays[i]);
+        for (std::size_t i = 0; i < in_texel.size(); ++i) {
+            const double arriving = irradiance(at.texel, rays[i]);
             if (!(arriving > 0.0))
                 continue;
             white += arriving;
@@ -191,23 +217,23 @@ private:
     }
 
     // Adds the light of points that gets past the occluders.
-    void add_traced(const Vec3& corner, std::span<const Vec3> steps, const Occluders& occluders, Texel& sum) const
+    void add_traced(const At& at, std::span<const SubTexel> in_texel, const Occluders& occluders, Texel& sum) const
     {
         Points points;
         Rays rays;
-        sample(corner, steps, points, rays);
+        sample(at, in_texel, points, rays);
         std::array<double, Occluders::packet_size> arriving;
         std::array<ShadowRay, Occluders::packet_size> shadow_rays;
         std::size_t count = 0;
-        for (std::size_t i = 0; i < steps.size(); ++i) {
-            arriving[count] = irradiance(rays[i]);
+        for (std::size_t i = 0; i < in_texel.size(); ++i) {
+            arriving[count] = irradiance(at.texel, rays[i]);
             if (!(arriving[count] > 0.0))
                 continue;
-            shadow_rays[count] = m_rays.shadow_ray(points[i], rays[i]);
+            shadow_rays[count] = m_rays.shadow_ray(at.texel, points[i], rays[i]);
             rays[count].travel = rays[i].travel;
             ++count;
         }
-        sum.is_shaded |= count < steps.size();
+        sum.is_shaded |= count < in_texel.size();
         std::array<Vec3f, Occluders::packet_size> transmittance;
         occluders.transmit(std::span(shadow_rays).first(count), transmittance.data());
         Texel result = sum;
@@ -221,10 +247,10 @@ private:
         sum = result;
     }
 
-    Vec3f mean_direction(const Vec3& flow) const
+    Vec3f mean_direction(std::size_t texel, const Vec3& flow) const
     {
         const bool is_lit = glm::dot(flow, flow) > 0.0;
-        return is_lit ? Vec3f(glm::normalize(m_grid.to_plane(flow))) : Vec3f(0.0f, 0.0f, -1.0f);
+        return is_lit ? Vec3f(glm::normalize(m_grid.to_tangent(texel, flow))) : Vec3f(0.0f, 0.0f, -1.0f);
     }
 
     const ReceiverGrid& m_grid;
@@ -232,13 +258,13 @@ private:
     LightSource m_source;
     const Occluders* m_occluders;
     bool m_with_travel;
-    std::vector<Vec3> m_points;
-    std::vector<Vec3> m_smooth_points;
-    double m_smooth_from;  // distance to a lamp, metres
+    std::vector<SubTexel> m_points;
+    std::vector<SubTexel> m_smooth_points;
     ReceiverRays m_rays;
     Shadows m_shadows;
-    // Irradiance and travel at texel (0, 0) where nothing blocks the light: those of all texels, if it is infinitely far.
-    Vec3f m_open_irradiance, m_far_travel;
+    // Irradiance and travel at texel (0, 0) where nothing blocks the light: those of all texels of a plane, if it is
+    // infinitely far.
+    Vec3f m_open_irradiance{0.0f}, m_far_travel{0.0f, 0.0f, -1.0f};
     std::vector<double> m_sums;  // [row] irradiance of texels and channels; empty unless noise is asked for
     PerThread<Work> m_work;
 };

@@ -15,6 +15,7 @@
 #include "base/error.h"
 #include "base/threads.h"
 #include "scene/checks.h"
+#include "scene/sky_irradiance.h"
 
 namespace beamspread {
 
@@ -27,6 +28,12 @@ constexpr std::size_t min_cells = 256;
 // Pixels of all images that are kept prepared for normals, some 10 bytes each. More: planes of several normals share
 // them, more memory.
 constexpr std::size_t max_prepared_pixels = std::size_t{1} << 23;
+
+// Columns and rows of the parts of the sky by which irradiance is found for any normal, powers of two. More: narrow lights
+// near the horizon are more exact.
+constexpr std::size_t sky_columns = 256;
+constexpr std::size_t sky_rows = 128;
+static_assert(sky_columns <= min_cells && sky_rows <= min_cells / 2);
 
 // Borders of the columns or rows of cells.
 struct Lines {
@@ -123,6 +130,14 @@ public:
         for (std::size_t y = 0; y < m_height; ++y)
             m_in_row.emplace_back(std::span(m_cumulated).subspan(y * (m_width + 1), m_width + 1));
         m_of_rows = Distribution(m_cumulated_rows);
+        if (m_faces_all) {
+            std::vector<SkyPart> parts(sky_columns * sky_rows);
+            parallel_for(sky_rows, [&](std::size_t y) {
+                for (std::size_t x = 0; x < sky_columns; ++x)
+                    parts[y * sky_columns + x] = sky_part(x, y);
+            });
+            m_sky = SkyIrradiance(std::move(parts), sky_columns);
+        }
     }
 
     void sample(std::span<const Vec3> /*points*/, const Vec3& normal, std::span<const Vec2> square,
@@ -138,7 +153,10 @@ public:
             sample_some(square.subspan(first, std::min(at_once, square.size() - first)), rays + first);
     }
 
-    Vec3 irradiance(const Vec3& /*point*/, const Vec3& /*normal*/) const override { return m_irradiance; }
+    Vec3 irradiance(const Vec3& /*point*/, const Vec3& normal) const override
+    {
+        return m_faces_all ? m_sky.at(glm::transpose(m_map.to_world) * normal) : m_irradiance;
+    }
 
     Vec3f radiance(const Vec3& direction) const override
     {
@@ -235,15 +253,8 @@ private:
         const double middle = cosine(0.5 * (m_columns.angle[x] + m_columns.angle[x + 1]), std::sin(0.5 * (e0 + e1)));
         if (middle <= -reach)
             return 0.0;
-        if (middle >= reach) {
-            // The integrals of the direction's coordinates.
-            const double across =
-                0.5 * (e1 - e0 + m_rows.sine[y + 1] * m_rows.cosine[y + 1] - m_rows.sine[y] * m_rows.cosine[y]);
-            const Vec3 sum((m_columns.sine[x] - m_columns.sine[x + 1]) * across,
-                           (m_columns.cosine[x + 1] - m_columns.cosine[x]) * across,
-                           0.5 * width * (m_rows.sine[y + 1] * m_rows.sine[y + 1] - m_rows.sine[y] * m_rows.sine[y]));
-            return glm::dot(sum, m_normal);
-        }
+        if (middle >= reach)
+            return glm::dot(directions(x, y), m_normal);
         // Steps along each side of a cell that the horizon cuts. More steps are slower; the error is below 4e-6.
         constexpr int steps = 8;
         double sum = 0.0;
@@ -253,6 +264,48 @@ private:
                 sum += std::max(cosine(m_columns.angle[x] - width * (i + 0.5) / steps, sine), 0.0);
         }
         return sum / (steps * steps) * solid_angle(y);
+    }
+
+    // The integral of unit vectors over a cell.
+    Vec3 directions(std::size_t x, std::size_t y) const
+    {
+        const double width = m_columns.angle[x] - m_columns.angle[x + 1];
+        const double across = 0.5 * (m_rows.angle[y + 1] - m_rows.angle[y] + m_rows.sine[y + 1] * m_rows.cosine[y + 1] -
+                                     m_rows.sine[y] * m_rows.cosine[y]);
+        return {(m_columns.sine[x] - m_columns.sine[x + 1]) * across,
+                (m_columns.cosine[x + 1] - m_columns.cosine[x]) * across,
+                0.5 * width * (m_rows.sine[y + 1] * m_rows.sine[y + 1] - m_rows.sine[y] * m_rows.sine[y])};
+    }
+
+    // The light of the cells of a part of the sky, in the image's space.
+    SkyPart sky_part(std::size_t column, std::size_t row) const
+    {
+        const std::size_t left = column * m_width / sky_columns;
+        const std::size_t right = (column + 1) * m_width / sky_columns;
+        const std::size_t bottom = row * m_height / sky_rows;
+        const std::size_t top = (row + 1) * m_height / sky_rows;
+        SkyPart part;
+        for (std::size_t y = bottom; y < top; ++y)
+            for (std::size_t x = left; x < right; ++x) {
+                const Vec3 radiance(m_map.of_cell(x, y));
+                const Vec3 flow = directions(x, y);
+                const double angle = solid_angle(y);
+                for (int c = 0; c < 3; ++c) {
+                    part.light[static_cast<std::size_t>(c)] += radiance[c] * angle;
+                    part.flow[static_cast<std::size_t>(c)] += radiance[c] * flow;
+                }
+            }
+        const auto direction = [](double azimuth, double elevation) {
+            return Vec3(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
+                        std::sin(elevation));
+        };
+        const std::array azimuths = {m_columns.angle[left], m_columns.angle[right]};
+        const std::array elevations = {m_rows.angle[bottom], m_rows.angle[top]};
+        part.center = direction(0.5 * (azimuths[0] + azimuths[1]), 0.5 * (elevations[0] + elevations[1]));
+        for (const double azimuth : azimuths)
+            for (const double elevation : elevations)
+                part.reach = std::max(part.reach, glm::distance(part.center, direction(azimuth, elevation)));
+        return part;
     }
 
     double cosine(double azimuth, double sine) const
@@ -271,7 +324,8 @@ private:
     std::vector<Distribution> m_in_row;
     Distribution m_of_rows;
     double m_sagitta;
-    Vec3 m_irradiance{0.0};
+    Vec3 m_irradiance{0.0};  // on the plane
+    SkyIrradiance m_sky;     // for any normal
 };
 
 }  // namespace

@@ -299,6 +299,8 @@ SurfaceHit Occluders::hit_on(unsigned instance, unsigned geometry, unsigned prim
     hit.position = a + (b - a) * static_cast<double>(barycentric.x) + (c - a) * static_cast<double>(barycentric.y);
     hit.normal *= (glm::dot(hit.normal, direction) > 0.0 ? -1.0 : 1.0) / area;
     hit.rounding = is_own ? rounding_of(corners, m_origin) : m_hierarchy->instances[instance].rounding;
+    if (is_own && index < set.opaque_count())
+        hit.own_opaque = index;
     hit.transmittance = set.transmittance_at(index, barycentric);
     hit.reflector = set.reflector(index);
     hit.uv = set.reflector_uv(index, barycentric);

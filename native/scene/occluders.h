@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -30,6 +31,8 @@ struct SurfaceHit {
     Vec3 position;  // world, on the triangle
     Vec3 normal;    // unit vector on the side that the ray comes from
     double rounding = 0.0;  // metres; rays that start nearer may meet the triangle itself
+    // Index of an opaque triangle outside of instances; of others the object is not known.
+    std::optional<std::size_t> own_opaque{};
     Vec3f transmittance;
     const Reflector* reflector = nullptr;  // null: black
     Vec2f uv;  // in the image of the reflector

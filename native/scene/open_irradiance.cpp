@@ -35,6 +35,8 @@ std::array<double, 4> spline_weights(double t)
 OpenIrradiance::OpenIrradiance(const ReceiverGrid& grid, const Light& light)
     : m_grid(grid), m_light(light), m_pitch(std::max(grid.pitch_x, grid.pitch_y))
 {
+    if (grid.is_bent())
+        return;
     if (std::isinf(light.distance_from(grid.origin))) {
         m_everywhere = light.irradiance(grid.origin, grid.normal);
         return;
@@ -51,6 +53,8 @@ OpenIrradiance::OpenIrradiance(const ReceiverGrid& grid, const Light& light)
 
 Vec3 OpenIrradiance::at(std::size_t x, std::size_t y) const
 {
+    if (m_grid.is_bent())
+        return in_bent_texel(x, y);
     if (m_nodes.empty())
         return m_everywhere;
     const Vec3 point = m_grid.point(static_cast<double>(x), static_cast<double>(y));
@@ -59,12 +63,25 @@ Vec3 OpenIrradiance::at(std::size_t x, std::size_t y) const
     return in_texel(static_cast<double>(x), static_cast<double>(y));
 }
 
+Vec3 OpenIrradiance::in_bent_texel(std::size_t x, std::size_t y) const
+{
+    const std::size_t texel = y * m_grid.width + x;
+    if (!m_grid.bent_texel(texel).is_inside())
+        return Vec3(0.0);
+    return in_texel(static_cast<double>(x), static_cast<double>(y), m_grid.normal_at(texel), m_grid.pitch_at(texel));
+}
+
 Vec3 OpenIrradiance::in_texel(double x, double y) const
 {
+    return in_texel(x, y, m_grid.normal, m_pitch);
+}
+
+Vec3 OpenIrradiance::in_texel(double x, double y, const Vec3& normal, double pitch) const
+{
     const auto at = [&](double sub_x, double sub_y) {
-        return m_light.irradiance(m_grid.point(x + sub_x, y + sub_y), m_grid.normal);
+        return m_light.irradiance(m_grid.point(x + sub_x, y + sub_y), normal);
     };
-    if (m_light.distance_from(m_grid.point(x, y)) > texels_to_even_light * m_pitch)
+    if (m_light.distance_from(m_grid.point(x, y)) > texels_to_even_light * pitch)
         return at(0.5, 0.5);
     // The Gauss rule of two points along each axis.
     constexpr double offset = 0.5 / std::numbers::sqrt3;

@@ -9,7 +9,7 @@
 namespace beamspread {
 
 // Near the light irradiance is computed at each texel; farther away, where it is smooth, at nodes some texels apart, because a
-// mesh of many faces takes time.
+// mesh of many faces takes time. Where the receiver bends it is computed at each texel.
 class OpenIrradiance {
 public:
     // The arguments must outlive the object.
@@ -19,7 +19,9 @@ public:
     Vec3 at(std::size_t x, std::size_t y) const;
 
 private:
+    Vec3 in_bent_texel(std::size_t x, std::size_t y) const;
     Vec3 in_texel(double x, double y) const;
+    Vec3 in_texel(double x, double y, const Vec3& normal, double pitch) const;
     Vec3 between_nodes(std::size_t x, std::size_t y) const;
 
     const ReceiverGrid& m_grid;

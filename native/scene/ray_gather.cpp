@@ -40,7 +40,7 @@ class SizedGatherer {
 public:
     SizedGatherer(const ReceiverGrid& grid, const Light& light, const Occluders* occluders, const RaySettings& settings)
         : m_grid(grid),
-          m_prepared(light.facing(grid.normal)),
+          m_prepared(grid.is_bent() ? light.facing_all() : light.facing(grid.normal)),
           m_light(m_prepared ? *m_prepared : light),
           m_open(grid, m_light),
           m_occluders(occluders),
@@ -97,7 +97,7 @@ public:
         RayNoise sum;
         for (const RayNoise& row : m_noise)
             sum.add(row, 1.0);
-        const auto texels = static_cast<double>(m_grid.width * m_grid.height);
+        const auto texels = static_cast<double>(std::max<std::size_t>(m_grid.receiving(), 1));
         return {sum.irradiance / texels, sum.variance / texels};
     }
 
@@ -281,6 +281,7 @@ private:
         const std::size_t count = part.count;
         const std::size_t x = work.span.x + texel;
         const std::size_t y = work.span.y;
+        const std::size_t of_grid = y * m_grid.width + x;
         // The share of the texel's open irradiance that this part of its rays carries.
         const Vec3 open = m_open.at(x, y) * (static_cast<double>(count) / static_cast<double>(part.all));
         if (open == Vec3(0.0))
@@ -318,15 +319,20 @@ private:
                 continue;
             const LightRay& ray = work.rays[i];
             const std::size_t index = i * work.span.width + texel;
+            if (m_rays.is_behind_face(of_grid, ray)) {
+                if (work.is_first)
+                    note_first(texel, Met::obstacle, Vec3f(scale * lit(work.weights[i])), Vec3f(0.0f), work);
+                continue;
+            }
             if (m_with_travel)
-                work.travel[index] = Vec3f(glm::normalize(m_grid.to_plane(ray.travel)));
+                work.travel[index] = Vec3f(glm::normalize(m_grid.to_tangent(of_grid, ray.travel)));
             work.irradiance[index] = Vec3f(scale * lit(work.weights[i]));
             if (!part.is_traced)
                 continue;
             if (work.is_first)
                 work.hits[index] = {Vec2f(work.on_light[i]),
                                     Vec2f(Vec2(static_cast<double>(x), static_cast<double>(y)) + work.in_texel[i])};
-            work.packet[work.waiting] = m_rays.shadow_ray(work.points[i], ray);
+            work.packet[work.waiting] = m_rays.shadow_ray(of_grid, work.points[i], ray);
             work.carried[work.waiting] = index;
             if (++work.waiting == Occluders::packet_size)
                 trace(work);
@@ -364,10 +370,11 @@ private:
         for (std::size_t i = 0; i < work.points.size(); ++i)
             work.points[i] =
                 m_grid.point(static_cast<double>(x) + work.in_texel[i].x, static_cast<double>(y) + work.in_texel[i].y);
-        m_light.sample(work.points, m_grid.normal, work.on_light, work.rays.data());
+        const std::size_t texel = y * m_grid.width + x;
+        m_light.sample(work.points, m_grid.normal_at(texel), work.on_light, work.rays.data());
         Vec3 sum(0.0);
         for (std::size_t i = 0; i < work.points.size(); ++i) {
-            work.weights[i] = Vec3(work.rays[i].flux) * m_rays.arriving_cosine(work.rays[i]);
+            work.weights[i] = Vec3(work.rays[i].flux) * m_rays.arriving_cosine(texel, work.rays[i]);
             sum += work.weights[i];
         }
         return sum;
@@ -376,20 +383,28 @@ private:
     void probe(std::span<const Vec2> positions, std::span<const Vec2> places, std::uint8_t* arrives) const
     {
         std::array<Vec3, Occluders::packet_size> points;
+        std::array<std::size_t, Occluders::packet_size> texels;
         std::array<LightRay, Occluders::packet_size> rays;
         std::array<ShadowRay, Occluders::packet_size> shadow_rays;
         std::array<Vec3f, Occluders::packet_size> transmittance;
         for (std::size_t first = 0; first < positions.size(); first += Occluders::packet_size) {
             const std::size_t count = std::min(positions.size() - first, Occluders::packet_size);
-            for (std::size_t i = 0; i < count; ++i)
+            for (std::size_t i = 0; i < count; ++i) {
                 points[i] = m_grid.point(positions[first + i].x, positions[first + i].y);
-            m_light.sample(std::span(points).first(count), m_grid.normal, places.subspan(first, count), rays.data());
+                texels[i] = m_grid.texel_at(positions[first + i].x, positions[first + i].y);
+            }
+            // The texels of a plane share a normal.
+            const std::size_t at_once = m_grid.is_bent() ? 1 : count;
+            for (std::size_t i = 0; i < count; i += at_once)
+                m_light.sample(std::span(points).subspan(i, at_once), m_grid.normal_at(texels[i]),
+                               places.subspan(first + i, at_once), &rays[i]);
             for (std::size_t i = 0; i < count; ++i)
-                shadow_rays[i] = m_rays.shadow_ray(points[i], rays[i]);
+                shadow_rays[i] = m_rays.shadow_ray(texels[i], points[i], rays[i]);
             m_occluders->transmit(std::span(shadow_rays).first(count), transmittance.data(), false);
             for (std::size_t i = 0; i < count; ++i)
                 arrives[first + i] = rays[i].flux != Vec3f(0.0f) && transmittance[i] != Vec3f(0.0f) &&
-                                     m_rays.arriving_cosine(rays[i]) > 0.0;
+                                     m_rays.arriving_cosine(texels[i], rays[i]) > 0.0 &&
+                                     !m_rays.is_behind_face(texels[i], rays[i]);
         }
     }
 
@@ -405,16 +420,23 @@ private:
             work.irradiance[index] *= transmittance[i];
             if (!work.is_first)
                 continue;
-            const std::size_t texel = index % work.span.width;
-            work.met[texel] |= transmittance[i] == Vec3f(1.0f)   ? Met::light
-                               : transmittance[i] == Vec3f(0.0f) ? Met::obstacle
-                                                                 : Met::both;
-            FirstRays& rays = work.first[texel];
-            ++rays.traced;
-            rays.open += mean(open);
-            rays.irradiance += mean(work.irradiance[index]);
+            note_first(index % work.span.width,
+                       transmittance[i] == Vec3f(1.0f)   ? Met::light
+                       : transmittance[i] == Vec3f(0.0f) ? Met::obstacle
+                                                         : Met::both,
+                       open, work.irradiance[index], work);
         }
         work.waiting = 0;
+    }
+
+    // Notes a ray of the first pass from a texel of a span.
+    static void note_first(std::size_t texel, Met met, const Vec3f& open, const Vec3f& irradiance, Work& work)
+    {
+        work.met[texel] |= met;
+        FirstRays& rays = work.first[texel];
+        ++rays.traced;
+        rays.open += mean(open);
+        rays.irradiance += mean(irradiance);
     }
 
     const ReceiverGrid& m_grid;

@@ -36,7 +36,7 @@ inline constexpr int max_rays = 4096;
 
 // Noise of light by rays, on average over texels.
 struct RayNoise {
-    double irradiance = 0.0;  // mean of texels and channels, W/m^2
+    double irradiance = 0.0;  // mean of receiving texels and channels, W/m^2
     double variance = 0.0;  // mean variance of a texel's irradiance, (W/m^2)^2
 
     // Adds light of another strength.
@@ -58,7 +58,8 @@ struct RaySettings {
     int even_rays = 0;
     std::uint32_t seed = 0;
     // Height above the plane where shadow rays start, metres, besides what rounding needs: the largest distance of the
-    // receiver's own faces to the plane, where they are among the occluders.
+    // receiver's own faces to the plane, where they are among the occluders. Where the receiver bends, the height above the
+    // face of each texel, besides what that needs.
     double clearance = 0.0;
     int threads = 0;  // 0: all
     bool with_travel = true;

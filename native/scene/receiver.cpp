@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "base/error.h"
 #include "scene/checks.h"
@@ -43,8 +44,30 @@ void check_side(const std::string& name, std::size_t side)
 
 }  // namespace
 
+ReceiverGrid ReceiverGrid::bent(std::vector<BentTexel> texels, std::size_t width, std::size_t height,
+                                std::uint32_t owner)
+{
+    check_side("width", width);
+    check_side("height", height);
+    ReceiverGrid grid{.width = width, .height = height, .owner = owner};
+    grid.shape = std::make_shared<const BentShape>(std::move(texels));
+    const double inside = static_cast<double>(std::max<std::size_t>(grid.shape->inside, 1));
+    grid.pitch_x = grid.pitch_y = std::sqrt(grid.shape->area / inside);
+    return grid;
+}
+
+Vec3 ReceiverGrid::bent_point(double x, double y) const
+{
+    const std::size_t texel = texel_at(x, y);
+    return bent_texel(texel).point(x - static_cast<double>(texel % width), y - static_cast<double>(texel / width));
+}
+
 double ReceiverGrid::reach(const Vec3& center) const
 {
+    if (is_bent()) {
+        const Vec3 offset = glm::max(glm::abs(shape->low - center), glm::abs(shape->high - center));
+        return std::max({offset.x, offset.y, offset.z});
+    }
     const double w = static_cast<double>(width);
     const double h = static_cast<double>(height);
     double largest = 0.0;
@@ -57,6 +80,8 @@ double ReceiverGrid::reach(const Vec3& center) const
 
 void ReceiverGrid::check() const
 {
+    if (is_bent())
+        return;  // checked when it was made
     detail::check_finite("origin", origin);
     check_unit("x_axis", x_axis);
     check_unit("y_axis", y_axis);

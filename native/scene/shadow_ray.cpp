@@ -5,6 +5,8 @@
 #include <limits>
 #include <span>
 
+#include "base/threads.h"
+
 namespace beamspread {
 
 namespace {
@@ -13,6 +15,14 @@ namespace {
 // a texel's position and of the ray's origin moves each by up to half a unit; Embree's robust test adds a few. Larger
 // values lose closer contact: here 2 micrometres in a scene of 1 metre.
 constexpr double offset_ulps = 16.0;
+
+// Height of the starts of rays above a face of a mesh that bends, as a fraction of the texel's longer side, besides
+// rounding: within a texel the mesh departs from the face. Larger: less noise in fine hollows, and light leaks under things
+// that touch the mesh.
+constexpr double bent_clearance = 0.01;
+
+// Texels whose creases are searched together.
+constexpr std::size_t texels_at_once = 1024;
 
 double rounding_at(double reach)
 {
@@ -38,6 +48,15 @@ bool may_lie_on(const ReceiverGrid& grid, std::span<const Vec3> corners, double 
            low.y <= static_cast<double>(grid.height) * grid.pitch_y && high.y >= 0.0 && low.z <= 0.0 && high.z >= 0.0;
 }
 
+// True if the box of a mesh that bends meets the box around an instance.
+bool may_touch(const BentShape& shape, const Hull& hull)
+{
+    const Vec3 half = glm::abs(hull.half_axes[0]) + glm::abs(hull.half_axes[1]) + glm::abs(hull.half_axes[2]);
+    const Vec3 low = glm::max(shape.low, hull.centre - half);
+    const Vec3 high = glm::min(shape.high, hull.centre + half);
+    return low.x <= high.x && low.y <= high.y && low.z <= high.z;
+}
+
 RayStart ray_start(const ReceiverGrid& grid, const Occluders* occluders, double clearance)
 {
     if (!occluders)
@@ -45,6 +64,13 @@ RayStart ray_start(const ReceiverGrid& grid, const Occluders* occluders, double 
     // World positions have double precision.
     const double in_world = offset_ulps * std::numeric_limits<double>::epsilon() * grid.reach(Vec3(0.0));
     double rounding = rounding_at(grid.reach(occluders->origin())) + in_world;
+    if (grid.is_bent()) {
+        // Texels lie on all faces of their own mesh, so that their reach is that of its triangles; instances round more.
+        for (const Hull& hull : occluders->hulls())
+            if (may_touch(*grid.shape, hull))
+                rounding = std::max(rounding, rounding_of(hull) + in_world);
+        return {.rounding = rounding, .clearance = clearance};
+    }
     // Only triangles that a ray could meet at its start count: large ones far away must not lift the rays.
     const auto include = [&](std::span<const Vec3> corners, double corner_rounding) {
         if (corner_rounding > rounding && may_lie_on(grid, corners, corner_rounding + clearance))
@@ -79,21 +105,82 @@ double rounding_of(const Hull& hull)
 ReceiverRays::ReceiverRays(const ReceiverGrid& grid, const Occluders* occluders, double clearance)
     : m_grid(grid),
       m_start(ray_start(grid, occluders, clearance)),
-      m_contacts(grid, occluders, m_start),
+      m_contacts(grid, grid.is_bent() ? nullptr : occluders, m_start),
       m_position_rounding(std::numeric_limits<double>::epsilon() * grid.reach(Vec3(0.0)))
 {
+    if (grid.is_bent() && occluders)
+        find_open_parts(*occluders);
 }
 
-ShadowRay ReceiverRays::shadow_ray(const Vec3& point, const LightRay& ray) const
+double ReceiverRays::bent_height(const BentTexel& texel) const
 {
-    // Below a triangle that lies on the plane, the ray starts behind both, and meets it.
-    const Vec3 lift = m_grid.normal * (m_contacts.cover(point) ? -m_start.height() : m_start.height());
+    return m_start.height() + bent_clearance * texel.pitch();
+}
+
+// Traces short rays from the middle of each texel to its corners and sides.
+void ReceiverRays::find_open_parts(const Occluders& occluders)
+{
+    constexpr std::array<Vec2, 8> border = {Vec2(0.0, 0.0), Vec2(0.5, 0.0), Vec2(1.0, 0.0), Vec2(1.0, 0.5),
+                                            Vec2(1.0, 1.0), Vec2(0.5, 1.0), Vec2(0.0, 1.0), Vec2(0.0, 0.5)};
+    m_open_parts.assign(m_grid.texels(), 1.0f);
+    const auto is_own = [&](const SurfaceHit& hit) {
+        return hit.is_hit && (!hit.own_opaque || occluders.owner(*hit.own_opaque) == m_grid.owner);
+    };
+    const auto find = [&](std::size_t i) {
+        const BentTexel& texel = m_grid.bent_texel(i);
+        if (!texel.is_inside())
+            return;
+        const Vec3 middle = texel.position + Vec3(texel.face) * bent_height(texel);
+        std::array<ShadowRay, border.size()> rays;
+        std::array<SurfaceHit, border.size()> hits;
+        for (std::size_t k = 0; k < border.size(); ++k) {
+            const Vec3 way = texel.point(border[k].x, border[k].y) - texel.position;
+            const double length = glm::length(way);
+            rays[k] = {.origin = middle, .direction = way / length, .distance = length};
+        }
+        occluders.find_surfaces(rays, hits.data(), true);
+        for (std::size_t k = 0; k < border.size(); ++k)
+            if (is_own(hits[k])) {
+                const double open = glm::distance(hits[k].position, middle) / rays[k].distance;
+                m_open_parts[i] = std::min(m_open_parts[i], static_cast<float>(open));
+            }
+    };
+    const std::size_t runs = (m_grid.texels() + texels_at_once - 1) / texels_at_once;
+    parallel_for(runs, [&](std::size_t run) {
+        const std::size_t end = std::min((run + 1) * texels_at_once, m_grid.texels());
+        for (std::size_t i = run * texels_at_once; i < end; ++i)
+            find(i);
+    });
+}
+
+Vec3 ReceiverRays::start_at(std::size_t texel, const Vec3& point) const
+{
+    const BentTexel& of_mesh = m_grid.bent_texel(texel);
+    const double part = m_open_parts.empty() ? 1.0 : static_cast<double>(m_open_parts[texel]);
+    return glm::mix(of_mesh.position, point, part);
+}
+
+ShadowRay ReceiverRays::shadow_ray(std::size_t texel, const Vec3& at, const LightRay& ray) const
+{
+    Vec3 point = at;
+    Vec3 lift;
+    double height = m_start.height();
+    if (m_grid.is_bent()) {
+        height = bent_height(m_grid.bent_texel(texel));
+        lift = Vec3(m_grid.bent_texel(texel).face) * height;
+        point = start_at(texel, at);
+    } else {
+        // Below a triangle that lies on the plane, the ray starts behind both, and meets it.
+        lift = m_grid.normal * (m_contacts.cover(point) ? -height : height);
+    }
     if (std::isinf(ray.distance))
         return {.origin = point + lift, .direction = -ray.travel, .distance = ray.distance};
-    const Vec3 way = -ray.travel * ray.distance - lift;
+    Vec3 way = -ray.travel * ray.distance - lift;
+    if (m_grid.is_bent())
+        way += at - point;
     const double length = glm::length(way);
     // The ray ends short of the lamp by the same margin, so that a lamp that touches a surface is not shadowed by it.
-    return {.origin = point + lift, .direction = way / length, .distance = length - m_start.height()};
+    return {.origin = point + lift, .direction = way / length, .distance = length - height};
 }
 
 }  // namespace beamspread

@@ -1,8 +1,13 @@
 // Rays between the texels of a receiver and a light: whether they arrive, and where shadow rays start and end.
+//
+// A mesh that bends shadows itself. Its rays start above the face of their texel, by a small part of the texel where faces
+// bend. Where another face of the mesh rises within the texel, as in a crease, they start nearer to the texel's middle, so
+// that none starts behind that face.
 #pragma once
 
 #include <array>
 #include <limits>
+#include <vector>
 
 #include "scene/contacts.h"
 #include "scene/light.h"
@@ -15,9 +20,9 @@ namespace beamspread {
 // vectors in single precision are known to within this.
 inline constexpr double min_cos_theta = 0.5 * static_cast<double>(std::numeric_limits<float>::epsilon());
 
-// Height above the plane where shadow rays start, metres.
+// Height above the face where shadow rays start, metres.
 struct RayStart {
-    double rounding = 0.0;  // bound of the rounding of a ray and of the triangles in the grid's plane
+    double rounding = 0.0;  // bound of the rounding of a ray and of the triangles that it could meet at its start
     double clearance = 0.0;
 
     double height() const { return rounding + clearance; }
@@ -34,23 +39,35 @@ public:
 
     const RayStart& start() const { return m_start; }
 
-    // Cosine of the angle of incidence of a ray that arrives; 0 if it comes from behind or within the plane, and if the
-    // light is so near that its direction is not known.
-    double arriving_cosine(const LightRay& ray) const
+    // Cosine of the angle of incidence of a ray that arrives at a texel; 0 if it comes from behind or within the surface by
+    // the shading normal, and if the light is so near that its direction is not known.
+    double arriving_cosine(std::size_t texel, const LightRay& ray) const
     {
-        const double cos_theta = -glm::dot(ray.travel, m_grid.normal);
+        const double cos_theta = -glm::dot(ray.travel, m_grid.normal_at(texel));
         // Comparisons with NaN are false.
         return cos_theta > min_cos_theta && ray.distance > m_position_rounding ? cos_theta : 0.0;
     }
 
-    // The shadow ray from a point of the grid toward the light.
-    ShadowRay shadow_ray(const Vec3& point, const LightRay& ray) const;
+    // True if the texel's own face blocks a ray that comes from above by the shading normal.
+    bool is_behind_face(std::size_t texel, const LightRay& ray) const
+    {
+        return m_grid.is_bent() && !(-glm::dot(ray.travel, Vec3(m_grid.bent_texel(texel).face)) > min_cos_theta);
+    }
+
+    // The shadow ray from a point of a texel toward the light.
+    ShadowRay shadow_ray(std::size_t texel, const Vec3& point, const LightRay& ray) const;
 
 private:
+    double bent_height(const BentTexel& texel) const;
+    Vec3 start_at(std::size_t texel, const Vec3& point) const;
+    void find_open_parts(const Occluders& occluders);
+
     const ReceiverGrid& m_grid;
     RayStart m_start;
     Contacts m_contacts;
     double m_position_rounding;  // metres
+    // [texel] part of the way from the middle of a texel to its border that no face of the mesh blocks; empty: 1.
+    std::vector<float> m_open_parts;
 };
 
 }  // namespace beamspread

@@ -190,9 +190,13 @@ void shade_row(const Shadow& shadow, std::size_t row, std::size_t width, Shade* 
 
 Shadows::Shadows(const ReceiverGrid& grid, const LightSource& source, const Occluders* occluders, const RayStart& start,
                  bool find)
-    : m_grid(grid), m_source(source), m_occluders(occluders), m_start(start), m_is_unknown(occluders && !find)
+    : m_grid(grid),
+      m_source(source),
+      m_occluders(occluders),
+      m_start(start),
+      m_is_unknown(occluders && (!find || grid.is_bent()))
 {
-    if (!occluders || !find)
+    if (!occluders || m_is_unknown)
         return;
     const Projection projection(grid, source, start);
     if (!projection.is_lit())

@@ -2,7 +2,7 @@
 // shades wholly.
 //
 // An instance of a mesh counts by the box around it. If there are too many triangles and boxes, no texel's shade is known,
-// because finding the shadows would take longer than tracing rays. docs/tuning.md has the speed-up
+// because finding the shadows would take longer than tracing rays; nor is it on a mesh that bends. docs/tuning.md has the speed-up
 // (tests/bench/gather.py).
 #pragma once
 
