@@ -9,16 +9,16 @@ namespace beamspread {
 namespace {
 
 // Image of a library by `make`: ldf_image or ldf_image_standard_error.
-template <auto make>
+template <auto make, class... More>
 Array<float> image(const LdfLibrary& library, double angle, double albedo, std::ptrdiff_t size, double pitch,
-                   const std::string& side, double beam_diameter)
+                   const std::string& side, double beam_diameter, More... more)
 {
     const Side image_of = side_from_name(side);
     const std::size_t texels_along = image_side(size);
     std::vector<float> texels;
     {
         const py::gil_scoped_release release;
-        texels = make(library, angle, albedo, texels_along, pitch, image_of, beam_diameter);
+        texels = make(library, angle, albedo, texels_along, pitch, image_of, beam_diameter, more...);
     }
     return to_array<float>(std::move(texels), {texels_along, texels_along});
 }
@@ -39,21 +39,59 @@ ones (a library that reaches 88 degrees serves up to 90); albedos are in [0, 1).
     library
         .def_static("load", &load_library, py::arg("path"), ReleaseGil(),
                     "Read a library from an OpenEXR file; OSError if it is missing, damaged or no library.")
-        .def("save", &save_library, py::arg("path"), ReleaseGil(),
-             "Write a multi-part OpenEXR file; an existing file is replaced only by a complete one.")
+        .def("save", &save_library, py::arg("path"), py::arg("with_plane") = true, ReleaseGil(),
+             R"(Write a multi-part OpenEXR file; an existing file is replaced only by a complete one.
+
+Without the plane, a file has the other `curvatures` alone, for `with_curved_from`.
+)")
+        .def(
+            "with_curved_from",
+            [](const LdfLibrary& self, const std::filesystem::path& path) {
+                return self.with_curved(load_curved(path));
+            },
+            py::arg("path"), ReleaseGil(),
+            R"(A copy with the curvatures of a file instead of its own.
+
+Raises OSError for a file that is missing, damaged or no library, and ValueError for one of another medium.
+)")
+        .def(
+            "with_curved",
+            [](const LdfLibrary& self, const std::vector<double>& curvatures, const std::vector<double>& angles,
+               std::int64_t photons, std::uint64_t seed, int threads, const py::object& progress,
+               const std::string& kernel) {
+                Progress report(progress_callback(progress));
+                const py::gil_scoped_release release;
+                return self.with_curved(simulate_curved(self.medium(), curvatures, angles,
+                                                        photons < 0 ? 0 : static_cast<std::uint64_t>(photons), seed,
+                                                        threads, kernel, report));
+            },
+            py::arg("curvatures"), py::arg("angles"), py::arg("photons"), py::arg("seed") = 1, py::arg("threads") = 0,
+            py::arg("progress") = py::none(), py::arg("kernel") = "",
+            R"(A copy with simulated curvatures instead of its own.
+
+Arguments are those of `simulate`. Curved surfaces may have fewer angles than the plane: between them the difference to
+the plane is interpolated.
+)")
         .def_property_readonly("medium", &LdfLibrary::medium)
         .def_property_readonly("angles", &LdfLibrary::angles_deg, "Simulated angles, degrees, ascending.")
         .def_property_readonly("photons", &LdfLibrary::photons, "Photons per angle.")
         .def_property_readonly("seed", &LdfLibrary::seed)
+        .def_property_readonly("curvatures", &LdfLibrary::curvatures,
+                               "Simulated curvatures of the surface, 1/mfp, ascending; 0 is a plane. Between them the "
+                               "LDF is linear in the curvature.")
         .def_property_readonly("is_calibrated", &LdfLibrary::is_calibrated, "True if `calibrated` made it.");
     library
         .def(
             "reflectance",
-            [](const LdfLibrary& self, double angle, double albedo) {
-                return self.total(angle, albedo, Side::reflected);
+            [](const LdfLibrary& self, double angle, double albedo, double curvature) {
+                return self.total(angle, albedo, Side::reflected, curvature);
             },
-            py::arg("angle"), py::arg("albedo"),
-            "Diffuse reflectance: power that leaves per unit incident power, specular reflection excluded.")
+            py::arg("angle"), py::arg("albedo"), py::arg("curvature") = 0.0,
+            R"(Diffuse reflectance: power that leaves per unit incident power, specular reflection excluded.
+
+On a ball (`curvature` above 0) it leaves out light that crosses without scattering. Raises ValueError outside the
+range of `curvatures`.
+)")
         .def(
             "transmittance",
             [](const LdfLibrary& self, double angle, double albedo) {
@@ -63,10 +101,10 @@ ones (a library that reaches 88 degrees serves up to 90); albedos are in [0, 1).
             "Power that leaves the far side per unit incident power, the unscattered beam included.")
         .def(
             "standard_error",
-            [](const LdfLibrary& self, double angle, double albedo, const std::string& side) {
-                return self.standard_error(angle, albedo, side_from_name(side));
+            [](const LdfLibrary& self, double angle, double albedo, const std::string& side, double curvature) {
+                return self.standard_error(angle, albedo, side_from_name(side), curvature);
             },
-            py::arg("angle"), py::arg("albedo"), py::arg("side") = "reflected",
+            py::arg("angle"), py::arg("albedo"), py::arg("side") = "reflected", py::arg("curvature") = 0.0,
             R"(Standard error of `reflectance` or `transmittance`.
 
 It follows from the scatter of 32 independent batches, without the error of interpolation between angles. For a
@@ -98,8 +136,9 @@ ValueError
         .def("diffuse_reflectance", &LdfLibrary::diffuse_reflectance, py::arg("albedo"),
              "Reflectance under uniform diffuse light; needs a library from 0 to at least 88 degrees.");
     library
-        .def("image", &image<ldf_image>, py::arg("angle"), py::arg("albedo"), py::arg("size"), py::arg("pitch"),
-             py::arg("side") = "reflected", py::arg("beam_diameter") = 0.0, R"(The LDF as texel means.
+        .def("image", &image<ldf_image, double>, py::arg("angle"), py::arg("albedo"), py::arg("size"), py::arg("pitch"),
+             py::arg("side") = "reflected", py::arg("beam_diameter") = 0.0, py::arg("curvature") = 0.0,
+             R"(The LDF as texel means.
 
 Parameters
 ----------
@@ -112,6 +151,10 @@ side : {"reflected", "transmitted"}
 beam_diameter : float
     Diameter of the disk around O that the beam lights evenly on the surface, mean free paths, up to 1e6 and 1e4 texels;
     0: a pencil beam.
+curvature : float
+    Curvature of the surface, 1/mfp, within `curvatures`. The image of a curved surface shows chords: a texel's distance
+    from O is the straight distance from O to a point of the surface, its azimuth that of the chord in the tangent plane
+    at O. Areas are true, since a ball's area within a chord c is pi c^2.
 
 Returns
 -------

@@ -33,7 +33,7 @@ LdfSample from_library(const LdfLibrary& library, double angle, double albedo, s
     const Side image_of = side_from_name(side);
     const std::size_t texels = image_side(size);
     const py::gil_scoped_release release;
-    std::vector<float> image = ldf_image(library, angle, albedo, texels, pitch, image_of, beam_diameter);
+    std::vector<float> image = ldf_image(library, angle, albedo, texels, pitch, image_of, beam_diameter, 0.0);
     LdfSample sample{texels, texels, std::move(image), pitch, angle, albedo, beam_diameter, library.medium().g};
     validate(sample);
     return sample;

@@ -25,6 +25,11 @@ py::tuple exact(const Medium& medium, const std::vector<double>& angles, const s
     return py::make_tuple(table(totals.reflectance), table(totals.transmittance));
 }
 
+std::uint64_t photon_count(std::int64_t photons)
+{
+    return photons < 0 ? 0 : static_cast<std::uint64_t>(photons);
+}
+
 }  // namespace
 
 void bind_medium(py::module_& m)
@@ -74,14 +79,14 @@ void bind_transport(py::module_& m)
     m.def(
         "simulate",
         [](const Medium& medium, const std::vector<double>& angles, std::int64_t photons, std::uint64_t seed,
-           int threads, const py::object& progress, const std::string& kernel) {
+           int threads, const py::object& progress, const std::string& kernel, const std::vector<double>& curvatures) {
             Progress report(progress_callback(progress));
             const py::gil_scoped_release release;
-            return std::make_shared<LdfLibrary>(simulate_library(
-                medium, angles, photons < 0 ? 0 : static_cast<std::uint64_t>(photons), seed, threads, kernel, report));
+            return std::make_shared<LdfLibrary>(
+                simulate_library(medium, angles, photon_count(photons), seed, threads, kernel, report, curvatures));
         },
         py::arg("medium"), py::arg("angles"), py::arg("photons"), py::arg("seed") = 1, py::arg("threads") = 0,
-        py::arg("progress") = py::none(), py::arg("kernel") = "",
+        py::arg("progress") = py::none(), py::arg("kernel") = "", py::arg("curvatures") = std::vector<double>(),
         R"(Simulate light inside a medium by Monte Carlo.
 
 One simulation serves every albedo, because light that leaves is tallied by scattering order.
@@ -101,6 +106,10 @@ progress : callable, optional
     Called with the finished fraction. Returning False (or NumPy's) stops the simulation; exceptions pass through.
 kernel : str
     One of `walk_kernels()`; empty: the fastest. Kernels agree up to the simulation's noise.
+curvatures : sequence of float
+    Curvatures of the surface, 1/mfp, from -100 to 100 and distinct; 0, a plane, is always simulated besides. Above 0
+    the medium is a ball of radius ``1 / curvature``, below 0 it surrounds a hollow ball. Only half-spaces may have them.
+    Light counts where it leaves if it has scattered; what crosses a hollow and enters again is not followed.
 
 Returns
 -------

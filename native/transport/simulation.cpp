@@ -21,6 +21,9 @@ namespace {
 // threads to share.
 constexpr std::uint64_t max_photons_per_job = 200'000;
 
+// Largest curvature, 1 / mean free path. Light hardly scatters in smaller balls.
+constexpr double max_curvature = 100.0;
+
 // Consecutive batches in a group (transport/tally/tally.h).
 constexpr std::size_t batches_per_group = batch_count / group_count;
 
@@ -167,6 +170,49 @@ std::size_t batches_per_job(std::uint64_t photons)
     return batches;
 }
 
+// Consecutive batches of a beam, for one thread.
+struct Job {
+    std::size_t beam;
+    std::size_t first_batch;
+    std::size_t batches;
+};
+
+std::vector<Job> jobs_of(std::span<const Beam> beams)
+{
+    std::vector<Job> jobs;
+    for (std::size_t beam = 0; beam < beams.size(); ++beam) {
+        const std::size_t per_job = batches_per_job(beams[beam].photons);
+        for (std::size_t first = 0; first < batch_count; first += per_job)
+            jobs.push_back({beam, first, per_job});
+    }
+    return jobs;
+}
+
+// Stream of a beam's random numbers.
+std::uint64_t stream_of(const Beam& beam)
+{
+    const auto angle = std::bit_cast<std::uint64_t>(beam.angle_deg);
+    if (beam.curvature == 0.0)
+        return angle;
+    return angle ^ (std::bit_cast<std::uint64_t>(beam.curvature) * 0x9e3779b97f4a7c15ULL);
+}
+
+void check(const Medium& medium, std::span<const Beam> beams)
+{
+    if (beams.empty())
+        reject("angles", "empty", "at least one angle in degrees, 0 <= angle < 90");
+    for (const Beam& beam : beams) {
+        if (!(beam.angle_deg >= 0.0 && beam.angle_deg < 90.0))
+            reject("angles", beam.angle_deg, "0 <= angle < 90 degrees");
+        if (!(std::abs(beam.curvature) <= max_curvature))
+            reject("curvatures", beam.curvature, "-100 <= curvature <= 100 per mean free path");
+        if (beam.curvature != 0.0 && !medium.is_half_space())
+            reject("curvatures", beam.curvature, "0 for a slab: only a half-space has balls and hollows");
+        if (beam.photons < 1)
+            reject("photons", static_cast<double>(beam.photons), "photons >= 1");
+    }
+}
+
 WalkKernel find_kernel(std::string_view name)
 {
     const std::vector<WalkKernel> kernels = walk_kernels();
@@ -184,53 +230,45 @@ WalkKernel find_kernel(std::string_view name)
 
 }  // namespace
 
-std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> angles_deg, std::uint64_t photons,
-                                  std::uint64_t seed, int threads, std::string_view kernel_name, Progress& progress)
+std::vector<AngleResult> simulate(const Medium& medium, std::span<const Beam> beams, std::uint64_t seed, int threads,
+                                  std::string_view kernel_name, Progress& progress)
 {
     validate(medium);
-    if (angles_deg.empty())
-        reject("angles", "empty", "at least one angle in degrees, 0 <= angle < 90");
-    for (double angle : angles_deg)
-        if (!(angle >= 0.0 && angle < 90.0))
-            reject("angles", angle, "0 <= angle < 90 degrees");
-    if (photons < 1)
-        reject("photons", static_cast<double>(photons), "photons >= 1");
-
-    const auto total_photons = static_cast<double>(photons);
-    progress.set_total(total_photons * static_cast<double>(angles_deg.size()));
+    check(medium, beams);
+    double total_photons = 0.0;
+    for (const Beam& beam : beams)
+        total_photons += static_cast<double>(beam.photons);
+    progress.set_total(total_photons);
 
     const WalkKernel kernel = find_kernel(kernel_name);
-    const std::vector<std::uint64_t> batches = batch_sizes(photons);
-    const std::size_t per_job = batches_per_job(photons);
-    const std::size_t jobs_per_angle = batch_count / per_job;
-
-    const auto walk_job = [&](std::size_t item) {
-        const double angle = angles_deg[item / jobs_per_angle];
-        const double theta = refracted_angle(angle * radians_per_degree, medium.ior);
-        const std::size_t first = item % jobs_per_angle * per_job;
+    const std::vector<Job> jobs = jobs_of(beams);
+    const auto walk_job = [&](const Job& job) {
+        const Beam& beam = beams[job.beam];
+        const double theta = refracted_angle(beam.angle_deg * radians_per_degree, medium.ior);
+        const std::vector<std::uint64_t> batches = batch_sizes(beam.photons);
         JobSums sums;
-        for (std::size_t batch = 0; batch < per_job; batch += batches_per_group)
+        for (std::size_t batch = 0; batch < job.batches; batch += batches_per_group)
             sums.groups.push_back(empty_tallies(medium, theta));
-        sums.batches.resize(per_job);
-        kernel.walk({medium, theta, seed, std::bit_cast<std::uint64_t>(angle), first,
-                     std::span(batches).subspan(first, per_job), batches_per_group, sums.groups, sums.batches,
-                     progress});
+        sums.batches.resize(job.batches);
+        kernel.walk({medium, beam.curvature, theta, seed, stream_of(beam), job.first_batch,
+                     std::span(batches).subspan(job.first_batch, job.batches), batches_per_group, sums.groups,
+                     sums.batches, progress});
         return sums;
     };
 
     std::vector<AngleResult> results;
     AngleSums sums;
-    const auto merge_job = [&](std::size_t item, JobSums job_sums) {
-        const std::size_t job = item % jobs_per_angle;
-        if (job == 0)
+    const auto merge_job = [&](const Job& job, JobSums job_sums) {
+        if (job.first_batch == 0)
             sums = AngleSums{};
-        merge(job * per_job, std::move(job_sums), sums);
-        if (job + 1 == jobs_per_angle)
-            results.push_back(normalized(angles_deg[item / jobs_per_angle], sums, total_photons));
+        merge(job.first_batch, std::move(job_sums), sums);
+        const Beam& beam = beams[job.beam];
+        if (job.first_batch + job.batches == batch_count)
+            results.push_back(normalized(beam.angle_deg, sums, static_cast<double>(beam.photons)));
     };
     with_threads(threads, [&] {
-        parallel_ordered(angles_deg.size() * jobs_per_angle, [&](std::size_t item) {
-            return [&, item, sums = walk_job(item)]() mutable { merge_job(item, std::move(sums)); };
+        parallel_ordered(jobs.size(), [&](std::size_t item) {
+            return [&, item, sums = walk_job(jobs[item])]() mutable { merge_job(jobs[item], std::move(sums)); };
         });
     });
     progress.finish();

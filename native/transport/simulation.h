@@ -1,4 +1,4 @@
-// Monte Carlo simulation of one medium for several angles of incidence.
+// Monte Carlo simulation of one medium for several angles of incidence and curvatures of its surface.
 #pragma once
 
 #include <cstdint>
@@ -35,9 +35,18 @@ struct AngleResult {
     std::array<SideResult, side_count> sides;
 };
 
-// Walks `photons` per angle. The result depends on seed, photons and kernel (a name from walk_kernels(); empty: the
-// fastest), never on threads. Throws InvalidArgument, Cancelled.
-std::vector<AngleResult> simulate(const Medium& medium, std::span<const double> angles_deg, std::uint64_t photons,
-                                  std::uint64_t seed, int threads, std::string_view kernel_name, Progress& progress);
+// A beam on the surface.
+struct Beam {
+    double angle_deg = 0.0;  // outside the medium, from the normal, in [0, 90)
+    double curvature = 0.0;  // of the surface, 1 / mean free path: 1 / radius of a ball, negative round a hollow
+    std::uint64_t photons = 0;
+};
+
+// Walks the photons of each beam. On a curved surface, which only a half-space may have, radii are chords: straight
+// distances from entry to exit, with their azimuths in the tangent plane of the entry. Light is counted when it leaves,
+// if it has scattered; what crosses a hollow and enters again is not followed. The result of a beam depends on seed,
+// beam and kernel (a name from walk_kernels(); empty: the fastest), never on threads. Throws InvalidArgument, Cancelled.
+std::vector<AngleResult> simulate(const Medium& medium, std::span<const Beam> beams, std::uint64_t seed, int threads,
+                                  std::string_view kernel_name, Progress& progress);
 
 }  // namespace beamspread

@@ -14,6 +14,7 @@ from ..errors import BakeError
 from ..native import native
 from ..progress import Callback, Progress
 from ..recent import keep_recent
+from .curvatures import curvatures_for, curved_angles_for, curved_photons_for, with_curvatures
 
 PHOTONS = {"preview": 80_000, "final": 4_000_000}
 """Photons per angle for a medium with g .8 and ior 1. More: less noise, more time; see `photons_for`."""
@@ -29,6 +30,9 @@ SIMULATING = {
 
 _FILE_VERSION = 10
 """Version of the simulation. Increment it when the simulation changes, so that cached files are made again."""
+
+_CURVED_FILE_VERSION = 1
+"""Version of the simulation of curved surfaces, as `_FILE_VERSION`."""
 
 SHIPPED_FOLDER = Path(__file__).resolve().parents[2] / "library"
 """Libraries that came with the package, made by ``tools/make_library.py``."""
@@ -101,6 +105,11 @@ def file_name(medium: native.Medium, quality: str) -> str:
     return f"g{medium.g:g}_ior{medium.ior:g}_thickness{medium.thickness:g}_{quality}.exr"
 
 
+def curved_file_name(medium: native.Medium, quality: str) -> str:
+    """Name of the shipped file of a medium's curved surfaces."""
+    return file_name(medium, f"{quality}_curved" if quality != "final" else "curved")
+
+
 def _cache_path(medium: native.Medium, quality: str) -> Path:
     key = repr(
         (_FILE_VERSION, medium.g, medium.ior, medium.thickness, angles_for(medium), photons_for(medium, quality))
@@ -108,6 +117,13 @@ def _cache_path(medium: native.Medium, quality: str) -> Path:
     digest = hashlib.sha256(key.encode()).hexdigest()[:16]
     name = Path(file_name(medium, quality))
     return cache_folder() / f"{name.stem}_{digest}.exr"
+
+
+def _curved_cache_path(medium: native.Medium, quality: str) -> Path:
+    photons = curved_photons_for(medium, quality)
+    key = repr((_CURVED_FILE_VERSION, medium, curvatures_for(medium), curved_angles_for(medium), photons))
+    digest = hashlib.sha256(key.encode()).hexdigest()[:16]
+    return cache_folder() / f"{Path(file_name(medium, quality)).stem}_curved_{digest}.exr"
 
 
 def _load(path: Path, medium: native.Medium) -> native.LdfLibrary | None:
@@ -128,12 +144,12 @@ def _load_shipped(medium: native.Medium, quality: str) -> native.LdfLibrary | No
     return None
 
 
-def _store(result: native.LdfLibrary, path: Path) -> None:
+def _store(result: native.LdfLibrary, path: Path, with_plane: bool) -> None:
     """Save a library to the cache; a full or read-only disk must not fail the bake."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(path) as temporary:
-            result.save(temporary)
+            result.save(temporary, with_plane)
     except OSError:
         pass
 
@@ -161,11 +177,17 @@ def clear_cache() -> int:
     return freed
 
 
-def is_known(medium: native.Medium, quality: str) -> bool:
+def is_known(medium: native.Medium, quality: str, curved: bool = False) -> bool:
     """True if `library` need not simulate. Checks names of files alone; damaged files are simulated again."""
-    path = _cache_path(medium, quality)
-    shipped = (SHIPPED_FOLDER / file_name(medium, name) for name in (quality, "final"))
-    return path in _loaded or path.is_file() or any(file.is_file() for file in shipped)
+    known = _is_any(_cache_path(medium, quality), [file_name(medium, name) for name in (quality, "final")])
+    if not curved or not curvatures_for(medium):
+        return known
+    names = [curved_file_name(medium, name) for name in (quality, "final")]
+    return known and _is_any(_curved_cache_path(medium, quality), names)
+
+
+def _is_any(path: Path, shipped: Sequence[str]) -> bool:
+    return path in _loaded or path.is_file() or any((SHIPPED_FOLDER / name).is_file() for name in shipped)
 
 
 _loaded: dict[Path, native.LdfLibrary] = {}
@@ -176,7 +198,11 @@ _MAX_LOADED = 8
 
 
 def library(
-    medium: native.Medium, quality: str = "final", progress: Callback | None = None, threads: int = 0
+    medium: native.Medium,
+    quality: str = "final",
+    progress: Callback | None = None,
+    threads: int = 0,
+    curved: bool = False,
 ) -> native.LdfLibrary:
     """Load the LDF library of a medium, for every angle of incidence and albedo, or simulate it (up to minutes).
 
@@ -190,6 +216,9 @@ def library(
         Called with the finished fraction while a simulation runs. It stops the simulation by returning False.
     threads : int
         Number of threads; 0: all. The result does not depend on it.
+    curved : bool
+        True for a library that also has curved surfaces, see `LdfLibrary.curvatures`: from -1/3 to 1 per transport mean
+        free path ``1 / (1 - g)``. A slab has none: a bent slab uses the LDF of the flat one.
 
     Returns
     -------
@@ -207,25 +236,63 @@ def library(
         raise ValueError(f"argument 'medium' is {medium!r}; allowed: a Medium")
     if quality not in PHOTONS:
         raise ValueError(f"argument 'quality' is {quality!r}; allowed: 'final', 'preview'")
-    if available := _available_library(medium, quality):
-        return available
     progress = Progress.of(progress)
-    progress.begin(SIMULATING[quality])
-    simulated = make(medium, quality, progress, threads=threads)
-    path = _cache_path(medium, quality)
-    _store(simulated, path)
+    curved = curved and bool(curvatures_for(medium))
+    if available := _available_library(medium, quality, curved):
+        return available
+    plane = _available_library(medium, quality)
+    if plane and not curved:
+        return plane
+    parts = iter(progress.split([1.0] * (curved + (not plane))))
+    if not plane:
+        part = next(parts)
+        part.begin(SIMULATING[quality])
+        plane = _keep(make(medium, quality, part, threads=threads), _cache_path(medium, quality))
+    if not curved:
+        return plane
+    part = next(parts)
+    part.begin(SIMULATING[quality])
+    result = with_curvatures(plane, quality, part, threads=threads)
+    return _keep(result, _curved_cache_path(medium, quality), with_plane=False)
+
+
+def _keep(simulated: native.LdfLibrary, path: Path, with_plane: bool = True) -> native.LdfLibrary:
+    """Cache a library in a file and in memory."""
+    _store(simulated, path, with_plane)
     return keep_recent(_loaded, path, simulated, _MAX_LOADED)
 
 
-def known_library(medium: native.Medium) -> native.LdfLibrary | None:
+def known_library(medium: native.Medium, curved: bool = False) -> native.LdfLibrary | None:
     """The best shipped or cached library of a medium; None if it must be simulated."""
-    return _available_library(medium, "final") or _available_library(medium, "preview")
+    return _available_library(medium, "final", curved) or _available_library(medium, "preview", curved)
 
 
-def _available_library(medium: native.Medium, quality: str) -> native.LdfLibrary | None:
+def _available_library(medium: native.Medium, quality: str, curved: bool = False) -> native.LdfLibrary | None:
+    if curved and curvatures_for(medium):
+        return _available_curved(medium, quality)
     path = _cache_path(medium, quality)
     available = _loaded.get(path) or _load_shipped(medium, quality) or _load(path, medium)
     return available and keep_recent(_loaded, path, available, _MAX_LOADED)
+
+
+def _available_curved(medium: native.Medium, quality: str) -> native.LdfLibrary | None:
+    path = _curved_cache_path(medium, quality)
+    available = _loaded.get(path)
+    if not available and (plane := _available_library(medium, quality)):
+        files = [SHIPPED_FOLDER / curved_file_name(medium, name) for name in (quality, "final")]
+        for file in (*files, path):
+            available = available or _load_curved(file, plane)
+    return available and keep_recent(_loaded, path, available, _MAX_LOADED)
+
+
+def _load_curved(path: Path, plane: native.LdfLibrary) -> native.LdfLibrary | None:
+    """A library with the curved surfaces in a file; None if the file is missing, damaged or of another medium."""
+    try:
+        loaded = plane.with_curved_from(path)
+    except (OSError, ValueError):
+        return None
+    nodes = sorted((0.0, *curvatures_for(plane.medium)))
+    return loaded if loaded.curvatures == nodes else None
 
 
 def load_source(folder: str, method: str):

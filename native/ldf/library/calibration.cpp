@@ -227,7 +227,8 @@ LdfLibrary calibrated(const LdfLibrary& library, int threads)
                     errors[k] = static_cast<float>(
                         std::abs(result.total(exact.angles_deg[angle], compared_albedos[k], side) / total - 1.0));
         }
-    return LdfLibrary(medium, library.photons(), library.seed(), std::move(results), std::move(residuals));
+    return LdfLibrary(medium, library.photons(), library.seed(), std::move(results), std::move(residuals))
+        .with_curved(library.curved());
 }
 
 }  // namespace beamspread

@@ -95,11 +95,12 @@ std::vector<double> texel_power(const std::vector<RadialProfile>& profiles, std:
 }  // namespace
 
 std::vector<float> ldf_image(const LdfLibrary& library, double angle_deg, double albedo, std::size_t size, double pitch,
-                             Side side, double beam_diameter)
+                             Side side, double beam_diameter, double curvature)
 {
     check_grid(size, pitch, beam_diameter);
-    std::vector<double> texels =
-        texel_power(library.pole_profiles(angle_deg, albedo, side), size, pitch, beam_diameter);
+    const auto profiles = curvature == 0.0 ? library.pole_profiles(angle_deg, albedo, side)
+                                           : std::vector{library.curved_profile(angle_deg, albedo, side, curvature)};
+    std::vector<double> texels = texel_power(profiles, size, pitch, beam_diameter);
     for (const BallisticExit& exit : library.ballistic(angle_deg, side)) {
         if (is_point(beam_diameter, pitch))
             add_delta(texels, size, pitch, exit);

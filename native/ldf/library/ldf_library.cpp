@@ -197,14 +197,4 @@ std::vector<BallisticExit> LdfLibrary::ballistic(double angle_deg, Side side) co
     return exits;
 }
 
-LdfLibrary simulate_library(const Medium& medium, const std::vector<double>& angles_deg, std::uint64_t photons,
-                            std::uint64_t seed, int threads, std::string_view kernel, Progress& progress)
-{
-    std::vector<double> sorted = angles_deg;
-    std::sort(sorted.begin(), sorted.end());
-    const AngleNodes checked(sorted);  // rejects bad angles before the simulation
-    auto results = simulate(medium, sorted, photons, seed, threads, kernel, progress);
-    return LdfLibrary(medium, photons, seed, std::move(results));
-}
-
 }  // namespace beamspread

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -85,12 +86,24 @@ struct Residuals {
 };
 using SideResiduals = std::array<Residuals, side_count>;
 
+class LdfLibrary;
+
+// The LDFs of a medium with a curved surface (transport/simulation.h).
+struct CurvedPart {
+    double curvature = 0.0;  // 1 / mean free path, not 0
+    // Its results are slim: without batches and deviations, see `slimmed`. Its residuals are relative standard errors.
+    std::shared_ptr<const LdfLibrary> library;
+};
+
 class LdfLibrary final : public LdfSource {
 public:
     // Takes one result per angle, in any order; of a calibrated library also the remaining errors, by ascending angles.
     // Throws InvalidArgument.
     LdfLibrary(const Medium& medium, std::uint64_t photons, std::uint64_t seed, std::vector<AngleResult> results,
                std::vector<SideResiduals> residuals = {});
+
+    // A copy with these curved parts, in any order, instead of its own. Throws InvalidArgument.
+    LdfLibrary with_curved(std::vector<CurvedPart> parts) const;
 
     const Medium& medium() const { return m_medium; }
     std::uint64_t photons() const { return m_photons; }  // per angle
@@ -104,9 +117,13 @@ public:
     // entry. The angle (degrees) is within the simulated ones, the albedo in [0, 1).
     double total(double angle_deg, double albedo, Side side) const;
 
+    // `total` on a surface of a curvature, without light that crosses a ball unscattered.
+    double total(double angle_deg, double albedo, Side side, double curvature) const;
+
     // Standard error of `total`, from the scatter of the batches. A calibrated library hardly has any; there it
     // includes the error of the exact totals and the errors that calibration and interpolation between angles left.
     double standard_error(double angle_deg, double albedo, Side side) const;
+    double standard_error(double angle_deg, double albedo, Side side, double curvature) const;
 
     // Reflectance under uniform diffuse light: the mean of `total` over the hemisphere, weighted by the cosine.
     double diffuse_reflectance(double albedo) const;
@@ -124,6 +141,16 @@ public:
     std::vector<RadialProfile> node_profiles(double albedo, Side side) const override;
     AngleWeights angle_weights(double angle_deg) const override;
 
+    // Curved parts, by ascending curvatures.
+    const std::vector<CurvedPart>& curved() const { return m_curved; }
+    std::vector<double> curvatures() const override;
+
+    // A curved part may have fewer angles than the plane: its difference to the plane is interpolated between them.
+    std::vector<RadialProfile> curved_node_profiles(double albedo, Side side, std::size_t curvature) const override;
+
+    // The scattered part of the LDF on a surface of a curvature, linear between `curvatures`.
+    RadialProfile curved_profile(double angle_deg, double albedo, Side side, double curvature) const;
+
     std::vector<BallisticExit> ballistic(double angle_deg, Side side) const override;
 
     // Throws InvalidArgument if the library does not reach to this angle.
@@ -131,6 +158,22 @@ public:
 
 private:
     using PoleProfiles = std::vector<RadialProfile>;  // of the simulated angles
+
+    // Part of an interpolated value: an index of `curvatures` and its weight.
+    struct CurvatureWeight {
+        std::size_t index;
+        double weight;
+    };
+    // Weights of the two curvatures around. Throws InvalidArgument.
+    std::array<CurvatureWeight, 2> curvature_weights(double curvature) const;
+    const CurvedPart* curved_part(std::size_t curvature) const;  // null for the plane
+
+    // Weights of the plane's simulated angles and of a part's, for weights of the plane's angles.
+    struct SplitWeights {
+        AngleWeights plane;
+        AngleWeights part;
+    };
+    SplitWeights split_weights(const AngleWeights& weights, const LdfLibrary& part) const;
 
     AngleWeights simulated_weights(double angle_deg) const;
     double residual(double angle_deg, double albedo, Side side) const;
@@ -148,11 +191,26 @@ private:
     std::vector<SideResiduals> m_residuals;
     AngleNodes m_simulated;
     AngleNodes m_nodes;  // of `node_profiles`
+    std::vector<CurvedPart> m_curved;
 };
 
-// Simulates a medium at these angles. See `simulate`.
+// Simulates a medium at these angles, on a plane and, at the same angles, on surfaces of these curvatures. See
+// `simulate`.
 LdfLibrary simulate_library(const Medium& medium, const std::vector<double>& angles_deg, std::uint64_t photons,
-                            std::uint64_t seed, int threads, std::string_view kernel, Progress& progress);
+                            std::uint64_t seed, int threads, std::string_view kernel, Progress& progress,
+                            const std::vector<double>& curvatures = {});
+
+// Simulates surfaces of these curvatures; 0 is left out. Curvatures and angles are in any order, but distinct.
+std::vector<CurvedPart> simulate_curved(const Medium& medium, const std::vector<double>& curvatures,
+                                        const std::vector<double>& angles_deg, std::uint64_t photons,
+                                        std::uint64_t seed, int threads, std::string_view kernel, Progress& progress);
+
+// A result of a curved surface with what files keep: numbers rounded to what their noise allows, without batches and
+// their deviations.
+AngleResult slimmed(AngleResult result);
+
+// Power that leaves one side at one angle, per unit power that entered and scattered.
+double scattered_total(const SideResult& side, double albedo);
 
 // A copy with exact totals: the power p_b of every order bin b, and so its distribution, is scaled by the s_b that
 // minimize
@@ -164,17 +222,19 @@ LdfLibrary calibrated(const LdfLibrary& library, int threads);
 
 // Mean exitance of each texel per unit incident power, in 1/mfp^2: size x size texels of side `pitch` (mean free
 // paths), rows v upward, columns u, O at the centre. The beam lights a disk of this diameter around O evenly (0: a
-// point). Throws InvalidArgument.
+// point). On a curved surface distances from O are chords. Throws InvalidArgument.
 std::vector<float> ldf_image(const LdfLibrary& library, double angle_deg, double albedo, std::size_t size, double pitch,
-                             Side side, double beam_diameter);
+                             Side side, double beam_diameter, double curvature);
 
 // Standard error of each texel of `ldf_image`, from the scatter between groups of batches, with a relative error of
 // about a quarter. Throws InvalidArgument.
 std::vector<float> ldf_image_standard_error(const LdfLibrary& library, double angle_deg, double albedo,
                                             std::size_t size, double pitch, Side side, double beam_diameter);
 
-// Write and read one multi-part OpenEXR file; library_format.h describes the layout. Throw IoError.
-void save_library(const LdfLibrary& library, const std::filesystem::path& path);
+// Write and read one multi-part OpenEXR file; library_format.h describes the layout. Without the plane, a file has only
+// the curved parts. Throw IoError.
+void save_library(const LdfLibrary& library, const std::filesystem::path& path, bool with_plane = true);
 LdfLibrary load_library(const std::filesystem::path& path);
+std::vector<CurvedPart> load_curved(const std::filesystem::path& path);
 
 }  // namespace beamspread

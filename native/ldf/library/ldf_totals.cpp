@@ -31,6 +31,19 @@ std::array<double, order_bin_count> order_weights(const SideResult& side, double
     return weights;
 }
 
+double scattered_total(const SideResult& side, double albedo)
+{
+    const auto by_order = order_weights(side, albedo);
+    double sum = 0.0;
+    for (std::size_t i = 0; i < side.batch_totals.size(); ++i)
+        sum += by_order[i % order_bin_count] * static_cast<double>(side.batch_totals[i]);
+    if (!side.batch_totals.empty())
+        return sum / static_cast<double>(batch_count);
+    for (std::size_t i = 0; i < side.power.size(); ++i)
+        sum += by_order[order_bin_of(i / radius_bin_count)] * static_cast<double>(side.power[i]);
+    return sum;
+}
+
 double LdfLibrary::total(double angle_deg, double albedo, Side side) const
 {
     check_albedo(albedo);
@@ -41,11 +54,7 @@ double LdfLibrary::total(double angle_deg, double albedo, Side side) const
         const SideResult& result = m_results[j].sides[static_cast<std::size_t>(side)];
         if (result.power.empty())
             continue;
-        const auto by_order = order_weights(result, albedo);
-        double scattered = 0.0;
-        for (std::size_t i = 0; i < result.batch_totals.size(); ++i)
-            scattered += by_order[i % order_bin_count] * static_cast<double>(result.batch_totals[i]);
-        sum += weights.even[j] * scattered / static_cast<double>(batch_count);
+        sum += weights.even[j] * scattered_total(result, albedo);
     }
     return sum;
 }

@@ -56,6 +56,11 @@ std::string part_name(std::size_t side, std::size_t angle)
     return std::string(side_names[side]) + "." + std::to_string(angle);
 }
 
+std::string curved_prefix(std::size_t i)
+{
+    return "curved." + std::to_string(i) + ".";
+}
+
 std::vector<float> with_columns(const std::vector<float>& values, std::size_t from_columns, std::size_t columns)
 {
     const std::size_t lines = values.size() / from_columns;

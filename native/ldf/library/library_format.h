@@ -14,6 +14,9 @@
 //                        line per batch: power that leaves;
 //   "<side>.<j>.scatter" columns: [pole][albedo][harmonic][radius bin], lines: groups of batches: their deviations
 //                        (transport/tally/tally.h), half precision.
+// Libraries of curved surfaces follow, by ascending curvatures: their parts are named "curved.<i>.<side>.<j>", have an
+// attribute curvature (1 / mean free path) and no lines for batches and no scatter; residuals are relative standard
+// errors. A file may have these alone.
 // Each part has one channel, because sorting channels into pixels takes OpenEXR longer than reading.
 #pragma once
 
@@ -33,6 +36,9 @@ inline constexpr std::size_t ratio_columns = 2048;
 inline constexpr int version = 8;
 
 std::string part_name(std::size_t side, std::size_t angle);
+
+// What the names of the i-th curved library's parts begin with.
+std::string curved_prefix(std::size_t i);
 
 // Number of lines for this number of values.
 inline std::size_t ratio_lines(std::size_t values)

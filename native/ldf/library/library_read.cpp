@@ -23,9 +23,28 @@ public:
 
     LdfLibrary library()
     {
-        if (m_parts.empty())
-            fail("holds no parts");
-        const ExrPart& first = m_parts.front();
+        if (!find(format::part_name(0, 0)))
+            fail(m_parts.empty() ? "holds no parts" : "holds no plane");
+        const LdfLibrary plane = of_prefix("", true);
+        std::vector<CurvedPart> parts = curved();
+        return parts.empty() ? plane : checked_whole([&] { return plane.with_curved(std::move(parts)); });
+    }
+
+    std::vector<CurvedPart> curved()
+    {
+        std::vector<CurvedPart> parts;
+        while (const ExrPart* first = find(format::curved_prefix(parts.size()) + format::part_name(0, 0)))
+            parts.push_back({attribute<double>(*first, "curvature"),
+                             std::make_shared<LdfLibrary>(of_prefix(format::curved_prefix(parts.size()), false))});
+        return parts;
+    }
+
+private:
+    // The library whose parts' names begin with a prefix; of curved parts if it has no batches.
+    LdfLibrary of_prefix(const std::string& prefix, bool has_batches)
+    {
+        const auto name = [&](std::size_t side, std::size_t j) { return prefix + format::part_name(side, j); };
+        const ExrPart& first = *find(name(0, 0));
         const auto version = attribute<int>(first, "beamspreadLdf");
         const Medium medium{attribute<double>(first, "g"), attribute<double>(first, "ior"),
                             attribute<double>(first, "thickness")};
@@ -34,29 +53,38 @@ public:
         std::vector<AngleResult> results;
         std::vector<SideResiduals> residuals;
         const bool is_calibrated = first.attributes.contains("residuals");
-        while (find(format::part_name(0, results.size())))
+        while (find(name(0, results.size())))
             results.emplace_back();
-        parallel_for(results.size(), [&](std::size_t j) { results[j] = angle_result(j, medium); });
+        parallel_for(results.size(),
+                     [&](std::size_t j) { results[j] = angle_result(name(0, j), name(1, j), medium, has_batches); });
         for (std::size_t j = 0; is_calibrated && j < results.size(); ++j)
-            residuals.push_back(side_residuals(j));
-        try {
+            residuals.push_back(side_residuals(name(0, j), name(1, j)));
+        return checked_whole([&] {
             return LdfLibrary(medium, number(first, "photons"), number(first, "seed"), std::move(results),
                               std::move(residuals));
+        });
+    }
+
+    template <class Make>
+    LdfLibrary checked_whole(const Make& make) const
+    {
+        try {
+            return make();
         } catch (const InvalidArgument& error) {
             fail(std::string("is inconsistent: ") + error.what());
         }
     }
 
-private:
-    AngleResult angle_result(std::size_t j, const Medium& medium)
+    AngleResult angle_result(const std::string& reflected, const std::string& transmitted, const Medium& medium,
+                             bool has_batches)
     {
         AngleResult result;
-        result.angle_deg = attribute<double>(*find(format::part_name(0, j)), "angle");
+        result.angle_deg = attribute<double>(*find(reflected), "angle");
         if (!(result.angle_deg >= 0.0 && result.angle_deg < 90.0))
             fail("has an angle out of range");
-        for (std::size_t side = 0; side < side_count; ++side)
-            if (find(format::part_name(side, j)))
-                result.sides[side] = side_result(format::part_name(side, j));
+        for (const auto& [side, name] : {std::pair(0, &reflected), std::pair(1, &transmitted)})
+            if (find(*name))
+                result.sides[static_cast<std::size_t>(side)] = side_result(*name, has_batches);
         if (result.sides[1].power.empty() != medium.is_half_space())
             fail("does not fit its own thickness");
         return result;
@@ -167,18 +195,19 @@ private:
         std::copy(values.begin(), values.end(), to.begin());
     }
 
-    SideResiduals side_residuals(std::size_t j)
+    SideResiduals side_residuals(const std::string& reflected, const std::string& transmitted)
     {
         SideResiduals residuals{};
-        for (std::size_t side = 0; side < side_count; ++side)
-            if (const ExrPart* part = find(format::part_name(side, j))) {
-                read_residuals(*part, "residuals", residuals[side].here);
-                read_residuals(*part, "residualsHalfway", residuals[side].halfway);
+        for (const auto& [side, name] : {std::pair(0, &reflected), std::pair(1, &transmitted)})
+            if (const ExrPart* part = find(*name)) {
+                Residuals& left = residuals[static_cast<std::size_t>(side)];
+                read_residuals(*part, "residuals", left.here);
+                read_residuals(*part, "residualsHalfway", left.halfway);
             }
         return residuals;
     }
 
-    SideResult side_result(const std::string& name)
+    SideResult side_result(const std::string& name, bool has_batches)
     {
         SideResult result;
         const ExrPart& first = checked(name);
@@ -187,7 +216,8 @@ private:
         result.harmonics = harmonics(first);
         result.ratios = ratios(name + ".ratios", result.harmonics, result.radii);
         const ExrPart& orders = checked(name + ".orders");
-        if (orders.width != static_cast<int>(order_bin_count) || orders.height != static_cast<int>(2 + batch_count))
+        const std::size_t batches = has_batches ? batch_count : 0;
+        if (orders.width != static_cast<int>(order_bin_count) || orders.height != static_cast<int>(2 + batches))
             fail_size(orders.name);
         const auto line = [&](std::size_t i) {
             return orders.pixels.begin() + static_cast<std::ptrdiff_t>(i * order_bin_count);
@@ -195,7 +225,8 @@ private:
         result.mean_order.assign(line(0), line(1));
         result.order_variance.assign(line(1), line(2));
         result.batch_totals.assign(line(2), orders.pixels.end());
-        result.deviations = scatter(checked(name + ".scatter"), result.harmonics, result.radii);
+        if (has_batches)
+            result.deviations = scatter(checked(name + ".scatter"), result.harmonics, result.radii);
         return result;
     }
 
@@ -208,6 +239,11 @@ private:
 LdfLibrary load_library(const std::filesystem::path& path)
 {
     return Reader(path.string()).library();
+}
+
+std::vector<CurvedPart> load_curved(const std::filesystem::path& path)
+{
+    return Reader(path.string()).curved();
 }
 
 }  // namespace beamspread

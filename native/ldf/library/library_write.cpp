@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <map>
 
+#include "base/error.h"
 #include "image/exr.h"
 #include "ldf/library/ldf_library.h"
 #include "ldf/library/library_format.h"
@@ -33,18 +34,19 @@ std::map<std::string, ExrAttribute> common_attributes(const LdfLibrary& library,
             {"angle", angle_deg}};
 }
 
-}  // namespace
-
-void save_library(const LdfLibrary& library, const std::filesystem::path& path)
+// Appends the parts of one library. Results of a curved part have no batches and deviations.
+void add_parts(const LdfLibrary& library, const std::string& prefix, const std::map<std::string, ExrAttribute>& more,
+               std::vector<ExrPart>& parts)
 {
-    std::vector<ExrPart> parts;
     for (std::size_t j = 0; j < library.results().size(); ++j) {
         const AngleResult& result = library.results()[j];
         for (std::size_t side = 0; side < side_count; ++side) {
             const SideResult& from = result.sides[side];
             if (from.power.empty())
                 continue;
-            const auto attributes = common_attributes(library, result.angle_deg);
+            const std::string part_name = prefix + format::part_name(side, j);
+            auto attributes = common_attributes(library, result.angle_deg);
+            attributes.insert(more.begin(), more.end());
             auto first_attributes = attributes;
             first_attributes["harmonics"] = std::vector<float>(from.harmonics.begin(), from.harmonics.end());
             if (library.is_calibrated()) {
@@ -60,19 +62,34 @@ void save_library(const LdfLibrary& library, const std::filesystem::path& path)
             };
             std::vector<float> power = format::with_columns(from.power, radius_bin_count, from.radii);
             power.resize(used_rows(from.power) * from.radii);
-            add(format::part_name(side, j), from.radii, std::move(power), first_attributes, false);
+            add(part_name, from.radii, std::move(power), first_attributes, false);
             if (!from.ratios.empty()) {
                 std::vector<float> ratios = format::with_columns(from.ratios, radius_bin_count, from.radii);
                 ratios.resize(format::ratio_lines(ratios.size()) * format::ratio_columns, 0.0F);
-                add(format::part_name(side, j) + ".ratios", format::ratio_columns, std::move(ratios), attributes, true);
+                add(part_name + ".ratios", format::ratio_columns, std::move(ratios), attributes, true);
             }
             std::vector<float> orders = from.mean_order;
             orders.insert(orders.end(), from.order_variance.begin(), from.order_variance.end());
             orders.insert(orders.end(), from.batch_totals.begin(), from.batch_totals.end());
-            add(format::part_name(side, j) + ".orders", order_bin_count, std::move(orders), attributes, false);
-            add(format::part_name(side, j) + ".scatter", from.deviations.size() / group_count, from.deviations,
-                attributes, true);
+            add(part_name + ".orders", order_bin_count, std::move(orders), attributes, false);
+            if (!from.deviations.empty())
+                add(part_name + ".scatter", from.deviations.size() / group_count, from.deviations, attributes, true);
         }
+    }
+}
+
+}  // namespace
+
+void save_library(const LdfLibrary& library, const std::filesystem::path& path, bool with_plane)
+{
+    std::vector<ExrPart> parts;
+    if (with_plane)
+        add_parts(library, "", {}, parts);
+    else if (library.curved().empty())
+        reject("with_plane", "False", "True for a library without curvatures");
+    for (std::size_t i = 0; i < library.curved().size(); ++i) {
+        const CurvedPart& part = library.curved()[i];
+        add_parts(*part.library, format::curved_prefix(i), {{"curvature", part.curvature}}, parts);
     }
     for (ExrPart& part : parts)
         part.attributes["checksum"] = format::checksum(part).text;

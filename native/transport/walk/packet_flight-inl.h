@@ -1,4 +1,4 @@
-// Photons of the vectorized walk: flights, scattering, and reflection at the boundary. Compiled once per target, like
+// Photons of the vectorized walk, their scattering, and Fresnel's reflectance. Compiled once per target, like
 // packet_math-inl.h.
 #if defined(BEAMSPREAD_TRANSPORT_PACKET_FLIGHT_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BEAMSPREAD_TRANSPORT_PACKET_FLIGHT_INL_H
@@ -108,16 +108,12 @@ private:
 // A medium's coefficients in single precision, converted once for all flights.
 struct PacketMedium {
     explicit PacketMedium(const Medium& medium)
-        : phase(medium.g),
-          boundary(medium.ior),
-          thickness(static_cast<float>(medium.thickness)),
-          is_half_space(medium.is_half_space())
+        : phase(medium.g), boundary(medium.ior), is_half_space(medium.is_half_space())
     {
     }
 
     PhaseFunction phase;
     Boundary boundary;
-    float thickness;
     bool is_half_space;
 };
 
@@ -169,25 +165,9 @@ private:
     std::array<Queue<std::uint32_t>, 3> m_words{};
 };
 
-struct Flight {
-    Floats length;    // free, to the next scattering
-    Floats depth;     // of the boundary ahead, along the normal
-    Floats cosine;    // between the flight and the normal
-    FloatMask hits;   // the boundary, before it ends
-};
-
-HWY_INLINE Flight fly(const PacketMedium& medium, const Photons& photons, PacketRandom& random)
-{
-    const Floats length = minus_log(random.uniform());
-    const Floats depth =
-        hn::IfNegativeThenElse(photons.w.z, photons.x.z, hn::Sub(hn::Set(floats, medium.thickness), photons.x.z));
-    // The bound gives flights along the surface a finite end, which they never reach.
-    const Floats cosine = hn::Max(hn::Abs(photons.w.z), broadcast(1e-30));
-    return {length, depth, cosine, hn::Ge(hn::Mul(length, cosine), depth)};
-}
-
 // Moves and deflects the photons whose flights end inside the medium. Lanes that hit a boundary get garbage, which
-// `reflect` replaces.
+// `reflect` of a shape replaces.
+template <class Flight>
 HWY_INLINE void scatter(Photons& photons, const Flight& flight, const Deflection& deflection, PacketRandom& random)
 {
     const auto scatters = hn::RebindMask(words, hn::Not(flight.hits));
@@ -196,25 +176,6 @@ HWY_INLINE void scatter(Photons& photons, const Flight& flight, const Deflection
                  hn::MulAdd(flight.length, photons.w.z, photons.x.z)};
     photons.w = deflect(photons.w, deflection.cos_theta, deflection.sin_theta, random_azimuth(random));
     photons.order = hn::Add(photons.order, hn::IfThenElseZero(scatters, hn::Set(words, 1u)));
-}
-
-// Reflects the chosen photons internally; `from` holds them before their flight.
-HWY_INLINE void reflect(Photons& photons, FloatMask mask, const Photons& from, Floats to_boundary, float thickness)
-{
-    const auto choose = [mask](Floats value, Floats& to) { to = hn::IfThenElse(mask, value, to); };
-    const FloatMask up = hn::Lt(from.w.z, hn::Zero(floats));
-    choose(hn::MulAdd(to_boundary, from.w.x, from.x.x), photons.x.x);
-    choose(hn::MulAdd(to_boundary, from.w.y, from.x.y), photons.x.y);
-    choose(hn::IfThenElse(up, hn::Zero(floats), hn::Set(floats, thickness)), photons.x.z);
-    // Count the reflection as `reflections_after` does (transport/tally/tally.h).
-    const Words meets = hn::IfThenElse(hn::RebindMask(words, up), hn::Set(words, far_reflection_bits << 1),
-                                       hn::Set(words, far_reflection_bits));
-    const Words next = hn::Or(hn::Add(photons.batch, photons.batch), hn::Set(words, reflection_bit(0)));
-    const Words reflected = hn::IfThenElseZero(hn::RebindMask(words, mask), hn::And(next, meets));
-    photons.batch = hn::Or(photons.batch, reflected);
-    choose(from.w.x, photons.w.x);
-    choose(from.w.y, photons.w.y);
-    choose(hn::Neg(from.w.z), photons.w.z);
 }
 
 }  // namespace HWY_NAMESPACE

@@ -7,6 +7,7 @@
 #include "base/constants.h"
 #include "base/vec.h"
 #include "medium/medium.h"
+#include "transport/walk/walk_shape.h"
 
 namespace beamspread {
 
@@ -29,22 +30,17 @@ Vec3 scatter(const Vec3& w, double g, Random& random)
     return out * (1.5 - 0.5 * glm::dot(out, out));
 }
 
-// Unit vector at this angle from the z axis and a uniform azimuth.
-Vec3 around_z(double cos_theta, Random& random)
-{
-    const double phi = 2.0 * pi * random.uniform();
-    const double sin_theta = std::sqrt(std::max(0.0, 1.0 - cos_theta * cos_theta));
-    return Vec3(sin_theta * std::cos(phi), sin_theta * std::sin(phi), cos_theta);
-}
-
+// `Shape` is FlatShape or RoundShape.
+template <class Shape>
 class Walk {
 public:
-    Walk(const Medium& medium, double theta_inside, Random& random, SideTallies& tallies)
-        : m_medium(medium),
+    Walk(const WalkJob& job, Random& random, SideTallies& tallies)
+        : m_medium(job.medium),
+          m_shape(job.medium, job.curvature),
           m_random(random),
           m_tallies(tallies),
-          m_plan(medium),
-          m_w(std::sin(theta_inside), 0.0, std::cos(theta_inside)),
+          m_plan(job.medium, job.curvature),
+          m_w(std::sin(job.theta_inside), 0.0, std::cos(job.theta_inside)),
           m_next_roulette(m_plan.first_roulette)
     {
     }
@@ -67,13 +63,13 @@ private:
     // Makes one flight, tallies its expected exit, and scatters or reflects at its end. False if the photon left.
     bool step_early()
     {
-        const double to_boundary = distance_to_boundary(m_w);
+        const Ahead ahead = m_shape.ahead(m_x, m_w);
         const double flight = -std::log(m_random.uniform_positive());
         if (m_order > 0)
-            tally_expected(flight, to_boundary);
+            tally_expected(flight, ahead);
         m_exit_weight = 1.0;
-        if (flight >= to_boundary)
-            return reflect(to_boundary);
+        if (flight >= ahead.distance)
+            return reflect(ahead);
         const Vec3 before = m_w;
         scatter_after(flight);
         if (m_order <= m_plan.last_expected_order)
@@ -84,13 +80,13 @@ private:
     // Makes one flight and tallies an actual exit. False if the photon left or lost the roulette.
     bool step_late()
     {
-        const double to_boundary = distance_to_boundary(m_w);
+        const Ahead ahead = m_shape.ahead(m_x, m_w);
         const double flight = -std::log(m_random.uniform_positive());
-        if (flight >= to_boundary) {
-            if (reflect(to_boundary))
+        if (flight >= ahead.distance) {
+            if (reflect(ahead))
                 return true;
             // The random decision above accounts for Fresnel's transmittance; the tally must not.
-            tally(m_w, to_boundary, 1.0);
+            tally(m_w, ahead.distance, 1.0);
             return false;
         }
         scatter_after(flight);
@@ -98,11 +94,11 @@ private:
     }
 
     // Far from the boundary the flight's length decides at random whether its exit is tallied: it comes this close with
-    // probability exp(-to_boundary) / rare_exit.
-    void tally_expected(double flight, double to_boundary)
+    // probability exp(-distance) / rare_exit.
+    void tally_expected(double flight, const Ahead& ahead)
     {
-        if (flight >= to_boundary - rare_exit_distance)
-            tally_exit(m_w, to_boundary, m_exit_weight * std::exp(-std::min(to_boundary, rare_exit_distance)));
+        if (flight >= ahead.distance - rare_exit_distance)
+            tally_exit(m_w, ahead, m_exit_weight * std::exp(-std::min(ahead.distance, rare_exit_distance)));
     }
 
     void scatter_after(double flight)
@@ -113,20 +109,19 @@ private:
     }
 
     // Reflects with the probability of Fresnel's reflectance. False if the photon leaves.
-    bool reflect(double to_boundary)
+    bool reflect(const Ahead& ahead)
     {
-        if (m_random.uniform() >= fresnel(std::abs(m_w.z), 1.0 / m_medium.ior))
+        if (m_random.uniform() >= fresnel(ahead.cosine, 1.0 / m_medium.ior))
             return false;
-        m_x += to_boundary * m_w;
-        m_x.z = m_w.z < 0.0 ? 0.0 : m_medium.thickness;
+        m_x += ahead.distance * m_w;
         m_reflections = reflections_after(m_reflections, m_w.z > 0.0);
-        m_w.z = -m_w.z;
+        m_shape.reflect(m_x, m_w);
         return true;
     }
 
     bool survive_roulette()
     {
-        const double survival = m_order <= last_common_order ? roulette_survival : late_roulette_survival;
+        const double survival = m_order <= m_plan.last_common_order ? roulette_survival : late_roulette_survival;
         if (m_order >= max_order || m_random.uniform() >= survival)
             return false;
         m_weight /= survival;
@@ -134,33 +129,20 @@ private:
         return true;
     }
 
-    // Distance in mean free paths; infinite toward the far side of a half-space.
-    double distance_to_boundary(const Vec3& w) const
-    {
-        const double depth = w.z < 0.0 ? m_x.z : m_medium.thickness - m_x.z;
-        // The bound on |w.z| gives flights along the surface a finite end, which they never reach.
-        return depth / std::max(std::abs(w.z), 1e-300);
-    }
-
     // Tallies the expected value of an exit along w that happens with this probability.
-    void tally_exit(const Vec3& w, double to_boundary, double probability)
+    void tally_exit(const Vec3& w, const Ahead& ahead, double probability)
     {
-        const double reflectance = fresnel(std::abs(w.z), 1.0 / m_medium.ior);
+        const double reflectance = fresnel(ahead.cosine, 1.0 / m_medium.ior);
         if (reflectance < 1.0)
-            tally(w, to_boundary, probability * (1.0 - reflectance));
+            tally(w, ahead.distance, probability * (1.0 - reflectance));
     }
 
-    void tally(const Vec3& w, double to_boundary, double probability)
+    void tally(const Vec3& w, double distance, double probability)
     {
-        const Side side = w.z < 0.0 ? Side::reflected : Side::transmitted;
-        m_tallies[static_cast<std::size_t>(side)].add(m_x.x + to_boundary * w.x, m_x.y + to_boundary * w.y, m_order,
-                                                      pole_of(m_reflections, side), m_weight * probability);
-    }
-
-    // Density per steradian of sampled connections: proportional to the cosine, inside the cone that can leave.
-    double connection_pdf(const Vec3& w) const
-    {
-        return w.z * w.z > 1.0 - m_plan.exit_cone ? std::abs(w.z) * inv_pi / m_plan.exit_cone : 0.0;
+        const Side side = m_shape.side_ahead(w);
+        const Vec2 exit = m_shape.exit(m_x, w, distance);
+        m_tallies[static_cast<std::size_t>(side)].add(exit.x, exit.y, m_order, pole_of(m_reflections, side),
+                                                      m_weight * probability);
     }
 
     // Exits of low order have two sampling strategies: the phase function (the walk itself) and a connection, a
@@ -169,34 +151,34 @@ private:
     void tally_connections(const Vec3& before)
     {
         const double phase = henyey_greenstein_pdf(glm::dot(before, m_w), m_medium.g);
-        if (m_w.z < 0.0 || !m_medium.is_half_space())
-            m_exit_weight = phase / (phase + connection_pdf(m_w));
-        connect(before, -1.0);
+        const typename Shape::Cones cones = m_shape.cones(m_x, m_plan.exit_cone);
+        m_exit_weight = phase / (phase + cones.pdf(m_w));
+        connect(before, cones, -1.0);
         if (!m_medium.is_half_space())
-            connect(before, 1.0);
+            connect(before, cones, 1.0);
     }
 
     // Samples one connection. From deep inside, where exp(-depth) is below rare_exit, only that fraction is sampled.
-    void connect(const Vec3& before, double side)
+    void connect(const Vec3& before, const typename Shape::Cones& cones, double side)
     {
-        const double depth = side < 0.0 ? m_x.z : m_medium.thickness - m_x.z;
+        const double depth = m_shape.depth(m_x, side);
         const double beyond = std::max(0.0, depth - rare_exit_distance);
         if (beyond > 0.0 && m_random.uniform() >= std::exp(-beyond))
             return;
-        const double cos_theta = std::sqrt(1.0 - m_plan.exit_cone * m_random.uniform());
-        const Vec3 w = around_z(side * cos_theta, m_random);
+        const Vec3 w = cones.sample(side, m_random);
         const double phase = henyey_greenstein_pdf(glm::dot(before, w), m_medium.g);
-        const double to_boundary = distance_to_boundary(w);
-        double probability = phase / (phase + connection_pdf(w)) * std::exp(beyond - to_boundary);
+        const Ahead ahead = m_shape.ahead(m_x, w);
+        double probability = phase / (phase + cones.pdf(w)) * std::exp(beyond - ahead.distance);
         if (probability < rare_exit) {
             if (m_random.uniform() * rare_exit >= probability)
                 return;
             probability = rare_exit;
         }
-        tally_exit(w, to_boundary, probability);
+        tally_exit(w, ahead, probability);
     }
 
     const Medium& m_medium;
+    Shape m_shape;
     Random& m_random;
     SideTallies& m_tallies;
     WalkPlan m_plan;
@@ -209,9 +191,8 @@ private:
     std::uint32_t m_next_roulette;
 };
 
-}  // namespace
-
-void walk_scalar(const WalkJob& job)
+template <class Shape>
+void walk(const WalkJob& job)
 {
     for (std::size_t b = 0; b < job.photons.size(); ++b) {
         Random random(job.seed, job.stream, job.first_batch + b);
@@ -222,7 +203,7 @@ void walk_scalar(const WalkJob& job)
         for (std::uint64_t done = 0; done < job.photons[b];) {
             const std::uint64_t block = std::min(photons_per_progress, job.photons[b] - done);
             for (std::uint64_t i = 0; i < block; ++i)
-                Walk(job.medium, job.theta_inside, random, tallies).run();
+                Walk<Shape>(job, random, tallies).run();
             done += block;
             job.progress.advance(static_cast<double>(block));
         }
@@ -230,6 +211,16 @@ void walk_scalar(const WalkJob& job)
             std::transform(tallies[side].weight.begin(), tallies[side].weight.end(), before[side].begin(),
                            job.weights[b][side].begin(), std::minus{});
     }
+}
+
+}  // namespace
+
+void walk_scalar(const WalkJob& job)
+{
+    if (job.curvature == 0.0)
+        walk<FlatShape>(job);
+    else
+        walk<RoundShape>(job);
 }
 
 }  // namespace beamspread

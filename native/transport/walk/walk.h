@@ -24,6 +24,7 @@ using SideWeights = std::array<OrderWeights, side_count>;
 // Consecutive batches of photons that entered at O, travelling toward +u at one angle.
 struct WalkJob {
     const Medium& medium;
+    double curvature;  // of the boundary, 1 / mean free path, see transport/walk/walk_shape.h; 0 in slabs
     double theta_inside;  // radians from the inward normal
     std::uint64_t seed;
     std::uint64_t stream;  // of random numbers; seed, stream and batch determine the result
@@ -52,13 +53,23 @@ std::vector<WalkKernel> walk_kernels();
 // Photons between two progress reports. More: less overhead, slower cancellation.
 inline constexpr std::uint64_t photons_per_progress = 512;
 
+// Scattering order beyond which roulette uses the late survival, because later orders matter only to albedos above
+// .9999. Larger values of either: less noise at such albedos, more time.
+inline constexpr std::uint32_t latest_common_order = 1u << 13;
+inline constexpr double late_roulette_survival = 0.5;
+
 struct WalkPlan {
-    explicit WalkPlan(const Medium& medium) : exit_cone(1.0 / (medium.ior * medium.ior))
+    WalkPlan(const Medium& medium, double curvature) : exit_cone(1.0 / (medium.ior * medium.ior))
     {
         // Compute the transport mean free path in scatterings, 1 / (1 - g).
         const double transport = 1.0 / (1.0 - std::max(0.0, medium.g));
         last_expected_order = 1 + static_cast<std::uint32_t>(0.2 * transport);
         first_roulette = static_cast<std::uint32_t>(8.0 * medium.ior * medium.ior * transport);
+        // Diffusion takes about three times (radius / transport mean free path)^2 transport mean free paths to feel a
+        // hollow's curvature. Much of the light that is still inside then never returns.
+        if (const double radius = -1.0 / (transport * curvature); curvature < 0.0)
+            last_common_order = static_cast<std::uint32_t>(
+                std::clamp(3.0 * radius * radius * transport, 2.0 * first_roulette, 1.0 * latest_common_order));
     }
 
     // Squared sine of the critical angle: the half angle of the cone that can leave.
@@ -72,20 +83,18 @@ struct WalkPlan {
     // Russian roulette (Arvo, Kirk 1990, doi:10.1145/97879.97886) is played at the scattering orders 2^k
     // first_roulette. Internal reflection keeps light inside for longer and delays it.
     std::uint32_t first_roulette;
+
+    // Scattering order beyond which the late survival applies.
+    std::uint32_t last_common_order = latest_common_order;
 };
 
 // Walks that continue each photon after its last expected exit, with equal parts of its weight. More: less noise, more
 // time.
 inline constexpr std::size_t late_walks = 4;
 
-// Probability to survive one roulette up to `last_common_order`. In a half-space the number of photons falls like
+// Probability to survive one roulette up to `WalkPlan::last_common_order`. In a half-space the number of photons falls like
 // order^-1/2; this survival makes each octave of orders cost the same and add the same variance.
 inline constexpr double roulette_survival = 0.70710678118654752;
-
-// Scattering order beyond which roulette uses the late survival, because later orders matter only to albedos above
-// .9999. Larger values of either: less noise at such albedos, more time.
-inline constexpr std::uint32_t last_common_order = 1u << 13;
-inline constexpr double late_roulette_survival = 0.5;
 
 // Probability below which an exit is tallied at random with this weight: deep flights, which hardly ever leave, cost
 // one comparison. Larger: less time, more noise.

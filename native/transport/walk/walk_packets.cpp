@@ -13,6 +13,7 @@
 #include "hwy/contrib/math/math-inl.h"
 #include "transport/walk/packet_flight-inl.h"
 #include "transport/walk/packet_math-inl.h"
+#include "transport/walk/packet_shape-inl.h"
 #include "transport/walk/packet_tally-inl.h"
 #include "transport/walk/walk.h"
 
@@ -23,9 +24,16 @@ namespace HWY_NAMESPACE {
 // Flights between two compactions of the pool. More: fewer compactions, more idle lanes.
 constexpr int flights_per_sweep = 4;
 
+// `Shape` is FlatPacketShape or RoundPacketShape.
+template <class Shape>
 class PacketWalk {
 public:
-    explicit PacketWalk(const WalkJob& job) : m_job(job), m_medium(job.medium), m_plan(job.medium), m_tally(job)
+    explicit PacketWalk(const WalkJob& job)
+        : m_job(job),
+          m_medium(job.medium),
+          m_plan(job.medium, job.curvature),
+          m_shape(job.medium, job.curvature, m_plan.exit_cone),
+          m_tally(job)
     {
         Random random(job.seed, job.stream, job.first_batch);
         PacketRandom::seed(random, m_random);
@@ -49,6 +57,9 @@ public:
     }
 
 private:
+    using Flight = typename Shape::Flight;
+    using Cones = typename Shape::Cones;
+
     // Moves to the next batch with photons left to start. True if there is one.
     bool next_batch()
     {
@@ -89,29 +100,29 @@ private:
         Floats exit_weight = broadcast(1.0);  // balance heuristic of the exit along the walk
         while (!hn::AllFalse(floats, active)) {
             const Photons from = photons;
-            const Flight flight = fly(m_medium, from, random);
-            const Floats to_boundary = hn::Div(flight.depth, flight.cosine);
+            const Flight flight = m_shape.fly(from, random);
+            const Floats to_boundary = flight.to_boundary();
             const Floats reflectance = m_medium.boundary.reflectance(flight.cosine);
-            tally_expected(hn::And(hn::And(active, comes_close(flight)), greater(from.order, hn::Zero(words))), from,
+            tally_expected(hn::And(hn::And(active, flight.comes_close()), greater(from.order, hn::Zero(words))), from,
                            to_boundary, reflectance, exit_weight);
 
             const Deflection deflection = m_medium.phase.sample(random.uniform());
             scatter(photons, flight, deflection, random);
             const FloatMask is_reflected = hn::And(flight.hits, hn::Lt(random.uniform(), reflectance));
-            reflect(photons, is_reflected, from, to_boundary, m_medium.thickness);
+            m_shape.reflect(photons, is_reflected, from, to_boundary);
             active = hn::And(active, hn::Or(hn::Not(flight.hits), is_reflected));
 
             const FloatMask late = greater(photons.order, hn::Set(words, m_plan.last_expected_order));
             const FloatMask connected = hn::AndNot(hn::Or(flight.hits, late), active);
             exit_weight = broadcast(1.0);
             if (!hn::AllFalse(floats, connected)) {
-                const FloatMask rivalled =
-                    m_medium.is_half_space ? hn::And(connected, hn::Lt(photons.w.z, hn::Zero(floats))) : connected;
-                const Floats balanced = hn::Div(deflection.pdf, hn::Add(deflection.pdf, connection_pdf(photons.w.z)));
+                const Cones cones = m_shape.cones(photons.x);
+                const FloatMask rivalled = hn::And(connected, cones.rivals(photons.w));
+                const Floats balanced = hn::Div(deflection.pdf, hn::Add(deflection.pdf, cones.pdf(photons.w)));
                 exit_weight = hn::IfThenElse(rivalled, balanced, exit_weight);
-                connect(connected, photons, from.w, -1.0, random);
+                connect(connected, photons, from.w, cones, -1.0, random);
                 if (!m_medium.is_half_space)
-                    connect(connected, photons, from.w, 1.0, random);
+                    connect(connected, photons, from.w, cones, 1.0, random);
             }
             if (const FloatMask leaving = hn::And(active, late); !hn::AllFalse(floats, leaving)) {
                 photons.weight = hn::Mul(photons.weight, broadcast(1.0 / late_walks));
@@ -145,13 +156,13 @@ private:
     HWY_INLINE FloatMask step(Photons& photons, FloatMask active, PacketRandom& random)
     {
         const Photons from = photons;
-        const Flight flight = fly(m_medium, from, random);
+        const Flight flight = m_shape.fly(from, random);
         scatter(photons, flight, m_medium.phase.sample(random.uniform()), random);
         if (const FloatMask hits = hn::And(active, flight.hits); !hn::AllFalse(floats, hits)) {
-            const Floats to_boundary = hn::Div(flight.depth, flight.cosine);
+            const Floats to_boundary = flight.to_boundary();
             const FloatMask is_reflected =
                 hn::And(hits, hn::Lt(random.uniform(), m_medium.boundary.reflectance(flight.cosine)));
-            reflect(photons, is_reflected, from, to_boundary, m_medium.thickness);
+            m_shape.reflect(photons, is_reflected, from, to_boundary);
             // The random decision above accounts for Fresnel's transmittance; the tally must not.
             const FloatMask leaves = hn::AndNot(is_reflected, hits);
             tally(leaves, from, from.w, to_boundary, from.weight);
@@ -166,7 +177,7 @@ private:
     // Returns the survivors.
     HWY_INLINE FloatMask play_roulette(Photons& photons, FloatMask at_risk, PacketRandom& random) const
     {
-        const FloatMask late = greater(photons.order, hn::Set(words, last_common_order));
+        const FloatMask late = greater(photons.order, hn::Set(words, m_plan.last_common_order));
         const Floats survival = hn::IfThenElse(late, broadcast(late_roulette_survival), broadcast(roulette_survival));
         photons.weight = hn::IfThenElse(at_risk, hn::Div(photons.weight, survival), photons.weight);
         const Words next = hn::Min(hn::Add(photons.next_roulette, photons.next_roulette), hn::Set(words, max_order));
@@ -178,17 +189,8 @@ private:
 
     HWY_INLINE void tally(FloatMask mask, const Photons& from, const Vectors& w, Floats to_boundary, Floats weight)
     {
-        const FloatMask up = hn::Lt(w.z, hn::Zero(floats));
-        const Words side = hn::IfThenZeroElse(hn::RebindMask(words, up), hn::Set(words, 1u << side_shift));
-        m_tally.add(mask, hn::MulAdd(to_boundary, w.x, from.x.x), hn::MulAdd(to_boundary, w.y, from.x.y), weight,
-                    hn::Or(hn::Or(from.order, from.batch), side));
-    }
-
-    // Far from the boundary the flight's length decides at random whether its exit is tallied: it comes this close with
-    // probability exp(-to_boundary) / rare_exit.
-    static HWY_INLINE FloatMask comes_close(const Flight& flight)
-    {
-        return hn::Ge(hn::Mul(hn::Add(flight.length, broadcast(rare_exit_distance)), flight.cosine), flight.depth);
+        const Exit exit = m_shape.exit(from.x, w, to_boundary);
+        m_tally.add(mask, exit.u, exit.v, weight, hn::Or(hn::Or(from.order, from.batch), exit.side));
     }
 
     // Tallies the expected exits of flights that begin at `from`.
@@ -204,40 +206,29 @@ private:
               hn::Mul(hn::Mul(from.weight, transmittance), hn::Mul(escape, exit_weight)));
     }
 
-    // Density per steradian of sampled connections: proportional to the cosine, inside the cone that can leave.
-    HWY_INLINE Floats connection_pdf(Floats wz) const
-    {
-        const FloatMask inside = hn::Gt(hn::Mul(wz, wz), broadcast(1.0 - m_plan.exit_cone));
-        return hn::IfThenElseZero(inside, hn::Mul(hn::Abs(wz), broadcast(inv_pi / m_plan.exit_cone)));
-    }
-
     // Samples one connection per photon: see Walk::connect.
-    HWY_INLINE void connect(FloatMask mask, const Photons& at, const Vectors& before, double side, PacketRandom& random)
+    HWY_INLINE void connect(FloatMask mask, const Photons& at, const Vectors& before, const Cones& cones, double side,
+                            PacketRandom& random)
     {
-        const Floats depth = side < 0.0 ? at.x.z : hn::Sub(hn::Set(floats, m_medium.thickness), at.x.z);
+        const Floats depth = m_shape.depth(at.x, side);
         const Floats beyond = hn::Max(hn::Sub(depth, broadcast(rare_exit_distance)), hn::Zero(floats));
         const FloatMask chosen = hn::And(mask, hn::Lt(random.uniform(), hn::Exp(floats, hn::Neg(beyond))));
         if (hn::AllFalse(floats, chosen))
             return;
-        const Floats sin2 = hn::Mul(broadcast(m_plan.exit_cone), random.uniform());
-        const Floats cos_theta = hn::Sqrt(hn::Sub(broadcast(1.0), sin2));
-        const Floats sin_theta = hn::Sqrt(sin2);
-        const SinCos azimuth = random_azimuth(random);
-        const Vectors w{hn::Mul(sin_theta, azimuth.cosine), hn::Mul(sin_theta, azimuth.sine),
-                        hn::Mul(broadcast(side), cos_theta)};
-        const Floats phase = m_medium.phase.pdf(dot(before, w));
-        const Floats to_boundary = hn::Div(depth, cos_theta);
-        const Floats balanced = hn::Div(phase, hn::Add(phase, connection_pdf(w.z)));
-        const Floats probability = hn::Mul(balanced, hn::Exp(floats, hn::Sub(beyond, to_boundary)));
+        const Connection to = cones.sample(m_shape, at.x, depth, side, random);
+        const Floats phase = m_medium.phase.pdf(dot(before, to.w));
+        const Floats balanced = hn::Div(phase, hn::Add(phase, cones.pdf(to.w)));
+        const Floats probability = hn::Mul(balanced, hn::Exp(floats, hn::Sub(beyond, to.distance)));
         const Floats rare = broadcast(rare_exit);
         const FloatMask tallied = hn::And(chosen, hn::Lt(hn::Mul(random.uniform(), rare), probability));
-        const Floats transmittance = hn::Sub(broadcast(1.0), m_medium.boundary.reflectance(cos_theta));
-        tally(tallied, at, w, to_boundary, hn::Mul(hn::Mul(at.weight, transmittance), hn::Max(probability, rare)));
+        const Floats transmittance = hn::Sub(broadcast(1.0), m_medium.boundary.reflectance(to.cosine));
+        tally(tallied, at, to.w, to.distance, hn::Mul(hn::Mul(at.weight, transmittance), hn::Max(probability, rare)));
     }
 
     const WalkJob& m_job;
     PacketMedium m_medium;
     WalkPlan m_plan;
+    Shape m_shape;
     PacketTally m_tally;
     PhotonPool m_pool;
     RandomState m_random{};
@@ -248,7 +239,10 @@ private:
 
 void walk_packets(const WalkJob& job)
 {
-    PacketWalk(job).run();
+    if (job.curvature == 0.0)
+        PacketWalk<FlatPacketShape>(job).run();
+    else
+        PacketWalk<RoundPacketShape>(job).run();
 }
 
 }  // namespace HWY_NAMESPACE
