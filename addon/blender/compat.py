@@ -99,6 +99,34 @@ def uv_attribute_type() -> str:
     return "FLOAT_VECTOR" if bpy.app.version < (3, 5, 0) else "FLOAT2"
 
 
+def corner_normals(mesh) -> np.ndarray | None:
+    """Shading normals of the corners of a mesh that `to_mesh` made, float32 (N, 3); None if its faces look flat.
+
+    Blender 3.4 and 4.0 compute them on request; it keeps them with this copy of the artist's mesh.
+    """
+    if not (mesh.has_custom_normals or smooth_faces(mesh).any()):
+        return None
+    normals = np.empty(len(mesh.loops) * 3, np.float32)
+    if bpy.app.version >= (4, 1, 0):
+        mesh.corner_normals.foreach_get("vector", normals)
+    else:
+        mesh.calc_normals_split()
+        mesh.loops.foreach_get("normal", normals)
+    return normals.reshape(-1, 3)
+
+
+def smooth_faces(mesh) -> np.ndarray:
+    """True for each face of a mesh that is shaded smoothly, bool (N,)."""
+    is_smooth = np.empty(len(mesh.polygons), bool)
+    mesh.polygons.foreach_get("use_smooth", is_smooth)
+    return is_smooth
+
+
+def smooth_angle(mesh) -> float | None:
+    """Angle of edges up to which a mesh is shaded smoothly; None if it has no such setting (Auto Smooth until 4.0)."""
+    return mesh.auto_smooth_angle if getattr(mesh, "use_auto_smooth", False) else None
+
+
 def input_identifier(tree, name: str) -> str | None:
     """Name of a modifier's property for an input of its node group; None if the group has no such input."""
     sockets = tree.interface.items_tree if hasattr(tree, "interface") else tree.inputs

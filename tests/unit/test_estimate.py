@@ -158,7 +158,7 @@ def test_a_forecast_counts_who_finds_light():
 
 
 def test_a_medium_is_simulated_once(monkeypatch):
-    monkeypatch.setattr(steps, "is_known", lambda medium, quality: False)
+    monkeypatch.setattr(steps, "is_known", lambda *_: False)
     known = seconds_of(forecast().steps(FINAL))
     bakes = [(forecast(), FINAL), (forecast(), FINAL), (None, FINAL)]
     first, second, nothing = map(seconds_of, steps_of_bakes(bakes))

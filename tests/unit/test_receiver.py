@@ -170,9 +170,6 @@ def test_texture_size_keeps_texels_square():
     assert texture_size(flatten(quad((1, 0, 0), (0, 1000, 0))), 100) == (1, 100)
 
 
-BENT = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.2], [0, 1, 0]], float)
-
-
 def replaced(**changes):
     polygons = quad((1, 0, 0), (0, 1, 0))
     values = {name: getattr(polygons, name) for name in ("corners", "uvs", "starts", "normals")}
@@ -182,7 +179,6 @@ def replaced(**changes):
 @pytest.mark.parametrize(
     ("polygons", "words"),
     [
-        (replaced(corners=BENT), "not flat"),
         (replaced(uvs=None), "no UV map"),
         (replaced(uvs=SQUARE * 2), "outside the image"),
         (replaced(uvs=SQUARE - [0.5, 0]), "outside the image"),

@@ -21,6 +21,7 @@ from ...core.bake.bounced import (
     BouncedLight,
     charts_of,
     mean_over,
+    not_on_bent,
 )
 from ...core.bake.estimate import cycles_light_seconds
 from ...core.bake.job import BakeJob, Step
@@ -29,7 +30,7 @@ from ...core.bake.smoothing import SPLINE_VARIANCE, smoothing_variance
 from ...core.errors import MissingImageError
 from ...core.messages import Message, note, warning
 from ...core.progress import Callback, Progress
-from ...core.scene.grid import Grid
+from ...core.scene.bent_grid import AnyGrid, BentGrid
 from ...core.scene.lights import STRATA, Field, FieldLight, Light, WorldLight
 from .. import compat
 from ..read.image_nodes import missing_images
@@ -95,6 +96,10 @@ class CyclesLight:
         bounced = job.settings.indirect and bool(illumination.lights or illumination.by_cycles)
         bounced = bounced and self.is_below_something(chart.grid for chart in job.receiver.charts)
         objects = [name for name in illumination.by_cycles if name != world and name in scene.objects]
+        if job.receiver.is_bent:
+            # Fields of light that was computed elsewhere lie on planes.
+            illumination = illumination.with_messages(*[not_on_bent(job.name)] * bounced)
+            bounced, objects = False, []
         if bounced:
             illumination = illumination.with_messages(*self._missing)
             # The world may be one that Cycles renders: our own rays need it as a panorama.
@@ -141,9 +146,14 @@ class CyclesLight:
             self._copy = CopyForCycles(scene, scene.view_layers[self._names[1]])
         return self._copy
 
-    def is_below_something(self, grids: Iterable[Grid]) -> bool:
+    def is_below_something(self, grids: Iterable[AnyGrid]) -> bool:
         """True if light may bounce to planes: something that renders is above them."""
         for grid in grids:
+            if isinstance(grid, BentGrid):
+                low, high = grid.corners()[[0, -1]] + 1e-5 * grid.size * np.array([[-1], [1]])
+                if ((self._corners < low) | (self._corners > high)).any():
+                    return True
+                continue
             heights = (self._corners - grid.origin) @ np.array(grid.normal)
             # The receiver's own corners lie in the plane up to rounding.
             size = max(grid.width * grid.pitch_x, grid.height * grid.pitch_y)
@@ -264,10 +274,9 @@ def _listed(names: Sequence[str]) -> str:
     return shown if len(names) <= 3 else f"{shown} and {len(names) - 3} more"
 
 
-def _open_irradiance_of_both_sides(grid: Grid, lights: Sequence[Light]) -> float:
+def _open_irradiance_of_both_sides(grid: AnyGrid, lights: Sequence[Light]) -> float:
     """Mean irradiance without obstacles, W/m^2: light from behind may come back as well."""
-    back = replace(grid, normal=tuple(-value for value in grid.normal))
-    return mean_open_irradiance(grid, lights) + mean_open_irradiance(back, lights)
+    return mean_open_irradiance(grid, lights) + mean_open_irradiance(grid.flipped(), lights)
 
 
 def _corners_of_solids(depsgraph) -> np.ndarray:

@@ -18,7 +18,7 @@ from ...core.errors import text_of
 from .. import compat
 from .nodes import Links, shows_bake
 
-SCHEME = 2
+SCHEME = 3
 """Number of the way in which digests are made; those of another one can't be compared. A change has to count it up."""
 
 LARGE = 8 << 20
@@ -26,6 +26,9 @@ LARGE = 8 << 20
 
 MAX_VALUES = 4 * 2048**2
 """Number of values of a painted image above which it has one digest for all strokes; more takes longer than .2 s."""
+
+NORMAL_DIGITS = 2
+"""Digits of custom normals that count; more tell smaller changes, and rounding."""
 
 MAX_DEPTH = 4
 """Levels of structs in structs that count as values of a struct."""
@@ -154,9 +157,22 @@ def digest_of_mesh(obj) -> str:
             values.foreach_get(name, array)
             hashed.update(array)
         hashed.update(repr([layer.active_render for layer in mesh.uv_layers]).encode())
+        _add_shading(hashed, mesh)
         return hashed.hexdigest()
     finally:
         obj.to_mesh_clear()
+
+
+def _add_shading(hashed, mesh) -> None:
+    """Add what shading normals depend on to the hash of a mesh; the normals themselves are rounded anew each time."""
+    is_smooth = compat.smooth_faces(mesh)
+    if is_smooth.any():
+        is_sharp = np.empty(len(mesh.edges), bool)
+        mesh.edges.foreach_get("use_edge_sharp", is_sharp)
+        hashed.update(np.concatenate([is_smooth, is_sharp]))
+        hashed.update(repr(compat.smooth_angle(mesh)).encode())
+    if mesh.has_custom_normals:
+        hashed.update(np.round(compat.corner_normals(mesh), NORMAL_DIGITS) + 0.0)  # no negative zero
 
 
 class ImageDigests:

@@ -16,6 +16,7 @@ from ...core.scene.islands import check_map
 from ...core.scene.occluders import Mesh, Occluder, is_within
 from ...core.scene.polygons import Polygons
 from ...core.scene.tiles import in_tiles
+from .. import compat
 from ..preferences import memory_limit
 from .image_nodes import UVTransform
 from .reflection import MaterialReflection, MediumOf, reflection_of
@@ -302,7 +303,7 @@ def polygons_of(mesh, matrix) -> Polygons:
     mesh.polygons.foreach_get("normal", normals)
     corners = np.empty(len(mesh.loops), np.int32)
     mesh.loops.foreach_get("vertex_index", corners)
-    uvs, vertices = _uvs(mesh), _vertices(mesh)
+    uvs, vertices, shading = _uvs(mesh), _vertices(mesh), compat.corner_normals(mesh)
     starts = np.concatenate([[0], np.cumsum(totals)]).astype(int)
     loops = np.repeat(first - starts[:-1], totals) + np.arange(starts[-1])
     world = np.array(matrix, dtype=float)[:3]
@@ -310,14 +311,19 @@ def polygons_of(mesh, matrix) -> Polygons:
         raise ReceiverError(INFINITE_MATRIX, MATRIX_REMEDY)
     world = _regular(world[:, :3])
     # Normals transform with the inverse transpose, which also keeps them outward under mirroring.
-    world_normals = normals.reshape(-1, 3) @ np.linalg.inv(world)
-    lengths = np.linalg.norm(world_normals, axis=1, keepdims=True)
+    inverse = np.linalg.inv(world)
     return Polygons(
         corners=_transform(vertices[corners[loops]], matrix),
         uvs=None if uvs is None else uvs[loops].astype(float),
         starts=starts,
-        normals=world_normals / np.where(lengths > 0, lengths, 1),
+        normals=_unit(normals.reshape(-1, 3) @ inverse),
+        corner_normals=None if shading is None else _unit(shading[loops] @ inverse).astype(np.float32),
     )
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors / np.where(lengths > 0, lengths, 1)
 
 
 def _regular(world: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..messages import note, warning
+from ..messages import Message, note, warning
 from ..native import native
 from ..progress import Progress
 from ..scene.grid import Grid
@@ -39,6 +39,13 @@ NOTHING_BOUNCES = warning(
     "", "Indirect light is left out: it is less than a millionth of what the lights send without obstacles."
 )
 
+
+def not_on_bent(name: str) -> Message:
+    """The warning about bounced light on an object that bends."""
+    text = f"Light that bounces is left out of '{name}': on meshes that bend it is not baked yet."
+    return warning(name, text)
+
+
 BY_OWN_RAYS = note("", "Beamspread's own rays find the bounced light.")
 
 
@@ -65,6 +72,8 @@ class BouncedLight(Step):
 
     def run(self, job: BakeJob, progress: Progress) -> BakeJob:
         receiver, illumination, settings = job.receiver, job.illumination, job.settings
+        if receiver.is_bent:
+            return replace(job, illumination=illumination.with_messages(not_on_bent(job.name)))
         grid = receiver.charts[0].grid
         surfaces = illumination.caster(grid)
         lights = [

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..messages import Message, note, warning
+from ..scene.bent_grid import AnyGrid, BentGrid
 from ..scene.grid import Grid
 from .spread import spread_lengths
 from .surface import OPEN, Surface
@@ -22,13 +23,16 @@ SPREADS, PATHS = 12.0, 9.2
 MAX_TEXELS, MAX_RATIO = 2**24, 2.25
 
 
-def with_edges(grids: Sequence[Grid], surface: Surface, name: str) -> tuple[list[Grid], list[Message]]:
+def with_edges(grids: Sequence[AnyGrid], surface: Surface, name: str) -> tuple[list[AnyGrid], list[Message]]:
     """The grids with the edges of their surface, and messages about those that can't have them.
 
     Only rectangles are mirrored: the images of others would leave gaps or cover each other.
     """
     if surface.edges == OPEN:
         return list(grids), []
+    if any(isinstance(grid, BentGrid) for grid in grids):
+        text = f"'{name}' bends, so light leaves through its edges: only planes can mirror it."
+        return list(grids), [warning(name, text, "Set Edges to Open.")]
     wanted = max(SPREADS * max(spread_lengths(surface)), PATHS * max(surface.material.mean_free_path))
     changed = [replace(grid, mirrored=min(wanted, _most(grid)) if _is_rectangle(grid) else 0.0) for grid in grids]
     messages = []
@@ -48,8 +52,10 @@ def with_edges(grids: Sequence[Grid], surface: Surface, name: str) -> tuple[list
     return changed, messages
 
 
-def texels_with_images(grid: Grid) -> int:
+def texels_with_images(grid: AnyGrid) -> int:
     """Texels that a grid and its mirror images fill."""
+    if not grid.mirrored:
+        return grid.texels
     across, up = (2 * math.ceil(grid.mirrored / pitch) for pitch in (grid.pitch_x, grid.pitch_y))
     return (grid.width + across) * (grid.height + up)
 

@@ -7,9 +7,10 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from ..ldf.library import PHOTONS, angles_for
+from ..ldf.curvatures import curvatures_for, curved_angles_for
+from ..ldf.library import PHOTONS, angles_for, is_known
+from ..scene.bent_grid import AnyGrid, BentGrid
 from ..scene.lights import STRATA, AreaLight, Light, MeshLight, WorldLight
-from ..scene.receiver import Grid
 from .bake_settings import BakeSettings
 from .edges import texels_with_images
 from .layers import MAX_RAYS_BY_SAMPLES, MIN_RAYS, RAYS_PER_SAMPLE, WITHOUT_MEDIUM, rays_per_texel
@@ -44,8 +45,13 @@ MANY_TRIANGLES = 1000
 # Seconds per texel and direction of the solver `adaptive`, and per pair of texels of `direct`; for suns and for others.
 ADAPTIVE, DIRECT = (1e-6, 3e-6), (0.2e-9, 30e-9)
 
+# Seconds per texel of surfaces that bend.
+BENT_TEXEL = 40e-6
+
 # Seconds of the simulation of an angle in final quality, in half-spaces and in slabs.
 HALF_SPACE_ANGLE, SLAB_ANGLE = 6.0, 2.5
+# The same of an angle on a surface of one curvature.
+CURVED_ANGLE = 6.0
 
 # Seconds of bounced light by rays of our own: in any case, for each doubling of the triangles, and for that and each
 # light.
@@ -76,6 +82,7 @@ class Workload:
     ----------
     texels : of all grids, with their mirror images.
     planes : number of grids.
+    is_bent : True if the grid is one of faces that bend.
     suns, lamps : numbers of lights of one direction, and of one direction at each texel.
     broad_rays, narrow_rays : rays of each texel to lights from all around, and to other lights of a size.
     bounced : True if bounced light may be added.
@@ -86,6 +93,7 @@ class Workload:
 
     texels: int
     planes: int = 1
+    is_bent: bool = False
     suns: int = 0
     lamps: int = 0
     broad_rays: float = 0.0
@@ -98,7 +106,7 @@ class Workload:
     @classmethod
     def of(
         cls,
-        grids: Sequence[Grid],
+        grids: Sequence[AnyGrid],
         lights: Sequence[Light],
         triangles: int,
         surface: Surface,
@@ -110,7 +118,8 @@ class Workload:
 
         `unknown`: fraction of all light, about, that comes from all around and is not among `lights`.
         """
-        load = cls(sum(map(texels_with_images, grids)), len(grids), bounced=bounced, triangles=triangles)
+        is_bent = any(isinstance(grid, BentGrid) for grid in grids)
+        load = cls(sum(map(texels_with_images, grids)), len(grids), is_bent, bounced=bounced, triangles=triangles)
         largest = max(grids, key=lambda grid: grid.texels)
         all_rays, shared = _rays(largest, lights, surface, settings, unknown)
         load = replace(load, broad_rays=all_rays * (unknown if shared else math.ceil(unknown)))
@@ -151,6 +160,8 @@ class Workload:
     def _spreading(self, settings: BakeSettings) -> float:
         """Seconds of the solver."""
         is_wide = self.broad_rays + self.narrow_rays > 0
+        if self.is_bent:
+            return BENT_TEXEL * self.texels
         directions = self.lamps + self.broad_rays + self.narrow_rays + len(STRATA) * self.bounced
         if settings.solver != "fft":
             sun, direction = ADAPTIVE if settings.solver == "adaptive" else DIRECT
@@ -165,7 +176,7 @@ class Workload:
 
 
 def _rays(
-    grid: Grid, lights: Sequence[Light], surface: Surface, settings: BakeSettings, unknown: float
+    grid: AnyGrid, lights: Sequence[Light], surface: Surface, settings: BakeSettings, unknown: float
 ) -> tuple[float, list[tuple[Light, float]]]:
     """Rays of each texel, and those to each light that reaches the grid; lights share them by irradiance.
 
@@ -183,14 +194,16 @@ def _rays(
     return rays, [(light, max(rays * mean / total, MIN_RAYS)) for light, mean in zip(lights, means)]
 
 
-def simulation_seconds(media: Sequence, settings: BakeSettings) -> float:
-    """Seconds in which media are simulated."""
-    return sum(_parallel(_simulation(medium, settings.quality), settings.threads) for medium in media)
+def simulation_seconds(media: Sequence, settings: BakeSettings, is_bent: bool = False) -> float:
+    """Seconds in which media are simulated, for surfaces that bend also on curves."""
+    return sum(_parallel(_simulation(medium, settings.quality, is_bent), settings.threads) for medium in media)
 
 
-def _simulation(medium, quality: str) -> float:
+def _simulation(medium, quality: str, is_bent: bool) -> float:
     per_angle = HALF_SPACE_ANGLE if math.isinf(medium.thickness) else SLAB_ANGLE
-    return per_angle * len(angles_for(medium)) * PHOTONS[quality] / PHOTONS["final"]
+    plane = per_angle * len(angles_for(medium)) * (not is_bent or not is_known(medium, quality))
+    curves = CURVED_ANGLE * len(curvatures_for(medium)) * len(curved_angles_for(medium)) * is_bent
+    return (plane + curves) * PHOTONS[quality] / PHOTONS["final"]
 
 
 def _parallel(seconds: float, threads: int) -> float:

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..material import Material
+from ..scene.bent_grid import BentGrid
 from ..scene.chart import Chart
 from ..scene.flat_mesh import FlatMesh
 from ..scene.receiver import Receiver
@@ -32,8 +33,8 @@ def finished_texture(
 
 def with_seams(receiver: Receiver, mesh: FlatMesh, settings: BakeSettings) -> Receiver:
     """The receiver of a mesh with the seams that the margin of these settings needs."""
-    if settings.margin_type != ADJACENT_FACES:
-        return receiver
+    if settings.margin_type != ADJACENT_FACES or mesh.is_bent:
+        return receiver  # the margins of faces that bend continue their islands
     return replace(receiver, seams=find_seams(mesh, receiver.charts, receiver.width, receiver.height))
 
 
@@ -85,6 +86,8 @@ def _nearest_edges(receiver: Receiver, margin: int) -> tuple[np.ndarray, np.ndar
 
 
 def _with_rims(values: np.ndarray, chart: Chart, material: Material, has_seams: bool) -> np.ndarray:
+    if isinstance(chart.grid, BentGrid):
+        return values  # light arrives on the part of each texel that the mesh covers
     grid, channels = chart.grid, zip(material.mean_free_path, material.channel_anisotropy)
     pitch = math.sqrt(grid.pitch_x * grid.pitch_y)
     paths = [path / (1 - min(forward, 0.999)) / pitch for path, forward in channels]

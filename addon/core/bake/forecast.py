@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from ..ldf.library import SIMULATING
+from ..scene.bent_grid import AnyGrid, BentGrid
 from ..scene.lights import Light
-from ..scene.receiver import Grid
 from .bake_settings import BakeSettings
 from .bounced import BouncedLight
 from .estimate import (
@@ -58,7 +58,7 @@ class Forecast:
     """
 
     name: str
-    grids: Sequence[Grid]
+    grids: Sequence[AnyGrid]
     lights: Sequence[Light]
     triangles: int
     surface: Surface
@@ -69,7 +69,7 @@ class Forecast:
         """Estimates of the steps, without the simulation of media."""
         finders, threads, steps = self.finders, settings.threads, []
         bounced = finders.bounced and settings.indirect
-        texels = sum(grid.width * grid.height for grid in self.grids)
+        texels = sum(grid.texels for grid in self.grids)
         if finders.colors and needs_medium(settings):
             steps.append((CYCLES_COLORS, cycles_color_seconds(texels)))
         by_cycles = bounced and not finders.is_own
@@ -83,13 +83,17 @@ class Forecast:
         steps.append((Solve.kind_for(settings), load.seconds(settings)))
         return [Estimate(kind, self.name, seconds) for kind, seconds in steps]
 
+    @property
+    def is_bent(self) -> bool:
+        return any(isinstance(grid, BentGrid) for grid in self.grids)
+
     def simulations(self, settings: BakeSettings) -> dict:
         """Estimates of the simulations of media that are not known yet, by medium and quality."""
         return {
-            (medium, settings.quality): Estimate(
-                SIMULATING[settings.quality], self.name, simulation_seconds([medium], settings)
+            (medium, settings.quality, self.is_bent): Estimate(
+                SIMULATING[settings.quality], self.name, simulation_seconds([medium], settings, self.is_bent)
             )
-            for medium in to_simulate(self.surface, settings)
+            for medium in to_simulate(self.surface, settings, self.is_bent)
         }
 
 

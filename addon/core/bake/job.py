@@ -165,7 +165,7 @@ class BakeJob:
         if self.settings.layer != COMBINED or not self.surface.thickness:
             return []
         grids = [chart.grid for chart in self.receiver.charts]
-        backs = [replace(grid, normal=tuple(-value for value in grid.normal)) for grid in grids]
+        backs = [grid.flipped() for grid in grids]
         lights = [light for light in self.illumination.lights if not all(light.is_behind(back) for back in backs)]
         if not lights:
             return []

@@ -12,7 +12,7 @@ from ..ldf.library import library, load_source
 from ..material import Material, check_thickness
 from ..native import native
 from ..progress import Callback, Progress
-from ..scene.grid import Grid
+from ..scene.bent_grid import AnyGrid, BentGrid
 from ..scene.illumination import Illumination
 from .bake_settings import COMBINED, DIRECTION, IRRADIANCE, BakeSettings
 from .surface import channel_media
@@ -39,7 +39,7 @@ Report = Callable[[float, float, float], None]
 
 
 def bake(
-    grids: Sequence[Grid],
+    grids: Sequence[AnyGrid],
     illumination: Illumination,
     material: Material,
     thickness: float,
@@ -48,11 +48,11 @@ def bake(
     bytes_for_light: int = 0,
     report_noise: Report | None = None,
 ) -> list[np.ndarray]:
-    """Luminance of translucent planes, between which no light passes.
+    """Luminance of translucent planes, between which no light passes, or of a surface that bends.
 
     Parameters
     ----------
-    grids : the planes that light arrives on, scene units.
+    grids : the planes that light arrives on, or one of faces that bend, scene units.
     material : its mean free path is in the units of the grids.
     thickness : in the units of the grids, 0 for a half-space.
     progress : called with 0..1, returns False to stop.
@@ -77,7 +77,8 @@ def bake(
     check_thickness(thickness)
     media_progress, light_progress = Progress.of(progress).split([LIBRARY_PART, 1.0 - LIBRARY_PART])
     if settings.distributions == "library":
-        sources = _libraries(material, thickness, settings, media_progress)
+        curved = any(isinstance(grid, BentGrid) for grid in grids)
+        sources = _libraries(material, thickness, settings, media_progress, curved)
     else:
         sources = [load_source(settings.sample_folder, settings.distributions)] * 3
     return spread(
@@ -86,7 +87,7 @@ def bake(
 
 
 def spread(
-    grids: Sequence[Grid],
+    grids: Sequence[AnyGrid],
     illumination: Illumination,
     material: Material,
     sources: list,
@@ -116,7 +117,7 @@ def spread(
 
 
 def _spread_group(
-    grids: list[Grid],
+    grids: list[AnyGrid],
     illumination: Illumination,
     material: Material,
     sources: list,
@@ -165,7 +166,7 @@ def _spread_group(
         raise BakeError(f"The LDF samples in '{settings.sample_folder}' don't reach this far: {error}.") from error
 
 
-def rays_per_texel(grid: Grid, material: Material, settings: BakeSettings) -> int:
+def rays_per_texel(grid: AnyGrid, material: Material, settings: BakeSettings) -> int:
     """How many rays of each texel leave noise of a hundredth, in a penumbra, of what the medium spreads.
 
     The noise of n low-discrepancy rays falls about as n^-5/8, from .69 for one (tests/bench/room.py). It is averaged
@@ -176,23 +177,23 @@ def rays_per_texel(grid: Grid, material: Material, settings: BakeSettings) -> in
     return min(round(at_four * (settings.samples / 4) ** 2) or 1, MAX_RAYS_BY_SAMPLES)
 
 
-def spread_texels(grid: Grid, material: Material) -> float:
+def spread_texels(grid: AnyGrid, material: Material) -> float:
     """Number of texels that the light from a point fills, about: 4 pi l^2, l the mean free path, and its own."""
     path = min(material.mean_free_path) / max(grid.pitch_x, grid.pitch_y)
     return 1.0 + 4.0 * math.pi * path**2
 
 
-def _libraries(material: Material, thickness: float, settings: BakeSettings, progress: Progress) -> list:
-    """The LDF library of each channel; channels of the same medium share one."""
+def _libraries(material: Material, thickness: float, settings: BakeSettings, progress: Progress, curved: bool) -> list:
+    """The LDF library of each channel; channels of the same medium share one. `curved`: as for `library`."""
     media = channel_media(material, thickness)
     libraries = dict.fromkeys(media)
     for medium, stage in zip(libraries, progress.split([1.0] * len(libraries))):
-        libraries[medium] = library(medium, settings.quality, stage, settings.threads)
+        libraries[medium] = library(medium, settings.quality, stage, settings.threads, curved)
     return [libraries[medium] for medium in media]
 
 
 def arrive(
-    grid: Grid,
+    grid: AnyGrid,
     illumination: Illumination,
     settings: BakeSettings,
     progress: Progress | None = None,
@@ -204,14 +205,15 @@ def arrive(
     -------
     irradiance : float32 (H, W, 3), W/m^2 on the surface, cosine and visibility included.
     flow : float32 (H, W, 3), sum over the light of its irradiance, the mean of the channels, times the unit vector
-        along which it travels, in the plane's frame. Its direction is the mean one.
+        along which it travels, in the plane's frame. Its direction is the mean one. On faces that bend, y runs up the
+        rows and is at right angles to the columns.
     """
 
     def report(irradiance: float, variance: float) -> None:
         if report_noise:
             report_noise(grid.area, irradiance, variance)
 
-    return native.bake_arrival(
+    irradiance, flow = native.bake_arrival(
         grid.surface(),
         illumination.native_lights(grid),
         samples=settings.samples,
@@ -220,6 +222,7 @@ def arrive(
         progress=progress,
         report_noise=report,
     )
+    return irradiance, flow * grid.handedness if isinstance(grid, BentGrid) else flow
 
 
 def mean_direction(flow: np.ndarray) -> np.ndarray:
@@ -228,7 +231,9 @@ def mean_direction(flow: np.ndarray) -> np.ndarray:
     return np.divide(flow, length, out=np.zeros_like(flow), where=length > 0)
 
 
-Layer = Callable[[Sequence[Grid], Illumination, Material, float, BakeSettings, Progress, int, Report], list[np.ndarray]]
+Layer = Callable[
+    [Sequence[AnyGrid], Illumination, Material, float, BakeSettings, Progress, int, Report], list[np.ndarray]
+]
 """Takes the arguments of `bake`; float32 (height, width, 3) of each grid, row 0 at the bottom."""
 
 

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-
-import numpy as np
 
 from ..native import native
-from ..scene.grid import Grid
+from ..scene.bent_grid import AnyGrid
 from ..scene.illumination import Illumination
 from ..scene.lights import Light, WorldLight
 
@@ -20,21 +17,18 @@ SHADOW_TEXELS, SHADOW_RAYS = 48, 16
 MEAN_WORLD_ROWS = 512
 
 
-def mean_open_irradiance(grid: Grid, lights: Sequence[Light], texels: int = OPEN_TEXELS) -> float:
+def mean_open_irradiance(grid: AnyGrid, lights: Sequence[Light], texels: int = OPEN_TEXELS) -> float:
     """Mean irradiance of lights that nothing blocks, W/m^2, by so many texels along a side."""
     return _mean_irradiance(grid, Illumination(lights), texels, OPEN_RAYS)
 
 
-def mean_irradiance(grid: Grid, illumination: Illumination) -> float:
+def mean_irradiance(grid: AnyGrid, illumination: Illumination) -> float:
     """Mean irradiance with shadows, W/m^2."""
     return _mean_irradiance(grid, illumination, SHADOW_TEXELS, SHADOW_RAYS)
 
 
-def _mean_irradiance(grid: Grid, illumination: Illumination, texels: int, rays: int) -> float:
-    width, height = min(grid.width, texels), min(grid.height, texels)
-    pitch = {"pitch_x": grid.pitch_x * grid.width / width, "pitch_y": grid.pitch_y * grid.height / height}
-    whole = np.ones((height, width), np.float32)
-    coarse = replace(grid, width=width, height=height, coverage=whole, color_in=None, color_out=None, **pitch)
+def _mean_irradiance(grid: AnyGrid, illumination: Illumination, texels: int, rays: int) -> float:
+    coarse = grid.coarse(texels)
     lights = [
         light.coarse(MEAN_WORLD_ROWS) if isinstance(light, WorldLight) else light for light in illumination.lights
     ]
@@ -44,4 +38,4 @@ def _mean_irradiance(grid: Grid, illumination: Illumination, texels: int, rays: 
         if not light.is_behind(coarse)
     ]
     irradiance, _ = native.bake_arrival(coarse.surface(), arriving, samples=1, rays=rays)
-    return float(irradiance.mean())
+    return coarse.mean(irradiance)

@@ -69,7 +69,8 @@ class Simulate(Step):
     name = "Simulating the material"
 
     def seconds(self, job: BakeJob) -> float:
-        return simulation_seconds(to_simulate(job.surface, job.settings), job.settings)
+        is_bent = job.receiver.is_bent
+        return simulation_seconds(to_simulate(job.surface, job.settings, is_bent), job.settings, is_bent)
 
     def kind(self, job: BakeJob) -> str:
         return self.stage(job)
@@ -78,9 +79,10 @@ class Simulate(Step):
         return SIMULATING[job.settings.quality]
 
     def run(self, job: BakeJob, progress: Progress) -> BakeJob:
-        media, settings = to_simulate(job.surface, job.settings), job.settings
+        is_bent, settings = job.receiver.is_bent, job.settings
+        media = to_simulate(job.surface, settings, is_bent)
         for medium, part in zip(media, progress.split([1.0] * len(media))):
-            library(medium, settings.quality, part, settings.threads)
+            library(medium, settings.quality, part, settings.threads, is_bent)
         return job
 
 
@@ -156,12 +158,12 @@ def needs_medium(settings: BakeSettings) -> bool:
     return settings.layer not in WITHOUT_MEDIUM
 
 
-def to_simulate(surface: Surface, settings: BakeSettings) -> list:
-    """The media that a bake has to simulate first, which takes long."""
+def to_simulate(surface: Surface, settings: BakeSettings, is_bent: bool = False) -> list:
+    """The media that a bake has to simulate first, which takes long; those of a surface that bends also for curves."""
     uses_library = settings.distributions == "library" or surface.base_color is not None
     if not (needs_medium(settings) and uses_library):
         return []
-    return [medium for medium in surface.media() if not is_known(medium, settings.quality)]
+    return [medium for medium in surface.media() if not is_known(medium, settings.quality, is_bent)]
 
 
 def bake_bytes(texels: int, solver: str, light: int, mean_free_paths: float) -> float:

@@ -190,7 +190,8 @@ class Inventory:
                 yield line
         receiver, grids = job.receiver, [chart.grid for chart in job.receiver.charts]
         sizes = [f"{grid.width * grid.pitch_x:.4g} x {grid.height * grid.pitch_y:.4g}" for grid in grids]
-        yield f"'{job.name}': {receiver.width} x {receiver.height} texels, {', '.join(sizes)} scene units"
+        extent = f"{grids[0].area:.4g} square" if receiver.is_bent else ", ".join(sizes)
+        yield f"'{job.name}': {receiver.width} x {receiver.height} texels, {extent} scene units"
         if job.spread is not None:
             yield f"'{job.name}': light spreads over {job.spread.texels:.3g} texels"
         yield f"'{job.name}': takes about {job.seconds():.1f} s"

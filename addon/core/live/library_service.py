@@ -29,7 +29,7 @@ class LibraryService:
     """
 
     def __init__(self, on_new_library: Callable[[], None] = lambda: None) -> None:
-        self._simulated: dict = {}  # libraries by medium
+        self._simulated: dict = {}  # libraries by medium and `curved`
         self._on_new_library = on_new_library
         self._condition = threading.Condition()
         self._requested: tuple = ()
@@ -37,17 +37,18 @@ class LibraryService:
         self._thread: threading.Thread | None = None
         self.simulating = ""
 
-    def serve(self, medium):
-        """The library of a medium; None if it needs a simulation first."""
-        library = self._simulated.get(medium) or libraries.known_library(medium)
-        return library and keep_recent(self._simulated, medium, library, MAX_LIBRARIES)
+    def serve(self, medium, curved: bool = False):
+        """The library of a medium, with curved surfaces if `curved`; None if it needs a simulation first."""
+        library = self._simulated.get((medium, curved)) or libraries.known_library(medium, curved)
+        return library and keep_recent(self._simulated, (medium, curved), library, MAX_LIBRARIES)
 
-    def request(self, media: Collection) -> None:
-        """Simulate these media in the background, and no others any more."""
+    def request(self, media: Collection, curved: Collection = ()) -> None:
+        """Simulate these media in the background, and no others any more; `curved` are those with curved surfaces."""
+        requested = (*((medium, False) for medium in media), *((medium, True) for medium in curved))
         with self._condition:
-            if tuple(media) == self._requested:
+            if requested == self._requested:
                 return
-            self._requested = tuple(media)
+            self._requested = requested
             if self._requested and self._thread is None and not self._is_ending:
                 self._thread = threading.Thread(target=self._run, daemon=True, name="Beamspread media")
                 self._thread.start()
@@ -79,18 +80,19 @@ class LibraryService:
                 self._condition.wait(PATIENCE_SECONDS)
                 if self._requested != requested:
                     continue
-            for medium in requested:
-                self._simulate(medium)
+            for medium, curved in requested:
+                self._simulate(medium, curved)
 
-    def _simulate(self, medium) -> None:
+    def _simulate(self, medium, curved: bool) -> None:
         self.simulating = f"g {medium.g:g}, IOR {medium.ior:g}"
         try:
-            library = libraries.library(medium, "preview", lambda _fraction: medium in self._requested)
+            wanted = medium, curved
+            library = libraries.library(medium, "preview", lambda _fraction: wanted in self._requested, curved=curved)
         except native.Cancelled:
             return
         finally:
             self.simulating = ""
-        keep_recent(self._simulated, medium, library, MAX_LIBRARIES)
+        keep_recent(self._simulated, wanted, library, MAX_LIBRARIES)
         self._on_new_library()
         with self._condition:
-            self._requested = tuple(waiting for waiting in self._requested if waiting != medium)
+            self._requested = tuple(waiting for waiting in self._requested if waiting != wanted)

@@ -48,7 +48,7 @@ class LiveTarget:
         """Values that are equal for targets with the same rendering."""
         lights = tuple(_light_key(light) for light in self.illumination.lights)
         shadows = self.illumination.shadow_key()
-        arrays = self.polygons.corners, self.polygons.uvs, self.polygons.normals
+        arrays = self.polygons.corners, self.polygons.uvs, self.polygons.normals, self.polygons.corner_normals
         texture = () if self.texture is None else (self.texture.blur, *map(_key, self.texture.colors))
         rest = self.size or self.resolution, self.surface, self.settings, texture, self.max_bounces
         return lights, shadows, *map(_key, arrays), *rest

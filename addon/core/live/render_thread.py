@@ -131,7 +131,8 @@ class RenderThread:
             missing.update(dict.fromkeys(self._render_quickly(target)))
         for target in targets:
             self._add_bounced(target, generation)
-        self.libraries.request(list(missing))
+        planes, curves = ([medium for medium, curved in missing if curved == wanted] for wanted in (False, True))
+        self.libraries.request(planes, curves)
         with self._condition:
             if self._condition.wait_for(lambda: self._is_outdated(generation), self._rest_seconds):
                 return False
@@ -142,7 +143,7 @@ class RenderThread:
         return True
 
     def _render_quickly(self, target: LiveTarget) -> list:
-        """Render a target unless its rendering is up to date; the media that it lacks libraries of."""
+        """Render a target unless its rendering is up to date; the media that it lacks, see `LiveRenderer.missing`."""
         work = self._work.setdefault(target.target, Work())
         missing = self._renderer.missing(target)
         if work.key == target.key and (work.has_libraries or missing):

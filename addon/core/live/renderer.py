@@ -12,6 +12,7 @@ from ..bake.edges import with_edges
 from ..bake.finish import finished_texture, with_seams
 from ..bake.layers import spread
 from ..bake.surface import channel_media
+from ..errors import BakeError
 from ..ldf.albedo import albedo_from_reflectance
 from ..ldf.library import load_source
 from ..material import Material
@@ -141,24 +142,32 @@ class LiveRenderer:
         return Rendering(target.target, texture, framed, is_exact=True, messages=messages)
 
     def missing(self, target: LiveTarget) -> list:
-        """Media of the target that have no library yet."""
+        """Media of the target that have no library yet, each with True if the library needs curved surfaces."""
         if target.settings.distributions != "library" and target.surface.base_color is None:
             return []
         try:
-            return [medium for medium in dict.fromkeys(_media(target)) if self._libraries.serve(medium) is None]
-        except ValueError:
+            wanted = dict.fromkeys((medium, self._mesh(target).is_bent) for medium in _media(target))
+        except (ValueError, BakeError):
             return []  # rendering raises the same error and says why
+        return [(medium, curved) for medium, curved in wanted if self._libraries.serve(medium, curved) is None]
 
     def has_libraries(self, target: LiveTarget) -> bool:
         """True if the target can be rendered: with its own libraries, or with those that it had before."""
-        return target.target in self._last_libraries or not self.missing(target)
+        missing = self.missing(target)
+        # A surface that bends shows the medium of a plane until that of curves is simulated.
+        is_plane_known = all(curved and self._libraries.serve(medium) is not None for medium, curved in missing)
+        return target.target in self._last_libraries or is_plane_known
 
     def _material(self, target: LiveTarget) -> tuple[Material, list]:
         """The material with its albedo, and the source of each channel's distributions."""
         surface, settings = target.surface, target.settings
         surface.check()
         former = self._last_libraries.get(target.target, [None] * 3)
-        sources = [self._libraries.serve(medium) or before for medium, before in zip(_media(target), former)]
+        is_bent, serve = self._mesh(target).is_bent, self._libraries.serve
+        sources = [
+            serve(medium, is_bent) or (is_bent and serve(medium)) or before
+            for medium, before in zip(_media(target), former)
+        ]
         if None not in sources:
             self._last_libraries[target.target] = sources
         material = surface.material
@@ -183,7 +192,8 @@ class LiveRenderer:
         rest = *self._material(target), settings, progress
         grids = [replace(chart.grid, color_out=None) for chart in framed.receiver.charts]
         sizes = {(grid.width, grid.height, grid.pitch_x, grid.pitch_y) for grid in grids}
-        if len(grids) > MAX_GRIDS_APART or len(sizes) > MAX_FIELDS:  # the cache has kernels of few sizes
+        # The cache has kernels of few sizes, and of planes.
+        if len(grids) > MAX_GRIDS_APART or len(sizes) > MAX_FIELDS or framed.receiver.is_bent:
             values = spread(grids, illumination, *rest, rays=QUICK_RAYS * max(len(illumination.lights), 1))
         else:
             values = [self._quick_luminance(grid, illumination, *rest) for grid in grids]

@@ -1,19 +1,27 @@
-"""Charts: planes of a receiver with their islands in a texture.
+"""Charts: planes of a receiver, or its faces that bend, with their islands in a texture.
 
 If a chart has one island, and its axes p_u and p_v are orthogonal, the chart's grid consists of the texture's texels.
-Otherwise it is a rectangular grid of the finest density, which the texels of each island sample bilinearly.
+Otherwise it is a rectangular grid of the finest density, which the texels of each island sample bilinearly. The grid of
+faces that bend always consists of the texture's texels.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .grid import Grid
+from .bent_grid import AnyGrid, BentGrid
 from .sampling import bilinear
 from .tiles import Place
+
+if TYPE_CHECKING:
+    from .receiver import Receiver
+
+# Overlap with an island, in texels, below which texels at its border are not part of it: rounding of float32 UVs.
+EDGE_TOLERANCE = 1e-3
 
 
 def in_chart(coverage: np.ndarray) -> np.ndarray:
@@ -31,13 +39,16 @@ class ChartIsland:
     offset : (column, row) of that part's first texel in the texture.
     texel_to_grid : (2, 3), maps (column, row, 1) in the texture to grid coordinates, both in texels with centres at
         half-integers; None if the grid consists of the part's texels.
-    place : texels of the island's UDIM tile in the texture; None if the texture is one image.
+    places : texels of the UDIM tiles that it lies in, from the bottom up; () if the texture is one image.
+    pieces : int32 (rows, columns), number of the piece of the UV map that each texel shows, -1 for none; None: all show
+        the same.
     """
 
     coverage: np.ndarray
     offset: tuple[int, int]
     texel_to_grid: np.ndarray | None = None
-    place: Place | None = None
+    places: tuple[Place, ...] = ()
+    pieces: np.ndarray | None = None
 
     def part_of(self, texture: np.ndarray) -> np.ndarray:
         """View of the texture's part around the island."""
@@ -53,8 +64,10 @@ class ChartIsland:
 
     def uvs(self, texels: np.ndarray, width: int, height: int) -> np.ndarray:
         """UVs (..., 2) at columns and rows (..., 2) of a texture of this size."""
-        place = self.place or Place(0, 0, width, height)
-        return (texels - (place.column, place.row)) / (place.width, place.height) + (place.u, place.v)
+        places = np.array(self.places or [Place(0, 0, width, height)])
+        tile = np.clip(np.searchsorted(places[:, 1], texels[..., 1], "right") - 1, 0, None) if len(places) > 1 else 0
+        first, size, corner = places[tile, :2], places[tile, 2:4], places[tile, 4:]
+        return (texels - first) / size + corner
 
     def sampled(self, values: np.ndarray, inside: np.ndarray) -> np.ndarray:
         """Values (N, C) at the texels that `inside` (rows, columns) chooses, from those of the grid (H, W, C)."""
@@ -67,7 +80,7 @@ class ChartIsland:
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """Flat part of a receiver.
+    """Part of a receiver: one that is flat, or all of one that bends.
 
     Attributes
     ----------
@@ -77,7 +90,7 @@ class Chart:
     coarser : factor by which texels of the grid are longer than the finest of the islands; 1 if none is finer.
     """
 
-    grid: Grid
+    grid: AnyGrid
     islands: tuple[ChartIsland, ...]
     labels: np.ndarray | None = None
     coarser: float = 1.0
@@ -89,6 +102,20 @@ class Chart:
         centre by default.
         """
         return self._by_island(lambda island, at: island.uvs(island.to_texels(at), width, height), at)
+
+    def places_of(
+        self, target: Chart, at: tuple[float, float], receiver: Receiver, of_target: Receiver
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Columns and rows on this chart's grid, flat arrays, of sample positions `at` on that of `target`.
+
+        `target` is the same chart in a receiver with another number of texels, `of_target`; this one's is `receiver`.
+        """
+        if not isinstance(self.grid, BentGrid):
+            return self.grid.columns_and_rows(target.grid.positions(at))
+        finer = np.array([receiver.width / of_target.width, receiver.height / of_target.height])
+        columns, rows = np.meshgrid(np.arange(target.grid.width) + at[0], np.arange(target.grid.height) + at[1])
+        texels = np.stack([columns.ravel(), rows.ravel()], axis=1) + target.islands[0].offset
+        return tuple((texels * finer - self.islands[0].offset).T)
 
     def _by_island(self, function: Callable, at: tuple[float, float] = (0.5, 0.5)) -> np.ndarray:
         """Result of a function of an island and positions (..., 2) on the grid, by the island of each of its texels."""

@@ -15,12 +15,8 @@ def with_triangles(polygons: Polygons, chosen: np.ndarray) -> Polygons:
     is_chosen = np.zeros(polygons.count, bool)
     is_chosen[chosen] = True
     rest = polygons.of_faces(np.flatnonzero(~is_chosen))
-    parts, owners = [], []
-    for face in np.flatnonzero(is_chosen).tolist():
-        corners = np.arange(polygons.starts[face], polygons.starts[face + 1])
-        parts.append(corners[triangles_of_face(polygons.corners[corners], polygons.area_vectors[face])].ravel())
-        owners += [face] * (len(parts[-1]) // 3)
-    corners, owners = np.concatenate([*parts, np.zeros(0, int)]), np.array(owners, int)
+    corners, owners = triangle_corners(polygons, np.flatnonzero(is_chosen))
+    corners = corners.ravel()
     points = np.concatenate([rest.corners, polygons.corners[corners]])
     uvs = None if polygons.uvs is None else np.concatenate([rest.uvs, polygons.uvs[corners]])
     starts = np.concatenate([rest.starts, rest.starts[-1] + 3 * np.arange(1, len(owners) + 1)])
@@ -28,7 +24,39 @@ def with_triangles(polygons: Polygons, chosen: np.ndarray) -> Polygons:
     numbers = np.concatenate([rest.numbers, numbers[owners]])
     normals = np.concatenate([rest.normals, polygons.normals[owners]])
     tiles = None if polygons.tiles is None else np.concatenate([rest.tiles, polygons.tiles[owners]])
-    return Polygons(points, uvs, starts, normals, polygons.uv_map, numbers, tiles)
+    shading = polygons.corner_normals
+    shading = None if shading is None else np.concatenate([rest.corner_normals, shading[corners]])
+    return Polygons(points, uvs, starts, normals, polygons.uv_map, numbers, tiles, shading)
+
+
+def triangle_corners(polygons: Polygons, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Corners (M, 3) of the triangles of faces (an index without repeats), as renderers show them, and each's face.
+
+    Those of a face follow each other, in the order of the faces.
+    """
+    sizes, firsts = polygons.sizes[faces], polygons.starts[:-1][faces]
+    triangles, quads = np.flatnonzero(sizes == 3), np.flatnonzero(sizes == 4)
+    is_convex = _is_convex(polygons.corners[firsts[quads, None] + np.arange(4)])
+    parts = [firsts[triangles, None] + np.arange(3)]
+    owners = [triangles]
+    parts.append((firsts[quads[is_convex], None, None] + np.array([(0, 1, 2), (0, 2, 3)])).reshape(-1, 3))
+    owners.append(np.repeat(quads[is_convex], 2))
+    for face in np.flatnonzero(~np.isin(np.arange(len(faces)), np.concatenate(owners)) & (sizes > 2)).tolist():
+        corners = np.arange(firsts[face], firsts[face] + sizes[face])
+        normal = polygons.area_vectors[faces[face]]
+        parts.append(corners[triangles_of_face(polygons.corners[corners], normal)])
+        owners.append(np.full(len(parts[-1]), face))
+    owner_of = np.concatenate(owners)
+    order = np.argsort(owner_of, kind="stable")
+    return np.concatenate(parts)[order], faces[owner_of[order]]
+
+
+def _is_convex(quads: np.ndarray) -> np.ndarray:
+    """True for each quadrilateral (N, 4, 3) whose corners all turn the same way, as seen along its mean normal."""
+    sides = np.roll(quads, -1, axis=1) - quads
+    turns = np.cross(np.roll(sides, 1, axis=1), sides)
+    normals = np.cross(quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1])
+    return (np.einsum("nij,nj->ni", turns, normals) >= 0).all(axis=1)
 
 
 def triangles_of_face(corners: np.ndarray, normal: np.ndarray) -> np.ndarray:

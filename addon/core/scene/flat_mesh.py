@@ -1,4 +1,4 @@
-"""A mesh as flat parts, each a plane with the islands that show it in a texture."""
+"""A mesh as parts that can be baked: planes with the islands that show them in a texture, or one part that bends."""
 
 from __future__ import annotations
 
@@ -8,14 +8,12 @@ import numpy as np
 
 from ..errors import ReceiverError
 from ..messages import Message, note, warning
+from .bent_part import BentIsland, BentPart, bent_part, facing_outward, lost_faces, lost_in_map
 from .ears import with_triangles
 from .islands import NO_UV_AREA, Island, check_uvs, find_islands
 from .planes import FLATNESS_TOLERANCE, FLATTENED, Plane, find_planes
 from .polygons import Polygons
 from .tiles import Place, Tiling
-
-# Part of the surface that must be flat. More refuses bent meshes with a few flat faces.
-MIN_FLAT = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,20 +26,26 @@ class FlatPart:
 
 @dataclass(frozen=True, eq=False)
 class FlatMesh:
-    """Parts of a mesh that can be baked, the largest first; messages about the rest; `uv_map` as of `Polygons`.
+    """Parts of a mesh that can be baked, and messages about them; `uv_map` as of `Polygons`.
 
-    `tiling` has the UDIM tiles of its islands in the texture; None for one image.
+    The parts are planes, the largest first, or one that bends. `tiling` has the UDIM tiles of its islands in the
+    texture; None for one image.
     """
 
-    parts: tuple[FlatPart, ...]
+    parts: tuple[FlatPart, ...] | tuple[BentPart]
     messages: tuple[Message, ...] = ()
     uv_map: str = ""
     tiling: Tiling | None = None
 
     @property
-    def islands(self) -> list[Island]:
+    def islands(self) -> list[Island] | list[BentIsland]:
         """Islands of all parts."""
         return [island for part in self.parts for island in part.islands]
+
+    @property
+    def is_bent(self) -> bool:
+        """True if all faces are one part that bends."""
+        return any(isinstance(part, BentPart) for part in self.parts)
 
     def within(self, tiling: Tiling) -> FlatMesh:
         """The islands in these tiles."""
@@ -51,7 +55,7 @@ class FlatMesh:
             parts += [replace(part, islands=islands)] if islands else []
         return replace(self, parts=tuple(parts), tiling=tiling)
 
-    def place(self, island: Island, width: int, height: int) -> Place:
+    def place(self, island: Island | BentIsland, width: int, height: int) -> Place:
         """Texels of the island's image in a texture of this size."""
         return Place(0, 0, width, height) if self.tiling is None else self.tiling.places[island.tile]
 
@@ -62,16 +66,16 @@ def finite_remedy(name: str) -> str:
 
 
 def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> FlatMesh:
-    """Find the flat parts of a mesh of the object `name`.
+    """Find the parts of a mesh of the object `name`.
 
     Faces are flattened onto a plane within a mean free path, in the units of the mesh, or within `FLATTENED`: the
-    medium, or the texels, show no more.
+    medium, or the texels, show no more. If the rest of the faces does not consist of planes, all faces are one part.
 
     Raises
     ------
     ReceiverError
-        The mesh has no faces, no area, hardly a flat part or vertices at no finite position; or UVs that are missing,
-        outside 0..1 or all without area.
+        The mesh has no faces, no area or vertices at no finite position; or UVs that are missing, outside 0..1 or all
+        without area.
     """
     if not polygons.count:
         raise ReceiverError("No face uses this material.", "Assign it to the faces that should be baked.")
@@ -79,21 +83,16 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> 
         text = f"The positions of {polygons.listed(~polygons.is_finite)} are infinite or not numbers."
         raise ReceiverError(text, finite_remedy(name))
     tolerance = max(mean_free_path, FLATTENED * polygons.diagonal)
-    count = polygons.count
     planes, bent = find_planes(polygons, tolerance)
     warped = bent[(polygons.sizes[bent] > 3) & (polygons.deviations[bent] > tolerance)]
-    if len(warped) == count:
-        text = "The faces are not flat: the corners of each are not on a plane."
-        raise ReceiverError(text, "Triangulate them (Edit Mode: Ctrl T), or use Mesh > Clean Up > Make Planar Faces.")
     if len(warped):
         polygons = with_triangles(polygons, warped)
         planes, bent = find_planes(polygons, tolerance)
-    if polygons.areas[bent].sum() > (1 - MIN_FLAT) * polygons.areas.sum():
-        raise ReceiverError(
-            "The faces are not flat: they bend from one to the next.",
-            "Only flat faces, and edges of 30 degrees or more between them, can be baked.",
-        )
     check_uvs(polygons.uvs)
+    if len(bent):
+        polygons, messages = facing_outward(polygons, name)
+        messages += lost_in_map(polygons, name)
+        return FlatMesh((bent_part(polygons),), tuple(messages), polygons.uv_map)
     exact = FLATNESS_TOLERANCE * polygons.diagonal
     messages, parts, lost = [], [], 0.0
     is_lost = np.zeros(polygons.count, bool)
@@ -117,14 +116,7 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> 
         raise ReceiverError("The UV map has no area, in all or some of the faces.", "Unwrap the mesh again.")
     part_lost = lost / sum(float(polygons.areas[plane.faces].sum()) for plane in planes)
     if part_lost > FLATNESS_TOLERANCE:
-        text = f"Faces of '{name}' have no area in the UV map: {part_lost:.1%} of its surface stay black."
-        remedy = f"Unwrap the mesh again{': ' + polygons.listed(is_lost) if is_lost.any() else ''}."
-        messages.append(warning(name, text, remedy))
-    if len(bent):
-        number = len(bent) if polygons.numbers is None else len(np.unique(polygons.numbers[bent]))
-        text = f"{number} of {count} faces of '{name}' are bent and stay black."
-        remedy = f"Give them another material, or flatten them: {polygons.listed(bent)}."
-        messages.append(warning(name, text, remedy))
+        messages.append(lost_faces(polygons, is_lost, part_lost, name))
     deviation = max(part.plane.deviation for part in parts)
     if deviation > exact:
         text = f"'{name}' is baked as flat faces; it departs from them by {deviation:.3g} units"

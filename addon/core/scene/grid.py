@@ -6,7 +6,7 @@ Positions are world positions in scene units. Rows of all arrays run up the plan
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -76,9 +76,52 @@ class Grid:
         offsets = positions.reshape(-1, 3) - self.origin
         return offsets @ np.array(self.x_axis) / self.pitch_x, offsets @ np.array(self.y_axis) / self.pitch_y
 
+    @property
+    def size(self) -> float:
+        """Longest side, scene units."""
+        return max(self.width * self.pitch_x, self.height * self.pitch_y)
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Area inside the mesh of each texel, float32 (height, width), for means."""
+        return self.coverage * (self.pitch_x * self.pitch_y)
+
+    def corners(self) -> np.ndarray:
+        """World positions (4, 3) of the corners."""
+        x, y = np.array([(0, 0), (1, 0), (0, 1), (1, 1)]).T[..., None]
+        right = x * self.width * self.pitch_x * np.array(self.x_axis)
+        return self.origin + right + y * self.height * self.pitch_y * np.array(self.y_axis)
+
     def height_of(self, point: Vector) -> float:
         """Distance of a world point from the plane, outward; negative behind it."""
         return float(np.dot(np.subtract(point, self.origin), self.normal))
+
+    def heights_of(self, points: np.ndarray) -> np.ndarray:
+        """The same of points (N, 3)."""
+        return np.subtract(points, self.origin) @ np.array(self.normal)
+
+    def cosine_to(self, direction: Vector) -> float:
+        """Cosine between a unit vector and the normal."""
+        return float(np.dot(direction, self.normal))
+
+    def length_across(self, vector: Vector) -> float:
+        """Length of a vector along the normal."""
+        return abs(float(np.dot(vector, self.normal)))
+
+    def flipped(self) -> Grid:
+        """The grid seen from behind."""
+        return replace(self, normal=tuple(-value for value in self.normal))
+
+    def coarse(self, texels: int) -> Grid:
+        """The grid with at most so many texels along a side, without colors."""
+        width, height = min(self.width, texels), min(self.height, texels)
+        pitch = {"pitch_x": self.pitch_x * self.width / width, "pitch_y": self.pitch_y * self.height / height}
+        whole = np.ones((height, width), np.float32)
+        return replace(self, width=width, height=height, coverage=whole, color_in=None, color_out=None, **pitch)
+
+    def mean(self, values: np.ndarray) -> float:
+        """Mean of values (height, width, C) over the grid."""
+        return float(values.mean())
 
     def native(self):
         """The native `ReceiverGrid`."""

@@ -9,7 +9,7 @@ from copy import copy
 import numpy as np
 
 from ..messages import Message, Messages
-from .grid import Grid
+from .bent_grid import AnyGrid
 from .lights import Light
 from .occluders import Mesh, Occluder, build
 
@@ -92,11 +92,11 @@ class Illumination:
         more.lights = (*self.lights, *lights)
         return more
 
-    def native_lights(self, grid: Grid) -> list[tuple]:
+    def native_lights(self, grid: AnyGrid) -> list[tuple]:
         """The lights that can reach a grid, as native code takes them: light, RGB strength, and `Occluders` or None."""
         return [self._native_light(light, grid) for light in self.lights if not light.is_behind(grid)]
 
-    def arriving_lights(self, grids: Sequence[Grid]) -> list[list[tuple | None]]:
+    def arriving_lights(self, grids: Sequence[AnyGrid]) -> list[list[tuple | None]]:
         """All lights at each grid, as those of `native_lights`; None where they can't reach it."""
         # Grids of one origin follow each other, so that its occluders are built once.
         order = sorted(range(len(grids)), key=lambda number: self._origin(grids[number]))
@@ -108,7 +108,7 @@ class Illumination:
             ]
         return arriving
 
-    def _native_light(self, light: Light, grid: Grid) -> tuple:
+    def _native_light(self, light: Light, grid: AnyGrid) -> tuple:
         return light.at(grid), light.rgb().tolist(), self.caster(grid, light) if light.cast_shadow else None
 
     def with_lights(self, lights: Sequence[Light]) -> Illumination:
@@ -144,11 +144,11 @@ class Illumination:
         )
 
     @staticmethod
-    def _origin(grid: Grid) -> tuple[float, ...]:
+    def _origin(grid: AnyGrid) -> tuple[float, ...]:
         step = TEXELS_BETWEEN_ORIGINS * 2.0 ** math.ceil(math.log2(min(grid.pitch_x, grid.pitch_y)))
         return tuple(step * np.round(grid.centre / step))
 
-    def caster(self, grid: Grid, light: Light | None = None):
+    def caster(self, grid: AnyGrid, light: Light | None = None):
         """The native `Occluders` that may block the light, with its origin near the receiver; None without triangles.
 
         The origin follows from the receiver alone, so that a bake does not depend on earlier ones. Cached occluders

@@ -46,6 +46,11 @@ class Island:
     p_v: np.ndarray
     tile: int = 0
 
+    @property
+    def lengths(self) -> tuple[float, float]:
+        """Lengths of the image's sides on the plane."""
+        return float(np.linalg.norm(self.p_u)), float(np.linalg.norm(self.p_v))
+
     def is_orthogonal(self) -> bool:
         """True if texels are rectangles."""
         cosine = self.p_u @ self.p_v / (np.linalg.norm(self.p_u) * np.linalg.norm(self.p_v))
@@ -109,7 +114,7 @@ def _in_one_image(part: Polygons, plane: Plane, tolerance: float) -> list[Island
     if whole is not None:
         return [whole]
     islands: list[Island] = []
-    for piece in _pieces(part, _connected(part)):
+    for piece in _pieces(part, connected_in_map(part)):
         island = _fit(piece, plane, tolerance)
         islands += [island] if island is not None else _of_triangles(piece, plane, tolerance)
     return islands
@@ -155,7 +160,7 @@ def _union(group: Sequence[Island]) -> Island:
     return replace(group[0], polygons=joined)
 
 
-def _connected(part: Polygons) -> np.ndarray:
+def connected_in_map(part: Polygons) -> np.ndarray:
     """Number of the connected part in the UV map of each face, int (N,)."""
     first, second = part.shared_edges
     following = part.next_corners

@@ -34,6 +34,7 @@ class Polygons:
     uv_map : name of the map of the UVs; "" is the one that renders.
     numbers : int (N,), numbers of the faces in the mesh; None: all in their order.
     tiles : int (N,), number of each face's UDIM tile, in which its UVs lie; None: one image.
+    corner_normals : float32 (K, 3), shading normals of the corners, world; None: those of the faces.
     """
 
     corners: np.ndarray
@@ -43,6 +44,7 @@ class Polygons:
     uv_map: str = ""
     numbers: np.ndarray | None = None
     tiles: np.ndarray | None = None
+    corner_normals: np.ndarray | None = None
 
     @property
     def count(self) -> int:
@@ -138,7 +140,8 @@ class Polygons:
         uvs = None if self.uvs is None else self.uvs[corners]
         numbers = np.arange(self.count)[faces] if self.numbers is None else self.numbers[faces]
         tiles = None if self.tiles is None else self.tiles[faces]
-        return Polygons(self.corners[corners], uvs, starts, self.normals[faces], self.uv_map, numbers, tiles)
+        shading = None if self.corner_normals is None else self.corner_normals[corners]
+        return Polygons(self.corners[corners], uvs, starts, self.normals[faces], self.uv_map, numbers, tiles, shading)
 
     def by_tile(self) -> dict[int, Polygons]:
         """Faces of each UDIM tile, by its number; all by 0 without tiles."""
@@ -163,6 +166,13 @@ class Polygons:
         names[MAX_LISTED:] = ["more"] * (len(names) > MAX_LISTED)
         listed = " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
         return f"face{'s' if len(numbers) > 1 else ''} {listed}"
+
+
+def same_faces(polygons: Polygons) -> np.ndarray:
+    """A number for each face, int (N,), that faces with the same corners share."""
+    keys = np.random.default_rng(0).random(polygons.points.max(initial=0) + 1)
+    faces = np.column_stack([sums(keys[polygons.points], polygons.starts), polygons.sizes])
+    return np.unique(np.round(faces, 9), axis=0, return_inverse=True)[1].ravel()
 
 
 def sums(values: np.ndarray, starts: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Receivers: the texels of a texture that one bake fills, and the planes on which their light is solved.
+"""Receivers: the texels of a texture that one bake fills, and the grids on which their light is solved.
 
 Rows of all arrays run up: row 0 is the bottom (v = 0), as Blender stores images.
 """
@@ -13,15 +13,15 @@ import numpy as np
 from ..errors import ReceiverError
 from ..messages import Message, note
 from ..native import native
-from .chart import Chart, ChartIsland, in_chart
+from .bent_chart import bent_chart
+from .bent_grid import AnyGrid, BentGrid
+from .bent_part import BentPart
+from .chart import EDGE_TOLERANCE, Chart, ChartIsland, in_chart
 from .flat_mesh import FlatMesh, FlatPart
 from .grid import Grid
 from .islands import Island
 from .seams import Seams
 from .tiles import Place, Tiling
-
-# Overlap with an island, in texels, below which texels at its border are not part of it: rounding of float32 UVs.
-EDGE_TOLERANCE = 1e-3
 
 # Largest number of texels of a grid over those of its islands; more keep islands of different density sharper.
 MAX_FINER = 4.0
@@ -33,6 +33,9 @@ MAX_COARSER = 1.1
 # comes near it.
 MAX_COVERAGE, MAX_OVERLAP = 1.5, 0.03
 
+# Texels along the longer side of the texture in which a mesh that bends is outlined. More: slower, finer.
+OUTLINE_SIDE = 64
+
 
 @dataclass(frozen=True, eq=False)
 class Receiver:
@@ -41,7 +44,7 @@ class Receiver:
     Attributes
     ----------
     coverage : float32 (height, width), largest fraction of each texel inside an island.
-    charts : flat parts, the largest first.
+    charts : flat parts, the largest first, or one for all faces of a mesh that bends.
     uv_map : name of the UV map; "" is the one that renders.
     tiling : UDIM tiles of which the texture consists; None for one image.
     seams : edges of the islands; None if margins need none.
@@ -61,6 +64,11 @@ class Receiver:
     def width(self) -> int:
         return self.coverage.shape[1]
 
+    @property
+    def is_bent(self) -> bool:
+        """True if it has one chart, of faces that bend."""
+        return any(isinstance(chart.grid, BentGrid) for chart in self.charts)
+
     def inside(self) -> np.ndarray:
         """Bool (height, width): texels that belong to a chart."""
         return in_chart(self.coverage)
@@ -68,12 +76,12 @@ class Receiver:
     def labels(self) -> np.ndarray | None:
         """Int32 (height, width): number of the island that covers most of each texel, -1 where none; None with one."""
         islands = [island for chart in self.charts for island in chart.islands]
-        if len(islands) < 2:
+        if len(islands) < 2 and islands[0].pieces is None:
             return None
         labels = np.full(self.coverage.shape, -1, np.int32)
         for number, island in enumerate(islands):
             is_most = in_chart(island.coverage) & (island.coverage >= island.part_of(self.coverage))
-            island.part_of(labels)[is_most] = number
+            island.part_of(labels)[is_most] = number if island.pieces is None else island.pieces[is_most]
         return labels
 
     def messages(self, name: str) -> list[Message]:
@@ -107,8 +115,7 @@ class Receiver:
 
 def texture_size(mesh: FlatMesh, resolution: int) -> tuple[int, int]:
     """Width and height of a texture with `resolution` texels along the longer side; texels are nearly square."""
-    sides = [(np.linalg.norm(island.p_u), np.linalg.norm(island.p_v)) for island in mesh.islands]
-    lengths = np.max(sides, axis=0).tolist()
+    lengths = np.max([island.lengths for island in mesh.islands], axis=0).tolist()
     return tuple(max(1, round(resolution * length / max(lengths))) for length in lengths)
 
 
@@ -120,6 +127,8 @@ def build_receiver(mesh: FlatMesh, width: int, height: int, owner: str = "") -> 
     ReceiverError
         The mesh covers no texel, or texels several times.
     """
+    if mesh.is_bent:
+        return _bent_receiver(mesh, width, height, owner)
     charts = []
     for part in mesh.parts:
         places = [mesh.place(island, width, height) for island in part.islands]
@@ -133,17 +142,40 @@ def build_receiver(mesh: FlatMesh, width: int, height: int, owner: str = "") -> 
             part, sums = island.part_of(coverage), island.part_of(total)
             np.maximum(part, island.coverage, out=part)
             sums += island.coverage
-        overlap = (total > MAX_COVERAGE).sum() / max(in_chart(coverage).sum(), 1)
-        if overlap > MAX_OVERLAP:
-            text = f"The UV map overlaps: {overlap:.0%} of its texels show several faces."
-            raise ReceiverError(text, "Unwrap the mesh so that each face has its own place (UV > Smart UV Project).")
+        _check_overlap(total)
     if not in_chart(coverage).any():
         raise ReceiverError("The UV map covers no texel of the image.", "Enlarge it, or the image.")
     return Receiver(coverage, tuple(charts), mesh.uv_map, mesh.tiling)
 
 
-def outline(mesh: FlatMesh, part: FlatPart, width: int, height: int) -> Grid:
-    """About the grid of a flat part of a mesh, in a texture of that size, as a rectangle; quickly made."""
+def _check_overlap(total: np.ndarray) -> None:
+    """Raise ReceiverError for texels whose total coverage is that of several faces."""
+    overlap = (total > MAX_COVERAGE).sum() / max(in_chart(total).sum(), 1)
+    if overlap > MAX_OVERLAP:
+        text = f"The UV map overlaps: {overlap:.0%} of its texels show several faces."
+        raise ReceiverError(text, "Unwrap the mesh so that each face has its own place (UV > Smart UV Project).")
+
+
+def _bent_receiver(mesh: FlatMesh, width: int, height: int, owner: str) -> Receiver:
+    """The receiver of a mesh that bends, with one chart of the texels around all its islands."""
+    (part,) = mesh.parts
+    places = {island.tile: mesh.place(island, width, height) for island in part.islands}
+    chart, covered = bent_chart(part, places, owner, mesh.tiling is not None)
+    _check_overlap(covered)
+    coverage = np.zeros((height, width), np.float32)
+    chart.islands[0].part_of(coverage)[...] = chart.grid.coverage
+    if not in_chart(coverage).any():
+        raise ReceiverError("The UV map covers no texel of the image.", "Enlarge it, or the image.")
+    return Receiver(coverage, (chart,), mesh.uv_map, mesh.tiling)
+
+
+def outline(mesh: FlatMesh, part: FlatPart | BentPart, width: int, height: int) -> AnyGrid:
+    """About the grid of a part of a mesh, in a texture of that size; a rectangle if the part is flat; quickly made."""
+    if isinstance(part, BentPart):
+        finer = max(max(width, height) / OUTLINE_SIDE, 1.0)
+        places = {island.tile: mesh.place(island, width, height) for island in part.islands}
+        coarse = {tile: Place(*(np.array(place[:4]) / finer).tolist()) for tile, place in places.items()}
+        return replace(bent_chart(part, coarse)[0].grid, finer=finer)
     island = part.islands[0]
     frame, pitch = _frame(island), _pitch(island, mesh.place(island, width, height))
     points = np.concatenate([island.polygons.corners @ frame.T / pitch for island in part.islands])
@@ -233,7 +265,7 @@ def _in_texture(island: Island, place: Place) -> ChartIsland:
     last = np.clip(np.ceil(texels.max(axis=0) - EDGE_TOLERANCE), first + 1, [width, height]).astype(int)
     faces = island.polygons.split(texels - first)
     offset = place.column + int(first[0]), place.row + int(first[1])
-    return ChartIsland(_coverage(faces, *(last - first).tolist()), offset, place=place if island.tile else None)
+    return ChartIsland(_coverage(faces, *(last - first).tolist()), offset, places=(place,) if island.tile else ())
 
 
 def _grid(

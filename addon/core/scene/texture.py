@@ -28,7 +28,7 @@ def mean_color(receiver: Receiver, colors: Sequence[np.ndarray]) -> tuple[float,
     """Mean color of all charts, weighted by area; `colors` are (grid height, grid width, 3) of each."""
     total, area = np.zeros(3), 0.0
     for chart, color in zip(receiver.charts, colors):
-        weights = chart.grid.coverage * (chart.grid.pitch_x * chart.grid.pitch_y)
+        weights = chart.grid.weights
         total += np.einsum("hw,hwc->c", weights, color, dtype=float)
         area += float(weights.sum(dtype=float))
     return tuple((total / area).tolist())
@@ -77,7 +77,7 @@ class Texture:
         count = int(np.clip(np.ceil(finer - 0.01), 1, MAX_SAMPLES))
         total = np.zeros((target.grid.height * target.grid.width, 3), np.float32)
         for at in sample_positions(count):
-            total += bilinear(color, *chart.grid.columns_and_rows(target.grid.positions(at)))
+            total += bilinear(color, *chart.places_of(target, at, self.receiver, receiver))
         return (total / count**2).reshape(target.grid.height, target.grid.width, 3)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..native import native
 from .planes import COPLANAR_COSINE, NO_AREA_BESIDE, SMOOTH_COSINE
-from .polygons import Polygons, components, sums
+from .polygons import Polygons, components, same_faces
 
 # Space around each island, over the side of the image: 8 texels at 1024 on each side, and the least of it where there
 # are many islands. More: less color of other islands in the mipmaps of distant surfaces, and fewer texels.
@@ -126,10 +126,8 @@ def _islands(polygons: Polygons) -> np.ndarray:
 
 def _layers(polygons: Polygons, normals: np.ndarray) -> np.ndarray:
     """Number of faces before each one that have the same corners and look the same way, int (N,)."""
-    keys = np.random.default_rng(0).random(polygons.points.max(initial=0) + 1)
     sides = np.take_along_axis(normals, np.abs(normals).argmax(axis=1)[:, None], 1)[:, 0] > 0
-    faces = np.column_stack([sums(keys[polygons.points], polygons.starts), polygons.sizes, sides])
-    same = np.unique(np.round(faces, 9), axis=0, return_inverse=True)[1]
+    same = np.unique(np.stack([same_faces(polygons), sides]), axis=1, return_inverse=True)[1].ravel()
     order = np.argsort(same, kind="stable")
     counts = np.bincount(same)
     layers = np.empty(polygons.count, int)

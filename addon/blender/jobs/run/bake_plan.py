@@ -49,7 +49,7 @@ class BakePlan:
     Attributes
     ----------
     image : full name of the node's image; "" if it has none.
-    mesh, size : flat parts of the object; width and height of the texture.
+    mesh, size : parts of the object; width and height of the texture.
     surface : values of the node, without its linked base color.
     by_cycles : completes the illumination, which all plans share.
     color : base color that is linked to the node, or None.
@@ -78,7 +78,7 @@ class BakePlan:
 
     def to_simulate(self, settings: BakeSettings) -> list:
         """Media that the bake would have to simulate first."""
-        return to_simulate(self.surface_with_color(), settings)
+        return to_simulate(self.surface_with_color(), settings, self.mesh.is_bent)
 
     def forecast(self) -> Forecast:
         """Facts that tell how long the bake will take."""

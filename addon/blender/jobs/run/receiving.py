@@ -1,4 +1,4 @@
-"""The flat parts of a target as they were read, and the size of its texture."""
+"""The parts of a target as they were read, and the size of its texture."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from ...settings import BeamspreadSettings
 
 @dataclass(frozen=True, eq=False)
 class Receiving:
-    """A target with its flat parts."""
+    """A target with its parts."""
 
     target: BakeTarget
     instance: ObjectInstance

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ...native import native
+from ..bent_grid import AnyGrid
 from ..grid import Grid, Vector
 from .light_kinds import Light
 
@@ -92,8 +93,8 @@ class FieldLight(Light):
     def _fields(self) -> dict[tuple, Field]:
         return {(tuple(field.origin), tuple(field.normal)): field for field in self.fields}
 
-    def field_of(self, grid: Grid) -> Field | None:
-        return self._fields.get((tuple(grid.origin), tuple(grid.normal)))
+    def field_of(self, grid: AnyGrid) -> Field | None:
+        return self._fields.get((tuple(grid.origin), tuple(grid.normal))) if isinstance(grid, Grid) else None
 
     def is_behind(self, grid):
         field = self.field_of(grid)

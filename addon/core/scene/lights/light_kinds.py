@@ -10,7 +10,8 @@ import numpy as np
 
 from ...native import native
 from ...recent import keep_with
-from ..grid import Grid, Vector
+from ..bent_grid import AnyGrid
+from ..grid import Vector
 
 
 @dataclass(frozen=True)
@@ -51,13 +52,13 @@ class Light(ABC):
         """The native light of strength 1 and without `color`, where it is the same for all grids."""
         raise NotImplementedError
 
-    def at(self, _grid: Grid):
+    def at(self, _grid: AnyGrid):
         """The native light of strength 1 and without `color` that reaches a grid."""
         return self.native()
 
     @abstractmethod
-    def is_behind(self, grid: Grid) -> bool:
-        """True if none of it can reach the lit side of the grid's plane."""
+    def is_behind(self, grid: AnyGrid) -> bool:
+        """True if none of it can reach the lit side of the grid."""
 
     def rgb(self) -> np.ndarray:
         return np.asarray(self.color, np.float32) * np.float32(self.strength)
@@ -118,7 +119,7 @@ class SunLight(Light):
     has_one_direction = is_parallel
 
     def is_behind(self, grid):
-        return bool(np.dot(self.direction, grid.normal) >= math.sin(min(0.5 * self.angle, 0.5 * math.pi)))
+        return bool(grid.cosine_to(self.direction) >= math.sin(min(0.5 * self.angle, 0.5 * math.pi)))
 
 
 @dataclass(frozen=True)
@@ -207,15 +208,12 @@ class AreaLight(Light):
         return native.AreaLight(self.position, self.frame, *size, self.spread)
 
     def is_behind(self, grid):
-        half_x = 0.5 * self.size_x * np.dot(self.frame[0], grid.normal)
-        half_y = 0.5 * self.size_y * np.dot(self.frame[1], grid.normal)
-        reach = np.hypot(half_x, half_y) if self.is_round else abs(half_x) + abs(half_y)
+        half_x = 0.5 * self.size_x * grid.length_across(self.frame[0])
+        half_y = 0.5 * self.size_y * grid.length_across(self.frame[1])
+        reach = np.hypot(half_x, half_y) if self.is_round else half_x + half_y
         if grid.height_of(self.position) + reach <= 0:
             return True
-        x, y = np.array([(0, 0), (1, 0), (0, 1), (1, 1)]).T[..., None]
-        right = x * grid.width * grid.pitch_x * np.array(grid.x_axis)
-        corners = grid.origin + right + y * grid.height * grid.pitch_y * np.array(grid.y_axis)
-        return bool(((corners - self.position) @ np.array(self.frame[2]) >= 0).all())
+        return bool(((grid.corners() - self.position) @ np.array(self.frame[2]) >= 0).all())
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,7 +287,7 @@ class MeshLight(Light):
         return bool((self.radiance != self.radiance[:, :1]).any())
 
     def is_behind(self, grid):
-        return bool((np.subtract(self.vertices[self.triangles.ravel()], grid.origin) @ grid.normal <= 0).all())
+        return bool((grid.heights_of(self.vertices[self.triangles.ravel()]) <= 0).all())
 
     def fault(self):
         if not np.isfinite(self.vertices).all():

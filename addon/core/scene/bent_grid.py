@@ -1,0 +1,157 @@
+"""Texels on faces that bend, on which light arrives and is solved: each has a position and a direction of its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..native import native
+from .grid import Grid, Vector, owner_number
+
+
+@dataclass(frozen=True, eq=False)
+class BentGrid:
+    """The texels of a part of a texture, with the attributes of a `Grid`.
+
+    Arrays have the shape (height, width) or (height, width, 3). Vectors are 0 at texels that show no part of the mesh.
+
+    Attributes
+    ----------
+    middles : float64, world positions of the middle of the surface that each texel shows.
+    steps_x, steps_y : float32, change of position along columns and rows, scene units per texel.
+    normals : float32, unit shading normals, outward.
+    tangents : float32, unit vectors along the columns, at right angles to the normals.
+    areas : float32, area of the surface that each texel shows, square scene units.
+    coverage : float32, fraction of each texel inside the mesh, 0..1.
+    finer : texels of the baked grid along a side for each of these; 1 but in an outline.
+    owner, color_in, color_out : as of a `Grid`.
+    """
+
+    middles: np.ndarray
+    steps_x: np.ndarray
+    steps_y: np.ndarray
+    normals: np.ndarray
+    tangents: np.ndarray
+    areas: np.ndarray
+    coverage: np.ndarray
+    finer: float = 1.0
+    color_in: np.ndarray | None = None
+    color_out: np.ndarray | None = None
+    owner: str = ""
+
+    # Shadow rays start where texels are.
+    clearance = 0.0
+    # Light that leaves at an edge is lost.
+    mirrored = 0.0
+
+    @property
+    def width(self) -> int:
+        return self.areas.shape[1]
+
+    @property
+    def height(self) -> int:
+        return self.areas.shape[0]
+
+    @property
+    def texels(self) -> int:
+        """Number of texels that show the mesh."""
+        return round(np.count_nonzero(self.areas) * self.finer**2)
+
+    @property
+    def area(self) -> float:
+        """Area of the surface, square scene units."""
+        return float(self.areas.sum(dtype=float))
+
+    @property
+    def pitch_x(self) -> float:
+        """Root of the mean area of a texel, scene units."""
+        return float(np.sqrt(self.area / max(self.texels, 1)))
+
+    pitch_y = pitch_x
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Area of each texel, float32 (height, width), for means."""
+        return self.areas
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Middle of the box around the surface."""
+        return self.corners().mean(axis=0)
+
+    @property
+    def size(self) -> float:
+        """Longest side of the box around the surface."""
+        return float(np.ptp(self.corners(), axis=0).max())
+
+    def corners(self) -> np.ndarray:
+        """World positions (8, 3) of the corners of the box around the middles of all texels."""
+        shown = self.middles[self.areas > 0]
+        low, high = shown.min(axis=0), shown.max(axis=0)
+        x, y, z = np.meshgrid(*zip(low, high), indexing="ij")
+        return np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
+
+    def positions(self, at: tuple[float, float] = (0.5, 0.5)) -> np.ndarray:
+        """World positions, float64 (height, width, 3), `at` columns and rows from each texel's corner."""
+        return self.middles + (at[0] - 0.5) * self.steps_x + (at[1] - 0.5) * self.steps_y
+
+    def height_of(self, point: Vector) -> float:
+        """Largest distance of a world point from the tangent planes of all texels, outward; negative if behind all."""
+        shown = self.areas > 0
+        return float(np.einsum("nc,nc->n", point - self.middles[shown], self.normals[shown]).max())
+
+    def heights_of(self, points: np.ndarray) -> np.ndarray:
+        """The same of points (N, 3), at most: their distance from the middle, and half the surface's diagonal."""
+        corners = self.corners()
+        reach = 0.5 * np.linalg.norm(np.ptp(corners, axis=0))
+        return np.linalg.norm(points - self.centre, axis=1) + reach
+
+    def cosine_to(self, direction: Vector) -> float:
+        """Least cosine between a unit vector and the normals."""
+        return float((self.normals[self.areas > 0] @ np.asarray(direction, np.float32)).min())
+
+    def length_across(self, vector: Vector) -> float:
+        """Largest length of a vector along a normal, at most."""
+        return float(np.linalg.norm(vector))
+
+    @property
+    def handedness(self) -> np.ndarray:
+        """Float32 (height, width, 3): signs that make y of right-handed frames run up the rows."""
+        bitangents = np.cross(self.normals, self.tangents)
+        is_mirrored = np.einsum("hwc,hwc->hw", bitangents, self.steps_y) < 0
+        signs = np.ones(self.normals.shape, np.float32)
+        signs[is_mirrored, 1] = -1
+        return signs
+
+    def flipped(self) -> BentGrid:
+        """The grid seen from behind."""
+        return replace(self, normals=-self.normals)
+
+    def coarse(self, texels: int) -> BentGrid:
+        """At most about `texels` x `texels` of the texels that show the mesh, evenly chosen, without colors."""
+        shown = np.flatnonzero(self.areas)
+        chosen = shown[np.linspace(0, len(shown) - 1, min(len(shown), texels**2)).astype(int)]
+
+        def pick(values: np.ndarray) -> np.ndarray:
+            return np.ascontiguousarray(values.reshape(self.areas.size, -1)[chosen].reshape(1, -1, *values.shape[2:]))
+
+        vectors = (self.middles, self.steps_x, self.steps_y, self.normals, self.tangents)
+        return BentGrid(*map(pick, (*vectors, self.areas, self.coverage)), owner=self.owner)
+
+    def mean(self, values: np.ndarray) -> float:
+        """Mean of values (height, width, C) over the surface."""
+        return float(np.einsum("hw,hwc->c", self.areas, values, dtype=float).mean() / max(self.area, 1e-300))
+
+    def native(self):
+        """The native `ReceiverGrid`."""
+        vectors = self.middles, self.steps_x, self.steps_y, self.normals, self.tangents
+        return native.ReceiverGrid.bent(*vectors, self.areas, owner_number(self.owner))
+
+    def surface(self):
+        """The native `Surface`, which views the arrays of the grid."""
+        return native.Surface(self.native(), self.coverage, self.clearance, self.color_in, self.color_out)
+
+
+AnyGrid = Grid | BentGrid
+"""A grid on a plane, or on faces that bend."""

@@ -1,0 +1,182 @@
+"""The faces of a mesh that bends, as one part: triangles with shading normals, which the UV map may show in any way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ..errors import ReceiverError
+from ..messages import Message, note, warning
+from .ears import triangle_corners
+from .islands import NO_UV_AREA, connected_in_map
+from .planes import FLATNESS_TOLERANCE, NO_AREA_BESIDE
+from .polygons import Polygons, components, same_faces
+
+# Part of a mesh's edges, or of its area, that a sentence about them needs. More: fewer notes about small faults.
+MIN_FAULT = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class BentIsland:
+    """Triangles that one image shows.
+
+    Attributes
+    ----------
+    polygons : the triangles, with UVs from 0 to 1 in the image.
+    pieces : int (N,), number of the piece of the UV map that shows each triangle.
+    tile : number of the UDIM tile; 0 for one image.
+    """
+
+    polygons: Polygons
+    pieces: np.ndarray
+    tile: int = 0
+
+    @cached_property
+    def lengths(self) -> tuple[float, float]:
+        """Lengths of the image's sides on the surface, root mean square over its area."""
+        corners, uvs = self.polygons.corners.reshape(-1, 3, 3), self.polygons.uvs.reshape(-1, 3, 2)
+        (a, b), (p, q) = ((values[:, 1] - values[:, 0], values[:, 2] - values[:, 0]) for values in (uvs, corners))
+        area = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+        is_shown = np.abs(area) > NO_UV_AREA
+        a, b, p, q, area = a[is_shown], b[is_shown], p[is_shown], q[is_shown], area[is_shown, None]
+        slopes = (p * b[:, 1:] - q * a[:, 1:]) / area, (q * a[:, :1] - p * b[:, :1]) / area
+        weights = np.abs(area[:, 0])
+        means = (np.average((slope**2).sum(axis=1), weights=weights) for slope in slopes)
+        along, up = np.sqrt(list(means)).tolist()
+        return along, up
+
+
+@dataclass(frozen=True, eq=False)
+class BentPart:
+    """All faces of a mesh that bends; `islands` are those of each UDIM tile."""
+
+    islands: tuple[BentIsland, ...]
+
+
+def bent_part(polygons: Polygons) -> BentPart:
+    """The part of faces whose UVs are checked; those without an area in space or in the UV map are left out.
+
+    Raises
+    ------
+    ReceiverError
+        No face has an area in the UV map.
+    """
+    is_shown = (polygons.uv_areas > NO_UV_AREA) & (polygons.areas > NO_AREA_BESIDE * polygons.areas.max())
+    if not is_shown.any():
+        raise ReceiverError("The UV map has no area, in all or some of the faces.", "Unwrap the mesh again.")
+    islands = []
+    for tile, part in polygons.of_faces(np.flatnonzero(is_shown)).by_tile().items():
+        pieces, (corners, owners) = connected_in_map(part), triangle_corners(part, np.arange(part.count))
+        islands.append(BentIsland(_outward(part, corners, owners), pieces[owners], tile))
+    return BentPart(tuple(islands))
+
+
+def _outward(polygons: Polygons, corners: np.ndarray, owners: np.ndarray) -> Polygons:
+    """Triangles of polygons, which `owners` names, anticlockwise seen from outside."""
+    a, b, c = np.moveaxis(polygons.corners[corners], 1, 0)
+    is_turned = np.einsum("ij,ij->i", np.cross(b - a, c - a), polygons.area_vectors[owners]) < 0
+    corners = np.where(is_turned[:, None], corners[:, ::-1], corners).ravel()
+    numbers = owners if polygons.numbers is None else polygons.numbers[owners]
+    shading = None if polygons.corner_normals is None else polygons.corner_normals[corners]
+    return Polygons(
+        polygons.corners[corners],
+        polygons.uvs[corners],
+        3 * np.arange(len(owners) + 1),
+        polygons.normals[owners],
+        polygons.uv_map,
+        numbers,
+        corner_normals=shading,
+    )
+
+
+def facing_outward(polygons: Polygons, name: str) -> tuple[Polygons, list[Message]]:
+    """The faces of the object `name` with closed bodies turned right side out, and messages about faces gone wrong."""
+    first, second = polygons.shared_edges
+    faces = polygons.face_of
+    body_of = components(polygons.count, faces[first], faces[second])
+    is_inward = _is_inside_out(polygons, body_of)[body_of]
+    messages = _faults(polygons, name)
+    if is_inward.any():
+        are = "The normals" if is_inward.all() else f"The normals of {polygons.listed(is_inward)}"
+        text = f"{are} of '{name}' point inward; it is baked as if they pointed outward."
+        messages.append(note(name, text, "Recalculate them (Edit Mode: Shift N)."))
+        polygons = _turned(polygons, is_inward)
+    return polygons, messages
+
+
+def _turned(polygons: Polygons, is_chosen: np.ndarray) -> Polygons:
+    """The faces, of which the chosen ones look to their other side."""
+    signs = np.where(is_chosen, -1.0, 1.0)[:, None]
+    shading = polygons.corner_normals
+    shading = None if shading is None else shading * signs[polygons.face_of].astype(np.float32)
+    return replace(polygons, normals=polygons.normals * signs, corner_normals=shading)
+
+
+def _is_inside_out(polygons: Polygons, body_of: np.ndarray) -> np.ndarray:
+    """True for each body that is closed and whose faces look inward, unless it is the hollow of another one."""
+    count = int(body_of.max(initial=-1)) + 1
+    first, _ = polygons.shared_edges
+    corners, is_edge = body_of[polygons.face_of], polygons.points != polygons.points[polygons.next_corners]
+    # Two faces meet at each edge of a closed body.
+    edges, pairs = np.bincount(corners[is_edge], minlength=count), np.bincount(corners[first], minlength=count)
+    middle = polygons.corners.mean(axis=0)
+    heights = np.einsum("ij,ij->i", polygons.corners[polygons.starts[:-1]] - middle, polygons.area_vectors)
+    volumes = np.bincount(body_of, heights, minlength=count) / 3
+    is_inward = (edges == 2 * pairs) & (volumes < 0)
+    is_outward = (edges == 2 * pairs) & (volumes > 0)
+    if not (is_inward.any() and is_outward.any()):
+        return is_inward
+    order = np.argsort(corners, kind="stable")
+    starts = np.searchsorted(corners[order], np.arange(count))
+    lows = np.minimum.reduceat(polygons.corners[order], starts)
+    highs = np.maximum.reduceat(polygons.corners[order], starts)
+    outer = np.flatnonzero(is_outward)
+    for body in np.flatnonzero(is_inward).tolist():
+        is_around = (lows[outer] <= lows[body]).all(axis=1) & (highs[outer] >= highs[body]).all(axis=1)
+        is_inward[body] = not (is_around & (volumes[outer] > -volumes[body])).any()
+    return is_inward
+
+
+def _faults(polygons: Polygons, name: str) -> list[Message]:
+    """Messages about faces that light can't pass between as in a solid."""
+    messages = []
+    first, second = polygons.shared_edges
+    # Neighbors run along their common edge in opposite directions, unless a normal tells that a face is mirrored.
+    looks = np.sign(np.einsum("ij,ij->i", _by_order(polygons), polygons.area_vectors))[polygons.face_of]
+    is_same_way = polygons.points[first] == polygons.points[second]
+    is_wrong = is_same_way == (looks[first] == looks[second])
+    if is_wrong.sum() > MIN_FAULT * len(first):
+        text = f"Faces of '{name}' that touch look to opposite sides, at {is_wrong.sum()} of {len(first)} edges."
+        remedy = "Light can't be right there. Recalculate the normals (Edit Mode: Shift N)."
+        messages.append(warning(name, text, remedy))
+    counts = np.bincount(same_faces(polygons))
+    is_double = counts[same_faces(polygons)] > 1
+    part = polygons.areas[is_double].sum() / polygons.areas.sum()
+    if part > MIN_FAULT:
+        text = f"Faces of '{name}' lie on each other, {part:.0%} of its surface: light counts for each of them there."
+        messages.append(warning(name, text, "Merge them (Edit Mode: A, then M, By Distance)."))
+    return messages
+
+
+def _by_order(polygons: Polygons) -> np.ndarray:
+    """Normals of faces by the order of their corners, float64 (N, 3), of any length."""
+    points = polygons.corners - polygons.corners[np.repeat(polygons.starts[:-1], polygons.sizes)]
+    crosses = np.cross(points, points[polygons.next_corners])
+    return np.add.reduceat(crosses, polygons.starts[:-1], axis=0)
+
+
+def lost_in_map(polygons: Polygons, name: str) -> list[Message]:
+    """The warning about faces without an area in the UV map."""
+    is_lost = (polygons.uv_areas <= NO_UV_AREA) & (polygons.areas > 0)
+    part = polygons.areas[is_lost].sum() / polygons.areas.sum()
+    return [] if part <= FLATNESS_TOLERANCE else [lost_faces(polygons, is_lost, part, name)]
+
+
+def lost_faces(polygons: Polygons, is_lost: Sequence[bool], part: float, name: str) -> Message:
+    """The warning about faces without an area in the UV map, a part of the surface."""
+    text = f"Faces of '{name}' have no area in the UV map: {part:.1%} of its surface stay black."
+    remedy = f"Unwrap the mesh again{': ' + polygons.listed(is_lost) if np.any(is_lost) else ''}."
+    return warning(name, text, remedy)
