@@ -4,6 +4,7 @@
 #include <numeric>
 #include <utility>
 
+#include "bake/bent_bake.h"
 #include "bake/canvas.h"
 #include "bake/canvas_light.h"
 #include "bake/field_bake.h"
@@ -73,6 +74,13 @@ void bake_canvas(const Canvas& canvas, const std::vector<CanvasLight>& lights, c
     progress.finish();
 }
 
+// Adds the noise of a part of all surfaces, which has that fraction of the area.
+void add_part(const RayNoise& part, double share, RayNoise& noise)
+{
+    noise.irradiance += share * part.irradiance;
+    noise.variance += share * part.variance;
+}
+
 std::vector<CanvasLight> on_canvas(const Canvas& canvas, const std::vector<ArrivingLights>& lights)
 {
     std::vector<CanvasLight> on_patches;
@@ -128,7 +136,12 @@ void bake_luminance(const std::vector<Surface>& surfaces, const std::vector<Arri
         texels += static_cast<double>(canvas.samples());
         area += canvas.area;
     }
-    progress.set_total(texels);
+    for (const Surface& surface : surfaces)
+        if (surface.grid.is_bent()) {
+            texels += static_cast<double>(surface.samples());
+            area += surface.grid.shape->area;
+        }
+    progress.set_total(std::max(texels, 1.0));
     Problem problem;
     problem.channels = channels;
     problem.solver = options.solver;
@@ -152,10 +165,30 @@ void bake_luminance(const std::vector<Surface>& surfaces, const std::vector<Arri
                 read_patch(canvas, patch, channels.size(), result, luminance[patch.index]);
             patch.surface->scale_by_color_out(channels.size(), luminance[patch.index]);
         }
-        if (options.noise) {
-            options.noise->irradiance += canvas.area / area * noise.irradiance;
-            options.noise->variance += canvas.area / area * noise.variance;
-        }
+        if (options.noise)
+            add_part(noise, canvas.area / area, *options.noise);
+    }
+    if (options.beyond_shares)
+        options.beyond_shares->assign(surfaces.size(), 0.0);
+    for (std::size_t i = 0; i < surfaces.size(); ++i) {
+        const Surface& surface = surfaces[i];
+        if (!surface.grid.is_bent())
+            continue;
+        RayNoise noise;
+        BakeOptions of_surface = options;
+        of_surface.noise = options.noise ? &noise : nullptr;
+        std::vector<const SurfaceLight*> arriving;
+        for (const std::optional<SurfaceLight>& light : lights[i])
+            if (light)
+                arriving.push_back(&*light);
+        progress.advance_by(static_cast<double>(surface.samples()), [&](Progress& part) {
+            const double beyond = bake_bent(surface, arriving, channels, of_surface, part, luminance[i]);
+            if (options.beyond_shares)
+                (*options.beyond_shares)[i] = beyond;
+        });
+        surface.scale_by_color_out(channels.size(), luminance[i]);
+        if (options.noise && area > 0.0)
+            add_part(noise, surface.grid.shape->area / area, *options.noise);
     }
     progress.finish();
 }

@@ -27,6 +27,8 @@ struct BakeOptions {
     std::size_t max_stored_bytes = std::size_t{512} << 20;
     std::size_t max_moment_bytes = 0;  // bytes of moments; 0: any
     RayNoise* noise = nullptr;  // takes the noise of all lights by rays; may be null
+    // Takes the share of each surface's area that bends more than the LDFs of the media cover; may be null.
+    std::vector<double>* beyond_shares = nullptr;
 
     // Settings for a light of so many rays from each texel.
     RaySettings ray_settings(int ray_count) const;
@@ -36,7 +38,8 @@ struct BakeOptions {
 using ArrivingLights = std::vector<std::optional<SurfaceLight>>;
 
 // Writes (height, width, channels) of each surface, exitance / pi in W/(m^2 sr) (Manabe et al. 2012, Eq. 2). Light does
-// not pass from surface to surface. `lights`: [surface], all of the same number. The result is the same for any number of
+// not pass from surface to surface. Planes are solved by the solver of the options; meshes that bend by pairs of samples,
+// for `direct` by all of them one by one, with 0 outside of the mesh. `lights`: [surface], all of the same number. The result is the same for any number of
 // threads. Throws InvalidArgument, MemoryLimit, Cancelled.
 void bake_luminance(const std::vector<Surface>& surfaces, const std::vector<ArrivingLights>& lights,
                     const std::vector<ChannelMedium>& channels, const BakeOptions& options, Progress& progress,
@@ -51,9 +54,9 @@ void bake_luminance(const Surface& surface, const std::vector<SurfaceLight>& lig
 std::unique_ptr<LightField> any_light_field(const Plane& plane, const std::vector<ChannelMedium>& channels,
                                             double max_angle, double tolerance, bool is_colored, int threads);
 
-// Light on the whole of each texel, without a medium. Writes the irradiance (height, width, channels), W/m^2, and the
+// Light on the whole of each texel, without a medium; 0 outside of a mesh that bends. Writes the irradiance (height, width, channels), W/m^2, and the
 // flow (height, width, 3): the sum of the irradiance, the mean of its channels, times the unit vector along which it
-// travels in the plane's frame. Throws InvalidArgument, Cancelled.
+// travels in the frame of the plane or of each texel. Throws InvalidArgument, Cancelled.
 void bake_arrival(const Surface& surface, const std::vector<SurfaceLight>& lights, const BakeOptions& options,
                   Progress& progress, float* irradiance, float* flow);
 

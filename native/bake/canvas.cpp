@@ -143,7 +143,7 @@ std::vector<std::vector<Patch>> by_pitch(const std::vector<Surface>& surfaces)
 {
     std::vector<std::vector<Patch>> groups;
     for (std::size_t i = 0; i < surfaces.size(); ++i) {
-        if (surfaces[i].mirrored > 0.0)
+        if (surfaces[i].mirrored > 0.0 || surfaces[i].grid.is_bent())
             continue;
         const auto same = std::ranges::find_if(
             groups, [&](const auto& group) { return have_same_pitch(*group.front().surface, surfaces[i]); });
@@ -207,7 +207,7 @@ std::vector<Canvas> canvases(const std::vector<Surface>& surfaces, const std::ve
             all_reach = std::max(all_reach, reach(medium));
     std::vector<Canvas> all;
     for (std::size_t i = 0; i < surfaces.size(); ++i)
-        if (!are_packed || surfaces[i].mirrored > 0.0)
+        if (!surfaces[i].grid.is_bent() && (!are_packed || surfaces[i].mirrored > 0.0))
             all.emplace_back(surfaces[i], i);
     for (std::vector<Patch>& group : by_pitch(surfaces))
         if (are_packed)

@@ -44,7 +44,7 @@ struct Canvas {
     }
 };
 
-// Canvases of all surfaces, which share one if their texels are of one size. Light of one patch does not reach another:
+// Canvases of all planes among the surfaces, which share one if their texels are of one size. Light of one patch does not reach another:
 // the gaps follow from the reach of the media. `max_texels`: of a canvas of several patches;
 // 0: each surface stays alone.
 std::vector<Canvas> canvases(const std::vector<Surface>& surfaces, const std::vector<ChannelMedium>& media,

@@ -1,4 +1,5 @@
-// Surface that a bake lights: samples with an area and a texture. Its samples are the texels of a plane's grid.
+// Surface that a bake lights: samples with an area and a texture. Its samples are the texels of a plane's grid or of a mesh
+// that bends.
 #pragma once
 
 #include "scene/receiver.h"
@@ -8,9 +9,10 @@ namespace beamspread {
 
 struct Surface {
     ReceiverGrid grid;
-    double clearance = 0.0;            // largest distance of the surface's faces to the plane, metres
-    const float* coverage = nullptr;   // [sample] fraction inside the mesh, 0 to 1; null: 1
-    const float* color_in = nullptr;   // [sample][channel] factors of light that enters; null: 1
+    double clearance = 0.0;  // largest distance of the surface's faces to the plane, metres
+    // [sample] fraction inside the mesh, 0 to 1; null: 1. Not used where the grid bends: the areas of its texels count.
+    const float* coverage = nullptr;
+    const float* color_in = nullptr;  // [sample][channel] factors of light that enters; null: 1
     const float* color_out = nullptr;  // [sample][channel] factors of light that leaves; null: 1
     double mirrored = 0.0;  // distance from the borders to which mirror images return light, metres; 0: it leaves
 

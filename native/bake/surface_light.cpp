@@ -19,7 +19,7 @@ public:
     {
         std::vector<Vec3f>& received = m_scratch.local();
         received.assign(run.irradiance, run.irradiance + run.count);
-        for (std::size_t i = 0; i < run.count && m_surface.coverage; ++i)
+        for (std::size_t i = 0; i < run.count && m_surface.coverage && !m_surface.grid.is_bent(); ++i)
             received[i] *= m_surface.coverage[run.sample + i];
         for (std::size_t i = 0; i < run.count && m_surface.color_in; ++i) {
             const float* color = m_surface.color_in + 3 * (run.sample + i);

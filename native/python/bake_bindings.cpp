@@ -154,13 +154,15 @@ std::vector<Array<float>> luminance(const std::vector<const HeldSurface*>& held,
                                     const std::vector<double>& mean_free_path, const std::string& solver,
                                     double tolerance, int samples, int rays, int min_rays, std::uint32_t seed,
                                     int threads, std::size_t max_stored_bytes, std::size_t memory_limit,
-                                    const py::object& progress, const py::object& report_noise)
+                                    const py::object& progress, const py::object& report_noise,
+                                    const py::object& report_beyond)
 {
     const std::vector<ChannelMedium> media = media_of(ldf, albedo, mean_free_path);
     const std::vector<ArrivingLights> lights = arriving_lights(light_tuples, held.size());
     RayNoise noise;
-    const BakeOptions options{named_solver(solver), tolerance,    samples, rays, min_rays, seed, threads,
-                              max_stored_bytes,     memory_limit, &noise};
+    std::vector<double> beyond_shares;
+    const BakeOptions options{named_solver(solver), tolerance,    samples, rays,          min_rays, seed, threads,
+                              max_stored_bytes,     memory_limit, &noise,  &beyond_shares};
     Progress report(progress_callback(progress));
     std::vector<Array<float>> results;
     std::vector<Surface> surfaces;
@@ -176,6 +178,8 @@ std::vector<Array<float>> luminance(const std::vector<const HeldSurface*>& held,
     }
     if (!report_noise.is_none())
         report_noise(noise.irradiance, noise.variance);
+    if (!report_beyond.is_none())
+        report_beyond(beyond_shares);
     return results;
 }
 
@@ -183,6 +187,8 @@ Array<float> field_luminance(HeldField& held, const HeldSurface& surface, const 
                              int rays, std::uint32_t seed, int threads, const py::object& progress)
 {
     const Plane& plane = held.field->plane();
+    if (surface.surface.grid.is_bent())
+        reject("surface", "a mesh that bends", "a plane");
     if (surface.surface.grid.width != plane.width || surface.surface.grid.height != plane.height)
         reject("surface", "of another size", "the size of the field");
     const std::vector<SurfaceLight> lights = lights_of(light_tuples);
@@ -220,13 +226,14 @@ py::tuple arrival(const HeldSurface& held, const LightTuples& light_tuples, int 
 
 void bind_bake(py::module_& m)
 {
-    py::class_<HeldSurface>(m, "Surface", R"(A plane that light falls on and spreads in.
+    py::class_<HeldSurface>(m, "Surface", R"(A plane, or a mesh that bends, that light falls on and spreads in.
 
 Parameters
 ----------
 grid : ReceiverGrid
 coverage : ndarray, float32, shape (H, W), optional
-    Fraction of each texel inside the mesh; None: 1. No array is copied.
+    Fraction of each texel inside the mesh; None: 1. No array is copied. Not used on a mesh that bends, where the areas of
+    texels count.
 clearance : float
     Largest distance of the surface's faces to the plane, metres.
 color_in, color_out : ndarray, float32, shape (H, W, 3), optional
@@ -259,12 +266,14 @@ position : 3 floats, optional
           py::arg("rays") = 256, py::arg("min_rays") = BakeOptions().min_rays, py::arg("seed") = 0,
           py::arg("threads") = 0, py::arg("max_stored_bytes") = BakeOptions().max_stored_bytes,
           py::arg("memory_limit") = 0, py::arg("progress") = py::none(), py::arg("report_noise") = py::none(),
+          py::arg("report_beyond") = py::none(),
           R"(Luminance of translucent surfaces: the engine behind `beamspread.core.bake`.
 
 Parameters
 ----------
 surfaces : sequence of Surface
-    Light does not pass from one to another.
+    Light does not pass from one to another. A mesh that bends is solved by pairs of its texels, with the solver 'direct'
+    by all of them one by one; it is 0 outside of the mesh.
 lights : sequence of sequences of (light, color, occluders) or None
     For each surface and light: a Light or FieldLight of strength 1, its strength times color, RGB, and the Occluders
     that block it or None. None for a light that does not reach the surface.
@@ -290,6 +299,8 @@ progress : callable, optional
 report_noise : callable, optional
     report_noise(irradiance, variance) takes the means over all surfaces of the irradiance, W/m^2, and of its variance
     in a texel, (W/m^2)^2. The latter comes from two halves of the rays to lights of a size.
+report_beyond : callable, optional
+    report_beyond(shares) takes the share of each surface's area that bends more than the LDFs cover; 0 on planes.
 
 Returns
 -------
@@ -345,7 +356,8 @@ Returns
 irradiance : ndarray, float32, shape (H, W, 3)
     W/m^2 on the surface, cosine and visibility included.
 flow : ndarray, float32, shape (H, W, 3)
-    Sum over the light of its irradiance, the mean of the channels, times the unit vector of travel in the plane's frame.
+    Sum over the light of its irradiance, the mean of the channels, times the unit vector of travel in the frame of the
+    plane or of each texel.
 )");
 }
 

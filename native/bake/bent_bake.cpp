@@ -1,0 +1,218 @@
+#include "bake/bent_bake.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numeric>
+
+#include "bake/field_bake.h"
+#include "base/threads.h"
+#include "solve/surface/surface_field.h"
+
+namespace beamspread {
+
+namespace {
+
+// Texels, and rays of each, of the survey that finds the mean irradiance of each light where nothing blocks it. More: rays
+// are shared more exactly, and it takes longer.
+constexpr std::size_t survey_texels = 2048;
+constexpr int survey_rays = 4;
+
+// The solver takes samples as disks, which overlap where texels are long. Long texels are divided into pieces: their length
+// over width from which on, their length over the shortest mean free path below which they stay whole, and their largest
+// number. Larger lengths: fewer samples, and luminance that is too high there (docs/tuning.md).
+constexpr double max_stretch = 1.3;
+constexpr double short_in_paths = 0.1;
+constexpr std::size_t max_pieces = 64;
+
+// The longer half axis of the ellipse that a texel's steps span, world, and the length of the other one.
+struct Ellipse {
+    Vec3 axis;
+    double length;
+    double width;
+
+    explicit Ellipse(const BentTexel& texel)
+    {
+        const Vec3 x(texel.step_x);
+        const Vec3 y(texel.step_y);
+        // The steps' singular values: turned by this angle they are at right angles (one step of Jacobi's method).
+        const double angle = 0.5 * std::atan2(2.0 * glm::dot(x, y), glm::dot(x, x) - glm::dot(y, y));
+        axis = x * std::cos(angle) + y * std::sin(angle);
+        length = glm::length(axis);
+        width = glm::length(y * std::cos(angle) - x * std::sin(angle));
+    }
+};
+
+// The samples of a mesh, in the order of its texels: one for each texel inside, or several for a long one.
+struct Samples {
+    Samples(const ReceiverGrid& grid, double mean_free_path)
+    {
+        const Vec3 origin = 0.5 * (grid.shape->low + grid.shape->high);
+        for (std::size_t i = 0; i < grid.texels(); ++i) {
+            first.push_back(all.size());
+            const BentTexel& texel = grid.bent_texel(i);
+            if (!(texel.area > 0.0f))
+                continue;
+            const Ellipse ellipse(texel);
+            const double longest = std::max(max_stretch * ellipse.width, short_in_paths * mean_free_path);
+            const double wanted = ellipse.length > longest ? std::ceil(ellipse.length / longest) : 1.0;
+            const auto pieces = static_cast<std::size_t>(std::min(wanted, static_cast<double>(max_pieces)));
+            for (std::size_t k = 0; k < pieces; ++k) {
+                const double at = (static_cast<double>(k) + 0.5) / static_cast<double>(pieces) - 0.5;
+                all.push_back({Vec3f(texel.position + at * ellipse.axis - origin), texel.normal, texel.tangent,
+                               texel.area / static_cast<float>(pieces)});
+            }
+        }
+        first.push_back(all.size());
+    }
+
+    std::vector<SurfaceSample> all;
+    std::vector<std::size_t> first;  // [texel], and the number of all
+};
+
+// Adds rays at texels to a field of samples.
+class SampleSink final : public RaySink {
+public:
+    SampleSink(const Samples& samples, const std::vector<double>& color, SurfaceField& field)
+        : m_samples(samples), m_color(color), m_field(field)
+    {
+    }
+
+    void add(const RayRun& run) override
+    {
+        Scratch& scratch = m_scratch.local();
+        scratch.travel.clear();
+        scratch.irradiance.clear();
+        for (std::size_t i = 0; i < run.count; ++i) {
+            const std::size_t pieces = m_samples.first[run.sample + i + 1] - m_samples.first[run.sample + i];
+            scratch.travel.insert(scratch.travel.end(), pieces, run.travel[i]);
+            scratch.irradiance.insert(scratch.irradiance.end(), pieces, run.irradiance[i]);
+        }
+        if (!scratch.travel.empty())
+            m_field.add(m_samples.first[run.sample], scratch.travel.size(), scratch.travel.data(),
+                        scratch.irradiance.data(), m_color);
+    }
+
+private:
+    struct Scratch {
+        std::vector<Vec3f> travel, irradiance;
+    };
+
+    const Samples& m_samples;
+    const std::vector<double>& m_color;
+    SurfaceField& m_field;
+    PerThread<Scratch> m_scratch;
+};
+
+// Few texels, evenly chosen among those inside the mesh.
+Surface survey_surface(const Surface& surface)
+{
+    std::vector<std::size_t> inside;
+    for (std::size_t i = 0; i < surface.samples(); ++i)
+        if (surface.grid.bent_texel(i).area > 0.0f)
+            inside.push_back(i);
+    const std::size_t count = std::min(survey_texels, inside.size());
+    std::vector<BentTexel> texels;
+    for (std::size_t i = 0; i < count; ++i)
+        texels.push_back(surface.grid.bent_texel(inside[i * inside.size() / count]));
+    return {.grid = ReceiverGrid::bent(std::move(texels), count, 1, surface.grid.owner)};
+}
+
+double mean_of(const std::vector<double>& color)
+{
+    return std::accumulate(color.begin(), color.end(), 0.0) / static_cast<double>(color.size());
+}
+
+// Mean irradiance by each light where nothing blocks it, over the area and the channels, W/m^2.
+std::vector<double> survey(const Surface& surface, const std::vector<const SurfaceLight*>& lights,
+                           const BakeOptions& options)
+{
+    const Surface few = survey_surface(surface);
+    BakeOptions quiet = options;
+    quiet.samples = 1;
+    quiet.noise = nullptr;
+    RaySettings settings = quiet.ray_settings(survey_rays);
+    settings.even_rays = 0;
+    std::vector<double> means;
+    for (const SurfaceLight* light : lights) {
+        SurfaceLight open = *light;
+        open.occluders = nullptr;
+        RaySum sum(few.samples(), 3, false);
+        Progress unseen;
+        open.gather(few, settings, sum, unseen);
+        double irradiance = 0.0;
+        for (std::size_t i = 0; i < few.samples(); ++i)
+            for (std::size_t c = 0; c < 3; ++c)
+                irradiance += static_cast<double>(few.grid.bent_texel(i).area * sum.irradiance[3 * i + c]);
+        const double area = std::max(few.grid.shape->area, std::numeric_limits<double>::min());
+        means.push_back(irradiance / (3.0 * area) * mean_of(light->color));
+    }
+    return means;
+}
+
+// True if the light of all channels is not proportional.
+bool is_colored(const Surface& surface, const std::vector<const SurfaceLight*>& lights)
+{
+    constexpr double rounding = 1e-6;
+    const auto is_like_first = [&](const SurfaceLight* light) {
+        const std::vector<double>& first = lights.front()->color;
+        for (std::size_t c = 0; c < first.size(); ++c)
+            if (std::abs(light->color[c] * mean_of(first) - first[c] * mean_of(light->color)) >
+                rounding * mean_of(first) * mean_of(light->color))
+                return false;
+        return true;
+    };
+    return std::ranges::any_of(
+        lights, [&](const SurfaceLight* light) { return light->is_colored(surface) || !is_like_first(light); });
+}
+
+}  // namespace
+
+double bake_bent(const Surface& surface, const std::vector<const SurfaceLight*>& lights,
+                 const std::vector<ChannelMedium>& channels, const BakeOptions& options, Progress& progress,
+                 float* luminance)
+{
+    std::fill_n(luminance, surface.samples() * channels.size(), 0.0f);
+    const auto shorter = [](const ChannelMedium& a, const ChannelMedium& b) {
+        return a.mean_free_path < b.mean_free_path;
+    };
+    const Samples samples(surface.grid, std::ranges::min_element(channels, shorter)->mean_free_path);
+    if (samples.all.empty() || lights.empty()) {
+        progress.finish();
+        return 0.0;
+    }
+    progress.set_total(light_work * static_cast<double>(lights.size()) + 2.0 * solver_work);
+    const std::vector<double> means = survey(surface, lights, options);
+    const double all = std::accumulate(means.begin(), means.end(), 0.0);
+    const SurfaceProblem problem{.samples = samples.all,
+                                 .channels = channels,
+                                 .tolerance = options.tolerance,
+                                 .is_colored = is_colored(surface, lights),
+                                 .threads = options.threads,
+                                 .max_moment_bytes = options.max_moment_bytes,
+                                 .is_direct = options.solver == Solver::direct};
+    std::unique_ptr<SurfaceField> field;
+    progress.advance_by(solver_work, [&](Progress& part) { field = std::make_unique<SurfaceField>(problem, part); });
+    for (std::size_t i = 0; i < lights.size(); ++i)
+        progress.advance_by(light_work, [&](Progress& part) {
+            const double share = all > 0.0 ? means[i] / all : 0.0;
+            const int rays = std::max(options.min_rays, static_cast<int>(std::nearbyint(options.rays * share)));
+            SampleSink sink(samples, lights[i]->color, *field);
+            lights[i]->gather(surface, options.ray_settings(rays), sink, part);
+        });
+    std::vector<float> values(samples.all.size() * channels.size());
+    progress.advance_by(solver_work, [&](Progress& part) { field->solve(part, values.data()); });
+    // The luminance of a texel is the mean of its pieces.
+    const std::size_t count = channels.size();
+    for (std::size_t i = 0; i < surface.samples(); ++i) {
+        const std::size_t pieces = samples.first[i + 1] - samples.first[i];
+        for (std::size_t k = samples.first[i]; k < samples.first[i + 1]; ++k)
+            for (std::size_t c = 0; c < count; ++c)
+                luminance[i * count + c] += values[k * count + c] / static_cast<float>(pieces);
+    }
+    progress.finish();
+    return field->beyond_share();
+}
+
+}  // namespace beamspread
