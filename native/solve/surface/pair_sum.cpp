@@ -63,26 +63,34 @@ constexpr std::size_t max_results = 3;
 
 // Rows of a table around a chord and a curvature, and their weights.
 struct Rows {
-    std::array<const float*, 4> row;
+    std::size_t first;  // index of the value of the lower chord and curvature
+    std::size_t to_next;  // to that of the next chord
+    std::size_t to_high;  // to that of the next curvature
     std::array<float, 4> weight;
 };
 
-template <std::size_t results>
-void add_pairs_of(const PairTables& tables, const PairTarget& target, const PairSource* sources, std::size_t count,
+template <std::size_t results, bool are_clusters>
+void add_pairs_of(const PairTables& tables, const PairTarget& target, std::span<const PairSource> sources,
                   const float* moments, std::size_t stride, float* sums, float& beyond)
 {
+    // Value at the place of some rows in a table.
+    const auto interpolated = [](const Rows& rows, const float* values) __attribute__((always_inline)) {
+        const float* first = values + rows.first;
+        const float* high = first + rows.to_high;
+        return (load(first) * rows.weight[0] + load(first + rows.to_next) * rows.weight[1]) +
+               (load(high) * rows.weight[2] + load(high + rows.to_next) * rows.weight[3]);
+    };
     std::array<Lanes, results> all{};
     Lanes clamped{};
     const std::size_t blocks = tables.blocks;
     const std::size_t lanes = blocks * lanes_per_block;
-    for (std::size_t i = 0; i < count; ++i) {
-        const PairSource& source = sources[i];
+    for (const PairSource& source : sources) {
         const Vec3f d = target.position - source.position;
         const float square = d.x * d.x + d.y * d.y + d.z * d.z;
         const float chord = std::sqrt(square);
         if (chord >= tables.reach)
             continue;
-        const bool is_disk = source.disk != no_disk && chord < tables.disk_end[source.disk];
+        const bool is_disk = !are_clusters && chord < tables.disk_end[source.disk];
         const ChordTable& table = is_disk ? tables.disks[source.disk] : tables.point;
         const std::uint32_t step = std::clamp(chord_step(chord), table.first, table.first + table.rows - 2);
         const float before = chord_of(step);
@@ -102,19 +110,16 @@ void add_pairs_of(const PairTables& tables, const PairTarget& target, const Pair
                 scale.per_step > 0.0f ? (inside - scale.nodes[k]) / (scale.nodes[k + 1] - scale.nodes[k]) : 0.0f;
             if (r == 0)
                 is_beyond = inside != curvature;
-            const float* first = table.values[r].data() + (step - table.first) * lanes;
-            const float* low = first + k * table.rows * lanes;
-            const float* high = first + next * table.rows * lanes;
+            const std::size_t row = k * table.rows + step - table.first;
             rows[r] = {
-                {low, low + lanes, high, high + lanes},
+                row * lanes,
+                lanes,
+                (next - k) * table.rows * lanes,
                 {(1.0f - to_next) * (1.0f - part), (1.0f - to_next) * part, to_next * (1.0f - part), to_next * part}};
         }
         // The chord's azimuth in the tangent plane of the source.
         const float x = d.x * source.tangent.x + d.y * source.tangent.y + d.z * source.tangent.z;
-        const Vec3f binormal{source.normal.y * source.tangent.z - source.normal.z * source.tangent.y,
-                             source.normal.z * source.tangent.x - source.normal.x * source.tangent.z,
-                             source.normal.x * source.tangent.y - source.normal.y * source.tangent.x};
-        const float y = d.x * binormal.x + d.y * binormal.y + d.z * binormal.z;
+        const float y = d.x * source.binormal.x + d.y * source.binormal.y + d.z * source.binormal.z;
         const float across = x * x + y * y;
         const float per_across = across > 0.0f ? 1.0f / std::sqrt(across) : 0.0f;
         Lanes cosines, sines;
@@ -131,10 +136,10 @@ void add_pairs_of(const PairTables& tables, const PairTarget& target, const Pair
                     light = load(values) * cosines + load(values + lanes_per_block) * sines;
                 }
                 const std::size_t at = b * lanes_per_block;
-                const Rows& kernel = rows[r];
-                const Lanes value =
-                    (load(kernel.row[0] + at) * kernel.weight[0] + load(kernel.row[1] + at) * kernel.weight[1]) +
-                    (load(kernel.row[2] + at) * kernel.weight[2] + load(kernel.row[3] + at) * kernel.weight[3]);
+                Lanes value = interpolated(rows[r], table.values[r].data() + at);
+                if constexpr (are_clusters)
+                    value +=
+                        interpolated(rows[r], tables.laplacian.values[r].data() + at) * (source.spread * per_square);
                 const Lanes product = light * value;
                 all[r] += product;
                 if (r == 0 && is_beyond)
@@ -147,16 +152,24 @@ void add_pairs_of(const PairTables& tables, const PairTarget& target, const Pair
     beyond += sum_of(clamped);
 }
 
-void add_pairs(const PairTables& tables, const PairTarget& target, const PairSource* sources, std::size_t count,
-               const float* moments, std::size_t stride, float* sums, float& beyond)
+template <bool are_clusters>
+void add_pairs_of_kind(const PairTables& tables, const PairTarget& target, std::span<const PairSource> sources,
+                       const float* moments, std::size_t stride, float* sums, float& beyond)
 {
     static_assert(max_results == 3);
     if (tables.results == 1)
-        add_pairs_of<1>(tables, target, sources, count, moments, stride, sums, beyond);
+        add_pairs_of<1, are_clusters>(tables, target, sources, moments, stride, sums, beyond);
     else if (tables.results == 2)
-        add_pairs_of<2>(tables, target, sources, count, moments, stride, sums, beyond);
+        add_pairs_of<2, are_clusters>(tables, target, sources, moments, stride, sums, beyond);
     else
-        add_pairs_of<3>(tables, target, sources, count, moments, stride, sums, beyond);
+        add_pairs_of<3, are_clusters>(tables, target, sources, moments, stride, sums, beyond);
+}
+
+void add_pairs(const PairTables& tables, const PairTarget& target, std::span<const PairSource> sources,
+               bool are_clusters, const float* moments, std::size_t stride, float* sums, float& beyond)
+{
+    const auto add = are_clusters ? add_pairs_of_kind<true> : add_pairs_of_kind<false>;
+    add(tables, target, sources, moments, stride, sums, beyond);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -167,10 +180,10 @@ HWY_AFTER_NAMESPACE();
 namespace beamspread {
 
 HWY_EXPORT(add_pairs);
-void add_pairs(const PairTables& tables, const PairTarget& target, const PairSource* sources, std::size_t count,
-               const float* moments, std::size_t stride, float* sums, float& beyond)
+void add_pairs(const PairTables& tables, const PairTarget& target, std::span<const PairSource> sources,
+               bool are_clusters, const float* moments, std::size_t stride, float* sums, float& beyond)
 {
-    HWY_DYNAMIC_DISPATCH(add_pairs)(tables, target, sources, count, moments, stride, sums, beyond);
+    HWY_DYNAMIC_DISPATCH(add_pairs)(tables, target, sources, are_clusters, moments, stride, sums, beyond);
 }
 
 }  // namespace beamspread

@@ -17,6 +17,9 @@ constexpr float disks_per_octave = 4.0f;
 constexpr float disk_end_radii = 8.0f;
 constexpr float disk_first_radii = 0.125f;
 
+// Step of the chord, relative, for derivatives. Smaller: the profiles' bins and their noise show; larger: less exact.
+constexpr double derivative_step = 0.15;
+
 const std::vector<ScaledProfile>& profiles_of(const SurfaceBasis& basis, std::size_t result, std::size_t curvature)
 {
     const std::size_t medium = basis.terms.sets.results[result].medium;
@@ -53,6 +56,7 @@ PairTables::PairTables(const SurfaceBasis& basis, float min_area, float max_area
     }
     point.first = chord_step(m_first_radius);
     make_table(basis, point, 0.0f, reach);
+    make_laplacian(basis);
     make_self(basis, m_first_radius, radius_of(max_area));
 }
 
@@ -110,6 +114,38 @@ void PairTables::make_table(const SurfaceBasis& basis, ChordTable& table, float 
     });
 }
 
+void PairTables::make_laplacian(const SurfaceBasis& basis)
+{
+    laplacian.first = point.first;
+    laplacian.rows = point.rows;
+    const std::size_t lanes = blocks * lanes_per_block;
+    for (std::size_t r = 0; r < results; ++r) {
+        const std::size_t nodes = scales[r].nodes.size();
+        AlignedVector<float>& values = laplacian.values.emplace_back(point.values[r].size(), 0.0f);
+        parallel_for(nodes * point.rows, [&](std::size_t item) {
+            const std::size_t curvature = item / point.rows;
+            const std::size_t row = item % point.rows;
+            const auto c = static_cast<double>(chord_of(point.first + static_cast<std::uint32_t>(row)));
+            const std::vector<ScaledProfile>& profiles = profiles_of(basis, r, curvature);
+            for (std::size_t rank = 0; rank < profiles.size(); ++rank) {
+                const double in_paths = c / profiles[rank].mean_free_path;
+                const auto at = [&](double ratio) { return profiles[rank].profile.density(in_paths * ratio); };
+                if (c * (1.0 + derivative_step) > profiles[rank].reach)
+                    continue;
+                const Harmonics before = at(1.0 - derivative_step);
+                const Harmonics here = at(1.0);
+                const Harmonics after = at(1.0 + derivative_step);
+                for (std::size_t m = 0; m < basis.harmonics; ++m) {
+                    const double second = (before[m] - 2.0 * here[m] + after[m]) / (derivative_step * derivative_step);
+                    const double first = (after[m] - before[m]) / (2.0 * derivative_step);
+                    values[item * lanes + rank * basis.harmonics + m] = static_cast<float>(
+                        (second + first - static_cast<double>(m * m) * here[m]) * in_paths * in_paths);
+                }
+            }
+        });
+    }
+}
+
 void PairTables::make_self(const SurfaceBasis& basis, float min_radius, float max_radius)
 {
     m_self.first = chord_step(min_radius);
@@ -125,6 +161,15 @@ void PairTables::make_self(const SurfaceBasis& basis, float min_radius, float ma
                     2.0 * pi * profiles[rank].profile.cumulative(radius / profiles[rank].mean_free_path)[0]);
             }
     }
+}
+
+float PairTables::least_radius() const
+{
+    float radius = 0.0f;
+    for (const CurvatureScale& scale : scales)
+        if (scale.nodes.back() > 0.0f)
+            radius = std::max(radius, 1.0f / scale.nodes.back());
+    return radius;
 }
 
 std::size_t PairTables::disk(float area) const

@@ -60,6 +60,9 @@ public:
     // Part of its own light in the radiant exitance of a sample's middle: factors of the moments m = 0, [block][lane].
     void add_self(float area, std::size_t result, float* factors) const;
 
+    // Radius of the smallest ball whose LDFs the tables have, metres; 0 if they have planes alone.
+    float least_radius() const;
+
     std::size_t results = 0;
     std::size_t blocks = 0;
     std::vector<std::size_t> set;        // [result]
@@ -68,10 +71,12 @@ public:
     std::vector<ChordTable> disks;
     std::vector<float> disk_end;  // [disk] chord from which its light counts as a point's, metres
     ChordTable point;
+    ChordTable laplacian;  // of the functions of a point, as c^4 times e'' + e' / c - m^2 e / c^2; rows of `point`
 
 private:
     void make_scales(const SurfaceBasis& basis);
     void make_table(const SurfaceBasis& basis, ChordTable& table, float radius, float end) const;
+    void make_laplacian(const SurfaceBasis& basis);
     void make_self(const SurfaceBasis& basis, float min_radius, float max_radius);
 
     float m_first_radius = 1.0f;

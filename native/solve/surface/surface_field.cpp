@@ -18,8 +18,13 @@ namespace {
 // Rays that pass all steps together. More: more cache.
 constexpr std::size_t rays_at_once = 512;
 
-// Samples of one work item.
-constexpr std::size_t targets_at_once = 64;
+// Leaves of the tree in one work item.
+constexpr std::size_t leaves_at_once = 16;
+
+// Size of clusters over their distance at a tolerance of 1e-3, and bounds. Larger: fewer pairs, larger errors.
+constexpr double opening_at_thousandth = 0.1;
+constexpr double min_opening = 0.02;
+constexpr double max_opening = 0.3;
 
 // Largest difference of the squared length of a unit vector from 1, and of the cosine of two vectors from 0.
 constexpr float unit_tolerance = 2e-3f;
@@ -72,6 +77,13 @@ void check_memory(std::size_t bytes, std::size_t limit)
     throw MemoryLimit(text.str());
 }
 
+// The errors of a cluster grow like the third power of its size.
+float opening_for(double tolerance)
+{
+    return static_cast<float>(
+        std::clamp(opening_at_thousandth * std::cbrt(tolerance / 1e-3), min_opening, max_opening));
+}
+
 double mean_area(std::span<const SurfaceSample> samples)
 {
     double sum = 0.0;
@@ -106,11 +118,15 @@ PairTables tables_of(const SurfaceProblem& problem, const SurfaceBasis& basis)
 }  // namespace
 
 SurfaceField::SurfaceField(const SurfaceProblem& problem, Progress& progress)
-    : m_problem(problem), m_basis(checked_basis(problem)), m_tables(tables_of(problem, m_basis))
+    : m_problem(problem),
+      m_basis(checked_basis(problem)),
+      m_tables(tables_of(problem, m_basis)),
+      m_tree(problem.samples)
 {
-    check_memory(problem.samples.size() * moment_bytes(), problem.max_moment_bytes);
+    const std::size_t moments = problem.samples.size() + m_tree.nodes();
+    check_memory(moments * moment_bytes(), problem.max_moment_bytes);
     progress.advance(0.0);
-    m_moments.resize(problem.samples.size() * m_basis.moments());
+    m_moments.resize(moments * m_basis.moments());
 }
 
 void SurfaceField::set_color(const std::vector<double>& color)
@@ -189,71 +205,86 @@ void SurfaceField::clear()
 
 void SurfaceField::solve(Progress& progress, float* luminance)
 {
-    const std::size_t count = m_problem.samples.size();
-    const std::size_t channels = m_problem.channels.size();
-    const std::size_t stride = m_basis.moments();
-    const std::size_t results = m_tables.results;
-    std::fill_n(luminance, count * channels, 0.0f);
+    std::fill_n(luminance, m_problem.samples.size() * m_problem.channels.size(), 0.0f);
     m_beyond_share = 0.0;
-    if (stride == 0)
+    if (m_basis.moments() == 0)
         return;
-    std::vector<PairSource> sources;
-    for (std::size_t i = 0; i < count; ++i) {
-        const float* moments = m_moments.data() + i * stride;
-        if (std::all_of(moments, moments + stride, [](float value) { return value == 0.0f; }))
-            continue;
-        const SurfaceSample& sample = m_problem.samples[i];
-        sources.push_back({sample.position, sample.area, sample.normal,
-                           static_cast<std::uint32_t>(m_tables.disk(sample.area)), sample.tangent,
-                           static_cast<std::uint32_t>(i)});
-    }
-    const std::size_t items = (count + targets_at_once - 1) / targets_at_once;
-    std::vector<std::array<double, 2>> areas(items);  // beyond the tables, all
-    const auto solve_item = [&](std::size_t item) {
-        std::vector<float> factors(m_basis.functions());
-        const std::size_t end = std::min(count, (item + 1) * targets_at_once);
-        for (std::size_t i = item * targets_at_once; i < end; ++i) {
-            const SurfaceSample& sample = m_problem.samples[i];
-            std::array<float, 3> sums{};
-            float beyond = 0.0f;
-            // Pairs before and after the sample itself.
-            const auto self = std::lower_bound(sources.begin(), sources.end(), i,
-                                               [](const PairSource& a, std::size_t b) { return a.moments < b; });
-            const auto before = static_cast<std::size_t>(self - sources.begin());
-            const bool is_lit = self != sources.end() && self->moments == i;
-            const std::size_t after = before + (is_lit ? 1 : 0);
-            const PairTarget target{sample.position, sample.normal};
-            add_pairs(m_tables, target, sources.data(), before, m_moments.data(), stride, sums.data(), beyond);
-            add_pairs(m_tables, target, sources.data() + after, sources.size() - after, m_moments.data(), stride,
-                      sums.data(), beyond);
-            for (std::size_t r = 0; r < results; ++r) {
-                if (is_lit) {
-                    std::fill(factors.begin(), factors.end(), 0.0f);
-                    m_tables.add_self(sample.area, r, factors.data());
-                    const float* moments = m_moments.data() + i * stride + m_tables.set[r] * 2 * m_basis.functions();
-                    for (std::size_t b = 0; b < m_basis.blocks; ++b)
-                        for (std::size_t k = 0; k < lanes_per_block; ++k)
-                            sums[r] += factors[b * lanes_per_block + k] * moments[b * 2 * lanes_per_block + k];
-                }
-                for (const ChannelSets::Member& member : m_basis.terms.sets.results[r].members) {
-                    const double color = m_problem.is_colored ? 1.0 : m_color.empty() ? 0.0 : m_color[member.channel];
-                    luminance[i * channels + member.channel] = std::max(
-                        0.0f, static_cast<float>(inv_pi * member.factor * color * static_cast<double>(sums[r])));
-                }
-            }
-            areas[item][1] += static_cast<double>(sample.area);
-            if (beyond > beyond_fraction * sums[0])
-                areas[item][0] += static_cast<double>(sample.area);
-        }
-        progress.advance(1.0 / static_cast<double>(items));
-    };
-    with_threads(m_problem.threads, [&] { parallel_for(items, solve_item); });
+    // Any cluster is too near if none may be far.
+    const SurfaceTree::Opening opening{m_problem.is_direct ? 0.0f : opening_for(m_problem.tolerance),
+                                       m_tables.least_radius()};
+    const std::size_t items = (m_tree.leaves() + leaves_at_once - 1) / leaves_at_once;
+    std::vector<Areas> areas(items);
+    with_threads(m_problem.threads, [&] {
+        m_tree.gather(m_basis, m_tables, m_moments);
+        parallel_for(items, [&](std::size_t item) {
+            SurfaceTree::Sources& sources = m_sources.local();
+            const std::size_t end = std::min(m_tree.leaves(), (item + 1) * leaves_at_once);
+            for (std::size_t leaf = item * leaves_at_once; leaf < end; ++leaf)
+                solve_leaf(leaf, opening, sources, areas[item], luminance);
+            progress.advance(1.0 / static_cast<double>(items));
+        });
+    });
     double all = 0.0;
     for (const auto& [beyond, area] : areas) {
         m_beyond_share += beyond;
         all += area;
     }
     m_beyond_share /= all;
+}
+
+void SurfaceField::solve_leaf(std::size_t leaf, const SurfaceTree::Opening& opening, SurfaceTree::Sources& sources,
+                              Areas& areas, float* luminance) const
+{
+    m_tree.find(leaf, opening, m_tables.reach, sources);
+    const std::span<const PairSource> near = sources.near;
+    std::vector<float> factors(m_basis.functions());
+    std::size_t self = 0;
+    for (const std::uint32_t i : m_tree.samples_of(leaf)) {
+        const SurfaceSample& sample = m_problem.samples[i];
+        const PairTarget target{sample.position, sample.normal};
+        Exitance exitance;
+        const auto add = [&](std::span<const PairSource> pairs, bool are_clusters) {
+            add_pairs(m_tables, target, pairs, are_clusters, m_moments.data(), m_basis.moments(), exitance.sums.data(),
+                      exitance.beyond);
+        };
+        const bool is_lit = self < near.size() && near[self].moments == i;
+        add(near.first(self), false);
+        add(near.subspan(is_lit ? self + 1 : self), false);
+        add(sources.far, true);
+        if (is_lit) {
+            add_self(i, factors, exitance.sums);
+            ++self;
+        }
+        store(i, exitance, areas, luminance);
+    }
+}
+
+void SurfaceField::add_self(std::size_t sample, std::vector<float>& factors, std::array<float, 3>& sums) const
+{
+    for (std::size_t r = 0; r < m_tables.results; ++r) {
+        std::fill(factors.begin(), factors.end(), 0.0f);
+        m_tables.add_self(m_problem.samples[sample].area, r, factors.data());
+        const float* moments =
+            m_moments.data() + sample * m_basis.moments() + m_tables.set[r] * 2 * m_basis.functions();
+        for (std::size_t b = 0; b < m_basis.blocks; ++b)
+            for (std::size_t k = 0; k < lanes_per_block; ++k)
+                sums[r] += factors[b * lanes_per_block + k] * moments[b * 2 * lanes_per_block + k];
+    }
+}
+
+void SurfaceField::store(std::size_t sample, const Exitance& exitance, Areas& areas, float* luminance) const
+{
+    const std::size_t channels = m_problem.channels.size();
+    for (std::size_t r = 0; r < m_tables.results; ++r)
+        for (const ChannelSets::Member& member : m_basis.terms.sets.results[r].members) {
+            const double color = m_problem.is_colored ? 1.0 : m_color.empty() ? 0.0 : m_color[member.channel];
+            luminance[sample * channels + member.channel] = std::max(
+                0.0f, static_cast<float>(inv_pi * member.factor * color * static_cast<double>(exitance.sums[r])));
+        }
+    const auto area = static_cast<double>(m_problem.samples[sample].area);
+    areas[1] += area;
+    if (exitance.beyond > beyond_fraction * exitance.sums[0])
+        areas[0] += area;
 }
 
 }  // namespace beamspread

@@ -2,6 +2,7 @@
 // samples, each by the LDF of its own curvature.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <mutex>
 #include <optional>
@@ -15,16 +16,9 @@
 #include "solve/surface/pair_sum.h"
 #include "solve/surface/pair_tables.h"
 #include "solve/surface/surface_basis.h"
+#include "solve/surface/surface_tree.h"
 
 namespace beamspread {
-
-// Part of a surface. Its frame has x along the tangent, z along the normal, and y = cross(normal, tangent).
-struct SurfaceSample {
-    Vec3f position;  // metres, from an origin that all samples share
-    Vec3f normal;    // unit vector
-    Vec3f tangent;   // unit vector across the normal
-    float area;      // m^2
-};
 
 struct SurfaceProblem {
     std::span<const SurfaceSample> samples;
@@ -70,15 +64,29 @@ private:
         std::vector<float> values;      // [term][beam]
     };
 
+    // Light of pairs at a sample, [result], and its part by pairs that bend more than the tables.
+    struct Exitance {
+        std::array<float, 3> sums{};
+        float beyond = 0.0f;
+    };
+    // Areas: by pairs that bend more than the tables, all.
+    using Areas = std::array<double, 2>;
+
+    void solve_leaf(std::size_t leaf, const SurfaceTree::Opening& opening, SurfaceTree::Sources& sources, Areas& areas,
+                    float* luminance) const;
+    void add_self(std::size_t sample, std::vector<float>& factors, std::array<float, 3>& sums) const;
+    void store(std::size_t sample, const Exitance& exitance, Areas& areas, float* luminance) const;
     void set_color(const std::vector<double>& color);
 
     SurfaceProblem m_problem;
     SurfaceBasis m_basis;
     PairTables m_tables;
-    std::vector<float> m_moments;  // [sample] as in `SurfaceBasis`
+    SurfaceTree m_tree;
+    std::vector<float> m_moments;  // [sample], then [node of the tree], as in `SurfaceBasis`
     std::vector<double> m_color;   // of all light, if channels are proportional
     std::mutex m_color_lock;
     PerThread<Scratch> m_scratch;
+    PerThread<SurfaceTree::Sources> m_sources;
     double m_beyond_share = 0.0;
 };
 

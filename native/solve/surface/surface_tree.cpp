@@ -1,0 +1,325 @@
+#include "solve/surface/surface_tree.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "base/constants.h"
+#include "base/threads.h"
+
+namespace beamspread {
+
+namespace {
+
+// Samples of a leaf, at most. They share their sources. More: fewer searches, more pairs.
+constexpr std::size_t leaf_size = 8;
+
+// Bits of a position along each axis in its code, and of the side that its normal faces.
+constexpr int axis_bits = 20;
+
+// Weight of the variance of a cluster's normals beside the squared size over the distance. More: smaller errors where a
+// surface bends, more pairs.
+constexpr float normal_weight = 3.0f;
+
+// Mean squared distance of the points of a sample, a disk, from its middle, over its area.
+constexpr float sample_spread = 0.5f * static_cast<float>(inv_pi);
+
+// Largest radius of a cluster over its distance. More: fewer pairs, larger errors near large clusters.
+constexpr float max_radius = 0.7f;
+
+// The bits of a number, three apart.
+std::uint64_t spread_bits(std::uint64_t x)
+{
+    x = (x | x << 32) & 0x1f00000000ffffULL;
+    x = (x | x << 16) & 0x1f0000ff0000ffULL;
+    x = (x | x << 8) & 0x100f00f00f00f00fULL;
+    x = (x | x << 4) & 0x10c30c30c30c30c3ULL;
+    return (x | x << 2) & 0x1249249249249249ULL;
+}
+
+// The axis that a normal is closest to, 0 to 5. Faces back to back are far apart in the tree, however near they are in
+// space.
+std::uint64_t side_of(const Vec3f& normal)
+{
+    const Vec3f size = glm::abs(normal);
+    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    return static_cast<std::uint64_t>(2 * axis + (normal[axis] < 0.0f ? 1 : 0));
+}
+
+std::vector<std::uint64_t> codes_of(std::span<const SurfaceSample> samples)
+{
+    Vec3f low(std::numeric_limits<float>::infinity());
+    Vec3f high = -low;
+    for (const SurfaceSample& sample : samples) {
+        low = glm::min(low, sample.position);
+        high = glm::max(high, sample.position);
+    }
+    const Vec3f size = high - low;
+    const float side = std::max({size.x, size.y, size.z, std::numeric_limits<float>::min()});
+    const float scale = static_cast<float>((1 << axis_bits) - 1) / side;
+    std::vector<std::uint64_t> codes;
+    codes.reserve(samples.size());
+    for (const SurfaceSample& sample : samples) {
+        std::uint64_t code = 0;
+        for (int axis = 0; axis < 3; ++axis)
+            code |= spread_bits(static_cast<std::uint64_t>((sample.position[axis] - low[axis]) * scale)) << axis;
+        codes.push_back(side_of(sample.normal) << (3 * axis_bits) | code);
+    }
+    return codes;
+}
+
+// A unit vector across a normal, which need not be a unit vector.
+Vec3f across(const Vec3f& normal)
+{
+    const Vec3f unit = glm::normalize(normal);
+    const Vec3f axis = std::abs(unit.z) < 0.7f ? Vec3f(0.0f, 0.0f, 1.0f) : Vec3f(1.0f, 0.0f, 0.0f);
+    return glm::normalize(axis - unit * glm::dot(axis, unit));
+}
+
+// Cosine and sine of the angle from the x axis of one frame to that of another, which is turned into the former's plane
+// along the shortest way.
+std::array<float, 2> turn(const PairSource& to, const PairSource& from)
+{
+    const Vec3f z = glm::cross(to.tangent, to.binormal);
+    const Vec3f from_z = glm::cross(from.tangent, from.binormal);
+    // Turn v by the rotation that takes from_z to z: v - (v . z) (z + from_z) / (1 + z . from_z), for v across from_z.
+    const Vec3f turned =
+        from.tangent - (z + from_z) * (glm::dot(from.tangent, z) / std::max(1.0f + glm::dot(z, from_z), 1e-3f));
+    const float x = glm::dot(turned, to.tangent);
+    const float y = glm::dot(turned, to.binormal);
+    const float length = std::sqrt(x * x + y * y);
+    return length > 0.0f ? std::array{x / length, y / length} : std::array{1.0f, 0.0f};
+}
+
+// Adds moments times a factor, turned from one frame to another.
+void add_turned(const SurfaceBasis& basis, const std::array<float, 2>& turned, float factor, const float* from,
+                float* to)
+{
+    std::array<float, lanes_per_block> cosines;
+    std::array<float, lanes_per_block> sines;
+    float c = factor;
+    float s = 0.0f;
+    for (std::size_t m = 0; m < basis.harmonics; ++m) {
+        for (std::size_t lane = m; lane < lanes_per_block; lane += basis.harmonics) {
+            cosines[lane] = c;
+            sines[lane] = s;
+        }
+        const float next = c * turned[0] - s * turned[1];
+        s = s * turned[0] + c * turned[1];
+        c = next;
+    }
+    for (std::size_t block = 0; block < basis.moments() / (2 * lanes_per_block); ++block) {
+        const float* from_sine = from + lanes_per_block;
+        float* to_sine = to + lanes_per_block;
+        for (std::size_t lane = 0; lane < lanes_per_block; ++lane) {
+            to[lane] += cosines[lane] * from[lane] - sines[lane] * from_sine[lane];
+            to_sine[lane] += cosines[lane] * from_sine[lane] + sines[lane] * from[lane];
+        }
+        from += 2 * lanes_per_block;
+        to += 2 * lanes_per_block;
+    }
+}
+
+void set_frame(const Vec3f& normal, PairSource& cluster)
+{
+    cluster.normal = normal;
+    cluster.tangent = across(normal);
+    cluster.binormal = glm::cross(glm::normalize(normal), cluster.tangent);
+}
+
+}  // namespace
+
+SurfaceTree::SurfaceTree(std::span<const SurfaceSample> samples)
+    : m_samples(samples), m_order(samples.size()), m_weights(samples.size()), m_disks(samples.size())
+{
+    const std::vector<std::uint64_t> codes = codes_of(samples);
+    std::iota(m_order.begin(), m_order.end(), 0u);
+    std::sort(m_order.begin(), m_order.end(),
+              [&](std::uint32_t a, std::uint32_t b) { return codes[a] != codes[b] ? codes[a] < codes[b] : a < b; });
+    for (const std::uint32_t sample : m_order)
+        m_codes.push_back(codes[sample]);
+    build(0, samples.size());
+    m_codes = {};
+}
+
+std::uint32_t SurfaceTree::build(std::size_t begin, std::size_t end)
+{
+    const auto number = static_cast<std::uint32_t>(m_nodes.size());
+    Node node;
+    node.begin = static_cast<std::uint32_t>(begin);
+    node.end = static_cast<std::uint32_t>(end);
+    Vec3f low(std::numeric_limits<float>::infinity());
+    Vec3f high = -low;
+    for (std::size_t i = begin; i < end; ++i) {
+        low = glm::min(low, m_samples[m_order[i]].position);
+        high = glm::max(high, m_samples[m_order[i]].position);
+    }
+    node.middle = 0.5f * (low + high);
+    node.radius = 0.5f * glm::length(high - low);
+    m_nodes.push_back(node);
+    if (end - begin <= leaf_size) {
+        m_leaves.push_back(number);
+        return number;
+    }
+    // Part the samples where the first bit changes in which their codes differ; equal codes in the middle.
+    const std::uint64_t differing = m_codes[begin] ^ m_codes[end - 1];
+    std::size_t middle = begin + (end - begin) / 2;
+    if (differing != 0) {
+        const std::uint64_t bit = std::bit_floor(differing);
+        const auto first = m_codes.begin() + static_cast<std::ptrdiff_t>(begin);
+        const auto last = m_codes.begin() + static_cast<std::ptrdiff_t>(end);
+        middle = static_cast<std::size_t>(
+            std::partition_point(first, last, [bit](std::uint64_t code) { return (code & bit) == 0; }) -
+            m_codes.begin());
+    }
+    build(begin, middle);
+    m_nodes[number].second = build(middle, end);
+    return number;
+}
+
+void SurfaceTree::gather(const SurfaceBasis& basis, const PairTables& tables, std::vector<float>& moments)
+{
+    const std::size_t stride = basis.moments();
+    const std::size_t count = m_samples.size();
+    constexpr std::size_t at_once = 1024;
+    parallel_for(count / at_once + 1, [&](std::size_t item) {
+        for (std::size_t i = item * at_once; i < std::min(count, (item + 1) * at_once); ++i) {
+            const float* first = moments.data() + i * stride;
+            const bool is_lit = std::any_of(first, first + stride, [](float value) { return value != 0.0f; });
+            float light = 0.0f;
+            for (std::size_t set = 0; set < basis.terms.sets.count(); ++set)
+                light += std::abs(first[set * 2 * basis.functions()]);
+            m_weights[i] = is_lit ? std::max(light * m_samples[i].area, std::numeric_limits<float>::min()) : 0.0f;
+            m_disks[i] = static_cast<std::uint32_t>(tables.disk(m_samples[i].area));
+        }
+    });
+    const auto sums_of = [&](std::size_t node) { return moments.data() + (count + node) * stride; };
+    std::fill(moments.begin() + static_cast<std::ptrdiff_t>(count * stride), moments.end(), 0.0f);
+    parallel_for(m_leaves.size() / at_once + 1, [&](std::size_t item) {
+        for (std::size_t i = item * at_once; i < std::min(m_leaves.size(), (item + 1) * at_once); ++i)
+            gather_leaf(basis, moments, m_nodes[m_leaves[i]], sums_of(m_leaves[i]));
+    });
+    for (std::size_t node = m_nodes.size(); node-- > 0;)
+        if (m_nodes[node].second != 0)
+            gather_children(basis, moments, m_nodes[node], sums_of(node));
+    for (std::size_t node = 0; node < m_nodes.size(); ++node)
+        m_nodes[node].cluster.moments = static_cast<std::uint32_t>(count + node);
+}
+
+void SurfaceTree::gather_leaf(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums)
+{
+    const auto samples = std::span(m_order).subspan(node.begin, node.end - node.begin);
+    Vec3f position(0.0f);
+    Vec3f normal(0.0f);
+    node.weight = 0.0f;
+    for (const std::uint32_t i : samples) {
+        node.weight += m_weights[i];
+        position += m_weights[i] * (m_samples[i].position - node.middle);
+        normal += m_weights[i] * m_samples[i].normal;
+    }
+    if (node.weight == 0.0f)
+        return;
+    PairSource& cluster = node.cluster;
+    cluster.area = 1.0f;
+    cluster.position = node.middle + position / node.weight;
+    set_frame(normal / node.weight, cluster);
+    float square = 0.0f;
+    node.light_radius = 0.0f;
+    for (const std::uint32_t i : samples) {
+        if (m_weights[i] == 0.0f)
+            continue;
+        const SurfaceSample& sample = m_samples[i];
+        const Vec3f offset = sample.position - cluster.position;
+        square += m_weights[i] * (glm::dot(offset, offset) + sample.area * sample_spread);
+        node.light_radius = std::max(node.light_radius, glm::length(offset));
+        add_turned(basis, turn(cluster, sample.as_source(0, 0)), sample.area, moments.data() + i * basis.moments(),
+                   sums);
+    }
+    cluster.spread = 0.25f * square / node.weight;
+}
+
+void SurfaceTree::gather_children(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums)
+{
+    const std::array<std::size_t, 2> children = {static_cast<std::size_t>(&node - m_nodes.data()) + 1, node.second};
+    Vec3f position(0.0f);
+    Vec3f normal(0.0f);
+    node.weight = 0.0f;
+    for (const std::size_t number : children) {
+        const Node& child = m_nodes[number];
+        if (child.weight == 0.0f)
+            continue;
+        node.weight += child.weight;
+        position += child.weight * (child.cluster.position - node.middle);
+        normal += child.weight * child.cluster.normal;
+    }
+    if (node.weight == 0.0f)
+        return;
+    PairSource& cluster = node.cluster;
+    cluster.area = 1.0f;
+    cluster.position = node.middle + position / node.weight;
+    set_frame(normal / node.weight, cluster);
+    float spread = 0.0f;
+    node.light_radius = 0.0f;
+    for (const std::size_t number : children) {
+        const Node& child = m_nodes[number];
+        if (child.weight == 0.0f)
+            continue;
+        const Vec3f offset = child.cluster.position - cluster.position;
+        spread += child.weight * (child.cluster.spread + 0.25f * glm::dot(offset, offset));
+        node.light_radius = std::max(node.light_radius, glm::length(offset) + child.light_radius);
+        add_turned(basis, turn(cluster, child.cluster), 1.0f,
+                   moments.data() + (m_samples.size() + number) * basis.moments(), sums);
+    }
+    cluster.spread = spread / node.weight;
+}
+
+void SurfaceTree::add_near(const Node& node, std::vector<PairSource>& near) const
+{
+    for (std::size_t i = node.begin; i < node.end; ++i)
+        if (const std::uint32_t sample = m_order[i]; m_weights[sample] > 0.0f)
+            near.push_back(m_samples[sample].as_source(m_disks[sample], sample));
+}
+
+bool SurfaceTree::is_far(const Node& node, float distance, const Opening& opening)
+{
+    if (distance <= 0.0f || node.light_radius > max_radius * distance)
+        return false;
+    // Kernels change with the curvature over about 1 / chord and 1 / `radius`, and normals change the curvature by their
+    // difference over the chord.
+    const float scale = std::min(1.0f, opening.radius / distance);
+    const float variance = 1.0f - glm::dot(node.cluster.normal, node.cluster.normal);
+    const float size = 4.0f * node.cluster.spread / (distance * distance);
+    return size + normal_weight * variance * scale * scale <= opening.size * opening.size;
+}
+
+void SurfaceTree::find(std::size_t leaf, const Opening& opening, float reach, Sources& sources) const
+{
+    sources.near.clear();
+    sources.far.clear();
+    const Node& target = m_nodes[m_leaves[leaf]];
+    add_near(target, sources.near);
+    sources.waiting.assign(1, 0);
+    while (!sources.waiting.empty()) {
+        const std::uint32_t number = sources.waiting.back();
+        sources.waiting.pop_back();
+        const Node& node = m_nodes[number];
+        if (node.weight == 0.0f || number == m_leaves[leaf])
+            continue;
+        const float distance = glm::length(node.cluster.position - target.middle) - target.radius;
+        if (distance - node.light_radius > reach)
+            continue;
+        if (is_far(node, distance, opening)) {
+            sources.far.push_back(node.cluster);
+        } else if (node.second == 0) {
+            add_near(node, sources.near);
+        } else {
+            sources.waiting.push_back(node.second);
+            sources.waiting.push_back(number + 1);
+        }
+    }
+}
+
+}  // namespace beamspread

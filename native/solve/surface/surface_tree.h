@@ -1,0 +1,92 @@
+// Tree over the samples of a surface: light from far away comes from clusters of samples.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/vec.h"
+#include "solve/surface/pair_sum.h"
+#include "solve/surface/surface_basis.h"
+
+namespace beamspread {
+
+// Part of a surface. Its frame has x along the tangent, z along the normal, and y = cross(normal, tangent).
+struct SurfaceSample {
+    Vec3f position;  // metres, from an origin that all samples share
+    Vec3f normal;    // unit vector
+    Vec3f tangent;   // unit vector across the normal
+    float area;      // m^2
+
+    PairSource as_source(std::uint32_t disk, std::uint32_t moments) const
+    {
+        return {position, area, normal, disk, tangent, moments, glm::cross(normal, tangent), 0.0f};
+    }
+};
+
+class SurfaceTree {
+public:
+    // Views the samples, which must outlive the tree.
+    explicit SurfaceTree(std::span<const SurfaceSample> samples);
+
+    // Number of nodes, which need moments besides those of the samples.
+    std::size_t nodes() const { return m_nodes.size(); }
+    std::size_t leaves() const { return m_leaves.size(); }
+
+    // Numbers of a leaf's samples.
+    std::span<const std::uint32_t> samples_of(std::size_t leaf) const
+    {
+        const Node& node = m_nodes[m_leaves[leaf]];
+        return std::span(m_order).subspan(node.begin, node.end - node.begin);
+    }
+
+    // Gathers the light of all samples in clusters. `moments`: [sample], then [node], as in `SurfaceBasis`; those of
+    // nodes are written.
+    void gather(const SurfaceBasis& basis, const PairTables& tables, std::vector<float>& moments);
+
+    // Light that reaches a leaf.
+    struct Sources {
+        std::vector<PairSource> near;  // samples; lit ones of the leaf itself come first, in their order
+        std::vector<PairSource> far;   // clusters
+        std::vector<std::uint32_t> waiting;  // working memory
+    };
+
+    // Decides which clusters are far: those whose light lies within `size` times their distance, root mean square.
+    // `radius` is the smallest of a ball whose LDF is known, metres.
+    struct Opening {
+        float size = 0.0f;
+        float radius = 0.0f;
+    };
+
+    // Finds the sources of a leaf; light from beyond `reach` (metres) is left out.
+    void find(std::size_t leaf, const Opening& opening, float reach, Sources& sources) const;
+
+private:
+    struct Node {
+        std::uint32_t begin = 0;  // its samples, in the tree's order
+        std::uint32_t end = 0;
+        std::uint32_t second = 0;  // its second child; the first one follows the node. 0: a leaf
+        float radius = 0.0f;       // of the samples around their middle, metres
+        Vec3f middle{0.0f};
+        float light_radius = 0.0f;  // of the lit samples around the cluster's position
+        float weight = 0.0f;        // of its light; 0: dark
+        PairSource cluster{};
+    };
+
+    static bool is_far(const Node& node, float distance, const Opening& opening);
+    std::uint32_t build(std::size_t begin, std::size_t end);
+    void gather_leaf(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums);
+    void gather_children(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums);
+    void add_near(const Node& node, std::vector<PairSource>& near) const;
+
+    std::span<const SurfaceSample> m_samples;
+    std::vector<std::uint64_t> m_codes;  // of `m_order`
+    std::vector<std::uint32_t> m_order;  // numbers of the samples
+    std::vector<Node> m_nodes;  // parents come before their children
+    std::vector<std::uint32_t> m_leaves;
+    std::vector<float> m_weights;       // [sample] of its light; 0: dark
+    std::vector<std::uint32_t> m_disks;  // [sample]
+};
+
+}  // namespace beamspread
