@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
+#include "base/error.h"
 #include "base/threads.h"
+#include "scene/bent_nodes.h"
 #include "simd/loops.h"
 
 namespace beamspread {
@@ -93,6 +96,21 @@ FieldLight::FieldLight(const float* radiance, std::size_t rows, std::size_t colu
     m_position = position;
 }
 
+FieldLight::FieldLight(const float* radiance, NodeCloud nodes, std::span<const Lobe> lobes)
+    : m_lobes(lobes.begin(), lobes.end()),
+      m_cloud(std::move(nodes)),
+      m_cloud_irradiance(m_cloud->size() * lobes.size()),
+      m_cloud_is_lit(m_cloud->size())
+{
+    for (std::size_t i = 0; i < m_cloud->size(); ++i)
+        for (std::size_t k = 0; k < lobes.size(); ++k) {
+            const float* value = radiance + 3 * (k * m_cloud->size() + i);
+            const Vec3f light(value[0], value[1], value[2]);
+            m_cloud_irradiance[i * lobes.size() + k] = light * lobes[k].solid_angle;
+            m_cloud_is_lit[i] |= light != Vec3f(0.0f);
+        }
+}
+
 Directions FieldLight::directions(std::size_t lobe) const
 {
     if (m_position)
@@ -102,6 +120,12 @@ Directions FieldLight::directions(std::size_t lobe) const
 
 void FieldLight::gather(const ReceiverGrid& grid, int threads, bool all, RaySink& sink, Progress& progress) const
 {
+    if (grid.is_bent() != m_cloud.has_value())
+        reject("light", m_cloud ? "at the nodes of a mesh" : "at nodes of a plane", "nodes like the surface");
+    if (m_cloud) {
+        gather_bent(grid, threads, sink, progress);
+        return;
+    }
     const NodeSpline nodes = spline(grid);
     const auto [top, bottom] = all ? std::pair(grid.height, grid.height) : nodes.inner_rows();
     const auto [left, right] = all ? std::pair(grid.width, grid.width) : nodes.inner_columns();
@@ -114,6 +138,53 @@ void FieldLight::gather(const ReceiverGrid& grid, int threads, bool all, RaySink
             gather_part(grid, nodes, {y, 0, left}, rows.local(), sink);
             gather_part(grid, nodes, {y, right, grid.width - right}, rows.local(), sink);
         }
+        progress.advance(1.0);
+    };
+    with_threads(threads, [&] { parallel_for(grid.height, gather_row); });
+    progress.finish();
+}
+
+// Light at a texel is the mean of the nodes around it.
+void FieldLight::gather_bent(const ReceiverGrid& grid, int threads, RaySink& sink, Progress& progress) const
+{
+    struct Scratch {
+        NodeCloud::Weights weights;
+        std::vector<Vec3f> irradiance, travel;  // [lobe][texel]
+    };
+    PerThread<Scratch> scratches;
+    const std::size_t count = m_lobes.size();
+    const auto gather_texel = [&](std::size_t y, std::size_t x, Scratch& scratch) {
+        const BentTexel& texel = grid.bent_texel(y * grid.width + x);
+        if (!texel.is_inside())
+            return;
+        const Vec3 normal(texel.normal);
+        m_cloud->find(texel.position, normal, node_reach * m_cloud->spacing(), scratch.weights);
+        float lit = 0.0f;
+        for (const auto& [node, weight] : scratch.weights) {
+            lit += m_cloud_is_lit[node] ? weight : 0.0f;
+            for (std::size_t k = 0; k < count; ++k)
+                scratch.irradiance[k * grid.width + x] += weight * m_cloud_irradiance[node * count + k];
+        }
+        const float factor = 1.0f / std::max(lit, min_lit_fraction);
+        const FieldFrame frame(normal);
+        for (std::size_t k = 0; k < count; ++k) {
+            scratch.irradiance[k * grid.width + x] *= factor;
+            scratch.travel[k * grid.width + x] = Vec3f(texel.to_tangent(frame.to_world(Vec3(m_lobes[k].travel))));
+        }
+    };
+    progress.set_total(static_cast<double>(grid.height));
+    const auto gather_row = [&](std::size_t y) {
+        Scratch& scratch = scratches.local();
+        scratch.irradiance.assign(count * grid.width, Vec3f(0.0f));
+        scratch.travel.assign(count * grid.width, Vec3f(0.0f, 0.0f, -1.0f));
+        for (std::size_t x = 0; x < grid.width; ++x)
+            gather_texel(y, x, scratch);
+        for (std::size_t k = 0; k < count; ++k)
+            sink.add({.sample = y * grid.width,
+                      .count = grid.width,
+                      .ray = k,
+                      .travel = &scratch.travel[k * grid.width],
+                      .irradiance = &scratch.irradiance[k * grid.width]});
         progress.advance(1.0);
     };
     with_threads(threads, [&] { parallel_for(grid.height, gather_row); });

@@ -63,6 +63,30 @@ HeldSurface surface_of(const ReceiverGrid& grid, const py::object& coverage, dou
     return held;
 }
 
+std::vector<Lobe> lobes_of(const py::object& directions, const Array<float>& solid_angles)
+{
+    const auto travel = py::cast<Array<float>>(directions);
+    if (travel.ndim() != 2 || travel.shape(0) != solid_angles.size() || travel.shape(1) != 3)
+        reject("directions", shape_text(travel), "(K, 3)");
+    std::vector<Lobe> lobes;
+    for (py::ssize_t i = 0; i < travel.shape(0); ++i)
+        lobes.push_back({{travel.at(i, 0), travel.at(i, 1), travel.at(i, 2)}, solid_angles.at(i)});
+    return lobes;
+}
+
+// Light at the nodes of a mesh that bends.
+FieldLight cloud_light(const Array<float>& radiance, const Array<float>& solid_angles, const py::object& directions,
+                       const py::array& positions, const py::array& normals, double spacing)
+{
+    const auto places = to_rows<Vec3, double>("positions", positions, "contiguous float64 (N, 3)");
+    const auto upward = to_rows<Vec3, double>("normals", normals, "contiguous float64 (N, 3)");
+    if (radiance.ndim() != 3 || side(radiance, 0) != side(solid_angles, 0) || side(radiance, 1) != places.size() ||
+        radiance.shape(2) != 3)
+        reject("radiance", shape_text(radiance), "(K, N, 3), with K solid angles and N positions");
+    return {radiance.data(), NodeCloud({places.begin(), places.end()}, {upward.begin(), upward.end()}, spacing),
+            lobes_of(directions, solid_angles)};
+}
+
 FieldLight field_light(const Array<float>& radiance, const Array<float>& solid_angles, const py::object& directions,
                        const py::object& position)
 {
@@ -76,13 +100,7 @@ FieldLight field_light(const Array<float>& radiance, const Array<float>& solid_a
             reject("radiance", shape_text(radiance), "one part for light from a position");
         return {radiance.data(), rows, columns, solid_angles.at(0), to_vec3("position", py::cast<Numbers>(position))};
     }
-    const auto travel = py::cast<Array<float>>(directions);
-    if (travel.ndim() != 2 || travel.shape(0) != radiance.shape(0) || travel.shape(1) != 3)
-        reject("directions", shape_text(travel), "(K, 3)");
-    std::vector<Lobe> lobes;
-    for (py::ssize_t i = 0; i < travel.shape(0); ++i)
-        lobes.push_back({{travel.at(i, 0), travel.at(i, 1), travel.at(i, 2)}, solid_angles.at(i)});
-    return {radiance.data(), rows, columns, lobes};
+    return {radiance.data(), rows, columns, lobes_of(directions, solid_angles)};
 }
 
 SurfaceLight light_of(const LightTuple& tuple)
@@ -244,7 +262,9 @@ mirrored : float
         .def(py::init(&surface_of), py::arg("grid"), py::arg("coverage") = py::none(), py::arg("clearance") = 0.0,
              py::arg("color_in") = py::none(), py::arg("color_out") = py::none(), py::arg("mirrored") = 0.0);
 
-    py::class_<FieldLight>(m, "FieldLight", R"(Light that was computed elsewhere, at nodes evenly spread over a plane.
+    py::class_<FieldLight>(
+        m, "FieldLight",
+        R"(Light that was computed elsewhere, at nodes evenly spread over a plane; `on_mesh` makes it for meshes that bend.
 
 Parameters
 ----------
@@ -259,7 +279,34 @@ position : 3 floats, optional
     in the plane's frame, z > 0.
 )")
         .def(py::init(&field_light), py::arg("radiance"), py::arg("solid_angles"), py::arg("directions") = py::none(),
-             py::arg("position") = py::none());
+             py::arg("position") = py::none())
+        .def_static(
+            "on_mesh", &cloud_light, py::arg("radiance"), py::arg("solid_angles"), py::arg("directions"),
+            py::arg("positions"), py::arg("normals"), py::arg("spacing"),
+            R"(Light that was computed at nodes of a mesh that bends, such as `BentNodes`, for surfaces that bend.
+
+Parameters
+----------
+radiance : ndarray, float32, shape (K, N, 3)
+    Mean radiance of K parts of the hemisphere at each node, W/(m^2 sr), 0 or more. Copied.
+solid_angles : ndarray, float32, shape (K,)
+    Irradiance over radiance of each part, sr.
+directions : ndarray, float32, shape (K, 3)
+    Unit vectors of travel in the frame of each node (`BentNodes`), z < 0.
+positions, normals : ndarray, float64, shape (N, 3), C-contiguous
+    World positions, metres, and unit normals of the nodes.
+spacing : float
+    Distance of neighbors, about, metres: texels take the light of nodes of like normals within twice that distance.
+
+Returns
+-------
+FieldLight
+
+Raises
+------
+ValueError
+    An argument is out of range; the message names it.
+)");
 
     m.def("bake_luminance", &luminance, py::arg("surfaces"), py::arg("lights"), py::arg("ldf"), py::arg("albedo"),
           py::arg("mean_free_path"), py::arg("solver") = "fft", py::arg("tolerance") = 5e-3, py::arg("samples") = 4,

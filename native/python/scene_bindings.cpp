@@ -133,15 +133,34 @@ NodeGrid node_grid(const py::dict& grid)
             .rows = nodes[1]};
 }
 
-py::dict bounced_light(const std::vector<py::dict>& grids, const Numbers& strata,
+// Positions or normals of nodes, (N, 3).
+Array<double> node_vectors(const std::vector<Vec3>& vectors)
+{
+    return to_array<double>(std::vector<Vec3>(vectors), {vectors.size(), std::size_t{3}});
+}
+
+// Radiance (K, N, 3) at the nodes of a mesh.
+Array<float> without_repeats(const std::vector<Vec3f>& radiance, const NodeGrid& grid)
+{
+    const std::size_t parts = radiance.size() / grid.nodes();
+    std::vector<Vec3f> at_nodes;
+    for (std::size_t k = 0; k < parts; ++k) {
+        const auto first = radiance.begin() + static_cast<std::ptrdiff_t>(k * grid.nodes());
+        at_nodes.insert(at_nodes.end(), first, first + static_cast<std::ptrdiff_t>(grid.different()));
+    }
+    return to_array<float>(std::move(at_nodes), {parts, grid.different(), std::size_t{3}});
+}
+
+py::dict bounced_light(const std::vector<py::object>& grids, const Numbers& strata,
                        const std::vector<std::tuple<const Light*, Numbers, const Occluders*>>& lights,
                        const Occluders* occluders, double direct, double tolerance,
                        const std::variant<int, std::array<int, 3>>& max_bounces, std::uint32_t seed, int threads,
                        const py::object& callback, double spread, int max_samples)
 {
     std::vector<NodeGrid> node_grids;
-    for (const py::dict& grid : grids)
-        node_grids.push_back(node_grid(grid));
+    for (const py::object& grid : grids)
+        node_grids.push_back(py::isinstance<BentNodes>(grid) ? NodeGrid::of(py::cast<const BentNodes&>(grid))
+                                                             : node_grid(py::cast<py::dict>(grid)));
     if (strata.ndim() != 2 || strata.shape(1) != 4 || strata.shape(0) < 1)
         reject("strata", shape_text(strata), "(K, 4) numbers");
     std::vector<Stratum> parts;
@@ -166,9 +185,14 @@ py::dict bounced_light(const std::vector<py::dict>& grids, const Numbers& strata
         light = trace_bounced_light(node_grids, parts, scene_lights, occluders, settings, progress);
     }
     py::list radiance;
-    for (std::size_t n = 0; n < node_grids.size(); ++n)
-        radiance.append(to_array<float>(std::move(light.radiance[n]),
-                                        {parts.size(), node_grids[n].rows, node_grids[n].columns, std::size_t{3}}));
+    for (std::size_t n = 0; n < node_grids.size(); ++n) {
+        const NodeGrid& grid = node_grids[n];
+        if (grid.bent)
+            radiance.append(without_repeats(light.radiance[n], grid));
+        else
+            radiance.append(
+                to_array<float>(std::move(light.radiance[n]), {parts.size(), grid.rows, grid.columns, std::size_t{3}}));
+    }
     py::dict result;
     result["radiance"] = radiance;
     result["irradiance"] = light.irradiance;
@@ -242,6 +266,39 @@ ValueError
 )")
         .def_property_readonly(
             "is_bent", [](const ReceiverGrid& grid) { return grid.is_bent(); }, "bool: True if `bent` made the grid.");
+
+    py::class_<BentNodes>(m, "BentNodes", R"(Coarse nodes of a mesh that bends, for light that surfaces reflect to it.
+
+Each node is a group of texels of like place and normal; paths start from one of them. Directions at a node, and at each
+texel, are in a frame that changes smoothly with the normal n: x = (1 - n.x^2 a, b, -n.x), y = (b, 1 - n.y^2 a, -n.y) and n,
+with a = 1 / (1 + n.z) and b = -n.x n.y a.
+
+Parameters
+----------
+grid : ReceiverGrid
+    Of `ReceiverGrid.bent`.
+count : int
+    Number of nodes, about.
+
+Raises
+------
+ValueError
+    The grid is a plane or without texels, or `count` is below 1.
+)")
+        .def(py::init([](const ReceiverGrid& grid, std::size_t count) {
+                 const py::gil_scoped_release released;
+                 return std::make_unique<BentNodes>(grid, count);
+             }),
+             py::arg("grid"), py::arg("count"))
+        .def_property_readonly(
+            "positions", [](const BentNodes& nodes) { return node_vectors(nodes.cloud().positions()); },
+            "ndarray, float64, shape (N, 3): world, metres.")
+        .def_property_readonly(
+            "normals", [](const BentNodes& nodes) { return node_vectors(nodes.cloud().normals()); },
+            "ndarray, float64, shape (N, 3): unit vectors.")
+        .def_property_readonly(
+            "spacing", [](const BentNodes& nodes) { return nodes.cloud().spacing(); },
+            "float: distance of neighbors, about, metres.");
 
     bind_lights(m);
     m.def("coverage", &coverage, py::arg("corners"), py::arg("corner_counts"), py::arg("width"), py::arg("height"),
@@ -325,9 +382,9 @@ Cancelled
 
 Parameters
 ----------
-grids : list of dict
+grids : list of dict or BentNodes
     Rectangles of nodes above the receivers: 'corner', 'x_axis', 'y_axis', 'normal' (3 floats each, world, metres), 'size'
-    (2 floats, metres) and 'nodes' (columns, rows).
+    (2 floats, metres) and 'nodes' (columns, rows); or the nodes of meshes that bend.
 strata : array of float, shape (K, 4)
     Parts of the hemisphere: begin and extent of the squared sine, and of the azimuth over 2 pi.
 lights : list of (Light, 3 floats, Occluders or None)
@@ -355,6 +412,7 @@ Returns
 -------
 dict
     'radiance': float32 (K, rows, columns, 3) for each grid, mean over each part weighted by the cosine, W/(m^2 sr);
+    (K, N, 3) for the N nodes of a mesh;
     'irradiance': its mean, W/m^2; 'noise': root mean square error of the irradiance after that averaging and the spline
     between nodes, relative to direct and bounced irradiance; 'paths': number of paths.
 

@@ -34,6 +34,9 @@ constexpr float mostly_visible = 0.5f;
 // Largest number of samples of a round: it bounds the work between two estimates of the noise.
 constexpr std::size_t max_round = 64;
 
+// Nodes of a mesh that bends whose paths are traced together.
+constexpr std::size_t bent_columns = 64;
+
 // Number of points in a block of the sequence of each node.
 constexpr std::size_t block = 1024;
 
@@ -121,7 +124,23 @@ private:
         place.y = random.uniform();
         Vec2 at(random.uniform(), 0.0);
         at.y = random.uniform();
-        wave.start(point(grid, place * grid.size), to_world(grid, cosine_hemisphere(at)), 0, random);
+        const Vec2 nodes(static_cast<double>(grid.columns), static_cast<double>(grid.rows));
+        if (grid.bent)
+            start_bent(grid, glm::floor(place * nodes), glm::fract(place.x * nodes.x), cosine_hemisphere(at), 0, random,
+                       wave);
+        else
+            wave.start(point(grid, place * grid.size), to_world(grid, cosine_hemisphere(at)), 0, random);
+    }
+
+    // Starts a path at a node of a mesh, at `place` among its texels.
+    static void start_bent(const NodeGrid& grid, const Vec2& column_and_row, double place, const Vec3& local,
+                           std::uint32_t slot, const Random& random, PathWave& wave)
+    {
+        const auto column = static_cast<std::size_t>(column_and_row.x);
+        const auto row = static_cast<std::size_t>(column_and_row.y);
+        const std::size_t node = std::min(row * grid.columns + column, grid.bent->size() - 1);
+        const BentNodes::Start start = grid.bent->start(node, place);
+        wave.start(start.origin, start.frame.to_world(local), slot, random);
     }
 
     std::vector<GuideRecord> learn_by_paths(int lesson, std::size_t item) const
@@ -178,11 +197,16 @@ private:
                 const Vec2& place = places[i * radiance.size() + slot];
                 const Vec3 local = cosine_hemisphere(
                     {stratum.begin + place.x * stratum.extent, stratum.turn + place.y * stratum.part});
-                const Vec2 within = (Vec2(slot % grid.columns, at.row) + positions[i * radiance.size() + slot]) * pitch;
+                const Vec2& position = positions[i * radiance.size() + slot];
                 const std::uint64_t stream = (m_samples + i) * 2 + half;
                 const std::uint64_t item = (std::uint64_t{at.grid} << 48) + at.row * radiance.size() + slot;
-                wave.start(point(grid, within), to_world(grid, local), static_cast<std::uint32_t>(slot),
-                           Random(m_settings.seed, stream, item));
+                const Random random(m_settings.seed, stream, item);
+                const auto numbered = static_cast<std::uint32_t>(slot);
+                const Vec2 node(slot % grid.columns, at.row);
+                if (grid.bent)
+                    start_bent(grid, node, position.x, local, numbered, random, wave);
+                else
+                    wave.start(point(grid, (node + position) * pitch), to_world(grid, local), numbered, random);
             }
             wave.trace(radiance);
         }
@@ -220,6 +244,15 @@ struct Estimate {
     double error = 0.0;  // root mean square, W/m^2
 };
 
+// Errors of a grid's nodes as results average them.
+std::vector<double> averaged(const NodeGrid& grid, const std::vector<double>& error, double spread)
+{
+    if (grid.bent)
+        return grid.bent->smoothed(error, spread);
+    const Vec2 pitch = grid.size / Vec2(grid.columns, grid.rows);
+    return smoothed(error, grid.columns, spread / pitch.x, spread / pitch.y);
+}
+
 Estimate estimate(const Tracer& tracer, std::span<const NodeGrid> grids, std::span<const Stratum> strata, double spread)
 {
     Estimate result;
@@ -228,16 +261,15 @@ Estimate estimate(const Tracer& tracer, std::span<const NodeGrid> grids, std::sp
         const NodeGrid& grid = grids[n];
         const std::vector<double> first = irradiance_of(tracer.sums(0, n), strata, grid.nodes(), tracer.samples());
         const std::vector<double> second = irradiance_of(tracer.sums(1, n), strata, grid.nodes(), tracer.samples());
-        std::vector<double> error(grid.nodes());
+        std::vector<double> error(grid.different());
         for (std::size_t i = 0; i < error.size(); ++i) {
             result.irradiance += 0.5 * (first[i] + second[i]);
             // The variance of the mean of both is a quarter of that of their difference.
             error[i] = 0.5 * (first[i] - second[i]);
         }
-        const Vec2 pitch = grid.size / Vec2(grid.columns, grid.rows);
-        for (const double value : smoothed(error, grid.columns, spread / pitch.x, spread / pitch.y))
+        for (const double value : averaged(grid, error, spread))
             result.error += value * value;
-        nodes += static_cast<double>(grid.nodes());
+        nodes += static_cast<double>(error.size());
     }
     result.irradiance /= nodes;
     result.error = std::sqrt(result.error / nodes);
@@ -266,8 +298,19 @@ void check(std::span<const NodeGrid> grids, std::span<const Stratum> strata, con
 
 }  // namespace
 
+NodeGrid NodeGrid::of(const BentNodes& bent)
+{
+    NodeGrid grid;
+    grid.columns = std::min(bent_columns, bent.size());
+    grid.rows = (bent.size() + grid.columns - 1) / grid.columns;
+    grid.bent = &bent;
+    return grid;
+}
+
 void NodeGrid::check() const
 {
+    if (bent)
+        return;
     detail::check_finite("corner", corner);
     for (const Vec3& axis : {x_axis, y_axis, normal})
         if (!(std::abs(glm::length(axis) - 1.0) <= 1e-4))

@@ -7,13 +7,15 @@
 #include <vector>
 
 #include "base/progress.h"
+#include "scene/bent_nodes.h"
 #include "scene/light_choice.h"
 #include "scene/occluders.h"
 #include "scene/path_wave.h"
 
 namespace beamspread {
 
-// A rectangle above a receiver, evenly divided into the surroundings of nodes.
+// A rectangle above a receiver, evenly divided into the surroundings of nodes; or nodes of a mesh that bends, row by row,
+// the last one repeated to fill the last row. Directions at these are in their `FieldFrame`.
 struct NodeGrid {
     Vec3 corner{};  // world, metres
     Vec3 x_axis{};  // unit vectors at right angles
@@ -22,8 +24,15 @@ struct NodeGrid {
     Vec2 size{0.0};  // metres
     std::size_t columns = 0;
     std::size_t rows = 0;
+    const BentNodes* bent = nullptr;  // null: the rectangle
+
+    // The nodes of a mesh, which must outlive the grid.
+    static NodeGrid of(const BentNodes& bent);
 
     std::size_t nodes() const { return columns * rows; }
+
+    // Nodes without repeated ones.
+    std::size_t different() const { return bent ? bent->size() : nodes(); }
 
     // Throws InvalidArgument.
     void check() const;

@@ -97,9 +97,7 @@ class CyclesLight:
         bounced = bounced and self.is_below_something(chart.grid for chart in job.receiver.charts)
         objects = [name for name in illumination.by_cycles if name != world and name in scene.objects]
         if job.receiver.is_bent:
-            # Fields of light that was computed elsewhere lie on planes.
-            illumination = illumination.with_messages(*[not_on_bent(job.name)] * bounced)
-            bounced, objects = False, []
+            objects = []  # fields of light that Cycles computes lie on planes
         if bounced:
             illumination = illumination.with_messages(*self._missing)
             # The world may be one that Cycles renders: our own rays need it as a panorama.
@@ -107,6 +105,8 @@ class CyclesLight:
             if not why_not_own:
                 job = replace(job, steps=(BouncedLight(self._max_bounces), *job.steps))
                 illumination, bounced = illumination.with_messages(BY_OWN_RAYS), False
+            elif job.receiver.is_bent:
+                illumination, bounced = illumination.with_messages(not_on_bent(job.name)), False
         key = self._key_of(world)
         kept = kept_world.kept(key, world)
         if kept is not None:

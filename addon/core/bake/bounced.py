@@ -1,4 +1,4 @@
-"""Bounced light by our own rays, at coarse nodes above the receiver."""
+"""Bounced light by our own rays, at coarse nodes above the receiver or among the texels of a mesh that bends."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..messages import Message, note, warning
 from ..native import native
 from ..progress import Progress
 from ..scene.grid import Grid
-from ..scene.lights import STRATA, Field, FieldLight
+from ..scene.lights import STRATA, BentField, Field, FieldLight
 from ..scene.receiver import Receiver
 from .estimate import bounced_seconds
 from .job import BakeJob, Step
@@ -20,7 +20,8 @@ from .layers import WITHOUT_MEDIUM
 from .mean_light import mean_irradiance, mean_open_irradiance
 from .smoothing import SPLINE_VARIANCE, smoothing_variance
 
-# Nodes along the longest side of a receiver; more resolve bounced light more finely and take longer.
+# Nodes along the longest side of a receiver, and the root of their number on a mesh that bends; more resolve bounced
+# light more finely and take longer.
 NODES = 64
 # Most paths for each part of the hemisphere at a node; more leave less noise and take longer.
 MAX_SAMPLES = 128
@@ -42,7 +43,7 @@ NOTHING_BOUNCES = warning(
 
 def not_on_bent(name: str) -> Message:
     """The warning about bounced light on an object that bends."""
-    text = f"Light that bounces is left out of '{name}': on meshes that bend it is not baked yet."
+    text = f"Light that bounces is left out of '{name}': on meshes that bend Cycles can't find it."
     return warning(name, text)
 
 
@@ -72,16 +73,15 @@ class BouncedLight(Step):
 
     def run(self, job: BakeJob, progress: Progress) -> BakeJob:
         receiver, illumination, settings = job.receiver, job.illumination, job.settings
-        if receiver.is_bent:
-            return replace(job, illumination=illumination.with_messages(not_on_bent(job.name)))
         grid = receiver.charts[0].grid
         surfaces = illumination.caster(grid)
         lights = [
             (light.at(grid), light.rgb().tolist(), surfaces if light.cast_shadow else None)
             for light in illumination.lights
         ]
+        nodes = bent_nodes_of(receiver, self.nodes) if receiver.is_bent else charts_of(receiver, self.nodes)
         bounced = native.bounced_light(
-            charts_of(receiver, self.nodes),
+            nodes,
             STRATA,
             lights,
             surfaces,
@@ -102,10 +102,16 @@ class BouncedLight(Step):
             percent = 100 * bounced["noise"]
             text = f"Bounced light on '{job.name}' has {percent:.1f} % of noise, relative to all light there."
             illumination = illumination.with_messages(note(job.name, text))
-        fields = tuple(
-            Field(chart.grid.origin, chart.grid.normal, radiance)
-            for chart, radiance in zip(receiver.charts, bounced["radiance"])
-        )
+        if receiver.is_bent:
+            fields = tuple(
+                BentField(of_chart.positions, of_chart.normals, of_chart.spacing, radiance)
+                for of_chart, radiance in zip(nodes, bounced["radiance"])
+            )
+        else:
+            fields = tuple(
+                Field(chart.grid.origin, chart.grid.normal, radiance)
+                for chart, radiance in zip(receiver.charts, bounced["radiance"])
+            )
         light = FieldLight("Bounced light", 1.0, (1.0, 1.0, 1.0), False, fields)
         return replace(job, illumination=illumination.lit_by([light]))
 
@@ -125,6 +131,11 @@ def mean_over(receiver: Receiver, value_of: Callable[[Grid], float]) -> float:
     grids = [chart.grid for chart in receiver.charts]
     areas = [grid.width * grid.pitch_x * grid.height * grid.pitch_y for grid in grids]
     return float(np.average([value_of(grid) for grid in grids], weights=areas))
+
+
+def bent_nodes_of(receiver: Receiver, nodes: int) -> list:
+    """The native `BentNodes` of a receiver that bends, about `nodes` x `nodes` of them."""
+    return [native.BentNodes(chart.grid.native(), nodes**2) for chart in receiver.charts]
 
 
 def charts_of(receiver: Receiver, nodes: int) -> list[dict]:

@@ -1,6 +1,6 @@
 """The kinds of light that can be baked; strengths follow Cycles (see each class)."""
 
-from .field_light import DIRECTIONS, STRATA, WEIGHTS, Field, FieldLight
+from .field_light import DIRECTIONS, STRATA, WEIGHTS, BentField, Field, FieldLight
 from .light_kinds import AreaLight, Light, MeshLight, PointLight, SpotLight, SunLight, WorldLight
 
 __all__ = [
@@ -8,6 +8,7 @@ __all__ = [
     "STRATA",
     "WEIGHTS",
     "AreaLight",
+    "BentField",
     "Field",
     "FieldLight",
     "Light",

@@ -1,4 +1,4 @@
-"""Light that was computed elsewhere, at coarse grids on the planes that it reaches, by direction."""
+"""Light that was computed elsewhere, at coarse nodes of the planes and meshes that it reaches, by direction."""
 
 from __future__ import annotations
 
@@ -63,6 +63,24 @@ class Field:
 
 
 @dataclass(frozen=True, eq=False)
+class BentField:
+    """Radiance at nodes of a mesh that bends.
+
+    Attributes
+    ----------
+    positions, normals : float64 (N, 3), world positions and unit normals of the nodes.
+    spacing : distance of neighbors, about, scene units.
+    radiance : float32 (K, N, 3), means by the cosine over K parts of the hemisphere, in the frames of
+        `native.BentNodes`, W/(m^2 sr).
+    """
+
+    positions: np.ndarray
+    normals: np.ndarray
+    spacing: float
+    radiance: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class FieldLight(Light):
     """Light that was computed elsewhere; `strength` is a factor.
 
@@ -70,12 +88,12 @@ class FieldLight(Light):
 
     Attributes
     ----------
-    fields : one for each plane that the light reaches.
+    fields : one for each plane that the light reaches, or the one of a mesh that bends.
     position : world position of the lamp that all light comes from, or None.
     direction : unit vector along which all light travels, world, or None.
     """
 
-    fields: tuple[Field, ...]
+    fields: tuple[Field | BentField, ...]
     position: Vector | None = None
     direction: Vector | None = None
 
@@ -91,17 +109,24 @@ class FieldLight(Light):
 
     @cached_property
     def _fields(self) -> dict[tuple, Field]:
-        return {(tuple(field.origin), tuple(field.normal)): field for field in self.fields}
+        return {(tuple(field.origin), tuple(field.normal)): field for field in self.fields if isinstance(field, Field)}
 
-    def field_of(self, grid: AnyGrid) -> Field | None:
-        return self._fields.get((tuple(grid.origin), tuple(grid.normal))) if isinstance(grid, Grid) else None
+    def field_of(self, grid: AnyGrid) -> Field | BentField | None:
+        if isinstance(grid, Grid):
+            return self._fields.get((tuple(grid.origin), tuple(grid.normal)))
+        return next((field for field in self.fields if isinstance(field, BentField)), None)
 
     def is_behind(self, grid):
         field = self.field_of(grid)
         return field is None or not field.radiance.any()
 
     def at(self, grid):
-        radiance = np.ascontiguousarray(self.field_of(grid).radiance, np.float32)
+        field = self.field_of(grid)
+        radiance = np.ascontiguousarray(field.radiance, np.float32)
+        solid_angles = (np.pi * WEIGHTS).astype(np.float32)
+        if isinstance(field, BentField):
+            nodes = field.positions, field.normals, field.spacing
+            return native.FieldLight.on_mesh(radiance, solid_angles, DIRECTIONS, *nodes)
         whole = np.full(1, np.pi, np.float32)
         axes = np.array((grid.x_axis, grid.y_axis, grid.normal))
         if self.direction is not None:
@@ -110,4 +135,4 @@ class FieldLight(Light):
             x, y, height = axes @ np.subtract(self.position, grid.origin)
             # The center of a lamp of a size may lie below a plane that the lamp lights.
             return native.FieldLight(radiance, whole, position=(x, y, max(height, 1e-3 * grid.pitch_x)))
-        return native.FieldLight(radiance, (np.pi * WEIGHTS).astype(np.float32), DIRECTIONS)
+        return native.FieldLight(radiance, solid_angles, DIRECTIONS)
