@@ -11,8 +11,8 @@ namespace {
 constexpr std::size_t coarsest_rows = 8;
 
 // Light times reach, as a fraction of all light, below which a part that the horizon crosses is not divided. Larger: faster,
-// and less exact: here 1e-4 of an even sky.
-constexpr double small_fraction = 2e-5;
+// and less exact: here 5e-4 at most, and 1e-4 on average.
+constexpr double small_fraction = 1e-4;
 
 // Reach along the normal of a square part in which light is even, as a fraction of the reach to its corners.
 constexpr double even_reach = 0.7;

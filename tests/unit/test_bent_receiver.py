@@ -44,19 +44,19 @@ def both(light, casters, grid, **options):
 
 @pytest.mark.parametrize("name", LIGHTS)
 def test_a_flat_mesh_is_lit_as_a_plane(name):
-    """Single precision apart; the irradiance of a world is a sum over parts of the sky, 3e-5 measured, and its flow has
+    """Single precision apart; the irradiance of a world is a sum over parts of the sky, right to 5e-4, and its flow has
     the noise of 64 rays, .8 % measured on average.
     """
     grid = make_grid(24, 18, axes=rotation(2), centre=(3, 2, 1))
     (plane, flow), (bent, bent_flow) = both(LIGHTS[name], None, grid, rays=64)
-    np.testing.assert_allclose(bent, plane, rtol=1e-4 if name in OTHER_RAYS else 1e-6, atol=1e-6 * plane.max())
+    np.testing.assert_allclose(bent, plane, rtol=6e-4 if name in OTHER_RAYS else 1e-6, atol=1e-6 * plane.max())
     scale = np.linalg.norm(flow, axis=-1).max()
     np.testing.assert_allclose(bent_flow, flow, atol=scale * (0.15 if name in OTHER_RAYS else 1e-5))
 
 
 @pytest.mark.parametrize("name", LIGHTS)
 def test_occluders_shade_a_flat_mesh_as_a_plane(name):
-    """Rays start a hundredth of a texel higher: the penumbra of a card moves by less than its noise, 1.3 % of the mean
+    """Rays start a thousandth of a texel higher: the penumbra of a card moves by less than its noise, 1.3 % of the mean
     for a world and .5 % for others.
     """
     grid = make_grid(32)
@@ -105,7 +105,7 @@ def test_a_ball_under_a_sun_has_its_terminator_and_no_acne(name):
 @pytest.mark.parametrize("name", BALLS)
 def test_a_ball_in_an_even_world_receives_pi_everywhere(name):
     """pi L less what lies between the horizons of face and shading normal; the sum over parts of the sky is right to
-    2e-4.
+    5e-4.
     """
     texels = texels_of(BALLS[name], 64)
     irradiance = native.gather_rays(texels.native(), WORLD, BALLS[name].occluders(), rays=128)[0]
@@ -113,7 +113,7 @@ def test_a_ball_in_an_even_world_receives_pi_everywhere(name):
     # The cosine-weighted part of a hemisphere above a plane tilted by an angle a: (1 + cos a) / 2.
     above = (1 + (faces_of(texels) * texels.normals).sum(-1)[texels.inside]) / 2
     np.testing.assert_allclose(part.mean(), above.mean(), atol=1e-3)
-    assert part.max() < 1 + 3e-4
+    assert part.max() < 1 + 6e-4
     assert np.abs(part.mean(axis=-1) - above).max() < 0.06  # noise of 128 rays where the face cuts some off
 
 
@@ -122,7 +122,7 @@ def test_a_ball_in_an_even_world_receives_pi_everywhere(name):
 def test_a_bowl_shades_itself(columns, size, zenith):
     """Light through the opening of a half ball reaches points whose chord toward the sun leaves the ball above the rim.
 
-    The shadow's border is uncertain by a texel and by the facets of the bowl: 1.5 % of the light at most.
+    The shadow's border is uncertain by a texel and by the facets of the bowl: 1 % of the light at most.
     """
     bowl = ball(columns, columns // 2, inward=True, zenith=np.pi / 2)  # opens downward
     texels = texels_of(bowl, size)
@@ -131,7 +131,7 @@ def test_a_bowl_shades_itself(columns, size, zenith):
     entry = texels.positions - 2 * (texels.positions @ travel)[..., None] * travel
     exact = np.where(entry[..., 2] < 0, np.maximum(-(texels.normals @ travel), 0), 0)
     error = (light - exact) * texels.areas
-    assert np.abs(error).sum() < 0.02 * (exact * texels.areas).sum()
+    assert np.abs(error).sum() < 0.015 * (exact * texels.areas).sum()
     assert abs(error.sum()) < 4e-3 * (exact * texels.areas).sum()
 
 
