@@ -64,7 +64,7 @@ choose_matrix() {
 }
 
 # Most comparisons with Cycles, and Live, take minutes. Those of lamps stay, because lamps changed between the versions.
-long_in_bpy=(test_cycles_copy test_cycles_extended_lights test_cycles_filter test_cycles_irradiance test_cycles_lamps
+long_in_bpy=(test_bodies_cycles test_cycles_copy test_cycles_extended_lights test_cycles_filter test_cycles_irradiance test_cycles_lamps
              test_indirect test_light_is_not_lost test_live test_live_and_bakes test_live_and_painters
              test_live_in_cycles test_panorama test_passes test_read_emitters test_read_world test_reflectance test_shown_in_cycles test_transparency)
 in_bpy_without_long() {
