@@ -1,6 +1,8 @@
 // A sun: parallel light, or the light of a disk infinitely far away. Irradiance E = S cos(theta), S the strength in W/m^2.
 #pragma once
 
+#include <memory>
+
 #include "base/constants.h"
 #include "scene/light.h"
 #include "scene/spherical_shapes.h"
@@ -30,6 +32,8 @@ public:
                 LightRay* rays) const override;
     Vec3 irradiance(const Vec3& point, const Vec3& normal) const override;
     std::optional<LightSource> source() const override;
+    // A flat disk with a table of its irradiance; this light must outlive it.
+    std::shared_ptr<const Light> facing_all() const override;
 
 private:
     LightRay ray(const Vec2& place) const;

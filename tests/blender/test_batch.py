@@ -154,15 +154,12 @@ def add_failures(folder):
         "Negative": ({"mean_free_path": (-1, 1, 1)}, "mean free path"),
         "Gone": ({"image": missing_image(folder)}, "gone.exr"),
         "Locked": ({"image": read_only_image(folder)}, "read-only"),
-        "Bent": ({}, "not flat"),
         "Hidden": ({}, "hidden from render"),
     }
     for place, (name, (properties, _)) in enumerate(wrong.items(), start=1):
         matrix = Matrix.Translation((0, 5 * place, 0))
         plane = add_plane(name, matrix=matrix, material=add_material(f"M {name}", **properties))
-        if name == "Bent":
-            plane.data.vertices[0].co.z = 1
-        elif name == "Hidden":
+        if name == "Hidden":
             plane.hide_render = True
     return {name: word for name, (_, word) in wrong.items()}
 

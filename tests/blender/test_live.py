@@ -210,12 +210,12 @@ def test_objects_of_one_material_keep_to_their_parts():
 
 def test_messages_name_objects_that_cannot_follow_and_the_others_follow():
     _plane, _lamp, material = make_scene()
-    bent = scenes.add_plane("Bent", material=scenes.add_material("Other"))
-    bent.location.x = 5
-    bent.data.vertices[0].co.z = 0.5
+    bare = scenes.add_plane("Bare", material=scenes.add_material("Other"))
+    bare.location.x = 5
+    bare.data.uv_layers.remove(bare.data.uv_layers[0])
     assert live_pixels(material).max() > 0
     (message,) = live_lines()
-    assert message.startswith("Bent / Other: The faces are not flat")
+    assert message.startswith("Bare / Other: The mesh has no UV map")
 
 
 def test_a_medium_without_library_is_simulated_and_then_shown(monkeypatch, tmp_path):

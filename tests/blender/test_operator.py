@@ -242,10 +242,6 @@ def test_two_objects_on_the_same_part_of_an_image():
     assert "same part of the image 'Shared'" in messages_of(bpy.ops.beamspread.bake)
 
 
-def bent(plane):
-    plane.data.vertices[0].co.z = 0.5
-
-
 def hidden(plane):
     plane.hide_render = True
 
@@ -268,7 +264,6 @@ def setting(name, value):
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
-        (bent, "not flat"),
         (hidden, "hidden from render"),
         (in_hidden_collection, "hidden from render"),
         (setting("albedo", (0.5, 1.0, 0.5)), "albedo's green is 1"),

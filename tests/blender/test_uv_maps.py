@@ -178,7 +178,7 @@ def map_after_modifiers(obj):
 
 
 def make_map(obj):
-    """Give an object a map without a bake, which would refuse bent faces; the text of the note."""
+    """Give an object a map without a bake; the text of the note."""
     bpy.context.view_layer.update()
     targets = [Target(obj.name, obj.data.materials[0].name)]
     return str(make_maps(bpy.context.evaluated_depsgraph_get(), targets)[obj.name])

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from beamspread.core.errors import ReceiverError
+from beamspread.core.native import native
 from beamspread.core.scene.flat_mesh import flatten
 from beamspread.core.scene.lights import AreaLight, PointLight, SunLight
 from beamspread.core.scene.polygons import Polygons
@@ -13,30 +14,9 @@ from beamspread.core.scene.tiles import Tiling
 from beamspread.core.scene.unwrap import unwrap
 
 from mesh_shapes import heights, mesh_of
+from mesh_shapes import smooth_ball as ball
 
 FRAME = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
-
-def ball(columns=48, rows=24, at=(0.0, 0.0, 0.0), radius=1.0):
-    """Faces of a ball of quadrilaterals, and of triangles at the poles, with smooth normals and longitudes as UVs."""
-    u, v = np.meshgrid(np.arange(columns + 1) / columns, np.arange(rows + 1) / rows)
-    azimuth, polar = 2 * np.pi * u, np.pi * (1 - v)
-    points = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], -1)
-    points[0], points[-1] = (0, 0, -1), (0, 0, 1)
-
-    def corners(values):
-        faces = []
-        for row in range(rows):
-            for column in range(columns):
-                around = [(row, column), (row, column + 1), (row + 1, column + 1), (row + 1, column)]
-                around = around[1:] if row == 0 else around[:3] if row == rows - 1 else around
-                faces.append(values[tuple(np.transpose(around))])
-        return faces
-
-    faces, uvs = corners(points), corners(np.stack([u, v], -1))
-    polygons = mesh_of(faces, uvs)
-    normals = polygons.corners / np.linalg.norm(polygons.corners, axis=1)[:, None]
-    return replace(polygons, corners=radius * polygons.corners + at, corner_normals=normals.astype(np.float32))
 
 
 def joined(*parts):
@@ -187,3 +167,20 @@ def test_some_texels_stand_for_all():
     assert few.mean(np.ones((few.height, few.width, 3))) == pytest.approx(1)
     shown = few.areas > 0
     np.testing.assert_allclose(np.linalg.norm(few.middles[shown], axis=-1), 1, atol=5e-3)
+
+
+@pytest.mark.parametrize("angle", [0.01, 0.5, 2.0])
+def test_a_flat_sun_lights_texels_as_planes_of_their_normals(angle):
+    """Blender 3.4 has flat suns. A table tells their irradiance where the horizon cuts the disk."""
+    grid, *_ = grid_of(replace(ball(), corner_normals=None), 24, 12)
+    sun = native.SunLight((0.3, 0.4, -0.8), angle, "flat")
+    white = [1.0, 1.0, 1.0]
+    irradiance, _ = native.bake_arrival(grid.surface(), [(sun, white, None)], samples=1, rays=16)
+    for row, column in np.argwhere(grid.areas > 0).tolist():
+        normal, tangent = grid.normals[row, column].astype(float), grid.tangents[row, column].astype(float)
+        normal /= np.linalg.norm(normal)
+        tangent -= normal * (tangent @ normal)
+        tangent /= np.linalg.norm(tangent)
+        plane = native.ReceiverGrid((0, 0, 0), tangent, np.cross(normal, tangent), normal, 1.0, 1.0, 1, 1)
+        expected, _ = native.bake_arrival(native.Surface(plane), [(sun, white, None)], samples=1, rays=16)
+        assert irradiance[row, column, 0] == pytest.approx(expected[0, 0, 0], abs=1e-4)

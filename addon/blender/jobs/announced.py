@@ -15,6 +15,7 @@ from ...core.bake.forecast import Finders, Forecast, seconds_of
 from ...core.bake.pace import Estimate
 from ...core.bake.spread import Spread, image_length
 from ...core.errors import BakeError, MaterialError
+from ...core.scene.flat_mesh import bends
 from ...core.scene.lights import Light, WorldLight
 from ...core.scene.receiver import Grid
 from ...core.target import Target
@@ -61,8 +62,8 @@ def announce(context, targets: list[Target]) -> dict[Target, Announced]:
     announced = {}
     for target in targets:
         bakes = [item for item in targets_of(objects[target.object_name]) if item.name == target]
-        length = _image_length(bakes[0], depsgraph) if bakes and _is_valid(bakes[0]) else 0.0
-        forecast = facts.forecast(bakes[0], _side(bakes[0], length, scene)) if length else None
+        length, is_bent = _shape(bakes[0], depsgraph) if bakes and _is_valid(bakes[0]) else (0.0, False)
+        forecast = facts.forecast(bakes[0], _side(bakes[0], length, scene), is_bent) if length else None
         if forecast is not None:
             bake = _announced(target, forecast, settings, facts.encloses(forecast.grids[0]))
             (grid,) = forecast.grids
@@ -152,7 +153,7 @@ class _SceneFacts:
         centers, halves = (self._centers - grid.centre) @ axes.T, np.abs(axes @ self._halves).sum(axis=2)
         return centers - halves, centers + halves
 
-    def forecast(self, target: BakeTarget, resolution: int) -> Forecast | None:
+    def forecast(self, target: BakeTarget, resolution: int, is_bent: bool) -> Forecast | None:
         """The forecast for a target; None if it has no faces or no size."""
         grid, obj = _grid(target, resolution), target.obj
         if grid is None or not (self.lights or self.unknown or self.world_by_cycles or self.lamps_by_cycles):
@@ -168,7 +169,7 @@ class _SceneFacts:
             colors=is_textured and not all_known(target.node.color_input(target.groups)),
         )
         surface = replace(surface, base_color=PLACEHOLDER_COLOR) if is_textured else surface
-        return Forecast(obj.name, [grid], self.lights, self.triangles, surface, finders, self.unknown)
+        return Forecast(obj.name, [grid], self.lights, self.triangles, surface, finders, self.unknown, is_bent)
 
 
 def _kinds(owner) -> NodeKinds:
@@ -189,27 +190,30 @@ def _side(target: BakeTarget, length: float, scene) -> int:
     return scene.beamspread.side_for(length, target.node.surface(), target.node.has_texture())
 
 
-def _image_length(target: BakeTarget, depsgraph) -> float:
-    """Length of an image's side on the surface, scene units; 0 for a surface without area.
+def _shape(target: BakeTarget, depsgraph) -> tuple[float, bool]:
+    """Length of an image's side on the surface, scene units, 0 for a surface without area; True if the surface bends.
 
-    Where a mesh is large, that of the box around its object.
+    Where a mesh is large, the length is that of the box around its object, and it counts as bent.
     """
     obj, matrix = target.obj, target.obj.matrix_world
     if len(obj.data.polygons) > MAX_FACES:
-        return max(obj.dimensions)
+        return max(obj.dimensions), True
     evaluated, node = obj.evaluated_get(depsgraph), target.node
     is_tiled = uses_tiles(node)
 
-    def read() -> float:
+    path = min(node.surface().material.mean_free_path)
+
+    def read() -> tuple[float, bool]:
         try:
             polygons = read_polygons(evaluated, target.material.name, None, node.uv_map, is_tiled)
+            length = image_length([polygons]) if polygons.count else 0.0
+            is_bent = 0 < length < math.inf and bends(polygons, path)
         except BakeError:
-            return 0.0  # the bake says why
-        length = image_length([polygons]) if polygons.count else 0.0
-        return length if math.isfinite(length) else 0.0
+            return 0.0, False  # the bake says why
+        return (length, is_bent) if math.isfinite(length) else (0.0, False)
 
-    state = mesh_key(evaluated), node.uv_map, is_tiled, *(tuple(row) for row in matrix)
-    return scene_cache.get(("length", obj, target.material.name), [obj], read, state=state)
+    state = mesh_key(evaluated), node.uv_map, is_tiled, path, *(tuple(row) for row in matrix)
+    return scene_cache.get(("shape of image", obj, target.material.name), [obj], read, state=state)
 
 
 def _grid(target: BakeTarget, resolution: int) -> Grid | None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..ldf.library import SIMULATING
-from ..scene.bent_grid import AnyGrid, BentGrid
+from ..scene.bent_grid import AnyGrid
 from ..scene.lights import Light
 from .bake_settings import BakeSettings
 from .bounced import BouncedLight
@@ -55,6 +55,7 @@ class Forecast:
     grids : about those of the receiver, without their coverage.
     triangles : number of those that block light.
     unknown : fraction of all light, about, that is not among the lights, besides that which Cycles finds.
+    is_bent : True if the receiver is a mesh that bends.
     """
 
     name: str
@@ -64,6 +65,7 @@ class Forecast:
     surface: Surface
     finders: Finders = Finders()
     unknown: float = 0.0
+    is_bent: bool = False
 
     def steps(self, settings: BakeSettings) -> list[Estimate]:
         """Estimates of the steps, without the simulation of media."""
@@ -80,12 +82,9 @@ class Forecast:
             steps.append((BouncedLight.name, bounced_seconds(self.triangles, len(self.lights), threads)))
         unknown = max(self.unknown, OF_WORLD * finders.world)
         load = Workload.of(self.grids, self.lights, self.triangles, self.surface, settings, bounced, unknown)
+        load = replace(load, is_bent=self.is_bent)
         steps.append((Solve.kind_for(settings), load.seconds(settings)))
         return [Estimate(kind, self.name, seconds) for kind, seconds in steps]
-
-    @property
-    def is_bent(self) -> bool:
-        return any(isinstance(grid, BentGrid) for grid in self.grids)
 
     def simulations(self, settings: BakeSettings) -> dict:
         """Estimates of the simulations of media that are not known yet, by medium and quality."""

@@ -47,6 +47,7 @@ def bake(
     progress: Callback | None = None,
     bytes_for_light: int = 0,
     report_noise: Report | None = None,
+    report_bend: Callable[[float], None] | None = None,
 ) -> list[np.ndarray]:
     """Luminance of translucent planes, between which no light passes, or of a surface that bends.
 
@@ -58,6 +59,7 @@ def bake(
     progress : called with 0..1, returns False to stop.
     bytes_for_light : largest memory, bytes, of the moments that the fft solver makes of light; 0: any.
     report_noise : takes the noise of the light, averaged over the area in which the medium spreads it.
+    report_bend : takes the fraction of a surface that bends more than the libraries know.
 
     Returns
     -------
@@ -81,9 +83,8 @@ def bake(
         sources = _libraries(material, thickness, settings, media_progress, curved)
     else:
         sources = [load_source(settings.sample_folder, settings.distributions)] * 3
-    return spread(
-        grids, illumination, material, sources, settings, light_progress, bytes_for_light, report_noise=report_noise
-    )
+    reports = {"report_noise": report_noise, "report_bend": report_bend}
+    return spread(grids, illumination, material, sources, settings, light_progress, bytes_for_light, **reports)
 
 
 def spread(
@@ -97,6 +98,7 @@ def spread(
     seed: int = 0,
     report_noise: Report | None = None,
     rays: int = 0,
+    report_bend: Callable[[float], None] | None = None,
 ) -> list[np.ndarray]:
     """`bake` with the LDF of each channel given; the material is checked, and `settings.quality` does not count.
 
@@ -110,7 +112,7 @@ def spread(
     rest = illumination, material, sources, settings
     luminances: list = [None] * len(grids)
     for (count, group), numbers, part in zip(groups, by_rays.values(), parts):
-        of_group = _spread_group(group, *rest, count, part, bytes_for_light, seed, report_noise)
+        of_group = _spread_group(group, *rest, count, part, bytes_for_light, seed, report_noise, report_bend)
         for number, luminance in zip(numbers, of_group):
             luminances[number] = luminance
     return luminances
@@ -127,6 +129,7 @@ def _spread_group(
     bytes_for_light: int,
     seed: int,
     report_noise: Report | None,
+    report_bend: Callable[[float], None] | None,
 ) -> list[np.ndarray]:
     """`spread` for grids with as many rays to each texel."""
 
@@ -153,6 +156,7 @@ def _spread_group(
             memory_limit=bytes_for_light,
             progress=progress,
             report_noise=report_spread,
+            report_beyond=lambda shares: report_bend and report_bend(max(shares)),
         )
     except native.MemoryLimit as error:
         largest = max(grids, key=lambda grid: grid.texels)
@@ -232,16 +236,20 @@ def mean_direction(flow: np.ndarray) -> np.ndarray:
 
 
 Layer = Callable[
-    [Sequence[AnyGrid], Illumination, Material, float, BakeSettings, Progress, int, Report], list[np.ndarray]
+    [Sequence[AnyGrid], Illumination, Material, float, BakeSettings, Progress, int, Report, Callable], list[np.ndarray]
 ]
 """Takes the arguments of `bake`; float32 (height, width, 3) of each grid, row 0 at the bottom."""
 
 
-def irradiance(grids, illumination, _material, _thickness, settings, progress, _bytes_for_light, report) -> list:
+def irradiance(
+    grids, illumination, _material, _thickness, settings, progress, _bytes_for_light, report, _bend=None
+) -> list:
     return [irradiance for irradiance, _ in _arrive_on_all(grids, illumination, settings, progress, report)]
 
 
-def direction(grids, illumination, _material, _thickness, settings, progress, _bytes_for_light, report) -> list:
+def direction(
+    grids, illumination, _material, _thickness, settings, progress, _bytes_for_light, report, _bend=None
+) -> list:
     return [mean_direction(flow) for _, flow in _arrive_on_all(grids, illumination, settings, progress, report)]
 
 

@@ -45,6 +45,9 @@ NARROW_SLAB, WIDE_SLAB = (200e6, 300), (800e6, 300)
 MAX_NOISE = 0.03
 """Noise of the light, relative to its mean, above which a bake names it. More: fewer notes."""
 
+MAX_BEYOND = 0.01
+"""Fraction of a surface that bends more than libraries know, above which a bake names it. More: fewer notes."""
+
 
 class NoiseSum:
     """Noise of the light on several planes: a dark one among bright ones shows little of its own."""
@@ -109,7 +112,7 @@ class Solve(Step):
             material = job.surface.resolve(settings.quality, None, settings.threads)
         grids, messages = with_edges([chart.grid for chart in job.receiver.charts], job.surface, job.name)
         job = replace(job, illumination=job.illumination.with_messages(*messages))
-        noise = NoiseSum()
+        noise, bends = NoiseSum(), [0.0]
         values = LAYERS[settings.layer](
             grids,
             job.illumination,
@@ -119,7 +122,10 @@ class Solve(Step):
             progress,
             self._bytes_for_light(job),
             noise.add,
+            bends.append,
         )
+        if max(bends) > MAX_BEYOND:
+            job = replace(job, illumination=job.illumination.with_messages(_beyond(job.name, max(bends))))
         if noise.relative() > MAX_NOISE:
             job = replace(job, illumination=job.illumination.with_messages(_noisy(job.name, noise.relative())))
         if not all(np.isfinite(on_grid).all() for on_grid in values):
@@ -151,6 +157,11 @@ BAKE_STEPS = (Simulate(), Solve())
 def _noisy(name: str, noise: float) -> Message:
     text = f"The light on '{name}' has a noise of {100 * noise:.0f} %, since few rays find it."
     return note(name, text, "Raise Samples.")
+
+
+def _beyond(name: str, fraction: float) -> Message:
+    text = f"{fraction:.0%} of the surface of '{name}' bends more than its medium is known for: light is rough there."
+    return note(name, text, "A shorter Mean Free Path, or a larger object, bends less.")
 
 
 def needs_medium(settings: BakeSettings) -> bool:

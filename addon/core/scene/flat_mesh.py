@@ -82,12 +82,8 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> 
     if not polygons.is_finite.all():
         text = f"The positions of {polygons.listed(~polygons.is_finite)} are infinite or not numbers."
         raise ReceiverError(text, finite_remedy(name))
-    tolerance = max(mean_free_path, FLATTENED * polygons.diagonal)
-    planes, bent = find_planes(polygons, tolerance)
-    warped = bent[(polygons.sizes[bent] > 3) & (polygons.deviations[bent] > tolerance)]
-    if len(warped):
-        polygons = with_triangles(polygons, warped)
-        planes, bent = find_planes(polygons, tolerance)
+    tolerance = _tolerance(polygons, mean_free_path)
+    polygons, planes, bent = _planes_of(polygons, tolerance)
     check_uvs(polygons.uvs)
     if len(bent):
         polygons, messages = facing_outward(polygons, name)
@@ -123,6 +119,25 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> 
         paths = f", {deviation / mean_free_path:.2g} mean free paths" if mean_free_path > 0 else ""
         messages.append(note(name, f"{text}{paths}."))
     return FlatMesh(tuple(parts), tuple(messages), polygons.uv_map)
+
+
+def bends(polygons: Polygons, mean_free_path: float = 0.0) -> bool:
+    """True if faces with an area, at finite positions, would be one part that bends."""
+    return len(_planes_of(polygons, _tolerance(polygons, mean_free_path))[2]) > 0
+
+
+def _tolerance(polygons: Polygons, mean_free_path: float) -> float:
+    return max(mean_free_path, FLATTENED * polygons.diagonal)
+
+
+def _planes_of(polygons: Polygons, tolerance: float) -> tuple[Polygons, list[Plane], np.ndarray]:
+    """The faces, warped ones as triangles, with the results of `find_planes`."""
+    planes, bent = find_planes(polygons, tolerance)
+    warped = bent[(polygons.sizes[bent] > 3) & (polygons.deviations[bent] > tolerance)]
+    if len(warped):
+        polygons = with_triangles(polygons, warped)
+        planes, bent = find_planes(polygons, tolerance)
+    return polygons, planes, bent
 
 
 def _capital(words: str) -> str:

@@ -93,7 +93,8 @@ class BakePlan:
             lamps=lamps,
             colors=self.color is not None and bool(self.color.unknown),
         )
-        return Forecast(name, grids, light.lights, light.triangle_count, self.surface_with_color(), finders)
+        facts = light.lights, light.triangle_count, self.surface_with_color(), finders
+        return Forecast(name, grids, *facts, is_bent=self.mesh.is_bent)
 
     def bake(self, settings: BakeSettings) -> Bake:
         """The bake, with its job or the error; call it in the main thread."""
