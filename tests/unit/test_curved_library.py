@@ -2,9 +2,12 @@
 
 import math
 
+import beamspread
 import numpy as np
 import pytest
 from beamspread import Cancelled, LdfLibrary, Medium, simulate
+from beamspread.core.ldf import curvatures as nodes
+from beamspread.core.ldf import library as module
 
 from plain_exr import damaged_copies
 
@@ -169,3 +172,91 @@ def test_slabs_allow_the_curvature_0():
 def test_cancel():
     with pytest.raises(Cancelled):
         simulate(Medium(), [0, 60], 100_000, curvatures=CURVATURES, progress=lambda fraction: fraction < 0.3)
+
+
+@pytest.mark.parametrize(
+    "medium", [Medium(0.0), Medium(0.8), Medium(0.9, 1.4), Medium(0.7), Medium(-0.5, 1.3)], ids=str
+)
+def test_simulated_curvatures_cover_the_range(medium):
+    """From -1/3 to 1 per transport mean free path. Diameters of balls are edges of bins: four per octave."""
+    curvatures = nodes.curvatures_for(medium)
+    assert list(curvatures) == sorted(set(curvatures))
+    length = 1 / (1 - max(medium.g, 0))
+    assert curvatures[0] * length == pytest.approx(-1 / 3)
+    assert 1 <= curvatures[-1] * length <= 1.25
+    for curvature in curvatures:
+        fraction, _ = math.frexp(2 / curvature)
+        assert curvature < 0 or fraction * 8 == pytest.approx(round(fraction * 8), abs=1e-9)
+    assert all(0.9 < b / a < 2.1 for a, b in zip(curvatures, curvatures[1:]) if a > 0)
+
+
+def test_slabs_have_no_curvatures():
+    assert nodes.curvatures_for(Medium(0.8, 1.0, 5.0)) == ()
+
+
+class TestLibrary:
+    @pytest.fixture(autouse=True)
+    def folders(self, tmp_path, monkeypatch):
+        monkeypatch.setenv("BEAMSPREAD_CACHE", str(tmp_path / "cache"))
+        monkeypatch.setattr(module, "SHIPPED_FOLDER", tmp_path / "shipped")
+        monkeypatch.setattr(module, "angles_for", lambda medium: (0.0, 45.0, 88.0))
+        monkeypatch.setattr(module, "PHOTONS", {"preview": 200, "final": 2000})
+        monkeypatch.setattr(nodes, "PHOTONS", {"preview": 200, "final": 400})
+        (tmp_path / "shipped").mkdir()
+        module._loaded.clear()
+        yield
+        module._loaded.clear()
+
+    def test_it_is_simulated_once_and_cached(self):
+        medium = Medium(0.8, 1.1)
+        plane = beamspread.library(medium, "preview")
+        assert module.is_known(medium, "preview")
+        assert not module.is_known(medium, "preview", curved=True)
+        assert module.known_library(medium, curved=True) is None
+        first = beamspread.library(medium, "preview", curved=True)
+        assert first.curvatures == sorted((0.0, *nodes.curvatures_for(medium)))
+        assert np.array_equal(first.image(*IMAGE), plane.image(*IMAGE))
+        assert module.is_known(medium, "preview", curved=True)
+        assert beamspread.library(medium, "preview", curved=True) is first
+        module._loaded.clear()
+        assert same(beamspread.library(medium, "preview", curved=True), first)
+        assert same(module.known_library(medium, curved=True), first)
+        assert len(module.cached_files()) == 2
+
+    def test_both_at_once(self):
+        fractions = []
+        medium = Medium(0.8, 1.1)
+        library = beamspread.library(medium, "preview", fractions.append, curved=True)
+        assert len(library.curvatures) > 1
+        assert fractions == sorted(fractions)
+        assert fractions[-1] == 1
+        assert module.is_known(medium, "preview", curved=True)
+
+    def test_shipped_files_come_first(self, tmp_path):
+        medium = Medium(0.8, 1.1)
+        plane = module.make(medium, "final")
+        plane.save(tmp_path / "shipped" / module.file_name(medium, "final"))
+        curved = nodes.with_curvatures(plane, "final")
+        curved.save(tmp_path / "shipped" / module.curved_file_name(medium, "final"), with_plane=False)
+        for quality in ("final", "preview"):
+            assert module.is_known(medium, quality, curved=True)
+            assert same(beamspread.library(medium, quality, curved=True), curved)
+        assert module.cached_files() == []
+
+    def test_files_of_other_curvatures_are_made_again(self, tmp_path, plane):
+        medium = Medium(0.8, 1.3)
+        plane.save(tmp_path / "shipped" / module.file_name(medium, "final"))
+        path = tmp_path / "shipped" / module.curved_file_name(medium, "final")
+        plane.with_curved([0.1], [0, 60], 100).save(path, with_plane=False)
+        library = beamspread.library(medium, "preview", curved=True)
+        assert library.curvatures == sorted((0.0, *nodes.curvatures_for(medium)))
+
+    def test_a_slab_is_the_flat_one(self):
+        medium = Medium(0.8, 1.0, 3.0)
+        flat = beamspread.library(medium, "preview")
+        assert beamspread.library(medium, "preview", curved=True) is flat
+        assert module.is_known(medium, "preview", curved=True)
+
+    def test_cancel(self):
+        with pytest.raises(Cancelled):
+            beamspread.library(Medium(0.8, 1.1), "preview", lambda fraction: fraction < 0.7, curved=True)

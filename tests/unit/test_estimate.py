@@ -78,6 +78,9 @@ def test_each_medium_to_simulate_takes_its_time():
     assert simulation_seconds([], FINAL) == 0
     assert simulation_seconds([first], FINAL) < simulation_seconds([first, second], FINAL)
     assert simulation_seconds([first], SETTINGS) < 0.1 * simulation_seconds([first], FINAL)
+    assert (
+        0 < simulation_seconds([first], SETTINGS, is_bent=True) < 0.1 * simulation_seconds([first], FINAL, is_bent=True)
+    )
 
 
 def test_more_triangles_make_bounced_light_slower():

@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from ..ldf.curvatures import curvatures_for, curved_angles_for
+from ..ldf.curvatures import curvatures_for, curved_angles_for, curved_photons_for, transport_length
 from ..ldf.library import PHOTONS, angles_for, is_known
 from ..scene.bent_grid import AnyGrid, BentGrid
 from ..scene.lights import STRATA, AreaLight, Light, MeshLight, WorldLight
@@ -50,8 +50,8 @@ BENT_TEXEL = 40e-6
 
 # Seconds of the simulation of an angle in final quality, in half-spaces and in slabs.
 HALF_SPACE_ANGLE, SLAB_ANGLE = 6.0, 2.5
-# The same of an angle on a surface of one curvature.
-CURVED_ANGLE = 6.0
+# Seconds of the simulation of a photon on a curved surface, for each transport mean free path in mean free paths.
+CURVED_PHOTON = 0.2e-6
 
 # Seconds of bounced light by rays of our own: in any case, for each doubling of the triangles, and for that and each
 # light.
@@ -201,9 +201,12 @@ def simulation_seconds(media: Sequence, settings: BakeSettings, is_bent: bool = 
 
 def _simulation(medium, quality: str, is_bent: bool) -> float:
     per_angle = HALF_SPACE_ANGLE if math.isinf(medium.thickness) else SLAB_ANGLE
-    plane = per_angle * len(angles_for(medium)) * (not is_bent or not is_known(medium, quality))
-    curves = CURVED_ANGLE * len(curvatures_for(medium)) * len(curved_angles_for(medium)) * is_bent
-    return (plane + curves) * PHOTONS[quality] / PHOTONS["final"]
+    plane = per_angle * len(angles_for(medium)) * PHOTONS[quality] / PHOTONS["final"]
+    if not is_bent:
+        return plane
+    beams = len(curvatures_for(medium)) * len(curved_angles_for(medium))
+    photon = CURVED_PHOTON * transport_length(medium) * medium.ior**2
+    return plane * (not is_known(medium, quality)) + photon * beams * curved_photons_for(medium, quality)
 
 
 def _parallel(seconds: float, threads: int) -> float:

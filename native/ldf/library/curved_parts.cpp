@@ -87,7 +87,8 @@ std::vector<RadialProfile> LdfLibrary::curved_node_profiles(double albedo, Side 
     const CurvedPart* part = curved_part(curvature);
     if (!part)
         return node_profiles(albedo, side);
-    std::vector<RadialProfile> curved = part->library->node_profiles(albedo, side);
+    const RadialEnd end = part->curvature > 0.0 ? RadialEnd::abrupt : RadialEnd::faded;
+    const std::vector<RadialProfile> curved = part->library->simulated_profiles(albedo, side, {}, end).front();
     if (part->library->angles_deg() == angles_deg())
         return curved;
     const std::vector<RadialProfile> plane = node_profiles(albedo, side);

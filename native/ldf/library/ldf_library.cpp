@@ -122,7 +122,8 @@ LdfLibrary::AngleWeights LdfLibrary::simulated_weights(double angle_deg) const
 }
 
 std::vector<LdfLibrary::PoleProfiles> LdfLibrary::simulated_profiles(double albedo, Side side,
-                                                                     std::optional<std::size_t> group) const
+                                                                     std::optional<std::size_t> group,
+                                                                     RadialEnd end) const
 {
     check_albedo(albedo);
     std::vector<PoleProfiles> poles(used_poles(m_medium));
@@ -135,7 +136,7 @@ std::vector<LdfLibrary::PoleProfiles> LdfLibrary::simulated_profiles(double albe
             std::vector<double> sums = contract_orders(from, albedo, pole);
             if (group)
                 deviate(sums, deviations_at(from.deviations, from.harmonics, from.radii, *group, pole, albedo));
-            profile = RadialProfile(0.0, sums, RadialDetail::bins);
+            profile = RadialProfile(0.0, sums, RadialDetail::bins, end);
             profile.drop_negligible(negligible_harmonics);
         }
     return poles;

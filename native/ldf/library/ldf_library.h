@@ -180,7 +180,8 @@ private:
     double entry_transmittance(double angle_deg) const;
 
     // Profiles of each pole at the simulated angles, with the centre still at 0.
-    std::vector<PoleProfiles> simulated_profiles(double albedo, Side side, std::optional<std::size_t> group = {}) const;
+    std::vector<PoleProfiles> simulated_profiles(double albedo, Side side, std::optional<std::size_t> group = {},
+                                                 RadialEnd end = RadialEnd::faded) const;
     RadialProfile interpolated(double angle_deg, Side side, std::size_t pole, const PoleProfiles& nodes,
                                const AngleWeights& weights) const;
 

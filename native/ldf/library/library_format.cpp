@@ -56,9 +56,9 @@ std::string part_name(std::size_t side, std::size_t angle)
     return std::string(side_names[side]) + "." + std::to_string(angle);
 }
 
-std::string curved_prefix(std::size_t i)
+std::string curved_name(std::size_t i)
 {
-    return "curved." + std::to_string(i) + ".";
+    return "curved." + std::to_string(i);
 }
 
 std::vector<float> with_columns(const std::vector<float>& values, std::size_t from_columns, std::size_t columns)

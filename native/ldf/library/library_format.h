@@ -14,9 +14,13 @@
 //                        line per batch: power that leaves;
 //   "<side>.<j>.scatter" columns: [pole][albedo][harmonic][radius bin], lines: groups of batches: their deviations
 //                        (transport/tally/tally.h), half precision.
-// Libraries of curved surfaces follow, by ascending curvatures: their parts are named "curved.<i>.<side>.<j>", have an
-// attribute curvature (1 / mean free path) and no lines for batches and no scatter; residuals are relative standard
-// errors. A file may have these alone.
+// Curved surfaces follow, by ascending curvatures; a file may have these alone. The parts of the i-th have an attribute
+// curvature (1 / mean free path), the attributes angle.<j> (degrees) instead of angle, and all angles together:
+//   "curved.<i>"         columns: radius bins, lines: for each angle the order bins up to the last that is not empty:
+//                        power times `curved_power_scale`, half precision;
+//   "curved.<i>.ratios"  as above, for each angle;
+//   "curved.<i>.orders"  columns: order bins; lines: for each angle the mean and the variance of the order, the number
+//                        of harmonics, and the relative standard errors at `compared_albedos`.
 // Each part has one channel, because sorting channels into pixels takes OpenEXR longer than reading.
 #pragma once
 
@@ -37,8 +41,14 @@ inline constexpr int version = 8;
 
 std::string part_name(std::size_t side, std::size_t angle);
 
-// What the names of the i-th curved library's parts begin with.
-std::string curved_prefix(std::size_t i);
+// Name of the i-th curved surface's first part.
+std::string curved_name(std::size_t i);
+
+// Lines of each angle among the orders of a curved surface.
+inline constexpr std::size_t curved_order_lines = 4;
+
+// Factor that keeps powers of curved surfaces, at most 1, in half precision's range.
+inline constexpr float curved_power_scale = 1 << 14;
 
 // Number of lines for this number of values.
 inline std::size_t ratio_lines(std::size_t values)

@@ -11,6 +11,23 @@ namespace beamspread {
 
 namespace {
 
+// Precision of the numbers of curved surfaces: binary digits of a bin's power, and steps of a ratio between 0 and 1.
+// Both errors are below the bins' noise. More: larger files.
+constexpr int power_digits = 6;
+constexpr float ratio_steps = 64.0F;
+
+// Unit below which powers are rounded: the last digit of small numbers in files (library_format.h).
+constexpr double smallest_power = 0x1p-38;
+
+// Rounds a number to this many binary digits.
+double rounded(double x, int digits, double smallest)
+{
+    int exponent = 0;
+    std::frexp(x, &exponent);
+    const double unit = std::max(std::ldexp(1.0, exponent - digits), smallest);
+    return std::round(x / unit) * unit;
+}
+
 std::vector<double> sorted(std::vector<double> values)
 {
     std::sort(values.begin(), values.end());
@@ -77,6 +94,10 @@ std::vector<CurvedPart> parts_of(const Medium& medium, const std::vector<double>
 AngleResult slimmed(AngleResult result)
 {
     for (SideResult& side : result.sides) {
+        for (float& power : side.power)
+            power = static_cast<float>(rounded(static_cast<double>(power), power_digits, smallest_power));
+        for (float& ratio : side.ratios)
+            ratio = std::round(ratio * ratio_steps) / ratio_steps;
         side.batch_totals.clear();
         side.deviations.clear();
     }

@@ -85,7 +85,8 @@ Cubic cubic_derivative(double t, double h)
 
 RadialProfile::RadialProfile() : m_remaining(edge_count, Harmonics{}), m_slope(edge_count, Harmonics{}) {}
 
-RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments, RadialDetail detail) : RadialProfile()
+RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments, RadialDetail detail, RadialEnd end)
+    : RadialProfile()
 {
     m_detail = detail;
     m_centre = centre;
@@ -104,7 +105,7 @@ RadialProfile::RadialProfile(double centre, std::span<const double> bin_moments,
 
     for (std::size_t i = 0; i + 1 < knot.size(); ++i) {
         const std::size_t k = knot[i];
-        m_slope[k] = slope_at(i, detail);
+        m_slope[k] = slope_at(i, detail, end);
         // Limit the slopes to three times those of the adjacent chords, which makes C_0 monotone and the azimuthal mean
         // of g positive (Fritsch, Carlson 1980, doi:10.1137/0717021).
         const auto chord = [&](std::size_t end) {
@@ -139,16 +140,22 @@ void RadialProfile::subdivide(std::size_t first, std::size_t last)
 }
 
 // Slopes of C_m at knot i. Far out g falls exponentially, by several times within a bin. A polynomial follows the
-// logarithm of the remaining power of m = 0 well, and the profile harmonics' ratios to it.
-Harmonics RadialProfile::slope_at(std::size_t i, RadialDetail detail) const
+// logarithm of the remaining power of m = 0 well, and the profile harmonics' ratios to it. Beside an abrupt end, where the
+// remaining power is no exponential, a parabola through three knots follows it.
+Harmonics RadialProfile::slope_at(std::size_t i, RadialDetail detail, RadialEnd end) const
 {
     const auto& [edge, stencils] = knots(detail);
     const Stencil& stencil = stencils[i];
     Harmonics slope{};
-    for (std::size_t j = 0; j < 5; ++j)
-        if (m_remaining[edge[stencil.first + j]][0] <= 0.0)
-            return slope;  // beside the last bin with light, or noise of subtracted profiles
     const Harmonics& here = m_remaining[edge[i]];
+    for (std::size_t j = 0; j < 5; ++j)
+        if (m_remaining[edge[stencil.first + j]][0] <= 0.0) {
+            // beside the last bin with light, or noise of subtracted profiles
+            if (end == RadialEnd::abrupt && here[0] > 0.0 && i > 0)
+                for (std::size_t m = 0; m < m_harmonics; ++m)
+                    slope[m] = parabola_slope(i, edge, m);
+            return slope;
+        }
     for (std::size_t j = 0; j < 5; ++j) {
         const Harmonics& there = m_remaining[edge[stencil.first + j]];
         slope[0] -= stencil.weight[j] * here[0] * std::log(there[0] / here[0]);
@@ -158,6 +165,16 @@ Harmonics RadialProfile::slope_at(std::size_t i, RadialDetail detail) const
     for (std::size_t m = 1; m < m_harmonics; ++m)
         slope[m] += here[m] / here[0] * slope[0];
     return slope;
+}
+
+// Slope of C_m at an inner knot, of the parabola through it and its neighbours.
+double RadialProfile::parabola_slope(std::size_t i, std::span<const std::size_t> edge, std::size_t m) const
+{
+    const double before = radial_edge(edge[i]) - radial_edge(edge[i - 1]);
+    const double after = radial_edge(edge[i + 1]) - radial_edge(edge[i]);
+    const double chord_before = (m_remaining[edge[i - 1]][m] - m_remaining[edge[i]][m]) / before;
+    const double chord_after = (m_remaining[edge[i]][m] - m_remaining[edge[i + 1]][m]) / after;
+    return (after * chord_before + before * chord_after) / (before + after);
 }
 
 void RadialProfile::add(const RadialProfile& profile, double even_weight, double odd_weight)

@@ -28,6 +28,9 @@ inline constexpr std::size_t edge_count = radius_bin_count + fine_edge_count - r
 // The edges of the bins, enough for light around one pole; or all edges.
 enum class RadialDetail { bins, all };
 
+// How a profile ends at the last edge that encloses light: it fades, or stops where a ball has no longer chords.
+enum class RadialEnd { faded, abrupt };
+
 // Radius of an edge, mean free paths, ascending.
 double radial_edge(std::size_t edge);
 
@@ -67,7 +70,8 @@ public:
 
     // Makes a profile from sums of weight * cos(m phi) between the edges of this detail, [harmonic][radius]. The cubics
     // meet at these edges.
-    RadialProfile(double centre, std::span<const double> bin_moments, RadialDetail detail);
+    RadialProfile(double centre, std::span<const double> bin_moments, RadialDetail detail,
+                  RadialEnd end = RadialEnd::faded);
 
     // Adds a weighted profile, with separate weights for harmonics of even and odd m. Keeps the centre.
     void add(const RadialProfile& profile, double even_weight, double odd_weight);
@@ -106,7 +110,8 @@ public:
     RadialDetail detail() const { return m_detail; }
 
 private:
-    Harmonics slope_at(std::size_t knot, RadialDetail detail) const;
+    Harmonics slope_at(std::size_t knot, RadialDetail detail, RadialEnd end) const;
+    double parabola_slope(std::size_t knot, std::span<const std::size_t> edge, std::size_t m) const;
     void subdivide(std::size_t first, std::size_t last);
     void update_support();
 

@@ -92,8 +92,8 @@ struct WalkPlan {
 // time.
 inline constexpr std::size_t late_walks = 4;
 
-// Probability to survive one roulette up to `WalkPlan::last_common_order`. In a half-space the number of photons falls like
-// order^-1/2; this survival makes each octave of orders cost the same and add the same variance.
+// Probability to survive one roulette up to `WalkPlan::last_common_order`. In a half-space the number of photons falls
+// like order^-1/2; this survival makes each octave of orders cost the same and add the same variance.
 inline constexpr double roulette_survival = 0.70710678118654752;
 
 // Probability below which an exit is tallied at random with this weight: deep flights, which hardly ever leave, cost
