@@ -20,7 +20,8 @@ def box():
     settings = bpy.context.scene.beamspread
     settings.use_indirect, settings.margin, settings.resolution = False, MARGIN, 256
     image = bpy.data.images.new("Target", SIDE, SIDE, float_buffer=True, alpha=False)
-    material = scenes.add_material(image=image, linked=True)
+    # Light spreads so little that little of it crosses the edges: the planes are baked apart.
+    material = scenes.add_material(image=image, linked=True, mean_free_path=(0.003,) * 3)
     bpy.ops.mesh.primitive_cube_add(size=1.0)
     cube = bpy.context.object
     cube.matrix_world = Matrix.Rotation(0.4, 4, "Z") @ Matrix.Translation((0, 0, 0.6))
@@ -40,7 +41,7 @@ def alone(cube, number):
     for corner, loop in enumerate(polygon.loop_indices):
         layer.data[corner].uv = cube.data.uv_layers[0].data[loop].uv
     image = bpy.data.images.new("Alone", SIDE, SIDE, float_buffer=True, alpha=False)
-    mesh.materials.append(scenes.add_material("Alone", image=image, linked=True))
+    mesh.materials.append(scenes.add_material("Alone", image=image, linked=True, mean_free_path=(0.003,) * 3))
     face = bpy.data.objects.new("Face", mesh)
     face.matrix_world = cube.matrix_world
     bpy.context.collection.objects.link(face)

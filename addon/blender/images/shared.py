@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from ...core.bake.margin import WHOLE, part_in_shared
+from ...core.bake.spread import spread_over_edges
 from ...core.errors import BakeError
 from ...core.scene.flat_mesh import flatten
 from ...core.scene.receiver import Receiver, build_receiver
@@ -43,7 +44,8 @@ def read_parts(target: Target, size: Size) -> Parts | None:
     evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
     try:
         is_tiled = isinstance(size, Tiling)
-        mesh = flatten(read_polygons(evaluated, target.material_name, None, node.uv_map, is_tiled))
+        polygons = read_polygons(evaluated, target.material_name, None, node.uv_map, is_tiled)
+        mesh = flatten(polygons, spread=spread_over_edges(node.surface()))
         mesh = mesh.within(size) if is_tiled else mesh
         return parts_of(build_receiver(mesh, *(size.size if is_tiled else size))) if mesh.parts else ()
     except BakeError:

@@ -13,7 +13,7 @@ from ...core.bake.bake_settings import COMBINED, FINAL, PREVIEW, BakeSettings
 from ...core.bake.estimate import OF_MESHES, OF_WORLD
 from ...core.bake.forecast import Finders, Forecast, seconds_of
 from ...core.bake.pace import Estimate
-from ...core.bake.spread import Spread, image_length
+from ...core.bake.spread import Spread, image_length, spread_over_edges
 from ...core.errors import BakeError, MaterialError
 from ...core.scene.flat_mesh import bends
 from ...core.scene.lights import Light, WorldLight
@@ -201,18 +201,23 @@ def _shape(target: BakeTarget, depsgraph) -> tuple[float, bool]:
     evaluated, node = obj.evaluated_get(depsgraph), target.node
     is_tiled = uses_tiles(node)
 
-    path = min(node.surface().material.mean_free_path)
+    surface = node.surface()
+    try:
+        surface.check()
+    except BakeError:
+        return 0.0, False  # the bake says why
+    path, spread = min(surface.material.mean_free_path), spread_over_edges(surface)
 
     def read() -> tuple[float, bool]:
         try:
             polygons = read_polygons(evaluated, target.material.name, None, node.uv_map, is_tiled)
             length = image_length([polygons]) if polygons.count else 0.0
-            is_bent = 0 < length < math.inf and bends(polygons, path)
+            is_bent = 0 < length < math.inf and bends(polygons, path, spread)
         except BakeError:
             return 0.0, False  # the bake says why
         return (length, is_bent) if math.isfinite(length) else (0.0, False)
 
-    state = mesh_key(evaluated), node.uv_map, is_tiled, path, *(tuple(row) for row in matrix)
+    state = mesh_key(evaluated), node.uv_map, is_tiled, path, spread, *(tuple(row) for row in matrix)
     return scene_cache.get(("shape of image", obj, target.material.name), [obj], read, state=state)
 
 

@@ -9,7 +9,8 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ...core.bake.spread import image_length
+from ...core.bake.spread import image_length, spread_over_edges
+from ...core.bake.surface import Surface
 from ...core.errors import ImageError, text_of
 from ...core.live.live_target import LiveTarget
 from ...core.live.renderer import for_live
@@ -186,6 +187,7 @@ class Reader:
             size = _image_size(material, node.image) or sizes.get(target.material_name)
             side = self._side(target, node, settings)
             color = self._base_color(depsgraph, target, size or side)
+            spread = spread_over_edges(node.surface())
         except Exception as error:  # noqa: BLE001 - the other targets are still to be read
             self.errors[target] = text_of(error)
             return None
@@ -196,6 +198,7 @@ class Reader:
             "illumination": self._lighting[target.object_name],
             "surface": node.surface() if color is None else node.surface().colored(color),
             "texture": None if color is None else color.texture,
+            "spread": spread,
             "settings": for_live(settings.for_bake()),
             "max_bounces": self._max_bounces(depsgraph, self._lighting[target.object_name]),
             "is_final": not self._sky.is_busy(),
@@ -228,7 +231,7 @@ class Reader:
 
         def read() -> BaseColor:
             instance = find_instances(depsgraph, {target.object_name})[target.object_name]
-            receiver = _receiver(polygons, size, min(node.surface().material.mean_free_path))
+            receiver = _receiver(polygons, size, node.surface())
             return read_texture(node.color_input(groups), node.texture_blur, instance, receiver)
 
         tree = scene_cache.texture(material, node.color_input(groups))
@@ -257,8 +260,8 @@ def _blurred(color: BaseColor, blur: float) -> BaseColor:
     return replace(color, texture=replace(color.texture, blur=blur))
 
 
-def _receiver(polygons: Polygons, size: Size, mean_free_path: float) -> Receiver:
-    mesh = flatten(polygons, mean_free_path)
+def _receiver(polygons: Polygons, size: Size, surface: Surface) -> Receiver:
+    mesh = flatten(polygons, min(surface.material.mean_free_path), spread=spread_over_edges(surface))
     width, height = texture_size(mesh, size) if isinstance(size, int) else size
     shrink = min(1.0, MAX_TEXELS / max(width, height))
     return build_receiver(mesh, max(1, round(width * shrink)), max(1, round(height * shrink)))

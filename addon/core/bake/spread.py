@@ -14,7 +14,7 @@ from ..messages import Message, note
 from ..native import native
 from ..scene.flat_mesh import FlatMesh
 from ..scene.polygons import Polygons
-from .surface import Surface, channel_media
+from .surface import MIRROR, Surface, channel_media
 
 # Texels along the longer side of new images: the fewest, the most by texel density, and the most by the medium.
 MIN_SIDE, MAX_BY_DENSITY, MAX_SIDE = 512, 2048, 4096
@@ -72,6 +72,17 @@ def _reflectances(medium) -> tuple[np.ndarray, np.ndarray]:
     cosines = (nodes + 1) / 2
     reflected, _ = native.exact_totals(medium, np.degrees(np.arccos(cosines)).tolist(), (1 - roots**2).tolist())
     return roots, (weights * cosines) @ reflected
+
+
+def spread_over_edges(surface: Surface) -> float:
+    """How far light spreads over the edges at which planes meet, scene units; 0 if it crosses none.
+
+    It is rounded to a power of sqrt(2), since it decides what stays the same while a color changes.
+    """
+    # Mirrors return light at edges, and slabs have none.
+    if surface.edges == MIRROR or surface.thickness > 0:
+        return 0.0
+    return 2 ** (round(2 * math.log2(max(spread_lengths(surface)))) / 2)
 
 
 def image_length(meshes: Iterable[Polygons]) -> float:

@@ -28,6 +28,7 @@ class LiveTarget:
     polygons : faces of the receiver, in the world.
     size : width and height of the image in texels; None: `resolution` texels along the longer side.
     texture : colors that light meets on its way in and out; the surface then has their mean.
+    spread : see `flatten`.
     max_bounces : see `BouncedLight`; None: no light bounces.
     is_final : False while better light is on its way, so that an exact rendering would be in vain.
     """
@@ -40,6 +41,7 @@ class LiveTarget:
     surface: Surface
     settings: BakeSettings
     texture: Texture | None = None
+    spread: float = 0.0
     max_bounces: tuple[int, int, int] | None = None
     is_final: bool = True
 
@@ -50,7 +52,7 @@ class LiveTarget:
         shadows = self.illumination.shadow_key()
         arrays = self.polygons.corners, self.polygons.uvs, self.polygons.normals, self.polygons.corner_normals
         texture = () if self.texture is None else (self.texture.blur, *map(_key, self.texture.colors))
-        rest = self.size or self.resolution, self.surface, self.settings, texture, self.max_bounces
+        rest = self.size or self.resolution, self.surface, self.settings, texture, self.spread, self.max_bounces
         return lights, shadows, *map(_key, arrays), *rest
 
 

@@ -244,9 +244,9 @@ class LiveRenderer:
 
     def _mesh(self, target: LiveTarget) -> FlatMesh:
         path, polygons = min(target.surface.material.mean_free_path), target.polygons
-        key = id(polygons), path
+        key = id(polygons), path, target.spread
         if key not in self._meshes:
-            mesh = flatten(polygons, path, target.target.object_name)
+            mesh = flatten(polygons, path, target.target.object_name, target.spread)
             # The entry holds the polygons, so that no others get their identity.
             keep_recent(self._meshes, key, (polygons, mesh), MAX_RECEIVERS)
         return self._meshes[key][1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +15,10 @@ from .islands import NO_UV_AREA, Island, check_uvs, find_islands
 from .planes import FLATNESS_TOLERANCE, FLATTENED, Plane, find_planes
 from .polygons import Polygons
 from .tiles import Place, Tiling
+
+# Part of the area that may lie near edges at which planes meet, if the planes are baked apart. Larger: faster, and more
+# light is lost at edges.
+MAX_EDGES = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,11 +70,12 @@ def finite_remedy(name: str) -> str:
     return f"Check its scale and modifiers, or run bpy.data.objects['{name}'].data.validate() in the Python Console."
 
 
-def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> FlatMesh:
+def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "", spread: float = 0.0) -> FlatMesh:
     """Find the parts of a mesh of the object `name`.
 
     Faces are flattened onto a plane within a mean free path, in the units of the mesh, or within `FLATTENED`: the
-    medium, or the texels, show no more. If the rest of the faces does not consist of planes, all faces are one part.
+    medium, or the texels, show no more. If the rest of the faces does not consist of planes, or if much light crosses
+    the edges at which planes meet, all faces are one part. `spread`: how far light spreads; 0: it crosses no edges.
 
     Raises
     ------
@@ -85,7 +91,7 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> 
     tolerance = _tolerance(polygons, mean_free_path)
     polygons, planes, bent = _planes_of(polygons, tolerance)
     check_uvs(polygons.uvs)
-    if len(bent):
+    if len(bent) or _edge_part(polygons, planes, spread) > MAX_EDGES:
         polygons, messages = facing_outward(polygons, name)
         messages += lost_in_map(polygons, name)
         return FlatMesh((bent_part(polygons),), tuple(messages), polygons.uv_map)
@@ -121,9 +127,10 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "") -> 
     return FlatMesh(tuple(parts), tuple(messages), polygons.uv_map)
 
 
-def bends(polygons: Polygons, mean_free_path: float = 0.0) -> bool:
-    """True if faces with an area, at finite positions, would be one part that bends."""
-    return len(_planes_of(polygons, _tolerance(polygons, mean_free_path))[2]) > 0
+def bends(polygons: Polygons, mean_free_path: float = 0.0, spread: float = 0.0) -> bool:
+    """True if faces with an area, at finite positions, would be one part that bends; arguments as of `flatten`."""
+    polygons, planes, bent = _planes_of(polygons, _tolerance(polygons, mean_free_path))
+    return len(bent) > 0 or _edge_part(polygons, planes, spread) > MAX_EDGES
 
 
 def _tolerance(polygons: Polygons, mean_free_path: float) -> float:
@@ -138,6 +145,19 @@ def _planes_of(polygons: Polygons, tolerance: float) -> tuple[Polygons, list[Pla
         polygons = with_triangles(polygons, warped)
         planes, bent = find_planes(polygons, tolerance)
     return polygons, planes, bent
+
+
+def _edge_part(polygons: Polygons, planes: Sequence[Plane], spread: float) -> float:
+    """Part of the area that lies within `spread` of edges at which planes meet, about."""
+    plane_of = np.full(polygons.count, -1)
+    for number, plane in enumerate(planes):
+        plane_of[plane.faces] = number
+    first, second = polygons.shared_edges
+    faces = polygons.face_of
+    meets = (plane_of[faces[first]] != plane_of[faces[second]]) & (plane_of[faces[[first, second]]] >= 0).all(axis=0)
+    begin = first[meets]
+    lengths = np.linalg.norm(polygons.corners[polygons.next_corners[begin]] - polygons.corners[begin], axis=1)
+    return 2 * spread * float(lengths.sum()) / float(polygons.areas.sum())
 
 
 def _capital(words: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from ....core.bake.spread import length_of, lengths_of_tiles
+from ....core.bake.spread import length_of, lengths_of_tiles, spread_over_edges
 from ....core.bake.surface import Surface
 from ....core.messages import Message
 from ....core.scene.flat_mesh import FlatMesh, flatten
@@ -42,7 +42,8 @@ def read_receiver(target: Target, instance: ObjectInstance, fills_image: bool, o
         check_image(image)
     is_tiled = fills_image and uses_tiles(evaluated.node)
     polygons = read_polygons(instance.obj, target.material_name, instance.matrix, evaluated.node.uv_map, is_tiled)
-    mesh = flatten(polygons, min(surface.material.mean_free_path), target.object_name)
+    path = min(surface.material.mean_free_path)
+    mesh = flatten(polygons, path, target.object_name, spread_over_edges(surface))
     if outcome is not None:
         mesh = replace(mesh, messages=(outcome, *mesh.messages))
     return Receiving(evaluated, instance, surface, mesh, is_tiled)
