@@ -1,14 +1,95 @@
 // The solver `surface` for tests and measurements: part of the module _native_test.
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "base/constants.h"
 #include "python/media.h"
 #include "solve/surface/surface_field.h"
 
 namespace beamspread {
 
 namespace {
+
+// LDFs in closed form, see `density`.
+class ExponentialSource final : public LdfSource {
+public:
+    explicit ExponentialSource(std::vector<double> curvatures) : m_curvatures(std::move(curvatures)) {}
+
+    RadialProfile profile(double angle_deg, double albedo, Side side) const override
+    {
+        RadialProfile sum;
+        const std::vector<RadialProfile> nodes = node_profiles(albedo, side);
+        const AngleWeights weights = angle_weights(angle_deg);
+        for (std::size_t j = 0; j < nodes.size(); ++j)
+            sum.add(nodes[j], weights.even[j], weights.odd[j]);
+        return sum;
+    }
+
+    std::vector<RadialProfile> node_profiles(double albedo, Side side) const override
+    {
+        const auto flat = std::find(m_curvatures.begin(), m_curvatures.end(), 0.0) - m_curvatures.begin();
+        return curved_node_profiles(albedo, side, static_cast<std::size_t>(flat));
+    }
+
+    std::vector<double> curvatures() const override { return m_curvatures; }
+
+    std::vector<RadialProfile> curved_node_profiles(double albedo, Side, std::size_t curvature) const override
+    {
+        std::vector<RadialProfile> nodes;
+        for (const double angle : node_angles) {
+            std::vector<double> moments(harmonics * edge_count);
+            double inner = 0.0;
+            for (std::size_t edge = 0; edge < edge_count; ++edge) {
+                const double half = 0.5 * (radial_edge(edge) - inner);
+                for (std::size_t q = 0; q < gauss_node.size(); ++q) {
+                    const double r = inner + half * (1.0 + gauss_node[q]);
+                    for (std::size_t m = 0; m < harmonics; ++m)
+                        moments[m * edge_count + edge] +=
+                            gauss_weight[q] * half * r * (m == 0 ? 2.0 * pi : pi) *
+                            density(m, r, angle, albedo, m_curvatures[curvature]);
+                }
+                inner = radial_edge(edge);
+            }
+            nodes.emplace_back(0.0, moments, RadialDetail::all);
+        }
+        return nodes;
+    }
+
+    AngleWeights angle_weights(double angle_deg) const override
+    {
+        AngleWeights weights{std::vector<double>(node_angles.size()), {}, {}};
+        const double step = node_angles[1];
+        const auto before = std::min(static_cast<std::size_t>(angle_deg / step), node_angles.size() - 2);
+        const double part = angle_deg / step - static_cast<double>(before);
+        weights.even[before] = 1.0 - part;
+        weights.even[before + 1] = part;
+        weights.odd = weights.even;
+        weights.neighbours = {before, before + 1};
+        return weights;
+    }
+
+    void check_angle(double /*angle_deg*/) const override {}
+
+    // c_m(r) = albedo (sin(angle) r / (1 + r))^m / (m + 1) (1 + (m + 1) curvature) exp(-r) / (2 pi), linear in between
+    // the nodes of angle and curvature.
+    static double density(std::size_t m, double r, double angle_deg, double albedo, double curvature)
+    {
+        const auto order = static_cast<double>(m);
+        return albedo * std::pow(std::sin(angle_deg * radians_per_degree) * r / (1.0 + r), order) / (order + 1.0) *
+               (1.0 + (order + 1.0) * curvature) * std::exp(-r) / (2.0 * pi);
+    }
+
+private:
+    static constexpr std::size_t harmonics = 4;
+    static constexpr std::array<double, 7> node_angles = {0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0};
+
+    std::vector<double> m_curvatures;
+};
 
 // A field with the objects that it views.
 class HeldField {
@@ -68,6 +149,9 @@ private:
 
 void bind_surface(py::module_& m)
 {
+    py::class_<ExponentialSource, LdfSource, std::shared_ptr<ExponentialSource>>(
+        m, "ExponentialSource", "LDFs in closed form, linear in angles 15 degrees apart and in the curvature.")
+        .def(py::init<std::vector<double>>(), py::arg("curvatures"));
     py::class_<HeldField>(m, "SurfaceField", "Light on samples of a surface, by the solver `surface`.")
         .def(py::init<const py::array&, const Sources&, const std::vector<double>&, const std::vector<double>&, double,
                       double, bool, int, std::size_t, bool>(),

@@ -22,6 +22,7 @@ SLOW = {
     "test_live",
     "test_memory",
     "test_ray_gather",
+    "test_surface_solver",
     "test_tolerance",
     "test_two_levels",
     "test_unscattered",

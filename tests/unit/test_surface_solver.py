@@ -1,36 +1,357 @@
-"""The solver `surface` on planes, where `fft` knows the result."""
+"""The solver `surface`: planes against `fft`, pairs against sums in NumPy, and what all surfaces have in common."""
+
+import functools
+import subprocess
+import sys
+from pathlib import Path
 
 import _native_test
 import numpy as np
 import pytest
-from beamspread import Medium, convolve, library
+from beamspread import Cancelled, Medium, convolve, library
+
+from body_samples import samples as samples_of
+from body_tables import BODIES
 
 SIDE, PITCH = 48, 1e-3
 ALBEDO = (0.9, 0.95, 0.6)
+WHITE = [1.0, 1.0, 1.0]
+OBLIQUE = np.array([np.sin(0.7), 0, -np.cos(0.7)], np.float32)
 
 
-def flat_samples():
+def flat_samples(side=SIDE):
     """Texels of a plane as float32 (N, 10): position, normal, tangent, area."""
-    y, x = np.mgrid[0:SIDE, 0:SIDE]
-    samples = np.zeros((SIDE * SIDE, 10), np.float32)
+    y, x = np.mgrid[0:side, 0:side]
+    samples = np.zeros((side * side, 10), np.float32)
     samples[:, 0], samples[:, 1] = (x.ravel() + 0.5) * PITCH, (y.ravel() + 0.5) * PITCH
     samples[:, 5] = samples[:, 6] = 1
     samples[:, 9] = PITCH**2
     return samples
 
 
+def square_of_light():
+    irradiance = np.zeros((SIDE, SIDE), np.float32)
+    irradiance[12:30, 15:33] = 1
+    return irradiance
+
+
+def rays(direction, count=SIDE * SIDE):
+    return np.ascontiguousarray(np.broadcast_to(direction, (count, 3)), np.float32)
+
+
+def gray(irradiance):
+    return np.ascontiguousarray(np.repeat(np.ravel(irradiance)[:, None], 3, axis=1), np.float32)
+
+
+def flat_field(ldf=None, path=PITCH, samples=None, **options):
+    samples = flat_samples() if samples is None else samples
+    ldf = library(Medium(0.8, 1.0)) if ldf is None else ldf
+    return _native_test.SurfaceField(samples, [ldf] * 3, list(ALBEDO), [*np.broadcast_to(path, 3)], **options)
+
+
+def lit_field(**options):
+    field = flat_field(**options)
+    field.add(rays(OBLIQUE), gray(square_of_light()), WHITE)
+    return field
+
+
+def relative_error(result, truth):
+    """Largest difference over the brightest truth of each channel."""
+    return (np.abs(result - truth).max(axis=0) / truth.max(axis=0)).max()
+
+
 @pytest.mark.parametrize("texels", [0.03, 0.3, 3.0, 30.0])
 def test_a_plane_of_samples_is_solved_as_by_fft(texels):
     """Samples are disks instead of squares: up to 1.6 % of the brightest where the medium spreads about a texel."""
     ldf, path = library(Medium(0.8, 1.0)), texels * PITCH
-    irradiance = np.zeros((SIDE, SIDE), np.float32)
-    irradiance[12:30, 15:33] = 1
-    travel = np.array([np.sin(0.7), 0, -np.cos(0.7)], np.float32)
-    expected = convolve(irradiance, travel, ldf, ALBEDO, path, PITCH)
-    field = _native_test.SurfaceField(flat_samples(), [ldf] * 3, list(ALBEDO), [path] * 3)
-    rays = np.ascontiguousarray(np.broadcast_to(travel, (SIDE * SIDE, 3)))
-    field.add(rays, np.ascontiguousarray(np.repeat(irradiance.reshape(-1, 1), 3, axis=1)), [1.0, 1.0, 1.0])
-    solved = field.solve().reshape(SIDE, SIDE, 3)
+    expected = convolve(square_of_light(), OBLIQUE, ldf, ALBEDO, path, PITCH)
+    solved = lit_field(path=path).solve().reshape(SIDE, SIDE, 3)
     bound = 0.02 if texels < 1 else 0.005
     assert np.abs(solved - expected).max() <= bound * expected.max()
     assert solved.sum() == pytest.approx(expected.sum(), rel=bound)
+
+
+def test_a_lamp_shines_on_channels_of_unlike_paths():
+    """Directions change from texel to texel. The bound is that of disks, as above."""
+    ldf, paths = library(Medium(0.8, 1.4)), np.array((4.0, 2.0, 1.0)) * PITCH
+    y, x = (np.mgrid[0:SIDE, 0:SIDE] + 0.5) * PITCH
+    way = np.stack([x - 0.3 * SIDE * PITCH, y - 0.5 * SIDE * PITCH, np.full_like(x, -8 * PITCH)], -1)
+    distance = np.linalg.norm(way, axis=-1)
+    irradiance, travel = (
+        ((8 * PITCH / distance) ** 3).astype(np.float32),
+        (way / distance[..., None]).astype(np.float32),
+    )
+    expected = convolve(irradiance, travel, ldf, ALBEDO, paths, PITCH, tolerance=1e-4)
+    field = flat_field(ldf, paths)
+    field.add(travel.reshape(-1, 3), gray(irradiance), WHITE)
+    assert relative_error(field.solve(), expected.reshape(-1, 3)) < 0.005
+
+
+def test_a_spread_far_below_a_texel_gives_the_local_reflectance():
+    """Light reaches a neighbour from the border alone: some 1e-3 for a path of a thousandth of a texel."""
+    ldf = library(Medium(0.8, 1.4))
+    y, x = np.mgrid[0:SIDE, 0:SIDE]
+    angle, lit = np.radians(70 * x / SIDE), ((x + y) % 2).ravel()
+    travel = np.stack([np.sin(angle), np.zeros_like(angle), -np.cos(angle)], -1).astype(np.float32).reshape(-1, 3)
+    field = flat_field(ldf, 1e-3 * PITCH)
+    field.add(travel, gray(lit), WHITE)
+    expected = [[ldf.reflectance(a, albedo) / np.pi for albedo in ALBEDO] for a in np.degrees(angle[0])]
+    expected = np.tile(expected, (SIDE, 1)) * lit[:, None]
+    assert relative_error(field.solve(), expected) < 3e-3
+
+
+@functools.cache
+def waves(count=400):
+    """Samples of a wavy surface at random places, with random tangents; every second one is lit from anywhere."""
+    random = np.random.default_rng(3)
+    x, y = random.uniform(-1, 1, (2, count))
+    normal = np.stack([-0.6 * np.cos(2 * x), 0.9 * np.sin(3 * y), np.ones(count)], 1)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    tangent = np.cross(normal, random.normal(size=(count, 3)))
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    position = np.stack([x, y, 0.3 * np.sin(2 * x) + 0.3 * np.cos(3 * y)], 1)
+    area = random.uniform(0.5, 1, count) / count * 1e-3  # far smaller than distances: points
+    samples = np.column_stack([position, normal, tangent, area]).astype(np.float32)
+    cosine, azimuth = random.uniform(0.1, 1, count), random.uniform(0, 2 * np.pi, count)
+    sine = np.sqrt(1 - cosine**2)
+    travel = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), -cosine], 1).astype(np.float32)
+    irradiance = (random.uniform(0, 9, (count, 3)) * (np.arange(count)[:, None] % 2)).astype(np.float32)
+    return samples, travel, irradiance
+
+
+NODES = [-0.5, 0.0, 0.5, 2.0]
+
+
+def summed_pairs(samples, travel, irradiance, paths):
+    """Luminance by `ExponentialSource`, pair by pair, and the curvature of the pairs: [from][to]."""
+    position, normal, tangent, area = np.split(samples.astype(float), [3, 6, 9], axis=1)
+    way = position[None] - position[:, None]
+    chord = np.linalg.norm(way, axis=-1) + np.eye(len(way))
+    curvature = np.einsum("ijc,ijc->ij", normal[None] - normal[:, None], way) / chord**2
+    binormal = np.cross(normal, tangent)
+    x, y = np.einsum("ijc,ic->ij", way, tangent), np.einsum("ijc,ic->ij", way, binormal)
+    fade = np.minimum(np.hypot(x, y) / (0.5 * chord), 1)  # of harmonics where a chord is steep
+    azimuth = np.arctan2(y, x)
+    azimuth -= np.arctan2(travel[:, 1], travel[:, 0])[:, None]
+    angle = np.degrees(np.arccos(-travel[:, 2].astype(float)))
+    nodes = np.arange(0, 91, 15)
+    luminance = []
+    for c, (albedo, path) in enumerate(zip(ALBEDO, paths)):
+        r, k = chord / path, np.clip(curvature * path, NODES[0], NODES[-1])
+        kernel = sum(
+            (np.interp(angle, nodes, np.sin(np.radians(nodes)) ** m) / (m + 1))[:, None]
+            * (1 + (m + 1) * k) * (fade * r / (1 + r)) ** m * np.exp(-r) * np.cos(m * azimuth)
+            for m in range(4)
+        )  # fmt: skip
+        kernel *= albedo / (2 * np.pi * path**2) * (1 - np.eye(len(way)))
+        luminance.append((area[:, 0] * irradiance[:, c]) @ kernel / np.pi)
+    return np.stack(luminance, 1), curvature, fade
+
+
+@pytest.mark.parametrize("is_colored", [True, False], ids=["colored", "gray"])
+def test_pairs_choose_kernels_by_chord_azimuth_and_curvature(is_colored):
+    """Tables are linear over 16 steps of an octave: 1e-3 at most, measured 4e-4."""
+    samples, travel, irradiance = waves()
+    paths, color = (0.3, 0.2, 0.5), [1.0, 0.5, 0.25]
+    if not is_colored:
+        irradiance = gray(irradiance[:, 0])
+    source = _native_test.ExponentialSource(NODES)
+    field = _native_test.SurfaceField(
+        samples, [source] * 3, list(ALBEDO), list(paths), tolerance=1e-4, is_colored=is_colored, is_direct=True
+    )
+    dark = 100
+    field.add(travel[:dark], irradiance[:dark], color)
+    field.add(travel[dark:], irradiance[dark:], color, dark)
+    expected, curvature, fade = summed_pairs(samples, travel, irradiance * np.array(color, np.float32), paths)
+    assert (np.abs(curvature * 0.5) > 0.5).mean() > 0.1
+    assert fade.min() < 0.5
+    # A sample's light at itself is a small part in between; it is known exactly.
+    samples_dark = irradiance.max(axis=1) == 0
+    error = np.abs(field.solve() - expected)[samples_dark]
+    assert (error / expected[samples_dark].max(axis=0)).max() < 1e-3
+
+
+def test_share_of_the_area_that_bends_too_much():
+    """A ball within the curvatures, and beyond them; a plane never is."""
+    ball = body("ball_6", 6.0)
+    shares = []
+    for nodes in ([0.0, 0.05], [0.0, 0.01]):  # the ball's is 1 / 30
+        field = _native_test.SurfaceField(
+            ball[0], [_native_test.ExponentialSource(nodes)] * 3, list(ALBEDO), [1.0, 2.0, 4.0]
+        )
+        field.add(*ball[1:], WHITE)
+        field.solve()
+        shares.append(field.beyond_share)
+    assert shares[0] == 0
+    assert shares[1] > 0.2  # dark samples count as covered where no light reaches them
+    flat = lit_field()
+    flat.solve()
+    assert flat.beyond_share == 0
+
+
+@functools.cache
+def body(name, texel):
+    """Samples, travel and irradiance of a body; a mean free path is 1 m."""
+    made = samples_of(BODIES[name][0], texel)
+    samples = np.column_stack([made.position, made.normal, made.tangent, made.area]).astype(np.float32)
+    return samples, made.travel, gray(made.irradiance)
+
+
+def solve_body(name, texel, **options):
+    samples, travel, irradiance = body(name, texel)
+    source = _native_test.ExponentialSource([-0.1, 0.0, 0.05, 0.2])
+    field = _native_test.SurfaceField(samples, [source] * 3, list(ALBEDO), [2.0, 1.0, 4.0], **options)
+    field.add(travel, irradiance, WHITE)
+    return field.solve()
+
+
+@pytest.mark.parametrize(
+    ("name", "texel"), [("ball_6", 1.2), ("cylinder_6", 2.0), ("hollow_6", 2.0), ("block_12", 2.0), ("saddle_6", 0.8)]
+)
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-2])
+def test_the_tree_keeps_the_tolerance_against_all_pairs(name, texel, tolerance):
+    truth = solve_body(name, texel, tolerance=tolerance, is_direct=True)
+    assert relative_error(solve_body(name, texel, tolerance=tolerance), truth) < tolerance
+
+
+def test_the_number_of_threads_changes_no_bit():
+    results = [solve_body("block_12", 3.0, threads=threads) for threads in (1, 2, 5)]
+    assert all(np.array_equal(results[0], result) for result in results)
+
+
+def test_the_order_of_samples_changes_rounding_alone():
+    samples, travel, irradiance = body("ball_6", 3.0)
+    order = np.random.default_rng(5).permutation(len(samples))
+    source = _native_test.ExponentialSource([0.0, 0.05])
+    results = []
+    for chosen in (np.arange(len(samples)), order):
+        field = _native_test.SurfaceField(samples[chosen], [source] * 3, list(ALBEDO), [2.0] * 3, is_direct=True)
+        field.add(travel[chosen], irradiance[chosen], WHITE)
+        results.append(field.solve())
+    assert relative_error(results[1], results[0][order]) < 1e-5
+
+
+def test_the_frame_of_a_sample_changes_nothing():
+    """Tangents turned at random, with the light's directions turned back."""
+    samples, travel, irradiance = (values.copy() for values in body("cylinder_6", 3.0))
+    before = solve_body("cylinder_6", 3.0, is_direct=True)
+    angle = np.random.default_rng(6).uniform(0, 2 * np.pi, len(samples))
+    cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    samples[:, 6:9] = cosine * samples[:, 6:9] + sine * np.cross(samples[:, 3:6], samples[:, 6:9])
+    x, y = travel[:, :1].copy(), travel[:, 1:2].copy()
+    travel[:, :1], travel[:, 1:2] = cosine * x + sine * y, cosine * y - sine * x
+    source = _native_test.ExponentialSource([-0.1, 0.0, 0.05, 0.2])
+    for is_direct, bound in ((True, 1e-5), (False, 1e-3)):
+        field = _native_test.SurfaceField(samples, [source] * 3, list(ALBEDO), [2.0, 1.0, 4.0], is_direct=is_direct)
+        field.add(travel, irradiance, WHITE)
+        assert relative_error(field.solve(), before) < bound
+
+
+def test_light_adds_up_and_goes():
+    """Rays of two calls, then none, then the first again."""
+    field = lit_field()
+    once = field.solve()
+    field.add(rays(OBLIQUE), gray(square_of_light()), WHITE)
+    assert relative_error(field.solve(), 2 * once) < 1e-6
+    field.clear()
+    assert not field.solve().any()
+    field.add(rays(OBLIQUE), gray(square_of_light()), WHITE)
+    assert np.array_equal(field.solve(), once)
+
+
+def test_colors_are_factors_of_the_channels():
+    color = np.array((0.2, 1.0, 0.5))
+    expected = lit_field(is_direct=True).solve() * color
+    for is_colored in (False, True):
+        field = flat_field(is_colored=is_colored, is_direct=True)
+        field.add(rays(OBLIQUE), gray(square_of_light()), list(color))
+        # Three sets have fewer functions each.
+        assert relative_error(field.solve(), expected) < (1e-3 if is_colored else 1e-5)
+
+
+def test_a_field_without_colors_takes_no_other_color():
+    field = lit_field()
+    field.add(rays(OBLIQUE), gray(square_of_light()), [2.0, 2.0, 2.0])
+    with pytest.raises(ValueError, match="'color'"):
+        field.add(rays(OBLIQUE), gray(square_of_light()), [1.0, 1.0, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "name"),
+    [(9, 0.0, "area"), (9, np.nan, "area"), (0, np.inf, "position"), (5, 0.5, "normal"), (8, 1.0, "normal")],
+)
+def test_samples_that_are_none(column, value, name):
+    samples = flat_samples()
+    samples[7, column] = value
+    with pytest.raises(ValueError, match=f"'{name}'"):
+        flat_field(samples=samples)
+
+
+@pytest.mark.parametrize(
+    ("options", "name"),
+    [
+        ({"samples": flat_samples()[:0]}, "samples"),
+        ({"tolerance": 0.0}, "tolerance"),
+        ({"max_angle": 0.0}, "max_angle_deg"),
+        ({"max_angle": 90.1}, "max_angle_deg"),
+        ({"path": 0.0}, "mean_free_path"),
+        ({"path": np.inf}, "mean_free_path"),
+    ],
+)
+def test_options_outside_their_range(options, name):
+    with pytest.raises(ValueError, match=f"'{name}'"):
+        flat_field(**options)
+
+
+def test_albedos_and_numbers_of_channels_outside_their_range():
+    ldf = library(Medium(0.8, 1.0))
+    with pytest.raises(ValueError, match="'albedo'"):
+        _native_test.SurfaceField(flat_samples(), [ldf], [1.0], [1.0])
+    with pytest.raises(ValueError, match="'channels'"):
+        _native_test.SurfaceField(flat_samples(), [ldf] * 4, [0.5] * 4, [1.0] * 4)
+
+
+def test_memory_is_limited():
+    field = flat_field(is_colored=True)
+    assert field.moment_bytes <= 1152  # and 40 % more for clusters
+    with pytest.raises(MemoryError, match="memory"):
+        flat_field(is_colored=True, max_moment_bytes=SIDE * SIDE * field.moment_bytes - 1)
+
+
+def test_a_solution_stops_and_starts_again():
+    field = lit_field(path=10 * PITCH, is_direct=True)  # takes long enough for reports
+    expected = field.solve()
+    for limit in (0.0, 0.4):
+        with pytest.raises(Cancelled):
+            field.solve(progress=lambda part, limit=limit: part < limit)
+    assert np.array_equal(field.solve(), expected)
+
+
+@pytest.mark.parametrize(("name", "bound"), [("ball_6", 0.005), ("ball_20", 0.01)])
+def test_a_ball_returns_as_much_light_as_its_library(name, bound):
+    """A beam lights all angles: a ring returns its irradiance times the reflectance.
+
+    The paths are .8 and .25 texels. Rings of samples are no square grid, for which a sample's own light is right: .7 %.
+    """
+    medium = Medium(0.8, 1.0)
+    radius = BODIES[name][0].radius
+    curvature = 1 / radius
+    angles = (0.0, 22.0, 43.0, 60.0, 73.0, 82.0, 88.5)
+    ldf = library(medium, "preview").with_curved([0.5 * curvature, curvature], angles, 4000)
+    samples, travel, irradiance = body(name, radius / 25)
+    field = _native_test.SurfaceField(samples, [ldf] * 3, list(ALBEDO), [1.0] * 3, tolerance=1e-3)
+    field.add(travel, irradiance, WHITE)
+    area = samples[:, 9].astype(float)
+    returned = np.pi * area @ field.solve()
+    angle = np.degrees(np.arccos(-travel[:, 2]))
+    between = np.linspace(0, 89.9, 46)
+    for c, albedo in enumerate(ALBEDO):
+        reflectance = [ldf.reflectance(a, albedo, curvature) for a in between]
+        expected = (area * irradiance[:, c]) @ np.interp(angle, between, reflectance)
+        assert returned[c] == pytest.approx(expected, rel=bound)
+
+
+def test_the_bench_runs_in_small():
+    bench = Path(__file__).resolve().parents[1] / "bench" / "bodies.py"
+    done = subprocess.run([sys.executable, str(bench), "1000"], capture_output=True, text=True, check=True)
+    assert len(done.stdout.splitlines()) > 5

@@ -11,6 +11,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "solve/surface/pair_sum.h"
 
@@ -19,15 +20,19 @@ namespace beamspread {
 namespace HWY_NAMESPACE {
 
 using Lanes = float __attribute__((vector_size(lanes_per_block * sizeof(float))));
-using Half = float __attribute__((vector_size(lanes_per_block * sizeof(float) / 2)));
+using Harmonics8 = float __attribute__((vector_size(surface_harmonics * sizeof(float))));
+using Indices8 = std::int32_t __attribute__((vector_size(surface_harmonics * sizeof(std::int32_t))));
+static_assert(lanes_per_block == 2 * surface_harmonics);
 
 constexpr std::size_t max_results = 3;
 
-[[gnu::always_inline]] inline Lanes load(const float* values)
+// Length of a chord in the tangent plane, over the chord, below which harmonics fade. Larger: smoother where light
+// crosses edges, less exact around balls.
+constexpr float steep = 0.5f;
+
+[[gnu::always_inline]] inline void load(const float* values, Lanes& lanes)
 {
-    Lanes lanes;
     std::memcpy(&lanes, values, sizeof(lanes));
-    return lanes;
 }
 
 [[gnu::always_inline]] inline float sum_of(const Lanes& lanes)
@@ -40,25 +45,37 @@ constexpr std::size_t max_results = 3;
     return values[0];
 }
 
-// cos and sin of m phi for the harmonics of each lane, m below 8 twice.
-[[gnu::always_inline]] inline void multiple_angles(float cosine, float sine, Lanes& cosines, Lanes& sines)
+// Real and imaginary part of the powers m below 8 of x + i y.
+[[gnu::always_inline]] inline void powers(float x, float y, Harmonics8& real, Harmonics8& imaginary)
 {
-    constexpr std::array<Half, 3> bits = {Half{0, 1, 0, 1, 0, 1, 0, 1}, Half{0, 0, 1, 1, 0, 0, 1, 1},
-                                          Half{0, 0, 0, 0, 1, 1, 1, 1}};
-    Half cos_m = Half{} + 1.0f;
-    Half sin_m{};
-    for (const Half& bit : bits) {
-        const Half by_cos = 1.0f + bit * (cosine - 1.0f);
-        const Half by_sin = bit * sine;
-        const Half next = cos_m * by_cos - sin_m * by_sin;
-        sin_m = sin_m * by_cos + cos_m * by_sin;
-        cos_m = next;
-        const float twice = 2.0f * cosine * sine;
-        cosine = cosine * cosine - sine * sine;
-        sine = twice;
+    constexpr std::array<Harmonics8, 3> bits = {Harmonics8{0, 1, 0, 1, 0, 1, 0, 1}, Harmonics8{0, 0, 1, 1, 0, 0, 1, 1},
+                                                Harmonics8{0, 0, 0, 0, 1, 1, 1, 1}};
+    real = Harmonics8{} + 1.0f;
+    imaginary = Harmonics8{};
+    for (const Harmonics8& bit : bits) {
+        const Harmonics8 by_x = 1.0f + bit * (x - 1.0f);
+        const Harmonics8 by_y = bit * y;
+        const Harmonics8 next = real * by_x - imaginary * by_y;
+        imaginary = imaginary * by_x + real * by_y;
+        real = next;
+        const float twice = 2.0f * x * y;
+        x = x * x - y * y;
+        y = twice;
     }
-    cosines = __builtin_shufflevector(cos_m, cos_m, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-    sines = __builtin_shufflevector(sin_m, sin_m, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+}
+
+// The values of each lane's harmonic.
+[[gnu::always_inline]] inline void spread(const Harmonics8& values, const std::int32_t* harmonic, Lanes& lanes)
+{
+#if defined(__clang__)
+    for (std::size_t i = 0; i < lanes_per_block; ++i)
+        lanes[i] = values[harmonic[i]];
+#else
+    std::array<Indices8, 2> half;
+    std::memcpy(half.data(), harmonic, sizeof(half));
+    const std::array<Harmonics8, 2> parts = {__builtin_shuffle(values, half[0]), __builtin_shuffle(values, half[1])};
+    std::memcpy(&lanes, parts.data(), sizeof(lanes));
+#endif
 }
 
 // Rows of a table around a chord and a curvature, and their weights.
@@ -74,16 +91,20 @@ void add_pairs_of(const PairTables& tables, const PairTarget& target, std::span<
                   const float* moments, std::size_t stride, float* sums, float& beyond)
 {
     // Value at the place of some rows in a table.
-    const auto interpolated = [](const Rows& rows, const float* values) __attribute__((always_inline)) {
+    const auto interpolate = [](const Rows& rows, const float* values, Lanes& value) __attribute__((always_inline)) {
         const float* first = values + rows.first;
         const float* high = first + rows.to_high;
-        return (load(first) * rows.weight[0] + load(first + rows.to_next) * rows.weight[1]) +
-               (load(high) * rows.weight[2] + load(high + rows.to_next) * rows.weight[3]);
+        std::array<Lanes, 4> row;
+        load(first, row[0]);
+        load(first + rows.to_next, row[1]);
+        load(high, row[2]);
+        load(high + rows.to_next, row[3]);
+        value =
+            (row[0] * rows.weight[0] + row[1] * rows.weight[1]) + (row[2] * rows.weight[2] + row[3] * rows.weight[3]);
     };
     std::array<Lanes, results> all{};
     Lanes clamped{};
-    const std::size_t blocks = tables.blocks;
-    const std::size_t lanes = blocks * lanes_per_block;
+    const std::size_t lanes = tables.blocks * lanes_per_block;
     for (const PairSource& source : sources) {
         const Vec3f d = target.position - source.position;
         const float square = d.x * d.x + d.y * d.y + d.z * d.z;
@@ -120,26 +141,38 @@ void add_pairs_of(const PairTables& tables, const PairTarget& target, std::span<
         // The chord's azimuth in the tangent plane of the source.
         const float x = d.x * source.tangent.x + d.y * source.tangent.y + d.z * source.tangent.z;
         const float y = d.x * source.binormal.x + d.y * source.binormal.y + d.z * source.binormal.z;
-        const float across = x * x + y * y;
-        const float per_across = across > 0.0f ? 1.0f / std::sqrt(across) : 0.0f;
-        Lanes cosines, sines;
-        multiple_angles(x * per_across, y * per_across, cosines, sines);
+        const float across = std::sqrt(x * x + y * y);
+        // On planes and balls |D_t| / c = sqrt(1 - (k c / 2)^2). Where a chord is steeper than any but the longest of a
+        // ball, the azimuth changes abruptly from point to point; there harmonics fade, as they do opposite the entry.
+        const float per_across = 1.0f / std::max({across, steep * chord, std::numeric_limits<float>::min()});
+        Harmonics8 real, imaginary;
+        powers(x * per_across, y * per_across, real, imaginary);
         const float* of_source = moments + source.moments * stride;
-        const Lanes weight = Lanes{} + source.area * per_square;
-        cosines *= weight;
-        sines *= weight;
+        const float weight = source.area * per_square;
+        real *= weight;
+        imaginary *= weight;
+        const std::size_t blocks = is_disk ? tables.blocks : tables.point_blocks[step - table.first];
         for (std::size_t b = 0; b < blocks; ++b) {
+            Lanes cosines, sines;
+            spread(real, tables.harmonic.data() + b * lanes_per_block, cosines);
+            spread(imaginary, tables.harmonic.data() + b * lanes_per_block, sines);
             Lanes light{};
             for (std::size_t r = 0; r < results; ++r) {
                 if (r == 0 || tables.set[r] != tables.set[r - 1]) {
-                    const float* values = of_source + (tables.set[r] * blocks + b) * 2 * lanes_per_block;
-                    light = load(values) * cosines + load(values + lanes_per_block) * sines;
+                    const float* values = of_source + (tables.set[r] * tables.blocks + b) * 2 * lanes_per_block;
+                    std::array<Lanes, 2> pair;
+                    load(values, pair[0]);
+                    load(values + lanes_per_block, pair[1]);
+                    light = pair[0] * cosines + pair[1] * sines;
                 }
                 const std::size_t at = b * lanes_per_block;
-                Lanes value = interpolated(rows[r], table.values[r].data() + at);
-                if constexpr (are_clusters)
-                    value +=
-                        interpolated(rows[r], tables.laplacian.values[r].data() + at) * (source.spread * per_square);
+                Lanes value;
+                interpolate(rows[r], table.values[r].data() + at, value);
+                if constexpr (are_clusters) {
+                    Lanes second;
+                    interpolate(rows[r], tables.laplacian.values[r].data() + at, second);
+                    value += second * (source.spread * per_square);
+                }
                 const Lanes product = light * value;
                 all[r] += product;
                 if (r == 0 && is_beyond)

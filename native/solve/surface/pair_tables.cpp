@@ -17,8 +17,68 @@ constexpr float disks_per_octave = 4.0f;
 constexpr float disk_end_radii = 8.0f;
 constexpr float disk_first_radii = 0.125f;
 
+// Fraction of the tolerance that functions may have where they are left out. Larger: less time for light far away.
+constexpr double block_share = 0.5;
+
 // Step of the chord, relative, for derivatives. Smaller: the profiles' bins and their noise show; larger: less exact.
 constexpr double derivative_step = 0.15;
+
+// Standard deviation of the window in which sums over a grid are compared with integrals, in pitches, and its end. Wider:
+// more of the kernel, more time.
+constexpr double window_width = 1.6;
+constexpr int window_end = 8;
+
+// The harmonic 0 of a profile times a Gaussian window, lengths in mean free paths.
+class WindowedProfile final : public RadialFunction {
+public:
+    WindowedProfile(const RadialProfile& profile, double pitch) : m_profile(profile)
+    {
+        constexpr int steps_per_octave = 32;
+        constexpr int octaves = 16;
+        for (int i = 0; i <= steps_per_octave * octaves; ++i) {
+            m_radii.push_back(window_end * pitch * std::exp2(static_cast<double>(i) / steps_per_octave - octaves));
+            const double middle = 0.5 * (m_radii.back() + (i == 0 ? 0.0 : m_radii[m_radii.size() - 2])) / pitch;
+            m_window.push_back(std::exp(-0.5 * middle * middle / (window_width * window_width)));
+            m_inside.push_back(profile.cumulative(m_radii.back())[0]);
+            m_sum.push_back((i == 0 ? 0.0 : m_sum.back()) +
+                            m_window.back() * (m_inside.back() - (i == 0 ? 0.0 : m_inside[m_inside.size() - 2])));
+        }
+    }
+
+    std::size_t harmonics() const override { return 1; }
+
+    Harmonics cumulative(double r) const override
+    {
+        const auto after =
+            static_cast<std::size_t>(std::lower_bound(m_radii.begin(), m_radii.end(), r) - m_radii.begin());
+        if (after == m_radii.size())
+            return {m_sum.back()};
+        return {m_sum[after] - m_window[after] * (m_inside[after] - m_profile.cumulative(r)[0])};
+    }
+
+    Harmonics remaining(double r) const override { return {m_sum.back() - cumulative(r)[0]}; }
+    double support() const override { return m_radii.back(); }
+
+private:
+    const RadialProfile& m_profile;
+    std::vector<double> m_radii;   // ascending
+    std::vector<double> m_window;  // from the previous radius to this one
+    std::vector<double> m_inside;  // of the profile
+    std::vector<double> m_sum;     // of the product
+};
+
+// Excess of the light of evenly lit disks on a square grid over that of an even plane, per irradiance. It is not 0 where
+// the medium spreads about as far as the grid's pitch (Poisson's sum formula).
+double grid_excess(const RadialProfile& profile, double radius)
+{
+    const double pitch = std::sqrt(pi) * radius;
+    const WindowedProfile windowed(profile, pitch);
+    double sum = 2.0 * pi * windowed.cumulative(radius)[0];
+    for (int y = 0; y <= window_end; ++y)
+        for (int x = 1; x * x + y * y <= window_end * window_end; ++x)
+            sum += 4.0 * pitch * pitch * disk_mean(windowed, radius, pitch * std::hypot(x, y))[0];
+    return sum - 2.0 * pi * windowed.cumulative(windowed.support())[0];
+}
 
 const std::vector<ScaledProfile>& profiles_of(const SurfaceBasis& basis, std::size_t result, std::size_t curvature)
 {
@@ -34,8 +94,8 @@ std::size_t flat_index(const SurfaceBasis& basis, std::size_t result)
 
 }  // namespace
 
-PairTables::PairTables(const SurfaceBasis& basis, float min_area, float max_area)
-    : results(basis.terms.sets.results.size()), blocks(basis.blocks)
+PairTables::PairTables(const SurfaceBasis& basis, float min_area, float max_area, double tolerance)
+    : results(basis.terms.sets.results.size()), blocks(basis.blocks), harmonic(basis.harmonic)
 {
     for (const ChannelSets::Result& result : basis.terms.sets.results)
         set.push_back(result.set);
@@ -56,6 +116,7 @@ PairTables::PairTables(const SurfaceBasis& basis, float min_area, float max_area
     }
     point.first = chord_step(m_first_radius);
     make_table(basis, point, 0.0f, reach);
+    choose_blocks(basis, tolerance);
     make_laplacian(basis);
     make_self(basis, m_first_radius, radius_of(max_area));
 }
@@ -98,8 +159,7 @@ void PairTables::make_table(const SurfaceBasis& basis, ChordTable& table, float 
         const auto [result, curvature, rank] = items[i];
         const ScaledProfile& scaled = profiles_of(basis, result, curvature)[rank];
         const double per_metre = 1.0 / scaled.mean_free_path;
-        float* values =
-            table.values[result].data() + curvature * table.rows * blocks * lanes_per_block + rank * basis.harmonics;
+        float* values = table.values[result].data() + curvature * table.rows * blocks * lanes_per_block;
         for (std::size_t row = 0; row < table.rows; ++row, values += blocks * lanes_per_block) {
             const auto chord = static_cast<double>(chord_of(table.first + static_cast<std::uint32_t>(row)));
             if (chord > scaled.reach + static_cast<double>(radius))
@@ -108,10 +168,45 @@ void PairTables::make_table(const SurfaceBasis& basis, ChordTable& table, float 
             const Harmonics value = radius > 0.0f
                                         ? disk_mean(scaled.profile, static_cast<double>(radius) * per_metre, c)
                                         : scaled.profile.density(c);
-            for (std::size_t m = 0; m < basis.harmonics; ++m)
-                values[m] = static_cast<float>(value[m] * c * c);
+            for (std::size_t lane = 0; lane < basis.rank.size(); ++lane)
+                if (basis.rank[lane] == rank)
+                    values[lane] = static_cast<float>(value[static_cast<std::size_t>(harmonic[lane])] * c * c);
         }
     });
+}
+
+void PairTables::choose_blocks(const SurfaceBasis& basis, double tolerance)
+{
+    const std::size_t lanes = blocks * lanes_per_block;
+    point_blocks.assign(point.rows, 0);
+    for (std::size_t r = 0; r < results; ++r) {
+        // Power beyond a chord of each block and those after it; the light is at its most in each function.
+        std::vector<double> beyond(blocks);
+        double all = 0.0;
+        for (const bool is_known : {false, true})
+            for (std::size_t row = point.rows; row-- > 0;) {
+                std::vector<double> power(blocks);
+                for (std::size_t lane = 0; lane < basis.largest.size(); ++lane) {
+                    float value = 0.0f;
+                    for (std::size_t k = 0; k < scales[r].nodes.size(); ++k)
+                        value = std::max(value, std::abs(point.values[r][(k * point.rows + row) * lanes + lane]));
+                    for (std::size_t b = 0; b <= lane / lanes_per_block; ++b)
+                        power[b] += static_cast<double>(value * basis.largest[lane]);
+                }
+                const float chord = chord_of(point.first + static_cast<std::uint32_t>(row));
+                const float next = chord_of(point.first + static_cast<std::uint32_t>(row + 1));
+                const double octave = std::log(static_cast<double>(next / chord));
+                if (!is_known) {
+                    all += octave * power[0];
+                    continue;
+                }
+                for (std::size_t b = 0; b < blocks; ++b) {
+                    beyond[b] += octave * power[b];
+                    if (beyond[b] > block_share * tolerance * all)
+                        point_blocks[row] = std::max(point_blocks[row], static_cast<std::uint8_t>(b + 1));
+                }
+            }
+    }
 }
 
 void PairTables::make_laplacian(const SurfaceBasis& basis)
@@ -135,10 +230,13 @@ void PairTables::make_laplacian(const SurfaceBasis& basis)
                 const Harmonics before = at(1.0 - derivative_step);
                 const Harmonics here = at(1.0);
                 const Harmonics after = at(1.0 + derivative_step);
-                for (std::size_t m = 0; m < basis.harmonics; ++m) {
+                for (std::size_t lane = 0; lane < basis.rank.size(); ++lane) {
+                    if (basis.rank[lane] != rank)
+                        continue;
+                    const auto m = static_cast<std::size_t>(harmonic[lane]);
                     const double second = (before[m] - 2.0 * here[m] + after[m]) / (derivative_step * derivative_step);
                     const double first = (after[m] - before[m]) / (2.0 * derivative_step);
-                    values[item * lanes + rank * basis.harmonics + m] = static_cast<float>(
+                    values[item * lanes + lane] = static_cast<float>(
                         (second + first - static_cast<double>(m * m) * here[m]) * in_paths * in_paths);
                 }
             }
@@ -154,22 +252,46 @@ void PairTables::make_self(const SurfaceBasis& basis, float min_radius, float ma
         m_self.values.emplace_back(m_self.rows * blocks * lanes_per_block, 0.0f);
         const std::size_t flat = flat_index(basis, r);
         const std::vector<ScaledProfile>& profiles = profiles_of(basis, r, flat);
-        for (std::size_t rank = 0; rank < profiles.size(); ++rank)
+        parallel_for(basis.rank.size(), [&](std::size_t lane) {
+            const std::size_t rank = basis.rank[lane];
+            if (harmonic[lane] != 0)
+                return;
+            std::vector<double> excess;  // [disk]
+            for (const float end : disk_end)
+                excess.push_back(grid_excess(
+                    profiles[rank].profile, static_cast<double>(end / disk_end_radii) / profiles[rank].mean_free_path));
             for (std::size_t row = 0; row < m_self.rows; ++row) {
-                const auto radius = static_cast<double>(chord_of(m_self.first + static_cast<std::uint32_t>(row)));
-                m_self.values[r][row * blocks * lanes_per_block + rank * basis.harmonics] = static_cast<float>(
-                    2.0 * pi * profiles[rank].profile.cumulative(radius / profiles[rank].mean_free_path)[0]);
+                const float radius = chord_of(m_self.first + static_cast<std::uint32_t>(row));
+                const double position =
+                    std::clamp(static_cast<double>(std::log2(radius / m_first_radius) * disks_per_octave), 0.0,
+                               static_cast<double>(disks.size() - 1));
+                const auto before = static_cast<std::size_t>(position);
+                const std::size_t after = std::min(before + 1, disks.size() - 1);
+                const double there = std::lerp(excess[before], excess[after], position - std::floor(position));
+                const double within =
+                    profiles[rank].profile.cumulative(static_cast<double>(radius) / profiles[rank].mean_free_path)[0];
+                m_self.values[r][row * blocks * lanes_per_block + lane] = static_cast<float>(2.0 * pi * within - there);
             }
+        });
     }
 }
 
-float PairTables::least_radius() const
+std::vector<double> PairTables::second_derivatives(std::size_t result) const
 {
-    float radius = 0.0f;
-    for (const CurvatureScale& scale : scales)
-        if (scale.nodes.back() > 0.0f)
-            radius = std::max(radius, 1.0f / scale.nodes.back());
-    return radius;
+    const std::size_t lanes = blocks * lanes_per_block;
+    std::vector<double> bounds(point.rows);
+    double largest = 0.0;
+    for (std::size_t row = point.rows; row-- > 0;) {
+        const auto chord = static_cast<double>(chord_of(point.first + static_cast<std::uint32_t>(row)));
+        float value = 0.0f;
+        for (std::size_t k = 0; k < scales[result].nodes.size(); ++k) {
+            const std::size_t at = (k * point.rows + row) * lanes;
+            value = std::max({value, std::abs(point.values[result][at]), std::abs(laplacian.values[result][at])});
+        }
+        largest = std::max(largest, static_cast<double>(value) / (chord * chord * chord * chord));
+        bounds[row] = largest;
+    }
+    return bounds;
 }
 
 std::size_t PairTables::disk(float area) const

@@ -52,7 +52,8 @@ struct CurvatureScale {
 // area and the medium's spread.
 class PairTables {
 public:
-    PairTables(const SurfaceBasis& basis, float min_area, float max_area);
+    // Functions are left out where they have less than the tolerance of the power.
+    PairTables(const SurfaceBasis& basis, float min_area, float max_area, double tolerance);
 
     // Index of the disk that stands for a sample of this area, m^2.
     std::size_t disk(float area) const;
@@ -60,22 +61,25 @@ public:
     // Part of its own light in the radiant exitance of a sample's middle: factors of the moments m = 0, [block][lane].
     void add_self(float area, std::size_t result, float* factors) const;
 
-    // Radius of the smallest ball whose LDFs the tables have, metres; 0 if they have planes alone.
-    float least_radius() const;
+    // Bounds on the second derivatives of the first function, [row of `point`], 1 / m^4. They don't grow with the chord.
+    std::vector<double> second_derivatives(std::size_t result) const;
 
     std::size_t results = 0;
     std::size_t blocks = 0;
+    std::vector<std::int32_t> harmonic;  // [lane]
     std::vector<std::size_t> set;        // [result]
     std::vector<CurvatureScale> scales;  // [result]
     float reach = 0.0f;                  // metres; light farther away counts as none
     std::vector<ChordTable> disks;
     std::vector<float> disk_end;  // [disk] chord from which its light counts as a point's, metres
     ChordTable point;
+    std::vector<std::uint8_t> point_blocks;  // [row of `point`] blocks that matter from this chord on
     ChordTable laplacian;  // of the functions of a point, as c^4 times e'' + e' / c - m^2 e / c^2; rows of `point`
 
 private:
     void make_scales(const SurfaceBasis& basis);
     void make_table(const SurfaceBasis& basis, ChordTable& table, float radius, float end) const;
+    void choose_blocks(const SurfaceBasis& basis, double tolerance);
     void make_laplacian(const SurfaceBasis& basis);
     void make_self(const SurfaceBasis& basis, float min_radius, float max_radius);
 

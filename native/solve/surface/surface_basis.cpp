@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numeric>
 #include <utility>
 
 #include "base/constants.h"
@@ -14,8 +15,19 @@ namespace {
 // Number of angles that stand for those of all light.
 constexpr std::size_t angle_count = 512;
 
-// Fraction of a kernel's power outside its reach, at most. Larger: fewer pairs, less light far away.
-constexpr double max_beyond = 1e-4;
+// Error of kernels over the tolerance of luminances, in which errors of kernels cancel. Larger: fewer functions.
+constexpr double tolerance_ratio = 2.0;
+
+// Fraction of a kernel's power outside its reach, over the tolerance. Larger: fewer pairs, less light far away.
+constexpr double max_beyond_ratio = 0.1;
+
+// A curved surface needs a function more for this many of a plane. Its LDFs have more noise, for which `within` would take
+// up to three times as many. Smaller: more functions, among them some of noise.
+constexpr std::size_t functions_per_curved = 4;
+
+// Number of functions of all sets. They take 2 kB of moments for each sample, those of clusters included. More: smaller
+// errors with colored light at ior 1, more memory.
+constexpr std::size_t max_functions = 3 * 48;
 
 // The LDFs of one curvature as those of a plane, for the decomposition.
 class OneCurvature final : public LdfSource {
@@ -90,28 +102,58 @@ SurfaceBasis::SurfaceBasis(const std::vector<ChannelMedium>& channels, double ma
             media.push_back({sources.back().get(), medium.albedo, medium.mean_free_path});
         }
     }
-    const KernelDecomposition kernels(incidence_up_to(max_angle_deg, 0.0), media, texel);
-    std::vector<std::size_t> chosen = kernels.within(tolerance);
-    std::erase_if(chosen, [&](std::size_t t) { return kernels.terms()[t].m >= harmonics; });
-    terms.basis = kernels.basis(chosen, std::min(max_beyond, 0.1 * tolerance));
-    std::size_t ranks = 0;
-    for (std::size_t f = 0; f < terms.basis.functions.size(); ++f) {
-        const auto& [m, rank, values] = terms.basis.functions[f];
-        ranks = std::max(ranks, rank + 1);
-        for (const Phase phase : {Phase::cosine, Phase::sine})
-            for (std::size_t set = 0; set < terms.sets.count() && (m > 0 || phase == Phase::cosine); ++set)
-                terms.terms.push_back({{}, f, phase, set, {}});
+    const Incidence incidence = incidence_up_to(max_angle_deg, 0.0);
+    const KernelDecomposition kernels(incidence, media, texel);
+    std::vector<std::size_t> chosen = kernels.within(tolerance_ratio * tolerance);
+    std::erase_if(chosen, [&](std::size_t t) { return kernels.terms()[t].m >= surface_harmonics; });
+    std::size_t most = max_functions / terms.sets.count();
+    if (media.size() > terms.sets.media.size()) {
+        const KernelDecomposition flat(incidence, terms.sets.media, texel);
+        const std::size_t needed = flat.within(tolerance_ratio * tolerance).size();
+        most = std::min(most, needed + needed / functions_per_curved);
     }
-    blocks = (ranks * harmonics + lanes_per_block - 1) / lanes_per_block;
+    // Lanes of the functions: those of large gains first. Terms come by ascending m, then rank.
+    std::vector<std::size_t> order;
+    const auto sort_by_gain = [&] {
+        order.resize(chosen.size());
+        std::iota(order.begin(), order.end(), std::size_t{0});
+        const auto gain = [&](std::size_t i) { return kernels.terms()[chosen[i]].gain; };
+        if (!order.empty())
+            std::stable_sort(order.begin() + 1, order.end(),
+                             [&](std::size_t a, std::size_t b) { return gain(a) > gain(b); });
+    };
+    sort_by_gain();
+    if (order.size() > most) {
+        const double least = kernels.terms()[chosen[order[most - 1]]].gain;
+        std::erase_if(chosen, [&](std::size_t t) { return kernels.terms()[t].gain < least; });
+        sort_by_gain();
+    }
+    terms.basis = kernels.basis(chosen, max_beyond_ratio * tolerance);
+    for (std::size_t f = 0; f < chosen.size(); ++f)
+        for (const Phase phase : {Phase::cosine, Phase::sine})
+            for (std::size_t set = 0; set < terms.sets.count(); ++set)
+                if (terms.basis.functions[f].m > 0 || phase == Phase::cosine)
+                    terms.terms.push_back({{}, f, phase, set, {}});
+    blocks = (chosen.size() + lanes_per_block - 1) / lanes_per_block;
+    harmonic.resize(functions());
+    m_lane.resize(chosen.size());
+    for (std::size_t lane = 0; lane < order.size(); ++lane) {
+        m_lane[order[lane]] = lane;
+        harmonic[lane] = static_cast<std::int32_t>(terms.basis.functions[order[lane]].m);
+        rank.push_back(terms.basis.functions[order[lane]].rank);
+        float most_light = 0.0f;
+        for (const TableStep& step : terms.basis.functions[order[lane]].values)
+            most_light = std::max(most_light, std::abs(step.value));
+        largest.push_back(most_light);
+    }
 }
 
 std::size_t SurfaceBasis::place(std::size_t term) const
 {
     const LightTerm& light = terms.terms[term];
-    const auto& [m, rank, values] = terms.basis.functions[light.function];
-    const std::size_t function = rank * harmonics + m;
-    const std::size_t block = light.set * blocks + function / lanes_per_block;
-    return (2 * block + (light.phase == Phase::sine ? 1 : 0)) * lanes_per_block + function % lanes_per_block;
+    const std::size_t lane = m_lane[light.function];
+    const std::size_t block = light.set * blocks + lane / lanes_per_block;
+    return (2 * block + (light.phase == Phase::sine ? 1 : 0)) * lanes_per_block + lane % lanes_per_block;
 }
 
 }  // namespace beamspread

@@ -21,10 +21,14 @@ constexpr std::size_t rays_at_once = 512;
 // Leaves of the tree in one work item.
 constexpr std::size_t leaves_at_once = 16;
 
-// Size of clusters over their distance at a tolerance of 1e-3, and bounds. Larger: fewer pairs, larger errors.
-constexpr double opening_at_thousandth = 0.1;
-constexpr double min_opening = 0.02;
-constexpr double max_opening = 0.3;
+// Bound on the error of a far cluster's light over the tolerance: errors of a few hundred clusters add up, with either
+// sign. Larger: fewer pairs, larger errors.
+constexpr double error_share = 0.3;
+
+// Leaves that are solved to find the largest luminance, twice, and the size of their clusters over the distance. More
+// leaves: a tolerance closer to that of the brightest sample.
+constexpr std::size_t probed_count = 64;
+constexpr float probing_size = 0.3f;
 
 // Largest difference of the squared length of a unit vector from 1, and of the cosine of two vectors from 0.
 constexpr float unit_tolerance = 2e-3f;
@@ -77,13 +81,6 @@ void check_memory(std::size_t bytes, std::size_t limit)
     throw MemoryLimit(text.str());
 }
 
-// The errors of a cluster grow like the third power of its size.
-float opening_for(double tolerance)
-{
-    return static_cast<float>(
-        std::clamp(opening_at_thousandth * std::cbrt(tolerance / 1e-3), min_opening, max_opening));
-}
-
 double mean_area(std::span<const SurfaceSample> samples)
 {
     double sum = 0.0;
@@ -110,7 +107,7 @@ PairTables tables_of(const SurfaceProblem& problem, const SurfaceBasis& basis)
         const auto [min, max] =
             std::minmax_element(problem.samples.begin(), problem.samples.end(),
                                 [](const SurfaceSample& a, const SurfaceSample& b) { return a.area < b.area; });
-        tables.emplace(basis, min->area, max->area);
+        tables.emplace(basis, min->area, max->area, problem.tolerance);
     });
     return *std::move(tables);
 }
@@ -209,18 +206,18 @@ void SurfaceField::solve(Progress& progress, float* luminance)
     m_beyond_share = 0.0;
     if (m_basis.moments() == 0)
         return;
-    // Any cluster is too near if none may be far.
-    const SurfaceTree::Opening opening{m_problem.is_direct ? 0.0f : opening_for(m_problem.tolerance),
-                                       m_tables.least_radius()};
     const std::size_t items = (m_tree.leaves() + leaves_at_once - 1) / leaves_at_once;
     std::vector<Areas> areas(items);
     with_threads(m_problem.threads, [&] {
         m_tree.gather(m_basis, m_tables, m_moments);
+        const SurfaceTree::Opening opening = m_problem.is_direct ? SurfaceTree::Opening{} : find_opening();
         parallel_for(items, [&](std::size_t item) {
             SurfaceTree::Sources& sources = m_sources.local();
             const std::size_t end = std::min(m_tree.leaves(), (item + 1) * leaves_at_once);
             for (std::size_t leaf = item * leaves_at_once; leaf < end; ++leaf)
-                solve_leaf(leaf, opening, sources, areas[item], luminance);
+                solve_leaf(leaf, opening, sources, [&](std::size_t sample, const Exitance& exitance) {
+                    store(sample, exitance, areas[item], luminance);
+                });
             progress.advance(1.0 / static_cast<double>(items));
         });
     });
@@ -232,8 +229,37 @@ void SurfaceField::solve(Progress& progress, float* luminance)
     m_beyond_share /= all;
 }
 
+// The error of a cluster's light is at most about its weight times its squared size times the kernel's second derivative.
+SurfaceTree::Opening SurfaceField::find_opening()
+{
+    const std::vector<std::size_t> leaves = m_tree.probed_leaves(probed_count);
+    std::vector<std::array<float, 3>> largest(leaves.size());
+    parallel_for(leaves.size(), [&](std::size_t i) {
+        solve_leaf(leaves[i], {probing_size, 0, {}}, m_sources.local(), [&](std::size_t, const Exitance& exitance) {
+            for (std::size_t r = 0; r < m_tables.results; ++r)
+                largest[i][r] = std::max(largest[i][r], exitance.sums[r]);
+        });
+    });
+    std::vector<double> bound(m_tables.point.rows);
+    for (std::size_t r = 0; r < m_tables.results; ++r) {
+        float most = 0.0f;
+        for (const auto& exitance : largest)
+            most = std::max(most, exitance[r]);
+        const double scale = static_cast<double>(m_tree.set_scales()[m_tables.set[r]]);
+        if (most == 0.0f || scale == 0.0)
+            continue;
+        const std::vector<double> bends = m_tables.second_derivatives(r);
+        for (std::size_t row = 0; row < bound.size(); ++row)
+            bound[row] = std::max(bound[row], bends[row] / (scale * static_cast<double>(most)));
+    }
+    SurfaceTree::Opening opening{0.0f, m_tables.point.first, {}};
+    for (const double value : bound)
+        opening.bound.push_back(static_cast<float>(value / (error_share * m_problem.tolerance)));
+    return opening;
+}
+
 void SurfaceField::solve_leaf(std::size_t leaf, const SurfaceTree::Opening& opening, SurfaceTree::Sources& sources,
-                              Areas& areas, float* luminance) const
+                              const std::function<void(std::size_t, const Exitance&)>& store_exitance) const
 {
     m_tree.find(leaf, opening, m_tables.reach, sources);
     const std::span<const PairSource> near = sources.near;
@@ -255,7 +281,7 @@ void SurfaceField::solve_leaf(std::size_t leaf, const SurfaceTree::Opening& open
             add_self(i, factors, exitance.sums);
             ++self;
         }
-        store(i, exitance, areas, luminance);
+        store_exitance(i, exitance);
     }
 }
 

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -72,8 +73,9 @@ private:
     // Areas: by pairs that bend more than the tables, all.
     using Areas = std::array<double, 2>;
 
-    void solve_leaf(std::size_t leaf, const SurfaceTree::Opening& opening, SurfaceTree::Sources& sources, Areas& areas,
-                    float* luminance) const;
+    SurfaceTree::Opening find_opening();
+    void solve_leaf(std::size_t leaf, const SurfaceTree::Opening& opening, SurfaceTree::Sources& sources,
+                    const std::function<void(std::size_t, const Exitance&)>& store_exitance) const;
     void add_self(std::size_t sample, std::vector<float>& factors, std::array<float, 3>& sums) const;
     void store(std::size_t sample, const Exitance& exitance, Areas& areas, float* luminance) const;
     void set_color(const std::vector<double>& color);

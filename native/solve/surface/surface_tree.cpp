@@ -30,6 +30,9 @@ constexpr float sample_spread = 0.5f * static_cast<float>(inv_pi);
 // Largest radius of a cluster over its distance. More: fewer pairs, larger errors near large clusters.
 constexpr float max_radius = 0.7f;
 
+// Samples of one work item.
+constexpr std::size_t at_once = 1024;
+
 // The bits of a number, three apart.
 std::uint64_t spread_bits(std::uint64_t x)
 {
@@ -98,15 +101,13 @@ std::array<float, 2> turn(const PairSource& to, const PairSource& from)
 void add_turned(const SurfaceBasis& basis, const std::array<float, 2>& turned, float factor, const float* from,
                 float* to)
 {
-    std::array<float, lanes_per_block> cosines;
-    std::array<float, lanes_per_block> sines;
+    std::array<float, surface_harmonics> cosines;
+    std::array<float, surface_harmonics> sines;
     float c = factor;
     float s = 0.0f;
-    for (std::size_t m = 0; m < basis.harmonics; ++m) {
-        for (std::size_t lane = m; lane < lanes_per_block; lane += basis.harmonics) {
-            cosines[lane] = c;
-            sines[lane] = s;
-        }
+    for (std::size_t m = 0; m < surface_harmonics; ++m) {
+        cosines[m] = c;
+        sines[m] = s;
         const float next = c * turned[0] - s * turned[1];
         s = s * turned[0] + c * turned[1];
         c = next;
@@ -114,9 +115,11 @@ void add_turned(const SurfaceBasis& basis, const std::array<float, 2>& turned, f
     for (std::size_t block = 0; block < basis.moments() / (2 * lanes_per_block); ++block) {
         const float* from_sine = from + lanes_per_block;
         float* to_sine = to + lanes_per_block;
+        const std::int32_t* harmonic = basis.harmonic.data() + block % basis.blocks * lanes_per_block;
         for (std::size_t lane = 0; lane < lanes_per_block; ++lane) {
-            to[lane] += cosines[lane] * from[lane] - sines[lane] * from_sine[lane];
-            to_sine[lane] += cosines[lane] * from_sine[lane] + sines[lane] * from[lane];
+            const auto m = static_cast<std::size_t>(harmonic[lane]);
+            to[lane] += cosines[m] * from[lane] - sines[m] * from_sine[lane];
+            to_sine[lane] += cosines[m] * from_sine[lane] + sines[m] * from[lane];
         }
         from += 2 * lanes_per_block;
         to += 2 * lanes_per_block;
@@ -180,22 +183,56 @@ std::uint32_t SurfaceTree::build(std::size_t begin, std::size_t end)
     return number;
 }
 
+void SurfaceTree::weigh(const SurfaceBasis& basis, const PairTables& tables, const std::vector<float>& moments)
+{
+    const std::size_t stride = basis.moments();
+    const std::size_t per_set = 2 * basis.functions();
+    const auto light = [&](std::size_t sample, std::size_t set) {
+        return std::abs(moments[sample * stride + set * per_set]);
+    };
+    m_set_scales.assign(basis.terms.sets.count(), 0.0f);
+    for (std::size_t set = 0; set < m_set_scales.size(); ++set) {
+        float most = 0.0f;
+        for (std::size_t i = 0; i < m_samples.size(); ++i)
+            most = std::max(most, light(i, set));
+        m_set_scales[set] = most > 0.0f ? 1.0f / most : 0.0f;
+    }
+    parallel_for(m_samples.size() / at_once + 1, [&](std::size_t item) {
+        for (std::size_t i = item * at_once; i < std::min(m_samples.size(), (item + 1) * at_once); ++i) {
+            const float* first = moments.data() + i * stride;
+            const bool is_lit = std::any_of(first, first + stride, [](float value) { return value != 0.0f; });
+            float sum = 0.0f;
+            for (std::size_t set = 0; set < m_set_scales.size(); ++set)
+                sum += m_set_scales[set] * light(i, set);
+            m_weights[i] = is_lit ? std::max(sum * m_samples[i].area, std::numeric_limits<float>::min()) : 0.0f;
+            m_disks[i] = static_cast<std::uint32_t>(tables.disk(m_samples[i].area));
+        }
+    });
+}
+
+std::vector<std::size_t> SurfaceTree::probed_leaves(std::size_t count) const
+{
+    std::vector<std::size_t> leaves(m_leaves.size());
+    std::iota(leaves.begin(), leaves.end(), std::size_t{0});
+    if (leaves.size() <= 2 * count)
+        return leaves;
+    const auto brighter = [&](std::size_t a, std::size_t b) {
+        const float first = m_nodes[m_leaves[a]].weight;
+        const float second = m_nodes[m_leaves[b]].weight;
+        return first != second ? first > second : a < b;
+    };
+    std::nth_element(leaves.begin(), leaves.begin() + static_cast<std::ptrdiff_t>(count), leaves.end(), brighter);
+    leaves.resize(count);
+    for (std::size_t i = 0; i < count; ++i)
+        leaves.push_back(i * m_leaves.size() / count);
+    return leaves;
+}
+
 void SurfaceTree::gather(const SurfaceBasis& basis, const PairTables& tables, std::vector<float>& moments)
 {
     const std::size_t stride = basis.moments();
     const std::size_t count = m_samples.size();
-    constexpr std::size_t at_once = 1024;
-    parallel_for(count / at_once + 1, [&](std::size_t item) {
-        for (std::size_t i = item * at_once; i < std::min(count, (item + 1) * at_once); ++i) {
-            const float* first = moments.data() + i * stride;
-            const bool is_lit = std::any_of(first, first + stride, [](float value) { return value != 0.0f; });
-            float light = 0.0f;
-            for (std::size_t set = 0; set < basis.terms.sets.count(); ++set)
-                light += std::abs(first[set * 2 * basis.functions()]);
-            m_weights[i] = is_lit ? std::max(light * m_samples[i].area, std::numeric_limits<float>::min()) : 0.0f;
-            m_disks[i] = static_cast<std::uint32_t>(tables.disk(m_samples[i].area));
-        }
-    });
+    weigh(basis, tables, moments);
     const auto sums_of = [&](std::size_t node) { return moments.data() + (count + node) * stride; };
     std::fill(moments.begin() + static_cast<std::ptrdiff_t>(count * stride), moments.end(), 0.0f);
     parallel_for(m_leaves.size() / at_once + 1, [&](std::size_t item) {
@@ -287,12 +324,16 @@ bool SurfaceTree::is_far(const Node& node, float distance, const Opening& openin
 {
     if (distance <= 0.0f || node.light_radius > max_radius * distance)
         return false;
-    // Kernels change with the curvature over about 1 / chord and 1 / `radius`, and normals change the curvature by their
-    // difference over the chord.
-    const float scale = std::min(1.0f, opening.radius / distance);
+    const float square = distance * distance;
     const float variance = 1.0f - glm::dot(node.cluster.normal, node.cluster.normal);
-    const float size = 4.0f * node.cluster.spread / (distance * distance);
-    return size + normal_weight * variance * scale * scale <= opening.size * opening.size;
+    const float size = 4.0f * node.cluster.spread + normal_weight * variance * square;
+    if (opening.size > 0.0f)
+        return size <= opening.size * opening.size * square;
+    const std::uint32_t step = chord_step(distance - node.light_radius);
+    if (opening.bound.empty() || step < opening.first)
+        return false;
+    const std::size_t row = std::min<std::size_t>(step - opening.first, opening.bound.size() - 1);
+    return size * node.weight * opening.bound[row] <= 1.0f;
 }
 
 void SurfaceTree::find(std::size_t leaf, const Opening& opening, float reach, Sources& sources) const

@@ -41,6 +41,12 @@ public:
         return std::span(m_order).subspan(node.begin, node.end - node.begin);
     }
 
+    // Factors from a set's light, irradiance times u(theta) of the first function, to the weights of clusters.
+    const std::vector<float>& set_scales() const { return m_set_scales; }
+
+    // The `count` brightest leaves, and as many evenly spread.
+    std::vector<std::size_t> probed_leaves(std::size_t count) const;
+
     // Gathers the light of all samples in clusters. `moments`: [sample], then [node], as in `SurfaceBasis`; those of
     // nodes are written.
     void gather(const SurfaceBasis& basis, const PairTables& tables, std::vector<float>& moments);
@@ -52,11 +58,12 @@ public:
         std::vector<std::uint32_t> waiting;  // working memory
     };
 
-    // Decides which clusters are far: those whose light lies within `size` times their distance, root mean square.
-    // `radius` is the smallest of a ball whose LDF is known, metres.
+    // Decides which clusters are far: those of which the light's squared size, of positions and normals, is small enough
+    // at their distance.
     struct Opening {
-        float size = 0.0f;
-        float radius = 0.0f;
+        float size = 0.0f;         // root of the largest size over the distance; 0: `bound` decides
+        std::uint32_t first = 0;   // step of the first chord of `bound`
+        std::vector<float> bound;  // [chord]: 1 / (size times weight of a far cluster), 1 / m^2; empty: none is far
     };
 
     // Finds the sources of a leaf; light from beyond `reach` (metres) is left out.
@@ -75,6 +82,7 @@ private:
     };
 
     static bool is_far(const Node& node, float distance, const Opening& opening);
+    void weigh(const SurfaceBasis& basis, const PairTables& tables, const std::vector<float>& moments);
     std::uint32_t build(std::size_t begin, std::size_t end);
     void gather_leaf(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums);
     void gather_children(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums);
@@ -85,6 +93,7 @@ private:
     std::vector<std::uint32_t> m_order;  // numbers of the samples
     std::vector<Node> m_nodes;  // parents come before their children
     std::vector<std::uint32_t> m_leaves;
+    std::vector<float> m_set_scales;
     std::vector<float> m_weights;       // [sample] of its light; 0: dark
     std::vector<std::uint32_t> m_disks;  // [sample]
 };
