@@ -13,8 +13,8 @@ from body_tables import ALBEDOS, BODIES, body_table
 # .9 to .97. At .6 most of the rest is the lattice: light then spreads over less than a sample. On the block it is the
 # method: pairs at an edge bend more than any ball of the library.
 BOUNDS = {
-    "ball_4": (1.0, (1.5, 1.5), (4.0, 2.0)),
-    "ball_6": (1.0, (1.5, 1.0), (3.0, 1.5)),
+    "ball_4": (1.0, (1.5, 1.0), (2.0, 1.0)),
+    "ball_6": (1.0, (1.5, 1.0), (2.0, 1.0)),
     "ball_20": (2.0, (1.5, 1.0), (2.0, 1.0)),
     "cylinder_6": (1.0, (4.0, 2.5), (4.0, 2.5)),
     "cylinder_20": (2.0, (2.0, 1.5), (2.0, 1.5)),
