@@ -260,3 +260,17 @@ class TestLibrary:
     def test_cancel(self):
         with pytest.raises(Cancelled):
             beamspread.library(Medium(0.8, 1.1), "preview", lambda fraction: fraction < 0.7, curved=True)
+
+
+def test_shipped_files_are_saved_as_they_are(tmp_path):
+    """The twelve shipped media have curved surfaces, in less than 14 MB together."""
+    shipped = sorted(module.SHIPPED_FOLDER.glob("*_curved.exr"))
+    assert len(shipped) == 12
+    assert sum(path.stat().st_size for path in shipped) < 14e6
+    for path in shipped:
+        plane = LdfLibrary.load(path.with_name(path.name.replace("curved", "final")))
+        curved = plane.with_curved_from(path)
+        assert curved.curvatures == sorted((0.0, *nodes.curvatures_for(plane.medium)))
+        curved.save(tmp_path / path.name, with_plane=False)
+        assert (tmp_path / path.name).read_bytes() == path.read_bytes()
+        assert module.is_known(plane.medium, "final", curved=True)
