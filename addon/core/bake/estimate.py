@@ -45,8 +45,8 @@ MANY_TRIANGLES = 1000
 # Seconds per texel and direction of the solver `adaptive`, and per pair of texels of `direct`; for suns and for others.
 ADAPTIVE, DIRECT = (1e-6, 3e-6), (0.2e-9, 30e-9)
 
-# Seconds per texel of surfaces that bend.
-BENT_TEXEL = 40e-6
+# Seconds of the solution on surfaces that bend: in any case, for the tables of its media, and per texel.
+BENT, BENT_TEXEL = 3.5, 125e-6
 
 # Seconds of the simulation of an angle in final quality, in half-spaces and in slabs.
 HALF_SPACE_ANGLE, SLAB_ANGLE = 6.0, 2.5
@@ -161,7 +161,7 @@ class Workload:
         """Seconds of the solver."""
         is_wide = self.broad_rays + self.narrow_rays > 0
         if self.is_bent:
-            return BENT_TEXEL * self.texels
+            return BENT + BENT_TEXEL * self.texels
         directions = self.lamps + self.broad_rays + self.narrow_rays + len(STRATA) * self.bounced
         if settings.solver != "fft":
             sun, direction = ADAPTIVE if settings.solver == "adaptive" else DIRECT

@@ -35,6 +35,9 @@ Peaks of processes with 256^2 to 2048^2 texels (tests/unit/test_memory.py), roun
 OTHER_SOLVER = BYTES["direct"]
 """The same of a solver that is not listed: the most that a listed one takes per texel."""
 
+BENT_BYTES = 400e6, 2500
+"""The same of surfaces that bend, per texel that shows them."""
+
 PASS_BYTES = 50e6, 120
 """The same of irradiance and direction, without a medium."""
 
@@ -137,6 +140,9 @@ class Solve(Step):
         texels, lights, surface = job.receiver.coverage.size, job.illumination.lights, job.surface
         if not needs_medium(job.settings):
             return pass_bytes(texels)
+        if job.receiver.is_bent:
+            fixed, per_texel = BENT_BYTES
+            return fixed + per_texel * job.receiver.charts[0].grid.texels
         mirrored, _ = with_edges([chart.grid for chart in job.receiver.charts], surface, job.name)
         texels = max(texels, *map(texels_with_images, mirrored))
         is_narrow = not job.finds_light and all(light.has_one_direction for light in lights)
