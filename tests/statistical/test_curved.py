@@ -42,11 +42,11 @@ def test_totals_of_balls_and_hollows():
 def test_a_ball_without_absorption_returns_all_light(medium, curvature, kernel):
     """All but what leaves without scattering, after any number of reflections: within 4 standard errors.
 
-    One of the 24 numbers is outside by chance with .15 %. Few photons of the scalar walk reach the last orders.
+    One of the 24 numbers is outside by chance with .15 %. The errors, at most 1 %, are those of an albedo of .99999.
     """
     almost_one = 1 - 1e-12
     angles = [0, 70]
-    photons, largest_error = (12_000, 0.1) if kernel == "scalar" else (40_000, 0.015)
+    photons = 12_000 if kernel == "scalar" else 40_000
     library = simulate(medium, angles, photons, seed=3, kernel=kernel, curvatures=[curvature])
     for angle in angles:
         cosine = np.sqrt(1 - (np.sin(np.radians(angle)) / medium.ior) ** 2)
@@ -55,7 +55,7 @@ def test_a_ball_without_absorption_returns_all_light(medium, curvature, kernel):
         entering = 1 - float(fresnel(np.cos(np.radians(angle)), medium.ior))
         returned = library.reflectance(angle, almost_one, curvature) / entering
         error = library.standard_error(angle, almost_one, curvature=curvature) / entering
-        assert error < largest_error
+        assert error < 0.01
         assert abs(returned - (1 - unscattered)) < 4 * error
 
 

@@ -70,7 +70,7 @@ def test_it_holds_the_staged_files_and_licences_and_nothing_else(files):
     assert licences == {f"LICENSES/{name}.txt" for name in LIBRARIES}
     for name in ("__init__.py", "blender_manifest.toml", "batch.py", "data/materials.csv", "VERSION"):
         assert f"beamspread/{name}" in files
-    assert sum(name.startswith("library/") for name in names) == 12
+    assert sum(name.startswith("library/") for name in names) == 24  # planes and curved surfaces
     assert all(files[f"beamspread/{name}"] == (STAGED / name).read_bytes() for name in staged)
 
 

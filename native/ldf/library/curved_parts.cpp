@@ -145,23 +145,26 @@ double LdfLibrary::total(double angle_deg, double albedo, Side side, double curv
 double LdfLibrary::standard_error(double angle_deg, double albedo, Side side, double curvature) const
 {
     const auto curvatures_around = curvature_weights(curvature);
-    const double of_plane_alone = standard_error(angle_deg, albedo, side);
     if (curvature == 0.0)
-        return of_plane_alone;
+        return standard_error(angle_deg, albedo, side);
+    check_albedo(albedo);
     const AngleWeights weights = simulated_weights(angle_deg);
-    double variance = of_plane_alone * of_plane_alone;
+    double variance = 0.0;
     for (const CurvatureWeight& node : curvatures_around) {
         const CurvedPart* part = curved_part(node.index);
-        if (!part)
+        if (!part) {
+            variance += std::pow(node.weight * standard_error(angle_deg, albedo, side), 2);
             continue;
-        const auto [of_plane, of_part] = split_weights(weights, *part->library);
-        for (std::size_t i = 0; i < of_part.even.size(); ++i) {
-            const LdfLibrary& library = *part->library;
-            const SideResult& result = library.results()[i].sides[static_cast<std::size_t>(side)];
-            const double error =
-                library.residual(library.angles_deg()[i], albedo, side) * scattered_total(result, albedo);
-            variance += std::pow(node.weight * of_part.even[i] * error, 2);
         }
+        const LdfLibrary& library = *part->library;
+        const auto [of_plane, of_part] = split_weights(weights, library);
+        double of_node = statistical_variance(of_plane, albedo, side);
+        for (std::size_t i = 0; i < of_part.even.size(); ++i) {
+            const SideResult& result = library.results()[i].sides[static_cast<std::size_t>(side)];
+            const double relative = library.residual(library.angles_deg()[i], albedo, side);
+            of_node += std::pow(of_part.even[i] * relative * scattered_total(result, albedo), 2);
+        }
+        variance += node.weight * node.weight * of_node;
     }
     return std::sqrt(variance);
 }

@@ -176,6 +176,9 @@ private:
     SplitWeights split_weights(const AngleWeights& weights, const LdfLibrary& part) const;
 
     AngleWeights simulated_weights(double angle_deg) const;
+
+    // Variance of a total with these weights of the simulated angles, from the scatter of the batches.
+    double statistical_variance(const AngleWeights& weights, double albedo, Side side) const;
     double residual(double angle_deg, double albedo, Side side) const;
     double entry_transmittance(double angle_deg) const;
 

@@ -62,7 +62,16 @@ double LdfLibrary::total(double angle_deg, double albedo, Side side) const
 double LdfLibrary::standard_error(double angle_deg, double albedo, Side side) const
 {
     check_albedo(albedo);
-    const AngleWeights weights = simulated_weights(angle_deg);
+    double variance = statistical_variance(simulated_weights(angle_deg), albedo, side);
+    if (is_calibrated()) {
+        const double relative = std::hypot(exact_totals_error(m_medium), residual(angle_deg, albedo, side));
+        variance += std::pow(relative * total(angle_deg, albedo, side), 2);
+    }
+    return std::sqrt(variance);
+}
+
+double LdfLibrary::statistical_variance(const AngleWeights& weights, double albedo, Side side) const
+{
     double variance = 0.0;  // angles are simulated independently
     for (std::size_t j = 0; j < m_results.size(); ++j) {
         const SideResult& result = m_results[j].sides[static_cast<std::size_t>(side)];
@@ -80,11 +89,7 @@ double LdfLibrary::standard_error(double angle_deg, double albedo, Side side) co
             squares += (t - mean) * (t - mean);
         variance += weights.even[j] * weights.even[j] * squares / static_cast<double>(batch_count * (batch_count - 1));
     }
-    if (is_calibrated()) {
-        const double relative = std::hypot(exact_totals_error(m_medium), residual(angle_deg, albedo, side));
-        variance += std::pow(relative * total(angle_deg, albedo, side), 2);
-    }
-    return std::sqrt(variance);
+    return variance;
 }
 
 // Largest remaining error at the compared angles and albedos around.
