@@ -17,9 +17,12 @@ sys.path[:0] = [str(HERE), str(HERE.parent / "build" / "stage")]
 
 import acrylic_letters  # noqa: E402
 import beamspread  # noqa: E402
+import jade_bowl  # noqa: E402
 import low_sun  # noqa: E402
 import marble_floor  # noqa: E402
+import marble_head  # noqa: E402
 import plank_floor  # noqa: E402
+import round_soap  # noqa: E402
 import scene_parts as parts  # noqa: E402
 import shop_window  # noqa: E402
 import soap_bar  # noqa: E402
@@ -90,11 +93,14 @@ def main():
     beamspread.register()
     scenes = {
         "acrylic_letters": acrylic_letters.build,
+        "jade_bowl": jade_bowl.build,
         "laser_beams": laser_beams,
         "obstacle": obstacle,
         "marble_floor": marble_floor.build,
+        "marble_head": marble_head.build,
         "low_sun": low_sun.build,
         "plank_floor": plank_floor.build,
+        "round_soap": round_soap.build,
         "soapstone": soapstone.build,
         "soap_bar": soap_bar.build,
         "stage": stage.build,
