@@ -46,6 +46,9 @@ bake shop_window
 bake soap_bar
 bake plank_floor
 bake acrylic_letters
+bake round_soap
+bake jade_bowl
+bake marble_head
 step "plot obstacle_cut" env PYTHONPATH="$root/build/stage" MPLBACKEND=Agg "$root/build/venv/bin/python" \
     "$here/cut_plot.py" "$pictures/baked/obstacle.json" "$here/cycles_edge.csv" "$pictures/obstacle_cut.png"
 cat "$logs/plot_obstacle_cut.log"

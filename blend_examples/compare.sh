@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Makes pictures in blend_examples/pictures: low_sun by Beamspread and by Cycles' own subsurface scattering; the scenes
-# with area lights by Beamspread and as diffuse surfaces; stage also as a volume with Cycles' paths. Bakes the examples
-# first. On two cores Cycles takes ten minutes for low_sun, five for the volume, half a minute for each of the others.
+# with area lights by Beamspread and as diffuse surfaces; stage and the bodies also as volumes with Cycles' paths. Bakes
+# the examples first. On two cores Cycles takes ten minutes for low_sun, two to five for each volume, half a minute for
+# each of the others.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 root=$(dirname "$here")
@@ -35,3 +36,9 @@ render stage with_volume.py "$pictures/stage_by_volume.png" \
     "$pictures/baked/stage/Stage_floor_Milky_acrylic.exr" 384
 beside stage "$pictures/stage.png" "Beamspread" "$pictures/stage_by_volume.png" "Cycles, paths through the volume" \
     "$pictures/stage_diffuse.png" "Cycles, diffuse"
+
+for scene in round_soap jade_bowl marble_head; do
+    render "$scene" with_paths.py "$pictures/${scene}_by_paths.png" 128
+    beside "$scene" "$pictures/$scene.png" "Beamspread" \
+        "$pictures/${scene}_by_paths.png" "Cycles, paths through the volume"
+done

@@ -37,7 +37,7 @@ def build():
     parts.lathe("Candle", parts.rounded(CANDLE), wax, (0, 0, 10 * MM), MM)
     flame = parts.glowing_material("Flame", (1.0, 0.6, 0.2), (1.0, 0.55, 0.16), 60.0)
     parts.lathe("Flame", parts.rounded(FLAME), flame, (0, 0, FLAME_HEIGHT - 4 * MM), MM).visible_shadow = False
-    parts.point_lamp("Candlelight", (0, 0, FLAME_HEIGHT + 2 * MM), 0.45, (1.0, 0.62, 0.28)).data.shadow_soft_size = 2 * MM
+    parts.point_lamp("Candlelight", (0, 0, FLAME_HEIGHT + 2 * MM), 0.22, (1.0, 0.62, 0.28)).data.shadow_soft_size = 2 * MM
     parts.area_lamp("Window", (-0.5, -0.25, 0.45), (0, 0, 0.03), (0.3, 0.3), 1.1, (0.62, 0.78, 1.0))
     scene.cycles.caustics_reflective = scene.cycles.caustics_refractive = False
     scene.cycles.max_bounces, scene.cycles.diffuse_bounces, scene.cycles.glossy_bounces = 4, 2, 3
