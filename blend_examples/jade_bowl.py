@@ -9,9 +9,7 @@ import scene_parts as parts
 
 MM = 0.001
 # Turned shapes as in marble_floor.py: radius,height in millimetres.
-BOWL = (
-    "0,1.5 15,1.5 15,0 17,0 20,0 22,2 38,12 50,28 56,44 58,52 57,55 54,56 51,55 49,52 47,44 41,30 30,19 18,12 0,9.5"
-)
+BOWL = "0,1.5 15,1.5 15,0 17,0 20,0 22,2 38,12 50,28 56,44 58,52 57,55 54,56 51,55 49,52 47,44 41,30 30,19 18,12 0,9.5"
 CANDLE = "0,0 0,0 11,0 11,0 11,16 9.5,17.5 0,17"
 FLAME = "0,0 1.6,1.2 2.2,3.4 1.5,6.8 0,11"
 FLAME_HEIGHT = 32 * MM
@@ -37,7 +35,9 @@ def build():
     parts.lathe("Candle", parts.rounded(CANDLE), wax, (0, 0, 10 * MM), MM)
     flame = parts.glowing_material("Flame", (1.0, 0.6, 0.2), (1.0, 0.55, 0.16), 60.0)
     parts.lathe("Flame", parts.rounded(FLAME), flame, (0, 0, FLAME_HEIGHT - 4 * MM), MM).visible_shadow = False
-    parts.point_lamp("Candlelight", (0, 0, FLAME_HEIGHT + 2 * MM), 0.22, (1.0, 0.62, 0.28)).data.shadow_soft_size = 2 * MM
+    parts.point_lamp("Candlelight", (0, 0, FLAME_HEIGHT + 2 * MM), 0.22, (1.0, 0.62, 0.28)).data.shadow_soft_size = (
+        2 * MM
+    )
     parts.area_lamp("Window", (-0.5, -0.25, 0.45), (0, 0, 0.03), (0.3, 0.3), 1.1, (0.62, 0.78, 1.0))
     scene.cycles.caustics_reflective = scene.cycles.caustics_refractive = False
     scene.cycles.max_bounces, scene.cycles.diffuse_bounces, scene.cycles.glossy_bounces = 4, 2, 3

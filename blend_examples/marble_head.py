@@ -16,7 +16,7 @@ MM = 0.001
 def build():
     scene = parts.empty_scene("Marble head", 540, 400, samples=64, view_transform="Filmic")
     scene.view_settings.look = "Medium High Contrast"
-    scene.beamspread.resolution = 1024
+    scene.beamspread.resolution = 512
     marble, _ = parts.medium_material(
         "Marble",
         color_mode="ALBEDO",

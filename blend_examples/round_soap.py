@@ -1,8 +1,8 @@
 """The scene round_soap: a worn bar of soap with round edges, lit from one side. Lengths are metres.
 
-The edges are as round as the light in the soap spreads, so light goes round them: the faces that look away from the lamp
-are bright along their edges and dark in their middle. The soap does not refract, so that paths can be traced through it
-(compare.sh does that).
+The edges are as round as the light in the soap spreads, so light goes round them: the faces that look away from the
+lamp are bright along their edges and dark in their middle. The soap does not refract, so that paths can be traced
+through it (compare.sh does that).
 """
 
 import math

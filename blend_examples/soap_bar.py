@@ -1,7 +1,7 @@
 """The scene soap_bar: a bar of soap on a wire rack, close to a lamp. Lengths are metres.
 
-The bar is a box with a bevel modifier and without a UV map: its first bake makes one. Light spreads some 4 mm inside, and
-crosses the edges; the sprig's shadow on the bar glows.
+The bar is a box with a bevel modifier and without a UV map: its first bake makes one. Light spreads some 4 mm inside,
+and crosses the edges; the sprig's shadow on the bar glows.
 """
 
 import math

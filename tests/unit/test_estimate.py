@@ -173,3 +173,11 @@ def test_a_medium_is_simulated_once(monkeypatch):
 def test_estimates_have_a_subject():
     Estimate("Baking", "Plane", 1.0).compare(3.0)
     assert Estimate("Baking", "Plane", 2.0).corrected() == pytest.approx(6.0)
+
+
+def test_bodies_take_longer_the_farther_their_light_spreads():
+    """CPU seconds in blend_examples: 20 for the worn soap of 257,000 texels and a path of 7, 14 with faster tables."""
+    load = Workload(texels=257_000, is_bent=True, path=7.0)
+    one_thread = replace(SETTINGS, threads=1)
+    assert 20 / 1.7 < load.seconds(one_thread) < 20 * 1.7
+    assert replace(load, path=0.1).seconds(one_thread) < 0.5 * load.seconds(one_thread)

@@ -45,8 +45,9 @@ MANY_TRIANGLES = 1000
 # Seconds per texel and direction of the solver `adaptive`, and per pair of texels of `direct`; for suns and for others.
 ADAPTIVE, DIRECT = (1e-6, 3e-6), (0.2e-9, 30e-9)
 
-# Seconds of the solution on surfaces that bend: in any case, for the tables of its media, and per texel.
-BENT, BENT_TEXEL = 3.5, 125e-6
+# Seconds of the solution on surfaces that bend: in any case, for the tables of its media; and per texel in any case, up
+# to a mean free path of a texel in proportion to it, and for each doubling of longer ones.
+BENT, BENT_TEXEL, BENT_SHORT, BENT_LONG = 3.5, 6e-6, 30e-6, 18e-6
 
 # Seconds of the simulation of an angle in final quality, in half-spaces and in slabs.
 HALF_SPACE_ANGLE, SLAB_ANGLE = 6.0, 2.5
@@ -87,6 +88,7 @@ class Workload:
     broad_rays, narrow_rays : rays of each texel to lights from all around, and to other lights of a size.
     bounced : True if bounced light may be added.
     triangles : number of those that block light; 0 without shadows.
+    path : mean free path in texels, the longest of the channels; on surfaces that bend.
     ior : index of refraction.
     thickness : in mean free paths; infinite for a half-space.
     """
@@ -100,6 +102,7 @@ class Workload:
     narrow_rays: float = 0.0
     bounced: bool = False
     triangles: int = 0
+    path: float = 1.0
     ior: float = 1.0
     thickness: float = math.inf
 
@@ -134,7 +137,8 @@ class Workload:
                 load = replace(load, narrow_rays=load.narrow_rays + rays)
         material = surface.material
         paths = surface.thickness / max(material.mean_free_path) if surface.thickness else math.inf
-        return replace(load, ior=material.ior, thickness=paths)
+        path = max(material.mean_free_path) / max(largest.pitch_x, largest.pitch_y)
+        return replace(load, path=path, ior=material.ior, thickness=paths)
 
     def seconds(self, settings: BakeSettings) -> float:
         """Seconds of the solution."""
@@ -160,9 +164,10 @@ class Workload:
     def _spreading(self, settings: BakeSettings) -> float:
         """Seconds of the solver."""
         is_wide = self.broad_rays + self.narrow_rays > 0
-        if self.is_bent:
-            return BENT + BENT_TEXEL * self.texels
         directions = self.lamps + self.broad_rays + self.narrow_rays + len(STRATA) * self.bounced
+        if self.is_bent and settings.solver != "direct":
+            doublings = math.log2(max(self.path, 1.0))
+            return BENT + (BENT_TEXEL + BENT_SHORT * min(self.path, 1.0) + BENT_LONG * doublings) * self.texels
         if settings.solver != "fft":
             sun, direction = ADAPTIVE if settings.solver == "adaptive" else DIRECT
             pairs = self.texels if settings.solver == "adaptive" else self.texels**2

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "base/constants.h"
 
@@ -19,6 +20,9 @@ constexpr float disk_first_radii = 0.125f;
 
 // Fraction of the tolerance that functions may have where they are left out. Larger: less time for light far away.
 constexpr double block_share = 0.5;
+
+// Least chord, in radii of a disk, at which curvatures are compared: both profiles are infinite at the pole.
+constexpr double least_chord = 0.1;
 
 // Step of the chord, relative, for derivatives. Smaller: the profiles' bins and their noise show; larger: less exact.
 constexpr double derivative_step = 0.15;
@@ -78,6 +82,27 @@ double grid_excess(const RadialProfile& profile, double radius)
         for (int x = 1; x * x + y * y <= window_end * window_end; ++x)
             sum += 4.0 * pitch * pitch * disk_mean(windowed, radius, pitch * std::hypot(x, y))[0];
     return sum - 2.0 * pi * windowed.cumulative(windowed.support())[0];
+}
+
+// Mean of the difference of two profiles over a disk around the chord c, by seven points (Stroud 1971, "Approximate
+// Calculation of Multiple Integrals", S2 5-1): exact for polynomials up to degree 5.
+Harmonics mean_change(const RadialProfile& from, const RadialProfile& to, double c, double radius,
+                      std::size_t harmonics)
+{
+    Harmonics mean{};
+    const double ring = radius * std::sqrt(2.0 / 3.0);
+    for (int point = 0; point < 7; ++point) {
+        const bool is_middle = point == 6;
+        const double x = c + (is_middle ? 0.0 : ring * std::cos(point * pi / 3.0));
+        const double y = is_middle ? 0.0 : ring * std::sin(point * pi / 3.0);
+        const double chord = std::max(std::hypot(x, y), least_chord * radius);
+        const double azimuth = std::atan2(y, x);
+        const Harmonics before = from.density(chord);
+        const Harmonics after = to.density(chord);
+        for (std::size_t m = 0; m < harmonics; ++m)
+            mean[m] += (is_middle ? 0.25 : 0.125) * (after[m] - before[m]) * std::cos(static_cast<double>(m) * azimuth);
+    }
+    return mean;
 }
 
 const std::vector<ScaledProfile>& profiles_of(const SurfaceBasis& basis, std::size_t result, std::size_t curvature)
@@ -155,23 +180,57 @@ void PairTables::make_table(const SurfaceBasis& basis, ChordTable& table, float 
             for (std::size_t rank = 0; rank < profiles_of(basis, r, k).size(); ++rank)
                 items.push_back({r, k, rank});
     }
-    parallel_for(items.size(), [&](std::size_t i) {
-        const auto [result, curvature, rank] = items[i];
-        const ScaledProfile& scaled = profiles_of(basis, result, curvature)[rank];
-        const double per_metre = 1.0 / scaled.mean_free_path;
-        float* values = table.values[result].data() + curvature * table.rows * blocks * lanes_per_block;
-        for (std::size_t row = 0; row < table.rows; ++row, values += blocks * lanes_per_block) {
+    const std::size_t lanes = blocks * lanes_per_block;
+    // Fills the functions of one item, of c^2 times `value(profile, c)` at each chord c in mean free paths.
+    const auto fill = [&](const Item& item, const auto& value) {
+        const ScaledProfile& scaled = profiles_of(basis, item.result, item.curvature)[item.rank];
+        float* values = table.values[item.result].data() + item.curvature * table.rows * lanes;
+        for (std::size_t row = 0; row < table.rows; ++row, values += lanes) {
             const auto chord = static_cast<double>(chord_of(table.first + static_cast<std::uint32_t>(row)));
             if (chord > scaled.reach + static_cast<double>(radius))
                 break;
-            const double c = chord * per_metre;
-            const Harmonics value = radius > 0.0f
-                                        ? disk_mean(scaled.profile, static_cast<double>(radius) * per_metre, c)
-                                        : scaled.profile.density(c);
+            const double c = chord / scaled.mean_free_path;
+            const Harmonics at_chord = value(scaled, c);
             for (std::size_t lane = 0; lane < basis.rank.size(); ++lane)
-                if (basis.rank[lane] == rank)
-                    values[lane] = static_cast<float>(value[static_cast<std::size_t>(harmonic[lane])] * c * c);
+                if (basis.rank[lane] == item.rank)
+                    values[lane] += static_cast<float>(at_chord[static_cast<std::size_t>(harmonic[lane])] * c * c);
         }
+    };
+    if (radius == 0.0f) {
+        parallel_for(items.size(), [&](std::size_t i) {
+            fill(items[i], [](const ScaledProfile& scaled, double c) { return scaled.profile.density(c); });
+        });
+        return;
+    }
+    const auto harmonics = static_cast<std::size_t>(*std::max_element(harmonic.begin(), harmonic.end())) + 1;
+    // Means over a disk take long. Curvature changes profiles by functions that are smooth at the pole: few points are
+    // enough for the mean of the change.
+    std::vector<Item> flat;
+    std::copy_if(items.begin(), items.end(), std::back_inserter(flat),
+                 [&](const Item& item) { return item.curvature == flat_index(basis, item.result); });
+    parallel_for(flat.size(), [&](std::size_t i) {
+        fill(flat[i], [radius](const ScaledProfile& scaled, double c) {
+            return disk_mean(scaled.profile, static_cast<double>(radius) / scaled.mean_free_path, c);
+        });
+    });
+    parallel_for(items.size(), [&](std::size_t i) {
+        const Item& item = items[i];
+        const std::size_t plane = flat_index(basis, item.result);
+        if (item.curvature == plane)
+            return;
+        const std::size_t size = table.rows * lanes;
+        float* values = table.values[item.result].data();
+        const float end_of_ball = static_cast<float>(profiles_of(basis, item.result, item.curvature)[item.rank].reach);
+        for (std::size_t at = 0; at < size; ++at)
+            if (chord_of(table.first + static_cast<std::uint32_t>(at / lanes)) > end_of_ball + radius)
+                break;
+            else if (const std::size_t lane = at % lanes; lane < basis.rank.size() && basis.rank[lane] == item.rank)
+                values[item.curvature * size + at] = values[plane * size + at];
+        const ScaledProfile& of_plane = profiles_of(basis, item.result, plane)[item.rank];
+        fill(item, [&](const ScaledProfile& scaled, double c) {
+            return mean_change(of_plane.profile, scaled.profile, c, static_cast<double>(radius) / scaled.mean_free_path,
+                               harmonics);
+        });
     });
 }
 

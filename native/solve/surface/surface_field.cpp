@@ -81,6 +81,10 @@ void check_memory(std::size_t bytes, std::size_t limit)
     throw MemoryLimit(text.str());
 }
 
+// Area of a sample, over the mean, below which its disk counts as one of that area: it has hardly any light. Smaller: more
+// tables, more time.
+constexpr double least_area = 1.0 / 64.0;
+
 double mean_area(std::span<const SurfaceSample> samples)
 {
     double sum = 0.0;
@@ -104,10 +108,11 @@ PairTables tables_of(const SurfaceProblem& problem, const SurfaceBasis& basis)
 {
     std::optional<PairTables> tables;
     with_threads(problem.threads, [&] {
+        const auto least = static_cast<float>(least_area * mean_area(problem.samples));
         const auto [min, max] =
             std::minmax_element(problem.samples.begin(), problem.samples.end(),
                                 [](const SurfaceSample& a, const SurfaceSample& b) { return a.area < b.area; });
-        tables.emplace(basis, min->area, max->area, problem.tolerance);
+        tables.emplace(basis, std::max(min->area, least), max->area, problem.tolerance);
     });
     return *std::move(tables);
 }
