@@ -40,6 +40,7 @@ bake laser_beams --no-indirect
 bake obstacle --no-indirect --frames 1-2
 bake marble_floor --no-indirect
 bake low_sun --no-indirect
+bake jade_bowl --no-indirect
 bake soapstone
 bake stage
 bake shop_window
@@ -47,7 +48,6 @@ bake soap_bar
 bake plank_floor
 bake acrylic_letters
 bake round_soap
-bake jade_bowl
 bake marble_head
 step "plot obstacle_cut" env PYTHONPATH="$root/build/stage" MPLBACKEND=Agg "$root/build/venv/bin/python" \
     "$here/cut_plot.py" "$pictures/baked/obstacle.json" "$here/cycles_edge.csv" "$pictures/obstacle_cut.png"

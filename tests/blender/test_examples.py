@@ -58,8 +58,9 @@ def test_objects_without_a_fitting_map_get_one(name):
 
 @pytest.mark.parametrize("name", KINDS)
 def test_all_are_baked(name, tmp_path):
-    # Bounced light takes long: Cycles would find that of the marble floor, and the planks lie in a room.
-    arguments = ["--no-indirect"] if name in ("marble_floor", "plank_floor") else []
+    # Bounced light takes long: Cycles would find that of the marble floor, and the planks lie in a room. Only Cycles
+    # could find that of the bowl's flame, and not on a mesh that bends.
+    arguments = ["--no-indirect"] if name in ("marble_floor", "plank_floor", "jade_bowl") else []
     bpy.ops.wm.open_mainfile(filepath=str(FOLDER / f"{name}.blend"))
     bpy.context.scene.beamspread.quality = "preview"
     report = bake_all(parse([*arguments, "--resolution", "64", "--output", str(tmp_path)]))
