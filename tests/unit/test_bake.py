@@ -321,7 +321,7 @@ def test_a_new_kind_of_light_and_a_new_layer_need_nothing_but_themselves(monkeyp
         def is_behind(self, target):
             return False
 
-    def irradiance(targets, illumination, _material, _thickness, settings, _progress, _bytes_for_light, _report):
+    def irradiance(targets, illumination, _material, _thickness, settings, *_progress_and_reports):
         return [arrive(target, illumination, settings)[0] for target in targets]
 
     monkeypatch.setitem(LAYERS, "Own", irradiance)
