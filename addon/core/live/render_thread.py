@@ -14,7 +14,7 @@ from ..progress import Progress
 from ..target import Target
 from .library_service import LibraryService
 from .live_target import LiveTarget
-from .renderer import SIDES, LiveRenderer, Rendering, quick_side
+from .renderer import SIDES, LiveRenderer, Rendering
 
 REST_SECONDS = 0.4
 """Seconds without changes before targets are rendered exactly; more wastes less work on targets that still change."""
@@ -150,8 +150,12 @@ class RenderThread:
             return missing
         if not self._renderer.has_libraries(target):
             return missing  # the service calls back once they are there
-        side, was_current = quick_side(target.illumination.lights), work.bounced_key == work.key
-        failed = not self._put(work, target, lambda: self._renderer.quick(target, side, lambda _: not self._is_ending))
+        was_current = work.bounced_key == work.key
+        failed = not self._put(
+            work,
+            target,
+            lambda: self._renderer.quick(target, self._renderer.quick_side(target), lambda _: not self._is_ending),
+        )
         # An error would occur again in the exact rendering.
         work.key, work.has_libraries, work.is_exact = target.key, not missing, failed
         if failed or target.max_bounces is None:
@@ -175,7 +179,7 @@ class RenderThread:
             work.bounced_key = work.key
 
     def _render_exactly(self, target: LiveTarget, work: Work, progress: Progress) -> None:
-        if quick_side(target.illumination.lights) < SIDES[-1] < max(self._renderer.size_of(target)):
+        if self._renderer.quick_side(target) < SIDES[-1] < max(self._renderer.size_of(target)):
             # The exact rendering of a large image may take long.
             self._put(work, target, lambda: self._renderer.quick(target, SIDES[-1], progress))
         self._put(work, target, lambda: self._renderer.exact(target, progress))

@@ -105,6 +105,10 @@ class LiveRenderer:
         """Width and height of the target's image in texels."""
         return target.size or texture_size(self._mesh(target), target.resolution)
 
+    def quick_side(self, target: LiveTarget) -> int:
+        """Texels along the longer side of a quick rendering of the target; few where it bends, which takes longer."""
+        return SIDES[0] if self._mesh(target).is_bent else quick_side(target.illumination.lights)
+
     def quick(self, target: LiveTarget, side: int, progress: Progress | None = None) -> Rendering:
         """Render at most `side` texels along the longer side, interpolated to the size of the image.
 
