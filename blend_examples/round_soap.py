@@ -7,6 +7,7 @@ through it (compare.sh does that).
 
 import math
 
+import bpy
 import scene_parts as parts
 from mathutils import Vector
 
@@ -31,6 +32,8 @@ def build():
     bar.location, bar.rotation_euler = (0, 0, HEIGHT / 2), (0, 0, math.radians(-20))
     bevel = bar.modifiers.new("Round edges", "BEVEL")
     bevel.width, bevel.segments = 8 * MM, 8
+    bpy.context.view_layer.objects.active = bar
+    bpy.ops.object.modifier_apply(modifier=bevel.name)  # later Blenders round corners otherwise
     for face in bar.data.polygons:
         face.use_smooth = True
     bar.data.use_auto_smooth, bar.data.auto_smooth_angle = True, math.radians(40)
