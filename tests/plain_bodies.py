@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-# Half of the photons end at each multiple of this order; those that stay count double. Larger: slower, less noise of
-# high albedos.
+# Scattering order at each multiple of which half of the photons end; the rest then count double. Larger: slower, less
+# noise of high albedos.
 ROULETTE_ORDER = 32
 # Photons end at the order where the weight of the largest albedo falls below this. Smaller: less bias.
 LEAST_WEIGHT = 1e-7

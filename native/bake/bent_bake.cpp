@@ -26,6 +26,9 @@ constexpr double max_stretch = 1.3;
 constexpr double short_in_paths = 0.1;
 constexpr std::size_t max_pieces = 64;
 
+// Coverage that smaller ones count as: rounding decides about their areas.
+constexpr float least_coverage = 1e-3f;
+
 // The longer half axis of the ellipse that a texel's steps span, world, and the length of the other one.
 struct Ellipse {
     Vec3 axis;
@@ -46,8 +49,9 @@ struct Ellipse {
 
 // The samples of a mesh, in the order of its texels: one for each texel inside, or several for a long one.
 struct Samples {
-    Samples(const ReceiverGrid& grid, double mean_free_path)
+    Samples(const Surface& surface, double mean_free_path)
     {
+        const ReceiverGrid& grid = surface.grid;
         const Vec3 origin = 0.5 * (grid.shape->low + grid.shape->high);
         for (std::size_t i = 0; i < grid.texels(); ++i) {
             first.push_back(all.size());
@@ -62,12 +66,15 @@ struct Samples {
                 const double at = (static_cast<double>(k) + 0.5) / static_cast<double>(pieces) - 0.5;
                 all.push_back({Vec3f(texel.position + at * ellipse.axis - origin), texel.normal, texel.tangent,
                                texel.area / static_cast<float>(pieces)});
+                const float coverage = surface.coverage ? surface.coverage[i] : 1.0f;
+                whole_areas.push_back(all.back().area / std::max(coverage, least_coverage));
             }
         }
         first.push_back(all.size());
     }
 
     std::vector<SurfaceSample> all;
+    std::vector<float> whole_areas;  // see `SurfaceProblem`
     std::vector<std::size_t> first;  // [texel], and the number of all
 };
 
@@ -177,7 +184,7 @@ double bake_bent(const Surface& surface, const std::vector<const SurfaceLight*>&
     const auto shorter = [](const ChannelMedium& a, const ChannelMedium& b) {
         return a.mean_free_path < b.mean_free_path;
     };
-    const Samples samples(surface.grid, std::ranges::min_element(channels, shorter)->mean_free_path);
+    const Samples samples(surface, std::ranges::min_element(channels, shorter)->mean_free_path);
     if (samples.all.empty() || lights.empty()) {
         progress.finish();
         return 0.0;
@@ -186,6 +193,7 @@ double bake_bent(const Surface& surface, const std::vector<const SurfaceLight*>&
     const std::vector<double> means = survey(surface, lights, options);
     const double all = std::accumulate(means.begin(), means.end(), 0.0);
     const SurfaceProblem problem{.samples = samples.all,
+                                 .whole_areas = samples.whole_areas,
                                  .channels = channels,
                                  .tolerance = options.tolerance,
                                  .is_colored = is_colored(surface, lights),

@@ -84,7 +84,7 @@ def test_areas_add_up_to_that_of_the_mesh_at_any_resolution():
     for width, height in ((1, 1), (7, 5), (64, 32), (500, 260)):
         result = texels_of(positions, uvs * (width, height), normals, width, height)
         assert result["areas"].sum(dtype=float) == pytest.approx(whole, rel=1e-6)
-        # Half of the triangles of the rows at both poles have no area, and cover nothing.
+        # At both poles every second triangle has no area: it covers nothing.
         assert result["covered"].sum(dtype=float) == pytest.approx((1 - 1 / 40) * width * height, rel=1e-6)
 
 

@@ -9,7 +9,7 @@ from beamspread import Cancelled, LdfLibrary, Medium, simulate
 from beamspread.core.ldf import curvatures as nodes
 from beamspread.core.ldf import library as module
 
-from plain_exr import damaged_copies
+from plain_exr import count_refused, damaged_copies
 
 CURVATURES = [-0.05, 0.02, 0.2]
 IMAGE = (40, 0.9, 9, 0.7)
@@ -124,17 +124,8 @@ def test_files_of_curvatures_alone(library, plane, tmp_path):
 def test_damaged_files_are_refused(library, tmp_path):
     path = tmp_path / "a.exr"
     library.save(path)
-    refused = 0
-    for damaged in damaged_copies(path.read_bytes(), 150, header=20_000):
-        path.write_bytes(damaged)
-        try:
-            loaded = LdfLibrary.load(path)
-        except OSError as error:
-            assert str(path) in str(error)  # noqa: PT017 - either outcome is fine, a crash is not
-            refused += 1
-        else:
-            assert same(loaded, library)  # the damaged byte does not matter: attributes of OpenEXR itself
-    assert refused > 100
+    copies = damaged_copies(path.read_bytes(), 150, header=20_000)
+    assert count_refused(path, LdfLibrary.load, lambda loaded: same(loaded, library), copies) > 100
 
 
 def test_a_calibrated_library_keeps_its_curvatures(library):

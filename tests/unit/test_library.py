@@ -14,7 +14,7 @@ from beamspread import Cancelled, LdfLibrary, Medium, simulate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from plain_exr import damaged_copies
+from plain_exr import count_refused, damaged_copies
 
 MAKE_LIBRARY = Path(__file__).parents[2] / "tools" / "make_library.py"
 
@@ -86,17 +86,8 @@ def test_damaged_files_are_refused(fixture, request, tmp_path):
     library = request.getfixturevalue(fixture)
     path = tmp_path / "a.exr"
     library.save(path)
-    refused = 0
-    for damaged in damaged_copies(path.read_bytes(), 300, header=4000):
-        path.write_bytes(damaged)
-        try:
-            loaded = LdfLibrary.load(path)
-        except OSError as error:
-            assert str(path) in str(error)  # noqa: PT017 - either outcome is fine, a crash is not
-            refused += 1
-        else:
-            assert same(loaded, library)  # the damaged byte does not matter: attributes of OpenEXR itself
-    assert refused > 200
+    copies = damaged_copies(path.read_bytes(), 300, header=4000)
+    assert count_refused(path, LdfLibrary.load, lambda loaded: same(loaded, library), copies) > 200
 
 
 @pytest.mark.parametrize("fixture", ["small", "slab", "mirrors"])

@@ -89,7 +89,7 @@ def test_even_light_that_was_computed_elsewhere_makes_a_piece_as_bright_as_an_in
 
 
 def test_mirror_images_that_would_take_too_much_memory_end_nearer_and_are_named():
-    """Also a plane of 4096^2 texels keeps some: a quarter of its width on each side."""
+    """A plane of 4096^2 texels keeps images within a quarter of its width on each side."""
     texels = np.ones((4096, 4096), np.float32)
     large = replace(square(4096), coverage=texels)
     wide = replace(MATERIAL, mean_free_path=(0.3, 0.3, 0.3))

@@ -319,7 +319,8 @@ def test_memory_is_limited():
 
 
 def test_a_solution_stops_and_starts_again():
-    field = lit_field(path=10 * PITCH, is_direct=True)  # takes long enough for reports
+    field = flat_field(path=10 * PITCH, samples=np.tile(flat_samples(), (2, 1)), is_direct=True, threads=1)
+    field.add(np.tile(rays(OBLIQUE), (2, 1)), gray(np.ones(2 * SIDE * SIDE)), WHITE)  # many pairs: they take seconds
     expected = field.solve()
     for limit in (0.0, 0.4):
         with pytest.raises(Cancelled):
@@ -327,7 +328,7 @@ def test_a_solution_stops_and_starts_again():
     assert np.array_equal(field.solve(), expected)
 
 
-@pytest.mark.parametrize(("name", "bound"), [("ball_6", 0.007), ("ball_20", 0.015)])
+@pytest.mark.parametrize(("name", "bound"), [("ball_6", 0.005), ("ball_20", 0.01)])
 def test_a_ball_returns_as_much_light_as_its_library(name, bound):
     """A beam lights all angles: a ring returns its irradiance times the reflectance.
 
@@ -356,3 +357,22 @@ def test_the_bench_runs_in_small():
     bench = Path(__file__).resolve().parents[1] / "bench" / "bodies.py"
     done = subprocess.run([sys.executable, str(bench), "1000"], capture_output=True, text=True, check=True)
     assert len(done.stdout.splitlines()) > 5
+
+
+def test_faint_light_of_normals_that_cancel():
+    """A faint sheet, lit from both sides, beside a bright wall: its light is one cluster, whose mean normal is 0."""
+    front, wall = flat_samples(), flat_samples()
+    back = front.copy()
+    back[:, 2], back[:, 5] = -PITCH, -1
+    wall[:, :9] = np.roll(wall[:, :9].reshape(-1, 3, 3), 1, axis=2).reshape(-1, 9)  # its normal is x
+    wall[:, 0] -= 2 * SIDE * PITCH
+    samples = np.concatenate([wall, front, back])
+    field = flat_field(path=20 * PITCH, samples=samples)
+    irradiance = np.full(len(samples), 1e-9)
+    irradiance[: len(wall)] = 1
+    field.add(rays([0, 0, -1], len(samples)), gray(irradiance), WHITE)
+    solved = field.solve()
+    assert np.isfinite(solved).all()
+    alone = flat_field(path=20 * PITCH, samples=wall)
+    alone.add(rays([0, 0, -1]), gray(np.ones(len(wall))), WHITE)
+    np.testing.assert_allclose(solved[: len(wall)], alone.solve(), rtol=5e-3)

@@ -12,6 +12,7 @@ from ..ldf.library import SIMULATING, is_known, library
 from ..messages import Message, note
 from ..progress import Progress
 from .bake_settings import BakeSettings
+from .bent_limits import bent_messages
 from .edges import texels_with_images, with_edges
 from .estimate import simulation_seconds
 from .finish import finished_texture
@@ -47,9 +48,6 @@ NARROW_SLAB, WIDE_SLAB = (200e6, 300), (800e6, 300)
 
 MAX_NOISE = 0.03
 """Noise of the light, relative to its mean, above which a bake names it. More: fewer notes."""
-
-MAX_BEYOND = 0.01
-"""Fraction of a surface that bends more than libraries know, above which a bake names it. More: fewer notes."""
 
 
 class NoiseSum:
@@ -127,8 +125,9 @@ class Solve(Step):
             noise.add,
             bends.append,
         )
-        if max(bends) > MAX_BEYOND:
-            job = replace(job, illumination=job.illumination.with_messages(_beyond(job.name, max(bends))))
+        if job.receiver.is_bent:
+            limits = bent_messages(job.name, job.surface, settings, max(bends))
+            job = replace(job, illumination=job.illumination.with_messages(*limits))
         if noise.relative() > MAX_NOISE:
             job = replace(job, illumination=job.illumination.with_messages(_noisy(job.name, noise.relative())))
         if not all(np.isfinite(on_grid).all() for on_grid in values):
@@ -163,11 +162,6 @@ BAKE_STEPS = (Simulate(), Solve())
 def _noisy(name: str, noise: float) -> Message:
     text = f"The light on '{name}' has a noise of {100 * noise:.0f} %, since few rays find it."
     return note(name, text, "Raise Samples.")
-
-
-def _beyond(name: str, fraction: float) -> Message:
-    text = f"{fraction:.0%} of the surface of '{name}' bends more than its medium is known for: light is rough there."
-    return note(name, text, "A shorter Mean Free Path, or a larger object, bends less.")
 
 
 def needs_medium(settings: BakeSettings) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..bake.bake_settings import COMBINED, BakeSettings
+from ..bake.bent_limits import bent_messages
 from ..bake.edges import with_edges
 from ..bake.finish import finished_texture, with_seams
 from ..bake.layers import spread
@@ -139,10 +140,13 @@ class LiveRenderer:
         grids, edges = with_edges(
             [chart.grid for chart in framed.receiver.charts], target.surface, target.target.object_name
         )
-        values = spread(grids, illumination, *rest)
+        name, bends = target.target.object_name, [0.0]
+        values = spread(grids, illumination, *rest, report_bend=bends.append)
+        is_bent = self._mesh(target).is_bent
+        limits = bent_messages(name, target.surface, target.settings, max(bends)) if is_bent else ()
         texture = finished_texture(framed.receiver, values, material, target.settings)
         news = [message for message in illumination.messages if message not in target.illumination.messages]
-        messages = (*self._mesh(target).messages, *edges, *news)
+        messages = (*self._mesh(target).messages, *edges, *limits, *news)
         return Rendering(target.target, texture, framed, is_exact=True, messages=messages)
 
     def missing(self, target: LiveTarget) -> list:

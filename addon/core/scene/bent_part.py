@@ -18,6 +18,9 @@ from .polygons import Polygons, components, same_faces
 # Part of a mesh's edges, or of its area, that a sentence about them needs. More: fewer notes about small faults.
 MIN_FAULT = 0.01
 
+# Number of loose parts, the largest ones, among which near ones are looked for. More: slower, more complete.
+MAX_LOOSE_PARTS = 256
+
 
 @dataclass(frozen=True, eq=False)
 class BentIsland:
@@ -92,13 +95,16 @@ def _outward(polygons: Polygons, corners: np.ndarray, owners: np.ndarray) -> Pol
     )
 
 
-def facing_outward(polygons: Polygons, name: str) -> tuple[Polygons, list[Message]]:
-    """The faces of the object `name` with closed bodies turned right side out, and messages about faces gone wrong."""
+def facing_outward(polygons: Polygons, name: str, spread: float = 0.0) -> tuple[Polygons, list[Message]]:
+    """The faces of the object `name` with closed bodies turned right side out, and messages about faces gone wrong.
+
+    `spread`: how far light spreads, for the message about loose parts; 0: nowhere.
+    """
     first, second = polygons.shared_edges
     faces = polygons.face_of
     body_of = components(polygons.count, faces[first], faces[second])
     is_inward = _is_inside_out(polygons, body_of)[body_of]
-    messages = _faults(polygons, name)
+    messages = [*_faults(polygons, name), *_loose_parts(polygons, body_of, spread, name)]
     if is_inward.any():
         are = "The normals" if is_inward.all() else f"The normals of {polygons.listed(is_inward)}"
         text = f"{are} of '{name}' point inward; it is baked as if they pointed outward."
@@ -159,6 +165,26 @@ def _faults(polygons: Polygons, name: str) -> list[Message]:
         text = f"Faces of '{name}' lie on each other, {part:.0%} of its surface: light counts for each of them there."
         messages.append(warning(name, text, "Merge them (Edit Mode: A, then M, By Distance)."))
     return messages
+
+
+def _loose_parts(polygons: Polygons, body_of: np.ndarray, spread: float, name: str) -> list[Message]:
+    """The note about parts without a common edge that are so near to each other that light crosses between them."""
+    areas = np.bincount(body_of, polygons.areas)
+    largest = np.argsort(-areas, kind="stable")[:MAX_LOOSE_PARTS]
+    if spread == 0 or len(largest) < 2:
+        return []
+    place = np.full(len(areas), -1)
+    place[largest] = np.arange(len(largest))
+    of_corner = place[body_of][polygons.face_of]
+    lows, highs = np.full((len(largest), 3), np.inf), np.full((len(largest), 3), -np.inf)
+    np.minimum.at(lows, of_corner[of_corner >= 0], polygons.corners[of_corner >= 0])
+    np.maximum.at(highs, of_corner[of_corner >= 0], polygons.corners[of_corner >= 0])
+    is_near = (lows[:, None] <= highs[None] + spread).all(axis=2) & (lows[None] <= highs[:, None] + spread).all(axis=2)
+    count = int((is_near.sum(axis=1) > 1).sum())
+    if not count:
+        return []
+    text = f"{count} loose parts of '{name}' are near to others: light crosses between them as if they touched."
+    return [note(name, text, "Separate them (Edit Mode: P, By Loose Parts) where it should not.")]
 
 
 def _by_order(polygons: Polygons) -> np.ndarray:

@@ -92,7 +92,7 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "", spr
     polygons, planes, bent = _planes_of(polygons, tolerance)
     check_uvs(polygons.uvs)
     if len(bent) or _edge_part(polygons, planes, spread) > MAX_EDGES:
-        polygons, messages = facing_outward(polygons, name)
+        polygons, messages = facing_outward(polygons, name, spread)
         messages += lost_in_map(polygons, name)
         return FlatMesh((bent_part(polygons),), tuple(messages), polygons.uv_map)
     exact = FLATNESS_TOLERANCE * polygons.diagonal

@@ -108,15 +108,17 @@ void add_pairs_of(const PairTables& tables, const PairTarget& target, std::span<
     for (const PairSource& source : sources) {
         const Vec3f d = target.position - source.position;
         const float square = d.x * d.x + d.y * d.y + d.z * d.z;
-        const float chord = std::sqrt(square);
+        float chord = std::sqrt(square);
         if (chord >= tables.reach)
             continue;
         const bool is_disk = !are_clusters && chord < tables.disk_end[source.disk];
+        if (is_disk)
+            chord = std::max(chord, tables.disk_begin[source.disk]);
         const ChordTable& table = is_disk ? tables.disks[source.disk] : tables.point;
         const std::uint32_t step = std::clamp(chord_step(chord), table.first, table.first + table.rows - 2);
         const float before = chord_of(step);
         const float part = std::clamp((chord - before) / (chord_of(step + 1) - before), 0.0f, 1.0f);
-        const float per_square = 1.0f / std::max(square, before * before);
+        const float per_square = 1.0f / std::max(chord * chord, before * before);
         const float curvature = ((target.normal.x - source.normal.x) * d.x + (target.normal.y - source.normal.y) * d.y +
                                  (target.normal.z - source.normal.z) * d.z) *
                                 per_square;

@@ -16,10 +16,18 @@ constexpr float disks_per_octave = 4.0f;
 // Chord from which a disk counts as a point, and first chord of its table, in radii. Larger end: smaller errors, more
 // time.
 constexpr float disk_end_radii = 8.0f;
-constexpr float disk_first_radii = 0.125f;
+constexpr float disk_first_radii = 1.0f;
+
+// Least chord of another sample, in radii: it lies outside of the disk. Texels at the rims of UV islands are cut, and their
+// middles lie within the disks of their neighbors.
+constexpr float disk_begin_radii = 1.125f;
 
 // Fraction of the tolerance that functions may have where they are left out. Larger: less time for light far away.
 constexpr double block_share = 0.5;
+
+// Area of the smallest disk over the mean of all samples. Samples below it have hardly any light for others. Smaller: more
+// tables, more time.
+constexpr float least_disk = 1.0f / 64.0f;
 
 // Least chord, in radii of a disk, at which curvatures are compared: both profiles are infinite at the pole.
 constexpr double least_chord = 0.1;
@@ -84,24 +92,30 @@ double grid_excess(const RadialProfile& profile, double radius)
     return sum - 2.0 * pi * windowed.cumulative(windowed.support())[0];
 }
 
-// Mean of the difference of two profiles over a disk around the chord c, by seven points (Stroud 1971, "Approximate
-// Calculation of Multiple Integrals", S2 5-1): exact for polynomials up to degree 5.
+// Rings of a disk and points on half of each, at which curvatures are compared. More: smaller errors, more time.
+constexpr int compared_rings = 4;
+constexpr int compared_azimuths = 6;
+
+// Mean of the difference of two profiles over a disk around the chord c: by points of equal area, on one side of the chord,
+// since the other is its mirror image.
 Harmonics mean_change(const RadialProfile& from, const RadialProfile& to, double c, double radius,
                       std::size_t harmonics)
 {
+    constexpr double weight = 1.0 / (compared_rings * compared_azimuths);
     Harmonics mean{};
-    const double ring = radius * std::sqrt(2.0 / 3.0);
-    for (int point = 0; point < 7; ++point) {
-        const bool is_middle = point == 6;
-        const double x = c + (is_middle ? 0.0 : ring * std::cos(point * pi / 3.0));
-        const double y = is_middle ? 0.0 : ring * std::sin(point * pi / 3.0);
-        const double chord = std::max(std::hypot(x, y), least_chord * radius);
-        const double azimuth = std::atan2(y, x);
-        const Harmonics before = from.density(chord);
-        const Harmonics after = to.density(chord);
-        for (std::size_t m = 0; m < harmonics; ++m)
-            mean[m] += (is_middle ? 0.25 : 0.125) * (after[m] - before[m]) * std::cos(static_cast<double>(m) * azimuth);
-    }
+    for (int i = 0; i < compared_rings; ++i)
+        for (int j = 0; j < compared_azimuths; ++j) {
+            const double ring = radius * std::sqrt((i + 0.5) / compared_rings);
+            const double turn = pi * (j + 0.5) / compared_azimuths;
+            const double x = c + ring * std::cos(turn);
+            const double y = ring * std::sin(turn);
+            const double azimuth = std::atan2(y, x);
+            const double chord = std::max(std::hypot(x, y), least_chord * radius);
+            const Harmonics before = from.density(chord);
+            const Harmonics after = to.density(chord);
+            for (std::size_t m = 0; m < harmonics; ++m)
+                mean[m] += weight * (after[m] - before[m]) * std::cos(static_cast<double>(m) * azimuth);
+        }
     return mean;
 }
 
@@ -119,7 +133,7 @@ std::size_t flat_index(const SurfaceBasis& basis, std::size_t result)
 
 }  // namespace
 
-PairTables::PairTables(const SurfaceBasis& basis, float min_area, float max_area, double tolerance)
+PairTables::PairTables(const SurfaceBasis& basis, const SampleAreas& areas, double tolerance)
     : results(basis.terms.sets.results.size()), blocks(basis.blocks), harmonic(basis.harmonic)
 {
     for (const ChannelSets::Result& result : basis.terms.sets.results)
@@ -130,11 +144,12 @@ PairTables::PairTables(const SurfaceBasis& basis, float min_area, float max_area
             for (const ScaledProfile& profile : profiles_of(basis, r, k))
                 reach = std::max(reach, static_cast<float>(profile.reach));
     const auto radius_of = [](float area) { return std::sqrt(area * static_cast<float>(inv_pi)); };
-    m_first_radius = radius_of(min_area);
-    const float octaves = std::log2(radius_of(max_area) / m_first_radius);
+    m_first_radius = radius_of(std::max(areas.least, least_disk * areas.mean));
+    const float octaves = std::log2(radius_of(areas.most) / m_first_radius);
     disks.resize(static_cast<std::size_t>(std::lround(octaves * disks_per_octave)) + 1);
     for (std::size_t d = 0; d < disks.size(); ++d) {
         const float radius = m_first_radius * std::exp2(static_cast<float>(d) / disks_per_octave);
+        disk_begin.push_back(disk_begin_radii * radius);
         disk_end.push_back(disk_end_radii * radius);
         disks[d].first = chord_step(disk_first_radii * radius);
         make_table(basis, disks[d], radius, std::min(disk_end.back(), reach));
@@ -143,7 +158,7 @@ PairTables::PairTables(const SurfaceBasis& basis, float min_area, float max_area
     make_table(basis, point, 0.0f, reach);
     choose_blocks(basis, tolerance);
     make_laplacian(basis);
-    make_self(basis, m_first_radius, radius_of(max_area));
+    make_self(basis, radius_of(areas.least), radius_of(areas.most));
 }
 
 void PairTables::make_scales(const SurfaceBasis& basis)
@@ -326,7 +341,9 @@ void PairTables::make_self(const SurfaceBasis& basis, float min_radius, float ma
                                static_cast<double>(disks.size() - 1));
                 const auto before = static_cast<std::size_t>(position);
                 const std::size_t after = std::min(before + 1, disks.size() - 1);
-                const double there = std::lerp(excess[before], excess[after], position - std::floor(position));
+                const double smaller = std::min(static_cast<double>(radius / m_first_radius), 1.0);
+                const double there =
+                    smaller * smaller * std::lerp(excess[before], excess[after], position - std::floor(position));
                 const double within =
                     profiles[rank].profile.cumulative(static_cast<double>(radius) / profiles[rank].mean_free_path)[0];
                 m_self.values[r][row * blocks * lanes_per_block + lane] = static_cast<float>(2.0 * pi * within - there);
@@ -365,7 +382,7 @@ void PairTables::add_self(float area, std::size_t result, float* factors) const
     const float radius = std::sqrt(area * static_cast<float>(inv_pi));
     const std::uint32_t step = std::clamp(chord_step(radius), m_self.first, m_self.first + m_self.rows - 2);
     const float before = chord_of(step);
-    const float part = (radius - before) / (chord_of(step + 1) - before);
+    const float part = std::clamp((radius - before) / (chord_of(step + 1) - before), 0.0f, 1.0f);
     const std::size_t lanes = blocks * lanes_per_block;
     const float* values = m_self.values[result].data() + (step - m_self.first) * lanes;
     for (std::size_t i = 0; i < lanes; ++i)

@@ -48,12 +48,19 @@ struct CurvatureScale {
     }
 };
 
+// Areas of the samples of a surface, m^2.
+struct SampleAreas {
+    float least = 0.0f;
+    float most = 0.0f;
+    float mean = 0.0f;
+};
+
 // Kernels of a surface. A sample's light comes from a disk of its area, which keeps the energy for any ratio of the
 // area and the medium's spread.
 class PairTables {
 public:
     // Functions are left out where they have less than the tolerance of the power.
-    PairTables(const SurfaceBasis& basis, float min_area, float max_area, double tolerance);
+    PairTables(const SurfaceBasis& basis, const SampleAreas& areas, double tolerance);
 
     // Index of the disk that stands for a sample of this area, m^2.
     std::size_t disk(float area) const;
@@ -71,6 +78,7 @@ public:
     std::vector<CurvatureScale> scales;  // [result]
     float reach = 0.0f;                  // metres; light farther away counts as none
     std::vector<ChordTable> disks;
+    std::vector<float> disk_begin;  // [disk] least chord of other samples, metres: samples do not overlap, disks may
     std::vector<float> disk_end;  // [disk] chord from which its light counts as a point's, metres
     ChordTable point;
     std::vector<std::uint8_t> point_blocks;  // [row of `point`] blocks that matter from this chord on

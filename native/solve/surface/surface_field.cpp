@@ -30,6 +30,10 @@ constexpr double error_share = 0.3;
 constexpr std::size_t probed_count = 64;
 constexpr float probing_size = 0.3f;
 
+// Area of a cut sample's own light over that of the whole sample, at least. Larger: cut samples are brighter where light
+// spreads about a sample, and darker where it spreads less.
+constexpr float least_own = 0.25f;
+
 // Largest difference of the squared length of a unit vector from 1, and of the cosine of two vectors from 0.
 constexpr float unit_tolerance = 2e-3f;
 
@@ -81,16 +85,14 @@ void check_memory(std::size_t bytes, std::size_t limit)
     throw MemoryLimit(text.str());
 }
 
-// Area of a sample, over the mean, below which its disk counts as one of that area: it has hardly any light. Smaller: more
-// tables, more time.
-constexpr double least_area = 1.0 / 64.0;
-
-double mean_area(std::span<const SurfaceSample> samples)
+SampleAreas areas_of(std::span<const SurfaceSample> samples)
 {
+    const auto [least, most] = std::minmax_element(
+        samples.begin(), samples.end(), [](const SurfaceSample& a, const SurfaceSample& b) { return a.area < b.area; });
     double sum = 0.0;
     for (const SurfaceSample& sample : samples)
         sum += static_cast<double>(sample.area);
-    return sum / static_cast<double>(samples.size());
+    return {least->area, most->area, static_cast<float>(sum / static_cast<double>(samples.size()))};
 }
 
 SurfaceBasis checked_basis(const SurfaceProblem& problem)
@@ -98,8 +100,9 @@ SurfaceBasis checked_basis(const SurfaceProblem& problem)
     std::optional<SurfaceBasis> basis;
     with_threads(problem.threads, [&] {
         check(problem);
-        basis.emplace(problem.channels, problem.max_angle_deg, std::sqrt(mean_area(problem.samples)),
-                      problem.is_colored, problem.tolerance);
+        basis.emplace(problem.channels, problem.max_angle_deg,
+                      std::sqrt(static_cast<double>(areas_of(problem.samples).mean)), problem.is_colored,
+                      problem.tolerance);
     });
     return *std::move(basis);
 }
@@ -107,13 +110,7 @@ SurfaceBasis checked_basis(const SurfaceProblem& problem)
 PairTables tables_of(const SurfaceProblem& problem, const SurfaceBasis& basis)
 {
     std::optional<PairTables> tables;
-    with_threads(problem.threads, [&] {
-        const auto least = static_cast<float>(least_area * mean_area(problem.samples));
-        const auto [min, max] =
-            std::minmax_element(problem.samples.begin(), problem.samples.end(),
-                                [](const SurfaceSample& a, const SurfaceSample& b) { return a.area < b.area; });
-        tables.emplace(basis, std::max(min->area, least), max->area, problem.tolerance);
-    });
+    with_threads(problem.threads, [&] { tables.emplace(basis, areas_of(problem.samples), problem.tolerance); });
     return *std::move(tables);
 }
 
@@ -290,11 +287,19 @@ void SurfaceField::solve_leaf(std::size_t leaf, const SurfaceTree::Opening& open
     }
 }
 
+// The surface goes on beyond the edge of a cut sample. Where light spreads less than a sample, that of its neighbors does
+// not reach its middle, and its own stands for all.
+float SurfaceField::own_area(std::size_t sample) const
+{
+    const float area = m_problem.samples[sample].area;
+    return m_problem.whole_areas.empty() ? area : std::max(area, least_own * m_problem.whole_areas[sample]);
+}
+
 void SurfaceField::add_self(std::size_t sample, std::vector<float>& factors, std::array<float, 3>& sums) const
 {
     for (std::size_t r = 0; r < m_tables.results; ++r) {
         std::fill(factors.begin(), factors.end(), 0.0f);
-        m_tables.add_self(m_problem.samples[sample].area, r, factors.data());
+        m_tables.add_self(own_area(sample), r, factors.data());
         const float* moments =
             m_moments.data() + sample * m_basis.moments() + m_tables.set[r] * 2 * m_basis.functions();
         for (std::size_t b = 0; b < m_basis.blocks; ++b)

@@ -23,6 +23,7 @@ namespace beamspread {
 
 struct SurfaceProblem {
     std::span<const SurfaceSample> samples;
+    std::span<const float> whole_areas{};  // [sample] m^2, without the edge that cuts it; empty: none is cut
     std::vector<ChannelMedium> channels;  // at most 3
     double tolerance = 1e-3;              // largest error of a luminance against all pairs, relative to the largest
     double max_angle_deg = 90.0;          // light comes at up to this angle from the normal
@@ -76,6 +77,7 @@ private:
     SurfaceTree::Opening find_opening();
     void solve_leaf(std::size_t leaf, const SurfaceTree::Opening& opening, SurfaceTree::Sources& sources,
                     const std::function<void(std::size_t, const Exitance&)>& store_exitance) const;
+    float own_area(std::size_t sample) const;
     void add_self(std::size_t sample, std::vector<float>& factors, std::array<float, 3>& sums) const;
     void store(std::size_t sample, const Exitance& exitance, Areas& areas, float* luminance) const;
     void set_color(const std::vector<double>& color);

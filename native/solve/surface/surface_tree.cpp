@@ -74,10 +74,9 @@ std::vector<std::uint64_t> codes_of(std::span<const SurfaceSample> samples)
     return codes;
 }
 
-// A unit vector across a normal, which need not be a unit vector.
-Vec3f across(const Vec3f& normal)
+// A unit vector across another one.
+Vec3f across(const Vec3f& unit)
 {
-    const Vec3f unit = glm::normalize(normal);
     const Vec3f axis = std::abs(unit.z) < 0.7f ? Vec3f(0.0f, 0.0f, 1.0f) : Vec3f(1.0f, 0.0f, 0.0f);
     return glm::normalize(axis - unit * glm::dot(axis, unit));
 }
@@ -126,11 +125,15 @@ void add_turned(const SurfaceBasis& basis, const std::array<float, 2>& turned, f
     }
 }
 
+// Sets the frame of a cluster, whose mean normal is 0 where those of its parts cancel.
 void set_frame(const Vec3f& normal, PairSource& cluster)
 {
+    constexpr float least = 1e-6f;
+    const float length = glm::length(normal);
+    const Vec3f axis = length > least ? normal / length : Vec3f(0.0f, 0.0f, 1.0f);
     cluster.normal = normal;
-    cluster.tangent = across(normal);
-    cluster.binormal = glm::cross(glm::normalize(normal), cluster.tangent);
+    cluster.tangent = across(axis);
+    cluster.binormal = glm::cross(axis, cluster.tangent);
 }
 
 }  // namespace
@@ -246,25 +249,36 @@ void SurfaceTree::gather(const SurfaceBasis& basis, const PairTables& tables, st
         m_nodes[node].cluster.moments = static_cast<std::uint32_t>(count + node);
 }
 
-void SurfaceTree::gather_leaf(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums)
+// Sets weight, place and frame of a node from the light of its parts; false if all are dark.
+bool SurfaceTree::place(Node& node, std::span<const Part> parts)
 {
-    const auto samples = std::span(m_order).subspan(node.begin, node.end - node.begin);
     Vec3f position(0.0f);
     Vec3f normal(0.0f);
     node.weight = 0.0f;
-    for (const std::uint32_t i : samples) {
-        node.weight += m_weights[i];
-        position += m_weights[i] * (m_samples[i].position - node.middle);
-        normal += m_weights[i] * m_samples[i].normal;
+    for (const Part& part : parts) {
+        node.weight += part.weight;
+        position += part.weight * (part.position - node.middle);
+        normal += part.weight * part.normal;
     }
+    node.light_radius = 0.0f;
     if (node.weight == 0.0f)
+        return false;
+    node.cluster.area = 1.0f;
+    node.cluster.position = node.middle + position / node.weight;
+    set_frame(normal / node.weight, node.cluster);
+    return true;
+}
+
+void SurfaceTree::gather_leaf(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums)
+{
+    const auto samples = std::span(m_order).subspan(node.begin, node.end - node.begin);
+    std::array<Part, leaf_size> parts;
+    for (std::size_t k = 0; k < samples.size(); ++k)
+        parts[k] = {m_weights[samples[k]], m_samples[samples[k]].position, m_samples[samples[k]].normal};
+    if (!place(node, std::span(parts).first(samples.size())))
         return;
     PairSource& cluster = node.cluster;
-    cluster.area = 1.0f;
-    cluster.position = node.middle + position / node.weight;
-    set_frame(normal / node.weight, cluster);
     float square = 0.0f;
-    node.light_radius = 0.0f;
     for (const std::uint32_t i : samples) {
         if (m_weights[i] == 0.0f)
             continue;
@@ -281,25 +295,15 @@ void SurfaceTree::gather_leaf(const SurfaceBasis& basis, const std::vector<float
 void SurfaceTree::gather_children(const SurfaceBasis& basis, const std::vector<float>& moments, Node& node, float* sums)
 {
     const std::array<std::size_t, 2> children = {static_cast<std::size_t>(&node - m_nodes.data()) + 1, node.second};
-    Vec3f position(0.0f);
-    Vec3f normal(0.0f);
-    node.weight = 0.0f;
-    for (const std::size_t number : children) {
-        const Node& child = m_nodes[number];
-        if (child.weight == 0.0f)
-            continue;
-        node.weight += child.weight;
-        position += child.weight * (child.cluster.position - node.middle);
-        normal += child.weight * child.cluster.normal;
+    std::array<Part, 2> parts;
+    for (std::size_t k = 0; k < 2; ++k) {
+        const Node& child = m_nodes[children[k]];
+        parts[k] = {child.weight, child.cluster.position, child.cluster.normal};
     }
-    if (node.weight == 0.0f)
+    if (!place(node, parts))
         return;
     PairSource& cluster = node.cluster;
-    cluster.area = 1.0f;
-    cluster.position = node.middle + position / node.weight;
-    set_frame(normal / node.weight, cluster);
     float spread = 0.0f;
-    node.light_radius = 0.0f;
     for (const std::size_t number : children) {
         const Node& child = m_nodes[number];
         if (child.weight == 0.0f)

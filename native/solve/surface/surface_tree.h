@@ -81,6 +81,14 @@ private:
         PairSource cluster{};
     };
 
+    // Light of a part of a cluster.
+    struct Part {
+        float weight;  // 0: dark
+        Vec3f position;
+        Vec3f normal;  // mean of unit vectors
+    };
+
+    static bool place(Node& node, std::span<const Part> parts);
     static bool is_far(const Node& node, float distance, const Opening& opening);
     void weigh(const SurfaceBasis& basis, const PairTables& tables, const std::vector<float>& moments);
     std::uint32_t build(std::size_t begin, std::size_t end);

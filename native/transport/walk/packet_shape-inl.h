@@ -26,7 +26,7 @@ struct Connection {
     Floats cosine;
 };
 
-// Where light leaves, with the side as a bit of the exit's tag.
+// Place at which light leaves; `side` is a bit of the exit's tag.
 struct Exit {
     Floats u;
     Floats v;

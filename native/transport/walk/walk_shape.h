@@ -99,7 +99,7 @@ private:
     bool m_is_half_space;
 };
 
-// As FlatCones, around the outward direction nearest to a ball's surface.
+// The cone of FlatCones around the outward direction of the nearest point of a ball's surface.
 class RoundCone {
 public:
     RoundCone(const Vec3& axis, double cone) : m_axis(axis), m_cone(cone) {}
