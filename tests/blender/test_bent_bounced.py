@@ -1,5 +1,6 @@
 """Bounced light on a mesh that bends, in Blender."""
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
@@ -36,3 +37,26 @@ def test_a_floor_lights_a_ball_from_below(output):
     if output == "IRRADIANCE":
         np.testing.assert_allclose(bounced[sides], exact[sides], rtol=0.08)
     assert bounced[rows // 8] > 2 * bounced[-rows // 8] >= 0
+
+
+def test_a_bowl_lights_itself():
+    """A point of a hemisphere sees all others by the same form factor. Light that bounces is even there: with the mean
+    M = E / 2 / (1 - reflectance / 2) of all irradiance under a sun E overhead, it is reflectance / 2 M.
+    """
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48)
+    bowl = bpy.context.object
+    shape = bmesh.new()
+    shape.from_mesh(bowl.data)
+    bmesh.ops.delete(shape, geom=[vertex for vertex in shape.verts if vertex.co.z > 1e-4], context="VERTS")
+    bmesh.ops.reverse_faces(shape, faces=shape.faces)
+    shape.to_mesh(bowl.data)
+    bpy.ops.object.shade_smooth()
+    reflectance = 0.6
+    bowl.data.materials.append(scenes.add_material(color_mode="BASE_COLOR", base_color=(reflectance,) * 3))
+    scenes.add_sun(0, 0, 2.0)
+    direct, all_light = (baked(bowl, indirect, "IRRADIANCE") for indirect in (False, True))
+    bounced = np.nan_to_num(all_light - direct)[..., :3]
+    rows = bounced.shape[0]
+    inside = bounced[rows // 8 : rows * 3 // 8].mean()  # the lower half of the map shows the bowl
+    mean = 2.0 / 2 / (1 - reflectance / 2)
+    assert inside == pytest.approx(reflectance / 2 * mean, rel=0.05)

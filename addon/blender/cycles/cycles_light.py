@@ -106,7 +106,7 @@ class CyclesLight:
                 job = replace(job, steps=(BouncedLight(self._max_bounces), *job.steps))
                 illumination, bounced = illumination.with_messages(BY_OWN_RAYS), False
             elif job.receiver.is_bent:
-                illumination, bounced = illumination.with_messages(not_on_bent(job.name)), False
+                illumination, bounced = illumination.with_messages(not_on_bent(job.name, why_not_own)), False
         key = self._key_of(world)
         kept = kept_world.kept(key, world)
         if kept is not None:
@@ -147,11 +147,11 @@ class CyclesLight:
         return self._copy
 
     def is_below_something(self, grids: Iterable[AnyGrid]) -> bool:
-        """True if light may bounce to planes: something that renders is above them."""
+        """True if light may bounce to the receiver: something that renders, or a part of itself, is above it."""
         for grid in grids:
             if isinstance(grid, BentGrid):
                 low, high = grid.corners()[[0, -1]] + 1e-5 * grid.size * np.array([[-1], [1]])
-                if ((self._corners < low) | (self._corners > high)).any():
+                if ((self._corners < low) | (self._corners > high)).any() or grid.is_hollow():
                     return True
                 continue
             heights = (self._corners - grid.origin) @ np.array(grid.normal)

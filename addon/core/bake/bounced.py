@@ -41,10 +41,10 @@ NOTHING_BOUNCES = warning(
 )
 
 
-def not_on_bent(name: str) -> Message:
-    """The warning about bounced light on an object that bends."""
-    text = f"Light that bounces is left out of '{name}': on meshes that bend Cycles can't find it."
-    return warning(name, text)
+def not_on_bent(name: str, problem: str) -> Message:
+    """The warning about bounced light on an object that bends; `problem` says why only Cycles could find it."""
+    text = f"Light that bounces is left out of '{name}', which bends: Cycles finds it on planes alone. {problem}"
+    return warning(name, text, "Hide what only Cycles knows from renders, or turn Indirect off.")
 
 
 BY_OWN_RAYS = note("", "Beamspread's own rays find the bounced light.")

@@ -9,6 +9,10 @@ import numpy as np
 from ..native import native
 from .grid import Grid, Vector, owner_number
 
+# Root of the number of texels among which hollows are looked for, and the depth of one over the surface's size. More
+# texels, less depth: smaller hollows count, and bounced light is looked for in more meshes.
+HOLLOW_SIDE, HOLLOW_DEPTH = 24, 0.02
+
 
 @dataclass(frozen=True, eq=False)
 class BentGrid:
@@ -106,6 +110,13 @@ class BentGrid:
         corners = self.corners()
         reach = 0.5 * np.linalg.norm(np.ptp(corners, axis=0))
         return np.linalg.norm(points - self.centre, axis=1) + reach
+
+    def is_hollow(self) -> bool:
+        """True if parts of the surface see each other: points of it lie above tangent planes of others."""
+        few = self.coarse(HOLLOW_SIDE)
+        middles, normals = few.middles.reshape(-1, 3), few.normals.reshape(-1, 3)
+        heights = np.einsum("nc,mnc->mn", normals, middles[:, None] - middles)
+        return bool((heights > HOLLOW_DEPTH * self.size).any())
 
     def cosine_to(self, direction: Vector) -> float:
         """Least cosine between a unit vector and the normals."""
