@@ -8,6 +8,7 @@ from mathutils import Matrix, Vector
 
 BEAMSPREAD_NODE = "BeamspreadNode"
 LATHE_STEPS = 48
+POLISHED = 0.1  # roughness of the coat
 
 
 def empty_scene(name, width, height, samples=64, view_transform="Standard", exposure=0.0):
@@ -67,6 +68,7 @@ def medium_material(name, **properties):
     node.name = node.label = "Beamspread"
     for key, value in properties.items():
         setattr(node, key, value)
+    node.inputs["Roughness"].default_value = POLISHED
     material.node_tree.links.new(node.outputs["BSDF"], output.inputs["Surface"])
     return material, node
 

@@ -35,7 +35,8 @@ def register_node_class(node_class, base: str) -> None:
     Blender (4.2 to 5.0, measured) replaces the Python class of `base` in between and accepts only subclasses of the new
     one.
     """
-    node_class.__bases__ = (getattr(bpy.types, base),)
+    mixins = (kind for kind in node_class.__bases__ if not issubclass(kind, bpy.types.bpy_struct))
+    node_class.__bases__ = (*mixins, getattr(bpy.types, base))
     bpy.utils.register_class(node_class)
 
 

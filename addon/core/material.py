@@ -132,9 +132,17 @@ def presets() -> dict[str, Material]:
     gives the reduced scattering coefficient sigma_s (1 - g) alone. It is taken for that of an isotropic medium
     (anisotropy 0), which looks the same from a few mean free paths away. `source` names the paper of each material.
     """
+    return {row["name"]: _preset(row) for row in _preset_rows()}
+
+
+def preset_roughness() -> dict[str, float]:
+    """Roughness of the coat that suits each measured material, by name: a look, and no measurement."""
+    return {row["name"]: float(row["roughness"]) for row in _preset_rows()}
+
+
+def _preset_rows() -> list[dict[str, str]]:
     with PRESET_FILE.open(newline="", encoding="utf-8") as file:
-        rows = csv.DictReader(line for line in file if not line.startswith("#"))
-        return {row["name"]: _preset(row) for row in rows}
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
 
 
 def _preset(row: dict[str, str]) -> Material:

@@ -74,3 +74,14 @@ def stage_left(expected: float, lasted: float, fraction: float, by_speed: float 
         return by_plan
     weight = min(max(fraction, (lasted / expected) ** 2 if expected > 0 else 1.0), 1.0)
     return (1.0 - weight) * by_plan + weight * min(by_speed, LONGEST * (lasted + expected))
+
+
+def duration(seconds: float) -> str:
+    """A length of time, rounded as one would say it."""
+    if seconds < 59.5:
+        return f"{max(1, round(seconds))} s"
+    if seconds < 3600:
+        return f"{round(seconds / 60)} min"
+    if seconds < 48 * 3600:
+        return f"{seconds / 3600:.0f} h"
+    return f"{seconds / 86400:.0f} days"

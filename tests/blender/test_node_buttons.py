@@ -59,7 +59,9 @@ class TestPreset:
             ("mean_free_path", (0.1, 0.1, 0.1)),
             ("anisotropy", 0.3),
             ("ior", 1.2),
-            ("color_mode", "BASE_COLOR"),
+            ("base_color", (0.5, 0.5, 0.5)),
+            ("path_length", 0.1),
+            ("path_color", (1.0, 0.5, 0.5)),
         ],
     )
     def test_becomes_custom_by_editing(self, name, value):

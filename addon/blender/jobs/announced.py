@@ -19,8 +19,10 @@ from ...core.scene.flat_mesh import bends
 from ...core.scene.lights import Light, WorldLight
 from ...core.scene.receiver import Grid
 from ...core.target import Target
+from ...core.time_left import duration
 from .. import compat
 from ..images.facts import is_sequence
+from ..node.draw import bent_materials
 from ..node.find import BakeTarget, targets_of, uses_tiles
 from ..read.geometry import mesh_key, read_polygons
 from ..read.lamps import fault, is_portal, read_lamp
@@ -28,7 +30,7 @@ from ..read.lights import lights_surfaces
 from ..read.node_kinds import NodeKinds, all_known, kinds_of
 from ..read.scene_cache import scene_cache
 from ..read.visibility import SURFACE_TYPES, by_name, placed, render_visible_names
-from .state import Announced, duration, state
+from .state import Announced, state
 
 PLACEHOLDER_COLOR = (0.5, 0.5, 0.5)
 
@@ -60,9 +62,11 @@ def announce(context, targets: list[Target]) -> dict[Target, Announced]:
     objects, settings = by_name(scene), scene.beamspread.for_bake()
     facts = _SceneFacts(scene, view_layer, depsgraph)
     announced = {}
+    bent_materials.clear()
     for target in targets:
         bakes = [item for item in targets_of(objects[target.object_name]) if item.name == target]
         length, is_bent = _shape(bakes[0], depsgraph) if bakes and _is_valid(bakes[0]) else (0.0, False)
+        bent_materials.update([target.material_name] if is_bent else [])
         forecast = facts.forecast(bakes[0], _side(bakes[0], length, scene), is_bent) if length else None
         if forecast is not None:
             bake = _announced(target, forecast, settings, facts.encloses(forecast.grids[0]))

@@ -17,6 +17,7 @@ from ...core.bake.spread import Spread
 from ...core.messages import Level, Message
 from ...core.progress import Progress
 from ...core.target import Target
+from ...core.time_left import duration
 from ..registration import all_or_nothing, handlers
 
 
@@ -95,17 +96,6 @@ class Run:
 
     def line(self) -> str:
         return f"{self.title()}, {self.in_short()} (Esc cancels)"
-
-
-def duration(seconds: float) -> str:
-    """A length of time, rounded as one would say it."""
-    if seconds < 59.5:
-        return f"{max(1, round(seconds))} s"
-    if seconds < 3600:
-        return f"{round(seconds / 60)} min"
-    if seconds < 48 * 3600:
-        return f"{seconds / 3600:.0f} h"
-    return f"{seconds / 86400:.0f} days"
 
 
 class State:

@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 
+from ...core.bake.estimate import simulation_seconds
+from ...core.bake.pace import Estimate
+from ...core.bake.steps import to_simulate
+from ...core.errors import BakeError
+from ...core.ldf.library import SIMULATING
+from ...core.time_left import duration
 from .output import former_output, is_in_group, is_shown, plain_of
+from .path import meters_per_unit
 
 # Units of length: shortest length shown in it, its length in meters, its name; the largest unit first.
 UNITS = ((1.0, 1.0, "m"), (1e-2, 1e-2, "cm"), (1e-4, 1e-3, "mm"), (0.0, 1e-6, "µm"))
+
+MIN_SIMULATION = 1.0
+"""Shortest simulation that is announced, seconds."""
+
+bent_materials: set[str] = set()
+"""Names of the materials of surfaces that bend, whose media are simulated for curves as well; scans keep it."""
 
 
 def readable_lengths(meters) -> str:
@@ -34,13 +49,14 @@ def draw_properties(node, layout) -> None:
     """Draw the node's properties and buttons."""
     layout.prop(node, "preset")
     _draw_color(node, layout)
-    _draw_channels(layout, node, "mean_free_path", "Mean Free Path")
-    meters = bpy.context.scene.unit_settings.scale_length
-    lengths = readable_lengths([length * meters for length in node.mean_free_path])
-    layout.label(text=f"Mean free path: {lengths}", icon="DRIVER_DISTANCE")
+    _draw_path(node, layout)
     layout.prop(node, "anisotropy")
     layout.prop(node, "ior")
-    layout.prop(node, "thickness")
+    layout.prop(node, "is_infinite")
+    if not node.is_infinite:
+        layout.prop(node, "thickness")
+    if line := new_medium_line(node):
+        layout.label(text=line, icon="TIME")
     layout.prop(node, "edges")
     layout.template_ID(node, "image", new="image.new", open="image.open")
     _draw_map(node, layout)
@@ -57,6 +73,38 @@ def _draw_color(node, layout) -> None:
         layout.prop(node, "base_color")
     else:
         _draw_channels(layout, node, "albedo", "Scattering Albedo")
+
+
+def _draw_path(node, layout) -> None:
+    """Draw the path as one length, by hand or by a slider, with a color; below it the lengths of the channels."""
+    column = layout.column(align=True)
+    column.prop(node, "path_length")
+    column.prop(node, "path_slider", slider=True)
+    layout.prop(node, "path_color")
+    lengths = readable_lengths([length * meters_per_unit() for length in node.mean_free_path])
+    layout.label(text=f"Mean free path: {lengths}", icon="DRIVER_DISTANCE")
+
+
+def new_medium_line(node) -> str:
+    """A line about the simulation of the node's medium that the next bake needs; "" without one."""
+    seconds = seconds_to_simulate(node)
+    return f"New medium: simulated in {duration(seconds)}" if seconds > MIN_SIMULATION else ""
+
+
+def seconds_to_simulate(node) -> float:
+    """Seconds in which the next bake simulates the node's medium; 0 if it is known, or if it can't be one."""
+    surface, settings = node.surface(), bpy.context.scene.beamspread.for_bake()
+    if node.has_texture():  # the medium needs its color, which is not known yet
+        surface = replace(surface, base_color=(0.5, 0.5, 0.5))
+    bent = filter(None, map(bpy.data.materials.get, bent_materials))
+    is_bent = any(material.node_tree == node.id_data for material in bent)
+    try:
+        surface.check()
+        media = to_simulate(surface, settings, is_bent)
+        seconds = simulation_seconds(media, settings, is_bent)
+    except (BakeError, ImportError):  # the bake says why; the module may be missing
+        return 0.0
+    return Estimate(SIMULATING[settings.quality], "", seconds).corrected()
 
 
 def _draw_map(node, layout) -> None:

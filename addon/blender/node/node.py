@@ -1,7 +1,5 @@
 """The shader node that makes a material translucent and shows its baked image."""
 
-import contextlib
-
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
@@ -14,10 +12,26 @@ from ...core.messages import Message
 from .. import compat
 from ..read.nodes import InputSocket
 from ..registration import all_or_nothing, handlers
+from .color import (
+    ALBEDO_MODE,
+    BASE_COLOR_MODE,
+    CUSTOM_PRESET,
+    ColorProperties,
+    fill_preset,
+    is_filled,
+    keep_name_of_preset,
+    note_medium,
+    note_own,
+    start,
+    switch_mode,
+    upgrade_color,
+)
 from .draw import draw_node
-from .output import link_output
+from .output import link_output, place
+from .path import PathProperties, meters_per_unit
 from .tree import (
     BASE_COLOR,
+    ROUGHNESS,
     all_nodes,
     is_shared,
     keep_map,
@@ -30,10 +44,11 @@ from .tree import (
     upgrade,
 )
 
-CUSTOM_PRESET = "CUSTOM"
-
 # Index of refraction of new nodes. The property's own default is that of older files, which don't hold a value.
 NEW_IOR = 1.4
+
+NEW_ROUGHNESS = 0.4
+"""Roughness of the coat of new nodes. Smaller: sharper reflections, as of wet surfaces."""
 
 
 def _preset_items() -> list[tuple]:
@@ -45,40 +60,46 @@ def _preset_items() -> list[tuple]:
     return [(CUSTOM_PRESET, "Custom", "Values set by hand", 0), *sorted(items)]
 
 
-_nodes_being_filled: set[int] = set()
-
-
-@contextlib.contextmanager
-def filling(node):
-    """Keep the preset's name while values are set in a `with` block."""
-    key = node.as_pointer()
-    _nodes_being_filled.add(key)
-    try:
-        yield
-    finally:
-        _nodes_being_filled.discard(key)
-
-
 def _apply_preset(node, context) -> None:
-    if node.preset == CUSTOM_PRESET:
-        return
-    # The node has one anisotropy for all channels.
-    material = presets()[node.preset].with_one_anisotropy()
-    # Lengths are in scene units, of `scale_length` meters each.
-    meters_per_unit = context.scene.unit_settings.scale_length if context and context.scene else 1.0
-    with filling(node):
-        node.color_mode = "ALBEDO"
-        node.albedo = material.albedo
-        node.mean_free_path = [length / meters_per_unit for length in material.mean_free_path]
-        node.anisotropy = material.anisotropy
-        node.ior = material.ior
+    if node.preset != CUSTOM_PRESET:
+        fill_preset(node, meters_per_unit(context))
 
 
 def _edited(node, _context) -> None:
     """Take the preset's name away, since a value differs from it."""
-    if node.as_pointer() not in _nodes_being_filled and node.preset != CUSTOM_PRESET:
+    if not is_filled(node):
+        note_medium(node)
+        _part_from_preset(node)
+    _show_color(node)
+
+
+def _part_from_preset(node) -> None:
+    if node.preset != CUSTOM_PRESET:
         node.preset = CUSTOM_PRESET
-    _color_edited(node, _context)
+
+
+def _color_edited(mode: str):
+    """A function for edits of the color of a mode."""
+
+    def edited(node, _context) -> None:
+        if not is_filled(node):
+            note_own(node, mode)
+            _part_from_preset(node)
+        _show_color(node)
+
+    return edited
+
+
+def _thickness_edited(node, _context) -> None:
+    note_medium(node)
+    _show_color(node)
+
+
+def _mode_edited(node, _context) -> None:
+    """Convert the color: the material, and so the name of its preset, stays."""
+    if not is_filled(node):
+        switch_mode(node)
+    _show_color(node)
 
 
 def _ior_edited(node, context) -> None:
@@ -88,7 +109,7 @@ def _ior_edited(node, context) -> None:
         show_ior(tree, node.ior)
 
 
-def _color_edited(node, _context) -> None:
+def _show_color(node) -> None:
     """Show the color of the node if it has no image yet."""
     if node.image is not None or BASE_COLOR not in node.inputs:
         return
@@ -107,7 +128,7 @@ def _show(node, _context) -> None:
     tree = own_tree(node)
     if tree is not None:
         show_values(tree, node.image, node.ior)
-        _color_edited(node, _context)
+        _show_color(node)
 
 
 def link_result(node, image, uv_map: str | None = None) -> list[Message]:
@@ -124,12 +145,13 @@ def link_result(node, image, uv_map: str | None = None) -> list[Message]:
     return link_output(node)
 
 
-class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
+class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustomGroup):
     """Translucent surface whose light is baked into an image, beam by beam."""
 
     bl_idname = "BeamspreadNode"
     bl_label = "Beamspread"
     bl_icon = "LIGHT_SUN"
+    bl_width_default = 240
 
     preset: EnumProperty(
         name="Preset", description="Fill in a measured material", items=_preset_items(), update=_apply_preset
@@ -147,7 +169,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
             ),
         ],
         default="ALBEDO",
-        update=_edited,
+        update=_mode_edited,
     )
     base_color: FloatVectorProperty(
         name="Base Color",
@@ -157,7 +179,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         default=(0.6, 0.6, 0.6),
         soft_min=0.0,
         soft_max=1.0,
-        update=_color_edited,
+        update=_color_edited(BASE_COLOR_MODE),
     )
     albedo: FloatVectorProperty(
         name="Scattering Albedo",
@@ -168,7 +190,7 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         soft_max=0.9999,
         precision=4,
         step=1,
-        update=_edited,
+        update=_color_edited(ALBEDO_MODE),
     )
     mean_free_path: FloatVectorProperty(
         name="Mean Free Path",
@@ -185,7 +207,8 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
     )
     anisotropy: FloatProperty(
         name="Anisotropy",
-        description="0: light scatters in all directions. Near 1: it keeps going forward (Henyey-Greenstein)",
+        description="0: light scatters in all directions. Near 1: it keeps going forward (Henyey-Greenstein). "
+        "A value that is new to this machine is simulated once, in a minute or two",
         default=0.8,
         soft_min=-0.95,
         soft_max=0.95,
@@ -207,7 +230,8 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
         soft_min=0.0,
         soft_max=10.0,
         precision=5,
-        update=_color_edited,
+        step=0.001,
+        update=_thickness_edited,
     )
     edges: EnumProperty(
         name="Edges",
@@ -242,9 +266,12 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
     plain_node: StringProperty(options={"HIDDEN"}, description="Group that shows the bake without this add-on")
 
     def init(self, _context) -> None:
-        self.width = 240
+        self.width = self.bl_width_default
+        place(self)  # the Add menu moves the node to the mouse afterwards
         compat.give_new_node_its_tree(self, make_inner_tree())
+        start(self)
         self.ior = NEW_IOR
+        self.inputs[ROUGHNESS].default_value = NEW_ROUGHNESS
 
     def free(self) -> None:
         # Removing the tree here crashes on undo; without its fake user it goes when the file is saved.
@@ -253,13 +280,17 @@ class BeamspreadNode(bpy.types.ShaderNodeCustomGroup):
 
     def surface(self) -> Surface:
         """Values of the node; lengths are in scene units, as those of the geometry."""
+        return self.surface_in(self.color_mode)
+
+    def surface_in(self, color_mode: str) -> Surface:
+        """Values of the node with the color of a mode."""
         material = Material(
             albedo=tuple(map(_decimal, self.albedo)),
             mean_free_path=tuple(map(_decimal, self.mean_free_path)),
             anisotropy=_decimal(self.anisotropy),
             ior=_decimal(self.ior),
         )
-        base_color = tuple(map(_decimal, self.base_color)) if self.color_mode == "BASE_COLOR" else None
+        base_color = tuple(map(_decimal, self.base_color)) if color_mode == BASE_COLOR_MODE else None
         return Surface(material, _decimal(self.thickness), base_color, self.edges)
 
     def visible_color(self) -> list[float]:
@@ -297,7 +328,31 @@ def upgrade_nodes(*_arguments) -> None:
         upgrade(tree)
     for node in all_nodes():
         if node.id_data.library is None:
-            _color_edited(node, None)
+            upgrade_color(node)
+            _show_color(node)
+
+
+_subscriber = object()
+
+
+@persistent
+def _watch_unit_scale(*_arguments) -> None:
+    """Have a new Unit Scale check the presets; files that are opened end the watch."""
+    _end_watch()
+    key = (bpy.types.UnitSettings, "scale_length")
+    bpy.msgbus.subscribe_rna(key=key, owner=_subscriber, args=(), notify=keep_names_of_presets)
+
+
+def _end_watch() -> None:
+    bpy.msgbus.clear_by_owner(_subscriber)
+
+
+@persistent
+def keep_names_of_presets(*_arguments) -> None:
+    """Call presets Custom whose lengths are no longer those of their materials."""
+    for node in all_nodes():
+        if node.id_data.library is None:
+            keep_name_of_preset(node, meters_per_unit())
 
 
 def _add_class() -> None:
@@ -320,5 +375,7 @@ def _remove_class() -> None:
 register, unregister = all_or_nothing(
     (_add_class, _remove_class),
     *handlers(load_post=upgrade_nodes, save_pre=release_unused_trees),
+    (_watch_unit_scale, _end_watch),
+    *handlers(load_post=_watch_unit_scale, undo_post=keep_names_of_presets, redo_post=keep_names_of_presets),
     *handlers(load_post=show_own_images, undo_post=show_own_images, redo_post=show_own_images),
 )

@@ -12,6 +12,28 @@ from .tree import NORMAL, ROUGHNESS, plain_of
 
 PLAIN_LABEL = "Baked Light"
 
+OUTPUT_KINDS = ("ShaderNodeOutputMaterial", "NodeGroupOutput")
+
+
+GAP, NODE_HEIGHT = 50.0, 640.0
+"""Distance of a new node from others, and the height of the Beamspread node, in units of the node editor."""
+
+
+def place(node) -> None:
+    """Put a new node left of its tree's output, above the nodes that are there."""
+    tree = node.id_data
+    output = next((other for other in tree.nodes if other.bl_idname in OUTPUT_KINDS), None)
+    if output is None:
+        return
+    left, right = output.location.x - GAP - node.width, output.location.x - GAP
+    below = (
+        other.location.y
+        for other in tree.nodes
+        if other != node and other.location.x < right and other.location.x + other.width > left
+    )
+    highest = max(below, default=None)
+    node.location = (left, output.location.y if highest is None else highest + GAP + NODE_HEIGHT)
+
 
 def is_linked(node) -> bool:
     """True if an output of the node, or of the group in its place, is linked."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..ldf.albedo import albedo_from_color
+from ..ldf.albedo import albedo_from_color, albedo_from_reflectance
 from ..material import RGB, Material, check_base_color, check_thickness
 from ..native import native
 from ..progress import Callback, Progress
@@ -56,14 +56,25 @@ class Surface:
         self.check()
         if self.base_color is not None:
             return list(map(float, self.base_color))
-        nodes, weights = np.polynomial.legendre.leggauss(8)
-        cosines = (nodes + 1) / 2
-        angles = np.degrees(np.arccos(cosines)).tolist()
-        values = []
-        for albedo, medium in zip(self.material.albedo, channel_media(self.material, self.thickness)):
-            reflected, _ = native.exact_totals(medium, angles, [albedo])
-            values.append(float(weights * cosines @ reflected[:, 0]))
-        return values
+        channels = zip(self.material.albedo, channel_media(self.material, self.thickness))
+        return [_exact_reflectance(medium, albedo) for albedo, medium in channels]
+
+    def exact_albedo(self) -> list[float]:
+        """Albedo of each channel that has the base color, exact and without a simulation; the inverse of `reflectance`.
+
+        Colors brighter than the medium can be get `MAX_ALBEDO`.
+        """
+        self.check()
+        if self.base_color is None:
+            return list(map(float, self.material.albedo))
+        channels = list(zip(self.base_color, channel_media(self.material, self.thickness)))
+        albedos = {
+            (color, medium): albedo_from_reflectance(
+                color, lambda albedo, medium=medium: _exact_reflectance(medium, albedo)
+            )
+            for color, medium in dict.fromkeys(channels)
+        }
+        return [albedos[channel] for channel in channels]
 
     def media(self) -> list:
         """Native `Medium`s that a bake needs libraries of, each once."""
@@ -79,3 +90,11 @@ class Surface:
         for (color, medium), stage in zip(channels, Progress.of(progress).split([1.0] * len(self.base_color))):
             albedo.append(albedo_from_color(color, medium, quality, stage, threads)[0])
         return replace(self.material, albedo=tuple(albedo))
+
+
+def _exact_reflectance(medium, albedo: float) -> float:
+    """Diffuse reflectance of a medium under uniform diffuse light."""
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    cosines = (nodes + 1) / 2
+    reflected, _ = native.exact_totals(medium, np.degrees(np.arccos(cosines)).tolist(), [albedo])
+    return float(weights * cosines @ reflected[:, 0])
