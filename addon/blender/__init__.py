@@ -21,7 +21,7 @@ from .cycles import kept_world, process
 from .images import atlas, facts, image_operators, undo
 from .jobs import state
 from .jobs.out_of_date import stale
-from .jobs.run import engine, operator
+from .jobs.run import active_image, engine, operator, render_copy
 from .live import timer
 from .node import buttons, node
 from .read import scene_cache
@@ -42,7 +42,9 @@ PARTS = (
     process,
     state,
     stale,
+    active_image,
     engine,
+    render_copy,
     operator,
     timer,
     panels,

@@ -228,6 +228,15 @@ def saving_png(scene) -> Iterator[None]:
             setattr(settings, name, value)
 
 
+def has_denoiser() -> bool:
+    """True if Cycles of this Blender can denoise; builds of some distributions can't."""
+    try:
+        import _cycles
+    except ImportError:
+        return False
+    return bool(getattr(_cycles, "with_openimagedenoise", True))
+
+
 def save_as_multilayer_exr(scene) -> None:
     """Save renders of the scene as multi-layer EXR of 32 bits (since Blender 5.0 a media type limits the formats)."""
     settings = scene.render.image_settings
@@ -351,7 +360,17 @@ def set_shader_color(tree) -> None:
         tree.color_tag = "SHADER"
 
 
-def has_fixed_radius(principled) -> bool:
-    """True if Cycles uses a Principled BSDF's radius independent of its color (Blender 4.0 changed the names)."""
-    color_dependent = "RANDOM_WALK_SKIN" if bpy.app.version >= (4, 0, 0) else "RANDOM_WALK"
-    return principled.subsurface_method != color_dependent
+def subsurface_walk(shader, method: str) -> str | None:
+    """Name of the `Walk` of a Principled BSDF or a Subsurface Scattering by its method; None if that is not known.
+
+    Blender 4.0 renamed the methods, and 5.2 gave RANDOM_WALK another meaning.
+    """
+    names = {"BURLEY": "FIXED", "RANDOM_WALK_FIXED_RADIUS": "FIXED", "RANDOM_WALK_LEGACY": "FIXED"}
+    names["RANDOM_WALK_SKIN"] = "SKIN"
+    if bpy.app.version < (4, 0, 0):
+        names["RANDOM_WALK"] = "SKIN"
+    else:
+        prop = shader.bl_rna.properties["falloff" if hasattr(shader, "falloff") else "subsurface_method"]
+        is_later = "RANDOM_WALK_LEGACY" in prop.enum_items
+        names["RANDOM_WALK"] = "FREE_PATH" if is_later else "FIXED"
+    return names.get(method)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from dataclasses import dataclass, replace
+from enum import Enum
 from pathlib import Path
 from typing import TypeAlias
 
@@ -27,8 +28,6 @@ SOURCES = {
     "Jensen2001": "Jensen et al. 2001, diffusion fit",
     "Narasimhan2006": "Narasimhan et al. 2006, diluted in water and scaled back to the undiluted liquid; ior of water",
 }
-
-FIXED_RADIUS, MEAN_FREE_PATH = "fixed", "walk"
 
 
 @dataclass(frozen=True)
@@ -166,22 +165,36 @@ def _preset(row: dict[str, str]) -> Material:
     )
 
 
-def transport_length(radius: float, method: str, color: float, ior: float) -> float:
-    """Transport mean free path 1 / (sigma_t (1 - g)) of Cycles' random walk, in the unit of `radius`.
+class Walk(Enum):
+    """Meaning of a radius in Cycles' random walks.
 
-    With the method "fixed" Cycles' free paths have the mean radius / (4 pi). With "walk" the radius is the diffuse mean
-    free path 1 / sqrt(3 sigma_a sigma_t'), and the reduced albedo follows from the dipole's reflectance (Jensen et al.
-    2001, Eq. 4).
+    FIXED : 4 pi transport mean free paths; also of Burley's profile. Blender 5.2 calls it Legacy.
+    SKIN : diffuse mean free path.
+    FREE_PATH : mean free path, whatever the anisotropy (Blender 5.2).
+    """
+
+    FIXED = 1
+    SKIN = 2
+    FREE_PATH = 3
+
+
+def mean_free_path(radius: float, walk: Walk, color: float, ior: float, anisotropy: float) -> float:
+    """Mean free path 1 / sigma_t of Cycles' random walk, in the unit of `radius`.
+
+    Cycles' sources: `bssrdf_setup_radius` (kernel/closure/bssrdf.h) and `subsurface_random_walk_remap`
+    (kernel/integrator/subsurface_random_walk.h). The diffuse mean free path of SKIN is 1 / sqrt(3 sigma_a sigma_t');
+    the reduced albedo follows from the dipole's reflectance (Jensen et al. 2001, Eq. 4).
 
     Parameters
     ----------
-    method : "fixed" or "walk".
-    color : diffuse reflectance, 0 to 1; used by "walk".
-    ior : index of refraction at entry; used by "walk".
+    color : diffuse reflectance, 0 to 1; used by SKIN.
+    ior : index of refraction at entry; used by SKIN.
     """
-    if method == FIXED_RADIUS:
-        return radius / (4 * math.pi)
-    return radius * math.sqrt(3 * (1 - reduced_albedo(color, ior)))
+    if walk == Walk.FREE_PATH:
+        return radius
+    if walk == Walk.FIXED:
+        return (1 - anisotropy) * radius / (4 * math.pi)
+    return (1 - anisotropy) * radius * math.sqrt(3 * (1 - reduced_albedo(color, ior)))
 
 
 def reduced_albedo(color: float, ior: float) -> float:

@@ -1,6 +1,7 @@
 """The engine: Blender's own Bake fills the active image through RenderEngine.bake."""
 
 import math
+import re
 import time
 from unittest.mock import MagicMock
 
@@ -8,14 +9,17 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+from beamspread.blender import compat
 from beamspread.blender.jobs.out_of_date import stale
-from beamspread.blender.jobs.run import engine
+from beamspread.blender.jobs.run import active_image, engine
+from beamspread.blender.jobs.run.active_image import refusals
 from beamspread.blender.jobs.run.render_copy import render_picture
 from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.ui.panels import target_of_blender
 from beamspread.core.bake.job import BakeJob
 from beamspread.core.target import Target
 from mathutils import Matrix
+from nodes import Nodes, add_sockets
 
 
 @pytest.fixture(autouse=True)
@@ -225,6 +229,32 @@ def test_f12_that_fails_says_why(seen, tmp_path, capfd):
     assert "camera" in said
 
 
+def test_f12_that_fails_says_so_in_one_sentence_and_the_log_has_the_rest(seen, caplog):
+    engine = MagicMock(resolution_x=64, resolution_y=64)
+    engine.test_break.return_value = False
+    bpy.context.scene.camera = None
+    render_picture(engine, bpy.context.evaluated_depsgraph_get())
+    (_, said), _ = engine.report.call_args
+    assert re.fullmatch(
+        r"Cycles failed on a copy of the scene: [^.:|]*camera[^.:|]*\. The console has the details\.", said
+    )
+    engine.error_set.assert_called_once_with(said)
+    assert "Traceback" in caplog.text
+
+
+def test_f12_comes_without_denoising_where_there_is_none_and_says_so(seen):
+    engine = MagicMock(resolution_x=64, resolution_y=64)
+    engine.test_break.return_value = False
+    bpy.context.scene.cycles.use_denoising = True
+    render_picture(engine, bpy.context.evaluated_depsgraph_get())
+    assert engine.begin_result.return_value.load_from_file.call_count == 1
+    said = [call.args for call in engine.report.call_args_list]
+    assert said == [({"WARNING"}, "The picture was not denoised: this Blender has no denoiser.")] * (
+        not compat.has_denoiser()
+    )
+    assert bpy.context.scene.cycles.use_denoising  # the scene's own setting stays
+
+
 def test_panels_of_blender_know_the_engine():
     names = ["MATERIAL_PT_preview", "RENDER_PT_color_management", "RENDER_PT_output", "RENDER_PT_format"]
     for name in names:
@@ -264,7 +294,95 @@ def test_the_panel_names_the_image_that_blenders_own_bake_fills():
     texture.image = bpy.data.images.new("Filled", 4, 4)
     material.node_tree.nodes.active = texture
     assert target_of_blender(material) == "Fills 'Filled', the image of the selected Image Texture node."
-    material.node_tree.links.new(
-        scenes.node_of(material).inputs["Base Color"], material.node_tree.nodes.active.outputs[0]
-    )
-    assert "'Filled' is the base color" in target_of_blender(material)
+
+
+class TestBakeActiveImage:
+    """The button refuses beforehand what Blender would clear."""
+
+    @pytest.fixture
+    def texture(self):
+        """Gray pixels in memory alone, which nothing brings back once Blender has cleared them."""
+        plane = scenes.add_plane(material=scenes.add_material(shader=True))
+        scenes.add_sun(0)
+        texture = add_active_image(plane.data.materials[0])
+        texture.pixels.foreach_set([0.5] * len(texture.pixels))
+        scenes.select(plane)
+        return texture
+
+    def refusal(self, texture):
+        """What the operator says; the panel shows the same, and the pixels are as before."""
+        said = scenes.messages_of(bpy.ops.beamspread.bake_active)
+        assert " ".join(dict.fromkeys(refusals(bpy.context).values())) in said
+        assert np.array_equal(scenes.pixels(texture), np.full((32, 32, 3), 0.5))
+        return said
+
+    def link(self, texture, name, reader=None):
+        material = bpy.data.materials["Medium"]
+        source = next(node for node in material.node_tree.nodes if getattr(node, "image", None) == texture)
+        reader = reader or scenes.node_of(material)
+        material.node_tree.links.new(reader.inputs[name], source.outputs["Color"])
+
+    def test_fills_an_image_that_nothing_reads(self, texture):
+        assert bpy.ops.beamspread.bake_active() == {"FINISHED"}
+        assert (scenes.pixels(texture) != 0.5).all()
+
+    @pytest.mark.parametrize("name", ["Base Color", "Roughness"])
+    def test_refuses_a_texture_of_the_node(self, texture, name):
+        self.link(texture, name)
+        assert "a texture of the Beamspread node" in self.refusal(texture)
+
+    def test_refuses_a_texture_of_the_former_shader(self, texture):
+        material = bpy.data.materials["Medium"]
+        bsdf = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+        self.link(texture, "Base Color", bsdf)
+        scenes.bake(bpy.data.objects["Plane"])
+        assert "the former shader" in self.refusal(texture)
+
+    def test_refuses_a_texture_at_the_input_of_a_group(self, texture):
+        material = scenes.add_group_material()
+        bpy.data.objects["Plane"].data.materials[0] = material
+        groups = bpy.data.node_groups
+        inner = groups["Inner"]
+        node = next(node for node in inner.nodes if node.bl_idname == "BeamspreadNode")
+        outer = material.node_tree.nodes
+        source = outer.new("ShaderNodeTexImage")
+        source.image = texture
+        for tree, child in ((groups["Outer"], inner), (material.node_tree, groups["Outer"])):
+            add_sockets(child, "NodeSocketColor", inputs=["Color"])
+            holder = next(node for node in tree.nodes if getattr(node, "node_tree", None) == child)
+            given = child.nodes.new("NodeGroupInput")
+            target = (
+                node.inputs["Base Color"]
+                if child == inner
+                else next(node.inputs["Color"] for node in child.nodes if getattr(node, "node_tree", None) == inner)
+            )
+            child.links.new(target, given.outputs["Color"])
+            if tree == material.node_tree:
+                tree.links.new(holder.inputs["Color"], source.outputs["Color"])
+        assert "a texture of the Beamspread node" in self.refusal(texture)
+
+    def test_refuses_objects_whose_images_it_could_only_clear(self, texture):
+        plain = Nodes(bpy.data.materials.new("Plain")).owner
+        bpy.data.objects["Plane"].data.materials.append(plain)
+        bpy.data.objects["Plane"].data.materials.pop(index=0)
+        source = plain.node_tree.nodes.new("ShaderNodeTexImage")
+        source.image = texture
+        assert "'Plain' of 'Plane' has no Beamspread node" in self.refusal(texture)
+
+    def test_refuses_tiles(self, texture):
+        texture.source = "TILED"
+        assert "UDIM tiles" in scenes.messages_of(bpy.ops.beamspread.bake_active)
+
+    @pytest.mark.parametrize("is_packed", [True, False])
+    def test_pixels_come_back_where_blenders_own_operator_ran(self, texture, is_packed):
+        """In a window; here the handlers are called as it does."""
+        self.link(texture, "Base Color")
+        if is_packed:
+            texture.pack()
+        active_image._before_bake()
+        scenes.messages_of(lambda: bpy.ops.object.bake(type="COMBINED"))
+        assert not scenes.pixels(texture).any()
+        assert "reload" not in state.lines()[0]
+        active_image._after_bake()
+        assert np.array_equal(scenes.pixels(texture), np.full((32, 32, 3), 0.5))
+        assert texture.is_dirty != is_packed

@@ -7,12 +7,12 @@ import sys
 import bpy
 import numpy as np
 import pytest
-from beamspread.blender import popup
+from beamspread.blender import compat, popup
 from beamspread.blender.jobs.out_of_date import stale
 from beamspread.blender.jobs.state import Status, state
 from beamspread.blender.node import draw, principled
 from beamspread.blender.node.buttons import BEAMSPREAD_OT_from_principled
-from beamspread.core.material import ior_of_reflectance, transport_length
+from beamspread.core.material import Walk, ior_of_reflectance, mean_free_path
 from scenes import (
     add_camera,
     add_material,
@@ -182,7 +182,7 @@ class TestFromPrincipled:
         bpy.ops.beamspread.from_principled()
         node = node_of(plane.data.materials[0])
         lengths = [
-            0.5 * transport_length(radius * self.scale(), "walk", color, 1.4)
+            mean_free_path(radius * self.scale(), Walk.SKIN, color, 1.4, 0.5)
             for radius, color in zip((0.8, 0.4, 0.2), (0.7, 0.5, 0.3))
         ]
         assert list(node.mean_free_path) == pytest.approx(lengths, rel=1e-5)
@@ -207,7 +207,7 @@ class TestFromPrincipled:
         bake(plane)
         material = plane.data.materials[0]
         other = material.node_tree.nodes.new("ShaderNodeBsdfPrincipled")
-        assert principled.find_principled(node_of(material)) == bsdf != other
+        assert principled.find_shader(node_of(material)) == bsdf != other
 
     def test_without_subsurface_the_mean_free_path_stays_and_it_is_said(self, plane, bsdf, capfd, monkeypatch):
         set_input(bsdf, 0.0, "Subsurface Weight", "Subsurface")
@@ -231,6 +231,162 @@ class TestFromPrincipled:
         material = plane.data.materials[0]
         material.node_tree.nodes.remove(principled_of(material))
         assert "no Principled BSDF" in messages_of(bpy.ops.beamspread.from_principled)
+
+
+# Mean free path over radius times scale at color .5 and IOR 1.4, by method, and the anisotropy that is copied of .6.
+# From Cycles' sources (bssrdf_setup_radius, subsurface_random_walk_remap), with numbers worked out by hand:
+# 1 / (4 pi) = .0795775; the dipole of Jensen et al. 2001 with a reflectance of .5 has 1 - alpha' = .02237.
+FIXED, SKIN, FREE_PATH = 0.0795775, 0.25906, 1.0
+PATHS = {
+    "BURLEY": (FIXED, 0.0),
+    "RANDOM_WALK_FIXED_RADIUS": (0.4 * FIXED, 0.6),
+    "RANDOM_WALK_LEGACY": (0.4 * FIXED, 0.6),
+    "RANDOM_WALK_SKIN": (0.4 * SKIN, 0.6),
+    "RANDOM_WALK": (0.4 * SKIN, 0.6) if IS_BEFORE_4 else (0.4 * FIXED, 0.6),
+}
+if bpy.app.version >= (5, 2, 0):
+    PATHS["RANDOM_WALK"] = (FREE_PATH, 0.6)
+KINDS = {"BsdfPrincipled": "subsurface_method", "SubsurfaceScattering": "falloff"}
+
+
+def methods_of(kind):
+    """All methods that this Blender has."""
+    node = getattr(bpy.types, f"ShaderNode{kind}")
+    return [(kind, item.identifier) for item in node.bl_rna.properties[KINDS[kind]].enum_items]
+
+
+class TestMethods:
+    """Each method of each Blender."""
+
+    def shader(self, plane, kind, method="BURLEY"):
+        tree = plane.data.materials[0].node_tree
+        tree.nodes.remove(principled_of(plane.data.materials[0]))
+        shader = tree.nodes.new(f"ShaderNode{kind}")
+        setattr(shader, KINDS[kind], method)
+        for name, value in {
+            "Color": (0.5, 0.5, 0.5, 1),
+            "Base Color": (0.5, 0.5, 0.5, 1),
+            "Subsurface Color": (0.5, 0.5, 0.5, 1),
+            "Subsurface Weight": 1.0,
+            "Subsurface": 1.0,
+            "IOR": 1.4,
+            "Subsurface IOR": 1.4,
+            "Subsurface Anisotropy": 0.6,  # from 4.0 on Burley's profile has none
+            "Anisotropy": 0.6,
+        }.items():
+            if name in shader.inputs:
+                shader.inputs[name].default_value = value
+        set_input(shader, (0.3, 0.2, 0.1), "Subsurface Radius", "Radius")
+        for name in ("Subsurface Scale", "Scale"):
+            if name in shader.inputs:
+                shader.inputs[name].default_value = 0.1
+        return shader
+
+    @pytest.mark.parametrize(("kind", "method"), [pair for kind in KINDS for pair in methods_of(kind)])
+    def test_path_and_anisotropy(self, plane, kind, method):
+        """Within 1 %: Cycles finds alpha' in 12 steps, and the dipole's number above has 3 digits."""
+        shader, node = self.shader(plane, kind, method), node_of(plane.data.materials[0])
+        scale = 0.1 if any(name in shader.inputs for name in ("Subsurface Scale", "Scale")) else 1.0
+        assert bpy.ops.beamspread.from_principled() == {"FINISHED"}
+        factor, anisotropy = PATHS[method]
+        expected = [factor * scale * radius for radius in (0.3, 0.2, 0.1)]
+        assert list(node.mean_free_path) == pytest.approx(expected, rel=0.01)
+        assert node.anisotropy == pytest.approx(anisotropy)
+        assert list(node.base_color) == pytest.approx([0.5] * 3)
+
+    def test_one_that_nobody_knows_leaves_the_path_and_says_so(self, plane, monkeypatch, capfd):
+        self.shader(plane, "BsdfPrincipled")
+        monkeypatch.setattr(compat, "subsurface_walk", lambda *_: None)
+        bpy.ops.beamspread.from_principled()
+        assert "method 'BURLEY' of 'Principled BSDF' is not known" in capfd.readouterr().out
+        assert list(node_of(plane.data.materials[0]).mean_free_path) == pytest.approx([0.05] * 3)
+
+    def test_a_subsurface_scattering_has_no_coat_and_gives_its_texture_and_normal(self, plane, capfd):
+        shader, tree = self.shader(plane, "SubsurfaceScattering"), plane.data.materials[0].node_tree
+        node = node_of(plane.data.materials[0])
+        image, bump = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeNormalMap")
+        tree.links.new(shader.inputs["Color"], image.outputs["Color"])
+        tree.links.new(shader.inputs["Normal"], bump.outputs["Normal"])
+        bpy.ops.beamspread.from_principled()
+        assert node.ior == 1
+        assert "no glossy coat" in capfd.readouterr().out
+        sources = [node.inputs[name].links[0].from_node for name in ("Base Color", "Normal")]
+        assert sources == [image, bump]
+
+    def test_one_that_scatters_comes_before_one_that_does_not(self, plane):
+        principled_of(plane.data.materials[0])  # weight 0
+        shader = plane.data.materials[0].node_tree.nodes.new("ShaderNodeSubsurfaceScattering")
+        for link in list(plane.data.materials[0].node_tree.links):
+            plane.data.materials[0].node_tree.links.remove(link)
+        assert principled.find_shader(node_of(plane.data.materials[0])) == shader
+
+
+class TestLostInputs:
+    @pytest.fixture
+    def bsdf(self, plane):
+        bsdf = principled_of(plane.data.materials[0])
+        set_input(bsdf, 1.0, "Subsurface Weight", "Subsurface")
+        return bsdf
+
+    def test_nothing_is_lost_of_a_new_one(self, bsdf):
+        assert principled.lost_inputs(bsdf) == []
+
+    @pytest.mark.parametrize(
+        ("said", "value", "names"),
+        [
+            ("Alpha", 0.5, ["Alpha"]),
+            ("Metallic", 1.0, ["Metallic"]),
+            ("Anisotropic", 0.5, ["Anisotropic"]),
+            ("Specular Tint", 0.5 if IS_BEFORE_4 else (1, 0.5, 0.5, 1), ["Specular Tint"]),
+            ("Emission", (0.1, 0, 0, 1) if IS_BEFORE_4 else 0.5, ["Emission" if IS_BEFORE_4 else "Emission Strength"]),
+            ("Coat", 0.5, ["Coat Weight", "Clearcoat"]),
+            ("Sheen", 0.5, ["Sheen Weight", "Sheen"]),
+            ("Transmission", 0.5, ["Transmission Weight", "Transmission"]),
+            ("Thin Film", 100.0, ["Thin Film Thickness"]),
+            ("Thin Wall", True, ["Thin Wall"]),
+            ("Diffuse Roughness", 0.5, ["Diffuse Roughness"]),
+        ],
+    )
+    def test_each_is_named(self, bsdf, capfd, said, value, names):
+        if not any(name in bsdf.inputs for name in names):
+            pytest.skip("this Blender has no such input")
+        set_input(bsdf, value, *names)
+        bpy.ops.beamspread.from_principled()
+        found = capfd.readouterr().out
+        assert any(f"The node has no {name}" in found for name in (said, *names))
+
+    def test_a_texture_counts_too(self, bsdf):
+        tree = bsdf.id_data
+        tree.links.new(bsdf.inputs["Alpha"], tree.nodes.new("ShaderNodeTexImage").outputs["Alpha"])
+        assert principled.lost_inputs(bsdf) == ["Alpha"]
+
+    @pytest.mark.skipif(IS_BEFORE_4, reason="the weight scaled the radius, and there was no diffuse share")
+    def test_a_weight_between_0_and_1_loses_the_diffuse_share(self, bsdf, capfd):
+        bsdf.inputs["Subsurface Weight"].default_value = 0.25
+        bpy.ops.beamspread.from_principled()
+        assert "its diffuse share of 75% is lost" in capfd.readouterr().out
+        bsdf.inputs["Subsurface Weight"].default_value = 1.0
+        bpy.ops.beamspread.from_principled()
+        assert "share" not in capfd.readouterr().out
+
+    def test_a_texture_of_the_weight_is_said(self, bsdf, capfd):
+        tree = bsdf.id_data
+        name = "Subsurface" if IS_BEFORE_4 else "Subsurface Weight"
+        tree.links.new(bsdf.inputs[name], tree.nodes.new("ShaderNodeTexImage").outputs["Alpha"])
+        bpy.ops.beamspread.from_principled()
+        assert "it counts as 1" in capfd.readouterr().out
+
+    @pytest.mark.skipif(not IS_BEFORE_4, reason="later ones have one color")
+    def test_two_colors_are_mixed_by_the_weight(self, plane, bsdf, capfd):
+        bsdf.inputs["Subsurface"].default_value = 0.25
+        bsdf.inputs["Base Color"].default_value = (0.8, 0.4, 0.0, 1)
+        bsdf.inputs["Subsurface Color"].default_value = (0.0, 0.8, 0.4, 1)
+        bpy.ops.beamspread.from_principled()
+        assert list(node_of(plane.data.materials[0]).base_color) == pytest.approx([0.6, 0.5, 0.1])
+        tree = bsdf.id_data
+        tree.links.new(bsdf.inputs["Base Color"], tree.nodes.new("ShaderNodeTexImage").outputs["Color"])
+        bpy.ops.beamspread.from_principled()
+        assert "Subsurface Color is ignored" in capfd.readouterr().out
 
 
 def test_specular_of_half_is_an_ior_of_1_5():

@@ -1,6 +1,7 @@
 """The engine in a window: F12 beside the window's own thread, viewports; and the node by copy, paste and undo."""
 
 import pytest
+from beamspread.blender import compat
 from scenario_player import results_of
 
 
@@ -13,6 +14,24 @@ def seen(tmp_path_factory):
 def test_f12_shows_the_baked_image(seen):
     assert seen["f12"] == ["complete"]
     assert seen["picture"] == pytest.approx([0.25, 0.5, 0.75], abs=2e-3)
+
+
+def test_f12_without_a_denoiser_says_that_the_picture_came_without(seen):
+    """Debian's Blender has none."""
+    note = ["Beamspread: the picture", ["The picture was not denoised: this Blender has no denoiser."]]
+    assert seen["popups of f12"] == [note] * (not compat.has_denoiser())
+
+
+def test_f12_that_fails_says_why(seen):
+    assert seen["popups of a failure"] == [["Beamspread: there is no picture", ["No space left on device"]]]
+
+
+def test_blender_s_own_bake_leaves_a_texture_of_the_node_as_it_was(seen):
+    assert seen["texture"] == [0.5]
+    ((title, (why, kept)),) = seen["popups of the texture"]
+    assert title == "Beamspread: nothing was baked"
+    assert "'Texture' is a texture of the Beamspread node" in why
+    assert kept == "The image has its pixels again."
 
 
 def test_rendered_viewports_show_the_scene_by_eevee(seen):

@@ -5,12 +5,14 @@ from pathlib import Path
 
 import bpy
 import scenes
+from beamspread.blender import popup
 from beamspread.blender.cycles import cycles_light
+from beamspread.blender.jobs.run import render_copy
 from beamspread.core.bake import bounced
 from nodes import Nodes
 from scenario_player import in_window, is_over
 
-results = {}
+results = {"popups": []}
 ended = []
 
 
@@ -40,7 +42,7 @@ def add_scene():
     scene.world = None
     scene.render.engine = "BEAMSPREAD"
     scene.render.resolution_x = scene.render.resolution_y = 16
-    scene.cycles.samples, scene.cycles.use_denoising = 4, False
+    scene.cycles.samples, scene.cycles.use_denoising = 4, True
     scene.render.image_settings.file_format = "OPEN_EXR"
     scenes.select(plane)
     return plane
@@ -82,6 +84,47 @@ def blender_s_own_bake(plane):
     scenes.select(plane)
 
 
+def bake_into_texture(plane):
+    """Blender's own operator on a gray texture of the node, which it clears: the pixels and the popups afterwards."""
+    material = plane.data.materials[0]
+    texture = bpy.data.images.new("Texture", 16, 16, float_buffer=True)
+    texture.pixels.foreach_set([0.5] * len(texture.pixels))
+    source = material.node_tree.nodes.new("ShaderNodeTexImage")
+    source.image = texture
+    link = material.node_tree.links.new(scenes.node_of(material).inputs["Base Color"], source.outputs["Color"])
+    material.node_tree.nodes.active = source
+    over = []
+    for handlers in (bpy.app.handlers.object_bake_complete, bpy.app.handlers.object_bake_cancel):
+        handlers.append(lambda *_: over.append(1))
+    results["popups"].clear()
+    # It raises if the engine has refused before the call returns.
+    scenes.messages_of(lambda: in_window(bpy.ops.object.bake, "INVOKE_DEFAULT", type="COMBINED", margin=0))
+    yield lambda: over
+    yield lambda: not bpy.app.is_job_running("OBJECT_BAKE")
+    results["texture"] = sorted({*scenes.pixels(texture).ravel().tolist()})
+    results["popups of the texture"] = list(results["popups"])
+    material.node_tree.links.remove(link)
+    material.node_tree.nodes.remove(source)
+
+
+class Broken:
+    """A copy of the scene that can't be made."""
+
+    def __init__(self, *_arguments):
+        raise OSError("No space left on device")
+
+
+def fail_to_render():
+    """F12 on a full disk."""
+    render_copy.SceneCopy, works = Broken, render_copy.SceneCopy
+    results["popups"].clear()
+    in_window(bpy.ops.render.render, "INVOKE_DEFAULT")
+    yield lambda: results["popups"]
+    yield lambda: not bpy.app.is_job_running("RENDER")
+    results["popups of a failure"] = list(results["popups"])
+    render_copy.SceneCopy = works
+
+
 def add_checkered_lamp():
     lamp = scenes.add_lamp((0, 0, 1))
     nodes = Nodes(lamp.data)
@@ -93,6 +136,13 @@ def add_checkered_lamp():
 def scenario():
     bpy.context.preferences.view.render_display_type = "NONE"
     bpy.app.handlers.render_complete.append(lambda *_: ended.append("complete"))
+    show_soon = popup.show_soon
+
+    def note(title, sentences):
+        results["popups"].append([title, sentences])
+        show_soon(title, sentences)
+
+    popup.show_soon = note
     plane = add_scene()
     area_of("DOPESHEET_EDITOR").ui_type = "ShaderNodeTree"
     viewport = area_of("VIEW_3D").spaces.active.shading
@@ -103,11 +153,14 @@ def scenario():
     in_window(bpy.ops.render.render, "INVOKE_DEFAULT")
     yield lambda: ended
     results["f12"] = list(ended)
+    results["popups of f12"] = list(results["popups"])
     path = str(Path(sys.argv[-1]).with_name("f12.exr"))
     bpy.data.images["Render Result"].save_render(path)
     results["picture"] = scenes.pixels(bpy.data.images.load(path))[8, 8].tolist()
 
+    yield from fail_to_render()
     yield from blender_s_own_bake(plane)
+    yield from bake_into_texture(plane)
 
     tree = plane.data.materials[0].node_tree
     for node in tree.nodes:

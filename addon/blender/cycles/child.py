@@ -63,8 +63,28 @@ def render(request, scene, progress) -> dict:
     scene.render.filepath, scene.render.use_file_extension = request["picture"], False
     compat.save_as_multilayer_exr(scene)
     bpy.app.handlers.render_stats.append(lambda text, *_: _report(progress, text))
-    bpy.ops.render.render(write_still=True, scene=scene.name, layer=request["view_layer"])
-    return {"frame": np.array(scene.frame_current)}
+    notes = _render_denoised(scene, {"write_still": True, "scene": scene.name, "layer": request["view_layer"]})
+    return {"frame": np.array(scene.frame_current), "notes": np.array(notes, dtype=str)}
+
+
+def _render_denoised(scene, options: dict) -> list[str]:
+    """Render, without the denoiser where there is none or where it fails; sentences on that."""
+    if not (scene.render.engine == "CYCLES" and scene.cycles.use_denoising):
+        bpy.ops.render.render(**options)
+        return []
+    if compat.has_denoiser():
+        try:
+            bpy.ops.render.render(**options)
+            return []
+        except RuntimeError as error:
+            if "denois" not in str(error).lower():
+                raise
+            note = f"Cycles could not denoise the picture, which came without: {sentence_of(error)}."
+    else:
+        note = "The picture was not denoised: this Blender has no denoiser."
+    scene.cycles.use_denoising = False
+    bpy.ops.render.render(**options)
+    return [note]
 
 
 def _report(progress, text) -> None:
@@ -78,6 +98,13 @@ TASKS = {
     "colors": child_colors.colors,
     "render": render,
 }
+
+
+def sentence_of(error: BaseException) -> str:
+    """First line of an error's text, without Blender's prefix and the period at its end."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    text = (lines or [type(error).__name__])[0].removeprefix("Error: ").rstrip(".")
+    return text if isinstance(error, RuntimeError) else f"{type(error).__name__}: {text}"
 
 
 def restore_images(file: Path) -> None:
@@ -174,8 +201,9 @@ def main() -> int:
             return IDLE
         try:
             answer(json.loads(path.read_text()), say)
-        except BaseException:  # noqa: BLE001 - the parent shows every error
+        except BaseException as error:  # noqa: BLE001 - the parent shows every error
             traceback.print_exc()
+            say(f"error {sentence_of(error)}")
             return FAILED
         say("done")
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)  # frees the scene

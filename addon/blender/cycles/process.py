@@ -8,6 +8,7 @@ request is cancelled or fails, and when this process ends, even if that is kille
 from __future__ import annotations
 
 import json
+import logging
 import os
 import re
 import subprocess
@@ -46,7 +47,8 @@ IDLE_SECONDS = 180.0
 # Exit code of a process that has ended for lack of requests.
 IDLE = 4
 
-LAST_LINES = 12
+# Last lines of its output that the log gets if the process fails. More: longer logs.
+LAST_LINES = 40
 
 
 def run(
@@ -56,6 +58,7 @@ def run(
     progress: Callback | None = None,
     doing: str = "Cycles works",
     keeps: bool = True,
+    worker: str = "Cycles",
 ) -> dict[str, np.ndarray]:
     """Have the child process do a task of child.py on the copy. Calls from several threads wait for each other.
 
@@ -65,6 +68,7 @@ def run(
     progress : called with 0..1 several times a second; returns False to stop.
     doing : name of the stage for the progress.
     keeps : False for a process of its own, which ends with the task and whose progress is that of its samples.
+    worker : engine that does the task, for errors.
 
     Returns
     -------
@@ -73,7 +77,7 @@ def run(
     Raises
     ------
     BakeError
-        The process failed; with the last lines that it printed.
+        The process failed; one sentence. The log has the last lines that it printed.
     Cancelled
         `progress` returned False; the process is dead by then.
     """
@@ -88,8 +92,7 @@ def run(
             child = process.child(copy.binary)  # the former one was about to end
             _ask(child, file, progress, doing)
         if not output.exists():
-            lines = " | ".join(child.last_lines)
-            raise BakeError(f"Cycles failed on a copy of the scene (exit code {child.code}). It said last: {lines}")
+            raise _failure(child, worker)
         with np.load(output) as arrays:
             result = dict(arrays)
     for temporary in (output, file):
@@ -110,6 +113,13 @@ def _ask(child: _Child, file: Path, progress: Progress, doing: str) -> bool:
         child.end()
         raise
     return child.has_answered or child.code != IDLE
+
+
+def _failure(child: _Child, worker: str) -> BakeError:
+    """The error of a process that ended without a result; its last lines go to the log."""
+    logging.getLogger(__name__).error("%s failed:\n%s", worker, "\n".join(child.last_lines))
+    why = child.error or f"its process ended with exit code {child.code}"
+    return BakeError(f"{worker} failed on a copy of the scene: {why}.", "The console has the details.")
 
 
 def start(copy: SceneCopy) -> None:
@@ -192,6 +202,7 @@ class _Child:
 
     def _begin(self) -> None:
         self.fraction, self.has_answered, self.heard = 0.0, False, time.monotonic()
+        self.error = ""
         self.last_lines: deque[str] = deque(maxlen=LAST_LINES)
         self._finished.clear()
 
@@ -230,9 +241,11 @@ class _Child:
         for line in self._process.stdout:
             self.heard = time.monotonic()
             if line.startswith(MARK):
-                word = line.split()[1]
+                word, _, rest = line.removeprefix(MARK).strip().partition(" ")
                 if word == "done":
                     self._finished.set()
+                elif word == "error":
+                    self.error = rest
                 else:
                     self.fraction, self.has_answered = float(word), True
             elif self._counts_samples and (match := SAMPLES.search(line)):

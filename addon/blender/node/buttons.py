@@ -72,7 +72,7 @@ class BEAMSPREAD_OT_make_plain(NodeOperator, bpy.types.Operator):
 
 
 class BEAMSPREAD_OT_from_principled(NodeOperator, bpy.types.Operator):
-    """Copy color, roughness, normal map, IOR and subsurface radius from the Principled BSDF"""
+    """Copy color, roughness, normal map, IOR and subsurface radius from the Principled BSDF or Subsurface Scattering"""
 
     bl_idname = "beamspread.from_principled"
     bl_label = "From Principled"
@@ -84,9 +84,12 @@ class BEAMSPREAD_OT_from_principled(NodeOperator, bpy.types.Operator):
         return self.execute(context)
 
     def change(self, node):
-        source = principled.find_principled(node)
+        source = principled.find_shader(node)
         if source is None:
-            self.report({"ERROR"}, "The material has no Principled BSDF. Add one, or set the values by hand")
+            text = (
+                "The material has no Principled BSDF and no Subsurface Scattering. Add one, or set the values by hand"
+            )
+            self.report({"ERROR"}, text)
             return {"CANCELLED"}
         warnings = principled.take_over(node, source)
         for sentence in warnings:

@@ -1,37 +1,57 @@
-"""Copies the look of a material's Principled BSDF to the node."""
+"""Copies the look of a material's Principled BSDF, or of its Subsurface Scattering, to the node."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...core.material import (
-    FIXED_RADIUS,
-    MEAN_FREE_PATH,
-    ior_of_reflectance,
-    reflectance_of_ior,
-    transport_length,
-)
+from ...core.material import Walk, ior_of_reflectance, mean_free_path, reflectance_of_ior
 from .. import compat
 from .output import former_output
 from .tree import BASE_COLOR, NORMAL, ROUGHNESS
 
-PRINCIPLED = "ShaderNodeBsdfPrincipled"
+PRINCIPLED, SUBSURFACE = "ShaderNodeBsdfPrincipled", "ShaderNodeSubsurfaceScattering"
 
 # Largest reflectance at normal incidence; it is that of an index of refraction of 3.
 MAX_REFLECTANCE = 0.25
 
-# Inputs of a Principled BSDF that the node lacks.
-LOST = ("Metallic", "Transmission", "Transmission Weight", "Sheen", "Sheen Weight", "Clearcoat", "Coat Weight")
+# Largest anisotropy of Cycles, in its walks of fixed radius and of skin, and in the others.
+MAX_ANISOTROPY = 0.9, 0.99
+
+# Inputs of a Principled BSDF that the node lacks, by any of their names, each with the value that has no effect.
+LOST = {
+    "Metallic": 0.0,
+    "Alpha": 1.0,
+    "Diffuse Roughness": 0.0,
+    "Specular Tint": None,
+    "Anisotropic": 0.0,
+    "Transmission": 0.0,
+    "Transmission Weight": 0.0,
+    "Sheen": 0.0,
+    "Sheen Weight": 0.0,
+    "Clearcoat": 0.0,
+    "Coat Weight": 0.0,
+    "Thin Film Thickness": 0.0,
+    "Thin Wall": False,
+}
 
 
-def find_principled(node):
-    """Principled BSDF to copy: the one that the material showed before, else one that is linked, else any; or None."""
+def find_shader(node):
+    """Shader to copy, a Principled BSDF or a Subsurface Scattering, or None.
+
+    It is the one that the material showed before, else one that is linked, else any; those that scatter light inside
+    come first.
+    """
     former = former_output(node)
-    if former is not None and former.node.bl_idname == PRINCIPLED:
+    if former is not None and former.node.bl_idname in (PRINCIPLED, SUBSURFACE):
         return former.node
-    candidates = [candidate for candidate in node.id_data.nodes if candidate.bl_idname == PRINCIPLED]
-    linked = [candidate for candidate in candidates if candidate.outputs[0].is_linked]
-    return next(iter(linked + candidates), None)
+    candidates = [candidate for candidate in node.id_data.nodes if candidate.bl_idname in (PRINCIPLED, SUBSURFACE)]
+    candidates.sort(key=lambda candidate: (not candidate.outputs[0].is_linked, not _scatters(candidate)))
+    return next(iter(candidates), None)
+
+
+def _scatters(shader) -> bool:
+    inputs = _Inputs(shader)
+    return shader.bl_idname == SUBSURFACE or inputs.has("Subsurface Weight", "Subsurface")
 
 
 @dataclass(frozen=True)
@@ -52,45 +72,127 @@ class _Inputs:
         socket = self.socket(*names)
         return socket.links[0].from_socket if socket is not None and socket.is_linked else None
 
+    def has(self, *names: str, neutral=0.0) -> bool:
+        """True if an input is linked, or its value is not the neutral one."""
+        return self.source(*names) is not None or self.value(*names, default=neutral) != neutral
 
-def take_over(node, principled) -> list[str]:
-    """Copy the Principled BSDF's values and links to the node; returns sentences on those that it lacks."""
-    inputs, notes = _Inputs(principled), []
-    weight = inputs.value("Subsurface Weight", "Subsurface")
-    color = _take_color(node, inputs, weight)
-    node.ior = _ior(inputs)
-    lengths = _mean_free_path(inputs, principled, weight, color)
-    if lengths is None:
-        notes.append(f"'{principled.name}' has no subsurface scattering: the mean free path stays unchanged.")
-    else:
-        node.anisotropy = inputs.value("Subsurface Anisotropy")
-        node.mean_free_path = [length * (1 - node.anisotropy) for length in lengths]
-    _take_input(node, ROUGHNESS, inputs)
+
+def take_over(node, shader) -> list[str]:
+    """Copy the shader's values and links to the node; returns sentences on those that it lacks or replaces."""
+    inputs = _Inputs(shader)
+    notes = _take_subsurface(node, inputs) if shader.bl_idname == SUBSURFACE else _take_principled(node, inputs)
     _take_input(node, NORMAL, inputs)
-    linked = [name for name in ("Subsurface Radius", "Subsurface Scale", "IOR") if inputs.source(name) is not None]
+    lengths = ("Subsurface Radius", "Subsurface Scale", "Radius", "Scale", "IOR", "Subsurface Anisotropy", "Anisotropy")
+    linked = [name for name in lengths if inputs.source(name) is not None]
     if linked:
-        notes.append(
-            f"The node can't have textures for {', '.join(linked)}: the links in '{principled.name}' are ignored."
-        )
-    lost = [name for name in LOST if inputs.value(name) > 0 or inputs.source(name) is not None]
+        notes.append(f"The node can't have textures for {', '.join(linked)}: the links in '{shader.name}' are ignored.")
+    lost = lost_inputs(shader) if shader.bl_idname == PRINCIPLED else []
     if lost:
-        notes.append(f"The node has no {', '.join(lost)}: these values of '{principled.name}' are ignored.")
+        notes.append(f"The node has no {', '.join(lost)}: these values of '{shader.name}' are ignored.")
     return notes
 
 
-def _take_color(node, inputs: _Inputs, weight: float) -> tuple[float, float, float]:
-    """Copy the color or its texture; before Blender 4.0 scattered light had a color of its own, mixed by its weight."""
-    names = ["Base Color"]
-    if weight > 0.5 and inputs.socket("Subsurface Color") is not None:
-        names.insert(0, "Subsurface Color")
-    source = inputs.source(names[0])
+def _take_subsurface(node, inputs: _Inputs) -> list[str]:
+    """Copy a Subsurface Scattering node, which has no glossy coat."""
+    color = _take_color(node, inputs, "Color")
+    node.ior = 1.0
+    radii = [radius * inputs.value("Scale") for radius in inputs.value("Radius")]
+    notes = _take_path(node, inputs.node.falloff, radii, color, inputs.value("Anisotropy"), inputs.value("IOR"), inputs)
+    return [*notes, f"'{inputs.node.name}' has no glossy coat: the node's IOR is 1."]
+
+
+def _take_principled(node, inputs: _Inputs) -> list[str]:
+    """Copy a Principled BSDF but for its normal."""
+    weight = inputs.value("Subsurface Weight", "Subsurface")
+    color, notes = _take_color_of_principled(node, inputs, weight)
+    node.ior = _ior(inputs)
+    _take_input(node, ROUGHNESS, inputs)
+    if inputs.source("Subsurface Weight", "Subsurface") is not None:
+        notes.append(
+            f"The node can't have a texture for the subsurface weight of '{inputs.node.name}': it counts as 1."
+        )
+        weight = 1.0
+    if weight <= 0:
+        return [*notes, f"'{inputs.node.name}' has no subsurface scattering: the mean free path stays unchanged."]
+    if weight < 1 and inputs.socket("Subsurface Weight") is not None:
+        text = f"The Subsurface Weight of '{inputs.node.name}' is {weight:.2g}: the node scatters all light inside,"
+        notes.append(f"{text} so its diffuse share of {1 - weight:.0%} is lost.")
+    # Before Blender 4.0 the weight scales the radius, and there is no diffuse share.
+    scale = inputs.value("Subsurface Scale", default=weight)
+    radii = [radius * scale for radius in inputs.value("Subsurface Radius")]
+    anisotropy, ior = inputs.value("Subsurface Anisotropy"), inputs.value("Subsurface IOR", default=1.4)
+    return notes + _take_path(node, inputs.node.subsurface_method, radii, color, anisotropy, ior, inputs)
+
+
+def _take_path(node, method: str, radii, color, anisotropy: float, ior: float, inputs: _Inputs) -> list[str]:
+    """Set mean free path and anisotropy to those of Cycles' walk."""
+    name, kind = inputs.node.name, compat.subsurface_walk(inputs.node, method)
+    if kind is None:
+        return [f"The subsurface method '{method}' of '{name}' is not known: the mean free path stays unchanged."]
+    if not all(radius > 0 for radius in radii):
+        return [f"'{name}' has a subsurface radius of 0: the mean free path stays unchanged."]
+    walk = Walk[kind]
+    limit = MAX_ANISOTROPY[walk == Walk.FREE_PATH]
+    # Burley's profile knows no directions.
+    node.anisotropy = 0.0 if method == "BURLEY" else min(max(anisotropy, -limit), limit)
+    node.mean_free_path = [
+        mean_free_path(radius, walk, channel, ior, node.anisotropy) for radius, channel in zip(radii, color)
+    ]
+    return []
+
+
+def lost_inputs(principled) -> list[str]:
+    """Names of the inputs of a Principled BSDF that have an effect, and that the node lacks."""
+    inputs = _Inputs(principled)
+    lost = [
+        name for name, neutral in LOST.items() if inputs.socket(name) is not None and _counts(inputs, name, neutral)
+    ]
+    strength = inputs.has("Emission Strength")
+    color = inputs.source("Emission Color", "Emission") is not None or any(
+        inputs.value("Emission Color", "Emission", default=(0.0,) * 3)[:3]
+    )
+    return lost + ["Emission"] * (strength and color)
+
+
+def _counts(inputs: _Inputs, name: str, neutral) -> bool:
+    value = inputs.value(name)
+    if neutral is None:  # a tint: white from Blender 4.0 on, a factor before
+        neutral = 0.0 if isinstance(value, float) else (1.0, 1.0, 1.0)
+        value = value if isinstance(value, float) else tuple(value[:3])
+    return inputs.source(name) is not None or value != neutral
+
+
+def _take_color_of_principled(node, inputs: _Inputs, weight: float) -> tuple[tuple[float, ...], list[str]]:
+    """Copy the color or its texture, and a sentence if one is lost.
+
+    Before Blender 4.0 scattered light had a color of its own, mixed by its weight.
+    """
+    names = ("Base Color", "Subsurface Color")
+    if inputs.socket(names[1]) is None or weight <= 0:
+        return _take_color(node, inputs, names[0]), []
+    sources = [inputs.source(name) for name in names]
+    colors = [tuple(inputs.value(name)[:3]) for name in names]
+    if sources == [None, None]:
+        mixed = [base + weight * (other - base) for base, other in zip(*colors)]
+        return _take_color(node, inputs, names[0], mixed), []
+    chosen = int(weight > 0.5)
+    color = _take_color(node, inputs, names[chosen])
+    if weight == 1.0 or sources[0] == sources[1]:
+        return color, []
+    other = names[1 - chosen]
+    return color, [f"'{inputs.node.name}' mixes two colors: {other} is ignored, since it weighs less."]
+
+
+def _take_color(node, inputs: _Inputs, name: str, value=None) -> tuple[float, ...]:
+    """Copy a color, or its texture, for which a grey is returned; `value` replaces the input's."""
+    source = inputs.source(name)
     if source is not None:
         node.id_data.links.new(node.inputs[BASE_COLOR], source)
         return (0.8, 0.8, 0.8)
     for link in list(node.inputs[BASE_COLOR].links):
         node.id_data.links.remove(link)
     node.color_mode = "BASE_COLOR"
-    node.base_color = inputs.value(names[0])[:3]
+    node.base_color = (value or inputs.value(name))[:3]
     return tuple(node.base_color)
 
 
@@ -104,17 +206,6 @@ def _ior(inputs: _Inputs) -> float:
     else:
         reflected = reflectance_of_ior(inputs.value("IOR")) * 2 * inputs.value("Specular IOR Level")
     return ior_of_reflectance(min(max(reflected, 0.0), MAX_REFLECTANCE))
-
-
-def _mean_free_path(inputs: _Inputs, principled, weight: float, color) -> list[float] | None:
-    """Mean free path of each channel at an anisotropy of 0, in scene units; None without subsurface scattering."""
-    scale = inputs.value("Subsurface Scale", default=weight)
-    radii = [radius * scale for radius in inputs.value("Subsurface Radius")]
-    if weight <= 0 or not all(radius > 0 for radius in radii):
-        return None
-    method = FIXED_RADIUS if compat.has_fixed_radius(principled) else MEAN_FREE_PATH
-    ior = inputs.value("Subsurface IOR", default=1.4)
-    return [transport_length(radius, method, channel, ior) for radius, channel in zip(radii, color)]
 
 
 def _take_input(node, name: str, inputs: _Inputs) -> None:

@@ -8,13 +8,12 @@ from .. import compat
 from ..images.files import clips
 from ..images.image_operators import image_in, wanted_size
 from ..images.udim import is_tiled
-from ..jobs.run.engine import BeamspreadEngine, active_image
+from ..jobs.run.active_image import active_image, refusals
+from ..jobs.run.engine import BeamspreadEngine
 from ..jobs.state import state
 from ..node.draw import draw_properties
-from ..node.find import find_node, find_node_in_groups, image_of
-from ..node.tree import BASE_COLOR
+from ..node.find import find_node, image_of
 from ..preferences import draw_help
-from ..read.nodes import Links
 from ..registration import all_or_nothing, classes
 from .bake_panel import draw_bake, draw_lines
 
@@ -120,8 +119,14 @@ class BEAMSPREAD_PT_active_image(RenderPanel, bpy.types.Panel):
         layout = self.layout
         _use_columns(layout)
         active = context.view_layer.objects.active  # `context.object` is empty in the render properties
-        draw_lines(layout, context, [target_of_blender(getattr(active, "active_material", None))], "INFO")
-        layout.operator("object.bake", text="Bake Active Image", icon="RENDER_STILL")
+        reasons = dict.fromkeys(refusals(context).values())
+        if reasons:
+            draw_lines(layout, context, reasons, "ERROR")
+        else:
+            draw_lines(layout, context, [target_of_blender(getattr(active, "active_material", None))], "INFO")
+        column = layout.column()
+        column.enabled = not reasons
+        column.operator("beamspread.bake_active", icon="RENDER_STILL")
         layout.prop(context.scene.render.bake, "margin")
         layout.prop(context.scene.render.bake, "use_clear", text="Clear Image")
 
@@ -131,17 +136,7 @@ def target_of_blender(material) -> str:
     image = active_image(material)
     if image is None:
         return "Select an Image Texture node with an image in the Shader Editor: Blender's Bake fills that."
-    if image in _base_color_images(material):
-        return f"'{image.name}' is the base color, which the bake would erase: select another Image Texture node."
     return f"Fills '{image.name}', the image of the selected Image Texture node."
-
-
-def _base_color_images(material) -> set:
-    node, groups = find_node_in_groups(material) or (None, ())
-    if node is None or BASE_COLOR not in node.inputs:
-        return set()
-    sources = Links().readers(node.color_input(groups))
-    return {getattr(source.node, "image", None) for source in sources if source.socket.is_output}
 
 
 class BEAMSPREAD_PT_images(RenderPanel, bpy.types.Panel):
@@ -198,9 +193,17 @@ class BEAMSPREAD_PT_render_with(RenderPanel, bpy.types.Panel):
         return context.engine == BeamspreadEngine.bl_idname
 
     def draw(self, context):
-        _use_columns(self.layout)
-        self.layout.prop(context.scene.beamspread, "render_engine")
-        self.layout.label(text="The viewport shows EEVEE", icon="INFO")
+        layout, scene = self.layout, context.scene
+        _use_columns(layout)
+        layout.prop(scene.beamspread, "render_engine")
+        if scene.beamspread.render_engine == "EEVEE":
+            layout.prop(scene.eevee, "taa_render_samples", text="Samples")
+        elif hasattr(scene, "cycles"):
+            layout.prop(scene.cycles, "samples")
+            layout.prop(scene.cycles, "use_denoising", text="Denoise")
+            if scene.cycles.use_denoising and not compat.has_denoiser():
+                draw_lines(layout, context, ["This Blender has no denoiser: pictures come without."], "INFO")
+        draw_lines(layout, context, ["EEVEE draws the viewport."], "INFO")
 
 
 class MaterialPanel:

@@ -11,19 +11,19 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ....core.bake.bake_settings import COMBINED, BakeSettings
+from ....core.bake.bake_settings import COMBINED
 from ....core.bake.runner import WRITTEN, Bake, Sink, run_bakes
-from ....core.errors import ImageError, text_of
+from ....core.errors import text_of
 from ....core.progress import Progress
 from ....core.target import Target
 from ... import compat
 from ...cycles.scene_copy import CopyForCycles
-from ...images.udim import is_tiled
 from ...node.find import NOTHING_FOUND, BakeTarget, find_misplaced, find_targets, image_of, targets_of
 from ...registration import all_or_nothing, classes, handlers
 from ..out_of_date import stale
 from ..out_of_date.fingerprint import Parts
 from ..state import state
+from .active_image import ENGINE, active_image, check_active_image
 from .bake_plan import read_plans
 from .render_copy import render_picture, show_by_eevee
 
@@ -31,7 +31,7 @@ from .render_copy import render_picture, show_by_eevee
 class BeamspreadEngine(bpy.types.RenderEngine):
     """Bakes translucent surfaces. Cycles or EEVEE render for it, and EEVEE draws its viewports."""
 
-    bl_idname = "BEAMSPREAD"
+    bl_idname = ENGINE
     bl_label = "Beamspread"
     bl_use_preview = False
     bl_use_eevee_viewport = True
@@ -98,34 +98,13 @@ def _prepare(engine, depsgraph, obj, passes, size: tuple[int, int]) -> list[Bake
     try:
         settings, targets = depsgraph.scene.beamspread.for_bake(), _targets_in(obj, passes, *size)
         for target in targets:
-            _check_active_image(target, settings)
+            check_active_image(target, settings, is_running=True)
         check = partial(Progress(lambda _: not engine.test_break()).check, 0.0)
         plans = read_plans(depsgraph, [target.name for target in targets], None, None, size, fillings.copy, None, check)
         bakes = [plan.bake(settings) for plan in plans] or find_misplaced([obj])
     except Exception as error:  # noqa: BLE001 - Blender would swallow it
         return [Bake(Target(obj.name), error=error)]
     return bakes or [Bake(Target(obj.name), error=NOTHING_FOUND)]
-
-
-def _check_active_image(target: BakeTarget, settings: BakeSettings) -> None:
-    """Raise ImageError if the result would be taken for luminance, or would replace a texture of the surface."""
-    active = active_image(target.material)
-    if is_tiled(active):
-        raise ImageError(
-            f"The active image '{active.name}' has UDIM tiles, which Blender's own Bake can't fill by Beamspread.",
-            "Choose it in the Beamspread node, and use Bake Beamspread.",
-        )
-    if active is not None and active in _images_read(target.node):
-        raise ImageError(
-            f"The active image '{active.name}' is a texture of the Beamspread node and no target.",
-            "If Blender has cleared it, reload it (Image > Reload), then add an Image Texture node with another image "
-            "and select that.",
-        )
-    if settings.layer != COMBINED and active is not None and active == target.node.image:
-        raise ImageError(
-            f"The image '{active.name}' shows luminance in the Beamspread node.",
-            f"Choose another active image for {settings.output.lower()}.",
-        )
 
 
 def _fills_own_image(bake: Bake) -> bool:
@@ -178,28 +157,6 @@ def _before_bake(*_arguments) -> None:
 @persistent
 def _after_bake(*_arguments) -> None:
     fillings.end()
-
-
-def active_image(material):
-    """The image that Blender's Bake fills: that of the texture node that was active last, or else of the first one."""
-    if material is None or material.node_tree is None:
-        return None
-    textures = [node for node in material.node_tree.nodes if node.type == "TEX_IMAGE"]
-    textures.sort(key=lambda node: not node.show_texture)
-    return textures[0].image if textures else None
-
-
-def _images_read(node) -> set:
-    """Images that the node's inputs come from."""
-    images, waiting, seen = set(), [node], {node}
-    while waiting:
-        for socket in waiting.pop().inputs:
-            for source in (link.from_node for link in socket.links):
-                if source not in seen:
-                    seen.add(source)
-                    waiting.append(source)
-                    images.add(getattr(source, "image", None))
-    return images - {None}
 
 
 def _step(engine, fraction: float) -> bool:

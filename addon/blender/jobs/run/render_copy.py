@@ -9,15 +9,25 @@ import threading
 from collections.abc import Callable
 
 import bpy
+from bpy.app.handlers import persistent
 
 from ....core.errors import BakeError, text_of
 from ....core.native import native
-from ... import compat
+from ... import compat, popup
 from ...cycles.process import run
 from ...cycles.scene_copy import SceneCopy
+from ...registration import all_or_nothing, handlers
 
 # Seconds to wait for the main thread, which alone may read the scene and may be busy.
 PATIENCE_SECONDS = 60.0
+
+EEVEE_REMEDY = "EEVEE needs OpenGL: try Cycles (Render > Beamspread > Render With)."
+
+_shown: set[str] = set()
+"""Errors of the present render and warnings of this file that a popup has shown: an animation repeats them."""
+
+_errors: set[str] = set()
+"""Errors of the present render."""
 
 
 def render_picture(engine, depsgraph) -> None:
@@ -37,16 +47,43 @@ def render_picture(engine, depsgraph) -> None:
                 "picture": str(picture),
             }
             # A process of its own: classes of nodes stay registered, and memory for pictures may be large.
-            run(copy, "render", request, lambda fraction: _step(engine, fraction), keeps=False)
+            worker = "EEVEE" if name == "EEVEE" else "Cycles"
+            step = lambda fraction: _step(engine, fraction)  # noqa: E731
+            outcome = run(copy, "render", request, step, keeps=False, worker=worker)
             result.load_from_file(str(picture))
             filled = True
+        for note in outcome["notes"].tolist():
+            engine.report({"WARNING"}, note)
+            _show("Beamspread: the picture", note)
     except native.Cancelled:
         pass
     except Exception as error:  # noqa: BLE001 - Blender would swallow it
-        remedy = " EEVEE needs OpenGL: try Cycles (Render > Beamspread > Render With)." if name == "EEVEE" else ""
-        engine.report({"ERROR"}, text_of(error) + remedy)
+        text = f"{text_of(error)} {EEVEE_REMEDY if name == 'EEVEE' else ''}".strip()
+        _errors.add(text)
+        engine.report({"ERROR"}, text)
+        engine.error_set(text)  # the header of the picture shows it
+        _show("Beamspread: there is no picture", text)
     finally:
         engine.end_result(result, cancel=not filled)
+
+
+def _show(title: str, text: str) -> None:
+    """Show a text in a popup, once: Blender shows what engines report in the Info editor alone."""
+    if text not in _shown and not bpy.app.background:
+        _shown.add(text)
+        popup.show_soon(title, [text])
+
+
+@persistent
+def _before_render(*_arguments) -> None:
+    _shown.difference_update(_errors)
+    _errors.clear()
+
+
+@persistent
+def _before_loading(*_arguments) -> None:
+    _shown.clear()
+    _errors.clear()
 
 
 def _copy(scene_name: str, layer: str) -> SceneCopy:
@@ -93,3 +130,6 @@ def show_by_eevee(context) -> None:
         shading.use_scene_lights = shading.use_scene_world = True
 
     bpy.app.timers.register(change)
+
+
+register, unregister = all_or_nothing(*handlers(render_init=_before_render, load_pre=_before_loading))

@@ -1,0 +1,195 @@
+"""The image that Blender's own Bake fills: the one of the active texture node. Textures of the artist are refused.
+
+Blender clears the image before it asks the engine for anything. *Bake Active Image* therefore refuses beforehand;
+where Blender's operator was started by itself, refused images get their pixels back afterwards.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+
+from ....core.bake.bake_settings import COMBINED, BakeSettings
+from ....core.errors import ImageError
+from ... import popup
+from ...images.udim import is_tiled
+from ...node.find import BakeTarget, targets_of
+from ...node.output import former_output
+from ...read.nodes import Links
+from ...registration import all_or_nothing, classes, handlers
+
+ENGINE = "BEAMSPREAD"
+
+MAX_OBJECTS = 100
+"""Number of selected objects whose images a panel checks. More slow the drawing down."""
+
+
+def active_image(material):
+    """The image that Blender's Bake fills: that of the texture node that was active last, or else of the first one."""
+    if material is None or material.node_tree is None:
+        return None
+    textures = [node for node in material.node_tree.nodes if node.type == "TEX_IMAGE"]
+    textures.sort(key=lambda node: not node.show_texture)
+    return textures[0].image if textures else None
+
+
+def check_active_image(target: BakeTarget, settings: BakeSettings, is_running: bool = False) -> None:
+    """Raise ImageError if the result would be taken for luminance, or would replace a texture of the material.
+
+    `is_running`: Blender's bake has begun, and may have cleared the image.
+    """
+    active = active_image(target.material)
+    if active is None:
+        return
+    if is_tiled(active):
+        raise ImageError(
+            f"The active image '{active.name}' has UDIM tiles, which Blender's own Bake can't fill by Beamspread.",
+            "Choose it in the Beamspread node, and use Bake Beamspread.",
+        )
+    reader = _reader(active, target)
+    if reader:
+        remedy = "Add an Image Texture node with another image, and select that."
+        if is_running and not _saved.has(active):
+            remedy = f"If Blender has cleared it, reload it (Image > Reload). {remedy}"
+        raise ImageError(f"The active image '{active.name}' is a texture of {reader} and no target.", remedy)
+    if settings.layer != COMBINED and active == target.node.image:
+        raise ImageError(
+            f"The image '{active.name}' shows luminance in the Beamspread node.",
+            f"Choose another active image for {settings.output.lower()}.",
+        )
+
+
+def _reader(image, target: BakeTarget) -> str:
+    """Words for the node whose inputs read the image: the Beamspread node, or the material's former shader; or ""."""
+    node = target.node
+    # A texture at an input of the group around the node counts, too.
+    sources = Links().readers(node.color_input(target.groups)) if node.has_texture() else ()
+    outer = {getattr(source.node, "image", None) for source in sources if source.socket.is_output}
+    if image in outer | _images_read(node):
+        return "the Beamspread node"
+    former = former_output(node)
+    if former is not None and image in _images_read(former.node):
+        return f"'{former.node.name}', the former shader,"
+    return ""
+
+
+def _images_read(node) -> set:
+    """Images that the node's inputs come from."""
+    images, waiting, seen = set(), [node], {node}
+    while waiting:
+        for socket in waiting.pop().inputs:
+            for source in (link.from_node for link in socket.links):
+                if source not in seen:
+                    seen.add(source)
+                    waiting.append(source)
+                    images.add(getattr(source, "image", None))
+    return images - {None}
+
+
+def refusals(context) -> dict:
+    """Images that Blender would clear although no bake may fill them, each with the reason, by the selected objects."""
+    settings, found = context.scene.beamspread.for_bake(), {}
+    for obj in list(context.view_layer.objects.selected)[:MAX_OBJECTS]:
+        if obj.type != "MESH":
+            continue
+        targets = targets_of(obj)
+        for target in targets:
+            try:
+                check_active_image(target, settings)
+            except ImageError as error:
+                found[active_image(target.material)] = str(error)
+        known = {target.material for target in targets}
+        for material in {slot.material for slot in obj.material_slots} - known - {None}:
+            image = active_image(material)
+            if image is not None and image not in found:
+                text = f"'{material.name}' of '{obj.name}' has no Beamspread node, so its image '{image.name}'"
+                found[image] = f"{text} would only be cleared. Add the node, or deselect the object."
+    return found
+
+
+class BEAMSPREAD_OT_bake_active(bpy.types.Operator):
+    """Fill the active image of each selected object by Blender's own Bake. Refuses textures that materials read"""
+
+    bl_idname = "beamspread.bake_active"
+    bl_label = "Bake Active Image"
+
+    @classmethod
+    def poll(cls, context):
+        if context.scene.render.engine != ENGINE:
+            cls.poll_message_set("Choose the render engine Beamspread")
+            return False
+        return bpy.ops.object.bake.poll()
+
+    def execute(self, context):
+        return self._bake(context, "EXEC_DEFAULT")
+
+    def invoke(self, context, _event):
+        return self._bake(context, "INVOKE_DEFAULT")
+
+    def _bake(self, context, how: str):
+        reasons = list(dict.fromkeys(refusals(context).values()))
+        if reasons:
+            self.report({"ERROR"}, " ".join(reasons))
+            return {"CANCELLED"}
+        return {"CANCELLED"} if "CANCELLED" in bpy.ops.object.bake(how) else {"FINISHED"}
+
+
+class _Saved:
+    """Pixels of refused images while Blender's own operator runs without ours, as from its search menu."""
+
+    def __init__(self) -> None:
+        self._pixels: dict[str, np.ndarray] = {}
+        self._packed: set[str] = set()
+        self._reasons: list[str] = []
+
+    def take(self, images: dict) -> None:
+        self._reasons = list(dict.fromkeys(images.values()))
+        self._pixels, self._packed = {}, set()
+        for image in images:
+            if 0 in image.size or is_tiled(image):
+                continue
+            self._pixels[image.name] = np.empty(len(image.pixels), np.float32)
+            image.pixels.foreach_get(self._pixels[image.name])
+            if not image.is_dirty and image.source != "GENERATED":
+                self._packed.add(image.name)
+
+    def has(self, image) -> bool:
+        """True if the image gets its pixels back."""
+        return image.name in self._pixels
+
+    def give_back(self) -> None:
+        """Restore the pixels: of files and packed images that had no other ones, from these."""
+        for name, pixels in self._pixels.items():
+            image = bpy.data.images.get(name)
+            if image is None or len(image.pixels) != len(pixels):
+                continue
+            if name in self._packed:
+                image.reload()
+            else:
+                image.pixels.foreach_set(pixels)
+                image.update()
+        if self._pixels:
+            kept = "The images have their pixels again." if len(self._pixels) > 1 else "The image has its pixels again."
+            popup.show_soon("Beamspread: nothing was baked", [*self._reasons, kept])
+        self._pixels.clear()
+
+
+_saved = _Saved()
+
+
+@persistent
+def _before_bake(*_arguments) -> None:
+    if bpy.context.scene.render.engine == ENGINE and bpy.context.scene.render.bake.use_clear:
+        _saved.take(refusals(bpy.context))
+
+
+@persistent
+def _after_bake(*_arguments) -> None:
+    _saved.give_back()
+
+
+register, unregister = all_or_nothing(
+    *classes(BEAMSPREAD_OT_bake_active),
+    *handlers(object_bake_pre=_before_bake, object_bake_complete=_after_bake, object_bake_cancel=_after_bake),
+)
