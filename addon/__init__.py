@@ -79,14 +79,18 @@ def unregister() -> None:
 
 
 def glTF2_pre_export_callback(_settings) -> None:  # Blender's exporter looks for this name in add-ons
-    """Have glTF files get the bakes, not the previews of Live."""
+    """Have glTF files get the bakes, not the previews of Live, by nodes that the exporter reads."""
     from .blender.live import timer
+    from .blender.node import gltf
 
     timer.hide_previews()
+    gltf.begin_export()
 
 
 def glTF2_post_export_callback(_settings) -> None:
-    """Show the previews of Live again."""
+    """Put the nodes back, and show the previews of Live again."""
     from .blender.live import timer
+    from .blender.node import gltf
 
+    gltf.end_export()
     timer.show_previews()

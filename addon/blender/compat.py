@@ -208,8 +208,8 @@ def transparent_bounces(scene) -> int | None:
 
 
 @contextmanager
-def saving_png(scene) -> Iterator[None]:
-    """Save renders of the scene as 8-bit PNG within the block (since Blender 5.0 a media type limits the formats)."""
+def saving_png(scene, bits: int = 8) -> Iterator[None]:
+    """Save renders of the scene as PNG within the block (since Blender 5.0 a media type limits the formats)."""
     settings = scene.render.image_settings
     names = [name for name in ("media_type", "file_format", "color_mode", "color_depth") if hasattr(settings, name)]
     before = {name: getattr(settings, name) for name in names}
@@ -218,7 +218,7 @@ def saving_png(scene) -> Iterator[None]:
             "media_type": "IMAGE",
             "file_format": "PNG",
             "color_mode": "RGB",
-            "color_depth": "8",
+            "color_depth": str(bits),
         }.items():
             if name in before:
                 setattr(settings, name, value)

@@ -215,9 +215,18 @@ class BeamspreadSettings(bpy.types.PropertyGroup):
         description="File format that a batch writes",
         items=[
             ("EXR", "OpenEXR", "Linear, 32-bit float, W/(m^2 sr)", 0),
-            ("PNG", "PNG", "8 bits; values above 1 are clipped", 1),
+            ("PNG", "PNG", "sRGB, 8 bits; values above 1 are clipped unless Fit Exposure scales them", 1),
+            ("EXR_HALF", "OpenEXR Half", "Linear, 16-bit float, W/(m^2 sr): half the size, 3 digits", 2),
+            ("PNG16", "PNG 16 Bit", "sRGB, 16 bits; values above 1 are clipped unless Fit Exposure scales them", 3),
+            ("HDR", "Radiance HDR", "Linear, 8 bits and a shared exponent: 2 digits", 4),
         ],
         default="EXR",
+    )
+    use_exposure: BoolProperty(
+        name="Fit Exposure",
+        description="Multiply the values of PNG files by the power of two that brings them to 1 or below. The file, "
+        "the report and the material name the factor",
+        default=False,
     )
 
     def side_for(self, length: float, surface: Surface, is_textured: bool) -> int:

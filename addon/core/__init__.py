@@ -9,6 +9,7 @@ Each package imports only those above it (tests/unit/test_layers.py reads this l
     time_left  time that a run still takes, from estimates and speed
     progress   progress of a job made of stages
     disk       files that are complete or unchanged, their names and headers
+    display    exposure, sRGB and PNG of files that hold no values above 1
     recent     caches
     arrays     array arguments, converted without loss
     scene      receivers (charts on planes), lights, triangles that cast shadows

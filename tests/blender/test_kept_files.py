@@ -104,7 +104,7 @@ def test_a_really_full_disk(tmp_path):
         pytest.skip("mounting a small disk takes an administrator")
     try:
         for file_format in files.EXTENSIONS:
-            old = disk / f"old{files.EXTENSIONS[file_format]}"
+            old = disk / f"{file_format}{files.EXTENSIONS[file_format]}"
             small = NOISE[:16, :16]
             files.write_file(old, small, file_format)
             before = old.read_bytes()

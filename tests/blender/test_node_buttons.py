@@ -446,12 +446,12 @@ class TestPlainNodes:
 
     def test_a_blender_without_the_add_on_shows_them_alone(self, baked, tmp_path):
         assert np.array_equal(self.render_without_add_on(tmp_path), [0, 0, 0])
-        assert bpy.ops.beamspread.make_plain() == {"FINISHED"}
+        assert bpy.ops.beamspread.make_plain(kind="GROUP") == {"FINISHED"}
         assert self.render_without_add_on(tmp_path) == pytest.approx([0.25, 0.5, 0.75], abs=1e-3)
 
     def test_a_bake_after_them_changes_both_and_they_can_go_again(self, baked):
         material = baked.data.materials[0]
-        bpy.ops.beamspread.make_plain()
+        bpy.ops.beamspread.make_plain(kind="GROUP")
         plain = surface_of(material)
         assert plain.bl_idname == "ShaderNodeGroup"
         node = node_of(material)
@@ -460,12 +460,12 @@ class TestPlainNodes:
         assert node.image.name == plain.node_tree.nodes["Image"].image.name
         assert plain.node_tree.nodes["Fresnel"].inputs["IOR"].default_value == pytest.approx(1.3)
         assert surface_of(material) == plain
-        bpy.ops.beamspread.make_plain()
+        bpy.ops.beamspread.make_plain(kind="GROUP")
         assert surface_of(material) == node
         assert "ShaderNodeGroup" not in [one.bl_idname for one in material.node_tree.nodes]
 
     def test_copies_of_the_material_part(self, baked):
-        bpy.ops.beamspread.make_plain()
+        bpy.ops.beamspread.make_plain(kind="GROUP")
         material = baked.data.materials[0]
         copy = material.copy()
         node_of(copy).ior = 1.6

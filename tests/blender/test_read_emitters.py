@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scenes
 from beamspread.blender.jobs.state import state
+from beamspread.blender.node import plain
 from beamspread.blender.node.output import make_plain, plain_of
 from beamspread.blender.read.emitters import _pieces
 from beamspread.core.scene.lights import MeshLight
@@ -230,6 +231,16 @@ def test_a_baked_image_is_no_light_by_any_way():
     make_plain(node)
     assert (read().lights, read().by_cycles) == ((), {})
     nodes.show(plain_of(node).outputs["BSDF"])
+    assert (read().lights, read().by_cycles) == ((), {})
+
+
+@pytest.mark.parametrize("kind", [plain.COAT, plain.EMISSION, plain.UNLIT])
+def test_plain_nodes_for_engines_are_no_light(kind):
+    image = bpy.data.images.new("Baked", 4, 4, float_buffer=True)
+    image.pixels.foreach_set(np.full(64, 3, np.float32))
+    material = scenes.add_material(image=image, linked=True)
+    scenes.add_plane(material=material)
+    plain.make(scenes.node_of(material), kind)
     assert (read().lights, read().by_cycles) == ((), {})
 
 

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from ...core.disk import is_half, text_of, whole_files
+from ...core.display import EXPOSURE, png, to_srgb
 from ...core.errors import ImageError
 from ...core.native import native
 from .. import compat
@@ -19,8 +20,8 @@ from . import icons, undo
 from .facts import facts_of, file_of
 from .udim import check_tiles, files_of, is_tiled
 
-EXTENSIONS = {"EXR": ".exr", "PNG": ".png"}
-"""Extensions of the formats that bakes are written in."""
+EXTENSIONS = {"EXR": ".exr", "PNG": ".png", "EXR_HALF": ".exr", "PNG16": ".png", "HDR": ".hdr"}
+"""Extensions of the formats that bakes are written in; the first with an extension is that of files in general."""
 
 EXTENSIONS_WITH_RANGE = {".exr", ".hdr"}
 """Extensions of the formats that hold values above 1."""
@@ -125,12 +126,6 @@ def linear_pixels(image) -> np.ndarray:
     return from_srgb(encoded) if _is_encoded(image) else encoded
 
 
-def to_srgb(linear: np.ndarray) -> np.ndarray:
-    """Encode linear values with the sRGB transfer function (IEC 61966-2-1), clipped to 0..1."""
-    clipped = np.clip(linear, 0, 1)
-    return np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055).astype(np.float32)
-
-
 def clips(image) -> bool:
     """True if the image or its file holds no values above 1."""
     path = file_of(image)
@@ -155,17 +150,27 @@ def check_writable(paths: Iterable[Path]) -> None:
 
 
 def write_file(
-    path: Path, texture: np.ndarray, file_format: str, attributes: dict[str, str] | None = None, view_of=None
+    path: Path,
+    texture: np.ndarray,
+    file_format: str,
+    attributes: dict[str, str] | None = None,
+    view_of=None,
+    exposure: float = 1.0,
 ) -> None:
-    """Write linear RGB (height, width, 3), row 0 at the bottom, as EXR, with its attributes, or as PNG.
+    """Write linear RGB (height, width, 3), row 0 at the bottom, times the exposure, in a format of `EXTENSIONS`.
 
-    `view_of` is the scene whose view transform a PNG gets, None for plain sRGB.
+    `attributes` are those of an EXR file, which has the exposure, too. `view_of` is the scene whose view transform a
+    PNG gets, None for plain sRGB.
     """
     check_writable([path])
-    if file_format == "EXR":
-        write_exr(path, texture, attributes)
+    if file_format in ("EXR", "EXR_HALF"):
+        noted = {} if exposure == 1 else {EXPOSURE: repr(exposure)}
+        scaled = texture if exposure == 1 else texture * np.float32(exposure)
+        write_exr(path, scaled, noted | (attributes or {}), half=True if file_format == "EXR_HALF" else None)
+    elif file_format == "HDR":
+        write_hdr(path, texture, exposure)
     else:
-        write_png(path, texture, view_of)
+        write_png(path, texture, view_of, bits=16 if file_format == "PNG16" else 8, exposure=exposure)
 
 
 def make_folder(folder: Path) -> None:
@@ -177,31 +182,40 @@ def make_folder(folder: Path) -> None:
 
 
 def write_exr(
-    path: Path, texture: np.ndarray, attributes: dict[str, str] | None = None, like: Path | None = None
+    path: Path,
+    texture: np.ndarray,
+    attributes: dict[str, str] | None = None,
+    like: Path | None = None,
+    half: bool | None = None,
 ) -> None:
     """Write linear RGB without compression, as Blender does.
 
-    The file keeps its `MADE_FOR` attribute. It has 16 bits if the file `like`, by default the old file, has 16 bits and
-    the values fit.
+    The file keeps its `MADE_FOR` attribute. It has 16 bits if `half` is true, or None and the file `like`, by default
+    the old file, has 16 bits; in either case only if the values fit.
     """
     with _whole_images([path]) as (temporary,):
-        _write_exr(temporary, texture, attributes, path, like or path)
+        _write_exr(temporary, texture, attributes, path, is_half(like or path) if half is None else half)
 
 
 def write_exrs(textures: Mapping[Path, np.ndarray], attributes: dict[str, str] | None = None) -> None:
     """`write_exr` for several files. No file is replaced before all are written."""
     with _whole_images(textures) as temporaries:
         for temporary, (path, texture) in zip(temporaries, textures.items()):
-            _write_exr(temporary, texture, attributes, path, path)
+            _write_exr(temporary, texture, attributes, path, is_half(path))
 
 
-def _write_exr(temporary: Path, texture: np.ndarray, attributes: dict[str, str] | None, path: Path, like: Path) -> None:
+def _write_exr(temporary: Path, texture: np.ndarray, attributes: dict[str, str] | None, path: Path, half: bool) -> None:
     texture = np.ascontiguousarray(texture, np.float32)
-    half = is_half(like) and np.abs(texture).max() <= np.finfo(np.float16).max
+    half = half and fits_half(texture)
     owner = {MADE_FOR: made_for(path)} if made_for(path) else {}
     native.write_exr(
         str(temporary), texture, ["R", "G", "B"], owner | (attributes or {}), compression="none", half=bool(half)
     )
+
+
+def fits_half(texture: np.ndarray) -> bool:
+    """True if 16-bit floats hold the largest value."""
+    return bool(np.abs(texture).max() <= np.finfo(np.float16).max)
 
 
 def made_for(path: Path) -> str:
@@ -209,19 +223,38 @@ def made_for(path: Path) -> str:
     return text_of(path, MADE_FOR)
 
 
-def write_png(path: Path, texture: np.ndarray, view_of=None) -> None:
-    """Write a PNG for viewing. Blender converts float images to the color space of byte images."""
+def write_png(path: Path, texture: np.ndarray, view_of=None, bits: int = 8, exposure: float = 1.0) -> None:
+    """Write a PNG: sRGB, or as the scene `view_of` would render it, which Blender computes."""
     height, width = texture.shape[:2]
+    if view_of is None:
+        with _whole_image(path) as temporary:
+            temporary.write_bytes(png(texture, bits, exposure))
+            _check_written(temporary, (width, height))
+        return
     image = make_image("Beamspread PNG", width, height)
     try:
-        set_pixels(image, texture)
+        set_pixels(image, texture * np.float32(exposure))
         image.file_format = "PNG"
-        if view_of is None:
-            save_image(image, path)
-            return
-        with _whole_image(path) as temporary, compat.saving_png(view_of):
+        with _whole_image(path) as temporary, compat.saving_png(view_of, bits):
             image.save_render(str(temporary), scene=view_of)
             _check_written(temporary, (width, height))
+    finally:
+        bpy.data.images.remove(image)
+
+
+def write_hdr(path: Path, texture: np.ndarray, exposure: float = 1.0) -> None:
+    """Write a Radiance file; its header has the exposure, which readers may take as the format defines it."""
+    image = make_image("Beamspread HDR", *texture.shape[1::-1], is_data=True)  # else Blender writes sRGB
+    try:
+        set_pixels(image, texture * np.float32(exposure))
+        image.file_format = "HDR"
+        with _whole_image(path) as temporary:
+            image.filepath_raw = str(temporary)
+            image.save()
+            if exposure != 1:
+                first, _, rest = temporary.read_bytes().partition(b"\n")
+                temporary.write_bytes(first + f"\nEXPOSURE={exposure!r}\n".encode() + rest)
+            _check_written(temporary, texture.shape[1::-1])
     finally:
         bpy.data.images.remove(image)
 

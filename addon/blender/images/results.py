@@ -13,6 +13,7 @@ from ...core.errors import BakeError
 from ...core.messages import note
 from ...core.scene.tiles import Tiling
 from ...core.target import Target
+from ..node import plain
 from ..node.find import find_node, node_of, uses_tiles
 from ..node.node import link_result
 from ..read.geometry import read_polygons
@@ -100,6 +101,7 @@ class Results:
         path = self.fill(image, bake, texture)
         if path is not None:
             note_bake(image, bake.target)
+            plain.refresh(image)
             if texture.max() > 1 and files.clips(image):
                 bake.warn(image.name, f"The image '{image.name}' clips values above 1.", "Make Float keeps them.")
         return path

@@ -87,17 +87,20 @@ def write_tiles(
     attributes: dict[str, str] | None = None,
     view_of=None,
     like=None,
+    file_format: str = "",
+    exposure: float = 1.0,
 ) -> None:
     """Write a file for each tile; EXR files are replaced once all are written.
 
     Parameters
     ----------
     path : with the token.
-    attributes, view_of : as for `files.write_file`.
+    attributes, view_of, exposure : as for `files.write_file`.
+    file_format : of new files; "" for EXR or PNG, by the path.
     like : image whose format files have that are neither EXR nor new.
     """
     tiles = {file_of_tile(path, number): part for number, part in tiling.split(texture).items()}
-    if path.suffix.lower() == files.EXTENSIONS["EXR"]:
+    if path.suffix.lower() == files.EXTENSIONS["EXR"] and file_format in ("", "EXR") and exposure == 1:
         files.check_writable(tiles)
         files.write_exrs(tiles, attributes)
         return
@@ -105,7 +108,7 @@ def write_tiles(
         if like is not None and file.is_file():
             files.write_like(file, part, like)
         else:
-            files.write_file(file, part, "PNG", attributes, view_of)
+            files.write_file(file, part, file_format or "PNG", attributes, view_of, exposure)
 
 
 def store_new(name: str, texture: np.ndarray, bake: Bake, is_data: bool = False) -> tuple[str, bpy.types.Image]:

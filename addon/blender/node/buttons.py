@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import bpy
+from bpy.props import EnumProperty
 
+from ...core.errors import ImageError
 from .. import compat, popup
 from ..registration import all_or_nothing, classes
-from . import output, principled
+from . import output, plain, principled
 from .find import find_node
 from .node import BeamspreadNode
 
@@ -58,17 +60,41 @@ class BEAMSPREAD_OT_toggle_result(NodeOperator, bpy.types.Operator):
 
 
 class BEAMSPREAD_OT_make_plain(NodeOperator, bpy.types.Operator):
-    """Replace the node by standard Blender nodes, for machines without this add-on, or put the node back"""
+    """Replace the node by standard Blender nodes, for glTF or machines without this add-on, or put the node back"""
 
     bl_idname = "beamspread.make_plain"
     bl_label = "Make Plain Nodes"
 
+    kind: EnumProperty(name="Kind", description="Nodes that show the bake", items=plain.KINDS, default=plain.COAT)
+
     def change(self, node):
-        if output.plain_of(node) is None:
-            output.make_plain(node)
-        else:
+        if output.has_plain(node):
             output.remove_plain(node)
+            return {"FINISHED"}
+        if self.kind == plain.GROUP:
+            output.make_plain(node)
+            return {"FINISHED"}
+        try:
+            exposure = plain.make(node, self.kind)
+        except ImageError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        if plain.is_map_of_modifier(node):
+            text = f"glTF files lack the UV map '{plain.map_of(node)}', which a modifier makes: apply the modifier"
+            self.report({"WARNING"}, text)
+        self.report({"INFO"}, exposure_line(exposure, self.kind))
         return {"FINISHED"}
+
+
+def exposure_line(exposure: float, kind: str) -> str:
+    """Sentence that tells what the image of plain nodes holds."""
+    held = "The image of the plain nodes has 8 bits, as glTF needs"
+    if exposure == 1:
+        return held
+    factor = 1 / exposure
+    if kind == plain.UNLIT:
+        return f"{held}, and holds the bake divided by {factor:g}: multiply by {factor:g} in the engine"
+    return f"{held}, and holds the bake divided by {factor:g}; the strength of the emission is {factor:g}"
 
 
 class BEAMSPREAD_OT_from_principled(NodeOperator, bpy.types.Operator):

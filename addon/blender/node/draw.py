@@ -12,7 +12,7 @@ from ...core.bake.steps import to_simulate
 from ...core.errors import BakeError
 from ...core.ldf.library import SIMULATING
 from ...core.time_left import duration
-from .output import former_output, is_in_group, is_shown, plain_of
+from .output import former_output, has_plain, is_in_group, is_shown
 from .path import meters_per_unit
 
 # Units of length: shortest length shown in it, its length in meters, its name; the largest unit first.
@@ -125,8 +125,10 @@ def _draw_actions(node, layout) -> None:
     elif node.image is not None and not is_in_group(node):
         column.operator("beamspread.toggle_result", text="Show Baked Result", icon="IMAGE_DATA")
     if node.image is not None:
-        text = "Make Plain Nodes" if plain_of(node) is None else "Remove Plain Nodes"
-        column.operator("beamspread.make_plain", text=text, icon="NODETREE")
+        if has_plain(node):
+            column.operator("beamspread.make_plain", text="Remove Plain Nodes", icon="NODETREE")
+        else:
+            column.operator_menu_enum("beamspread.make_plain", "kind", text="Make Plain Nodes", icon="NODETREE")
 
 
 def _draw_channels(layout, node, name: str, label: str) -> None:

@@ -12,6 +12,7 @@ from ...core.messages import Message
 from .. import compat
 from ..read.nodes import InputSocket
 from ..registration import all_or_nothing, handlers
+from . import plain
 from .color import (
     ALBEDO_MODE,
     BASE_COLOR_MODE,
@@ -129,6 +130,7 @@ def _show(node, _context) -> None:
     if tree is not None:
         show_values(tree, node.image, node.ior)
         _show_color(node)
+    plain.refresh(node.image, node)
 
 
 def link_result(node, image, uv_map: str | None = None) -> list[Message]:
@@ -142,6 +144,7 @@ def link_result(node, image, uv_map: str | None = None) -> list[Message]:
     _show(node, None)
     if uv_map is not None:
         keep_map(node.node_tree, uv_map)
+        plain.refresh(image, node)
     return link_output(node)
 
 

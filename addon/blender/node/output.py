@@ -8,12 +8,10 @@ from ...core.errors import NotSupportedError
 from ...core.messages import Message, note, warning
 from ..read.nodes import InputSocket
 from ..read.shading import ShadingPoints
+from . import plain
 from .tree import NORMAL, ROUGHNESS, plain_of
 
-PLAIN_LABEL = "Baked Light"
-
 OUTPUT_KINDS = ("ShaderNodeOutputMaterial", "NodeGroupOutput")
-
 
 GAP, NODE_HEIGHT = 50.0, 640.0
 """Distance of a new node from others, and the height of the Beamspread node, in units of the node editor."""
@@ -36,7 +34,11 @@ def place(node) -> None:
 
 
 def is_linked(node) -> bool:
-    """True if an output of the node, or of the group in its place, is linked."""
+    """True if an output of the node, or of plain nodes in its place, is linked."""
+    image = plain.image_node_of(node)
+    if image is not None:
+        own = plain.nodes_of(node)
+        return any(link.to_node not in own for socket in plain.outputs_of(node).values() for link in socket.links)
     nodes = [node, *filter(None, [plain_of(node)])]
     return any(socket.is_linked for shown in nodes for socket in shown.outputs)
 
@@ -52,7 +54,7 @@ def is_shown(node) -> bool:
     surface = _surface(node.id_data)
     if surface is None or not surface.is_linked:
         return False
-    return surface.links[0].from_node in (node, plain_of(node))
+    return surface.links[0].from_node in (node, plain_of(node), *plain.nodes_of(node))
 
 
 def link_output(node) -> list[Message]:
@@ -109,26 +111,32 @@ def make_plain(node):
     The group shares the node's inner tree: a bake changes both.
     """
     tree = node.id_data
-    plain = plain_of(node)
-    if plain is None:
-        plain = tree.nodes.new("ShaderNodeGroup")
-        plain.name = plain.label = PLAIN_LABEL
-        plain.location, plain.width = (node.location.x, node.location.y + 200), 180
-        node.plain_node = plain.name
-    plain.node_tree = node.node_tree
+    group = plain_of(node)
+    if group is None:
+        group = tree.nodes.new("ShaderNodeGroup")
+        group.name = group.label = plain.LABEL
+        group.location, group.width = (node.location.x, node.location.y + 200), 180
+        node.plain_node = group.name
+    group.node_tree = node.node_tree
     for name in (ROUGHNESS, NORMAL):
-        _same_input(node, plain, name)
-    _move_links(node, plain)
-    return plain
+        _same_input(node, group, name)
+    _move_links(node, group)
+    return group
 
 
 def remove_plain(node) -> None:
-    """Put the node back where the plain group is."""
-    plain = plain_of(node)
-    if plain is not None:
-        _move_links(plain, node)
-        node.id_data.nodes.remove(plain)
+    """Put the node back where its plain nodes are."""
+    plain.remove(node)
+    group = plain_of(node)
+    if group is not None:
+        _move_links(group, node)
+        node.id_data.nodes.remove(group)
     node.plain_node = ""
+
+
+def has_plain(node) -> bool:
+    """True if plain nodes of any kind are in the node's place."""
+    return plain_of(node) is not None or plain.image_node_of(node) is not None
 
 
 def _shines(surface) -> bool:
@@ -158,7 +166,8 @@ def _owner_name(tree) -> str:
 
 
 def _link(surface, node) -> None:
-    node.id_data.links.new(surface, (plain_of(node) or node).outputs["BSDF"])
+    shown = plain.outputs_of(node) or (plain_of(node) or node).outputs
+    node.id_data.links.new(surface, shown["BSDF"])
 
 
 def _remember(node, link) -> None:

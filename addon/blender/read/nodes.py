@@ -19,6 +19,9 @@ OWN_NODE = "BeamspreadNode"
 # Name of the node's inner tree. Its nodes show a bake, which neither shines on other objects nor lets light through.
 INNER_TREE = ".Beamspread"
 
+PLAIN = "beamspread_plain"
+"""Key of image nodes that show a bake in the node's place: kind of the plain nodes around them."""
+
 
 class Source(NamedTuple):
     """Output of a node, or an input without a link, whose own value counts.
@@ -54,7 +57,9 @@ class InputSocket(NamedTuple):
 
 
 def shows_bake(node) -> bool:
-    """True for a Beamspread node, and for the group of plain nodes in its place."""
+    """True for a Beamspread node, and for the plain nodes in its place: a group, or a marked image node."""
+    if node.bl_idname == "ShaderNodeTexImage":
+        return PLAIN in node
     tree = getattr(node, "node_tree", None)
     return node.bl_idname == OWN_NODE or (tree is not None and tree.name.startswith(INNER_TREE))
 

@@ -175,7 +175,8 @@ class BEAMSPREAD_PT_batch(RenderPanel, bpy.types.Panel):
         _use_columns(layout)
         layout.prop(context.scene.beamspread, "output_dir")
         layout.prop(context.scene.beamspread, "format")
-        if context.scene.beamspread.format == "PNG":
+        if context.scene.beamspread.format.startswith("PNG"):
+            layout.prop(context.scene.beamspread, "use_exposure")
             layout.prop(context.scene.beamspread, "use_view_transform")
         column = layout.column(align=True)
         column.operator("beamspread.show_frames", icon="RENDER_ANIMATION")

@@ -29,6 +29,7 @@ class Bake:
     texture : result of the job, see `BakeJob`; None before it has run and once it is stored.
     lights : number of lights of the job; once it has run, with those that its steps have found.
     path : file that `keep` has written, if any.
+    exposure : factor that the file's values were multiplied by.
     seconds : wall-clock time of `run` and `keep`.
     estimated_seconds : estimate of the seconds of `run`, made before it ran; 0 until then.
     is_dark : True if the job has run and no light arrived.
@@ -40,7 +41,7 @@ class Bake:
         self.messages = Messages(job.messages() if job else ())
         self.texture: np.ndarray | None = None
         self.lights = len(job.illumination.lights) if job else 0
-        self.path = ""
+        self.path, self.exposure = "", 1.0
         self.is_dark = False
         self.seconds = self.estimated_seconds = 0.0
         if error:

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..bake.bake_settings import OUTPUTS
+from ..display import AUTO
 
 SOLVERS = ("fft", "direct", "adaptive")
-FORMATS = ("EXR", "PNG")
+FORMATS = ("EXR", "EXR_HALF", "PNG", "PNG16", "HDR")
 PASSES = tuple(OUTPUTS)
 
 
@@ -24,6 +25,7 @@ class BatchOptions:
     solver: str | None
     output: str | None
     format: str | None
+    exposure: float | str | None
     report: str | None
     pass_name: str | None
     indirect: bool | None
@@ -90,6 +92,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--output", metavar="DIR", help="folder for the images (default: the scene's setting)")
     parser.add_argument("--format", type=str.upper, choices=FORMATS)
+    parser.add_argument(
+        "--exposure",
+        type=_exposure,
+        metavar="auto|FACTOR",
+        help="multiply all values by this; auto: by the power of two that brings those of a PNG to 1 or below. The "
+        "file and the report have the factor (default: the scene's setting)",
+    )
     parser.add_argument("--report", metavar="FILE.json", help="write the result of each bake")
     parser.add_argument("--allow-dark", action="store_true", help="exit code 0 even if no light arrives")
     parser.add_argument("--verbose", action="store_true", help="print lights, triangles and the time of each stage")
@@ -110,6 +119,18 @@ def _frames(text: str) -> tuple[int, int]:
     if end < start:
         raise argparse.ArgumentTypeError(f"{text!r} ends before it starts")
     return start, end
+
+
+def _exposure(text: str) -> float | str:
+    if text.strip().lower() == AUTO:
+        return AUTO
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 1e-6 <= value <= 1e6:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither auto nor a factor between 1e-6 and 1e6")
+    return value
 
 
 def _resolution(text: str) -> int:

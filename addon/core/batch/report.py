@@ -22,6 +22,7 @@ class BakeRecord:
     path : the file that was written; of UDIM tiles that with <UDIM> in place of their numbers.
     width, height : texels; of UDIM tiles those of the largest.
     files : files of UDIM tiles; the report has this key for them alone.
+    exposure : factor that the file's values were multiplied by; radiance is a value divided by it.
     seconds : wall-clock time.
     estimated_seconds : the same, as estimated before the bake.
     output : the requested pass, LUMINANCE, IRRADIANCE or DIRECTION.
@@ -47,6 +48,7 @@ class BakeRecord:
     dark: bool = False
     estimated_seconds: float = 0.0
     files: list[str] = field(default_factory=list)
+    exposure: float = 1.0
 
     @classmethod
     def of(cls, bake: Bake, frame: int) -> BakeRecord:
@@ -65,7 +67,7 @@ class BakeRecord:
             tiles = job.receiver.tiling.sizes if bake.path else {}
             size = max(job.receiver.tiling.sizes.values())
         files = [bake.path.replace("<UDIM>", str(number)) for number in tiles]
-        rest = bake.is_dark, round(bake.estimated_seconds, 3), files
+        rest = bake.is_dark, round(bake.estimated_seconds, 3), files, bake.exposure
         return cls(*subject, *size, *outcome, job.settings.output, *lights, *rest)
 
     def entry(self) -> dict:

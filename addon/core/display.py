@@ -1,0 +1,86 @@
+"""Files that hold no values above 1: exposure that brings values there, sRGB encoding, and PNG.
+
+An *exposure* is the factor that texels of a file were multiplied by; the radiance is the decoded value divided by it.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import zlib
+
+import numpy as np
+
+EXPOSURE = "beamspread:exposure"
+"""Attribute of EXR files and text of PNG files: the exposure of the file. HDR files have their own EXPOSURE line."""
+
+AUTO = "auto"
+"""Exposure by the largest value."""
+
+
+def auto_exposure(texture: np.ndarray) -> float:
+    """Largest power of two, at most 1, that brings all finite values to 1 or below.
+
+    A power of two changes no digit of a value, and is a whole number of stops.
+    """
+    finite = texture[np.isfinite(texture)]
+    largest = float(finite.max(initial=0.0))
+    return 1.0 if largest <= 1 else 0.5 ** math.ceil(math.log2(largest))
+
+
+def to_srgb(linear: np.ndarray) -> np.ndarray:
+    """Encode linear values with the sRGB transfer function (IEC 61966-2-1), clipped to 0..1."""
+    clipped = np.clip(linear, 0, 1)
+    return np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055).astype(np.float32)
+
+
+def png(texture: np.ndarray, bits: int = 8, exposure: float = 1.0) -> bytes:
+    """Content of a PNG file: linear RGB (height, width, 3), row 0 at the bottom, times the exposure, as sRGB.
+
+    Blender writes no text into a PNG of 16 bits, so the chunks are made here (ISO/IEC 15948); zlib packs them.
+
+    Parameters
+    ----------
+    bits : of each number, 8 or 16.
+    exposure : also stored as the file's text `EXPOSURE`, unless it is 1.
+
+    8 bits are rounded up or down by fixed random numbers, so that dark areas keep their mean and show no bands.
+    """
+    if bits not in (8, 16):
+        raise ValueError(f"bits = {bits}, must be 8 or 16")
+    height, width = texture.shape[:2]
+    encoded = to_srgb(np.nan_to_num(texture[::-1] * np.float32(exposure)))
+    threshold = np.random.default_rng(1).random(encoded.shape, np.float32) if bits == 8 else np.float32(0.5)
+    numbers = np.floor(encoded * np.float32(2**bits - 1) + threshold).astype(np.uint8 if bits == 8 else ">u2")
+    rows = numbers.reshape(height, -1).view(np.uint8)
+    unfiltered = np.zeros((height, 1), np.uint8)  # type of filter of each row
+    text = f"{EXPOSURE}\0{exposure!r}".encode("latin-1")
+    chunks = [
+        (b"IHDR", struct.pack(">IIBBBBB", width, height, bits, 2, 0, 0, 0)),
+        (b"sRGB", b"\0"),
+        *([(b"tEXt", text)] if exposure != 1 else []),
+        (b"IDAT", zlib.compress(np.hstack([unfiltered, rows]).tobytes(), 6)),
+        (b"IEND", b""),
+    ]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, content) for kind, content in chunks)
+
+
+def png_exposure(content: bytes) -> float:
+    """Exposure of a PNG file; 1 if the file names none."""
+    return float(_texts(content).get(EXPOSURE, "1"))
+
+
+def _chunk(kind: bytes, content: bytes) -> bytes:
+    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+
+
+def _texts(content: bytes) -> dict[str, str]:
+    """Texts of a PNG file by their keywords."""
+    found, start = {}, 8
+    while start + 8 <= len(content):
+        size, kind = struct.unpack(">I4s", content[start : start + 8])
+        if kind == b"tEXt":
+            keyword, _, text = content[start + 8 : start + 8 + size].decode("latin-1").partition("\0")
+            found[keyword] = text
+        start += size + 12
+    return found

@@ -1,0 +1,58 @@
+"""Exposure and PNG files, read by Pillow."""
+
+import io
+
+import numpy as np
+import pytest
+from beamspread.core.display import auto_exposure, png, png_exposure, to_srgb
+from PIL import Image
+
+
+def test_exposure_is_the_largest_power_of_two_that_fits():
+    assert auto_exposure(np.zeros((2, 2, 3))) == 1
+    assert auto_exposure(np.full((2, 2, 3), 1.0)) == 1
+    assert auto_exposure(np.full((2, 2, 3), 1.001)) == 0.5
+    assert auto_exposure(np.full((2, 2, 3), 8.0)) == 0.125
+    assert auto_exposure(np.array([np.nan, np.inf, 3.0])) == 0.25
+
+
+@pytest.mark.parametrize("exposure", [1.0, 0.25])
+def test_eight_bits_are_rounded_up_or_down_and_keep_means(exposure):
+    texture = np.random.default_rng(2).random((64, 48, 3), np.float32) * 0.02
+    picture = Image.open(io.BytesIO(png(texture, 8, exposure)))
+    assert (picture.mode, picture.size) == ("RGB", (48, 64))
+    stored = np.asarray(picture, float)[::-1]
+    exact = 255 * to_srgb(texture * exposure).astype(float)
+    assert np.abs(stored - exact).max() < 1
+    # 9216 roundings, whose errors have a standard deviation of .4: 5 sigma.
+    assert abs((stored - exact).mean()) < 5 * 0.4 / np.sqrt(stored.size)
+    assert picture.info.get("beamspread:exposure") == (None if exposure == 1 else "0.25")
+
+
+def test_sixteen_bits_are_exact():
+    texture = np.linspace(0, 1.5, 5 * 7 * 3, dtype=np.float32).reshape(5, 7, 3)
+    content = png(texture, 16, 0.5)
+    assert content[24:26] == b"\x10\x02"  # bits, RGB
+    rows = content.split(b"IDAT")[1]
+    import zlib
+
+    lines = np.frombuffer(zlib.decompressobj().decompress(rows), np.uint8).reshape(5, 1 + 7 * 6)[::-1, 1:]
+    numbers = lines.copy().view(">u2").astype(float).reshape(5, 7, 3)
+    assert np.abs(numbers - 65535 * to_srgb(texture * 0.5).astype(float)).max() <= 0.51
+    Image.open(io.BytesIO(content)).verify()  # checksums
+
+
+def test_black_and_white_stay_and_row_0_is_the_lowest():
+    texture = np.zeros((2, 3, 3), np.float32)
+    texture[0] = 1
+    shown = np.asarray(Image.open(io.BytesIO(png(texture))))
+    assert (shown[0] == 0).all()
+    assert (shown[1] == 255).all()
+
+
+def test_the_exposure_is_in_the_file():
+    texture = np.zeros((2, 2, 3), np.float32)
+    assert png_exposure(png(texture, 8, 2**-20)) == 2**-20
+    assert png_exposure(png(texture)) == 1
+    with pytest.raises(ValueError, match="bits = 12"):
+        png(texture, 12)
