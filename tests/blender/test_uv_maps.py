@@ -332,10 +332,10 @@ def test_live_asks_for_a_bake_and_then_follows():
     assert any("Bake it: Beamspread's own Bake makes a UV map." in line for line in live_lines())
     baked = scenes.bake(box)[0]
     settle()
-    assert live_lines() == []
+    assert "UV map" not in str(live_lines())
     box.location.x = 0.2
     live = live_pixels(box.data.materials[0])
-    assert live_lines() == []
+    assert all("bends more than its medium is known for" in line for line in live_lines())
     switch_off()
     np.testing.assert_allclose(live, scenes.bake(box)[0], rtol=1e-4, atol=1e-6)
     assert np.abs(live - baked).max() > 0
