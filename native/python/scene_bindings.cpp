@@ -139,6 +139,26 @@ Array<double> node_vectors(const std::vector<Vec3>& vectors)
     return to_array<double>(std::vector<Vec3>(vectors), {vectors.size(), std::size_t{3}});
 }
 
+// Places above the texels of each node, evenly spread over its area, and the normals there.
+py::tuple node_starts(const BentNodes& nodes, std::size_t count)
+{
+    if (count < 1 || count > 64)
+        reject("count", std::to_string(count), "1 to 64 places");
+    std::vector<Vec3> origins, normals;
+    for (std::size_t node = 0; node < nodes.size(); ++node) {
+        for (std::size_t i = 0; i < count; ++i) {
+            const BentNodes::Start start =
+                nodes.start(node, (static_cast<double>(i) + 0.5) / static_cast<double>(count));
+            origins.push_back(start.origin);
+            normals.push_back(start.frame.z);
+        }
+    }
+    const auto array = [&](std::vector<Vec3>&& vectors) {
+        return to_array<double>(std::move(vectors), {nodes.size(), count, std::size_t{3}});
+    };
+    return py::make_tuple(array(std::move(origins)), array(std::move(normals)));
+}
+
 // Radiance (K, N, 3) at the nodes of a mesh.
 Array<float> without_repeats(const std::vector<Vec3f>& radiance, const NodeGrid& grid)
 {
@@ -298,7 +318,25 @@ ValueError
             "ndarray, float64, shape (N, 3): unit vectors.")
         .def_property_readonly(
             "spacing", [](const BentNodes& nodes) { return nodes.cloud().spacing(); },
-            "float: distance of neighbors, about, metres.");
+            "float: distance of neighbors, about, metres.")
+        .def("starts", &node_starts, py::arg("count"),
+             R"(Places where light arrives at each node, slightly above its texels.
+
+Parameters
+----------
+count : int
+    Places in each node, 1 to 64, evenly spread over its area.
+
+Returns
+-------
+positions, normals : ndarray, float64, shape (N, count, 3)
+    World, metres, and unit vectors.
+
+Raises
+------
+ValueError
+    `count` is out of range.
+)");
 
     bind_lights(m);
     m.def("coverage", &coverage, py::arg("corners"), py::arg("corner_counts"), py::arg("width"), py::arg("height"),

@@ -33,7 +33,7 @@ def test_the_filter_knows_its_error(child_filter, variance):
     inside[10:20, 15:30] = True
     clean[inside] = 0
     halves = [np.float32(clean * (1 + 0.3 * rng.standard_normal((80, 96, 1)))) for _ in range(2)]
-    filtered, noise, blur = child_filter.filter_map(*halves, inside, variance)
+    filtered, noise, blur = child_filter.filter_map(*halves, inside, variance, child_filter.Grid())
     assert not filtered[inside].any()
     np.testing.assert_allclose(filtered.mean(axis=(0, 1)), np.mean(halves, axis=(0, 1, 2)), rtol=1e-5)
     error = (filtered - clean).mean(axis=-1)
@@ -49,10 +49,10 @@ def test_the_filter_knows_its_error(child_filter, variance):
 def test_nodes_that_are_dark_by_chance_are_no_insides(child_filter):
     rng = np.random.default_rng(1)
     rare = np.float32(rng.random((32, 40, 40, 1)) < 0.01) * np.ones(3, np.float32)
-    assert not child_filter.insides(rare).any()
+    assert not child_filter.insides(rare, child_filter.Grid()).any()
     covered = np.ones((32, 40, 40, 3), np.float32)
     covered[:, 10:13, 10:14] = 0
-    np.testing.assert_array_equal(child_filter.insides(covered), ~covered.any(axis=(0, 3)))
+    np.testing.assert_array_equal(child_filter.insides(covered, child_filter.Grid()), ~covered.any(axis=(0, 3)))
 
 
 FRAMES = {

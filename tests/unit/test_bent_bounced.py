@@ -56,6 +56,18 @@ def arriving(light, texels=TEXELS, **options):
     return native.bake_arrival(native.Surface(texels.native()), [(light, list(WHITE), None)], **options)
 
 
+def test_places_of_a_node_lie_above_its_texels(nodes):
+    positions, normals = nodes.starts(8)
+    assert positions.shape == normals.shape == (len(nodes.positions), 8, 3)
+    # Texels of a ball of radius 1 of triangles, which lie up to .5 % of it below.
+    np.testing.assert_allclose(np.linalg.norm(positions, axis=-1), 1, atol=6e-3)
+    assert (np.linalg.norm(positions - nodes.positions[:, None], axis=-1) < 2 * nodes.spacing).all()
+    assert np.ptp(positions, axis=1).max() > nodes.spacing / 4
+    np.testing.assert_allclose(normals, positions / np.linalg.norm(positions, axis=-1, keepdims=True), atol=0.03)
+    with pytest.raises(ValueError, match="count"):
+        nodes.starts(0)
+
+
 def test_nodes_lie_on_the_mesh_and_are_about_as_many_as_wanted(nodes):
     assert 512 < len(nodes.positions) < 2048
     radii = np.linalg.norm(nodes.positions, axis=1)

@@ -1,4 +1,4 @@
-"""Light that arrives at coarse grids on planes, by direction, path traced by Cycles with the artist's materials.
+"""Light that arrives at coarse nodes on planes and bodies, by direction, path traced by Cycles with the materials.
 
 Part of the child process (child.py).
 """
@@ -8,7 +8,7 @@ import math
 import bpy
 import compat
 import numpy as np
-from child_filter import filter_map, insides, smooth
+from child_filter import Cloud, Grid, filter_map, insides, smooth
 from child_ghost import add_ghost, draw_anew
 
 # Samples of each half, node and stratum in the first round, which shows how much there is to find. More take longer
@@ -36,6 +36,7 @@ DIM = 0.01
 
 def fields(request, scene, progress) -> dict:
     """Task `fields`: radiance_0, radiance_1, ... of the charts, float32 (K, rows, columns, 3), and noise.
+    Nodes of bodies are (K, N, 1, 3).
 
     `light` is "INDIRECT" or "DIRECT". `only` names the objects whose light counts; none: all. With `by_lamps` a white
     diffuse surface of one stratum replaces the mirrors, so that Cycles samples lamps of any size; with
@@ -109,13 +110,14 @@ class Chart:
     noise, blur : mean squares of its errors.
     """
 
-    def __init__(self, request, first, second) -> None:
+    def __init__(self, request, neighbors, first, second) -> None:
         _, reach, _, part = np.transpose(request["strata"])
         halves = [np.tensordot(np.float32(reach * part), values, 1) for values in (first, second)]
         self._radiance = (first + second) / 2
-        self._inside = insides(self._radiance)
+        self._neighbors = neighbors
+        self._inside = insides(self._radiance, neighbors)
         self._noisy = (halves[0] + halves[1]) / 2
-        self.clean, self.noise, self.blur = filter_map(*halves, self._inside, request["variance"])
+        self.clean, self.noise, self.blur = filter_map(*halves, self._inside, request["variance"], neighbors)
 
     def radiance(self):
         """Radiance of the strata, in proportion to the clean irradiance; dark nodes have their neighbors' mean."""
@@ -124,8 +126,8 @@ class Chart:
         for passes in (1, 4, 16, 64):
             if lit[~self._inside].all():
                 break
-            wide = np.stack([smooth(values, weights, passes) for values in self._radiance])
-            wide_noisy = smooth(self._noisy, weights, passes)
+            wide = np.stack([smooth(values, weights, passes, self._neighbors) for values in self._radiance])
+            wide_noisy = smooth(self._noisy, weights, passes, self._neighbors)
             radiance, noisy = np.where(lit, radiance, wide), np.where(lit, noisy, wide_noisy)
             lit = noisy > 0
         return radiance * np.divide(self.clean, noisy, out=np.zeros_like(noisy), where=noisy > 0)
@@ -284,7 +286,18 @@ def baker_of(request, scene):
 
 def charts_of(request, pixels) -> list:
     """The light on each chart, from the pixels of an image."""
-    return [Chart(request, *halves) for halves in halves_of(request, np.maximum(pixels, 0))]
+    halves = halves_of(request, np.maximum(pixels, 0))
+    return [Chart(request, neighbors_of(chart), *pair) for chart, pair in zip(request["charts"], halves)]
+
+
+def neighbors_of(chart):
+    """The neighbors of the nodes of a chart, found once."""
+    if "positions" not in chart:
+        return Grid()
+    if "neighbors" not in chart:
+        first = (np.array(chart[name])[:, 0] for name in ("positions", "normals"))
+        chart["neighbors"] = Cloud(*first, chart["spacing"])
+    return chart["neighbors"]
 
 
 class Baker:
@@ -328,11 +341,17 @@ class Baker:
 
 
 def halves_of(request, pixels) -> list:
-    """Both halves of the samples of each chart, (K, rows, columns, 3), from the pixels of the image."""
+    """Both halves of the samples of each chart, (K, rows, columns, 3), from the pixels of the image.
+
+    Nodes of a mesh that bends are (K, N, 1, 3).
+    """
     halves, row, count = [], 0, len(request["strata"])
     for chart in request["charts"]:
         columns, rows = chart["nodes"]
         block = pixels[row : row + rows, : 2 * count * columns].reshape(rows, 2, count, columns, 3)
-        halves.append(np.ascontiguousarray(block.transpose(1, 2, 0, 3, 4)))
+        block = np.ascontiguousarray(block.transpose(1, 2, 0, 3, 4))
+        if "positions" in chart:
+            block = block.reshape(2, count, -1, 1, 3)[:, :, : len(chart["positions"])]
+        halves.append(block)
         row += rows
     return halves

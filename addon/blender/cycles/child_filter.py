@@ -19,6 +19,9 @@ LOCAL_PASSES = 96
 # Factor of the mean squared error over its estimate, which is of the same samples as the choice of the widths.
 HIDDEN_ERROR = 1.4
 
+# Neighbors of a node in space, and nodes whose neighbors are found at once. More neighbors: wider tails, more time.
+NEAREST, CHUNK = 16, 256
+
 # Fraction of the strata with light around a dark node, from which the node counts as the inside of an object.
 # Larger values darken surfaces beside objects; smaller ones brighten those that light seldom reaches.
 LIT_STRATA = 0.25
@@ -34,13 +37,14 @@ def node_share(passes: int) -> float:
     return (math.comb(4 * passes, 2 * passes) / 16**passes) ** 2
 
 
-def filter_map(first, second, inside, variance):
+def filter_map(first, second, inside, variance, neighbors):
     """The filtered mean of two independent maps, float32 (rows, columns, 3), and mean squares of its error.
 
     Parameters
     ----------
     inside : bool (rows, columns), nodes inside of objects, which stay dark and don't count.
     variance : of the Gaussian that reduces noise as much as all that follows, in squared distances of nodes.
+    neighbors : `Grid` or `Cloud`; the nodes of the latter are rows of one column.
 
     Returns
     -------
@@ -50,22 +54,23 @@ def filter_map(first, second, inside, variance):
     if not lit.any():
         return np.zeros_like(first), 0.0, 0.0
     difference = ((first - second).mean(axis=-1)) ** 2 / 2
-    local_variance = smooth(difference, lit, LOCAL_PASSES)
+    local_variance = smooth(difference, lit, LOCAL_PASSES, neighbors)
     costs, versions = [], []
     sides = [first, second]
     done = 0
     for passes in PASSES:
-        sides = [smooth(side, lit, passes - done) for side in sides]
+        sides = [smooth(side, lit, passes - done, neighbors) for side in sides]
         done = passes
         crossed = sum(((a - b).mean(axis=-1)) ** 2 for a, b in zip(sides, (second, first))) / 2
         blur = crossed - (1 + node_share(passes)) * difference  # square of the blur, on average
         noise = final_share(passes, variance) / 2
-        costs.append(smooth(crossed, lit, LOCAL_PASSES) + (noise - 1 - node_share(passes)) * local_variance)
+        local_error = smooth(crossed, lit, LOCAL_PASSES, neighbors)
+        costs.append(local_error + (noise - 1 - node_share(passes)) * local_variance)
         versions.append(((sides[0] + sides[1]) / 2, blur, noise * difference))
     best = np.argmin(costs, axis=0)
     result, blurs, noises = np.zeros_like(first), np.zeros(lit.shape), np.zeros(lit.shape)
     for number, (values, blur, noise) in enumerate(versions):
-        chosen = smooth((best == number).astype(np.float32), lit, 1)
+        chosen = smooth((best == number).astype(np.float32), lit, 1, neighbors)
         result += chosen[..., None] * values
         blurs += chosen * blur
         noises += chosen * noise
@@ -75,21 +80,56 @@ def filter_map(first, second, inside, variance):
     return result, HIDDEN_ERROR * float((noises * lit).mean()), HIDDEN_ERROR * max(float((blurs * lit).mean()), 0.0)
 
 
-def smooth(values, lit, passes: int):
+def smooth(values, lit, passes: int, neighbors):
     """Means of the neighbors that are lit, after these passes."""
     if not passes:
         return values
     weights = lit if values.ndim == 2 else lit[..., None]
-    total, weight = _passed(values * weights, passes), _passed(weights, passes)
+    total, weight = neighbors.passed(values * weights, passes), neighbors.passed(weights, passes)
     return np.divide(total, weight, out=np.zeros_like(total), where=weight > 1e-6) * weights
 
 
-def _passed(values, passes: int):
-    """The values after these passes along both axes; beyond the border they go on with the last one."""
-    down, across = (_matrix(length, passes) for length in values.shape[:2])
-    return np.einsum(
-        "ij,jk...->ik...", down, np.einsum("kl,jl...->jk...", across, values, optimize=True), optimize=True
-    )
+class Grid:
+    """Neighbors on a plane."""
+
+    @staticmethod
+    def passed(values, passes: int):
+        """The values after these passes along both axes; beyond the border they go on with the last one."""
+        down, across = (_matrix(length, passes) for length in values.shape[:2])
+        return np.einsum(
+            "ij,jk...->ik...", down, np.einsum("kl,jl...->jk...", across, values, optimize=True), optimize=True
+        )
+
+
+class Cloud:
+    """Neighbors among nodes in space, for which a pass is about as wide as one on a grid.
+
+    Parameters
+    ----------
+    positions, normals : (N, 3).
+    spacing : distance of neighbors, about.
+    """
+
+    def __init__(self, positions, normals, spacing: float) -> None:
+        positions, normals = np.asarray(positions), np.asarray(normals)
+        count = min(NEAREST, len(positions))
+        self._nearest = np.empty((len(positions), count), np.intp)
+        self._weights = np.empty((len(positions), count), np.float32)
+        squares = (positions**2).sum(1)
+        for first in range(0, len(positions), CHUNK):
+            part = slice(first, first + CHUNK)
+            squared = squares[part, None] + squares - 2 * positions[part] @ positions.T
+            nearest = np.argpartition(squared, count - 1, axis=1)[:, :count]
+            distance = np.maximum(np.take_along_axis(squared, nearest, 1), 0)
+            alike = np.maximum(np.einsum("ni,nki->nk", normals[part], normals[nearest]), 0)
+            weights = np.exp(-distance / spacing**2) * alike + 1e-30
+            self._nearest[part], self._weights[part] = nearest, weights / weights.sum(1, keepdims=True)
+
+    def passed(self, values, passes: int):
+        """The values (N, 1, ...) after these passes."""
+        for _ in range(passes):
+            values = np.einsum("nk,nk...->n...", self._weights, values[self._nearest])
+        return values
 
 
 @lru_cache(maxsize=32)
@@ -101,7 +141,7 @@ def _matrix(length: int, passes: int):
     return np.linalg.matrix_power(once, passes).astype(np.float32)
 
 
-def insides(radiance):
+def insides(radiance, neighbors):
     """Nodes inside of objects, bool (rows, columns): dark ones, among nodes that most strata light.
 
     `radiance` is (K, rows, columns, 3). Nodes that are dark by chance, where light is rare, are no insides.
@@ -109,6 +149,6 @@ def insides(radiance):
     fraction = (radiance.any(axis=-1)).mean(axis=0)
     dark = fraction == 0
     total, weight = fraction.astype(np.float32), (~dark).astype(np.float32)
-    total, weight = _passed(total, 2), _passed(weight, 2)
+    total, weight = neighbors.passed(total, 2), neighbors.passed(weight, 2)
     around = np.divide(total, weight, out=np.zeros_like(total), where=weight > 0)
     return dark & (around > LIT_STRATA)

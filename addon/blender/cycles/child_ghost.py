@@ -1,4 +1,4 @@
-"""Mirrors that gather the light that arrives at a plane, by direction, when Cycles bakes them.
+"""Mirrors that gather the light that arrives at planes and bodies, by direction, when Cycles bakes them.
 
 Part of the child process (child.py). A bake looks straight down on each of its points. A sharp mirror whose shading
 normal lies halfway between that view and a direction w shows the radiance that arrives from w. Here w is drawn at
@@ -13,8 +13,17 @@ import numpy as np
 
 STRATUM, AXES = "stratum", ("x_axis", "y_axis", "z_axis")
 
+# Corners of a square, counter-clockwise.
+AROUND = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+AXES_OF_PLANE = "x_axis", "y_axis", "normal"
+
 # Node that differs from round to round: the first sample of each bake is at the middle of its texel for any seed.
 ROUND = "Round"
+
+
+# Side of the mirrors at nodes of a mesh that bends, as fractions of their distance and of the largest coordinate.
+# Larger ones cut into the mesh where it bends; smaller ones lose their shape to rounding.
+SIDE_IN_SPACINGS, SIDE_IN_REACH = 1e-3, 1e-5
 
 
 def add_ghost(charts, strata, is_diffuse=False):
@@ -22,35 +31,26 @@ def add_ghost(charts, strata, is_diffuse=False):
 
     Parameters
     ----------
-    charts : dicts with corner, x_axis, y_axis, normal, size (2), nodes (columns, rows).
+    charts : dicts with nodes (columns, rows), and corner, x_axis, y_axis, normal, size (2) of a plane, or positions and
+        normals (N, starts, 3) and spacing of the nodes of a mesh that bends.
     is_diffuse : True if white diffuse surfaces replace the mirrors.
     strata : (K, 4): begin and length of r^2, begin and length of the azimuth / 2 pi.
     """
     width = max(chart["nodes"][0] for chart in charts) * len(strata)
     height = sum(chart["nodes"][1] for chart in charts)
-    corners, uvs, values, axes = [], [], [], ([], [], [])
-    row = 0
+    parts, row = [], 0
     for chart in charts:
-        columns, rows = chart["nodes"]
-        x_axis, y_axis, normal = (np.array(chart[name]) for name in ("x_axis", "y_axis", "normal"))
-        across, up = chart["size"][0] * x_axis, chart["size"][1] * y_axis
-        corner = np.array(chart["corner"])
-        # Counter-clockwise as seen from outside; a mirrored UV map makes the frame left-handed.
-        around = [(0, 0), (1, 0), (1, 1), (0, 1)]
-        if np.dot(np.cross(x_axis, y_axis), normal) < 0:
-            around.reverse()
-        for number, stratum in enumerate(strata):
-            corners += [corner + u * across + v * up for u, v in around]
-            uvs += [((number + u) * columns / width, (row + v * rows) / height) for u, v in around]
-            values += [stratum] * 4
-            for filled, axis in zip(axes, (x_axis, y_axis, normal)):
-                filled += [axis] * 4
-        row += rows
+        quads_of = _quads_at_nodes if "positions" in chart else _quads_of_plane
+        parts.append(quads_of(chart, np.array(strata, float), row))
+        row += chart["nodes"][1]
+    corners, uvs, values, axes = (np.concatenate(arrays) for arrays in zip(*parts))
     mesh = bpy.data.meshes.new("Beamspread ghost")
-    mesh.from_pydata([tuple(point) for point in corners], [], np.arange(len(corners)).reshape(-1, 4).tolist())
+    mesh.from_pydata(corners.reshape(-1, 3).tolist(), [], np.arange(4 * len(corners)).reshape(-1, 4).tolist())
+    uvs = uvs / (width, height)
     mesh.uv_layers.new(name="UVMap").data.foreach_set("uv", np.ravel(uvs).astype(np.float32))
-    mesh.attributes.new(STRATUM, "FLOAT_COLOR", "POINT").data.foreach_set("color", np.ravel(values).astype(np.float32))
-    for name, filled in zip(AXES, axes):
+    values = np.repeat(values, 4, 0).astype(np.float32)
+    mesh.attributes.new(STRATUM, "FLOAT_COLOR", "POINT").data.foreach_set("color", values.ravel())
+    for name, filled in zip(AXES, np.repeat(axes, 4, 0).transpose(1, 0, 2)):
         mesh.attributes.new(name, "FLOAT_VECTOR", "POINT").data.foreach_set(
             "vector", np.ravel(filled).astype(np.float32)
         )
@@ -61,6 +61,45 @@ def add_ghost(charts, strata, is_diffuse=False):
     for kind in ("camera", "diffuse", "glossy", "transmission", "shadow"):
         setattr(obj, f"visible_{kind}", False)
     return obj, image
+
+
+def _quads_of_plane(chart, strata, row):
+    """A mirror over the whole plane for each stratum: corners (Q, 4, 3), texels (Q, 4, 2), strata (Q, 4), and axes
+    (Q, 3, 3).
+    """
+    columns, rows = chart["nodes"]
+    x_axis, y_axis, normal = (np.array(chart[name]) for name in AXES_OF_PLANE)
+    # Counter-clockwise as seen from outside; a mirrored UV map makes the frame left-handed.
+    around = AROUND if np.dot(np.cross(x_axis, y_axis), normal) > 0 else AROUND[::-1]
+    corners = np.array(chart["corner"]) + around * chart["size"] @ np.stack([x_axis, y_axis])
+    texels = around * (columns, rows) + (0, row) + np.arange(len(strata))[:, None, None] * (columns, 0)
+    count = len(strata)
+    axes = np.stack([x_axis, y_axis, normal])
+    return np.broadcast_to(corners, (count, 4, 3)), texels, strata, np.broadcast_to(axes, (count, 3, 3))
+
+
+def _quads_at_nodes(chart, strata, row):
+    """A small mirror for each node and stratum, as of `_quads_of_plane`; strata start from different places."""
+    positions, normals = (np.array(chart[name]) for name in ("positions", "normals"))
+    nodes, starts = positions.shape[:2]
+    number, node = (values.ravel() for values in np.meshgrid(np.arange(len(strata)), np.arange(nodes), indexing="ij"))
+    # The places of both halves of a stratum differ, so that their difference shows how light changes in a node.
+    half, stratum = np.divmod(number, max(len(strata) // 2, 1))
+    start = (3 * stratum + half * (starts // 2) + node) % starts
+    centers, axes = positions[node, start], frames(normals[node, start])
+    side = SIDE_IN_SPACINGS * chart["spacing"] + SIDE_IN_REACH * np.abs(positions).max()
+    corners = centers[:, None] + (AROUND - 0.5) * side @ axes[:, :2]
+    columns = chart["nodes"][0]
+    first = np.stack([number * columns + node % columns, row + node // columns], 1)
+    return corners, first[:, None] + AROUND, strata[number], axes
+
+
+def frames(normals):
+    """Axes x, y, z (..., 3, 3) around unit normals (..., 3), as of `beamspread._native.BentNodes`."""
+    x, y, z = np.moveaxis(normals, -1, 0)
+    a = 1 / np.maximum(1 + z, 1e-12)
+    b = -x * y * a
+    return np.stack([np.stack([1 - x * x * a, b, -x], -1), np.stack([b, 1 - y * y * a, -y], -1), normals], -2)
 
 
 def draw_anew(ghost, number: int) -> None:

@@ -19,9 +19,9 @@ from ...core.bake.bounced import (
     NOISY,
     NOTHING_BOUNCES,
     BouncedLight,
+    bent_nodes_of,
     charts_of,
     mean_over,
-    not_on_bent,
 )
 from ...core.bake.estimate import cycles_light_seconds
 from ...core.bake.job import BakeJob, Step
@@ -31,7 +31,7 @@ from ...core.errors import MissingImageError
 from ...core.messages import Message, note, warning
 from ...core.progress import Callback, Progress
 from ...core.scene.bent_grid import AnyGrid, BentGrid
-from ...core.scene.lights import STRATA, Field, FieldLight, Light, WorldLight
+from ...core.scene.lights import STRATA, BentField, Field, FieldLight, Light, WorldLight
 from .. import compat
 from ..read.image_nodes import missing_images
 from ..read.nodes import Links, surface_of
@@ -42,6 +42,9 @@ from .scene_copy import CopyForCycles, SceneCopy
 
 # Nodes along the longest side for direct light of lamps whose nodes only Cycles can evaluate.
 DIRECT_NODES = 256
+
+# Places in each node of a mesh that bends where light arrives. More show better how it changes in a node.
+STARTS = 8
 
 # Samples of each texel of the world's panorama, and of texels in tiles around a sun; more reduce noise.
 WORLD_SAMPLES, SUN_SAMPLES = 2, 256
@@ -97,7 +100,7 @@ class CyclesLight:
         bounced = bounced and self.is_below_something(chart.grid for chart in job.receiver.charts)
         objects = [name for name in illumination.by_cycles if name != world and name in scene.objects]
         if job.receiver.is_bent:
-            objects = []  # fields of light that Cycles computes lie on planes
+            objects = [name for name in objects if name not in self._lamps]  # fields of lamps lie on planes
         if bounced:
             illumination = illumination.with_messages(*self._missing)
             # The world may be one that Cycles renders: our own rays need it as a panorama.
@@ -105,8 +108,6 @@ class CyclesLight:
             if not why_not_own:
                 job = replace(job, steps=(BouncedLight(self._max_bounces), *job.steps))
                 illumination, bounced = illumination.with_messages(BY_OWN_RAYS), False
-            elif job.receiver.is_bent:
-                illumination, bounced = illumination.with_messages(not_on_bent(job.name, why_not_own)), False
         key = self._key_of(world)
         kept = kept_world.kept(key, world)
         if kept is not None:
@@ -234,7 +235,7 @@ class LightByCycles(Step):
 
     def _with_fields(
         self, job: BakeJob, progress: Progress, doing: str, nodes: int = 0, **options
-    ) -> tuple[BakeJob, tuple[Field, ...], float]:
+    ) -> tuple[BakeJob, tuple[Field | BentField, ...], float]:
         """Bounced light, or light as the options ask for: the job with messages, the light, its fraction of all.
 
         The fraction is that of the irradiance without obstacles on both sides; infinite if there is no other light.
@@ -242,8 +243,10 @@ class LightByCycles(Step):
         receiver, lights = job.receiver, job.illumination.lights
         without_obstacles = mean_over(receiver, lambda grid: _open_irradiance_of_both_sides(grid, lights))
         nodes = nodes or NODES
+        bent = bent_nodes_of(receiver, nodes) if receiver.is_bent else []
+        charts = [_chart_of(of_chart) for of_chart in bent] or charts_of(receiver, nodes)
         request = REQUEST | {
-            "charts": charts_of(receiver, nodes),
+            "charts": charts,
             "with_world": self.has_world,
             "reflectances": self.copy.reflectances,
             "textures": self.copy.textures,
@@ -254,14 +257,32 @@ class LightByCycles(Step):
             "most_samples": MAX_SAMPLES,
         }
         arrays = run(self.copy.scene, "fields", request | options, progress, doing)
-        grids = (chart.grid for chart in receiver.charts)
-        fields = tuple(Field(grid.origin, grid.normal, arrays[f"radiance_{n}"]) for n, grid in enumerate(grids))
+        radiances = [arrays[f"radiance_{n}"] for n in range(len(charts))]
+        if bent:
+            fields = tuple(
+                BentField(of_chart.positions, of_chart.normals, of_chart.spacing, radiance[:, :, 0])
+                for of_chart, radiance in zip(bent, radiances)
+            )
+        else:
+            grids = (chart.grid for chart in receiver.charts)
+            fields = tuple(Field(grid.origin, grid.normal, radiance) for grid, radiance in zip(grids, radiances))
         noise, irradiance = float(arrays["noise"]), float(arrays["irradiance"])
         fraction = irradiance / without_obstacles if without_obstacles > 0 else math.inf * (irradiance > 0)
         if fraction >= NEGLIGIBLE and noise > NOISY * NOISE:
             text = f"{doing} on '{job.name}' ended with {100 * noise:.1f} % of noise, relative to all light there."
             job = replace(job, illumination=job.illumination.with_messages(note(job.name, text)))
         return job, fields, fraction
+
+
+def _chart_of(nodes) -> dict:
+    """The nodes of a mesh that bends, for the child process; they are rows of up to `NODES` columns."""
+    positions, normals = nodes.starts(STARTS)
+    return {
+        "positions": positions.tolist(),
+        "normals": normals.tolist(),
+        "spacing": nodes.spacing,
+        "nodes": [NODES, -(-len(positions) // NODES)],
+    }
 
 
 def _finder_note(names: Sequence[str]) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..messages import Message, note, warning
+from ..messages import note, warning
 from ..native import native
 from ..progress import Progress
 from ..scene.grid import Grid
@@ -39,14 +39,6 @@ NEGLIGIBLE = 1e-6
 NOTHING_BOUNCES = warning(
     "", "Indirect light is left out: it is less than a millionth of what the lights send without obstacles."
 )
-
-
-def not_on_bent(name: str, problem: str) -> Message:
-    """The warning about bounced light on an object that bends; `problem` says why only Cycles could find it."""
-    text = f"Light that bounces is left out of '{name}', which bends: Cycles finds it on planes alone. {problem}"
-    return warning(name, text, "Hide what only Cycles knows from renders, or turn Indirect off.")
-
-
 BY_OWN_RAYS = note("", "Beamspread's own rays find the bounced light.")
 
 

@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(beamspread.__file__).with_name("blender") / "cycles"
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blender"))
 import child_fields
 import scenes
-from child_filter import filter_map, insides
+from child_filter import Grid, filter_map, insides
 from child_ghost import add_ghost
 
 NODES, LOOKS, TEXELS = 64, 3, 256
@@ -115,7 +115,10 @@ def main():
         start = time.process_time()
         halves = [irradiances(baker.bake(count)) for _ in range(LOOKS)]
         seconds = (time.process_time() - start) / LOOKS
-        clean = [filter_map(*pair, insides(np.ones((1, NODES, NODES, 3))), SPLINE_VARIANCE) for pair in halves]
+        clean = [
+            filter_map(*pair, insides(np.ones((1, NODES, NODES, 3)), Grid()), SPLINE_VARIANCE, Grid())
+            for pair in halves
+        ]
         estimate = math.sqrt(np.mean([noise + blur for _, noise, blur in clean])) / mean
         pair, cells = ([one.mean(axis=0) for one in halves], [one for one, _, _ in clean]), []
         for view in (lambda values: values, between_nodes, in_blocks):
