@@ -213,7 +213,8 @@ def test_a_panel_shows_a_message_of_object_and_last_bake_once(monkeypatch):
     bpy.ops.object.select_all(action="DESELECT")
     stale.refresh(bpy.context)
     bake_panel.draw_bake(MagicMock(), bpy.context)
-    assert said == ["Grouped: Failed", message.replace("Grouped / Grouped: ", "")]
+    nothing = "No selected object has a Beamspread node"
+    assert said == [nothing, "Grouped: Failed", message.replace("Grouped / Grouped: ", "")]
 
 
 def test_messages_go_with_the_file():

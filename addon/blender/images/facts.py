@@ -157,6 +157,18 @@ def record_of(image, target: Target) -> Record | None:
     return record if record is not None and record.parts else None
 
 
+def follow_name(image, target: Target) -> None:
+    """Keep the record of a target that was renamed under its new name: a copy would make its old name ambiguous."""
+    facts = facts_of(image)
+    if target in facts.bakes or image.library is not None:
+        return
+    users = users_of(image)
+    old = next((name for name in facts.bakes if name not in users and _known_as(name, users) == [target]), None)
+    if old is not None:
+        facts.bakes = {target if name == old else name: record for name, record in facts.bakes.items()}
+        set_facts(image, facts)
+
+
 def owners_of(image, users: list[Target] | None = None) -> list[Target]:
     """Targets whose results the image holds and that still show it, by their present names.
 

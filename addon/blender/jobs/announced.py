@@ -14,8 +14,8 @@ from ...core.bake.estimate import OF_MESHES, OF_WORLD
 from ...core.bake.forecast import Finders, Forecast, seconds_of
 from ...core.bake.pace import Estimate
 from ...core.bake.spread import Spread, image_length, spread_over_edges
-from ...core.errors import BakeError, MaterialError
-from ...core.scene.flat_mesh import bends
+from ...core.errors import BakeError, MaterialError, ReceiverError
+from ...core.scene.flat_mesh import NO_FACES, bends
 from ...core.scene.lights import Light, WorldLight
 from ...core.scene.receiver import Grid
 from ...core.target import Target
@@ -53,6 +53,10 @@ MAX_LINES = 4
 MIN_SIMULATION = 1.0
 
 
+NO_SHAPE = 0.0, False, None
+"""Shape of a target about which nothing is known."""
+
+
 def announce(context, targets: list[Target]) -> dict[Target, Announced]:
     """Estimates for bakes of these targets; those about which too little is known are left out."""
     if len(targets) > MAX_TARGETS:
@@ -63,9 +67,12 @@ def announce(context, targets: list[Target]) -> dict[Target, Announced]:
     facts = _SceneFacts(scene, view_layer, depsgraph)
     announced = {}
     bent_materials.clear()
+    state.refused.clear()
     for target in targets:
         bakes = [item for item in targets_of(objects[target.object_name]) if item.name == target]
-        length, is_bent = _shape(bakes[0], depsgraph) if bakes and _is_valid(bakes[0]) else (0.0, False)
+        length, is_bent, error = _shape(bakes[0], depsgraph) if bakes and _is_valid(bakes[0]) else NO_SHAPE
+        if error is not None:
+            state.refused[target] = error
         bent_materials.update([target.material_name] if is_bent else [])
         forecast = facts.forecast(bakes[0], _side(bakes[0], length, scene), is_bent) if length else None
         if forecast is not None:
@@ -194,14 +201,15 @@ def _side(target: BakeTarget, length: float, scene) -> int:
     return scene.beamspread.side_for(length, target.node.surface(), target.node.has_texture())
 
 
-def _shape(target: BakeTarget, depsgraph) -> tuple[float, bool]:
-    """Length of an image's side on the surface, scene units, 0 for a surface without area; True if the surface bends.
+def _shape(target: BakeTarget, depsgraph) -> tuple[float, bool, BakeError | None]:
+    """Length of an image's side on the surface, scene units, 0 for a surface without area; True if the surface bends;
+    the reason why it can't be baked, if that is known.
 
     Where a mesh is large, the length is that of the box around its object, and it counts as bent.
     """
     obj, matrix = target.obj, target.obj.matrix_world
     if len(obj.data.polygons) > MAX_FACES:
-        return max(obj.dimensions), True
+        return max(obj.dimensions), True, None
     evaluated, node = obj.evaluated_get(depsgraph), target.node
     is_tiled = uses_tiles(node)
 
@@ -209,17 +217,19 @@ def _shape(target: BakeTarget, depsgraph) -> tuple[float, bool]:
     try:
         surface.check()
     except BakeError:
-        return 0.0, False  # the bake says why
+        return NO_SHAPE  # `problems` says why
     path, spread = min(surface.material.mean_free_path), spread_over_edges(surface)
 
-    def read() -> tuple[float, bool]:
+    def read() -> tuple[float, bool, BakeError | None]:
         try:
             polygons = read_polygons(evaluated, target.material.name, None, node.uv_map, is_tiled)
-            length = image_length([polygons]) if polygons.count else 0.0
+            if not polygons.count:
+                raise ReceiverError(*NO_FACES)
+            length = image_length([polygons])
             is_bent = 0 < length < math.inf and bends(polygons, path, spread)
-        except BakeError:
-            return 0.0, False  # the bake says why
-        return (length, is_bent) if math.isfinite(length) else (0.0, False)
+        except BakeError as error:
+            return 0.0, False, error
+        return (length, is_bent, None) if math.isfinite(length) else NO_SHAPE
 
     state = mesh_key(evaluated), node.uv_map, is_tiled, path, spread, *(tuple(row) for row in matrix)
     return scene_cache.get(("shape of image", obj, target.material.name), [obj], read, state=state)

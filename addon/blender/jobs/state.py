@@ -14,6 +14,7 @@ from ...core.bake.bounced import BouncedLight
 from ...core.bake.pace import Estimate, pace
 from ...core.bake.runner import CANCELLED, WRITTEN, Bake
 from ...core.bake.spread import Spread
+from ...core.errors import BakeError
 from ...core.messages import Level, Message
 from ...core.progress import Progress
 from ...core.target import Target
@@ -25,6 +26,7 @@ class Status(Enum):
     """Status of a target, in the words of the panels."""
 
     NEVER = "Never baked"
+    REFUSED = "Can't be baked"
     BAKED = "Baked"
     WARNED = "Baked, with warnings"
     FAILED = "Failed"
@@ -106,6 +108,7 @@ class State:
     run : the run in the window, or None.
     rows : status of each target of the scene; `out_of_date.stale` keeps them up to date.
     announced : how long bakes of targets will take; so does this.
+    refused : reasons why targets can't be baked that are known beforehand; so does this.
     factors : estimates once a scene was read, relative to those without its meshes, by target and kind of step.
     """
 
@@ -113,6 +116,7 @@ class State:
         self.run: Run | None = None
         self.rows: dict[Target, Row] = {}
         self.announced: dict[Target, Announced] = {}
+        self.refused: dict[Target, BakeError] = {}
         self.factors: dict[tuple[Target, str], float] = {}
         self._last: dict[Target, Row] = {}
 
@@ -167,6 +171,7 @@ class State:
         self._last.clear()
         self.rows.clear()
         self.announced.clear()
+        self.refused.clear()
         self.factors.clear()
 
 

@@ -14,6 +14,7 @@ from ...core.ldf.library import SIMULATING
 from ...core.time_left import duration
 from .output import former_output, has_plain, is_in_group, is_shown
 from .path import meters_per_unit
+from .tree import all_nodes
 
 # Units of length: shortest length shown in it, its length in meters, its name; the largest unit first.
 UNITS = ((1.0, 1.0, "m"), (1e-2, 1e-2, "cm"), (1e-4, 1e-3, "mm"), (0.0, 1e-6, "µm"))
@@ -41,8 +42,16 @@ def draw_node(node, layout) -> None:
         return
     row = layout.row()
     row.scale_y = 1.2
-    row.operator("beamspread.bake", text="Bake", icon="RENDER_STILL")
+    # Without a node among the selected objects, the operator bakes all.
+    row.operator("beamspread.bake", text="Bake" if _is_selected(node) else "Bake All", icon="RENDER_STILL")
     draw_properties(node, layout)
+
+
+def _is_selected(node) -> bool:
+    """True if a selected object has the node's material, or one with another Beamspread node."""
+    materials = (slot.material for obj in bpy.context.view_layer.objects.selected for slot in obj.material_slots)
+    trees = {material.node_tree for material in materials if material is not None}
+    return node.id_data in trees or any(other.id_data in trees for other in all_nodes())
 
 
 def draw_properties(node, layout) -> None:

@@ -147,19 +147,28 @@ def rendered_counts(view_layer) -> dict[str, int]:
     return {**shown, **dict.fromkeys(visible, 1)}
 
 
-def find_misplaced(objects: Iterable) -> list[Bake]:
+def find_misplaced(objects: Iterable, with_images: bool = False) -> list[Bake]:
     """Failed bakes of Beamspread nodes that no bake can use, with the remedy.
 
-    A node with an image on an object without a mesh is left out: it was baked elsewhere.
+    A node with an image on an object without a mesh is left out, unless `with_images`: it was baked elsewhere.
     """
-    shown = with_instanced(objects)
-    return [Bake(Target(obj.name, material.name), error=error) for obj in shown for material, error in _misplaced(obj)]
+    return [
+        Bake(Target(obj.name, material.name), error=error)
+        for obj in with_instanced(objects)
+        for material, error in _misplaced(obj, with_images)
+    ]
 
 
-def _misplaced(obj) -> Iterator[tuple]:
+def has_node(objects: Iterable) -> bool:
+    """True if a bake of the objects has a Beamspread node to bake, or one to complain about."""
+    return any(targets_of(obj) or any(_misplaced(obj, with_images=True)) for obj in with_instanced(objects))
+
+
+def _misplaced(obj, with_images: bool) -> Iterator[tuple]:
     for material in _all_materials(obj):
         node = find_node(material)
-        if node is not None and obj.type != "MESH" and node.image is None:
+        is_wanted = node is not None and (node.image is None or (with_images and material.library is None))
+        if is_wanted and obj.type != "MESH":
             yield material, BakeError(f"'{obj.name}' is not a mesh.", "Convert it to one (Object > Convert > Mesh).")
         if node is None and compat.uses_nodes(material):
             for _, groups in _nodes_in(material.node_tree):

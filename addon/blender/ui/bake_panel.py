@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 
-import bpy
-
 from ...core import native
-from ...core.errors import BakeError, message_of
 from ...core.messages import Messages
 from .. import compat
-from ..images.files import check_image
-from ..images.results import check_editable
 from ..jobs.announced import line_of, simulation_line, spread_lines
+from ..jobs.problems import problems_of
 from ..jobs.state import Row, Status, state
 from ..live import timer
-from ..node.find import find_misplaced, find_targets, rendered_counts, targets_of
+from ..node.find import find_targets, has_node, rendered_counts
 from ..popup import wrap
-from ..read.visibility import ObjectInstance, check_instance, with_instanced
+from ..read.visibility import with_instanced
 
 # Objects whose errors and rows a panel shows, and objects of collections that it checks; more slow the drawing down.
 MAX_OBJECTS, MAX_CHECKED = 8, 1000
@@ -27,6 +24,7 @@ MAX_ANNOUNCED = 100
 
 ICONS = {
     Status.NEVER: "RADIOBUT_OFF",
+    Status.REFUSED: "CANCEL",
     Status.BAKED: "CHECKMARK",
     Status.WARNED: "ERROR",
     Status.FAILED: "CANCEL",
@@ -34,34 +32,6 @@ ICONS = {
     Status.STALE: "FILE_REFRESH",
     Status.RUNNING: "RENDER_STILL",
 }
-
-
-def problems_of(obj, counts: dict[str, int]) -> Messages:
-    """Errors that a bake of the object would end with, as far as they are known without baking.
-
-    `counts` is the result of `rendered_counts`. An error of the object as a whole comes once for each of its targets.
-    """
-    misplaced = find_misplaced([obj] if obj.instance_type == "NONE" else [])
-    messages = Messages(message for bake in misplaced for message in bake.messages)
-    targets, view_layer = targets_of(obj), bpy.context.view_layer
-    if targets and obj.name not in view_layer.objects:  # an instance alone
-        targets = [target for target in targets if not target.was_baked_elsewhere()]
-    times = counts.get(obj.name, 0)
-    for target in targets:
-        checks = [
-            lambda: check_instance(obj.name, ObjectInstance(obj, None, times) if times else None, view_layer),
-            lambda target=target: target.node.surface().check(),
-        ]
-        if bpy.context.scene.beamspread.output == "LUMINANCE":
-            checks.append(lambda target=target: check_editable(target.material))
-        if target.image is not None:
-            checks.append(lambda target=target: check_image(target.image))
-        for check in checks:
-            try:
-                check()
-            except BakeError as error:
-                messages.add(message_of(error, str(target.name)))
-    return messages
 
 
 # Pixels of a panel beside its text, and of an average letter, at a user-interface scale of 1.
@@ -88,7 +58,7 @@ def draw_bake(layout, context, material_name: str = "") -> None:
         draw_progress(layout, context)
     else:
         shown = draw_problems(layout, context)
-        draw_buttons(layout)
+        draw_buttons(layout, context)
         draw_announced(layout, context)
         row = layout.row()
         row.use_property_split = False  # as wide as the buttons above
@@ -116,12 +86,16 @@ def draw_problems(layout, context) -> Messages:
     return shown
 
 
-def draw_buttons(layout) -> None:
+def draw_buttons(layout, context) -> None:
     column = layout.column(align=True)
     row = column.row(align=True)
     row.scale_y = 1.4
-    row.operator("beamspread.bake", text="Bake", icon="RENDER_STILL").objects = "SELECTED"
-    row.operator("beamspread.bake", text="Bake All").objects = "ALL"
+    if has_node(list(context.view_layer.objects.selected)[:MAX_CHECKED]):
+        row.operator("beamspread.bake", text="Bake", icon="RENDER_STILL").objects = "SELECTED"
+        row.operator("beamspread.bake", text="Bake All").objects = "ALL"
+    else:
+        row.operator("beamspread.bake", text="Bake All", icon="RENDER_STILL").objects = "ALL"
+        draw_lines(column, context, ["No selected object has a Beamspread node"], "INFO")
     stale = sum(row.is_stale for row in state.rows.values())
     if stale:
         column.operator(
@@ -158,9 +132,11 @@ def draw_results(layout, context, material_name: str, shown: Messages) -> None:
     # Rows that need attention come first.
     rows.sort(key=lambda row: row.status in (Status.NEVER, Status.BAKED))
     box = layout.box().column(align=True)
+    times = Counter(target.object_name for target in state.rows)
     for row in rows[:MAX_OBJECTS]:
         status = _status(row)
-        draw_lines(box, context, [f"{row.target.object_name}: {status.value}"], ICONS[status])
+        name = row.target.object_name if times[row.target.object_name] == 1 else str(row.target)
+        draw_lines(box, context, [f"{name}: {status.value}"], ICONS[status])
         draw_lines(box, context, [str(message) for message in row.messages if message not in shown], "DOT")
         shown.add(*row.messages)
     if len(rows) > MAX_OBJECTS:

@@ -65,6 +65,10 @@ class FlatMesh:
         return Place(0, 0, width, height) if self.tiling is None else self.tiling.places[island.tile]
 
 
+NO_FACES = "No face uses this material.", "Assign it to the faces that should be baked."
+"""Text and remedy of the error about a material without faces."""
+
+
 def finite_remedy(name: str) -> str:
     """Advice about an object with vertices at no finite position."""
     return f"Check its scale and modifiers, or run bpy.data.objects['{name}'].data.validate() in the Python Console."
@@ -84,7 +88,7 @@ def flatten(polygons: Polygons, mean_free_path: float = 0.0, name: str = "", spr
         without area.
     """
     if not polygons.count:
-        raise ReceiverError("No face uses this material.", "Assign it to the faces that should be baked.")
+        raise ReceiverError(*NO_FACES)
     if not polygons.is_finite.all():
         text = f"The positions of {polygons.listed(~polygons.is_finite)} are infinite or not numbers."
         raise ReceiverError(text, finite_remedy(name))

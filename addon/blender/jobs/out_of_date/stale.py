@@ -6,6 +6,7 @@ The scene's cache notes changes; a timer of the window scans the scene. In backg
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from dataclasses import replace
 
 import bpy
@@ -20,6 +21,7 @@ from ...images.facts import (
     Record,
     facts_of,
     file_at,
+    follow_name,
     is_sequence,
     note_bake,
     record_in,
@@ -29,11 +31,12 @@ from ...images.facts import (
 from ...images.files import file_of
 from ...images.udim import is_tiled, missing_files
 from ...images.undo import is_undone
-from ...node.find import find_bakeable, find_misplaced, image_of
+from ...node.find import find_bakeable, find_misplaced, image_of, rendered_counts
 from ...read.scene_cache import listeners
-from ...read.visibility import by_name
+from ...read.visibility import by_name, render_visible_names
 from ...registration import all_or_nothing, handlers
-from ..announced import announce
+from ..announced import MAX_TARGETS, announce
+from ..problems import problems_of
 from ..state import Row, Status, redraw, state
 from .fingerprint import IMAGE, QUALITY, Parts, fingerprints, image_part
 
@@ -67,9 +70,41 @@ def refresh(context) -> None:
     for target in recorded:
         pace.recall(target.object_name, records[target].ratios)
     now = fingerprints(context, recorded) if recorded else {}
-    state.rows = {target: _row(target, image, records[target], now.get(target)) for target, image in images.items()}
-    state.rows |= {row.target: row for row in _failures_of_others(context.scene, list(images))}
     state.announced = announce(context, list(images))
+    rows = {target: _row(target, image, records[target], now.get(target)) for target, image in images.items()}
+    problems = _problems(context, list(images))
+    rows = {target: _with_problems(row, problems.get(target, ())) for target, row in rows.items()}
+    rows |= {row.target: row for row in _failures_of_others(context.scene, list(images))}
+    state.rows = _refused(context) | rows
+
+
+def _problems(context, targets: list[Target]) -> dict[Target, list[Message]]:
+    """Errors that bakes of the targets would end with."""
+    if len(targets) > MAX_TARGETS:
+        return {}
+    objects, counts, problems = by_name(context.scene), rendered_counts(context.view_layer), {}
+    named = {str(target): target for target in targets}
+    for name in dict.fromkeys(target.object_name for target in targets):
+        for message in problems_of(objects[name], counts) if name in objects else ():
+            if message.subject in named:
+                problems.setdefault(named[message.subject], []).append(message)
+    return problems
+
+
+def _with_problems(row: Row, problems: Iterable[Message]) -> Row:
+    """The row of a target that the next bake refuses, with the reason. A bake that is up to date stays one."""
+    if not problems or row.status not in (Status.NEVER, Status.STALE):
+        return row
+    status = Status.REFUSED if row.status == Status.NEVER else row.status
+    return replace(row, status=status, messages=(*row.messages, *problems))
+
+
+def _refused(context) -> dict[Target, Row]:
+    """Rows of nodes that no bake can use, as that of a text."""
+    visible = render_visible_names(context.view_layer)
+    shown = (obj for obj in context.scene.objects if obj.name in visible)
+    misplaced = find_misplaced(shown, with_images=True)
+    return {bake.target: Row(bake.target, Status.REFUSED, tuple(bake.messages)) for bake in misplaced}
 
 
 def _failures_of_others(scene, targets: list[Target]) -> list[Row]:
@@ -115,7 +150,10 @@ def _record(target: Target, image, scene) -> Record | None:
     if is_sequence(image):
         path = file_at(image, scene.frame_current)
         return path and record_in(path)
-    return None if image is None else record_of(image, target)
+    record = None if image is None else record_of(image, target)
+    if record is not None:
+        follow_name(image, target)
+    return record
 
 
 def _row(target: Target, image, record: Record | None, now: Parts | None) -> Row:

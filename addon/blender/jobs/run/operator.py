@@ -143,9 +143,10 @@ class BEAMSPREAD_OT_bake(bpy.types.Operator):
             return [row.target for row in state.rows.values() if row.is_stale], []
         if self.objects == "SELECTED":
             chosen = context.selected_objects
-            targets, misplaced = find_bakeable(context.view_layer, chosen), find_misplaced(chosen)
+            targets, misplaced = find_bakeable(context.view_layer, chosen), find_misplaced(chosen, with_images=True)
             if targets or misplaced:
                 return targets, misplaced
+            self.report({"INFO"}, "No selected object has a Beamspread node: all that have one are baked")
         return find_bakeable(context.view_layer), find_misplaced(context.scene.objects)
 
     def _show_progress(self, context) -> None:
