@@ -1,29 +1,20 @@
 """Nodes of light that Cycles finds: their filter, directions and noise."""
 
-import importlib
 import math
-from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 import scenes
-from beamspread.blender.cycles import process
+from beamspread.blender.cycles import child_filter, process
 from beamspread.blender.cycles.scene_copy import SceneCopy
 from beamspread.core.bake.smoothing import SPLINE_VARIANCE
 from beamspread.core.scene.lights import DIRECTIONS, STRATA, WEIGHTS
 from mathutils import Euler, Matrix
 
 
-@pytest.fixture
-def child_filter(monkeypatch):
-    """The child's module."""
-    monkeypatch.syspath_prepend(Path(process.__file__).parent)
-    return importlib.import_module("child_filter")
-
-
 @pytest.mark.parametrize("variance", [1e-9, 1 / 3, 2.0])
-def test_the_filter_knows_its_error(child_filter, variance):
+def test_the_filter_knows_its_error(variance):
     """Two halves with noise of 30 %, and the result's noise against the truth, after a Gaussian of the variance: from
     three quarters of it to twice as much, and 7 % at most. Means stay within their noise, and dark nodes stay dark."""
     rng = np.random.default_rng(4)
@@ -46,7 +37,7 @@ def test_the_filter_knows_its_error(child_filter, variance):
     assert np.sqrt((error**2).mean()) < 0.07
 
 
-def test_nodes_that_are_dark_by_chance_are_no_insides(child_filter):
+def test_nodes_that_are_dark_by_chance_are_no_insides():
     rng = np.random.default_rng(1)
     rare = np.float32(rng.random((32, 40, 40, 1)) < 0.01) * np.ones(3, np.float32)
     assert not child_filter.insides(rare, child_filter.Grid()).any()

@@ -119,3 +119,10 @@ def test_blender_finds_it_a_valid_extension(path):
     done = subprocess.run([sys.executable, "-B", BLENDER_EXT, "validate", path], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "error" not in (done.stdout + done.stderr).lower()
+
+
+def test_no_module_of_the_package_adds_to_the_search_path(files):
+    """Extensions share one Python: a folder in its search path hides other add-ons' modules."""
+    adds = re.compile(r"sys\.path\.(insert|append|extend)|sys\.path\[[^\]]*\] *=(?! *\[folder for folder in sys\.path)")
+    found = [name for name, text in files.items() if name.endswith(".py") and adds.search(text.decode())]
+    assert found == []

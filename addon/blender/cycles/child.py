@@ -7,6 +7,7 @@ by name, to the file that the request names. Opening a copy resets all data, so 
 The process ends at the first error, without requests for some time, and when its parent ends in any way.
 """
 
+import importlib
 import json
 import os
 import queue
@@ -18,18 +19,31 @@ import tempfile
 import threading
 import time
 import traceback
+import types
 from contextlib import suppress
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-sys.path.append(str(Path(__file__).resolve().parents[1]))  # for compat
-import child_colors
-import child_fields
-import child_world
-import compat
+CYCLES = Path(__file__).resolve().parent
+
+
+def package(name: str, folder: Path) -> None:
+    """Have relative imports find the files of a folder by this name, without the folder's own `__init__`."""
+    module = types.ModuleType(name)
+    module.__path__ = [str(folder)]
+    sys.modules[name] = module
+
+
+# The add-on is not loaded in this process: its parts read more than the process needs, and register classes.
+package("beamspread_child", CYCLES.parent)
+package("beamspread_child.cycles", CYCLES)
+child_colors, child_fields, child_world = (
+    importlib.import_module(f"beamspread_child.cycles.{name}")
+    for name in ("child_colors", "child_fields", "child_world")
+)
+compat = importlib.import_module("beamspread_child.compat")
 
 # Exit codes after an error, and after a time without requests.
 FAILED, IDLE = 1, 4

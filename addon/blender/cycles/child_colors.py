@@ -5,9 +5,10 @@ Part of the child process (child.py).
 
 import bpy
 import numpy as np
-from child_fields import Baker, linked_source, without_limits
-from child_ghost import finish
 from mathutils import Matrix
+
+from .child_fields import Baker, linked_source, without_limits
+from .child_ghost import finish
 
 
 def colors(request, scene, _progress) -> dict:

@@ -6,10 +6,11 @@ Part of the child process (child.py).
 import math
 
 import bpy
-import compat
 import numpy as np
-from child_filter import Cloud, Grid, filter_map, insides, smooth
-from child_ghost import add_ghost, draw_anew
+
+from .. import compat
+from .child_filter import Cloud, Grid, filter_map, insides, smooth
+from .child_ghost import add_ghost, draw_anew
 
 # Samples of each half, node and stratum in the first round, which shows how much there is to find. More take longer
 # where there is little; the first of a round lies in the middle of its node, so that a single one shows no difference.

@@ -8,8 +8,9 @@ so one bake gathers all. Rays other than those of volumes don't see the mirrors,
 """
 
 import bpy
-import compat
 import numpy as np
+
+from .. import compat
 
 STRATUM, AXES = "stratum", ("x_axis", "y_axis", "z_axis")
 

@@ -8,8 +8,9 @@ import tempfile
 from pathlib import Path
 
 import bpy
-import compat
 import numpy as np
+
+from .. import compat
 
 # Outputs of Light Path nodes for light on a receiver. Cycles sets no flag when it samples the world, and those of a
 # diffuse ray else.

@@ -11,20 +11,17 @@ import sys
 import time
 from pathlib import Path
 
-import beamspread
 import bpy
 import numpy as np
+from beamspread.blender.cycles import child_fields
+from beamspread.blender.cycles.child_filter import Grid, filter_map, insides
+from beamspread.blender.cycles.child_ghost import add_ghost
 from beamspread.core.bake.smoothing import SPLINE_VARIANCE
 from beamspread.core.native import native
 from beamspread.core.scene.lights import STRATA, WEIGHTS
 
-sys.path.insert(0, str(Path(beamspread.__file__).with_name("blender")))
-sys.path.insert(0, str(Path(beamspread.__file__).with_name("blender") / "cycles"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blender"))
-import child_fields
 import scenes
-from child_filter import Grid, filter_map, insides
-from child_ghost import add_ghost
 
 NODES, LOOKS, TEXELS = 64, 3, 256
 CHART = {
