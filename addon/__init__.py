@@ -22,6 +22,8 @@ bl_info = {
     "blender": (3, 4, 0),
     "location": "Properties > Render > Beamspread; Shader Editor > Add > Shader > Beamspread",
     "category": "Render",
+    "doc_url": "https://extensions.blender.org/add-ons/beamspread/",
+    "tracker_url": "https://extensions.blender.org/add-ons/beamspread/reviews/",
 }
 
 if problem:

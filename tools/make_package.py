@@ -4,7 +4,8 @@
 
 takes the modules for further Pythons and the licences of the libraries in them from their folders, and
 makes OUTPUT_FOLDER/beamspread-VERSION-PLATFORM.zip with one folder, `beamspread`: Blender 3.4 can't install files at
-the archive's root. The same files give the same bytes. CMake's target `package` calls this.
+the archive's root. Pages of docs/ go in as HTML (tools/make_help.py). The same files give the same bytes. CMake's
+target `package` calls this.
 """
 
 import platform
@@ -13,6 +14,7 @@ import sys
 import zipfile
 from pathlib import Path
 
+from make_help import help_files
 from version import versions
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -21,8 +23,8 @@ FOLDER = "beamspread"
 TIME = (1980, 1, 1, 0, 0, 0)
 MOST_BYTES = 40_000_000
 # Type stubs are for editors: the wheel has them.
-LEFT_OUT = re.compile(r"(^|/)__pycache__/|\.pyc$|\.pyi$|^py\.typed$|/\.|^\.|^CMakeFiles/")
-SUFFIXES = {".py", ".exr", ".csv", ".toml", ".so", ".pyd", ".md"}
+LEFT_OUT = re.compile(r"(^|/)__pycache__/|\.pyc$|\.pyi$|^py\.typed$|/\.|^\.|^CMakeFiles/|^docs/")
+SUFFIXES = {".py", ".exr", ".csv", ".toml", ".so", ".pyd"}
 MODULE = re.compile(r"^_native\.(?P<abi>cpython-3\d+|cp3\d+|abi3)[^/]*\.(so|pyd)$")
 
 
@@ -60,7 +62,8 @@ def content(staged: Path, further_modules: Path, licences_folder: Path) -> dict[
         files[name] = path.read_bytes()
     if not any(MODULE.match(name) for name in files):
         sys.exit(f"{staged} has no native module: build first")
-    return {**files, **licences(licences_folder)}
+    pages = {f"docs/{name}": page for name, page in help_files().items()}
+    return {**files, **pages, **licences(licences_folder)}
 
 
 def write(path: Path, files: dict[str, bytes]) -> None:

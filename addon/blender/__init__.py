@@ -26,7 +26,7 @@ from .live import timer
 from .node import buttons, node
 from .read import scene_cache
 from .registration import all_or_nothing
-from .ui import panels
+from .ui import panels, sidebar
 
 PARTS = (
     preferences,
@@ -48,6 +48,7 @@ PARTS = (
     operator,
     timer,
     panels,
+    sidebar,
 )
 
 

@@ -9,10 +9,11 @@ import functools
 from pathlib import Path
 
 import bpy
-from bpy.props import IntProperty, StringProperty
+from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
 from ..core import native
 from ..core.ldf import library
+from ..core.material import presets
 from . import compat
 from .popup import wrap
 from .registration import all_or_nothing, classes
@@ -22,6 +23,34 @@ PACKAGE = __package__.rpartition(".")[0]
 
 DOCS = [folder / "docs" for folder in Path(__file__).resolve().parents[1:3]]
 """Possible folders of the documentation: in the package, or beside it in the sources."""
+
+PAGE_ENDINGS = (".html", ".md")
+"""Endings of a page: packages have HTML, sources Markdown."""
+
+CUSTOM_PRESET = "CUSTOM"
+
+NEW_BASE_COLOR, NEW_PATH_M, NEW_IOR = (0.8, 0.8, 0.8), 0.01, 1.4
+"""Values of new nodes, unless the preferences have others: the color of Blender's own shaders, meters, index of
+refraction. The node's properties have other defaults, those of older files, which don't hold a value."""
+
+MANUAL = (
+    ("bpy.types.beamspreadnode.image*", "guide", "4-the-images"),
+    ("bpy.types.beamspreadnode*", "guide", "1-the-node"),
+    ("bpy.types.beamspreadsettings.image_*", "guide", "4-the-images"),
+    ("bpy.types.beamspreadsettings.resolution*", "guide", "4-the-images"),
+    ("bpy.types.beamspreadsettings.texel_density*", "guide", "4-the-images"),
+    ("bpy.types.beamspreadsettings.format*", "engines", "formats"),
+    ("bpy.types.beamspreadsettings.use_exposure*", "engines", "formats"),
+    ("bpy.types.beamspreadsettings.output*", "python-and-batch", "passes"),
+    ("bpy.types.beamspreadsettings*", "guide", "3-the-bake"),
+    ("bpy.types.beamspreadpreferences*", "python-and-batch", "libraries"),
+    ("bpy.ops.beamspread.make_plain*", "engines", "by-gltf"),
+    ("bpy.ops.beamspread.from_principled*", "guide", "from-principled"),
+    ("bpy.ops.beamspread.show_*", "guide", "5-animation"),
+    ("bpy.ops.beamspread*", "guide", "3-the-bake"),
+)
+"""Names of buttons and properties in Python, small letters and wildcards, with the page and the heading for them; the
+first that fits counts."""
 
 
 def preferences(context=None):
@@ -45,7 +74,14 @@ def memory_limit() -> int:
 @functools.cache
 def documentation(name: str) -> str:
     """URL of a page of the documentation; empty if it is not on this machine."""
-    return next((page.as_uri() for folder in DOCS if (page := folder / f"{name}.md").is_file()), "")
+    pages = (folder / f"{name}{ending}" for folder in DOCS for ending in PAGE_ENDINGS)
+    return next((page.as_uri() for page in pages if page.is_file()), "")
+
+
+def manual_map() -> tuple[str, tuple[tuple[str, str], ...]]:
+    """Where F1 and *Online Manual* of a button lead: start of all URLs, and the rest of each by the button's name."""
+    found = ((pattern, documentation(page), heading) for pattern, page, heading in MANUAL)
+    return "", tuple((pattern, f"{url}#{heading}") for pattern, url, heading in found if url)
 
 
 def draw_help(layout, name: str) -> None:
@@ -56,6 +92,16 @@ def draw_help(layout, name: str) -> None:
 
 def _use_cache_folder(chosen, _context) -> None:
     library.choose_cache_folder(bpy.path.abspath(chosen.cache_folder) if chosen.cache_folder else "")
+
+
+def preset_items() -> list[tuple]:
+    """Measured materials as items of an enum."""
+    # Files hold the number, which is the row in the table: new materials go to its end.
+    items = [
+        (name, name.replace("_", " ").title(), material.source, number)
+        for number, (name, material) in enumerate(presets().items(), start=1)
+    ]
+    return [(CUSTOM_PRESET, "Custom", "Values set by hand", 0), *sorted(items)]
 
 
 class BeamspreadPreferences(bpy.types.AddonPreferences):
@@ -87,6 +133,33 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
         step=512,
     )
 
+    new_preset: EnumProperty(
+        name="Preset",
+        description="Measured material of new nodes. Custom: the values below",
+        items=preset_items(),
+        default=CUSTOM_PRESET,
+    )
+    new_base_color: FloatVectorProperty(
+        name="Base Color",
+        description="Color of new nodes",
+        subtype="COLOR",
+        size=3,
+        default=NEW_BASE_COLOR,
+        min=0.0,
+        max=1.0,
+    )
+    new_path: FloatProperty(
+        name="Mean Free Path (mm)",
+        description="Mean distance that light travels between two scattering events in new nodes, in millimeters",
+        default=NEW_PATH_M * 1000,
+        min=1e-4,
+        soft_max=1000.0,
+        precision=3,
+    )
+    new_ior: FloatProperty(
+        name="IOR", description="Index of refraction of new nodes", default=NEW_IOR, min=1.0, soft_max=2.0
+    )
+
     def draw(self, context) -> None:
         layout = self.layout
         if native.problem:
@@ -96,6 +169,12 @@ class BeamspreadPreferences(bpy.types.AddonPreferences):
                 column.label(text=line, icon="BLANK1" if number else "ERROR")
         layout.use_property_split = True
         layout.use_property_decorate = False
+        column = layout.column(heading="New Nodes")
+        column.prop(self, "new_preset")
+        if self.new_preset == CUSTOM_PRESET:
+            column.prop(self, "new_base_color")
+            column.prop(self, "new_path")
+            column.prop(self, "new_ior")
         layout.prop(self, "threads")
         layout.prop(self, "memory_limit", text="Memory Limit (MB)")
         layout.prop(self, "cache_folder")
@@ -133,5 +212,6 @@ def _choose_folder() -> None:
 register, unregister = all_or_nothing(
     (lambda: None, lambda: library.choose_cache_folder("")),
     *classes(BeamspreadPreferences, BEAMSPREAD_OT_clear_cache),
+    (lambda: bpy.utils.register_manual_map(manual_map), lambda: bpy.utils.unregister_manual_map(manual_map)),
     (_choose_folder, lambda: None),
 )

@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import zipfile
+from html.parser import HTMLParser
 from pathlib import Path
 
 import beamspread
@@ -65,8 +66,11 @@ def test_it_holds_the_staged_files_and_licences_and_nothing_else(files):
     names = {name.removeprefix("beamspread/") for name in files}
     staged = {path.relative_to(STAGED).as_posix() for path in STAGED.rglob("*") if path.is_file()}
     staged = {name for name in staged if "__pycache__" not in name and not name.endswith((".pyi", "py.typed"))}
+    staged = {name for name in staged if not name.startswith("docs/")}
+    pages = {name for name in names if name.startswith("docs/")}
     licences = {name for name in names if name.startswith("LICENSES/")}
-    assert names == staged | licences | {"LICENSE", OTHER_MODULE}
+    assert names == staged | licences | pages | {"LICENSE", OTHER_MODULE}
+    assert {Path(name).suffix for name in pages} == {".html", ".webp"}
     assert licences == {f"LICENSES/{name}.txt" for name in LIBRARIES}
     for name in ("__init__.py", "blender_manifest.toml", "batch.py", "data/materials.csv", "VERSION"):
         assert f"beamspread/{name}" in files
@@ -82,7 +86,45 @@ def test_help_buttons_find_their_pages(files):
         for page in re.findall(r'(?:draw_help\(self\.layout, |documentation\()"([\w-]+)"', text)
     }
     assert pages == {"guide", "performance", "python-and-batch"}
-    assert {f"beamspread/docs/{page}.md" for page in pages} <= set(files)
+    assert {f"beamspread/docs/{page}.html" for page in pages} <= set(files)
+
+
+class Page(HTMLParser):
+    """Anchors of a page, and the targets of its links and pictures."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.anchors, self.targets = set(), set()
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        known = dict(attributes)
+        self.anchors |= {known.get("id"), known.get("name")}
+        self.targets |= {known[name] for name in ("href", "src") if name in known}
+
+
+def test_help_is_whole_its_links_and_pictures_are_in_it(files):
+    texts = {name.removeprefix("beamspread/docs/"): text for name, text in files.items() if "/docs/" in name}
+    pages = {name: Page(text.decode()) for name, text in texts.items() if name.endswith(".html")}
+    assert len(pages) == 7
+    local = {(name, target) for name, page in pages.items() for target in page.targets if "://" not in target}
+    assert len(local) > 60
+    for name, target in sorted(local):
+        path, _, anchor = target.partition("#")
+        assert (path or name) in texts, (name, target)
+        assert not anchor or anchor in pages[path or name].anchors, (name, target)
+    assert sum(name.endswith(".webp") for name in texts) > 15
+    assert all(text[8:12] == b"WEBP" for name, text in texts.items() if name.endswith(".webp"))
+    # Tables, and code in them with a vertical bar, as GitHub shows them.
+    assert "<td><code>--format EXR|EXR_HALF|PNG|PNG16|HDR</code></td>" in texts["python-and-batch.html"].decode()
+
+
+def test_f1_leads_to_headings_of_the_help(files):
+    source = ast.parse(files["beamspread/blender/preferences.py"])
+    assigned = [node for node in source.body if isinstance(node, ast.Assign)]
+    (manual,) = [node.value for node in assigned if getattr(node.targets[0], "id", "") == "MANUAL"]
+    for pattern, page, heading in ast.literal_eval(manual):
+        assert heading in Page(files[f"beamspread/docs/{page}.html"].decode()).anchors, pattern
 
 
 def test_blender_reads_its_bl_info_without_running_it(files):

@@ -12,13 +12,10 @@ from bpy.props import BoolProperty
 
 from ...core.errors import MaterialError
 from ...core.material import preset_roughness, presets
+from ..preferences import CUSTOM_PRESET
 from .tree import ROUGHNESS
 
 BASE_COLOR_MODE, ALBEDO_MODE = "BASE_COLOR", "ALBEDO"
-CUSTOM_PRESET = "CUSTOM"
-
-NEW_BASE_COLOR = (0.8, 0.8, 0.8)
-"""Base color of new nodes, that of Blender's own shaders. The property's own default is that of older files."""
 
 SAME = 1e-5
 """Relative difference up to which a value is that of its preset: rounding of 32-bit floats, and of scene units."""
@@ -54,10 +51,10 @@ def is_filled(node) -> bool:
     return node.as_pointer() in _nodes_being_filled
 
 
-def start(node) -> None:
-    """Give a new node its color."""
+def start(node, color) -> None:
+    """Give a new node its base color."""
     with filling(node):
-        node.color_mode, node.base_color = BASE_COLOR_MODE, NEW_BASE_COLOR
+        node.color_mode, node.base_color = BASE_COLOR_MODE, color
     node.has_own_base_color = node.has_new_color = True
 
 

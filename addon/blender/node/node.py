@@ -7,9 +7,9 @@ from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, PointerP
 
 from ...core.bake.surface import MIRROR, OPEN, Surface
 from ...core.errors import MaterialError
-from ...core.material import Material, presets
+from ...core.material import Material
 from ...core.messages import Message
-from .. import compat
+from .. import compat, preferences
 from ..read.nodes import InputSocket
 from ..registration import all_or_nothing, handlers
 from . import plain
@@ -19,6 +19,7 @@ from .color import (
     CUSTOM_PRESET,
     ColorProperties,
     fill_preset,
+    filling,
     is_filled,
     keep_name_of_preset,
     note_medium,
@@ -45,20 +46,8 @@ from .tree import (
     upgrade,
 )
 
-# Index of refraction of new nodes. The property's own default is that of older files, which don't hold a value.
-NEW_IOR = 1.4
-
 NEW_ROUGHNESS = 0.4
 """Roughness of the coat of new nodes. Smaller: sharper reflections, as of wet surfaces."""
-
-
-def _preset_items() -> list[tuple]:
-    # Files hold the number, which is the row in the table: new materials go to its end.
-    items = [
-        (name, name.replace("_", " ").title(), material.source, number)
-        for number, (name, material) in enumerate(presets().items(), start=1)
-    ]
-    return [(CUSTOM_PRESET, "Custom", "Values set by hand", 0), *sorted(items)]
 
 
 def _apply_preset(node, context) -> None:
@@ -157,7 +146,7 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
     bl_width_default = 240
 
     preset: EnumProperty(
-        name="Preset", description="Fill in a measured material", items=_preset_items(), update=_apply_preset
+        name="Preset", description="Fill in a measured material", items=preferences.preset_items(), update=_apply_preset
     )
     color_mode: EnumProperty(
         name="Color",
@@ -272,9 +261,20 @@ class BeamspreadNode(ColorProperties, PathProperties, bpy.types.ShaderNodeCustom
         self.width = self.bl_width_default
         place(self)  # the Add menu moves the node to the mouse afterwards
         compat.give_new_node_its_tree(self, make_inner_tree())
-        start(self)
-        self.ior = NEW_IOR
+        chosen = preferences.preferences()
+        start(self, chosen.new_base_color if chosen else preferences.NEW_BASE_COLOR)
+        self.ior = chosen.new_ior if chosen else preferences.NEW_IOR
+        if chosen:
+            self._fill_as_preferred(chosen)
         self.inputs[ROUGHNESS].default_value = NEW_ROUGHNESS
+
+    def _fill_as_preferred(self, chosen) -> None:
+        """Take the path or the preset that the user's preferences have for new nodes."""
+        if chosen.is_property_set("new_path"):
+            with filling(self):
+                self.mean_free_path = (chosen.new_path / 1000 / meters_per_unit(),) * 3
+        if chosen.new_preset != CUSTOM_PRESET:
+            self.preset = chosen.new_preset
 
     def free(self) -> None:
         # Removing the tree here crashes on undo; without its fake user it goes when the file is saved.
